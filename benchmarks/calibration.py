@@ -80,9 +80,9 @@ def drive_campaign(axis, case, seed, compared):
     from swashplate import Campaign, Drive
     from swashplate.campaign import rig
     from swashplate.identification.assessment import assess
-    from swashplate.identification.fitting import fit
+    from swashplate.identification.drive_model import true_value
+    from swashplate.identification.fitting import drawn, fit
     from swashplate.identification.setup import load_setup
-    from swashplate.identification.staging import drawn, true_value
     from swashplate.identification.validation import predict
     from swashplate.identification.verdict import verdict
 

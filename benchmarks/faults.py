@@ -128,8 +128,8 @@ def simulated_campaign(fault, axis, seed):
     """Logs of a campaign with a fault, and the machine that was simulated."""
     from swashplate import Drive
     from swashplate.campaign import rig
+    from swashplate.identification.fitting import drawn
     from swashplate.identification.setup import load_setup
-    from swashplate.identification.staging import drawn
     from swashplate.maneuvers import source_tests
 
     nominal = Drive.preset(axis)
@@ -227,10 +227,10 @@ def campaign(_, item):
     from swashplate.errors import SwashplateError
     from swashplate.identification.assessment import assess
     from swashplate.identification.data_checks import check_runs
+    from swashplate.identification.drive_model import true_value
     from swashplate.identification.fitting import fit, smooth
     from swashplate.identification.lack_of_fit import lack_of_fit
     from swashplate.identification.setup import load_setup
-    from swashplate.identification.staging import true_value
     from swashplate.identification.validation import predict
     from swashplate.identification.verdict import verdict
 

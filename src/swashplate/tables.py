@@ -30,8 +30,6 @@ class Form(NamedTuple):
     what: str
     """In words, with an article: ``"a table"``."""
     endings: tuple[str, ...]
-    also: tuple[str, ...] = ()
-    """Endings that are taken without being offered."""
 
 
 class Cell(NamedTuple):
@@ -280,9 +278,9 @@ def count(number: int, what: str, several: str = "") -> str:
 # --- files ----------------------------------------------------------------------------------------
 
 
-TABLE = Form("a table", (".csv", ".parquet"), (".pq",))
+TABLE = Form("a table", (".csv", ".parquet"))
 FIGURE = Form("a figure", (".png", ".svg", ".pdf"))
-PAGE = Form("a page", (".html",), (".htm",))
+PAGE = Form("a page", (".html",))
 
 
 def ending(path: str | Path, form: Form) -> str:
@@ -294,7 +292,7 @@ def ending(path: str | Path, form: Form) -> str:
         If the form has no such ending.
     """
     suffix = Path(path).suffix
-    if suffix.lower() not in (*form.endings, *form.also):
+    if suffix.lower() not in form.endings:
         known = " or ".join(filter(None, (", ".join(form.endings[:-1]), form.endings[-1])))
         raise FileError(f"{path} ends in '{suffix}'; {form.what} is written as {known}.")
     return suffix.lower()

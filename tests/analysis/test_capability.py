@@ -104,18 +104,6 @@ def test_accelerations_are_those_of_a_simulation(hoist: Drive, refined: dict[str
     assert set(curve.by) == {"orifice"}
 
 
-def test_curves_of_refined_drives_are_those_of_their_mean_motion(hoist: Drive, found) -> None:
-    """What leaks under the load, 0.03 rad/s, shifts them; what swings about the mean does not."""
-    swinging = {"cam_ripple": 0.02, "swash_damping": 0.02, "solenoid_hysteresis": 0.005}
-    plain = acceleration_curve(hoist, 6.0)
-    for line in ({}, {"line_stiffness": 1e6, "load_inertia": 5e3}):
-        drive = hoist.replace(**LEAKING, **swinging, **line)
-        curve = acceleration_curve(drive, 6.0)
-        np.testing.assert_allclose(curve.speed, plain.speed - 0.03, rtol=0.0, atol=1e-12)
-        np.testing.assert_array_equal(curve.acceleration, plain.acceleration)
-        assert speed_limits(drive)[1] == pytest.approx(found["hoist"].plus.speed_limit - 0.03)
-
-
 def test_what_sets_the_acceleration(hoist: Drive) -> None:
     wide = hoist.replace(Z16=np.inf)
     assert envelope(wide.replace(Z14=1e-4)).plus.accelerated_by == "spool stop"

@@ -160,28 +160,3 @@ def test_table(hoist: Drive, tmp_path) -> None:
     table = pl.read_csv(tmp_path / "shares.csv")
     assert table["limit"][0] == "swash stop"
     assert table["error"][0] == pytest.approx(found.shares[0].error)
-
-
-def test_a_limit_eased_is_the_drive_with_its_lever_moved() -> None:
-    """Against the same wanted speed; by hand on the parameters."""
-    hoist, command = Drive.preset("hoist"), maneuvers.step(9.0).sample()
-    found = limit_shares(hoist, command)
-    shares = {each.limit: each for each in found.shares}
-    for limit, eased in (
-        ("orifice", hoist.scale(Z16=1.5)),
-        ("delay", hoist.scale(tau=0.5)),
-        ("current rate", hoist.scale(lim1=1.5, lim2=1.5)),
-    ):
-        by_hand = limit_shares(eased, command, wanted=found.wanted).error
-        assert shares[limit].eased_error == by_hand, limit
-    assert shares["orifice"].error < shares["orifice"].eased_error < found.error
-    assert shares["swash stop"].eased_by == {}
-    assert shares["swash stop"].eased_error is None
-
-
-def test_a_dead_zone_beyond_the_jump_is_eased_as_well() -> None:
-    drive = Drive.preset("hoist").replace(Z17=0.30)  # the jump down is 0.2947 A, up 0.2747 A
-    found = limit_shares(drive, maneuvers.sine(2.0, 0.2).sample())
-    (share,) = (each for each in found.shares if each.limit == "dead zone")
-    assert share.eased_by == pytest.approx({"dead_zone": 0.0, "Z17": 0.27473 / 0.30})
-    assert share.eased_error == pytest.approx(share.error, rel=1e-12)

@@ -57,14 +57,11 @@ def test_a_covariance_made_by_hand_becomes_that_of_the_drives(hoist):
     np.testing.assert_allclose(np.cov(vectors), covariance, rtol=0.13)
     assert (columns["Z16_minus"] == numbers["Z16_minus"]).all()
     assert (drawn.redrawn, drawn.fixed, drawn.sentences()) == (0, (), ())
-
-
-def test_a_seed_gives_the_same_drives(hoist):
-    unknowns = Unknowns((Unknown("Z10", 12.396, 6.0, 24.0),))
-    given = [assessment(hoist, unknowns, np.array([[1e-4]]))]
-    first, again, other = (drives(given, 5, seed=seed) for seed in (3, 3, 4))
-    np.testing.assert_array_equal(first.columns["Z10"], again.columns["Z10"])
-    assert (first.columns["Z10"] != other.columns["Z10"]).all()
+    again, other = (
+        drives([assessment(hoist, unknowns, covariance)], 5, seed=seed) for seed in (2, 3)
+    )
+    np.testing.assert_array_equal(again.columns["Z10"], columns["Z10"][:5])
+    assert (other.columns["Z10"] != columns["Z10"][:5]).all()
 
 
 def test_draws_outside_the_bounds_are_drawn_again(hoist):
@@ -122,7 +119,7 @@ def test_refusals(hoist):
     drawn = pumps(hoist, 0.1, 2)
     with pytest.raises(InputError, match="level 1 of a band"):
         bands(drawn, VOLTAGE, level=1.0)
-    with pytest.raises(InputError, match="takes too much memory: draw 1 drives at most"):
+    with pytest.raises(InputError, match="take too much memory: take 1 drives at most"):
         bands(drawn, np.zeros(100_000_000))
 
 

@@ -15,7 +15,6 @@ from swashplate.campaign import (
     speed_from_angle,
     speed_of,
 )
-from swashplate.errors import InputError
 
 H = 1.0 / 512.0
 
@@ -71,10 +70,3 @@ def test_counts_are_joined_before_they_are_filtered() -> None:
     expected = -0.3 * 2.0 * np.pi / 2526.3 / H
     np.testing.assert_allclose(found.speed[200:380], expected, rtol=0.02)
     assert found.delay == pytest.approx(0.02122, abs=1e-5)
-
-
-def test_methods_that_cannot_be() -> None:
-    with pytest.raises(InputError, match="no method 'kalman'; there are exact and difference"):
-        speed_of(position(np.arange(9.0), np.zeros(9)), "kalman")
-    with pytest.raises(InputError, match="column 'x' is a other"):
-        speed_of(position(np.arange(9.0), np.zeros(9), kind="other"))

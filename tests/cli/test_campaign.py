@@ -159,15 +159,6 @@ Words = Callable[..., str]
 SHORT = ("--maneuver", "step:4,start=0.5,stop=1,length=2")
 
 
-def test_a_virtual_campaign_can_be_checked(done: Words, tmp_path: Path) -> None:
-    said = done("rig", "hoist", "--out", "virtual", *SHORT)
-    assert "hoist_step_4_V.csv" in said.replace("+", "")
-    tests = Campaign.from_toml(tmp_path / "virtual" / "campaign.toml")
-    assert tests.virtual
-    assert next(iter(tests)).maneuver == "step +4 V"
-    assert "virtual" in done("campaign", "check", "virtual/campaign.toml")
-
-
 def test_refinements_and_backlash_change_the_logs(done: Words, tmp_path: Path) -> None:
     done("rig", "slew", "--out", "a", "--severity", "clean", *SHORT)
     done("rig", "slew", "--out", "b", "--severity", "clean", "--backlash-deg", "0.1", *SHORT)

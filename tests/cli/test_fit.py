@@ -163,10 +163,13 @@ def test_a_result_that_is_of_no_use_ends_with_1(
 ) -> None:
     narrow = SETUP.replace("relative = [0.5, 2.0]", "relative = [0.99, 1.01]")
     (tmp_path / "narrow.toml").write_text(narrow, "utf-8")
-    result = run("fit", "virtual/campaign.toml", "--setup", "narrow.toml", "--no-report")
+    words = ("--setup", "narrow.toml", "--no-report", "--evaluations", "900")
+    result = run("fit", "virtual/campaign.toml", *words)
     assert result.exit_code == 1
     assert result.stderr.startswith("Not usable: ")
     assert "bound" in result.stderr
+    said = " ".join(result.stdout.split())
+    assert "write J = { relative = [0.99, 2.02] } under [stages.free] of the stage 'card'" in said
     # whoever takes the drive along hears of it, and so do those who get the files
     said = run("export", "fitted", "--c", "folder").stdout
     assert "! The fit of this drive says: Not usable: " in said

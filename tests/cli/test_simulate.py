@@ -100,14 +100,6 @@ def test_a_load_that_nothing_feels_is_said(done):
     assert "! load_torque changes nothing without motor_leakage or motor_constant" in text
 
 
-def test_changes_are_said(done):
-    text = done("simulate", "hoist", "step:9", "--set", "Z16=0.18mm", "--scale", "Z10=1.5")
-    said = "Z16 (opening at which the orifice limits the flow): 0.00011634/0.00015126 -> "
-    assert f"{said}0.00018/0.00018 m" in " ".join(text.split())
-    assert "Z10 (swash plate angle to shaft speed): 12.396 -> 18.594 1/s" in " ".join(text.split())
-    assert "Z17" not in text
-
-
 # --- records --------------------------------------------------------------------------------------
 
 
@@ -144,14 +136,6 @@ def test_a_record_is_simulated(done, tmp_path, name, write):
     written = simulated(done, name, "--interpolation", "linear")
     expected = Drive.preset("hoist").simulate(VOLTAGE)
     np.testing.assert_allclose(written["shaft_speed"], expected.shaft_speed, atol=1e-12)
-
-
-def test_interpolation(done, tmp_path):
-    (tmp_path / "log.csv").write_text("time,voltage\n0,0\n1,8\n2,8\n")
-    held = simulated(done, "log.csv", "--interpolation", "previous", "--rate", "100")
-    line = simulated(done, "log.csv", "--interpolation", "linear", "--rate", "100")
-    assert held["voltage"][50] == 0.0
-    assert line["voltage"][50] == 4.0
 
 
 @pytest.mark.parametrize(
@@ -204,15 +188,6 @@ def test_show_lists_every_parameter_in_80_columns(done):
     assert set(CATALOGUE) <= set(first_words)
     assert max(map(len, text.splitlines())) <= 80
     assert "…" not in text
-
-
-def test_show_has_values_units_status_and_source(done):
-    lines = done("show", "hoist").splitlines()
-    (row,) = [line for line in lines if line.startswith("Z16 ")]
-    assert row.split()[-4:] == ["0.00011634", "0.00015126", "m", "fitted"]
-    assert row.split()[1:3] == ["opening", "at"]
-    sources = [line.strip() for line in lines if line.strip().endswith(":")]
-    assert sources == ["tables 4.1, 4.3:", "tables 4.2, 4.4:", "table 7.2:"]
 
 
 def test_toml_starts_an_own_set(done, tmp_path):

@@ -19,7 +19,6 @@ from swashplate.crane.kinematics import (
     tip_of,
     to_inertial,
 )
-from swashplate.crane.rope import hook_pulls
 from swashplate.errors import InputError
 
 G = 9.80665
@@ -297,22 +296,6 @@ def test_hook_and_load_fall_together_and_are_caught_together():
     np.testing.assert_allclose(made.hook[:, 2], one.position[:, 2], atol=1e-9)
     np.testing.assert_allclose(made.position[:, 2], one.position[:, 2] - 2.0, atol=1e-9)
     np.testing.assert_allclose(made.pull[1:], one.pull[1:], atol=1e-6)
-
-
-@pytest.mark.parametrize(
-    ("rope", "sling", "pulls"),
-    [
-        (10.01, 1.9, (0.001, 0.0)),  # slings slack: the hook alone, 10.01 - 10 u = 10
-        (9.9, 2.1, (0.0, 0.0125)),  # rope slack: 2.1 - (1 + 3) 2 w = 2
-        (9.9, 1.9, (0.0, 0.0)),
-        (10.01, 2.01, (0.007, 0.01)),  # 10 u - 6 w = 8 w - 10 u = 0.01
-    ],
-)
-def test_rope_and_slings_pull_where_they_are_taut(rope, sling, pulls):
-    numbers = Suspension(hook=1.0, sling=2.0).hanging(3.0, 10.0, RATE)
-    down = [Vector(0.0, 0.0, -each) for each in (rope, sling, 10.0, 2.0)]
-    found = hook_pulls(*down, 10.0, numbers)
-    assert found == pytest.approx(pulls, abs=1e-12)
 
 
 @pytest.mark.parametrize(

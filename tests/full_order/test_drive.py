@@ -191,19 +191,6 @@ def test_symmetric_root_is_taken_from_the_drive(hoist: FullOrderDrive, step: np.
 
 
 @pytest.mark.traced
-def test_records(hoist: FullOrderDrive) -> None:
-    current = np.zeros(257)
-    current[26:] = 0.5
-    held = hoist.simulate_current(current, interpolation="previous")
-    stamps = np.array([0.0, 26.0 / 512.0])
-    sparse = hoist.simulate_current([0.0, 0.5, 0.5], time=[*stamps, 0.5], interpolation="previous")
-    assert sparse.shaft_speed == pytest.approx(held.shaft_speed, abs=1e-12)
-    slow = hoist.simulate_current(current[::4], 128.0)
-    assert slow.time.size == 65
-    assert slow.shaft_speed[-1] == pytest.approx(held.shaft_speed[-1], rel=0.02)
-
-
-@pytest.mark.traced
 def test_table(marched: FullOrderSimulation, tmp_path: Path) -> None:
     marched.write(tmp_path / "run.parquet")
     table = pl.read_parquet(tmp_path / "run.parquet")

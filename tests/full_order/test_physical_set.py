@@ -58,23 +58,6 @@ def test_a_packaged_drive_gives_the_packaged_set(name: str) -> None:
     assert full.physical["oil_volume"].source == "stroking cylinder and lines"
 
 
-def test_hoist_by_hand() -> None:
-    n = PhysicalSet.preset("hoist").numbers
-    assert n["piston_area"] == pytest.approx(pi * 0.06**2 / 4.0)
-    # Z1 = A_s/(k_r d4)
-    assert n["return_spring_rate"] == pytest.approx(2.82743e-3 / (4.6441e-7 * 0.08), rel=1e-5)
-    # what swings at 40 Hz: model.md's 3.66e-6 and 7.7e-3 kg m²
-    spool = n["feedback_arm_inertia"] + n["spool_mass"] * n["spool_arm"] ** 2
-    assert spool == pytest.approx(3.66e-6, rel=2e-3)
-    plate = n["swash_inertia"] + n["piston_mass"] * n["swash_arm"] ** 2
-    assert plate == pytest.approx(7.7e-3, rel=2e-3)
-    # 100 < Z6 < 1000 with some 1e-4 m³ of oil
-    Z6 = PhysicalSet.preset("hoist").to_lumped()["Z6"]
-    stiffness = n["piston_area"] ** 2 * 1e9 / 2e-4
-    assert pytest.approx(stiffness / n["return_spring_rate"]) == Z6
-    assert 1e2 < Z6 < 1e3
-
-
 def test_gravity_moves_the_pressures_reference_and_nothing_else() -> None:
     hoist = PhysicalSet.preset("hoist")
     loaded = hoist.replace(load_torque=5e3, motor_leakage=1e-6)
@@ -150,17 +133,6 @@ def test_what_is_chosen_is_marked_and_the_rest_assumed() -> None:
     # the load is held by the motor's pressure: K_mf C_g
     run = full.simulate(np.zeros(64))
     assert run.motor_pressure_drop[0] == pytest.approx(200.0 * 2e3, rel=1e-12)
-
-
-def test_like_is_the_axis_of_the_name_or_the_hoist() -> None:
-    slew = Drive.preset("slew")
-    mass = PhysicalSet.preset("slew").numbers["spool_mass"]
-    assert FullOrderDrive.from_drive(slew).physical.numbers["spool_mass"] == mass == 0.01
-    hoist = Drive.preset("hoist").renamed("winch 7")
-    assert FullOrderDrive.from_drive(hoist).physical.numbers["spool_mass"] == 0.04
-    assert FullOrderDrive.from_drive(hoist, "slew").physical.numbers["spool_mass"] == mass
-    with pytest.raises(ParameterError, match="no packaged physical set 'crane'; there are hoist"):
-        FullOrderDrive.from_drive(hoist, "crane")
 
 
 def test_an_inertia_takes_the_place_of_its_frequency() -> None:
@@ -279,17 +251,3 @@ def test_files(tmp_path: Path) -> None:
     mine = PhysicalSet.from_toml(own)
     assert mine.numbers["oil_volume"] == pytest.approx(1e-4)
     assert mine.to_lumped(0.073926)["Z8"] == pytest.approx(1651400.0, rel=1e-9)
-
-
-def test_a_file_s_hertz_are_turns(tmp_path: Path) -> None:
-    path = tmp_path / "own.toml"
-    path.write_text(
-        'name = "own"\nlumps = "hoist"\n[physical]\n'
-        'spool_frequency = { value = 40, unit = "Hz" }\nspool_mass = { value = 40, unit = "g" }\n',
-        "utf-8",
-    )
-    own, packaged = PhysicalSet.from_toml(path).numbers, PhysicalSet.preset("hoist").numbers
-    assert own["feedback_arm_inertia"] == pytest.approx(packaged["feedback_arm_inertia"])
-    path.write_text(path.read_text("utf-8").replace('"Hz"', '"kHz/bar"'), "utf-8")
-    with pytest.raises(ParameterError, match="own.toml: spool_frequency .* does not measure"):
-        PhysicalSet.from_toml(path)

@@ -32,8 +32,7 @@ def _text(folder: Path) -> Iterator[Path]:
     )
     quoted = '"time","a, b"\r\n' + "".join(f'"{t}","{u}"\r\n' for t, u, *_ in rows)
     tabbed = "Hoist\nDate\t2008/10/06\nX\tY\n" + "".join(f"{t}\t{u}\n" for t, u, *_ in rows)
-    column = "voltage\n" + "".join(f"{u}\n" for _, u, *_ in rows)
-    for number, text in enumerate((plain, comma, spaced, quoted, tabbed, column)):
+    for number, text in enumerate((plain, comma, spaced, quoted, tabbed)):
         path = folder / f"{number}.csv"
         path.write_bytes(text.encode())
         yield path

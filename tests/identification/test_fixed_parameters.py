@@ -1,16 +1,21 @@
-"""What fixed parameters may be off by, in the intervals of the estimates."""
+"""What earlier stages do not know and fixed parameters may be off by, in later intervals."""
 
 from pathlib import Path
 
 import numpy as np
 import pytest
+from tests.identification.linear import unknowns_of
 from tests.identification.test_own_model_fit import FREE, NOISE, RUNS, servo
 
 from swashplate import Campaign, Drive, ParameterError
 from swashplate.campaign import rig
 from swashplate.identification import ModelSetup, assess, fit
+from swashplate.identification.drive_model import stage_problem
+from swashplate.identification.intervals import Handed, slopes_by_earlier, with_handed
 from swashplate.identification.lack_of_fit import lack_of_fit
+from swashplate.identification.noise import Covariance
 from swashplate.identification.setup import Setup, load_setup, setup_text
+from swashplate.identification.solving import solve
 from swashplate.maneuvers import source_tests
 
 DOUBTS = {"Z9": "3 %", "tau": 1e-3}
@@ -118,3 +123,49 @@ def test_what_is_wrong_is_refused(
 def test_a_name_that_no_parameter_has_is_refused(campaign: Campaign) -> None:
     with pytest.raises(ParameterError, match="no parameter 'Z99'"):
         fit(Drive.preset("hoist"), campaign, stated(Z99="5 %"))
+
+
+# --- earlier stages -------------------------------------------------------------------------------
+
+
+def test_slopes_are_those_of_fitting_again(campaign: Campaign) -> None:
+    """Move an estimate of the card, fit the pump again, and see how far it follows."""
+    card, pump = assess(fit(Drive.preset("hoist"), campaign, load_setup("hoist")).stages)
+    slopes = slopes_by_earlier(pump.stage, card.stage, pump.linearised)
+    assert slopes is not None
+    unknowns, vector = card.stage.problem.unknowns, card.stage.solution.vector
+    told = pump.linearised.determined
+    for name in ("J_plus", "omega_minus", "lim2_plus"):
+        index = unknowns.names.index(name)
+        step, ends = 3e-4, []
+        for sign in (1.0, -1.0):
+            moved = vector.copy()
+            moved[index] += sign * step
+            parameters = card.stage.problem.model.parameters_at(unknowns.targets(moved, ""))
+            again = stage_problem(pump.stage.stage, parameters, campaign.experiments)
+            ends.append(solve(again, pump.stage.solution.vector).vector)
+        expected = ((ends[0] - ends[1]) / (2.0 * step))[told]
+        # Gauss and Newton leave out the residuals' curvature: some per cent of the larger slopes
+        np.testing.assert_allclose(
+            slopes[told, index], expected, rtol=0.1, atol=0.05 * np.abs(expected).max()
+        )
+    found = pump.uncertainty
+    assert (found.quoted.standard_errors[told] >= found.own.standard_errors[told]).all()
+    assert any("the uncertainty of earlier stages" in each for each in found.sentences())
+
+
+def test_variances_add_up_and_so_do_degrees_of_freedom() -> None:
+    """By hand: 4 + (0.5² 9 + 1² 1) = 7.25, each part with 8 degrees of freedom."""
+    known = np.ones(1, dtype=bool)
+    own = Covariance(unknowns_of(["p"], [1.0]), np.array([[4.0]]), known, np.array([8.0]))
+    earlier = Covariance(
+        unknowns_of(["a", "b"], [1.0, 1.0]),
+        np.diag([9.0, 1.0]),
+        np.ones(2, dtype=bool),
+        np.array([8.0, 8.0]),
+    )
+    both = with_handed(own, [Handed(earlier, np.array([[0.5, 1.0]]))])
+    assert both.matrix[0, 0] == pytest.approx(7.25)
+    spread = (4.0**2 + 2.25**2 + 1.0**2) / 8.0
+    assert both.degrees_of_freedom[0] == pytest.approx(7.25**2 / spread)
+    assert with_handed(own, []) is own

@@ -5,7 +5,6 @@ import pytest
 from tests.identification.linear import unknowns_of
 
 from swashplate import Drive, maneuvers
-from swashplate.errors import InputError
 from swashplate.identification.identifiability import (
     GAUGES,
     Direction,
@@ -77,15 +76,6 @@ def test_two_null_directions_come_apart() -> None:
     assert len({each.fix for each in found.null}) == 2
 
 
-def test_holding_what_is_offered_determines_the_rest() -> None:
-    derivatives = columns((1.0, 1.0, 1.0, 0.0), (0.0, 1.0, 2.0, 0.5))
-    found = judged(derivatives, "abcd")
-    kept = [k for k, name in enumerate("abcd") if name not in found.to_fix]
-    again = judged(derivatives[:, kept], [*"abcd"][: len(kept)])
-    assert again.complete
-    assert len(kept) == 2
-
-
 def test_an_unexcited_unknown_is_named() -> None:
     derivatives = RNG.normal(size=(20, 3))
     derivatives[:, 1] = 0.0
@@ -93,25 +83,6 @@ def test_an_unexcited_unknown_is_named() -> None:
     assert found.unexcited == ("Z14",)
     assert found.to_fix == ("Z14",)
     assert "No test exercises Z14: fix it, or add a test that does." in found.sentences()
-
-
-def test_nothing_at_all_is_a_verdict() -> None:
-    found = judged(np.zeros((5, 2)), "ab")
-    assert found.rank == 0
-    assert found.sentences()[0] == "The tests determine none of the parameters."
-
-
-def test_all_at_bounds_is_a_verdict() -> None:
-    variables = unknowns_of("ab", np.ones(2), at_bound=[1, -1])
-    found = identifiability(RNG.normal(size=(5, 2)), variables)
-    assert found.sentences()[0].startswith("All parameters are at a bound")
-
-
-def test_one_sample_is_a_verdict() -> None:
-    found = judged(np.array([[1.0, 2.0, 3.0]]), "abc")
-    assert found.rank == 1
-    assert len(found.null) == 2
-    assert found.sentences()[0].startswith("The tests determine 1 combination of 3 free parameters")
 
 
 def test_a_weak_unknown_is_named_with_what_follows_it() -> None:
@@ -125,15 +96,18 @@ def test_a_weak_unknown_is_named_with_what_follows_it() -> None:
     assert direction.half_width == pytest.approx(1.96 / 10.0, rel=1e-3)
     assert set(direction.changes) == {"a", "b"}
     assert direction.changes["a"] == pytest.approx(-direction.changes["b"], rel=1e-3)
-    assert direction.sentence.startswith(f"Weak: {direction.fix} is known to ±19.6 % only, as ")
-    assert direction.sentence.endswith("or add a test that distinguishes them.")
+    assert direction.sentence.startswith(f"Weak: {direction.fix} is known to ±19.6 % only (")
+    assert "have little effect together" in direction.sentence
 
 
 def test_weak_is_what_the_given_covariance_says() -> None:
     given = np.diag([0.06**2, 0.01**2, 0.04**2])
     (direction,) = judged(RNG.normal(size=(10, 3)), "abc", covariance=given).weak
     assert direction.fix == "a"
-    assert direction.sentence == "Weak: a is known to ±11.8 % only; add a test that determines it."
+    assert direction.sentence.startswith("Weak: a is known to ±11.8 % only. Add a test")
+    wider = judged(RNG.normal(size=(10, 3)), "abc", covariance=9.0 * given).sentences()
+    assert sum("Weak" in each for each in wider) == 1
+    assert "Weak, each with those before it fixed: a to ±35.3 % and c to ±23.5 %." in wider[-1]
 
 
 def test_directions_in_words() -> None:
@@ -145,22 +119,12 @@ def test_directions_in_words() -> None:
         "Z14 +1 % changes nothing. Fix Z14."
     )
     gauge = next(each for each in GAUGES if "Z6" in each.moves)
-    assert Direction({"Z8": 1.0, "Z6": 0.9}, 0.3, gauge, "Z6").sentence == (
-        "Weak: Z6 is known to ±30 % only, as Z6 and Z8 change together with almost no effect "
-        "(piston motion "
-        "against flow gain): only Z8/(1+Z6) is determined; fix one of them only if you know it, or "
-        "add a test that distinguishes them."
+    assert Direction({"Z8": 1.0, "Z6": 0.9}, np.inf, gauge, "Z6").sentence == (
+        "Z6 and Z8 change together without effect (piston motion against flow gain): only "
+        "Z8/(1+Z6) is determined. Fix Z6."
     )
-    many = {f"Z{k}": 1.0 for k in range(9)}
-    said = Direction(many, np.inf, None, "Z1").sentence
+    said = Direction({f"Z{k}": 1.0 for k in range(9)}, np.inf, None, "Z1").sentence
     assert "Z5 +1 % and 3 others together change nothing" in said
-
-
-def test_the_largest_change_is_one_per_cent() -> None:
-    """Columns 1 and -4 of one shape: the first must move four times as far."""
-    (found,) = judged(RNG.normal(size=(20, 1)) * [1.0, -4.0], "ab").null
-    assert found.changes["a"] == pytest.approx(1.0)
-    assert found.changes["b"] == pytest.approx(0.25)
 
 
 def test_an_unknown_at_its_bound_is_flagged_and_held() -> None:
@@ -183,15 +147,6 @@ def test_the_gauges_of_the_hoist(hoist_columns: tuple) -> None:
     ]
     assert len(found.null) == 4
     assert found.to_fix == ("Z14", "Z15", "Z1", "Z2", "Z5", "Z4")
-    # a speed that is known to 0.1 rad/s hardly tells the piston's motion
-    weak = hoist((*hoist_columns[:2], 10.0 * hoist_columns[2]), set()).weak
-    assert any(each.gauge and each.gauge.name.startswith("piston motion") for each in weak)
-
-
-def test_a_held_member_ends_a_gauge(hoist_columns: tuple) -> None:
-    """With Z8 and Z5 held the pressure's scale and the spool's are gone, the force's is not."""
-    found = hoist(hoist_columns, {"Z14", "Z15", "Z2", "Z7", "Z11", "Z12", "Z8", "Z5"})
-    assert [each.fix for each in found.null] == ["Z4"]
 
 
 def test_two_gauges_tied_by_a_held_member_are_one_direction(hoist_columns: tuple) -> None:
@@ -200,22 +155,6 @@ def test_two_gauges_tied_by_a_held_member_are_one_direction(hoist_columns: tuple
     (direction,) = [each for each in found.null if each.gauge is None]
     assert {"Z1", "Z5", "Z9", "Z16_plus", "Z16_minus", "Z18"} <= set(direction.changes)
     assert direction.changes["Z1"] / direction.changes["Z5"] == pytest.approx(-2.0, rel=1e-6)
-
-
-def test_the_default_set_without_gauges_is_complete(hoist_columns: tuple) -> None:
-    gone = {"Z14", "Z15", "Z1", "Z2", "Z4", "Z5", "Z6"}
-    assert hoist(hoist_columns, gone).complete
-
-
-@pytest.mark.parametrize(
-    ("derivatives", "said"),
-    [
-        (np.array([[1.0, np.nan]]), "derivatives by b are not all finite"),
-    ],
-)
-def test_wrong_derivatives_are_refused(derivatives: np.ndarray, said: str) -> None:
-    with pytest.raises(InputError, match=said):
-        judged(derivatives, "ab")
 
 
 # --- gauges ---------------------------------------------------------------------------------------
@@ -272,10 +211,3 @@ def test_tangents_by_hand() -> None:
     np.testing.assert_allclose(motion, [0.0, 1.0, 0.0, 2.5, 0.0, 0.0, 0.0], atol=1e-11)
     force = BY_NAME["scale of force"].tangent(variables)
     np.testing.assert_allclose(force, [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.5], atol=1e-11)
-
-
-def test_a_gauge_that_needs_a_held_value_is_told_it() -> None:
-    variables = unknowns_of(["Z2", "Z9"], [0.0, 2.0], scales=[1.0, 2.0])
-    gauge = BY_NAME["zero of pressure"]
-    assert not gauge.tangent(variables).any()
-    np.testing.assert_allclose(gauge.tangent(variables, {"Z1": 0.5}), [1.0, 1.0], atol=1e-11)

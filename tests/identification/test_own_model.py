@@ -134,20 +134,19 @@ def test_derivatives_are_exact_and_the_triangle_is_theirs() -> None:
         )
 
 
-def test_a_run_has_a_load_a_beginning_a_zero_and_a_clock_of_its_own() -> None:
+def test_a_run_has_a_load_a_beginning_and_a_zero_of_its_own() -> None:
     loads = {"a": Load(0.2), "b": Load(-0.3, stop=9.0)}
     first, second = trial("a", loads["a"], 0.7), trial("b", loads["b"])
-    late = replace(second["position"], values=second["position"].values + 0.4, time=TIME + 0.06)
+    moved = replace(second["position"], values=second["position"].values + 0.4)
     free = (
         *FREE,
         Unknown("start.position", 0.0, -2.0, 2.0, run="a"),
         Unknown("offset position", 0.0, -2.0, 2.0, run="b"),
-        Unknown("clock position", 0.0, -0.5, 0.5, run="b"),
     )
     model = OwnModel(valve, given=loads)
-    runs = (first, replace(second, channels={"position": late}))
+    runs = (first, replace(second, channels={"position": moved}))
     values = found(problem(model, *runs, free=free))
-    own = {"start.position (a)": 0.7, "offset position (b)": 0.4, "clock position (b)": -0.06}
+    own = {"start.position (a)": 0.7, "offset position (b)": 0.4}
     assert values == pytest.approx({**TRUTH._asdict(), **own}, rel=1e-6)
 
 
@@ -155,14 +154,6 @@ def test_a_run_begins_where_a_channel_does() -> None:
     model = OwnModel(valve, given=Load(), begin={"position": "position"})
     values = found(problem(model, trial("a", begin=0.7)))
     assert values == pytest.approx(TRUTH._asdict(), rel=1e-7)
-
-
-def test_what_is_fixed_or_given_need_not_be_unknown() -> None:
-    by_p = OwnModel(valve, Valve(0.4, 9.0, 0.13), given=Load())
-    assert found(problem(by_p, trial("a"), free=FREE[1:2]))["gain"] == pytest.approx(1.5)
-    fixed = {"lag": 0.4, "delay": 0.13}
-    made = problem(OWN, trial("a"), free=FREE[1:2], fixed=fixed)
-    assert found(made)["gain"] == pytest.approx(1.5)
 
 
 @pytest.mark.parametrize("hold", ["previous", "linear"])

@@ -4,7 +4,7 @@ from collections.abc import Callable, Mapping
 
 import numpy as np
 import pytest
-from scipy.optimize import brentq, least_squares, minimize_scalar
+from scipy.optimize import brentq, least_squares
 from scipy.stats import t as student
 
 from swashplate import Experiment
@@ -103,13 +103,6 @@ def test_a_bound_leaves_a_side_open() -> None:
     )
 
 
-def test_an_undetermined_unknown_is_open() -> None:
-    found = profile(bowl(0.0), ZERO, 1.0, 0, LIMIT, 1.0)
-    assert found.endings == ("open", "open")
-    assert (found.lower, found.upper) == (None, None)
-    assert "reaches the end of the search" in found.sentences("Z6")[0]
-
-
 def test_the_domains_edge_ends_a_side() -> None:
     def edged(index: int, value: float, start: np.ndarray) -> tuple[float, np.ndarray]:
         if value > 0.5:
@@ -145,13 +138,6 @@ def test_a_cost_that_is_lower_by_next_to_nothing_does_not_stop_it() -> None:
     found = profile(dented, ZERO, 1.0, 0, LIMIT, 1.0)
     assert found.better is None
     assert found.upper == pytest.approx(2.0**0.5, rel=0.02)
-
-
-def test_the_root_of_a_kinked_cost_is_found() -> None:
-    kinked = lambda i, value, s: (1.0 + max(0.02 * abs(value), 3.0 * (value - 0.9)), ZERO)  # noqa: E731
-    found = profile(kinked, ZERO, 1.0, 0, LIMIT, 0.3)
-    expected = minimize_scalar(lambda v: (3.0 * (v - 0.9) - 0.5) ** 2, bounds=(0, 2)).x
-    assert found.upper == pytest.approx(expected, rel=5e-3)
 
 
 @pytest.mark.parametrize(

@@ -9,10 +9,9 @@ import pytest
 
 from swashplate import Campaign, Channel, Drive, Experiment
 from swashplate.campaign import InputSignal, Source, rig
-from swashplate.identification.drive_model import DriveModel, at_rate_of
+from swashplate.identification.drive_model import DriveModel, at_rate_of, stage_problem
 from swashplate.identification.fitting import fit, smooth
 from swashplate.identification.setup import Free, Setup, Stage, load_setup, setup_names
-from swashplate.identification.staging import stage_problem
 from swashplate.identification.unknowns import Unknown
 from swashplate.maneuvers import source_tests, step
 
@@ -56,31 +55,6 @@ def test_the_sources_weights_of_the_pump(campaign: Campaign) -> None:
     )
     assert (sine[0.5], sine[5.0]) == pytest.approx((0.0, 0.1))
     assert (ramp[0.5], ramp[5.0]) == pytest.approx((0.0, 2.0))
-
-
-def test_a_clock_that_is_late_is_found(campaign: Campaign) -> None:
-    """The speed's clock moved by 20 ms: its offset, one for all runs, is free and found."""
-    late = [
-        replace(
-            each,
-            channels={
-                name: replace(channel, time=channel.time + 0.02)
-                if channel.kind == "shaft_speed"
-                else channel
-                for name, channel in each.channels.items()
-            },
-        )
-        for each in campaign.experiments
-    ]
-    stage = Stage(
-        name="pump",
-        part="pump",
-        free={"Z8": Free(relative=(0.5, 2.0), log=True)},
-        clock_offsets={"shaft_speed": 0.05},
-    )
-    found = fit(Drive.preset("hoist").parameters, late, Setup(stages=(stage,))).stages[-1].values
-    (offset,) = [value for name, value in found.items() if name.startswith("clock")]
-    assert abs(offset) == pytest.approx(0.02, abs=2e-4)
 
 
 def test_what_is_freed_is_on_and_stays_above_off(campaign: Campaign) -> None:

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from tests.identification.linear import unknowns_of
 
-from swashplate import InputError, ParameterError
+from swashplate import ParameterError
 from swashplate.identification.unknowns import Prior, Unknown, Unknowns, bounded
 
 
@@ -40,11 +40,6 @@ def test_tied_directions_and_unknowns_of_one_experiment() -> None:
     assert unknowns.targets(vector, "lower") == {"Z16_plus": 2.0, "Z16_minus": 2.0, "offset": 3.0}
     chain = unknowns.chain(vector, ["Z16_minus", "offset", "Z16_plus"], "lift")
     np.testing.assert_allclose(chain, [[2.0, 0.0, 0.0], [0.0, 1.0, 0.0], [2.0, 0.0, 0.0]])
-
-
-def test_chain_of_a_logarithm() -> None:
-    unknowns = Unknowns((bounded("k", 5.0, relative=(0.5, 2.0), log=True),))
-    assert unknowns.chain(np.array([log(7.0)]), ["k"], "") == pytest.approx(np.array([[7.0]]))
 
 
 def test_priors() -> None:
@@ -85,19 +80,6 @@ def test_bounds_that_are_reached() -> None:
 def test_what_is_refused(make, sentence: str) -> None:
     with pytest.raises(ParameterError, match=sentence):
         make()
-
-
-def test_unbounded_vectors_give_no_nan() -> None:
-    variables = unknowns_of(["a", "b"], [1.0, 1.0], logarithmic=[True, False])
-    assert variables.to_values(np.array([np.inf, np.inf])).tolist() == [np.inf, np.inf]
-    assert variables.to_values(np.array([-np.inf, -np.inf])).tolist() == [0.0, -np.inf]
-
-
-def test_an_unknown_is_found_by_name() -> None:
-    variables = unknowns_of(["a", "b"], [1.0, 2.0])
-    assert variables.index("b") == 1
-    with pytest.raises(InputError, match="no parameter c; there are a, b"):
-        variables.index("c")
 
 
 def test_released_unknowns_stay_where_they_are() -> None:

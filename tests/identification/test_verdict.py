@@ -15,8 +15,8 @@ from swashplate.identification.problem import Problem
 from swashplate.identification.setup import Stage
 from swashplate.identification.solving import StartResult, solve
 from swashplate.identification.unknowns import Unknown, Unknowns
-from swashplate.identification.validation import RunQuality, compared
-from swashplate.identification.verdict import Criterion, part_of_range, percent
+from swashplate.identification.validation import RunQuality, compared, part_of_range, percent
+from swashplate.identification.verdict import Criterion
 
 TIME = np.linspace(0.0, 4.0, 81)
 WAVE = 10.0 * np.sin(2.0 * np.pi * TIME[:-1] / 4.0)

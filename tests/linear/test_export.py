@@ -48,15 +48,6 @@ def test_a_sampled_model_is_exact(axis: Drive, rate: float) -> None:
         np.testing.assert_allclose(of_scipy(system, F, row), expected[row], rtol=1e-8)
 
 
-def test_scipy_marches_like_the_simulation(hoist: Drive) -> None:
-    system = hoist.linearize(4.0).discrete(1.0 / 512.0).to_scipy()
-    u = 1e-5 * np.minimum(np.arange(400) / 50.0, 1.0)
-    run = hoist.simulate(4.0 + u, start="steady")
-    _, answer, _ = scipy.signal.dlsim(system, u)
-    moved = run.shaft_speed - run.shaft_speed[0]
-    np.testing.assert_allclose(answer[:, 0], moved, rtol=0.0, atol=1e-4 * np.abs(moved).max())
-
-
 @pytest.mark.parametrize("ending", ["toml", "json"])
 def test_files_hold_everything(hoist: Drive, tmp_path: Path, ending: str) -> None:
     model = hoist.linearize(4.0, outputs=OUTPUTS).discrete(1.0 / 512.0)
@@ -74,14 +65,6 @@ def test_files_hold_everything(hoist: Drive, tmp_path: Path, ending: str) -> Non
     assert read["output_units"] == ["rad/s", "Pa", "A"]
     assert read["operating_point"]["voltage"] == 4.0
     assert read["operating_point"]["shaft_speed"] == hoist.steady_speed(4.0)
-
-
-def test_a_model_from_a_current_has_no_voltage(hoist: Drive, tmp_path: Path) -> None:
-    hoist.linearize(current=0.45).write(tmp_path / "pump.toml")
-    read = tomllib.loads((tmp_path / "pump.toml").read_text("utf-8"))
-    assert read["kind"] == "continuous"
-    assert "voltage" not in read["operating_point"]
-    assert "sample_time" not in read
 
 
 def test_places_that_cannot_be_written(hoist: Drive, tmp_path: Path) -> None:

@@ -42,16 +42,6 @@ def test_the_delay_margin_brings_the_loop_to_its_edge(hoist: Drive) -> None:
     assert radius(model, gain, whole) < 1.0 < radius(model, gain, whole + 1)
 
 
-def test_margins_of_the_continuous_model_are_the_sampled_one_s_limit(hoist: Drive) -> None:
-    model = hoist.linearize(4.0)
-    fine = model.discrete(1e-5)
-    assert fine.largest_gain == pytest.approx(model.largest_gain, rel=1e-3)
-    assert fine.bandwidth == pytest.approx(model.bandwidth, rel=1e-3)
-    assert fine.margins(5.0).delay_margin == pytest.approx(
-        model.margins(5.0).delay_margin, rel=1e-3
-    )
-
-
 def test_a_first_order_lag(hoist: Drive) -> None:
     # G = g/(1 + s τ): |K G| = 1 at ω τ = √((K g)² - 1), phase margin π - atan(ω τ)
     model = hoist.linearize(current=0.45)
@@ -120,17 +110,6 @@ def test_loops_without_sense(hoist: Drive) -> None:
     unstable = replace(hoist.linearize(current=0.45), A=np.array([[1.0]]))
     with pytest.raises(DomainError, match="linear model is unstable"):
         print(unstable.bandwidth)
-
-
-def test_a_falling_output_is_turned_round(hoist: Drive) -> None:
-    model = hoist.linearize(4.0)
-    turned = replace(model, C=-model.C)
-    assert turned.largest_gain == pytest.approx(model.largest_gain)
-    assert turned.bandwidth == pytest.approx(model.bandwidth)
-
-
-def test_an_output_that_keeps_up_has_no_bandwidth(hoist: Drive) -> None:
-    assert hoist.linearize(current=0.45, outputs=["solenoid_force"]).bandwidth == inf
 
 
 def test_frequencies_out_of_range(hoist: Drive) -> None:

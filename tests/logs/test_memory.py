@@ -7,7 +7,6 @@ import h5py
 import numpy as np
 import polars as pl
 import pytest
-import scipy.io
 from nptdms import ChannelObject, TdmsWriter
 
 COLUMNS = 40
@@ -38,16 +37,8 @@ def csv(path, table):
     pl.DataFrame(table).write_csv(path)
 
 
-def semicolons(path, table):
-    pl.DataFrame(table).write_csv(path, separator=";", decimal_comma=True)
-
-
 def parquet(path, table):
     pl.DataFrame(table).write_parquet(path)
-
-
-def matlab(path, table):
-    scipy.io.savemat(path, {"s": table})
 
 
 def hdf5(path, table):
@@ -69,9 +60,7 @@ def tdms(path, table):
     ("write", "suffix", "column"),
     [
         (csv, ".csv", "c7"),
-        (semicolons, ".csv", "c7"),
         (parquet, ".parquet", "c7"),
-        (matlab, ".mat", "s.c7"),
         (hdf5, ".h5", "/c7"),
         (tdms, ".tdms", "c7"),
     ],

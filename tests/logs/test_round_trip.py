@@ -101,32 +101,6 @@ def test_parquet(path, arrays, compression):
         same(read, table[name])
 
 
-@pytest.mark.parametrize(
-    ("stamp", "delimiter", "decimal"),
-    [
-        ("2026-11-21 23:59:{}", ",", "."),
-        ("2026-11-21T23:59:{}Z", ";", "."),
-        ("2026/11/21 23:59:{}", "\t", "."),
-        ("21.11.2026 23:59:{}", ";", ","),
-        ("23:59:{}", ";", "."),
-    ],
-)
-def test_text_of_dates(tmp_path, stamp, delimiter, decimal):
-    """Seconds since the first row; a row without a stamp has none, and a day ends."""
-    seconds = ["58.5", "58.502", "", "59.000001"]
-    stamps = [stamp.format(each).replace(".5", f"{decimal}5") if each else "" for each in seconds]
-    if stamp.startswith("2026-"):
-        stamps[-1] = stamps[-1].replace("-21", "-22").replace("23:59:59", "00:00:00")
-    written = [0.0, 0.002, np.nan, 1.500001 if stamp.startswith("2026-") else 0.500001]
-    rows = [f"{each}{delimiter}1{decimal}25" for each in stamps]
-    (tmp_path / "log.csv").write_text(f"clock{delimiter}y\n" + "\n".join(rows) + "\n", "utf-8")
-    log = open_log(tmp_path / "log.csv")
-    assert log.columns == (Column("clock", "s"), Column("y", None))
-    read = log.read(["clock", "y"])
-    np.testing.assert_allclose(read["clock"], written, rtol=0.0, atol=1e-9)
-    same(read["y"], [1.25] * 4)
-
-
 def test_parquet_of_dates(tmp_path):
     begin = datetime.datetime(2024, 1, 1)
     table = {

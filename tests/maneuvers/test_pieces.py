@@ -76,13 +76,6 @@ def test_voltage_is_zero_outside_and_has_the_shape_of_the_times():
     assert math.isnan(m(math.nan))
 
 
-def test_time_stamps_go_with_the_samples():
-    m = maneuvers.rest(2.0)
-    assert m.time(2.0).tolist() == [0.0, 0.5, 1.0, 1.5, 2.0]
-    assert m.time().size == m.sample().size == 1025
-    assert maneuvers.rest(0.0).sample().tolist() == [0.0]
-
-
 @pytest.mark.parametrize(
     ("m", "name"),
     [
@@ -174,13 +167,6 @@ def test_lengths_are_exact_where_the_return_is_longer_than_what_precedes_it(befo
         assert (m(m.length), m.slope(m.length)) == (0.0, 0.0)
         assert m.sample(10.0).size == round(10 * (before + settle)) + 1
         assert m.sample(10.0)[-1] == 0.0
-
-
-def test_superposed_voltages_add_up_over_the_longest():
-    hold = maneuvers.stairs([2.0], dwell=2.0, start=0.0, settle=0)
-    m = maneuvers.superpose(hold, maneuvers.step(1.0, stop=4.0, length=5.0))
-    assert m.length == 5.0
-    assert m.sample(1.0).tolist() == [2.0, 3.0, 1.0, 1.0, 0.0, 0.0]
 
 
 seconds = st.floats(0.01, 8.0)

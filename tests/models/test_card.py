@@ -7,14 +7,12 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from numba import njit
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
-from scipy.optimize import brentq, least_squares
+from scipy.optimize import brentq
 
 from swashplate import Drive
 from swashplate.equations.model import Window
-from swashplate.models import card
 from swashplate.models import channel as single
 from swashplate.models.channel import Channel, ChannelConstants, Filter
 from swashplate.simulation.instance import step_limit
@@ -45,21 +43,6 @@ def test_the_settled_current_is_a_jump_and_a_cubic(channel: Channel) -> None:
     assert single.steady_current(0.4, 0.25, p) == 0.075
     assert single.channel_level(0.5, p) == 0.0
     assert single.channel_level(-3.0, p) == 0.0
-
-
-def test_published_levels() -> None:
-    """Currents of Kruse's drives at 1, 4, 6.5 and 9 V."""
-    expected = {
-        ("hoist", "plus"): (0.3184, 0.4754, 0.6106, 0.7452),
-        ("hoist", "minus"): (0.3447, 0.5093, 0.6374, 0.7474),
-        ("slew", "plus"): (0.2048, 0.3185, 0.4132, 0.5079),
-        ("slew", "minus"): (0.1979, 0.3071, 0.3980, 0.4890),
-    }
-    for (axis, side), currents in expected.items():
-        numbers = Drive.preset(axis).parameters.numbers
-        p = Channel(*(numbers[f"{name}_{side}"] for name in Channel._fields))
-        found = [single.channel_level(voltage, p) for voltage in (1.0, 4.0, 6.5, 9.0)]
-        assert found == pytest.approx(currents, abs=5e-5)
 
 
 # --- Kruse's recursion ----------------------------------------------------------------------
@@ -171,48 +154,6 @@ def test_it_is_stable_and_sticks_at_any_rate(zeta: float) -> None:
         assert np.abs(found).max() < 1.0
 
 
-@njit(error_model="numpy")
-def currents(command: Array, p: card.Card, h: float, options: single.CardOptions) -> Array:
-    """Signed current under a command that is zero before the first sample."""
-    made = np.empty(command.size)
-    k = card.card_constants(p, h, options)
-    behind, ahead = p.tau / h, p.tau / h - 0.5
-    back, late = int(behind), int(ahead)
-    padded = np.concatenate((np.zeros(back + 3), command))
-    still = single.CardInputs(Window((0.0, 0.0, 0.0), 0.0), Window((0.0, 0.0, 0.0), 0.0))
-    state = card.card_rest(p, k, options, still)
-    for n in range(command.size):
-        at, end = n + 3, n + back + 3 - late
-        inputs = single.CardInputs(
-            Window((padded[at], padded[at - 1], padded[at - 2]), behind - back),
-            Window((padded[end], padded[end - 1], padded[end - 2]), ahead - late),
-        )
-        signals = card.card_sample(state, inputs, p, k, h, options)
-        made[n] = signals.current
-        state = card.card_step(state, signals, inputs, p, k, h, options)
-    return made
-
-
-@pytest.mark.parametrize("rate", RATES)
-def test_the_same_parameters_describe_the_response_at_every_rate(rate: float) -> None:
-    """ζ, ω and C of a truth at 16 kHz, with jumps between the samples, by least squares."""
-    channel = Channel(0.5, 0.2, 0.05, 0.0, 0.0, 1.1014, 135.39, 4.8368, inf, inf, inf, 0.0, inf)
-    # straight between the samples of every rate, which are multiples of 8 Hz
-    corners = ([0.0, 0.125, 0.25, 0.5, 0.625, 0.75, 1.0], [0.0, 0.0, 6.0, 2.0, 2.0, 0.0, 0.0])
-    fine, time = np.arange(0.0, 1.0, 1.0 / 16000.0), np.arange(0.0, 1.0, 1.0 / rate)
-    truth = card.Card(channel, channel, 0.014)
-    response = currents(np.interp(fine, *corners), truth, 1.0 / 16000.0, EXACT)
-    measured, command = np.interp(time, fine, response), np.interp(time, *corners)
-
-    def misfit(x: Array) -> Array:
-        mine = channel._replace(zeta=x[0], omega=100.0 * x[1], C=x[2])
-        return currents(command, card.Card(mine, mine, 0.014), 1.0 / rate, EXACT) - measured
-
-    zeta, omega, _ = least_squares(misfit, [0.9, 1.1, 3.0], xtol=1e-12).x
-    assert 100.0 * omega == pytest.approx(channel.omega, rel=1e-3)
-    assert zeta == pytest.approx(channel.zeta, rel=1e-3)
-
-
 @pytest.mark.interpreted
 def test_friction_takes_the_rate_and_stops_at_zero(channel: Channel) -> None:
     k = ChannelConstants(1.0, 1.0, 0.0, 0.0, 1.0, 0.0, 0.0, coulomb=0.5, lost=0.1)
@@ -232,22 +173,6 @@ def test_the_course_over_a_step_keeps_integral_and_moment(samples: list[float], 
     assert 0.5 * (begins + ends) == pytest.approx(steady.mean(), abs=1e-5)
     moment = (steady * (f + 0.5 - back)).mean()
     assert (ends - begins) / 12.0 == pytest.approx(moment, abs=1e-5)
-
-
-@pytest.mark.parametrize("exact", [None, True])
-def test_a_settled_card_stays(channel: Channel, exact: bool | None) -> None:
-    p = card.Card(channel, channel._replace(C=3.0, zeta=1.2), 0.014)
-    options = single.CardOptions(exact=exact)
-    k = card.card_constants(p, 1.0 / 512.0, options)
-    for voltage in (6.0, -6.0):
-        inputs = single.CardInputs(Window((voltage,) * 3, 0.2), Window((voltage,) * 3, 0.7))
-        state = card.card_settled(inputs, p, k, options)
-        for _ in range(50):
-            signals = card.card_sample(state, inputs, p, k, 1.0 / 512.0, options)
-            level = single.channel_level(6.0, p.plus if voltage > 0.0 else p.minus)
-            assert signals.current == pytest.approx(np.sign(voltage) * level, rel=1e-14)
-            assert not card.card_limits(state, signals, inputs, p, k, options).current_rate
-            state = card.card_step(state, signals, inputs, p, k, 1.0 / 512.0, options)
 
 
 # --- filter to output ----------------------------------------------------------------------------

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from swashplate import Drive, Serial, Simulation, SquaredError, Threads, maneuvers
+from swashplate import Drive, Simulation, maneuvers
 from swashplate.equations.marching.observation import Observation, ObservedRecord
 from swashplate.equations.marching.record import record_of
 from swashplate.simulation.residuals import jacobian, residuals
@@ -177,27 +177,6 @@ def test_a_part_of_a_refinement_at_zero_does_not_switch_it_off_in_a_batch(hoist:
     for i, depth in enumerate((0.0, 0.01)):
         one = drive.replace(cam_ripple=depth).simulate(voltage)
         assert np.array_equal(batch.output[i], one.shaft_speed), i
-
-
-def test_cost_is_the_weighted_sum_of_squares(hoist: Drive) -> None:
-    voltage = command(256.0)
-    measured = hoist.simulate(voltage, 256.0).shaft_speed + 0.1
-    weight = np.linspace(0.0, 2.0, measured.size)
-    batch = hoist.simulate_many(
-        {"Z10": [12.396, 13.0]}, voltage=voltage, rate=256.0, cost=SquaredError(measured, weight)
-    )
-    assert batch.output is None
-    for cost, drive in zip(batch.cost, (hoist, hoist.replace(Z10=13.0)), strict=True):
-        error = drive.simulate(voltage, 256.0).shaft_speed - measured
-        assert cost == pytest.approx(np.sum(weight * error**2), rel=1e-12)
-
-
-def test_batch_does_not_depend_on_threads(hoist: Drive) -> None:
-    rng = np.random.default_rng(5)
-    changes = {"Z8": 1.65e6 * rng.uniform(0.8, 1.2, 70)}
-    one = hoist.simulate_many(changes, voltage=command(), executor=Serial())
-    four = hoist.simulate_many(changes, voltage=command(), executor=Threads(4))
-    assert np.array_equal(one.output, four.output)
 
 
 def test_state_of_a_stepper_can_be_kept_and_restored(hoist: Drive) -> None:

@@ -67,7 +67,7 @@ def test_overflow_fails_only_its_set(hoist: Drive) -> None:
         ({"Z16": [1e-4], "Z16_plus": [1e-4]}, {"voltage": [0.0]}, "Z16_plus is given twice"),
         ({"Z10": [3.0]}, {}, "either a voltage or a current"),
         ({"Z10": [3.0]}, {"voltage": [0.0], "current": [0.0]}, "either a voltage or a current"),
-        ({"Z10": [3.0]}, {"voltage": [0.0], "output": "torque"}, "no output 'torque'"),
+        ({"Z10": [3.0]}, {"voltage": [0.0], "output": "torque"}, "no signal 'torque'"),
         (
             {"Z10": [3.0]},
             {"voltage": [0.0, 1.0], "cost": SquaredError([0.0, np.nan])},

@@ -19,7 +19,7 @@ from swashplate.equations.marching.run import march_of
 from swashplate.simulation.result import KEPT
 run = Drive.preset("hoist").simulate_current(np.full(60, 0.5))
 print(run.shaft_speed[-1])
-march = march_of(run.instance.model, (run.driven_by,), run.instance.options, KEPT).made
+march = march_of(run.instance.model, (run.driven_by,), run.instance.options, KEPT)()
 print(march.cache_hits)
 """
 

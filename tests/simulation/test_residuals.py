@@ -17,7 +17,6 @@ from swashplate.equations.marching.record import record_of
 from swashplate.equations.marching.triangle import combine
 from swashplate.simulation.residuals import (
     ALL_COLUMNS,
-    OBSERVABLE,
     PUMP_COLUMNS,
     Own,
     jacobian,
@@ -29,6 +28,8 @@ from swashplate.simulation.run import simulate_drive
 RATE = 512.0
 SWING = maneuvers.sine(3.0, 0.8, start=0.05, length=3.0, settle=0.4).sample(RATE)
 CARD = ("current", "current_sum", "current_positive", "current_negative")
+PUMP = ("shaft_speed", "shaft_position", "stroker_pressure", "swash_angle", "spool_position")
+OBSERVABLE = (*CARD, *PUMP)
 
 
 def steps(*levels: float) -> np.ndarray:
@@ -243,20 +244,6 @@ def test_slope_by_the_clock_on_the_grid_is_the_mean_of_both_sides(hoist: Drive) 
     np.testing.assert_allclose(found[:, 0], 1.5 * RATE * (padded[2:] - padded[:-2]), atol=1e-10)
 
 
-@pytest.mark.traced
-def test_other_rates_are_compared_on_the_marchs_grid(hoist: Drive) -> None:
-    command = maneuvers.sine(3.0, 0.8, start=0.1, length=3.0, settle=0.4).sample(100.0)
-    run = hoist.simulate(command, 100.0)
-    observed = ObservedRecord(
-        record_of(command, 100.0, what="voltage"),
-        [Observation("shaft_speed", run.time, np.zeros(run.time.size))],
-    )
-    found = jacobian(hoist.parameters, observed, ["Z16", "omega"])
-    assert np.array_equal(found.residuals, run.shaft_speed)
-    by = hoist.sensitivities(command, 100.0, parameters=["Z16", "omega"])
-    close(found.columns, by.shaft_speed)
-
-
 FREE = ("Z8", "G1", "Z16", "tau", "Z6", "start_pressure", "Z10", "Z12", "lim1_minus")
 
 
@@ -372,6 +359,8 @@ def test_refusals(hoist: Drive) -> None:
     observed = observed_at_samples(HARD, signals=["shaft_speed"])
     with pytest.raises(InputError, match="Z16_plus is asked for twice"):
         jacobian(hoist.parameters, observed, ["Z16", "Z16_plus"])
+    with pytest.raises(InputError, match="no signal 'torque'"):
+        residuals(hoist.parameters, observed_at_samples(HARD, signals=["torque"]))
     with pytest.raises(ParameterError, match="no parameter 'Z99'"):
         triangle(hoist.parameters, observed, ["Z99"])
     with pytest.raises(InputError, match="start_pressure is a column, so Own needs a value"):

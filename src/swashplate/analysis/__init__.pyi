@@ -50,7 +50,6 @@ from .sizing import performance_table as performance_table
 from .sizing import size as size
 from .sizing import smallest_alone as smallest_alone
 from .sizing import smallest_change as smallest_change
-from .sizing import typed_factors as typed_factors
 from .whatif import AS_IS as AS_IS
 from .whatif import CHANGED as CHANGED
 from .whatif import LEVERS as LEVERS
@@ -64,5 +63,4 @@ from .whatif import one_at_a_time as one_at_a_time
 from .whatif import outcome_table as outcome_table
 from .whatif import pulled as pulled
 from .whatif import pulled_columns as pulled_columns
-from .whatif import ranges_of as ranges_of
 from .whatif import what_if as what_if

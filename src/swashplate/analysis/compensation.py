@@ -30,7 +30,7 @@ Array = NDArray[np.float64]
 
 FEWEST, MOST = 2, 10_001  # Points each way.
 MOST_SHOWN = 5  # Points each way in a table.
-INVERSE_MAP = Form("an inverse map", (".toml", ".csv", ".parquet"), (".pq",))
+INVERSE_MAP = Form("an inverse map", (".toml", ".csv", ".parquet"))
 COMMENTS = """\
 # swashplate inverse steady-state map: the voltage for a wanted speed; SI units
 # plus and minus: straight lines between the points; beyond their ends hold the end

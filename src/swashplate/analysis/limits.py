@@ -5,13 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from math import atan, inf
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from swashplate.analysis.outcomes import rms_difference, time_share
-from swashplate.analysis.whatif import pulled
 from swashplate.drive import Drive
 from swashplate.equations.marching.record import SOURCE_RATE, Interpolation
 from swashplate.equations.marching.run import Start
@@ -40,35 +39,23 @@ class Removal(NamedTuple):
 
     limit: str  # In words.
     component: str  # What would have to change in the machine.
-    changes: Mapping[str, Change] | Callable[[Mapping[str, float]], Mapping[str, Change]]
-    """What takes it away, the same for every drive or of its values."""
-    eased_by: Mapping[str, float] | Callable[[Mapping[str, float]], Mapping[str, float]]
-    """Factors on levers that ease the limit under the same command; none where that needs another
-    command as well."""
-    flag: Limit | None = None
-    """How a simulation marks it, None for what acts always or is not marked."""
+    flag: Limit | None  # How a simulation marks it, None for what acts always or is not marked.
+    changes: Callable[[Mapping[str, float]], Mapping[str, Change]]
+    """What takes it away from a drive of these values."""
 
-    def of(self, drive: Drive) -> tuple[dict[str, Change], dict[str, float]]:
-        """The changes that alter anything in this drive, none if it has no such limit; factors."""
-        numbers = drive.parameters.numbers
-        changes = self.changes(numbers) if callable(self.changes) else self.changes
-        eased = self.eased_by(numbers) if callable(self.eased_by) else self.eased_by
-        made = {}
-        for name, value in changes.items():
+    def of(self, drive: Drive) -> dict[str, Change]:
+        """The changes that alter anything in this drive; none if it has no such limit."""
+        numbers, made = drive.parameters.numbers, {}
+        for name, value in self.changes(numbers).items():
             both = drive[name].values if name in drive.parameters else (numbers[name],)
             if any(value != old for old in both):
                 made[name] = value
-        return made, dict(eased)
+        return made
 
 
-def _covered(numbers: Mapping[str, float]) -> float:
-    """Dead zone of the solenoids that the card's jump covers: more of it would stay. [A]"""
-    return min(numbers["Z17"], numbers["J_plus"], numbers["J_minus"])
-
-
-def _dead_zone_eased(numbers: Mapping[str, float]) -> dict[str, float]:
-    covered, dead = _covered(numbers), numbers["Z17"]
-    return {"dead_zone": 0.0} | ({} if covered == dead else {"Z17": covered / dead})
+def _dead_zone(numbers: Mapping[str, float]) -> dict[str, Change]:
+    # with the card's jump left as it is, a solenoid's dead zone beyond it would stay
+    return {"V_dz": 0.0, "Z17": min(numbers["Z17"], numbers["J_plus"], numbers["J_minus"])}
 
 
 def _swash_stop(numbers: Mapping[str, float]) -> dict[str, Change]:
@@ -76,35 +63,30 @@ def _swash_stop(numbers: Mapping[str, float]) -> dict[str, Change]:
     return {name: max(widest, numbers[name]) for name in ("Z13_plus", "Z13_minus")}
 
 
+def _to(**changes: Change) -> Callable[[Mapping[str, float]], Mapping[str, Change]]:
+    """The same changes for any drive."""
+    return lambda _: changes
+
+
 REMOVALS = (
     Removal(
         *("dead zone", "card: dead-zone compensation (V_dz, or an inverse map)"),
-        lambda numbers: {"V_dz": 0.0, "Z17": _covered(numbers)},
-        *(_dead_zone_eased, Limit.DEAD_ZONE),
+        *(Limit.DEAD_ZONE, _dead_zone),
     ),
     Removal(
-        *("current rate", "card: faster ramp (lim1, lim2)", {"lim1": inf, "lim2": inf}),
-        *({"rate_limits": 1.5}, Limit.CURRENT_RATE),
+        *("current rate", "card: faster ramp (lim1, lim2)", Limit.CURRENT_RATE),
+        _to(lim1=inf, lim2=inf),
     ),
-    Removal("final decay", "card: no decay of the current (I_t2)", {"I_t2": 0.0}, {"I_t2": 0.5}),
-    Removal("delay", "card: shorter delay (tau)", {"tau": 0.0}, {"tau": 0.5}),
+    Removal("final decay", "card: no decay of the current (I_t2)", None, _to(I_t2=0.0)),
+    Removal("delay", "card: shorter delay (tau)", None, _to(tau=0.0)),
+    Removal("orifice", "in-line orifice: larger bore (Z16)", Limit.ORIFICE, _to(Z16=inf)),
+    Removal("spool stop", "spool: longer stroke (Z14)", Limit.SPOOL, _to(Z14=inf)),
     Removal(
-        *("orifice", "in-line orifice: larger bore (Z16)", {"Z16": inf}),
-        *({"orifice": 1.5}, Limit.ORIFICE),
+        *("swash stop", "pump: larger, or a smaller motor (Z10, Z13)"),
+        *(Limit.SWASH_STOP, _swash_stop),
     ),
-    Removal(
-        *("spool stop", "spool: longer stroke (Z14)", {"Z14": inf}),
-        *({"spool_stroke": 1.5}, Limit.SPOOL),
-    ),
-    Removal(
-        *("swash stop", "pump: larger, or a smaller motor (Z10, Z13)", _swash_stop, {}),
-        Limit.SWASH_STOP,
-    ),
-    Removal(
-        *("relief valve", "relief valve: higher setting (Z15)", {"Z15": inf}),
-        *({"relief": 1.5}, Limit.RELIEF),
-    ),
-    Removal("plussing", "spool: centred at rest (Z18)", {"Z18": 0.0}, {"plussing": 0.0}),
+    Removal("relief valve", "relief valve: higher setting (Z15)", Limit.RELIEF, _to(Z15=inf)),
+    Removal("plussing", "spool: centred at rest (Z18)", None, _to(Z18=0.0)),
 )
 """What can be taken away, in the order of the chain; the plussing, which no force limits, because
 the creep that it makes is an error, too."""
@@ -128,10 +110,6 @@ class LimitShare(Result):
     error_share: float | None
     """By how much of itself the rms error falls without it; negative if it grows. [1]"""
     alone: float | None  # Rms tracking error with this limit and none of the others. [rad/s]
-    eased_by: Mapping[str, float]
-    """Factors on levers (`whatif.LEVERS`) that ease it, to try; none where that needs another
-    command."""
-    eased_error: float | None  # Rms tracking error with these; None without any. [rad/s]
     failure: str = ""  # Why a drive without it cannot be simulated.
 
 
@@ -176,18 +154,6 @@ class LimitShares(Tabular):
         failed = (each for each in self.shares if each.failure)
         return said + [f"Not without the {each.limit}: {each.failure}" for each in failed]
 
-    def eased_sentence(self) -> str:
-        """What a change of the first limit buys, where it can be eased."""
-        first = self.first
-        assert first is not None
-        assert first.eased_error is not None
-        named = " and ".join(f"{name} x {factor:.4g}" for name, factor in first.eased_by.items())
-        fall = 100.0 * (1.0 - first.eased_error / self.error)
-        return (
-            f"With {named} it {'falls' if fall >= 0.0 else 'grows'} by {abs(fall):.1f} % to "
-            f"{quantity(first.eased_error, 'rad/s', spec='.3f')} rms."
-        )
-
     def table(self) -> Table:
         """What each limit costs, the costliest first."""
         errors = ("rad/s", "none")
@@ -200,13 +166,12 @@ class LimitShares(Tabular):
                 Column("error without it\n", ".3f", *errors, key="error"),
                 Column("share of error", "z.1%", key="error_share"),
                 Column("error if alone\n", ".3f", *errors, key="alone"),
-                Column("eased_error", of="f"),
             ),
         )
         for each in self.shares:
             time = Cell(0.0, "never") if each.time_share == 0.0 else each.time_share
             words = each.limit, each.component, each.failure
-            numbers = time, each.error, each.error_share, each.alone, each.eased_error
+            numbers = time, each.error, each.error_share, each.alone
             made.add(*words, *numbers)
         return made
 
@@ -270,14 +235,13 @@ def limit_shares(
     run = drive.simulate(
         voltage, rate, time=time, interpolation=interpolation, start=start, clip=clip
     )
-    present = [(each, *each.of(drive)) for each in REMOVALS]
-    present = [each for each in present if each[1]]
-    built = {removal.limit: _changed(drive, changes) for removal, changes, _ in present}
-    unlimited, removed = drive, dict[str, dict[str, Change]]()
-    for removal, changes, _ in present:  # as many at once as the model's domain allows
+    present = {each: changes for each in REMOVALS if (changes := each.of(drive))}
+    built = {each: _changed(drive, changes) for each, changes in present.items()}
+    unlimited, removed = drive, dict[Removal, dict[str, Change]]()
+    for removal, changes in present.items():  # as many at once as the model's domain allows
         more = _changed(unlimited, changes)
-        if not isinstance(built[removal.limit], str) and not isinstance(more, str):
-            unlimited, removed[removal.limit] = more, changes
+        if not isinstance(built[removal], str) and not isinstance(more, str):
+            unlimited, removed[removal] = more, changes
     asked = _free_speed(unlimited, run, start) if wanted is None else np.array(wanted, dtype=float)
     if asked.shape != run.shaft_speed.shape or not np.isfinite(asked).all():
         raise InputError(
@@ -296,9 +260,9 @@ def limit_shares(
         return rms_difference(again.shaft_speed, asked), ""
 
     shares = []
-    for removal, changes, eased_by in present:
-        without, failure = error_of(built[removal.limit])
-        others = [c for limit, c in removed.items() if limit != removal.limit]
+    for removal, changes in present.items():
+        without, failure = error_of(built[removal])
+        others = {k: v for each, c in removed.items() if each is not removal for k, v in c.items()}
         fall = None
         if without is not None:
             fall = (error - without) / error if error > 0.0 else 0.0
@@ -310,9 +274,7 @@ def limit_shares(
                 None if removal.flag is None else time_share(run, removal.flag),
                 without,
                 fall,
-                error_of(_changed(drive, {k: v for c in others for k, v in c.items()}))[0],
-                eased_by,
-                error_of(_changed(drive, eased_by, pulled))[0] if eased_by else None,
+                error_of(_changed(drive, others))[0],
                 failure,
             )
         )
@@ -320,14 +282,10 @@ def limit_shares(
     return LimitShares(drive.name, run, asked, error, error_of(unlimited)[0], tuple(shares))
 
 
-def _changed(
-    drive: Drive,
-    changes: Mapping[str, Any],
-    change: Callable[[Drive, Mapping[str, Any]], Drive] = lambda drive, to: drive.replace(**to),
-) -> Drive | str:
+def _changed(drive: Drive, changes: Mapping[str, Change]) -> Drive | str:
     """The drive with changes, or why there is none such."""
     try:
-        return change(drive, changes)
+        return drive.replace(**changes)
     except SwashplateError as refusal:
         return str(refusal)
 

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from swashplate.analysis.outcomes import batch_outcomes
+from swashplate.analysis.outcomes import batch_outcomes, batch_speeds
 from swashplate.analysis.whatif import WhatIf, pulled
 from swashplate.campaign import Campaign
 from swashplate.documents import read_text
@@ -234,8 +234,6 @@ def _campaign_of(path: Path) -> Path:
 
 # --- bands ----------------------------------------------------------------------------------------
 
-MOST_SAMPLES = 150_000_000  # Samples of speed that a band may take: 1.2 GB.
-
 
 @dataclass(frozen=True, eq=False)
 class Bands(Result):
@@ -279,19 +277,13 @@ def bands(drawn: Draws, voltage: ArrayLike, rate: float = 512.0, *, level: float
     """
     if not 0.0 < level < 1.0:
         raise InputError(f"The level {level:g} of a band must lie between 0 and 1.")
-    volts, count = np.asarray(voltage, dtype=np.float64), len(drawn.drives)
-    if volts.size * count > MOST_SAMPLES:
-        raise InputError(
-            f"A band of {count} drives over {volts.size} samples takes too much memory: draw "
-            f"{MOST_SAMPLES // volts.size} drives at most, or give the command at a lower rate."
-        )
-    run = drawn.drives[0].simulate_many(drawn.columns, voltage=volts, rate=rate)
-    if run.failures:
-        raise DomainError(f"A drawn drive cannot be simulated: {next(iter(run.failures.values()))}")
-    assert run.output is not None
+    volts = np.asarray(voltage, dtype=np.float64)
+    speeds, failures = batch_speeds(drawn.drives[0], drawn.columns, volts, rate)
+    if failures:
+        raise DomainError(f"A drawn drive cannot be simulated: {next(iter(failures.values()))}")
     parts = 0.5 - 0.5 * level, 0.5, 0.5 + 0.5 * level
-    lower, median, upper = np.quantile(run.output, parts, axis=0, overwrite_input=True)
-    return Bands(np.arange(volts.size) / rate, lower, median, upper, level, count)
+    lower, median, upper = np.quantile(speeds, parts, axis=0, overwrite_input=True)
+    return Bands(np.arange(volts.size) / rate, lower, median, upper, level, len(speeds))
 
 
 def half_widths(result: WhatIf, draws: Draws, level: float = 0.95) -> Array:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from difflib import get_close_matches
 from functools import cached_property, partial
@@ -12,10 +11,9 @@ from typing import TYPE_CHECKING, Literal, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from swashplate.analysis.capability import saturation
 from swashplate.drive import Drive
-from swashplate.equations.marching.lanes import LANES
 from swashplate.errors import InputError
-from swashplate.executors import Serial, available_cores
 from swashplate.parameters.rules import FULL_VOLTAGE
 from swashplate.results import Result
 from swashplate.simulation.result import Limit
@@ -28,7 +26,6 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 REST = 0.5  # A command that rests at 0 V this long lets the drive settle at its creep. [s]
-STOPPED = 1.0 - 1e-9  # Part of the speed limit from which the plate counts as at its stop.
 TURNED = 0.05  # Part of its range by which a command may turn back and still go one way.
 
 # --- a command to judge drives by -----------------------------------------------------------------
@@ -128,14 +125,9 @@ def proportional_speed(drive: Drive, voltage: ArrayLike, *, limited: bool = True
 
 def speed_per_volt(drive: Drive, sign: float) -> float:
     """Speed limit of a direction by the voltage that first reaches it. [(rad/s)/V]"""
-    low, high = 0.0, FULL_VOLTAGE
+    saturated = saturation(drive, sign)
     limit = abs(drive.steady_speed(float(np.copysign(FULL_VOLTAGE, sign))))
-    for _ in range(4):  # each pass narrows the place a hundredfold
-        volts = np.linspace(low, high, 101)
-        stopped = np.abs(drive.steady_speed(np.copysign(volts, sign))) >= STOPPED * limit
-        first = max(int(np.argmax(stopped)), 1)
-        low, high = float(volts[first - 1]), float(volts[first])
-    return limit / high
+    return limit / (FULL_VOLTAGE if saturated is None else abs(saturated))
 
 
 # --- outcomes -------------------------------------------------------------------------------------
@@ -338,8 +330,7 @@ def rms_difference(speed: Array, other: Array) -> float:
 
 # --- many drives at once --------------------------------------------------------------------------
 
-SAMPLES_AT_ONCE = 2**20
-"""Samples of speed that a block of drives holds: 8 MB, whatever the number of drives."""
+MOST_SAMPLES = 150_000_000  # Samples of speed that are kept at once: 1.2 GB.
 
 
 class BatchOutcomes(NamedTuple):
@@ -350,15 +341,10 @@ class BatchOutcomes(NamedTuple):
     failures: Mapping[int, str]  # Why a drive could not be simulated, by its number.
 
 
-def batch_outcomes(
-    drive: Drive,
-    columns: Mapping[str, Array],
-    trial: Trial,
-    outcomes: Sequence[Outcome],
-    *,
-    threads: int | None = None,
-) -> BatchOutcomes:
-    """Simulate many variants of a drive over one command and keep only their outcomes.
+def batch_speeds(
+    drive: Drive, columns: Mapping[str, Array], voltage: Array, rate: float
+) -> tuple[Array, Mapping[int, str]]:
+    """Speeds (m, n) of many variants of a drive over a command, and why some failed, by number.
 
     Parameters
     ----------
@@ -366,40 +352,37 @@ def batch_outcomes(
         What is not varied.
     columns : mapping of str to (m,) array
         Values by symbol or column, one a variant, as `Drive.simulate_many` takes them. [SI]
-    trial : Trial
-        The command, from rest.
-    outcomes : sequence of Outcome
-        What to keep.
-    threads : int, optional
-        Blocks at once, one a core by default. The numbers do not depend on it.
+    voltage : (n,) array
+        From rest. [V]
+    rate : float
+        Samples a second. [Hz]
 
     Raises
     ------
     InputError
-        If the columns do not fit the drive or each other.
-
-    Notes
-    -----
-    Speeds are made block by block and dropped, so that memory grows with the outcomes alone.
+        If the columns do not fit the drive or each other, or the speeds take too much memory.
     """
     count = len(next(iter(columns.values())))
+    if voltage.size * count > MOST_SAMPLES:
+        raise InputError(
+            f"{count} drives over {voltage.size} samples take too much memory: take "
+            f"{MOST_SAMPLES // voltage.size} drives at most, or give the command at a lower rate."
+        )
+    run = drive.simulate_many(columns, voltage=voltage, rate=rate)
+    assert run.output is not None
+    return run.output, run.failures
 
-    def block(first: int, size: int) -> tuple[Array, dict[int, str]]:
-        part = {name: values[first : first + size] for name, values in columns.items()}
-        run = drive.simulate_many(part, voltage=trial.voltage, rate=trial.rate, executor=Serial())
-        assert run.output is not None
-        ran = np.ones(len(run.output), dtype=bool)
-        ran[list(run.failures)] = False
-        kept = np.full((ran.size, len(outcomes)), np.nan)
-        kept[ran] = outcome_matrix(run.output[ran], trial, outcomes)
-        return kept, {first + k: why for k, why in run.failures.items()}
 
-    # whole blocks of what the batch marches side by side
-    size = max(SAMPLES_AT_ONCE // trial.voltage.size // LANES * LANES, LANES)
-    with ThreadPoolExecutor(threads or available_cores()) as pool:
-        done = list(pool.map(partial(block, size=size), range(0, count, size)))
-    failures = {k: why for _, failed in done for k, why in failed.items()}
-    return BatchOutcomes(np.concatenate([kept for kept, _ in done]), failures)
+def batch_outcomes(
+    drive: Drive, columns: Mapping[str, Array], trial: Trial, outcomes: Sequence[Outcome]
+) -> BatchOutcomes:
+    """Outcomes of many variants of a drive over one command; see `batch_speeds`."""
+    speeds, failures = batch_speeds(drive, columns, trial.voltage, trial.rate)
+    ran = np.ones(len(speeds), dtype=bool)
+    ran[list(failures)] = False
+    values = np.full((ran.size, len(outcomes)), np.nan)
+    values[ran] = outcome_matrix(speeds[ran], trial, outcomes)
+    return BatchOutcomes(values, failures)
 
 
 # --- runs in words --------------------------------------------------------------------------------

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from itertools import product
-from math import ceil, copysign
 
 import numpy as np
 from numpy.typing import NDArray
@@ -312,25 +311,3 @@ def performance_table(found: Sizing, required: Requirements) -> Table:
         limit = wanted and Cell(wanted, f"{sign} {display_unit(unit).factor * wanted:.2f}")
         made.add(name.replace("_", " "), limit, before, after, unit=unit)
     return made
-
-
-def typed_factors(
-    found: Sizing, drive: Drive, required: Requirements, follow: Trial | None
-) -> dict[str, float]:
-    """Factors that someone can type: short, and still enough.
-
-    Each is rounded away from 1, to as few decimals, four or more, as meet what is required.
-    """
-    moved = {name: factor for name, factor in found.factors.items() if factor != 1.0}
-    for decimals in range(4, 9):
-        factors = {name: _away_from_one(factor, decimals) for name, factor in moved.items()}
-        after = performance(pulled(drive, factors), follow, direction=required.direction)
-        if min(required.slacks(after).values()) >= 0.0:
-            return factors
-    return moved
-
-
-def _away_from_one(factor: float, decimals: int) -> float:
-    # round() drops what only the factor's last bits are off a number of so many decimals
-    steps = ceil(round(abs(factor - 1.0) * 10.0**decimals, 6))
-    return 1.0 + copysign(steps, factor - 1.0) / 10.0**decimals

@@ -327,21 +327,6 @@ def levers_table() -> Table:
 # --- each lever by itself -------------------------------------------------------------------------
 
 
-def ranges_of(levers: Sequence[str], span: float = 0.1) -> dict[str, Range]:
-    """Factors 1 - span and 1 + span for each lever.
-
-    Raises
-    ------
-    InputError
-        For an unknown lever, none, or a span that is not between 0 and 1.
-    """
-    if not 0.0 < span < 1.0:
-        raise InputError(f"The span {span:g} of the factors must lie between 0 and 1.")
-    ranges = {find_lever(name).name: (1.0 - span, 1.0 + span) for name in levers}
-    check_ranges(ranges)
-    return ranges
-
-
 @dataclass(frozen=True, eq=False)
 class OneAtATime(Result):
     """Outcomes with each lever moved down and up by itself."""
@@ -381,7 +366,6 @@ def one_at_a_time(
     trial: Trial,
     *,
     outcomes: Sequence[str],
-    threads: int | None = None,
 ) -> OneAtATime:
     """Move each lever down and up by itself.
 
@@ -390,13 +374,11 @@ def one_at_a_time(
     drive : Drive
         As it is.
     ranges : mapping of str to (float, float)
-        Lower and upper factor by lever, see `ranges_of`. [1]
+        Lower and upper factor by lever, such as ``{"orifice": (0.9, 1.1)}``. [1]
     trial : Trial
         The command.
     outcomes : sequence of str
         Names in `outcomes.OUTCOMES`.
-    threads : int, optional
-        One a core by default.
 
     Raises
     ------
@@ -410,7 +392,7 @@ def one_at_a_time(
         factors[name][1 + 2 * number : 3 + 2 * number] = pair
     columns = pulled_columns(drive.parameters.numbers, factors)
     chosen = find_outcomes(outcomes)
-    found = batch_outcomes(drive, columns, trial, chosen, threads=threads)
+    found = batch_outcomes(drive, columns, trial, chosen)
     if 0 in found.failures:
         raise InputError(f"The drive as it is cannot follow this command: {found.failures[0]}")
     names = [AS_IS, *(f"{name} x {f:g}" for name, pair in ranges.items() for f in pair)]

@@ -63,15 +63,9 @@ CHANNELS: tuple[tuple[ChannelKind, str], ...] = (
     ("position", ROD),
 )
 UNITS: Mapping[str, ChannelKind] = {
-    "A": "rectified_current",
-    "mA": "rectified_current",
-    "counts": "encoder_counts",
-    "count": "encoder_counts",
-    "rad/s": "shaft_speed",
-    "deg/s": "shaft_speed",
-    "rpm": "shaft_speed",
-    "m/s": "shaft_speed",
-    "mm/s": "shaft_speed",
+    **dict.fromkeys(("A", "mA"), "rectified_current"),
+    **dict.fromkeys(("counts", "count"), "encoder_counts"),
+    **dict.fromkeys(("rad/s", "deg/s", "rpm", "m/s", "mm/s"), "shaft_speed"),
 }
 GIVEN = ("time", "voltage", "current")
 """What one column alone can be said to be."""

@@ -170,15 +170,22 @@ class _Trace:
 def _trace(time: ArrayLike, voltage: ArrayLike, unit: str) -> _Trace:
     stamps = increasing(time) if np.size(time) > 1 else row("time", time)
     values = signal("input", voltage, stamps.size)
-    steps = np.diff(stamps)
     noise = _noise(stamps, values)
-    zero, error = _rest(values, noise)
+    # the mean of what the record begins with, as long as it stays there
+    zero, count = float(np.median(values[:3])), 3
+    for _ in range(2):
+        away = np.abs(values - zero) > SURE * noise + 1e-12 * abs(zero)
+        stays = int(away.argmax()) if away.any() else values.size
+        # the second half may hold the beginning of a slow ramp
+        count = max(stays // 2, 3)
+        zero = float(values[:count].mean())
     values = values - zero
     peak = float(np.abs(values).max())
     smallest = SMALLEST_VOLTS if unit == "V" else 0.0
     # more noise than that may well be what is commanded
     least = max(smallest, min(SURE * noise, SURE * smallest), 1e-12 * abs(zero))
-    spacing = float(np.median(steps)) if steps.size else 0.0
+    spacing = float(np.median(np.diff(stamps))) if stamps.size > 1 else 0.0
+    error = noise / count**0.5
     return _Trace(stamps, values, zero, error, min(noise, 0.05 * peak), least, peak, spacing)
 
 
@@ -200,18 +207,6 @@ def _noise(time: Array, values: Array) -> float:
     # of a command without noise the smallest change is no converter's step, but a part of it
     quantum = min(0.3 * smallest, 0.002 * float(np.ptp(values)))
     return max(float(np.median(np.abs(deviation))) / 0.6745, quantum)
-
-
-def _rest(values: Array, noise: float) -> tuple[float, float]:
-    """Mean of what the record begins with, as long as it stays there, and its standard error."""
-    zero, count = float(np.median(values[:3])), 3
-    for _ in range(2):
-        away = np.abs(values - zero) > SURE * noise + 1e-12 * abs(zero)
-        stays = int(away.argmax()) if away.any() else values.size
-        # the second half may hold the beginning of a slow ramp
-        count = max(stays // 2, 3)
-        zero = float(values[:count].mean())
-    return zero, noise / float(np.sqrt(count))
 
 
 # --- how a command ends, and whether a model of it will do ----------------------------------------

@@ -39,26 +39,48 @@ class Kind(NamedTuple):
     """SI units that it may have; the first is meant where none is given. None: as written."""
     meaning: str
     """In words, with its sign convention."""
+    signal: str = ""
+    """Simulated signal that it is compared with; none of an input or of anything else."""
 
 
 KINDS: dict[str, Kind] = {
     "voltage": Kind(("V",), "the card's command, positive towards positive speed"),
     "current": Kind(("A",), "signed current that drives the pump without a card"),
-    "signed_current": Kind(("A",), "positive solenoid's current less the negative one's"),
-    "rectified_current": Kind(("A",), "|I+| + |I-|, one ammeter around both leads"),
-    "current_plus": Kind(("A",), "current of the positive solenoid, a magnitude"),
-    "current_minus": Kind(("A",), "current of the negative solenoid, a magnitude"),
-    "shaft_speed": Kind(("rad/s", "m/s"), "speed of the shaft, or of a cylinder's rod"),
-    "position": Kind(("rad", "m"), "integral of the speed from a free zero"),
-    "encoder_counts": Kind(("rad",), "counts of an encoder; an angle from a free zero"),
-    "stroker_pressure": Kind(("Pa",), "stroking pressure about its equilibrium"),
-    "swash_angle": Kind(("rad",), "angle of the swash plate, positive with the speed"),
-    "spool_position": Kind(("m",), "displacement of the spool, positive with the force"),
+    "signed_current": Kind(
+        ("A",), "positive solenoid's current less the negative one's", "current"
+    ),
+    "rectified_current": Kind(("A",), "|I+| + |I-|, one ammeter around both leads", "current_sum"),
+    "current_plus": Kind(
+        ("A",), "current of the positive solenoid, a magnitude", "current_positive"
+    ),
+    "current_minus": Kind(
+        ("A",), "current of the negative solenoid, a magnitude", "current_negative"
+    ),
+    "shaft_speed": Kind(
+        ("rad/s", "m/s"), "speed of the shaft, or of a cylinder's rod", "shaft_speed"
+    ),
+    "position": Kind(("rad", "m"), "integral of the speed from a free zero", "shaft_position"),
+    "encoder_counts": Kind(
+        ("rad",), "counts of an encoder; an angle from a free zero", "shaft_position"
+    ),
+    "stroker_pressure": Kind(
+        ("Pa",), "stroking pressure about its equilibrium", "stroker_pressure"
+    ),
+    "swash_angle": Kind(
+        ("rad",), "angle of the swash plate, positive with the speed", "swash_angle"
+    ),
+    "spool_position": Kind(
+        ("m",), "displacement of the spool, positive with the force", "spool_position"
+    ),
     "other": Kind((), "anything else, kept in the unit that it is written in"),
 }
 """Every kind of input and channel, by its name in a campaign file."""
 
 CHANNEL_KINDS: tuple[ChannelKind, ...] = get_args(ChannelKind)
+SIGNALS: Mapping[ChannelKind, str] = {
+    kind: KINDS[kind].signal for kind in CHANNEL_KINDS if KINDS[kind].signal
+}
+"""Simulated signals by the kinds of channel that measure them."""
 
 
 def conversion(kind: str, unit: str | None, what: str) -> tuple[str, float, float]:

@@ -9,9 +9,6 @@ from typing import TYPE_CHECKING
 
 from swashplate.cli.options import (
     AxisName,
-    CampaignPath,
-    SetupWord,
-    StartWord,
     TableFile,
 )
 from swashplate.cli.terminal import Outputs, note, say, show, working
@@ -37,10 +34,11 @@ LEGEND = (
 
 
 def excitation(
-    path: CampaignPath = Path("campaign.toml"),
+    path: Path = Path("campaign.toml"),
+    *,
     axis: AxisName = None,
-    setup: SetupWord = None,
-    begin: StartWord = None,
+    setup: str | None = None,
+    begin: str | None = None,
     out: TableFile = None,
 ) -> None:
     """Show before a fit which parameters the runs determine, and what to fix.
@@ -54,10 +52,10 @@ def excitation(
       swashplate excitation harbour/campaign.toml --setup mine.toml --from worn.toml
       swashplate excitation harbour/campaign.toml --out runs.csv
     """
-    from swashplate.identification.data_checks import check_sound, refuse_unsound
+    from swashplate.identification.data_checks import check_runs, refuse_unsound
+    from swashplate.identification.drive_model import setup_of
     from swashplate.identification.experiment_design import outlook
     from swashplate.identification.fitting import smooth
-    from swashplate.identification.staging import setup_of
     from swashplate.identification.tables import outlook_table
 
     files = Outputs((out, TABLE))
@@ -67,7 +65,7 @@ def excitation(
         drive = parameters_of(begin) if begin is not None else campaign.drive(chosen).parameters
         runs = runs_to_fit(campaign, chosen)
     with working("Simulating"):
-        doubts = refuse_unsound(check_sound(runs, smooth(drive), plan, rank=False))
+        doubts = refuse_unsound(check_runs(runs, smooth(drive)))
         looks = [outlook(stage, smooth(drive), runs) for stage in plan.stages]
     names = [each.name for each in runs]
     shown = [outlook_table(look, names) for look in looks]
@@ -94,7 +92,7 @@ def advise(
     *,
     drive: str | None = None,
     axis: AxisName = None,
-    setup: SetupWord = None,
+    setup: str | None = None,
     free: list[str] | None = None,
     maneuver: list[str] | None = None,
     top: int = 10,
@@ -176,10 +174,10 @@ def _bench(
     free: Sequence[str],
 ) -> Bench:
     from swashplate.drive import Drive
+    from swashplate.identification.drive_model import setup_of
     from swashplate.identification.experiment_design import bench, default_sensors
     from swashplate.identification.fitting import smooth
     from swashplate.identification.setup import load_setup
-    from swashplate.identification.staging import setup_of
 
     if file_kind(Path(word)) != "campaign":
         if axis is not None:

@@ -12,9 +12,7 @@ import typer
 
 from swashplate.cli.options import (
     AxisName,
-    CampaignPath,
     DriveChoice,
-    Seed,
     command,
 )
 from swashplate.cli.terminal import (
@@ -118,7 +116,7 @@ def _from(folder: Path, drive: str | None) -> str | None:
     return (place.relative_to(root) if place.is_relative_to(root) else place).as_posix()
 
 
-def check(path: CampaignPath = CAMPAIGN, *, strict: bool = False) -> None:
+def check(path: Path = CAMPAIGN, *, strict: bool = False) -> None:
     """Check a campaign and the measurements in all its logs.
 
     Each signal's rate, jitter, longest interval, range, clipping and lost
@@ -175,7 +173,7 @@ def check(path: CampaignPath = CAMPAIGN, *, strict: bool = False) -> None:
 
 
 def plot(
-    path: CampaignPath = CAMPAIGN,
+    path: Path = CAMPAIGN,
     *,
     out: Path = Path("campaign.png"),
     run: str | None = None,
@@ -270,7 +268,7 @@ def rig(
     drive: DriveChoice,
     *,
     out: Path,
-    seed: Seed = 1,
+    seed: int = 1,
     severity: Severity = "realistic",
     backlash_deg: float = 0.0,
     perturb: float = 0.0,
@@ -326,7 +324,7 @@ def rig(
     note(f"Truth:    {path.parent / 'truth'} (open it only after the fit)")
 
 
-def guess(path: CampaignPath = CAMPAIGN, *, axis: AxisName = None, out: Path | None = None) -> None:
+def guess(path: Path = CAMPAIGN, *, axis: AxisName = None, out: Path | None = None) -> None:
     """Read a machine's dead zones, gains, limits, delay and lag off its logs.
 
     For a machine of unknown numbers: needs the command and a speed or a position,

@@ -21,6 +21,7 @@ EXTRAS = {
     "dask": ("distributed", "fit --dask: many starts on a cluster"),
     "fmu": ("fmpy", "an FMU compared with the drive, export.compare"),
     "mdf": ("asammdf", "logs in ASAM MDF 4 (.mf4)"),
+    "mpc": ("osqp", "the example of predictive control of a crane"),
     "tdms": ("npTDMS", "logs in National Instruments' TDMS"),
 }
 """Library of each optional extra, and what it enables."""

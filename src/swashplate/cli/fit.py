@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING, Annotated, Literal
@@ -11,12 +10,7 @@ import typer
 
 from swashplate.cli.options import (
     AxisName,
-    CampaignPath,
-    OwnModel,
     Required,
-    Seed,
-    SetupWord,
-    StartWord,
     option,
 )
 from swashplate.cli.terminal import (
@@ -52,9 +46,8 @@ from swashplate.tables import (
 if TYPE_CHECKING:
     from swashplate.campaign import Campaign
     from swashplate.identification.assessment import Judged
+    from swashplate.identification.drive_model import Parameters
     from swashplate.identification.solving import Progress, StartResult
-    from swashplate.identification.staging import Parameters
-    from swashplate.identification.validation import RunQuality
     from swashplate.identification.verdict import Verdict
     from swashplate.parameters.parameter_set import ParameterSet
 
@@ -81,20 +74,22 @@ CAMPAIGN = Path("campaign.toml")
 
 
 def fit(
-    path: CampaignPath = CAMPAIGN,
+    path: Path = CAMPAIGN,
     *,
     out: Path = Path("fitted"),
     axis: AxisName = None,
-    setup: SetupWord = None,
-    model: OwnModel = None,
+    setup: str | None = None,
+    model: Path | None = None,
     joint: bool = False,
-    begin: StartWord = None,
+    begin: str | None = None,
     starts: int = 0,
-    evaluations: int = MOST_EVALUATIONS,
+    evaluations: Annotated[
+        int, option("Evaluations of the model that a search may take.", min=1, metavar="N")
+    ] = MOST_EVALUATIONS,
     folds: int = 0,
     bootstrap: int = 0,
     profile: list[str] | None = None,
-    seed: Seed = 0,
+    seed: int = 0,
     jobs: int = 0,
     dask: str | None = None,
     resume: bool = False,
@@ -147,10 +142,10 @@ def fit(
     with working("Starting"):
         from swashplate.executors import Dask, Processes
         from swashplate.identification.assessment import Wanted, judge_fit
-        from swashplate.identification.fitting import Search, refined
+        from swashplate.identification.drive_model import setup_of
+        from swashplate.identification.fitting import Search
         from swashplate.identification.fitting import fit as fitted
         from swashplate.identification.setup import ModelSetup
-        from swashplate.identification.staging import setup_of
     with working(f"Reading {path}"):
         campaign, chosen = campaign_of(path, axis)
         runs = runs_to_fit(campaign, chosen)
@@ -167,7 +162,10 @@ def fit(
     with long_work("Fitting") as shown:
 
         def watch(stage: str, now: Progress) -> None:
-            shown(f"{stage}: iteration {now.iteration}, cost {now.cost:.6g}")
+            shown(
+                f"{stage}: iteration {now.iteration}, evaluation {now.evaluations} of at most "
+                f"{evaluations}, cost {now.cost:.6g}"
+            )
 
         def ended(stage: str, one: StartResult, done: int) -> None:
             words = f"{stage}: {done} of {starts + 1} starts, the last to cost {one.cost:.6g}"
@@ -184,7 +182,9 @@ def fit(
             watch=watch,
         )
         if joint and len(plan.stages) > 1 and not result.interrupted:
-            result = refined(result, runs, max_evaluations=evaluations, watch=watch)
+            # from where the stages ended: from afar a joint fit is often caught on its way
+            staged, whole = result.parameters, plan.joint()
+            result = fitted(staged, runs, whole, max_evaluations=evaluations, watch=watch)
     searched = perf_counter()
     if result.interrupted and starts:
         last = result.stages[-1]
@@ -317,10 +317,10 @@ def _say_verdict(verdict: Verdict) -> None:
 
 def validate(
     drive: str,
-    path: CampaignPath = CAMPAIGN,
+    path: Path = CAMPAIGN,
     *,
     axis: AxisName = None,
-    model: OwnModel = None,
+    model: Path | None = None,
     role: Role = "validate",
     out: Path | None = None,
     require: Required = 10.0,
@@ -365,10 +365,17 @@ def validate(
             raise InputError(f"{path}: all samples of these runs are ignored; nothing is left.")
         judged = verdict((), predicted, required=require / 100.0)
         qualities = with_speeds(predicted)
-    lines = []
     if out is not None:
+        from swashplate.identification.assessment import versions
+        from swashplate.report.fit_report import write_validation_report
+
         with working("Writing the report"):
-            lines = _validation_written(parameters, campaign, predicted, judged, out, drive)
+            made_folder(out)
+            joined(tables.runs_tables(qualities)).write(out / "measures.csv")
+            page, notes = out / "report.html", {**versions(), "drive from": drive}
+            write_validation_report(
+                parameters, campaign, page, predicted, judged=judged, notes=notes
+            )
     virtual = " (virtual)" if campaign.virtual else ""
     note(f"{campaign.title}{virtual}, {chosen}: {parameters.name} from {drive}")
     show(*tables.runs_tables(qualities))
@@ -376,39 +383,17 @@ def validate(
     show(tables.residual_table(predicted))
     say(RESIDUALS)
     bullets(judged.sentences)
-    for line in lines:
-        note(line)
+    if out is not None:
+        note(f"Measures:  {out / 'measures.csv'}")
+        note(f"Report:    {out / 'report.html'}")
     _say_verdict(judged)
-
-
-def _validation_written(
-    parameters: Parameters,
-    campaign: Campaign,
-    predicted: Sequence[RunQuality],
-    judged: Verdict,
-    out: Path,
-    drive: str,
-) -> list[str]:
-    """Write the report and its tables; lines that say so."""
-    from swashplate.identification.assessment import versions
-    from swashplate.identification.tables import runs_tables
-    from swashplate.identification.validation import with_speeds
-    from swashplate.report.fit_report import write_validation_report
-
-    made_folder(out)
-    joined(runs_tables(with_speeds(predicted))).write(out / "measures.csv")
-    notes = {**versions(), "drive from": drive}
-    write_validation_report(
-        parameters, campaign, out / "report.html", predicted, judged=judged, notes=notes
-    )
-    return [f"Measures:  {out / 'measures.csv'}", f"Report:    {out / 'report.html'}"]
 
 
 def report(
     fitted: Path,
-    path: CampaignPath = CAMPAIGN,
+    path: Path = CAMPAIGN,
     *,
-    model: OwnModel = None,
+    model: Path | None = None,
     pdf: Path | None = None,
     data: Path | None = None,
     truth: str | None = None,
@@ -476,7 +461,7 @@ def _stored(fitted: Path, place: Path, campaign: Campaign, model: Path | None) -
     return stored
 
 
-def demo(*, out: Path = Path("demo"), seed: Seed = 1) -> None:
+def demo(*, out: Path = Path("demo"), seed: int = 1) -> None:
     """Identify a virtual hoist from its tests, and compare it with the truth.
 
     Draws a hoist that differs from the published one, logs the 13 tests of
@@ -494,9 +479,8 @@ def demo(*, out: Path = Path("demo"), seed: Seed = 1) -> None:
     from swashplate.campaign import Campaign, rig
     from swashplate.drive import Drive
     from swashplate.identification.assessment import Wanted, judge_fit
-    from swashplate.identification.fitting import fit
+    from swashplate.identification.fitting import drawn, fit
     from swashplate.identification.setup import load_setup
-    from swashplate.identification.staging import drawn
     from swashplate.identification.tables import estimates_table, runs_tables, truth_count
 
     if not (out / "virtual" / "truth").is_dir():  # an earlier demo is replaced, nothing else

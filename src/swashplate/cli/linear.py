@@ -147,7 +147,7 @@ def bode(
         linear = None if linear_at is None else _linear(drive.chosen, linear_at)
         grid = np.union1d(np.geomspace(lowest, highest, points), [frequency])
         response = drive.chosen.frequency_response(grid, amplitudes or AMPLITUDES, bias=bias)
-        made = response_table(response.at(frequency))
+        made = response_table(response, frequency)
     files.write(out, "Gain, phase and distortion, in SI", response.write)
     files.draw(plot, "plot_bode", response, linear=linear, mark=frequency)
     span = f"{grid.size} frequencies from {grid[0]:g} to {grid[-1]:g} Hz"

@@ -8,11 +8,11 @@ from __future__ import annotations
 
 import inspect
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import MISSING, dataclass, fields, is_dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal, get_type_hints
+from typing import TYPE_CHECKING, Annotated, Any, Literal, get_origin, get_type_hints
 
 import typer
 
@@ -36,89 +36,53 @@ def argument(metavar: str, help: str) -> Any:
     return typer.Argument(metavar=metavar, help=help, show_default=False)
 
 
-DriveWord = Annotated[
-    str,
-    argument(
-        "AXIS|SET.toml",
-        "A packaged drive (see 'swashplate axes'), your own TOML file, or the folder of a fit.",
-    ),
+AxisName = Annotated[
+    str | None, option("The axis, where the campaign has several.", metavar="NAME")
 ]
-CommandWord = Annotated[
-    str,
-    argument(
-        "MANEUVER|FILE",
-        'A maneuver such as step:9 or "step +9 V", or a log with columns of time and voltage: '
-        "text such as .csv, .parquet, .mat, .h5, .tdms or .mf4; a column may carry its unit: "
-        "'time \\[ms]'.",
-    ),
-]
-CampaignPath = Annotated[Path, argument("CAMPAIGN.toml", "The campaign file, beside its logs.")]
-AxisName = Annotated[str | None, option("The axis, where the campaign has several.")]
-SetupWord = Annotated[
-    str | None,
-    option(
-        "What is free: a packaged fit configuration (hoist, slew, luff, neutral ...) or your own "
-        "TOML file; by default the one of the axis's drive.",
-        metavar="NAME|FILE",
-    ),
-]
-StartWord = Annotated[
-    str | None,
-    option("Begin at this drive instead of the campaign's.", "--from", metavar="AXIS|SET.toml"),
-]
-OwnModel = Annotated[
-    Path | None,
-    option(
-        "A Python file with a model of your own and what is free of it.",
-        "--model",
-        metavar="FILE.py",
-    ),
-]
-Rate = Annotated[float, option("Samples a second, 10 to 100000.", metavar="HZ")]
 TableFile = Annotated[
     Path | None, option("Write all numbers, in SI, to a .csv or .parquet file.", metavar="FILE")
 ]
-SetFile = Annotated[
-    Path | None, option("Write the changed drive as a parameter file.", metavar="SET.toml")
-]
 FigureFile = Annotated[Path | None, option("Draw a figure: .png, .svg or .pdf.", metavar="FILE")]
 Required = Annotated[float, option("Largest error of held-out runs, in % of their range.", min=0.0)]
-Seed = Annotated[int, option("Of everything drawn at random.", min=0)]
-Levers = Annotated[
-    list[str] | None,
-    option(
-        "A lever or parameter, by itself or with its lowest and highest factor; may be repeated. "
-        "'swashplate whatif --levers' lists them.",
-        "--lever",
-        metavar="LEVER[=LOW/HIGH]",
-    ),
-]
-Values = Annotated[
-    list[str] | None,
-    option(
-        "Another value for a parameter: Z16=1.2e-4 in SI, Z16=1.2e-4/1.5e-4 for plus and minus, "
-        "Z16_plus=0.12mm with a unit. May be repeated.",
-        "--set",
-        metavar="NAME=VALUE",
-    ),
-]
-Factors = Annotated[
-    list[str] | None,
-    option(
-        "A factor on a parameter or a lever, after --set: Z16=1.5, orifice=1.5. May be repeated.",
-        "--scale",
-        metavar="NAME=FACTOR",
-    ),
-]
+
+SHARED = """
+  begin --from AXIS|SET.toml: Begin at this drive instead of the campaign's.
+  clip: Clip a voltage beyond ±10 V instead of refusing it.
+  column NAME: Column of the voltage in FILE.
+  command MANEUVER|FILE: A maneuver such as step:9 or "step +9 V", or a log with columns of time and
+      voltage: text such as .csv, .parquet, .mat, .h5, .tdms or .mf4; a column may carry its unit:
+      'time \\[ms]'.
+  drive AXIS|SET.toml: A packaged drive (see 'swashplate axes'), your own TOML file, or the folder
+      of a fit.
+  factors --scale NAME=FACTOR: A factor on a parameter or a lever, after --set: Z16=1.5,
+      orifice=1.5. May be repeated.
+  force: Replace older files.
+  interpolation: The voltage between rows or samples: linear, or zero-order hold. Must be given with
+      a FILE.
+  levers --lever LEVER[=LOW/HIGH]: A lever or parameter, by itself or with its lowest and highest
+      factor; may be repeated. 'swashplate whatif --levers' lists them.
+  model FILE.py: A Python file with a model of your own and what is free of it.
+  path CAMPAIGN.toml: The campaign file, beside its logs.
+  rate HZ: Samples a second, 10 to 100000.
+  seed: Of everything drawn at random.
+  setup NAME|FILE: What is free: a packaged fit configuration (hoist, slew, luff, neutral ...) or
+      your own TOML file; by default the one of the axis's drive.
+  start: Start from rest at 0 V, or settled at the first voltage.
+  time_column NAME: Column of the time in FILE.
+  units UNIT,UNIT: Units to show, such as rpm,bar; m/min is of rope, with --drum.
+  values --set NAME=VALUE: Another value for a parameter: Z16=1.2e-4 in SI, Z16=1.2e-4/1.5e-4 for
+      plus and minus, Z16_plus=0.12mm with a unit. May be repeated.
+"""
+"""Parameters that several commands have, described as in a command's own docstring."""
 
 
 @dataclass(frozen=True)
 class DriveChoice:
     """A drive as the command line names it, with values set and then scaled."""
 
-    drive: DriveWord
-    values: Values = None
-    factors: Factors = None
+    drive: str
+    values: list[str] | None = None
+    factors: list[str] | None = None
 
     @cached_property
     def chosen(self) -> Drive:
@@ -159,16 +123,10 @@ class DriveChoice:
 class Sampling:
     """How a command is sampled, and read where it is a file."""
 
-    rate: Rate = 512.0
-    interpolation: Annotated[
-        Interpolation | None,
-        option(
-            "The voltage between rows or samples: linear, or zero-order hold. Must "
-            "be given with a FILE."
-        ),
-    ] = None
-    time_column: Annotated[str, option("Column of the time in FILE.", metavar="NAME")] = "time"
-    column: Annotated[str, option("Column of the voltage in FILE.", metavar="NAME")] = "voltage"
+    rate: float = 512.0
+    interpolation: Interpolation | None = None
+    time_column: str = "time"
+    column: str = "voltage"
 
     @property
     def start(self) -> Start:
@@ -185,28 +143,22 @@ class Sampling:
 class Simulating(Sampling):
     """How a command is sampled, and simulated."""
 
-    start: Annotated[Start, option("Start from rest at 0 V, or settled at the first voltage.")] = (
-        "rest"
-    )
-    clip: Annotated[
-        bool, option("Clip a voltage beyond ±10 V instead of refusing it.", "--clip")
-    ] = False
+    start: Start = "rest"
+    clip: bool = False
 
 
 @dataclass(frozen=True)
 class Replacing:
     """Whether files that are there may be replaced."""
 
-    force: Annotated[bool, option("Replace older files.", "--force")] = False
+    force: bool = False
 
 
 @dataclass(frozen=True)
 class ShownUnits:
     """Units that tables and figures are shown in."""
 
-    units: Annotated[
-        str, option("Units to show, such as rpm,bar; m/min is of rope, with --drum.")
-    ] = ""
+    units: str = ""
     drum: Annotated[
         float | None, option("Diameter of the drum on the shaft.", metavar="M", min=0.0)
     ] = None
@@ -235,22 +187,19 @@ def command(
         text = inspect.cleandoc(function.__doc__ or "")
         text, head, shown = text.partition("\n\nFor example:")
         text, _, entries = text.partition("\n\nOptions:\n")
-        said = {found[1]: found for found in _ENTRY.finditer(entries)}
+        said = {found[1]: found for found in _ENTRY.finditer(SHARED + entries)}
         hints = get_type_hints(function, include_extras=True)
         given = inspect.signature(function).parameters.values()
-        for each in given:
-            if each.name in said:
-                hints[each.name] = _described(each, hints[each.name], said[each.name])
         groups = {each.name: hints[each.name] for each in given if is_dataclass(hints[each.name])}
         flat = []
         for each in given:
             if each.name in groups:
                 flat += _spread(groups[each.name])
             else:
-                kind = inspect.Parameter.KEYWORD_ONLY
-                flat.append(each.replace(annotation=hints[each.name], kind=kind))
+                flat.append(each.replace(annotation=hints[each.name]))
         flat += _spread(Replacing) if WRITTEN & {each.name for each in given} else []
         flat += _spread(ShownUnits) if name not in UNITLESS else []
+        flat = [_described(each, said) for each in flat]
 
         def run(**words: Any) -> None:
             units, drum = words.pop("units", ""), words.pop("drum", None)
@@ -274,14 +223,19 @@ def command(
     return register
 
 
-def _described(given: inspect.Parameter, kind: Any, said: re.Match[str]) -> Any:
-    """Typer's description of a parameter, from its entry."""
-    name, flags, metavar, words = said[1], said[2].split(), said[3], " ".join(said[4].split())
-    if given.kind is not inspect.Parameter.KEYWORD_ONLY:
-        return Annotated[kind, argument(metavar, words)]
-    flags = flags or ([f"--{name}"] if kind is bool else [])
-    least = {"min": 0} if kind is int else {}
-    return Annotated[kind, option(words, *flags, metavar=metavar or None, **least)]
+def _described(given: inspect.Parameter, entries: Mapping[str, re.Match[str]]) -> inspect.Parameter:
+    """A parameter as Typer reads it, from its entry unless its type describes it."""
+    kind, own = given.annotation, entries.get(given.name)
+    if own is not None and get_origin(kind) is not Annotated:
+        flags, metavar, words = own[2].split(), own[3], " ".join(own[4].split())
+        flags = flags or ([f"--{given.name}"] if kind is bool else [])
+        least = {"min": 0} if kind is int else {}
+        # a switch takes nothing, which Typer would show as <bool>
+        metavar = metavar or {bool: " ", int: "N", float: "X"}.get(kind)
+        more = option(words, *flags, metavar=metavar, **least)
+        is_option = given.kind is inspect.Parameter.KEYWORD_ONLY
+        kind = Annotated[kind, more if is_option else argument(own[3] or given.name.upper(), words)]
+    return given.replace(annotation=kind, kind=inspect.Parameter.KEYWORD_ONLY)
 
 
 def _spread(group: Any) -> list[inspect.Parameter]:
@@ -289,7 +243,10 @@ def _spread(group: Any) -> list[inspect.Parameter]:
     return [
         inspect.Parameter(
             each.name,
-            inspect.Parameter.KEYWORD_ONLY,
+            # what must be given is an argument
+            inspect.Parameter.POSITIONAL_OR_KEYWORD
+            if each.default is MISSING
+            else inspect.Parameter.KEYWORD_ONLY,
             default=inspect.Parameter.empty if each.default is MISSING else each.default,
             annotation=hints[each.name],
         )

@@ -9,10 +9,8 @@ from typing import TYPE_CHECKING
 import typer
 
 from swashplate.cli.options import (
-    CommandWord,
     DriveChoice,
     FigureFile,
-    Rate,
     Simulating,
     TableFile,
 )
@@ -34,7 +32,7 @@ if TYPE_CHECKING:
 
 def simulate(
     drive: DriveChoice,
-    command: CommandWord,
+    command: str,
     *,
     sampling: Simulating,
     out: TableFile = None,
@@ -82,7 +80,7 @@ def compare(
     second: str,
     *,
     maneuver: str = "step:9",
-    rate: Rate = 512.0,
+    rate: float = 512.0,
     plot: FigureFile = None,
     out: TableFile = None,
 ) -> None:

@@ -12,11 +12,8 @@ import typer
 
 from swashplate.cli.options import (
     DriveChoice,
-    DriveWord,
     FigureFile,
-    Levers,
     Sampling,
-    SetFile,
     Simulating,
     TableFile,
     option,
@@ -130,16 +127,6 @@ def _say_shares(
         show(shares)
     for sentence in found.sentences():
         say(sentence)
-    first = found.first
-    if first is None or first.eased_error is None or drive.changes:
-        return
-    if sampling.start == "rest" and not sampling.clip:
-        say(found.eased_sentence())
-    if sampling == Simulating():  # a log or another rate: the reader knows how to type it
-        words = ["swashplate", "whatif", drive.drive]
-        for lever, factor in first.eased_by.items():
-            words += ["--scale", f"{lever}={factor:.6g}"]
-        note(f"See more of it: {shlex.join([*words, '--maneuver', command])}")
 
 
 def _list_levers(asked: bool) -> None:
@@ -151,14 +138,14 @@ def _list_levers(asked: bool) -> None:
 
 
 def whatif(
-    drive: DriveWord,
+    drive: str,
     *,
     factors: list[str],
     maneuver: str = "sine:9,0.1",
     uncertainty: Path | None = None,
     campaign: Path | None = None,
     plot: FigureFile = None,
-    out: SetFile = None,
+    out: Path | None = None,
     levers: Annotated[
         bool, option("List the levers and end.", "--levers", callback=_list_levers, is_eager=True)
     ] = False,
@@ -176,6 +163,7 @@ def whatif(
           --levers), or on a parameter: Z16_plus=1.2. May be repeated.
       maneuver NAME|FILE: Command for both: a maneuver such as step:9 or "step +9 V", or a log.
       uncertainty DIR: Folder that 'fit' wrote: bands from the errors of its estimates.
+      out SET.toml: Write the changed drive as a parameter file.
       campaign CAMPAIGN.toml: The campaign of that fit, if it is not where it was.
 
     For example:
@@ -237,8 +225,8 @@ def size(
     tracking_deg_s: float | None = None,
     maneuver: str | None = None,
     direction: Direction = "both",
-    levers: Levers = None,
-    out: SetFile = None,
+    levers: list[str] | None = None,
+    out: Path | None = None,
 ) -> None:
     """Find the smallest change that meets what is required.
 
@@ -253,6 +241,7 @@ def size(
       maneuver NAME: What is to be followed: the speed in proportion to this maneuver's voltage, at
           the ratio of the drive as it is. Each candidate is commanded in proportion to it, at its
           own ratio.
+      out SET.toml: Write the changed drive as a parameter file.
       direction: Where speed and acceleration are required.
 
     For example:
@@ -284,9 +273,8 @@ def size(
         say("The drive meets it as it is; nothing needs to be changed.")
     elif not drive.changes:  # whatif begins at a drive as its file has it
         words = ["swashplate", "whatif", drive.drive]
-        typed = sizing.typed_factors(found, drive.chosen, required, follow)
-        for name, factor in typed.items():
-            words += ["--scale", f"{name}={factor:.9g}"]
+        for name, factor in found.factors.items():
+            words += ["--scale", f"{name}={factor!r}"] if factor != 1.0 else []
         note(f"See it over a command: {shlex.join(words)}")
     files.say()
 
@@ -294,7 +282,7 @@ def size(
 def sensitivity(
     drive: DriveChoice,
     *,
-    levers: Levers = None,
+    levers: list[str] | None = None,
     outcomes: list[str] | None = None,
     maneuver: str = "step:9",
     plot: FigureFile = None,

@@ -8,7 +8,6 @@ from functools import cached_property, lru_cache
 from importlib.resources import files
 from math import cos, degrees, isfinite, radians, sin
 from pathlib import Path
-from types import MappingProxyType
 from typing import TYPE_CHECKING, Annotated, Any, Literal, Protocol, Unpack
 
 from numpy.typing import ArrayLike
@@ -58,40 +57,22 @@ class Quantity(BaseModel):
     source: str = ""
 
 
-class Quantities(BaseModel):
-    """Geometry of a crane."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-    boom_length: Quantity
-    foot_offset: Quantity
-    slew_axis: Quantity
-    tower_sheave_distance: Quantity
-    tower_sheave_angle: Quantity
-    hoist_drum_radius: Quantity
-    hoist_falls: Quantity
-    luff_drum_radius: Quantity
-    luff_falls: Quantity
-    rope_coupling: Quantity
-    safe_load: Quantity
-    boom_limits: Quantity
-    rope_limits: Quantity
-
-
-UNITS: Mapping[str, tuple[str, int]] = {
-    **dict.fromkeys(Quantities.model_fields, ("m", 1)),
-    "slew_axis": ("m", 3),
-    "tower_sheave_angle": ("rad", 1),
-    **dict.fromkeys(("hoist_falls", "luff_falls", "rope_coupling"), ("1", 1)),
-    "safe_load": ("kg", 1),
-    "boom_limits": ("rad", 2),
-    "rope_limits": ("m", 2),
+GEOMETRY: Mapping[str, tuple[str, int, Literal["above 0", "at least 0", ""]]] = {
+    "boom_length": ("m", 1, "above 0"),
+    "foot_offset": ("m", 1, "at least 0"),
+    "slew_axis": ("m", 3, ""),
+    "tower_sheave_distance": ("m", 1, "above 0"),
+    "tower_sheave_angle": ("rad", 1, ""),
+    "hoist_drum_radius": ("m", 1, "above 0"),
+    "hoist_falls": ("1", 1, "above 0"),
+    "luff_drum_radius": ("m", 1, "above 0"),
+    "luff_falls": ("1", 1, "above 0"),
+    "rope_coupling": ("1", 1, "at least 0"),
+    "safe_load": ("kg", 1, "above 0"),
+    "boom_limits": ("rad", 2, ""),
+    "rope_limits": ("m", 2, ""),
 }
-"""SI unit of each quantity, and how many numbers it has."""
-ABOVE_ZERO = (
-    *("boom_length", "tower_sheave_distance", "hoist_drum_radius", "hoist_falls"),
-    *("luff_drum_radius", "luff_falls", "safe_load"),
-)
+"""Quantities of a crane: SI unit, how many numbers it has, and their range."""
 
 
 class CraneFile(BaseModel):
@@ -103,7 +84,7 @@ class CraneFile(BaseModel):
     name: str
     title: str = ""
     drives: Annotated[dict[Literal["hoist", "slew", "luff"], str], Field(min_length=3)]
-    geometry: Quantities
+    geometry: dict[str, Quantity]
 
 
 @dataclass(frozen=True, eq=False)
@@ -140,13 +121,13 @@ class Crane:
 
     def __repr__(self) -> str:
         drives = ", ".join(f"{axis} {getattr(self, axis).name!r}" for axis in AXES)
-        assumed = sum(each.status == "assumed" for each in self.quantities.values())
-        return f"Crane({self.name!r}, {drives}; {assumed} of {len(UNITS)} quantities assumed)"
+        return f"Crane({self.name!r}, {drives}; {self.assumed or 'no quantities'} assumed)"
 
-    def __reduce__(self) -> tuple[Any, ...]:
-        """Names and numbers, by which another process makes the same crane."""
-        drives = {axis: getattr(self, axis) for axis in AXES}
-        return _crane_of, (self.name, self.title, dict(self.quantities), drives)
+    @property
+    def assumed(self) -> str:
+        """How much of the geometry is assumed: ``"12 of 13 quantities"``, empty if nothing is."""
+        count = sum(each.status == "assumed" for each in self.quantities.values())
+        return f"{count} of {len(self.quantities)} quantities" if count else ""
 
     def with_drive(
         self,
@@ -217,17 +198,17 @@ class Crane:
         """
         made = dict(self.quantities)
         for name, value in changes.items():
-            if name not in UNITS:
-                raise ParameterError(f"A crane has no {name}; it has {', '.join(UNITS)}.")
+            if name not in GEOMETRY:
+                raise ParameterError(f"A crane has no {name}; it has {', '.join(GEOMETRY)}.")
             number = float(value) if isinstance(value, int | float) else list(map(float, value))
-            made[name] = Quantity(value=number, unit=UNITS[name][0])
-        return replace(self, quantities=MappingProxyType(made))
+            made[name] = Quantity(value=number, unit=GEOMETRY[name][0])
+        return replace(self, quantities=made)
 
     @cached_property
     def _si(self) -> dict[str, tuple[float, ...]]:
         """Quantities in SI."""
         found = {}
-        for name, (unit, count) in UNITS.items():
+        for name, (unit, count, _) in GEOMETRY.items():
             entry = self.quantities[name]
             values = entry.value if isinstance(entry.value, list) else [entry.value]
             if len(values) != count:
@@ -408,12 +389,6 @@ class Crane:
         return made
 
 
-def _crane_of(
-    name: str, title: str, quantities: dict[str, Quantity], drives: dict[str, Drive]
-) -> Crane:
-    return Crane(name, title, MappingProxyType(quantities), **drives)
-
-
 def _drive_of(given: DriveLike) -> Drive:
     """A drive as it may be given to a crane."""
     if isinstance(given, Drive):
@@ -448,18 +423,22 @@ def _read(text: str, origin: str, folder: Path | None) -> Crane:
     for axis, word in content.drives.items():
         own = folder is not None and word.endswith(".toml")
         drives[axis] = Drive.from_toml(folder / word) if own and folder else Drive.preset(word)
-    quantities = {name: getattr(content.geometry, name) for name in UNITS}
-    return Crane(content.name, content.title, MappingProxyType(quantities), **drives)
+    lacks = [name for name in GEOMETRY if name not in content.geometry]
+    strange = [name for name in content.geometry if name not in GEOMETRY]
+    if lacks or strange:
+        extra = f", and knows no '{strange[0]}'" if strange else ""
+        need = f"needs an entry '{lacks[0]}'" if lacks else f"has {len(GEOMETRY)} quantities"
+        raise ParameterError(f"{origin}: geometry {need}{extra}.")
+    quantities = {name: content.geometry[name] for name in GEOMETRY}
+    return Crane(content.name, content.title, quantities, **drives)
 
 
 def _check(name: str, si: Mapping[str, tuple[float, ...]]) -> None:
     """Refuse lengths that make no crane."""
-    for each in ABOVE_ZERO:
-        if not si[each][0] > 0.0:
-            raise ParameterError(f"{name}: {each} is {si[each][0]:g}, but must be above 0.")
-    for each in ("foot_offset", "rope_coupling"):
-        if not si[each][0] >= 0.0:
-            raise ParameterError(f"{name}: {each} is {si[each][0]:g}, but must be at least 0.")
+    for each, (_, _, rule) in GEOMETRY.items():
+        value = si[each][0]
+        if (rule and not value >= 0.0) or (rule == "above 0" and value == 0.0):
+            raise ParameterError(f"{name}: {each} is {value:g}, but must be {rule}.")
     low, high = si["boom_limits"]
     angle = si["tower_sheave_angle"][0]
     if not 0.0 <= low < high < radians(90.0):

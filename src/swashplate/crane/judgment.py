@@ -273,14 +273,13 @@ class Judgment(Tabular):
 
     def sentences(self) -> tuple[str, ...]:
         """The verdict, and what it rests on."""
-        quantities, study = self.study.crane.quantities, self.study
-        assumed = sum(each.status == "assumed" for each in quantities.values())
+        study, assumed = self.study, self.study.crane.assumed
         rests = (
             f"Swing counts from {study.start:g} s to {study.stick.length:g} s of each seaway. "
             f"Control fails if it is worse than none in more than {_percent(self.allowed)} of them."
         )
-        crane = f"{assumed} of {len(quantities)} quantities of the crane are assumed."
-        return (self.verdict(), rests, *([crane] if assumed else []))
+        crane = (f"{assumed} of the crane are assumed.",) if assumed else ()
+        return (self.verdict(), rests, *crane)
 
 
 def _interval(spec: str, name: str) -> tuple[Column, ...]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from math import cos, isfinite, log, radians, sin
+from math import isfinite, log, radians
 from pathlib import Path
 from typing import NamedTuple
 
@@ -194,9 +194,11 @@ class Seaway(Result):
             raise InputError(f"A ship's motion has a multiple of {COARSE:g} samples a second.")
         met, amplitude = self._phasors
         intervals = max(-(-(count - 1) // inner), 1)
-        rise = _basis(inner)
+        # value, slope and curvature of each motion, by e^{iωt}
+        w = met[:, None]
+        sums = np.hstack([amplitude.T, 1j * w * amplitude.T, -w * w * amplitude.T])
         made = np.empty((intervals * inner + 1, 6))
-        _synthesised(met, amplitude.real.copy(), amplitude.imag.copy(), rise, made)
+        _synthesised(met, sums.real.copy(), sums.imag.copy(), _basis(inner), made)
         return made[:count]
 
 
@@ -262,7 +264,7 @@ def ship_motion(
 
 
 def _basis(inner: int) -> Array:
-    """Quintic polynomials of an interval: of value, slope and curvature at its start and end."""
+    """Quintic polynomials, (inner, 6): of value, slope and curvature at start and end."""
     t = np.arange(inner) / inner
     h = 1.0 / COARSE
     rise = t**3 * (10.0 - 15.0 * t + 6.0 * t * t)
@@ -274,35 +276,42 @@ def _basis(inner: int) -> Array:
             rise,
             h * t**3 * (-4.0 + 7.0 * t - 3.0 * t * t),
             h * h * 0.5 * t**3 * (1.0 - t) ** 2,
-        ]
+        ],
+        axis=1,
     )
 
 
 @kernel
 def _synthesised(met: Array, real: Array, imag: Array, basis: Array, out: Array) -> None:
-    """Add up components on the coarse grid, turned from point to point; join the points."""
-    inner, size, motions = basis.shape[1], met.size, real.shape[0]
-    c, s, turn_c, turn_s = np.ones(size), np.zeros(size), np.empty(size), np.empty(size)
-    for j in range(size):
-        turn_c[j], turn_s[j] = cos(met[j] / COARSE), sin(met[j] / COARSE)
-    points = np.zeros((6, motions))
+    """Add up components on the coarse grid, turned from point to point; join the points.
+
+    Parameters
+    ----------
+    real, imag : (components, 3 motions) array
+        Amplitudes of value, slope and curvature, a row for each component: the inner loop runs
+        along rows, which the processor takes several numbers at a time.
+    basis : (inner, 6) array
+        Polynomials within an interval.
+    """
+    size, columns = real.shape
+    inner, motions = basis.shape[0], columns // 3
+    c, s = np.ones(size), np.zeros(size)
+    turn_c, turn_s = np.cos(met / COARSE), np.sin(met / COARSE)
+    points = np.zeros((2, columns))
     for n in range((out.shape[0] - 1) // inner + 1):
-        points[:3] = points[3:]
-        points[3:] = 0.0
+        now, before = points[n % 2], points[(n + 1) % 2]
+        now[:] = 0.0
         for j in range(size):
-            w = met[j]
-            for q in range(motions):
-                along = real[q, j] * c[j] - imag[q, j] * s[j]
-                across = real[q, j] * s[j] + imag[q, j] * c[j]
-                points[3, q] += along
-                points[4, q] -= w * across
-                points[5, q] -= w * w * along
-            c[j], s[j] = c[j] * turn_c[j] - s[j] * turn_s[j], c[j] * turn_s[j] + s[j] * turn_c[j]
+            a, b = c[j], s[j]
+            for k in range(columns):
+                now[k] += a * real[j, k] - b * imag[j, k]
+            c[j], s[j] = a * turn_c[j] - b * turn_s[j], a * turn_s[j] + b * turn_c[j]
         for i in range(inner if n else 0):
             row = (n - 1) * inner + i
             for q in range(motions):
                 value = 0.0
-                for k in range(6):
-                    value += basis[k, i] * points[k, q]
+                for k in range(3):
+                    value += basis[i, k] * before[k * motions + q]
+                    value += basis[i, 3 + k] * now[k * motions + q]
                 out[row, q] = value
-    out[out.shape[0] - 1] = points[3]
+        out[out.shape[0] - 1] = now[:motions]

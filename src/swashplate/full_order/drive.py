@@ -76,24 +76,6 @@ def path_of(name: str) -> str:
     )
 
 
-SIGNALS = (
-    "current",
-    "solenoid_force",
-    "spool_position",
-    "spool_velocity",
-    "orifice_opening",
-    "valve_flow",
-    "stroker_pressure",
-    "swash_angle",
-    "swash_rate",
-    "shaft_speed",
-    "shaft_position",
-    "motor_pressure_drop",
-    "pump_flow",
-)
-"""Signals in the order of the chain."""
-
-
 @dataclass(frozen=True, eq=False)
 class FullOrderSimulation(Signals):
     """Signals of one record, read-only arrays of the record's length, all SI.
@@ -176,12 +158,11 @@ class FullOrderSimulation(Signals):
         """Table of time, all signals and the limits that hold."""
         import polars as pl
 
-        columns: dict[str, NDArray[np.generic]] = {"time": self.time}
-        columns.update((signal, getattr(self, signal)) for signal in SIGNALS)
-        columns.update((limit, getattr(self, limit)) for limit in HOLDS)
-        return pl.DataFrame(columns)
+        return pl.DataFrame({name: getattr(self, name) for name in (*self.names, *HOLDS)})
 
 
+SIGNALS = tuple(n for n, each in vars(FullOrderSimulation).items() if isinstance(each, Named))
+"""Signals in the order of the chain."""
 HOLDS = ("spool_hold", "relief_hold", "plate_hold")  # Limits that can hold.
 
 

@@ -110,21 +110,31 @@ class PhysicalSet(Mapping[str, Parameter]):
     @classmethod
     def preset(cls, name: str) -> PhysicalSet:
         """An assumed set of one of Kruse's axes: ``"hoist"``, ``"slew"``, ``"luff"``."""
-        return load_preset(name)
+        return _set_of(_packaged(name), f"{name}.toml")
 
     @classmethod
     def from_toml(cls, path: str | Path) -> PhysicalSet:
         """A set from a file; a `ParameterError` names file, quantity and rule."""
-        return read_set(read_text(path), str(path))
+        origin = str(path)
+        return _set_of(validated(parse_toml(read_text(path), origin), PhysicalFile, origin), origin)
 
     def to_toml(self, path: str | Path) -> None:
         """Store all quantities; `from_toml` gives an equal set back.
 
         If the file cannot be written (`FileError`), an older one stays as it was.
         """
+        from tomlkit import comment, document, dumps, table
+
         from swashplate.tables import write_text
 
-        write_text(dump_set(self), path)
+        text, entries = document(), table()
+        text.add(comment("swashplate physical set; SI units; [plus, minus] as magnitudes"))
+        for name, value in (("format", 1), ("name", self.name), ("title", self.title)):
+            text.add(name, value)
+        for name, each in self.items():
+            entries.add(name, written(each))
+        text.add("physical", entries)
+        write_text(dumps(text), path)
 
     @property
     def machine(self) -> Machine:
@@ -482,20 +492,9 @@ def _packaged(name: str) -> PhysicalFile:
     return validated(parse_toml(text, f"{name}.toml"), PhysicalFile, f"{name}.toml")
 
 
-@cache
-def load_preset(name: str) -> PhysicalSet:
-    """A packaged set."""
-    return _set_of(_packaged(name), f"{name}.toml")
-
-
 def nearest_set(name: str) -> str:
     """Name of the packaged set that a drive of this name is taken to be like: its own, or hoist."""
     return name if name in AXES else AXES[0]
-
-
-def read_set(text: str, origin: str) -> PhysicalSet:
-    """A physical set from TOML text; `origin` names it in errors."""
-    return _set_of(validated(parse_toml(text, origin), PhysicalFile, origin), origin)
 
 
 def _set_of(contents: PhysicalFile, origin: str) -> PhysicalSet:
@@ -507,22 +506,6 @@ def _set_of(contents: PhysicalFile, origin: str) -> PhysicalSet:
         return from_lumped(parameters, name=contents.name, title=contents.title, entries=entries)
     except (ParameterError, InputError) as error:
         raise ParameterError(f"{origin}: {error}") from None
-
-
-def dump_set(physical: PhysicalSet) -> str:
-    """A physical set as TOML text that `read_set` turns back into an equal set."""
-    from tomlkit import comment, document, dumps, table
-
-    text = document()
-    text.add(comment("swashplate physical set; SI units; [plus, minus] as magnitudes"))
-    text.add("format", 1)
-    text.add("name", physical.name)
-    text.add("title", physical.title)
-    entries = table()
-    for name, each in physical.items():
-        entries.add(name, written(each))
-    text.add("physical", entries)
-    return dumps(text)
 
 
 def _entries(contents: PhysicalFile) -> dict[str, Parameter]:

@@ -12,7 +12,6 @@ from .experiment_design import outlook as outlook
 from .fitting import Fit as Fit
 from .fitting import Search as Search
 from .fitting import fit as fit
-from .fitting import refined as refined
 from .identifiability import Identifiability as Identifiability
 from .intervals import Uncertainty as Uncertainty
 from .intervals import uncertainty as uncertainty

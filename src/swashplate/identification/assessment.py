@@ -20,6 +20,7 @@ from swashplate.campaign.campaign import Campaign
 from swashplate.campaign.experiment import Experiment
 from swashplate.documents import read_json
 from swashplate.errors import FileError, InputError
+from swashplate.identification.drive_model import Parameters, stage_problem, with_estimates
 from swashplate.identification.fitting import Fit, StageFit, smooth
 from swashplate.identification.identifiability import Identifiability, identifiability
 from swashplate.identification.intervals import (
@@ -42,7 +43,6 @@ from swashplate.identification.resampling import (
 )
 from swashplate.identification.setup import ModelParameters, ModelSetup, Setup
 from swashplate.identification.solving import Solution, StartResult
-from swashplate.identification.staging import Parameters, stage_problem, with_estimates
 from swashplate.identification.unknowns import Unknown, Unknowns
 from swashplate.identification.validation import RunQuality, predict, run_qualities
 from swashplate.identification.verdict import LIMITS, REQUIRED, Verdict, verdict
@@ -55,7 +55,6 @@ from swashplate.tables import write_text
 if TYPE_CHECKING:
     from swashplate.campaign import Campaign, Experiment
     from swashplate.executors import Executor
-    from swashplate.identification.intervals import Estimate
     from swashplate.identification.solving import Loss
     from swashplate.tables import Table
 
@@ -206,7 +205,7 @@ class Judged(Result):
     @property
     def sentences(self) -> tuple[str, ...]:
         """The verdict's headline and all that it says."""
-        return (self.verdict.headline, *self.verdict.sentences)
+        return (self.verdict.headline, *self.verdict.sentences, *self.verdict.not_judged)
 
     def name_of(self, profile: StageProfile) -> str:
         """The unknown that a profile is of."""
@@ -283,34 +282,27 @@ def motion_of(runs: Iterable[Experiment]) -> Motion:
 
 def _interval_words(assessments: Sequence[Assessment], found: ParameterSet) -> dict[str, list[str]]:
     """Intervals of the fitted parameters in words, by symbol."""
-    ends: dict[str, list[str]] = {}
+    words: dict[str, list[str]] = {}
     for each in assessments:
         unknowns = each.stage.problem.unknowns
         for estimate, unknown in zip(each.uncertainty.estimates, unknowns, strict=True):
             if unknown.run is not None:
                 continue
             if unknown.name.startswith("force_"):
-                for symbol in ("Z19", "Z20", "Z21", "Z22"):
-                    ends[symbol] = ["from the fitted forces"]
+                forces = ("Z19", "Z20", "Z21", "Z22")
+                words |= {symbol: ["from the fitted forces"] for symbol in forces}
                 continue
+            low, high = estimate.lower, estimate.upper
+            ends: str = estimate.status
+            if low is not None or high is not None:
+                ends = f"{'none below' if low is None else f'{low:.5g}'} to "
+                ends += "none above" if high is None else f"{high:.5g}"
             for target in unknown.targets:
                 if target in found.numbers:
                     side = target.rpartition("_")[2]
                     side = f"{side} " if side in ("plus", "minus") else ""
-                    words = f"{side}{_ends(estimate)}"
-                    ends.setdefault(find(target).symbol, []).append(words)
-    return ends
-
-
-def _ends(estimate: Estimate) -> str:
-    low, high = estimate.lower, estimate.upper
-    if low is None and high is None:
-        return estimate.status
-    words = (
-        "none below" if low is None else f"{low:.5g}",
-        "none above" if high is None else f"{high:.5g}",
-    )
-    return " to ".join(words)
+                    words.setdefault(find(target).symbol, []).append(f"{side}{ends}")
+    return words
 
 
 def judge_fit(
@@ -341,8 +333,12 @@ def judge_fit(
         If a profile of an unknown is wanted that there is not.
     """
     assessments = result.assessments
-    _check(wanted.profiles, assessments)
-    folds, bootstraps, profiles = None, {}, []
+    known = [name for each in assessments for name in each.stage.problem.unknowns.names]
+    for name in wanted.profiles:
+        if name != "all" and name not in known:
+            machine = [each for each in known if "(" not in each]
+            raise InputError(f"There is no parameter '{name}'; there are {', '.join(machine)}.")
+    folds, bootstraps, profiles = None, {}, list[StageProfile]()
     if wanted.folds:
         folds = cross_validate(
             runs,
@@ -363,7 +359,15 @@ def judge_fit(
             seed=wanted.seed,
         )
     for each in assessments if wanted.profiles else ():
-        profiles += _profiles(each, wanted, watch)
+        stage, own = each.stage.stage.name, each.stage.problem.unknowns.names
+        every = "all" in wanted.profiles
+        found = profiles_of(
+            each,
+            None if every else [name for name in wanted.profiles if name in own],
+            executor=wanted.executor,
+            watch=lambda done, stage=stage: watch(f"{stage}: {done} profiles"),  # type: ignore[misc]
+        )
+        profiles += [StageProfile(stage, one) for one in found.values()]
     notes = {**versions(), "seed": str(wanted.seed), "campaign": str(campaign.path)}
     return Judged(campaign, result, runs, bootstraps, profiles, folds, notes, wanted.required)
 
@@ -371,30 +375,6 @@ def judge_fit(
 def versions() -> dict[str, str]:
     """Of this package and of Python."""
     return {"swashplate": __version__, "Python": platform.python_version()}
-
-
-def _check(names: Sequence[str], assessments: Sequence[Assessment]) -> None:
-    known = [name for each in assessments for name in each.stage.problem.unknowns.names]
-    for name in names:
-        if name != "all" and name not in known:
-            machine = [each for each in known if "(" not in each]
-            raise InputError(f"There is no parameter '{name}'; there are {', '.join(machine)}.")
-
-
-def _profiles(
-    assessment: Assessment, wanted: Wanted, watch: Callable[[str], None]
-) -> list[StageProfile]:
-    name, known = assessment.stage.stage.name, assessment.stage.problem.unknowns.names
-    names = None if "all" in wanted.profiles else [n for n in wanted.profiles if n in known]
-    if names == []:
-        return []
-    found = profiles_of(
-        assessment,
-        names,
-        executor=wanted.executor,
-        watch=lambda done: watch(f"{name}: {done} profiles"),
-    )
-    return [StageProfile(name, each) for each in found.values()]
 
 
 class StageProfile(NamedTuple):
@@ -499,14 +479,7 @@ def load_fit(
         parameters = with_estimates(parameters, problem, entry.solution.vector)
         stages.append(StageFit(stage, problem, entry.solution, parameters, entry.starts))
     found = Fit(file.setup, nominal, tuple(stages))
-    return Judged(
-        campaign,
-        found,
-        experiments,
-        profiles=file.profiles,
-        folds=file.folds,
-        notes=file.notes,
-    )
+    return Judged(campaign, found, experiments, {}, file.profiles, file.folds, file.notes)
 
 
 def fingerprint(experiment: Experiment) -> str:

@@ -17,9 +17,8 @@ from swashplate.errors import InputError
 from swashplate.identification.drive_model import SIGNALS, simulated_run
 from swashplate.identification.model import EquationModel
 from swashplate.identification.problem import Problem
-from swashplate.identification.setup import ModelSetup, Setup
+from swashplate.identification.setup import ModelSetup
 from swashplate.identification.solving import Loss
-from swashplate.identification.staging import stage_problem
 from swashplate.parameters.parameter_set import ParameterSet
 from swashplate.parameters.rules import FULL_VOLTAGE
 from swashplate.simulation.result import Simulation
@@ -32,17 +31,8 @@ WINDOW = 0.2
 """Time over which the speed behind a position is taken. [s]"""
 MOVING = 0.1
 """Of the largest motion in any run, from which a run's own can be judged."""
-POINTS = 1024
-"""Instants at which two runs are compared."""
-COARSE = 32
-"""Every so many of these instants are looked at first."""
-SAME_COMMAND = 0.05
-"""Difference of two commands, over their size, below which they are the same."""
 ALIKE = 0.5
-"""Correlation below which two signals have nothing in common, or above minus which none is the
-other turned round."""
-FACTOR = 1.5
-"""By which two runs of one command cannot differ."""
+"""Correlation below minus which a signal is that of the drive turned round."""
 FAR_OFF = 3.0
 """By which a channel should not differ from the nominal drive."""
 FROZEN = 1.0
@@ -72,48 +62,13 @@ refusal, warning = partial(Finding, "refuse"), partial(Finding, "warn")
 # --- what is looked at ----------------------------------------------------------------------------
 
 
-def check_sound(
-    experiments: Sequence[Experiment],
-    nominal: ParameterSet,
-    setup: Setup,
-    *,
-    rank: bool = True,
-) -> tuple[Finding, ...]:
-    """What stands in the way of a fit, before it is tried.
-
-    Parameters
-    ----------
-    experiments : sequence of Experiment
-        The runs to fit.
-    nominal : ParameterSet
-        Where the fit begins.
-    setup : Setup
-        What is free.
-    rank : bool
-        Also see whether anything depends on the unknowns, which needs derivatives;
-        `excitation.outlook` tells it in full.
-
-    Returns
-    -------
-    tuple of Finding
-        What must be refused first. Later checks need what earlier ones found sound, so that not
-        everything that is wrong is always listed at once.
-
-    Raises
-    ------
-    InputError, ParameterError
-        If runs and set-up do not fit each other.
-    DomainError
-        If the model does not hold at the nominal values.
-    """
-    found = check_runs(experiments, nominal)
-    for stage in setup.stages if rank and not _refused(found) else ():
-        found += _rank(f"Stage {stage.name}", stage_problem(stage, nominal, experiments))
-    return tuple(sorted(found, key=lambda each: each.severity != "refuse"))
-
-
 def check_runs(experiments: Sequence[Experiment], nominal: ParameterSet) -> list[Finding]:
-    """What is wrong with runs beside each other and beside the nominal drive."""
+    """What stands in the way of a fit: runs beside each other and beside the nominal drive.
+
+    What must be refused comes first. Later checks need what earlier ones found sound, so that not
+    everything that is wrong is always listed at once. Runs or a drive that cannot be simulated are
+    refused in an `InputError` or a `DomainError`.
+    """
     unsigned = unsigned_currents(experiments).items()
     found = [refusal(None, name, f"{said}.") for (_, name), said in unsigned]
     for each in experiments:
@@ -134,15 +89,14 @@ def check_runs(experiments: Sequence[Experiment], nominal: ParameterSet) -> list
             for name, ours in of_channels.items()
         }
         found += check(left)
-    return found
+    return sorted(found, key=lambda each: each.severity != "refuse")
 
 
 def check_model(experiments: Sequence[Experiment], setup: ModelSetup) -> tuple[Finding, ...]:
-    """What stands in the way of a fit of a model of one's own, as `check_sound` of a drive.
+    """What stands in the way of a fit of a model of one's own, as `check_runs` of a drive.
 
     Whatever the model: samples that are no numbers, sensors that stand still while their input
-    moves, a run that is there twice, fewer samples than unknowns, and a model of equations on
-    whose unknowns nothing depends.
+    moves, and a run that is there twice.
     """
     found, seen = list[Finding](), dict[bytes, str]()
     for each in experiments:
@@ -166,8 +120,6 @@ def check_model(experiments: Sequence[Experiment], setup: ModelSetup) -> tuple[F
                 said = f"{each.name}: '{name}' never changes, though the input does and it moves in"
                 also = "other runs; look at the sensor, or ignore the channel in this run."
                 found.append(warning(each.name, name, f"{said} {also}"))
-    if not _refused(found):
-        found += _rank(setup.name, problem)
     return tuple(sorted(found, key=lambda each: each.severity != "refuse"))
 
 
@@ -405,20 +357,12 @@ def _frozen_positions(of_channels: Mapping[str, Sequence[Motion]]) -> list[Findi
 
 
 def contradictions(of_channels: Mapping[str, Sequence[Motion]]) -> list[Finding]:
-    """Runs whose sign or scale cannot be right, each once.
-
-    Runs of the same command are held against each other, which needs no model; the nominal drive
-    tells which of the two is the odd one, and whether a channel as a whole is turned round or far
-    off in scale.
-    """
+    """Runs whose sign or scale beside the drive cannot be right, or a channel's as a whole."""
     found: list[Finding] = []
     for name, ours in of_channels.items():
         turned = [each for each in ours if each.correlation < -ALIKE]
         found += _turned(name, turned, len(ours))
-        right = [each for each in ours if each not in turned]
-        found += _twins(name, right)
-        odd = {each.run for each in found if each.channel == name}
-        found += _scales(name, [each for each in right if each.experiment.name not in odd])
+        found += _scales(name, [each for each in ours if each not in turned])
     return found
 
 
@@ -436,81 +380,6 @@ def _turned(name: str, turned: Sequence[Motion], runs: int) -> list[Finding]:
         )
         for each in turned
     ]
-
-
-def _twins(name: str, ours: Sequence[Motion]) -> list[Finding]:
-    """Runs beside the one of the same command that is nearest to what all have in common."""
-    middle = float(np.median([each.gain for each in ours])) if ours else 1.0
-    nearest = sorted(ours, key=lambda each: abs(np.log(abs(each.gain / middle) + 1e-12)))
-    found: list[Finding] = []
-    for good, *others in _of_one_command(nearest):
-        for odd in others:
-            factor, correlation = _compared(good, odd)
-            both = f"{good.experiment.name} and {odd.experiment.name} have the same command, but"
-            if correlation < ALIKE:
-                said = (
-                    f"{both} '{name}' has nothing in common: one of them belongs to another test; "
-                    "leave it out."
-                )
-            elif not 1.0 / FACTOR < factor < FACTOR:
-                said = (
-                    f"{both} '{name}' moves {factor:.3g} times as far in the second: both cannot "
-                    f"be right; mend scale or unit of '{name}' in one of them, or leave it out."
-                )
-            else:
-                continue
-            found.append(refusal(odd.experiment.name, name, said))
-    return found
-
-
-def _of_one_command(ours: Sequence[Motion]) -> list[list[Motion]]:
-    """Runs in groups of the same command, in their order: each is held against each group once.
-
-    Against most groups by a few instants alone, so that the time for thousands of runs that all
-    differ hardly grows faster than their number.
-    """
-    inputs = [each.experiment.input for each in ours]
-    longest = max((each.time[-1] - each.time[0] for each in inputs), default=0.0)
-    since = np.linspace(0.0, longest, POINTS)
-    groups: list[list[Motion]] = []
-    heads = np.empty((len(ours), POINTS))
-    for each, drive in zip(ours, inputs, strict=True):
-        within = since <= drive.time[-1] - drive.time[0]
-        command = np.where(within, drive.at(drive.time[0] + since), np.nan)
-        near = np.arange(len(groups))
-        for step, allowed in ((COARSE, 2.0 * SAME_COMMAND), (1, SAME_COMMAND)):
-            near = near[_same(heads[near, ::step], command[::step], allowed)]
-        alike = [k for k in near if groups[k][0].experiment.input.kind == drive.kind]
-        if alike:
-            groups[alike[0]].append(each)
-        else:
-            heads[len(groups)] = command
-            groups.append([each])
-    return groups
-
-
-def _same(heads: Array, command: Array, allowed: float) -> NDArray[np.bool_]:
-    """(g,) whether commands (g, n) are one (n,), as far as both last."""
-    both = np.isfinite(heads) & np.isfinite(command)
-    off, left, right = (
-        np.sum(np.where(both, part, 0.0) ** 2, axis=1) for part in (heads - command, heads, command)
-    )
-    same: NDArray[np.bool_] = off <= allowed**2 * np.maximum(left, right)
-    return same
-
-
-def _compared(first: Motion, second: Motion) -> tuple[float, float]:
-    """How many times as far the second one moves, and the correlation of both about zero."""
-    zeros = first.experiment.input.time[0], second.experiment.input.time[0]
-    begin = max(first.time[0] - zeros[0], second.time[0] - zeros[1])
-    end = min(first.time[-1] - zeros[0], second.time[-1] - zeros[1])
-    since = np.linspace(begin, max(end, begin), POINTS)
-    a = np.interp(since, first.time - zeros[0], first.measured)
-    b = np.interp(since, second.time - zeros[1], second.measured)
-    sizes = _rms(a), _rms(b)
-    if not min(sizes) > 0.0:
-        return (0.0 if sizes[1] == 0.0 else np.inf), 1.0
-    return sizes[1] / sizes[0], _correlation(a, b)
 
 
 def _scales(name: str, ours: Sequence[Motion]) -> list[Finding]:
@@ -535,7 +404,7 @@ def _scales(name: str, ours: Sequence[Motion]) -> list[Finding]:
 # --- what the runs determine ----------------------------------------------------------------------
 
 
-def _rank(where: str, problem: Problem) -> list[Finding]:
+def check_rank(where: str, problem: Problem) -> list[Finding]:
     """Fewer samples than unknowns, or unknowns on which nothing depends."""
     unknowns = problem.unknowns
     if problem.samples < len(unknowns):

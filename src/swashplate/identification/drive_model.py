@@ -1,24 +1,40 @@
-"""The drive as a model to be fitted: card, pump and motor, or the whole chain."""
+"""The drive as a model to be fitted: card, pump or the whole chain; the problem of a stage."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from types import MappingProxyType
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from swashplate.campaign import ChannelKind
+from swashplate.campaign import ChannelKind, applying, inside
+from swashplate.campaign.campaign import Campaign
 from swashplate.campaign.experiment import Channel, Experiment, InputSignal
 from swashplate.campaign.samples import signed_by_command
+from swashplate.campaign.schema import SIGNALS as SIGNALS
+from swashplate.drive import Drive
 from swashplate.equations.marching.observation import ObservedRecord
 from swashplate.equations.marching.record import SLOWEST, SOURCE_RATE, Record, even_rate, record_of
 from swashplate.errors import DomainError, InputError, ParameterError
+from swashplate.executors import available_cores
 from swashplate.identification.model import EquationModel
-from swashplate.parameters.definitions import is_column
+from swashplate.identification.problem import Problem, noise_scales
+from swashplate.identification.setup import (
+    Forces,
+    Free,
+    ModelParameters,
+    Setup,
+    Stage,
+    deviation,
+    load_setup,
+)
+from swashplate.identification.unknowns import Prior, Unknown, Unknowns, bounded
+from swashplate.parameters.definitions import SWITCHES, columns_of, find, is_column
 from swashplate.parameters.parameter_set import ParameterSet
+from swashplate.parameters.rules import FULL_VOLTAGE
 from swashplate.results import Result
 from swashplate.simulation.instance import START_PRESSURE, at_every_rate
 from swashplate.simulation.residuals import Own, Ready, made_ready
@@ -135,73 +151,6 @@ def _record(experiment: Experiment, what: str) -> Record:
     return record_of(values, SOURCE_RATE, what=what, time=time, interpolation=interpolation)
 
 
-SYMBOLS = ("Z19", "Z20", "Z21", "Z22")
-
-
-@dataclass(frozen=True)
-class Forces:
-    """Forces at four effective currents each way, as magnitudes.
-
-    ``"force_plus_1"`` is the force at the first of `plus`; the effective current is what is left
-    of the current beyond the dead zone Z17.
-    """
-
-    plus: tuple[float, float, float, float]
-    """Effective currents of the positive direction, increasing. [A]"""
-    minus: tuple[float, float, float, float]
-    """Of the negative direction, as magnitudes. [A]"""
-
-    @cached_property
-    def names(self) -> tuple[str, ...]:
-        """Names of the eight forces."""
-        return tuple(f"force_{side}_{k}" for side in ("plus", "minus") for k in (1, 2, 3, 4))
-
-    @property
-    def columns(self) -> tuple[str, ...]:
-        """The parameters that they stand for."""
-        return tuple(f"{symbol}_{side}" for side in ("plus", "minus") for symbol in SYMBOLS)
-
-    @cached_property
-    def _maps(self) -> dict[str, Array]:
-        """For each direction the (4, 4) map from forces to coefficients."""
-        signs = {"plus": np.ones(4), "minus": np.array([1.0, -1.0, 1.0, -1.0])}
-        return {
-            side: np.linalg.inv(
-                np.power.outer(np.array(getattr(self, side)), np.arange(1, 5)) * signs[side]
-            )
-            for side in ("plus", "minus")
-        }
-
-    def values(self, parameters: ParameterSet) -> dict[str, float]:
-        """The forces of a parameter set, by name. [N]"""
-        forces = {}
-        for side, map_ in self._maps.items():
-            coefficients = [parameters.numbers[f"{symbol}_{side}"] for symbol in SYMBOLS]
-            for k, force in enumerate(np.linalg.solve(map_, coefficients), start=1):
-                forces[f"force_{side}_{k}"] = float(force)
-        return forces
-
-    def coefficients(
-        self, values: Mapping[str, float], parameters: ParameterSet
-    ) -> dict[str, float]:
-        """Coefficients for some forces; those not named are as in the parameter set. [N/Aᵏ]"""
-        forces = {**self.values(parameters), **{k: v for k, v in values.items() if k in self.names}}
-        made = {}
-        for side, map_ in self._maps.items():
-            of_side = np.array([forces[f"force_{side}_{k}"] for k in (1, 2, 3, 4)])
-            for symbol, coefficient in zip(SYMBOLS, map_ @ of_side, strict=True):
-                made[f"{symbol}_{side}"] = float(coefficient)
-        return made
-
-    def slopes(self, name: str) -> dict[str, float]:
-        """Derivatives of the coefficients by one force. [1/Aᵏ]"""
-        _, side, number = name.split("_")
-        column = self._maps[side][:, int(number) - 1]
-        return {
-            f"{symbol}_{side}": float(slope) for symbol, slope in zip(SYMBOLS, column, strict=True)
-        }
-
-
 REST = 0.01
 """Share of the largest command below which it has no sign of its own. [1]"""
 
@@ -251,18 +200,6 @@ def _signed_channel(experiment: Experiment) -> tuple[Channel, Array]:
 Part = Literal["card", "pump", "chain"]
 """What of the drive is simulated: the card alone, pump and motor over a current, or all."""
 
-SIGNALS: Mapping[ChannelKind, str] = {
-    "signed_current": "current",
-    "rectified_current": "current_sum",
-    "current_plus": "current_positive",
-    "current_minus": "current_negative",
-    "shaft_speed": "shaft_speed",
-    "position": "shaft_position",
-    "encoder_counts": "shaft_position",
-    "stroker_pressure": "stroker_pressure",
-    "swash_angle": "swash_angle",
-    "spool_position": "spool_position",
-}
 CURRENTS: tuple[ChannelKind, ...] = (
     "signed_current",
     "rectified_current",
@@ -281,8 +218,7 @@ class DriveModel(Result, EquationModel):
 
     Besides columns it knows ``"force_plus_1"`` ... (see `Forces`), ``"start_pressure"`` of an
     experiment [Pa], ``"start_current_plus"`` or ``"..._minus"`` of its card [A], and of each
-    channel ``"offset NAME"`` (its free zero) and ``"clock NAME"`` (by how much the input's clock
-    is ahead of the channel's [s]).
+    channel ``"offset NAME"``, its free zero.
 
     Derivatives are exact, those by refinements as well.
     """
@@ -325,7 +261,7 @@ class DriveModel(Result, EquationModel):
         experiment: Experiment,
         observed: ObservedRecord,
         columns: Sequence[str],
-        shifts: tuple[Sequence[float], Sequence[float]],
+        offsets: Sequence[float],
     ) -> Ready:
         """The drive with numbers; see `EquationModel.ready`."""
         states = {
@@ -334,7 +270,7 @@ class DriveModel(Result, EquationModel):
             if name in values
             for path in self._start_paths(name)
         }
-        own = Own(values.get(START_PRESSURE), *shifts, states)
+        own = Own(values.get(START_PRESSURE), offsets, states=states)
         try:
             return made_ready(self.parameters_at(values), observed, columns, own)
         except InputError as error:  # a filter that is unstable at this step
@@ -384,3 +320,268 @@ class DriveModel(Result, EquationModel):
     def _is_parameter(self, name: str) -> bool:
         known = is_column(name)
         return known or (self.forces is not None and name in self.forces.names)
+
+
+# --- from a stage of a fit configuration to its problem -------------------------------------------
+
+
+def weighted(experiment: Experiment, stage: Stage) -> Experiment:
+    """The experiment with the stage's own weights multiplied in."""
+    if not stage.weights and not stage.weights_by_input:
+        return experiment
+    channels = {}
+    for name, channel in experiment.channels.items():
+        weight = channel.weight.copy()
+        for window in applying(stage.weights.get(channel.kind, ()), experiment.maneuver):
+            weight[inside(window, channel.time)] *= window.factor
+        for sized in applying(stage.weights_by_input.get(channel.kind, ()), experiment.maneuver):
+            levels, factors = np.transpose(sized.factors)
+            within = inside(sized, channel.time)
+            size = np.abs(experiment.input.at(channel.time[within]))
+            weight[within] *= np.interp(size, levels, factors)
+        channels[name] = replace(channel, weight=weight)
+    return replace(experiment, channels=channels)
+
+
+Parameters = ParameterSet | ModelParameters
+"""The numbers of what is fitted: a drive, or a model of one's own."""
+LARGEST_START_PRESSURE = 4e6
+"""Bound of a free pressure at the start where the set-up gives none. [Pa]"""
+
+
+def setup_of(campaign: Campaign, axis: str, name: str | None = None) -> Setup:
+    """The set-up of a name, or the packaged one of the axis's drive.
+
+    Raises
+    ------
+    InputError
+        If none is named and the drive has no packaged one.
+    """
+    if name is not None:
+        return load_setup(name)
+    drive = campaign.drive(axis).name
+    try:
+        return load_setup(drive)
+    except ParameterError:
+        raise InputError(
+            f"There is no packaged fit configuration for the drive '{drive}': give one of your "
+            "own, a .toml "
+            "file with stages and free parameters; 'swashplate guess' reads one off the logs."
+        ) from None
+
+
+def stage_problem(
+    stage: Stage,
+    parameters: Parameters,
+    experiments: Sequence[Experiment],
+    *,
+    threads: int | None = None,
+    uncertain: Mapping[str, float | str] = MappingProxyType({}),
+) -> Problem:
+    """The problem of a stage.
+
+    Parameters
+    ----------
+    stage : Stage
+        What is free and what is fitted.
+    parameters : ParameterSet or ModelParameters
+        Nominal values, those of earlier stages already found.
+    experiments : sequence of Experiment
+        The runs to fit.
+    threads : int, optional
+        Threads over experiments; all cores by default.
+    uncertain : mapping of str to float or str, optional
+        Standard uncertainties of what stays fixed, as of `Setup`.
+
+    Raises
+    ------
+    InputError
+        If no experiment has a channel that the stage fits, none that it weighs, or no current that
+        the stage asks for.
+    ParameterError
+        If a free parameter is unknown or its bounds are wrong.
+    """
+    if isinstance(parameters, ModelParameters):
+        return parameters.setup.problem(experiments, threads=threads or available_cores())
+    if stage.part == "model":
+        raise InputError("part = 'model' needs a model of your own, not a drive.")
+    channels = _channels(stage, experiments)
+    runs = tuple(each for each in experiments if any(name in each.channels for name in channels))
+    weighed = [*stage.weights, *stage.weights_by_input]
+    kinds = {c.kind for each in runs for name, c in each.channels.items() if name in channels}
+    if weighed and not kinds & set(weighed):  # they would be lost in silence
+        raise InputError(
+            f"The stage '{stage.name}' weighs {', '.join(dict.fromkeys(weighed))}, but the runs "
+            f"have {', '.join(sorted(kinds))}: add weights for that, or take a fit "
+            "configuration without."
+        )
+    of_forces = []
+    if stage.forces is not None:
+        of_forces = [
+            bounded(name, value, relative=stage.forces.relative, unit="N", log=value > 0.0)
+            for name, value in stage.forces.values(parameters).items()
+        ]
+    currents = {}
+    if stage.part == "pump":
+        currents = {
+            each.name: measured_current(each, stage.current_scale)
+            if stage.current == "measured" or each.input.kind == "current"
+            else simulated_current(each, parameters)
+            for each in runs
+        }
+    free = _parameters(stage.free, parameters)
+    unknowns = (
+        *free,
+        *of_forces,
+        *_own(stage, runs, channels, parameters),
+    )
+    return Problem(
+        DriveModel(_switched_on(parameters, free), stage.part, currents, stage.forces),
+        tuple(weighted(each, stage) for each in runs),
+        Unknowns(unknowns),
+        channels,
+        noise_scales(runs, channels),
+        uncertain=tuple(
+            {c: deviation(each, _nominal(parameters, c)) for c in columns_of([name])}
+            for name, each in uncertain.items()
+        ),
+        threads=threads or available_cores(),
+    )
+
+
+def with_estimates(parameters: Parameters, problem: Problem, vector: Array) -> Parameters:
+    """The parameters with what a stage found, at a point of its problem.
+
+    Raises
+    ------
+    DomainError
+        If a value breaks a rule.
+    """
+    found = problem.unknowns.targets(vector, "")
+    if isinstance(parameters, ModelParameters):
+        numbers = {**parameters.numbers, **found}
+        return ModelParameters(parameters.setup, numbers, problem.scales)
+    assert isinstance(problem.model, DriveModel)
+    return problem.model.parameters_at(found)
+
+
+def _channels(stage: Stage, experiments: Sequence[Experiment]) -> tuple[str, ...]:
+    """Names of the channels that a stage fits."""
+    kinds = stage.channels or tuple(
+        kind
+        for kind in SIGNALS
+        if stage.part == "chain" or (kind in CURRENTS) == (stage.part == "card")
+    )
+    names = dict.fromkeys(
+        name
+        for each in experiments
+        for name, channel in each.channels.items()
+        if channel.kind in kinds
+    )
+    if not names:
+        had = ", ".join(dict.fromkeys(c.kind for e in experiments for c in e.channels.values()))
+        hint = ""
+        if stage.part == "card":
+            hint = "; without a current, let 'swashplate guess' write start and fit configuration"
+        raise InputError(
+            f"The stage '{stage.name}' fits {', '.join(kinds)}, but the runs to fit have "
+            f"{had or 'no channel'}{hint}."
+        )
+    return tuple(names)
+
+
+def _parameters(free: Mapping[str, Free], parameters: ParameterSet) -> list[Unknown]:
+    unknowns: list[Unknown] = []
+    for name, entry in free.items():
+        definition = find(name)
+        columns = definition.columns if name == definition.symbol else (name,)
+        groups = [columns] if entry.tied or len(columns) == 1 else [(each,) for each in columns]
+        unknowns += [
+            bounded(
+                name if entry.tied else group[0],
+                float(np.mean([_nominal(parameters, column) for column in group])),
+                relative=entry.relative,
+                absolute=entry.bounds,
+                unit=definition.unit,
+                least=definition.least,
+                log=entry.log,
+                prior=None
+                if entry.prior is None
+                else Prior(entry.prior.mean, entry.prior.deviation),
+                sets=group,
+            )
+            for group in groups
+        ]
+    return unknowns
+
+
+def _switched_on(parameters: ParameterSet, free: Sequence[Unknown]) -> ParameterSet:
+    """The set where the unknowns begin, with all that they belong to on."""
+    begin = {column: each.start for each in free for column in each.targets if column in SWITCHES}
+    options = parameters.options | {SWITCHES[column] for column in begin}
+    return parameters.replace(begin, options) if begin else parameters
+
+
+def _nominal(parameters: ParameterSet, column: str) -> float:
+    """Where a parameter begins: a refinement that the set does not give, where it is off."""
+    if column in parameters.numbers:
+        return parameters.numbers[column]
+    return parameters[column].values[0]
+
+
+def _own(
+    stage: Stage,
+    experiments: Sequence[Experiment],
+    channels: Sequence[str],
+    parameters: ParameterSet,
+) -> list[Unknown]:
+    """Unknowns of single experiments: free zeros of positions, initial pressure and current."""
+    unknowns = []
+    for each in experiments:
+        for name in channels:
+            channel = each.channels.get(name)
+            if channel is None or not channel.is_position:
+                continue
+            # a free zero: far enough both ways never to be reached
+            first, reach = float(channel.values[0]), 1.0 + 10.0 * float(np.ptp(channel.values))
+            unknowns.append(
+                Unknown(
+                    f"offset {name}",
+                    first,
+                    first - reach,
+                    first + reach,
+                    channel.unit,
+                    run=each.name,
+                )
+            )
+        if stage.part != "card" and (stage.start_pressure is not None or each.start == "estimated"):
+            most = stage.start_pressure or LARGEST_START_PRESSURE
+            unknowns.append(Unknown(START_PRESSURE, 0.0, -most, most, "Pa", run=each.name))
+        measured = [each.channels[name].kind for name in channels if name in each.channels]
+        if (
+            stage.part != "pump"
+            and each.start == "estimated"
+            and each.input.kind == "voltage"
+            and not set(CURRENTS).isdisjoint(measured)
+        ):
+            unknowns += _start_current(each, parameters)
+    return unknowns
+
+
+def _start_current(experiment: Experiment, parameters: ParameterSet) -> list[Unknown]:
+    """Current of the driven channel at the first sample; none where neither can be told driven."""
+    first = float(measured_current(experiment).values[0])
+    if first == 0.0:
+        return []
+    side, sign = ("plus", 1.0) if first > 0.0 else ("minus", -1.0)
+    most = 2.0 * abs(Drive(parameters).steady_current(sign * FULL_VOLTAGE))
+    start = min(abs(first), 0.9 * most)
+    return [Unknown(f"start_current_{side}", start, 0.0, most, "A", run=experiment.name)]
+
+
+def true_value(unknown: Unknown, model: DriveModel, truth: ParameterSet) -> float | None:
+    """What an unknown of the machine really is; None for one of a single experiment."""
+    if unknown.run is not None:
+        return None
+    forces = model.forces.values(truth) if model.forces is not None else {}
+    return {**truth.numbers, **forces}[unknown.targets[0]]

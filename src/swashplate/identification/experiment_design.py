@@ -7,7 +7,7 @@ and `advise` rank tests to come by what they would add.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 from math import inf
 from pathlib import Path
@@ -21,7 +21,12 @@ from swashplate.campaign.experiment import Channel, Experiment, InputSignal, Sou
 from swashplate.campaign.rig import COUNTS_PER_TURN
 from swashplate.drive import Drive
 from swashplate.errors import InputError
-from swashplate.identification.drive_model import CURRENTS, SIGNALS, DriveModel, Forces
+from swashplate.identification.drive_model import (
+    CURRENTS,
+    SIGNALS,
+    DriveModel,
+    stage_problem,
+)
 from swashplate.identification.identifiability import Identifiability, identifiability
 from swashplate.identification.intervals import uncertainty
 from swashplate.identification.problem import (
@@ -32,8 +37,7 @@ from swashplate.identification.problem import (
     triangular_factor,
     whitening,
 )
-from swashplate.identification.setup import Free, Setup, Stage
-from swashplate.identification.staging import stage_problem
+from swashplate.identification.setup import Forces, Free, Setup, Stage
 from swashplate.identification.unknowns import Unknowns
 from swashplate.maneuvers import Maneuver, multisine, ramp, sine, stairs, step
 from swashplate.parameters.definitions import CATALOGUE, COLUMNS, find
@@ -175,7 +179,7 @@ def outlook(
     Raises
     ------
     InputError, ParameterError
-        If runs and set-up do not fit each other, see `staging.stage_problem`.
+        If runs and set-up do not fit each other, see `drive_model.stage_problem`.
     DomainError
         If the model does not hold at the nominal values.
     """
@@ -315,18 +319,12 @@ class Bench(Result):
     sensors: tuple[Sensor, ...]
     """Those of the campaign, or of a fresh plan."""
 
-    _tried: dict[tuple[str, Sensor], Array] = field(default_factory=dict, repr=False)
-
     def rows(self, maneuver: Maneuver, sensor: Sensor) -> Array:
         """(<= K, K) factor of what one sensor would tell in a test, its free zero spent."""
-        key = (maneuver.name, sensor)
-        if key not in self._tried:
-            # what is known beforehand counts once, not once a test
-            free = {k: v.model_copy(update={"prior": None}) for k, v in self.stage.free.items()}
-            stage = self.stage.model_copy(update={"free": free})
-            problem = stage_problem(stage, self.parameters, [_imagined(maneuver, sensor)])
-            self._tried[key] = _machine_rows(problem)
-        return self._tried[key]
+        # what is known beforehand counts once, not once a test
+        free = {k: v.model_copy(update={"prior": None}) for k, v in self.stage.free.items()}
+        stage = self.stage.model_copy(update={"free": free})
+        return _machine_rows(stage_problem(stage, self.parameters, [_imagined(maneuver, sensor)]))
 
     def candidate(
         self, maneuver: Maneuver, sensors: Sequence[Sensor], name: str | None = None

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from hashlib import blake2b
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,11 +21,18 @@ from swashplate.errors import InputError
 from swashplate.executors import Executor, Serial
 from swashplate.identification.data_checks import (
     check_model,
-    check_sound,
+    check_rank,
+    check_runs,
     refuse_unsound,
     spike_findings,
 )
-from swashplate.identification.drive_model import DriveModel, at_rate_of
+from swashplate.identification.drive_model import (
+    DriveModel,
+    Parameters,
+    at_rate_of,
+    stage_problem,
+    with_estimates,
+)
 from swashplate.identification.intervals import weighed
 from swashplate.identification.lack_of_fit import measurement_error
 from swashplate.identification.model import Model, OwnModel
@@ -40,8 +47,8 @@ from swashplate.identification.solving import (
     solve,
     solve_from,
 )
-from swashplate.identification.staging import Parameters, stage_problem, with_estimates
 from swashplate.identification.unknowns import Unknown
+from swashplate.parameters.definitions import columns_of
 from swashplate.parameters.parameter_set import ParameterSet
 from swashplate.results import Result
 
@@ -236,7 +243,7 @@ def fit(
                 "A drive needs a Setup, such as load_setup('hoist'), for what is free."
             )
         setup = free
-        doubts += refuse_unsound(check_sound(experiments, smooth(nominal), setup))
+        doubts += refuse_unsound(check_runs(experiments, smooth(nominal)))
         nominal, changed = at_rate_of(experiments, nominal)
         doubts = (*doubts, *changed)
     elif not isinstance(nominal, ModelParameters):
@@ -255,6 +262,7 @@ def fit(
         problem = stage_problem(
             stage, parameters, experiments, threads=threads, uncertain=setup.standard_uncertainty
         )
+        refuse_unsound(check_rank(f"Stage {stage.name}", problem))
         begin: Array | None = None
         results: tuple[StartResult, ...] = ()
         if search is not None and search.starts > 0:
@@ -325,25 +333,6 @@ def _from_elsewhere(
         others = ()
     nominal = StartResult.of(0, problem.start, found)
     return nominal, *(replace(each, number=each.number + 1) for each in others)
-
-
-def refined(staged: Fit, experiments: Sequence[Experiment], **settings: Any) -> Fit:
-    """All unknowns of a staged fit at once through the whole chain, from where the stages ended.
-
-    A staged fit takes each stage's result for granted in the next one, so that its intervals leave
-    out what the earlier stages do not know. Those of a joint fit do not; from afar, though, a joint
-    fit is often caught on its way.
-
-    Parameters
-    ----------
-    staged : Fit
-        Of more than one stage.
-    experiments :
-        The runs.
-    **settings :
-        As of `fit`: tolerance, max_evaluations, threads, watch.
-    """
-    return fit(staged.parameters, experiments, staged.setup.joint(), **settings)
 
 
 def smooth(parameters: P) -> P:
@@ -420,3 +409,38 @@ def _stopped(best: StartResult, done: int, starts: int) -> Solution:
         f"interrupted after {done} of {starts} starts: the best of them",
         best.seconds,
     )
+
+
+SPREAD = 0.05
+"""Standard deviation of the logarithm by which a drawn parameter differs from the nominal one."""
+
+OF_FORCES = ("Z19", "Z21")
+"""The solenoids' coefficients that are drawn where a set-up frees forces: those of odd powers."""
+
+
+def drawn(nominal: Drive, setup: Setup, seed: int, *, spread: float = SPREAD) -> Drive:
+    """A drive that differs from a nominal one in what a set-up frees, and in nothing else.
+
+    Parameters
+    ----------
+    nominal : Drive
+        About which it is drawn.
+    setup : Setup
+        Its free parameters are multiplied by log-normal factors, both directions apart.
+    seed : int
+        Not negative.
+    spread : float
+        Standard deviation of the factors' logarithms.
+
+    Raises
+    ------
+    ParameterError
+        If what was drawn breaks a rule: draw with another seed.
+    """
+    random = np.random.default_rng(seed)
+    names = [name for stage in setup.stages for name in columns_of(list(stage.free))]
+    if any(stage.forces is not None for stage in setup.stages):
+        names += columns_of(list(OF_FORCES))
+    numbers = nominal.parameters.numbers
+    factors = {name: float(np.exp(random.normal(0.0, spread))) for name in names}
+    return nominal.replace(**{name: numbers[name] * factor for name, factor in factors.items()})

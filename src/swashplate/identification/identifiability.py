@@ -13,16 +13,13 @@ from numpy.typing import NDArray
 from scipy.linalg import null_space, qr
 
 from swashplate.errors import InputError
-from swashplate.identification.drive_model import DriveModel
+from swashplate.identification.drive_model import DriveModel, true_value
 from swashplate.identification.problem import TOLERANCE, triangular_factor, whitening
-from swashplate.identification.staging import true_value
 from swashplate.identification.unknowns import Unknowns
 from swashplate.models.displacement_control import (
-    ANGLE,
     FORCE,
     MOTION,
     PRESSURE,
-    TILT,
     TRAVEL,
     ZERO,
 )
@@ -49,7 +46,7 @@ def scaled(power: float) -> Move:
     return lambda value, t, known: value * exp(power * t)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Gauge:
     """Parameters that can move together without changing what is measured."""
 
@@ -148,19 +145,6 @@ GAUGES: Sequence[Gauge] = (
         "only Z8/(1+Z6) is determined",
         ("Z6", "Z8"),
     ),
-    Gauge(
-        "scale of the spool's tilt",
-        _powers(TILT, "force"),
-        "only the force, Z16 and Z18 over Z3 and Z8·Z3 are determined well: a small tilt is its "
-        "own tangent",
-        ("Z3", "Z8", "Z16"),
-    ),
-    Gauge(
-        "scale of the swash angle",
-        _powers(ANGLE),
-        "only Z1·Z10, Z3/Z10 and Z13·Z10 are determined well: a small angle is its own tangent",
-        ("Z10", "Z13", "Z3"),
-    ),
 )
 """Those of the model; the sentence on Z8/(1+Z6) holds away from the swash plate's stops."""
 
@@ -187,7 +171,7 @@ class Direction(NamedTuple):
     half_width: float
     """Of the 95 % interval of the unknown to fix, of its value or scale; inf for no effect. [1]"""
     gauge: Gauge | None
-    """The known gauge that it is, if it is one."""
+    """The known gauge that it is, if it is one that changes nothing."""
     fix: str
     """The unknown to fix; in a weak direction only if its value is known, as a wrong one shows in
     the others."""
@@ -200,24 +184,21 @@ class Direction(NamedTuple):
     @property
     def sentence(self) -> str:
         """What an engineer would say."""
-        begin, end = "", f". Fix {self.fix}."
-        if self.weak:
-            begin = f"Weak: {self.fix} is known to ±{100.0 * self.half_width:.3g} % only"
-            end = "; fix one of them only if you know it, or add a test that distinguishes them."
-            if len(self.changes) == 1:
-                return f"{begin}; add a test that determines it."
         if self.gauge is not None:
-            together = listed(sorted(self.changes, key=_in_order))
-            how = f"change together {'with almost no' if self.weak else 'without'} effect"
-            words = f"{together} {how} ({self.gauge.name}): {self.gauge.determined}"
-            return f"{begin}{', as ' if begin else ''}{words}{end}"
+            names = listed(sorted(self.changes, key=_in_order))
+            how = f"change together without effect ({self.gauge.name})"
+            return f"{names} {how}: {self.gauge.determined}. Fix {self.fix}."
         moves = ", ".join(f"{name} {by:+.2g} %" for name, by in [*self.changes.items()][:NAMED])
         if len(self.changes) > NAMED:
             moves += f" and {len(self.changes) - NAMED} others"
         if self.weak:
-            return f"{begin}, as {moves} change together with almost no effect{end}"
+            along = f" ({moves} have little effect together)" if len(self.changes) > 1 else ""
+            return (
+                f"Weak: {self.fix} is known to ±{100.0 * self.half_width:.3g} % only{along}. Add a "
+                "test that determines it, or fix one whose value you know."
+            )
         change = "together change" if len(self.changes) > 1 else "changes"
-        return f"{moves} {change} nothing{end}"
+        return f"{moves} {change} nothing. Fix {self.fix}."
 
 
 def _in_order(name: str) -> tuple[str | int, ...]:
@@ -304,7 +285,6 @@ def identifiability(
     covariance: Array | None = None,
     tolerance: float = TOLERANCE,
     fixed: Known | None = None,
-    gauges: Sequence[Gauge] = GAUGES,
 ) -> Identifiability:
     """Judge what derivatives tell of the unknowns.
 
@@ -322,8 +302,6 @@ def identifiability(
         1e-6 for central differences.
     fixed : mapping of str to float, optional
         Values of parameters that are no unknowns, by symbol; some gauges need them.
-    gauges : sequence of Gauge
-        Directions that have a name.
 
     Raises
     ------
@@ -340,9 +318,8 @@ def identifiability(
     # a column of mere rounding is none
     moving = variables.free & (lengths > 1e-14 * lengths.max(initial=0.0))
     unexcited = variables.free & ~moving
-    tangents = {each.name: each.tangent(variables, fixed) for each in gauges}
-    space = _Space(triangle, lengths, np.flatnonzero(moving), variables, gauges, tangents)
-    null, rank = space.null(tolerance)
+    space = _Space(triangle, lengths, np.flatnonzero(moving), variables)
+    null, rank = space.null(tolerance, {each: each.tangent(variables, fixed) for each in GAUGES})
     left = space.without([variables.names.index(each.fix) for each in null])
     return Identifiability(
         variables,
@@ -365,15 +342,14 @@ class _Space:
     places: NDArray[np.intp]
     """(k,) numbers of these unknowns."""
     variables: Unknowns
-    gauges: Sequence[Gauge]
-    tangents: Mapping[str, Array]
-    """(K,) of each gauge."""
 
     def without(self, numbers: Sequence[int]) -> _Space:
         """The same without some unknowns."""
         return replace(self, places=self.places[~np.isin(self.places, numbers)])
 
-    def null(self, tolerance: float) -> tuple[list[Direction], int]:
+    def null(
+        self, tolerance: float, tangents: Mapping[Gauge, Array]
+    ) -> tuple[list[Direction], int]:
         """Directions that change nothing, known gauges first, and the rank of the others."""
         if not self.places.size:
             return [], 0
@@ -381,8 +357,8 @@ class _Space:
         _, sizes, rows = np.linalg.svd(self.triangle[:, self.places] / lengths, full_matrices=True)
         rank = int(np.count_nonzero(sizes > tolerance * sizes[0]))
         null, found, fixed = rows[rank:].T, list[Direction](), list[int]()
-        for gauge in self.gauges:
-            vector = self.tangents[gauge.name][self.places] * lengths
+        for gauge, tangent in tangents.items():
+            vector = tangent[self.places] * lengths
             vector /= np.linalg.norm(vector) or 1.0
             # as long as its part in the null space: it changes nothing
             if np.linalg.norm(null.T @ vector) < 1.0 - 1e-6:
@@ -419,24 +395,12 @@ class _Space:
             half = HALF * sqrt(max(variances[place], 0.0))
             if half <= WIDE:
                 break
-            gauge, vector = space._gauge(left, place)
-            found.append(space._direction(vector, half, gauge, place))
+            vector = left[place] / left[place, place]
+            found.append(space._direction(vector, half, None, place))
             rest = np.arange(space.places.size) != place
             left = (left - np.outer(left[place], left[place]) / left[place, place])[rest][:, rest]
             space = space.without([int(space.places[place])])
         return found
-
-    def _gauge(self, covariance: Array, place: int) -> tuple[Gauge | None, Array]:
-        """A gauge along which an unknown is weak, if there is one, and how all others follow it."""
-        for gauge in self.gauges:
-            tangent = self.tangents[gauge.name][self.places]
-            if np.count_nonzero(tangent) < 2 or tangent[place] == 0.0:
-                continue
-            vector = tangent / tangent[place]
-            told = vector @ np.linalg.lstsq(covariance, vector, rcond=1e-14)[0]
-            if WIDE * sqrt(max(told, 0.0)) < HALF:
-                return gauge, vector
-        return None, covariance[place] / covariance[place, place]
 
     def _place_to_fix(
         self, gauge: Gauge, vector: Array, null: Array, fixed: Sequence[int]
@@ -481,12 +445,12 @@ def true_values(stage: StageFit, truth: ParameterSet) -> dict[str, float]:
     """What the stage's unknowns of the machine really are, by name, in their units."""
     model = stage.problem.model
     assert isinstance(model, DriveModel)
-    found = {}
-    for name, unknown in zip(stage.problem.unknowns.names, stage.problem.unknowns, strict=True):
-        value = true_value(unknown, model, truth)
-        if value is not None:
-            found[name] = value
-    return found
+    unknowns = stage.problem.unknowns
+    found = {
+        name: true_value(unknown, model, truth)
+        for name, unknown in zip(unknowns.names, unknowns, strict=True)
+    }
+    return {name: value for name, value in found.items() if value is not None}
 
 
 def moved_columns(fit: Fit) -> set[str]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from math import inf, log
 from types import MappingProxyType
@@ -32,6 +32,7 @@ from swashplate.tables import percent
 
 if TYPE_CHECKING:
     from swashplate.campaign.experiment import Experiment
+    from swashplate.identification.assessment import Assessment
     from swashplate.identification.fitting import StageFit
 
 Array = NDArray[np.float64]
@@ -470,3 +471,51 @@ def prior_sentences(unknowns: Unknowns, vector: Array, quoted: Covariance) -> tu
             f"{abs(pull):.2g} deviations {'above' if pull >= 0.0 else 'below'} its mean."
         )
     return tuple(said)
+
+
+OPEN = 0.01
+"""Part of a channel's range that a prediction moves by, for 10 % of an unknown, from which it
+depends on that unknown."""
+
+
+def open_unknowns(assessment: Assessment, experiments: Iterable[Experiment]) -> Iterator[str]:
+    """Unknowns without an interval on which the prediction of some runs depends.
+
+    Only a prediction that leaves the directions which the fitted runs determine is open: of two
+    unknowns of which the fit tells the product, it depends on the product alone.
+    """
+    stage, found = assessment.stage, assessment.uncertainty
+    model, unknowns, vector = stage.problem.model, stage.problem.unknowns, stage.solution.vector
+    assert isinstance(model, DriveModel)
+    status = [estimate.status for estimate in found.estimates]
+    undetermined = np.array(
+        [s == "undetermined" and u.run is None for s, u in zip(status, unknowns, strict=True)]
+    )
+    # a better optimum that was met says nothing of how far an unknown can go
+    one_ended = np.zeros(len(unknowns), dtype=np.bool_)
+    one_ended[[e.number for e in found.ends if np.isinf(e.distance) and e.better is None]] = True
+    if not (undetermined | one_ended).any():
+        return
+    lengths = np.linalg.norm(assessment.linearised.triangle, axis=0)
+    lengths[lengths == 0.0] = 1.0
+    # directions that the fitted runs determine, in units of their effect there
+    told = np.linalg.qr(lengths[:, None] * assessment.linearised.whitening)[0]
+    chain = DriveModel(stage.drive.parameters, "card" if model.part == "card" else "chain")
+    chain = replace(chain, forces=model.forces)
+    targets = [t for u in unknowns if u.run is None for t in u.targets]
+    values = {t: v for t, v in unknowns.targets(vector, "").items() if t in targets}
+    by_name = unknowns.chain(vector, targets, "")
+    for experiment in experiments:
+        if experiment.input.kind != "voltage" or not chain.signals_of(experiment):
+            continue
+        for name, part in chain.linearise(values, experiment, targets).items():
+            channel = experiment[name]
+            rows = part.by[channel.used] @ by_name
+            if channel.is_position:
+                rows = rows - rows.mean(axis=0)
+            beyond = rows / lengths
+            beyond = (beyond - (beyond @ told) @ told.T) * lengths
+            moved = 0.1 * np.where(undetermined, np.abs(beyond).max(axis=0), 0.0)
+            moved += 0.1 * np.where(one_ended, np.abs(rows).max(axis=0), 0.0)
+            reach = float(np.ptp(channel.values[channel.used]))
+            yield from (unknowns.names[k] for k in np.flatnonzero(moved > OPEN * reach))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import degrees, inf, isfinite, sqrt
 from typing import TYPE_CHECKING, NamedTuple
@@ -14,7 +14,7 @@ from scipy.linalg import solve_banded
 from swashplate.campaign.experiment import Channel, Experiment
 from swashplate.errors import DomainError
 from swashplate.identification.drive_model import CURRENTS, DriveModel
-from swashplate.identification.model import OFFSET, linearised, simulated
+from swashplate.identification.model import OFFSET, Model, linearised, simulated
 from swashplate.identification.problem import TOLERANCE, triangular_factor
 from swashplate.parameters.definitions import CATALOGUE, COLUMNS, columns_of
 from swashplate.tables import listed
@@ -269,47 +269,43 @@ def lack_of_fit(assessments: Sequence[Assessment]) -> LackOfFit:
     are not laid to what an earlier one does not know exactly. All follows from the triangular
     factor of all derivatives.
     """
-    blocks = [block for each in assessments for block in _StageBlocks(each, assessments).blocks()]
+    blocks = [block for each in assessments for block in _blocks(each, assessments)]
     places: dict[str, int] = {}
+    counts = []
     for group in ("estimates", "fixed", "faults"):
         for block in blocks:
             for name in getattr(block, group):
                 places.setdefault(name, len(places))
-        if group == "estimates":
-            count = len(places)
-        elif group == "fixed":
-            constants = list(places)[count:]
+        counts.append(len(places))
+    count, known, _ = counts
+    names, meanings = list(places), {k: v for each in blocks for k, v in each.meanings.items()}
+    constants, rows = names[count:known], np.eye(len(places) + 1)
     uncertain = [place for name, place in places.items() if name.startswith(UNCERTAIN)]
-    triangle = np.eye(len(places) + 1)[uncertain]
-    triangle = triangular_factor(np.vstack([triangle, *(each.factor(places) for each in blocks)]))
+    triangle = triangular_factor(
+        np.vstack([rows[uncertain], *(each.factor(places) for each in blocks)])
+    )
+    open_fixed = triangular_factor(np.vstack([rows[count:known] / FIXED_OFF, triangle]))
     basis, inverse = _span(triangle[:, :count])
-    known, steps = count + len(constants), np.eye(len(places) + 1)[count : count + len(constants)]
-    open_fixed = triangular_factor(np.vstack([steps / FIXED_OFF, triangle]))
     wider, instead = _span(open_fixed[:, :known])
     shift = inverse @ triangle[:, -1]
     left = triangle[:, -1] - basis @ (basis.T @ triangle[:, -1])
-    squares = float(left @ left)
-    spare = max(sum(block.residual.size for block in blocks) - count, 1)
-    deviation = sqrt(squares / spare)
-    names, meanings = list(places), {k: v for each in blocks for k, v in each.meanings.items()}
+    squares, lengths = float(left @ left), np.linalg.norm(triangle, axis=0)
+    deviation = sqrt(squares / max(sum(block.residual.size for block in blocks) - count, 1))
     found = []
-    for name in names[count:]:
-        column = triangle[:, places[name]]
-        length = float(np.linalg.norm(column))
+    for name, place in [*places.items()][count:]:
+        column, free, length = triangle[:, place], open_fixed[:, place], float(lengths[place])
         if not length > 0.0:
             continue
         beyond = column - basis @ (basis.T @ column)
         along = float(np.linalg.norm(beyond))
         told = along > SAME_DIRECTION * length and squares > 0.0
         pull = float(beyond @ left) if told else 0.0
-        change = inverse @ column
-        effect = np.abs(change) * np.linalg.norm(triangle[:, :count], axis=0)
+        effect = np.abs(inverse @ column) * lengths[:count]
         order = [int(k) for k in np.argsort(-effect)[:4] if effect[k] > 0.01 * length]
-        factor, unit, plausible = meanings[name]
-        free = open_fixed[:, places[name]]
         left_over = float(np.linalg.norm(free - wider @ (wider.T @ free)))
-        moved = np.abs((instead @ free)[count:]) * np.linalg.norm(triangle[:, count:known], axis=0)
+        moved = np.abs((instead @ free)[count:]) * lengths[count:known]
         fixed = [constants[k] for k in np.argsort(-moved)[:3] if moved[k] > 0.1 * moved.max()]
+        factor, unit, plausible = meanings[name]
         found.append(
             Fault(
                 name,
@@ -324,12 +320,13 @@ def lack_of_fit(assessments: Sequence[Assessment]) -> LackOfFit:
                 tuple(dict.fromkeys(COLUMNS.get(each, each) for each in fixed)),
             )
         )
+    runs = {run.name: run for each in assessments for run in each.stage.problem.experiments}
     twins = [twin for each in assessments for twin in _late_commands(each)][:1]
     return LackOfFit(
         tuple(fit for block in blocks for fit in block.against_known(places, shift)),
         (*sorted(found, key=lambda each: -each.share), *twins),
-        _units(triangle[:, : count + len(constants)], constants, found),
-        clipped_channels(_distinct(assessments)),
+        _units(triangle[:, :known], constants, found),
+        clipped_channels(list(runs.values())),
     )
 
 
@@ -385,6 +382,10 @@ def _moved_at(end: float, experiment: Experiment, name: str) -> float:
     return most
 
 
+Meaning = tuple[float, str, float]
+"""Factor to a fault's unit, unit, and plausible size."""
+
+
 class _Block(NamedTuple):
     """One channel of one run: derivatives by all that could explain its residuals."""
 
@@ -400,8 +401,8 @@ class _Block(NamedTuple):
     """(n,) by the logarithm of each fixed parameter."""
     faults: Mapping[str, Array]
     """(n,) by faults of instruments and of the campaign."""
-    meanings: Mapping[str, tuple[float, str, float]]
-    """Factor to its unit, unit, and plausible size of each fixed parameter and fault."""
+    meanings: Mapping[str, Meaning]
+    """Of each fixed parameter and fault."""
 
     def factor(self, places: Mapping[str, int]) -> Array:
         """(<= n, P + 1) triangular factor of its own columns and the residual, among all others."""
@@ -414,7 +415,7 @@ class _Block(NamedTuple):
     def against_known(self, places: Mapping[str, int], shift: Array) -> list[ChannelFit]:
         """The residuals, estimates shifted by (K,), over the known error; none if it is unknown."""
         error = measurement_error(self.channel)
-        if error is None or not error > 0.0:
+        if not error:
             return []
         left = self.residual.copy()
         for name, values in self.estimates.items():
@@ -423,164 +424,153 @@ class _Block(NamedTuple):
         return [ChannelFit(self.run, self.channel.name, ratio, left.size)]
 
 
-class _StageBlocks:
-    """A stage's runs with derivatives by its own and by earlier estimates, and by faults."""
-
-    def __init__(self, assessment: Assessment, assessments: Sequence[Assessment]) -> None:
-        self.assessment, self.stage = assessment, assessment.stage
-        self.problem, self.vector = self.stage.problem, self.stage.solution.vector
-        self.noise = _noise_units(assessment)
-        model = self.problem.model
-        self.model, self.numbers = model, self.stage.parameters.numbers
-        self.earlier: list[Assessment] = []
-        self.fixed: list[str] = []
-        if not isinstance(model, DriveModel):
-            self.fixed = [name for together in self.problem.uncertain for name in together]
-            return
-        part = model.part
-        simulated_currents = self.stage.stage.current == "simulated"
-        if part == "pump" and simulated_currents and _all_voltages(self.problem.experiments):
-            part = "chain"
-            self.earlier = [
-                each
-                for each in assessments[: assessments.index(assessment)]
-                if each.stage.stage.part == "card"
-            ]
-        self.model = DriveModel(self.stage.drive.parameters, part, model.currents, model.forces)
-        self.fixed = self._constants(part, [each.stage.problem for each in assessments])
-
-    def _constants(self, part: str, problems: Sequence[Problem]) -> list[str]:
-        """Columns of the drive that no stage estimates and that are not zero or infinite."""
-        taken = {t for each in problems for unknown in each.unknowns for t in unknown.targets}
-        if any(isinstance(p.model, DriveModel) and p.model.forces is not None for p in problems):
-            taken |= set(columns_of(["Z19", "Z20", "Z21", "Z22"]))
-        blocks = {"card": ("control_card",), "pump": ("pump_motor",)}
-        numbers = self.stage.parameters.numbers
-        return [
-            name
-            for name, symbol in COLUMNS.items()
-            if CATALOGUE[symbol].block in blocks.get(part, ("control_card", "pump_motor"))
-            and name not in taken
-            and numbers[name] != 0.0
-            and isfinite(numbers[name])
-        ]
-
-    def blocks(self) -> list[_Block]:
-        """One for each channel of each run."""
-        made = []
-        runs = {(run.name, run.channel): run for run in self.assessment.linearised.runs}
-        free = self.assessment.linearised.variables.free
-        fastest = {name: self._fastest(name) for name in self.problem.channels}
-        for number, experiment in enumerate(self.problem.experiments):
-            outputs = self.problem.outputs(self.vector, number)
-            by_others = self._by_others(number)
-            commanded = self._by_command(number, outputs)
-            for name, weights in self.problem.weights[number].items():
-                run = runs.get((experiment.name, name))
-                if run is None:
-                    continue
-                used, scale = weights > 0.0, self.noise[name]
-                weight = weights[used] / scale
-                estimates = {
-                    f"{self.stage.stage.name}: {label}": run.jacobian[:, k] / scale
-                    for k, label in enumerate(self.problem.unknowns.names)
-                    if self.problem.unknowns[k].run in (None, experiment.name) and free[k]
-                }
-                held: dict[str, Array] = {}
-                for label, column in by_others.get(name, {}).items():
-                    target = held if label in self.fixed else estimates
-                    target[label] = weight * column[used]
-                for together in self.problem.uncertain:
-                    known = [column for column in together if column in held]
-                    if known:
-                        estimates[f"{UNCERTAIN}{', '.join(known)}"] = sum(
-                            (held.pop(c) * (together[c] / abs(self.numbers[c])) for c in known),
-                            np.zeros(run.residual.size),
-                        )
-                place = number / max(len(self.problem.experiments) - 1, 1) - 0.5
-                faults = {
-                    **_instrument_faults(experiment, name, outputs[name], place, fastest[name]),
-                    **commanded.get(name, {}),
-                }
-                made.append(
-                    _Block(
-                        experiment.run,
-                        experiment[name],
-                        run.residual / scale,
-                        weight,
-                        estimates,
-                        held,
-                        {label: weight * found[0][used] for label, found in faults.items()},
-                        {
-                            **dict.fromkeys(held, (100.0, "%", inf)),
-                            **{label: found[1] for label, found in faults.items()},
-                        },
-                    )
-                )
-        return made
-
-    def _fastest(self, name: str) -> float:
-        """Largest measured rate of a position in any run, over short windows; 0 of others."""
-        rates = [0.0]
-        for each in self.problem.experiments:
-            if name in each.channels and each[name].is_position:
-                time, values = each[name].time[each[name].used], each[name].values[each[name].used]
-                if time.size > 1:
-                    width = max(round(WINDOW / float(np.median(np.diff(time)))), 1)
-                    moved = np.abs(values[width:] - values[:-width])
-                    rates.append(float((moved / (time[width:] - time[:-width])).max(initial=0.0)))
-        return max(rates)
-
-    def _by_others(self, number: int) -> dict[str, dict[str, Array]]:
-        """By channel, (m,) derivatives by earlier stages' estimates and fixed parameters."""
-        names = list(self.fixed)
-        for each in self.earlier:
-            names += _machine(each.stage.problem)
-        if not names:
-            return {}
-        experiment, numbers = self.problem.experiments[number], self.numbers
-        values = self.problem.model_values(self.vector, number)
-        made: dict[str, dict[str, Array]] = {}
-        for channel, part in linearised(self.model, values, experiment, names).items():
-            columns = {name: part.by[:, k] * numbers[name] for k, name in enumerate(self.fixed)}
-            first = len(self.fixed)
-            for each in self.earlier:
-                targets, found = _machine(each.stage.problem), each.stage
-                chain = found.problem.unknowns.chain(found.solution.vector, targets, "")
-                by = part.by[:, first : first + len(targets)] @ chain
-                first += len(targets)
-                for k, label in enumerate(found.problem.unknowns.names):
-                    if found.problem.unknowns[k].run is None and each.linearised.variables.free[k]:
-                        columns[f"{found.stage.name}: {label}"] = by[:, k]
-            made[channel] = columns
-        return made
-
-    def _by_command(
-        self, number: int, outputs: Mapping[str, Array]
-    ) -> dict[str, dict[str, tuple[Array, tuple[float, str, float]]]]:
-        """By channel, the effects of a scale error and of a lag of the command, by differences."""
-        experiment = self.problem.experiments[number]
-        if not isinstance(self.model, DriveModel) or self.model.part == "pump":
-            return {}
-        signal = experiment.input
-        values = self.problem.unknowns.targets(self.vector, experiment.name)
-        plain = {k: v for k, v in values.items() if not k.startswith(OFFSET)}
-        changed = ((1.0 - COMMAND_CHANGE) * signal.values, _lagged(signal.time, signal.values))
-        try:
-            before, less, later = (
-                simulated(self.model, plain, replace(experiment, input=replace(signal, values=x)))
-                for x in (signal.values, *changed)
-            )
-        except DomainError:
-            return {}
-        scale, lag = (100.0, "%", 100.0 * PLAUSIBLE_SCALE), (1e3, "ms", inf)
-        return {
-            name: {
-                "scale of the command": ((before[name] - less[name]) / COMMAND_CHANGE, scale),
-                f"{SLOW}the command": ((later[name] - before[name]) / LAG, lag),
+def _blocks(assessment: Assessment, assessments: Sequence[Assessment]) -> Iterator[_Block]:
+    """One for each channel of each run of a stage: by its own and earlier estimates, by faults."""
+    stage, problem = assessment.stage, assessment.stage.problem
+    vector, numbers, model = stage.solution.vector, stage.parameters.numbers, stage.problem.model
+    earlier: list[Assessment] = []
+    fixed = [name for together in problem.uncertain for name in together]
+    if isinstance(model, DriveModel):
+        part, voltages = model.part, all(e.input.kind == "voltage" for e in problem.experiments)
+        if part == "pump" and stage.stage.current == "simulated" and voltages:
+            part, before = "chain", assessments[: assessments.index(assessment)]
+            earlier = [each for each in before if each.stage.stage.part == "card"]
+        model = DriveModel(stage.drive.parameters, part, model.currents, model.forces)
+        fixed = _constants(numbers, part, [each.stage.problem for each in assessments])
+    runs = {(run.name, run.channel): run for run in assessment.linearised.runs}
+    noise, free = _noise_units(assessment), assessment.linearised.variables.free
+    fastest = {name: _fastest(name, problem.experiments) for name in problem.channels}
+    for number, experiment in enumerate(problem.experiments):
+        outputs, own = problem.outputs(vector, number), problem.model_values(vector, number)
+        by_others = _by_others(model, own, experiment, numbers, fixed, earlier)
+        values = problem.unknowns.targets(vector, experiment.name)
+        commanded = _by_command(model, values, experiment)
+        place = number / max(len(problem.experiments) - 1, 1) - 0.5
+        for name, weights in problem.weights[number].items():
+            run = runs.get((experiment.name, name))
+            if run is None:
+                continue
+            used, scale = weights > 0.0, noise[name]
+            weight = weights[used] / scale
+            estimates = {
+                f"{stage.stage.name}: {label}": run.jacobian[:, k] / scale
+                for k, label in enumerate(problem.unknowns.names)
+                if problem.unknowns[k].run in (None, experiment.name) and free[k]
             }
-            for name in outputs
+            constant: dict[str, Array] = {}
+            for label, column in by_others.get(name, {}).items():
+                (constant if label in fixed else estimates)[label] = weight * column[used]
+            for together in problem.uncertain:
+                known = [column for column in together if column in constant]
+                if known:
+                    estimates[f"{UNCERTAIN}{', '.join(known)}"] = np.sum(
+                        [constant.pop(c) * (together[c] / abs(numbers[c])) for c in known], axis=0
+                    )
+            faults = _instrument_faults(experiment, name, outputs[name], place, fastest[name])
+            faults |= commanded.get(name, {})
+            yield _Block(
+                experiment.run,
+                experiment[name],
+                run.residual / scale,
+                weight,
+                estimates,
+                constant,
+                {label: weight * column[used] for label, (column, _) in faults.items()},
+                dict.fromkeys(constant, (100.0, "%", inf))
+                | {label: meaning for label, (_, meaning) in faults.items()},
+            )
+
+
+def _constants(numbers: Mapping[str, float], part: str, problems: Sequence[Problem]) -> list[str]:
+    """Columns of the drive that no stage estimates and that are not zero or infinite."""
+    taken = {t for each in problems for unknown in each.unknowns for t in unknown.targets}
+    if any(isinstance(p.model, DriveModel) and p.model.forces is not None for p in problems):
+        taken |= set(columns_of(["Z19", "Z20", "Z21", "Z22"]))
+    blocks = {"card": ("control_card",), "pump": ("pump_motor",)}
+    return [
+        name
+        for name, symbol in COLUMNS.items()
+        if CATALOGUE[symbol].block in blocks.get(part, ("control_card", "pump_motor"))
+        and name not in taken
+        and numbers[name] != 0.0
+        and isfinite(numbers[name])
+    ]
+
+
+def _fastest(name: str, experiments: Sequence[Experiment]) -> float:
+    """Largest measured rate of a position in any run, over short windows; 0 of others."""
+    rates = [0.0]
+    for channel in (each[name] for each in experiments if name in each.channels):
+        time, values = channel.time[channel.used], channel.values[channel.used]
+        if channel.is_position and time.size > 1:
+            width = max(round(WINDOW / float(np.median(np.diff(time)))), 1)
+            moved = np.abs(values[width:] - values[:-width])
+            rates.append(float((moved / (time[width:] - time[:-width])).max(initial=0.0)))
+    return max(rates)
+
+
+def _by_others(
+    model: Model,
+    values: Mapping[str, float],
+    experiment: Experiment,
+    numbers: Mapping[str, float],
+    fixed: Sequence[str],
+    earlier: Sequence[Assessment],
+) -> dict[str, dict[str, Array]]:
+    """By channel, (m,) derivatives by earlier stages' estimates and fixed parameters."""
+    targets = [
+        [t for u in each.stage.problem.unknowns if u.run is None for t in u.targets]
+        for each in earlier
+    ]
+    names = [*fixed, *(name for each in targets for name in each)]
+    if not names:
+        return {}
+    made: dict[str, dict[str, Array]] = {}
+    for channel, part in linearised(model, values, experiment, names).items():
+        columns = {name: part.by[:, k] * numbers[name] for k, name in enumerate(fixed)}
+        first = len(fixed)
+        for each, own in zip(earlier, targets, strict=True):
+            found, unknowns = each.stage, each.stage.problem.unknowns
+            chain = unknowns.chain(found.solution.vector, own, "")
+            by = part.by[:, first : first + len(own)] @ chain
+            first += len(own)
+            columns |= {
+                f"{found.stage.name}: {unknown.name}": by[:, k]
+                for k, unknown in enumerate(unknowns)
+                if unknown.run is None and each.linearised.variables.free[k]
+            }
+        made[channel] = columns
+    return made
+
+
+Effects = dict[str, tuple[Array, Meaning]]
+"""(m,) change of a reading, and its meaning, by fault."""
+
+
+def _by_command(
+    model: Model, values: Mapping[str, float], experiment: Experiment
+) -> dict[str, Effects]:
+    """By channel, the effects of a scale error and of a lag of the command, by differences."""
+    if not isinstance(model, DriveModel) or model.part == "pump":
+        return {}
+    signal = experiment.input
+    plain = {k: v for k, v in values.items() if not k.startswith(OFFSET)}
+    changed = ((1.0 - COMMAND_CHANGE) * signal.values, _lagged(signal.time, signal.values))
+    try:
+        before, less, later = (
+            simulated(model, plain, replace(experiment, input=replace(signal, values=x)))
+            for x in (signal.values, *changed)
+        )
+    except DomainError:
+        return {}
+    scale, lag = (100.0, "%", 100.0 * PLAUSIBLE_SCALE), (1e3, "ms", inf)
+    return {
+        name: {
+            "scale of the command": ((before[name] - less[name]) / COMMAND_CHANGE, scale),
+            f"{SLOW}the command": ((later[name] - before[name]) / LAG, lag),
         }
+        for name in before
+    }
 
 
 def _lagged(time: Array, values: Array) -> Array:
@@ -594,7 +584,7 @@ def _lagged(time: Array, values: Array) -> Array:
 
 def _instrument_faults(
     experiment: Experiment, name: str, output: Array, place: float, fastest: float
-) -> dict[str, tuple[Array, tuple[float, str, float]]]:
+) -> Effects:
     """Effects (m,) of faults on a channel's reading, with factor, unit and plausible size.
 
     `place` is that of the run in the campaign, from -1/2 to 1/2; `fastest` the largest rate of a
@@ -635,50 +625,27 @@ def _instrument_faults(
 def _late_commands(assessment: Assessment) -> list[Fault]:
     """Late stamps of the command beside a longer tau, where that is fixed: both by one sample."""
     stage = assessment.stage
-    model, problem = stage.problem.model, stage.problem
-    if not isinstance(model, DriveModel) or model.part == "pump":
+    model, problem, tau = stage.problem.model, stage.problem, stage.parameters.numbers.get("tau")
+    if not isinstance(model, DriveModel) or model.part == "pump" or tau is None:
         return []
     if any("tau" in each.targets for each in problem.unknowns):
         return []
-    experiment, (numbers, step) = problem.experiments[0], (stage.parameters.numbers, 0.0)
-    step = float(np.median(np.diff(experiment.input.time)))
-    signal = experiment.input
-    later = np.concatenate([signal.values[:1], signal.values[:-1]])
-    values = {
-        k: v
-        for k, v in problem.unknowns.targets(stage.solution.vector, experiment.name).items()
-        if not k.startswith(OFFSET)
-    }
-    shifted = replace(experiment, input=replace(signal, values=later))
-    first = simulated(model, values, shifted)
-    second = simulated(model, {**values, "tau": numbers["tau"] + step}, experiment)
+    experiment, signal = problem.experiments[0], problem.experiments[0].input
+    step = float(np.median(np.diff(signal.time)))
+    late = replace(signal, values=np.concatenate([signal.values[:1], signal.values[:-1]]))
+    targets = problem.unknowns.targets(stage.solution.vector, experiment.name)
+    values = {k: v for k, v in targets.items() if not k.startswith(OFFSET)}
+    first = simulated(model, values, replace(experiment, input=late))
+    second = simulated(model, {**values, "tau": tau + step}, experiment)
     plain = simulated(model, values, experiment)
-    apart = sum(float(np.sum((first[k] - second[k]) ** 2)) for k in first)
-    moved = sum(float(np.sum((first[k] - plain[k]) ** 2)) for k in first)
+    apart, moved = (
+        sum(float(np.sum((first[k] - other[k]) ** 2)) for k in first) for other in (second, plain)
+    )
     outside = sqrt(apart / moved) if moved > 0.0 else inf
-    if outside > SAME_STAMPS:
-        return []
-    return [
-        Fault(
-            "time stamps of the command",
-            "ms",
-            0.0,
-            inf,
-            0.0,
-            outside,
-            (f"the fixed tau = {1e3 * numbers['tau']:.3g} ms",),
-            1e3 * PLAUSIBLE_DELAY,
-        )
-    ]
-
-
-def _all_voltages(experiments: Sequence[Experiment]) -> bool:
-    return all(each.input.kind == "voltage" for each in experiments)
-
-
-def _machine(problem: Problem) -> list[str]:
-    """Names in the model that a problem's unknowns of the machine set."""
-    return [t for each in problem.unknowns if each.run is None for t in each.targets]
+    same = (f"the fixed tau = {1e3 * tau:.3g} ms",)
+    name, plausible = f"{STAMPS}the command", 1e3 * PLAUSIBLE_DELAY
+    twin = Fault(name, "ms", 0.0, inf, 0.0, outside, same, plausible)
+    return [twin] if outside <= SAME_STAMPS else []
 
 
 def _noise_units(assessment: Assessment) -> dict[str, float]:
@@ -714,12 +681,6 @@ def _span(matrix: Array) -> tuple[Array, Array]:
     kept = sizes > TOLERANCE * sizes[0]
     inverse[moving] = (right[kept].T / sizes[kept]) @ left[:, kept].T / lengths[moving, None]
     return left[:, kept], inverse
-
-
-def _distinct(assessments: Sequence[Assessment]) -> list[Experiment]:
-    """The experiments of all stages, each once."""
-    runs = {run.name: run for each in assessments for run in each.stage.problem.experiments}
-    return list(runs.values())
 
 
 def _units(matrix: Array, fixed: Sequence[str], found: Sequence[Fault]) -> tuple[str, ...]:

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, Literal, NamedTuple, Protocol, runtime_checkable
+from typing import Any, NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -189,9 +189,15 @@ def _check(
                 )
 
 
-OFFSET, CLOCK = "offset ", "clock "
-"""What the names begin with of a channel's free zero, and of the time by which the input's clock is
-ahead of the channel's [s]."""
+def refused_channel(experiment: Experiment, name: str, known: Collection[str]) -> InputError:
+    """What to say of a channel that the model does not give."""
+    return InputError(
+        f"{experiment.name}: the model gives no '{name}'; it gives {', '.join(known)}."
+    )
+
+
+OFFSET = "offset "
+"""What the name of a channel's free zero begins with."""
 _Key = tuple[int, tuple[int, ...], tuple[str, ...]]
 
 
@@ -199,16 +205,19 @@ _Key = tuple[int, tuple[int, ...], tuple[str, ...]]
 class EquationModel(ABC):
     """What every model of equations has in common; see `OwnModel` and `DriveModel`.
 
-    Besides its own names it knows of each channel ``"offset NAME"`` and ``"clock NAME"``.
+    Besides its own names it knows ``"offset NAME"`` of each channel.
     """
 
     _observed: dict[_Key, tuple[object, ObservedRecord]] = field(
         default_factory=dict, repr=False, init=False
     )
+    _chains: dict[tuple[int, tuple[str, ...]], tuple[object, tuple[list[str], Array]]] = field(
+        default_factory=dict, repr=False, init=False
+    )
 
     def __getstate__(self) -> dict[str, object]:
         """Without what can be made again."""
-        return {**self.__dict__, "_observed": {}}
+        return {**self.__dict__, "_observed": {}, "_chains": {}}
 
     @abstractmethod
     def signals_of(self, experiment: Experiment) -> Mapping[str, str]:
@@ -225,12 +234,9 @@ class EquationModel(ABC):
         experiment: Experiment,
         observed: ObservedRecord,
         columns: Sequence[str],
-        shifts: tuple[Sequence[float], Sequence[float]],
+        offsets: Sequence[float],
     ) -> Ready:
-        """The model with numbers, and columns as the engine names them.
-
-        `shifts` are offsets and clock offsets of the observations.
-        """
+        """The model with numbers and offsets of observations; columns as the engine names them."""
 
     def moves(self, name: str) -> Mapping[str, float]:
         """Derivatives by a name of the columns that it moves."""
@@ -240,7 +246,7 @@ class EquationModel(ABC):
         """Simulate the measured channels; see `model.Model`."""
         channels = list(self.signals_of(experiment))
         observed = self._record(experiment, dict.fromkeys(channels), ())
-        ready = self.ready(values, experiment, observed, (), _shifts(values, channels))
+        ready = self.ready(values, experiment, observed, (), ())
         flat = residuals(ready.instance, observed, ready.own)
         return {name: flat[observed.rows_of(k)] for k, name in enumerate(channels)}
 
@@ -251,7 +257,7 @@ class EquationModel(ABC):
         channels = list(self.signals_of(experiment))
         observed = self._record(experiment, dict.fromkeys(channels), names)
         columns, chain = self._chain(names, channels, observed)
-        ready = self.ready(values, experiment, observed, columns, _shifts(values, channels))
+        ready = self.ready(values, experiment, observed, columns, ())
         found = jacobian(ready.instance, observed, ready.paths, ready.own, moved=ready.moved)
         by = found.columns @ chain
         return {
@@ -270,31 +276,36 @@ class EquationModel(ABC):
 
         `weights` are the channels that count, and the factors (m,) on their residuals.
         """
-        known = self.signals_of(experiment)
-        channels = [name for name in weights if name in known]
-        observed = self._record(experiment, {name: weights[name] for name in channels}, names)
+        known, channels = self.signals_of(experiment), list(weights)
+        for name in channels:
+            if name not in known:
+                raise refused_channel(experiment, name, known)
+        observed = self._record(experiment, weights, names)
         columns, chain = self._chain(names, channels, observed)
-        shifts = _shifts(values, channels, offsets=True)
-        ready = self.ready(values, experiment, observed, columns, shifts)
+        offsets = [values.get(f"{OFFSET}{name}", 0.0) for name in channels]
+        ready = self.ready(values, experiment, observed, columns, offsets)
         found = triangle(ready.instance, observed, ready.paths, ready.own, moved=ready.moved)
         return np.column_stack([found.factor[:, :-1] @ chain, found.factor[:, -1]])
 
     def _chain(
         self, names: Sequence[str], channels: Sequence[str], observed: ObservedRecord
     ) -> tuple[list[str], Array]:
-        """Columns to ask for, and the derivatives of all columns by the names."""
-        moved = [
-            {name: 1.0} if name.startswith((OFFSET, CLOCK)) else self.moves(name) for name in names
-        ]
+        """Columns to ask for, and the derivatives of all columns by the names; made once."""
+        key = id(observed), tuple(names)
+        if key not in self._chains:
+            self._chains[key] = (observed, self._chain_of(names, channels, observed))
+        return self._chains[key][1]
+
+    def _chain_of(
+        self, names: Sequence[str], channels: Sequence[str], observed: ObservedRecord
+    ) -> tuple[list[str], Array]:
+        moved = [{name: 1.0} if name.startswith(OFFSET) else self.moves(name) for name in names]
         own = [
-            f"{word}{channel}"
+            f"{OFFSET}{channel}"
             for channel, each in zip(channels, observed.observations, strict=True)
-            for word, unknown in ((OFFSET, "offset"), (CLOCK, "clock_offset"))
-            if unknown in each.unknown
+            if each.unknown
         ]
-        asked = list(
-            dict.fromkeys(c for each in moved for c in each if not c.startswith((OFFSET, CLOCK)))
-        )
+        asked = list(dict.fromkeys(c for each in moved for c in each if not c.startswith(OFFSET)))
         chain = np.array([[each.get(row, 0.0) for each in moved] for row in (*asked, *own)])
         return asked, chain.reshape(len(asked) + len(own), len(names))
 
@@ -305,46 +316,28 @@ class EquationModel(ABC):
         names: Sequence[str],
     ) -> ObservedRecord:
         """The experiment as the march sees it; made once."""
-        own = tuple(name for name in names if name.startswith((OFFSET, CLOCK)))
+        own = tuple(name for name in names if name.startswith(OFFSET))
         key = (id(experiment), tuple(id(each) for each in weights.values()), own)
         if key not in self._observed:
             # both are kept as well, so that no others can have their identity
             kept = (experiment, dict(weights))
-            self._observed[key] = (kept, self._made(experiment, weights, own))
-        return self._observed[key][1]
-
-    def _made(
-        self, experiment: Experiment, weights: Mapping[str, Array | None], own: Sequence[str]
-    ) -> ObservedRecord:
-        signals, observations = self.signals_of(experiment), []
-        for name, weight in weights.items():
-            channel = experiment[name]
-            unknown: list[Literal["offset", "clock_offset"]] = []
-            if f"{OFFSET}{name}" in own:
-                unknown.append("offset")
-            if f"{CLOCK}{name}" in own:
-                unknown.append("clock_offset")
-            observations.append(
+            signals = self.signals_of(experiment)
+            observations = [
                 Observation(
                     signals[name],
-                    channel.time,
-                    channel.values if weight is not None else np.zeros_like(channel.values),
+                    experiment[name].time,
+                    np.zeros_like(experiment[name].values)
+                    if weight is None
+                    else experiment[name].values,
                     1.0 if weight is None else weight,
-                    unknown=tuple(unknown),
+                    unknown=("offset",) if f"{OFFSET}{name}" in own else (),
                 )
-            )
-        by, record, others = self.driven(experiment)
-        return ObservedRecord(record, observations, by, experiment.begins, others)
-
-
-def _shifts(
-    values: Mapping[str, float], channels: Sequence[str], *, offsets: bool = False
-) -> tuple[Sequence[float], Sequence[float]]:
-    """Offsets, where residuals are made with them, and clock offsets of channels."""
-    return (
-        [values.get(f"{OFFSET}{name}", 0.0) for name in channels] if offsets else (),
-        [values.get(f"{CLOCK}{name}", 0.0) for name in channels],
-    )
+                for name, weight in weights.items()
+            ]
+            by, record, others = self.driven(experiment)
+            made = ObservedRecord(record, observations, by, experiment.begins, others)
+            self._observed[key] = (kept, made)
+        return self._observed[key][1]
 
 
 @dataclass(frozen=True, eq=False)
@@ -444,7 +437,7 @@ class OwnModel(Result, EquationModel):
         experiment: Experiment,
         observed: ObservedRecord,
         columns: Sequence[str],
-        shifts: tuple[Sequence[float], Sequence[float]],
+        offsets: Sequence[float],
     ) -> Ready:
         """The model with numbers; see `EquationModel.ready`.
 
@@ -465,7 +458,7 @@ class OwnModel(Result, EquationModel):
                 numbers[name] = value
             elif name.startswith("start."):
                 begin |= dict.fromkeys(self._started(name), value)
-            elif not name.startswith((OFFSET, CLOCK)):
+            elif not name.startswith(OFFSET):
                 raise InputError(
                     f"{model.name} has no parameter '{name}'; it has {', '.join(paths)}."
                 )
@@ -486,7 +479,7 @@ class OwnModel(Result, EquationModel):
                 raise InputError(f"{model.name} has no given numbers for {experiment.name}.")
             given = given[experiment.name]
         instance = instance_of(model, p, options=self.options, given=given)
-        return Ready(instance, EngineOwn(begin, *shifts), columns)
+        return Ready(instance, EngineOwn(begin, offsets), columns)
 
     def _started(self, name: str) -> list[str]:
         """Paths of the states that a name such as ``start.position`` sets."""

@@ -117,21 +117,10 @@ def grid_of(time: Array) -> Grid:
 
 
 def pair_sums(samples: Array, grid: Grid, lags: int) -> tuple[Array, Array]:
-    """Sums of products of samples a lag apart, and how many pairs there are.
+    """Sums of products of samples (n,) a lag apart, and how many pairs there are.
 
-    Parameters
-    ----------
-    samples : (n,) array
-        Of one run.
-    grid : Grid
-        Where they lie.
-    lags : int
-        Largest lag, in steps.
-
-    Returns
-    -------
-    sums, counts : (lags + 1,) arrays
-        For the lags 0 to `lags`; pairs across a gap count with their true distance.
+    Both (lags + 1,), for the lags 0 to `lags` in steps; pairs across a gap count with their true
+    distance.
     """
     size = next_fast_len(grid.size + lags, real=True)
     spectrum = rfft(grid.spread(samples), size)
@@ -145,29 +134,17 @@ def pair_sums(samples: Array, grid: Grid, lags: int) -> tuple[Array, Array]:
 
 
 def correlation_length(autocovariance: Array, counts: Array) -> int:
-    """First lag after which the autocorrelation stays inside its band.
+    """First lag, 0 to m, after which the autocorrelation stays inside its band; 0 for white noise.
 
-    Parameters
-    ----------
-    autocovariance : (m + 1,) array
-        At the lags 0 to m.
-    counts : (m + 1,) array
-        Pairs that each was taken from.
-
-    Returns
-    -------
-    int
-        0 for white noise, at most m.
+    From the autocovariance (m + 1,) at the lags 0 to m and the number of pairs of each.
 
     Notes
     -----
     The band at lag k is ±2 √((1 + 2 Σ_{j<k} ρ_j²)/n), Bartlett's for noise that is correlated over
     fewer than k lags; "stays" means at least five lags in a row (Politis 2003), and not more than a
-    fifth of the next max(20, k/4): far out one lag in twenty lies outside by chance, and to wait
-    for k/4 in a row there would be to wait for ever. A first-order plug-in from the lag-one
-    correlation (Andrews 1991) is not used: filtered noise is smooth from sample to sample and its
-    lag one says hardly anything of its length, and a small slow part under white noise would be
-    missed.
+    fifth of the next max(20, k/4): far out one lag in twenty lies outside by chance. A first-order
+    plug-in from the lag-one correlation (Andrews 1991) would miss a small slow part under white
+    noise.
     """
     variance = float(autocovariance[0])
     if not variance > 0.0:
@@ -183,16 +160,6 @@ def correlation_length(autocovariance: Array, counts: Array) -> int:
     stray = so_far[ends] - so_far[lengths]
     stays = (near == 0) & (stray <= STRAY * np.maximum(ends - lengths, 1))
     return int(lengths[np.argmax(stays)]) if stays.any() else int(rho.size - 1)
-
-
-def flat_top(lags: Array, length: float) -> Array:
-    """Taper that leaves lags up to `length` alone and falls to 0 at twice that.
-
-    Politis's (2003) flat top, with a cosine in place of the straight flank: a tone in the
-    residuals, the beat of an ammeter's current, then leaks less into other frequencies.
-    """
-    beyond = np.clip(lags / max(length, 1.0) - 1.0, 0.0, 1.0)
-    return 0.5 * (1.0 + np.cos(np.pi * beyond))
 
 
 @dataclass(frozen=True, eq=False)
@@ -257,7 +224,11 @@ def noise_colours(fit: LinearisedFit) -> tuple[NoiseColour, ...]:
         lags = np.arange(min(2 * max(flat, 1), longest) + 1.0)
         correlation = np.where(lags == 0.0, 1.0, 0.0)
         if autocovariance[0] > 0.0 and flat:
-            correlation = autocovariance[: lags.size] / autocovariance[0] * flat_top(lags, flat)
+            # Politis's (2003) flat top, with a cosine in place of the straight flank: a spectral
+            # line then leaks less into other frequencies
+            beyond = np.clip(lags / flat - 1.0, 0.0, 1.0)
+            taper = 0.5 * (1.0 + np.cos(np.pi * beyond))
+            correlation = autocovariance[: lags.size] / autocovariance[0] * taper
         channel, step = fit.runs[members[0]].channel, grids[members[0]].step
         colours.append(NoiseColour(channel, members, step, correlation, length, longest))
     return tuple(colours)
@@ -485,18 +456,14 @@ def without_lines(fit: LinearisedFit) -> tuple[LinearisedFit, tuple[SpectralLine
     """
     runs, found = list(fit.runs), list[SpectralLine]()
     for channel in dict.fromkeys(run.channel for run in fit.runs):
-        members = [
-            k
-            for k, run in enumerate(fit.runs)
-            if run.channel == channel and run.time.size >= FEWEST
-        ]
+        alike = [k for k, run in enumerate(fit.runs) if run.channel == channel]
+        members = [k for k in alike if fit.runs[k].time.size >= FEWEST]
         if not members:
             continue
-        whole = sum(
-            float(np.sum(unweighted(run) ** 2)) for run in fit.runs if run.channel == channel
-        )
+        whole = sum(float(np.sum(unweighted(fit.runs[k]) ** 2)) for k in alike)
         left = {k: unweighted(fit.runs[k]) for k in members}
-        for frequency in _frequencies([left[k] for k in members], [_grid(fit, k) for k in members]):
+        grids = [grid_of(fit.runs[k].time) for k in members]
+        for frequency in _frequencies([*left.values()], grids):
             taken = 0.0
             for k in members:
                 turn = 2.0 * np.pi * frequency * fit.runs[k].time
@@ -526,10 +493,6 @@ def line_sentences(lines: Sequence[SpectralLine]) -> tuple[str, ...]:
         share = 100.0 * sum(each.share for each in alike)
         said.append(f"{what} {share:.2g} % of the residuals' variance of {channel}{largest}.")
     return tuple(said)
-
-
-def _grid(fit: LinearisedFit, number: int) -> Grid:
-    return grid_of(fit.runs[number].time)
 
 
 def _frequencies(runs: Sequence[Array], grids: Sequence[Grid]) -> list[float]:

@@ -21,6 +21,7 @@ from swashplate.identification.model import (
     Model,
     OwnModel,
     linearised,
+    refused_channel,
     simulated,
 )
 from swashplate.identification.solving import Evaluation, Loss, influence
@@ -59,6 +60,9 @@ class Problem(Result):
     compare: Callable[[Channel, Array], Array] | None = None
     """Linear map of a channel's samples, (m,) or (m, k), before they are compared: a position that
     drifts by its motion since the last anchor, for example."""
+    _last: dict[tuple[bytes, bool], Evaluation] = field(
+        default_factory=dict, repr=False, init=False, compare=False
+    )
 
     def __post_init__(self) -> None:
         if isinstance(self.model, OfEquations):
@@ -101,7 +105,14 @@ class Problem(Result):
         return sum(int(np.count_nonzero(w)) for run in self.weights for w in run.values())
 
     def evaluate(self, vector: Array, *, compressed: bool = True) -> Evaluation:
-        """Residuals and Jacobian by the vector, see `solving.Objective`."""
+        """Residuals and Jacobian by the vector, see `solving.Objective`; the last ones are kept."""
+        key = vector.tobytes(), compressed
+        if key not in self._last:
+            self._last.clear()
+            self._last[key] = self._evaluated(vector, compressed)
+        return self._last[key]
+
+    def _evaluated(self, vector: Array, compressed: bool) -> Evaluation:
         if compressed and self.compare is None and isinstance(self.model, EquationModel):
             parts = self._each(lambda k: self._reduced(vector, k))
         else:
@@ -199,9 +210,7 @@ class Problem(Result):
     @staticmethod
     def _output(outputs: Mapping[str, Part], experiment: Experiment, name: str) -> Part:
         if name not in outputs:
-            raise InputError(
-                f"{experiment.name}: the model gives no '{name}'; it gives {', '.join(outputs)}."
-            )
+            raise refused_channel(experiment, name, outputs)
         return outputs[name]
 
     def _each(self, work: Callable[[int], Part]) -> list[Part]:

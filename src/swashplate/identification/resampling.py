@@ -15,13 +15,17 @@ from scipy.fft import irfft, next_fast_len, rfft
 from swashplate.campaign.experiment import Experiment
 from swashplate.errors import DomainError, InputError
 from swashplate.executors import Executor, Serial
-from swashplate.identification.drive_model import DriveModel, simulated_current
+from swashplate.identification.drive_model import (
+    DriveModel,
+    Parameters,
+    simulated_current,
+    stage_problem,
+)
 from swashplate.identification.fitting import Fit, Search, StageFit, fit, smooth
 from swashplate.identification.noise import grid_of, noise_colours, unweighted, without_lines
 from swashplate.identification.problem import LinearisedFit, Problem
 from swashplate.identification.setup import Setup
 from swashplate.identification.solving import Loss, solve
-from swashplate.identification.staging import Parameters, stage_problem
 from swashplate.identification.unknowns import Unknowns
 from swashplate.identification.validation import Measures, predict, with_speeds
 from swashplate.parameters.parameter_set import ParameterSet
@@ -29,7 +33,6 @@ from swashplate.results import Result
 
 if TYPE_CHECKING:
     from swashplate.identification.assessment import Assessment
-    from swashplate.identification.validation import RunQuality
 
 Array = NDArray[np.float64]
 
@@ -45,26 +48,10 @@ class HeldRun(NamedTuple):
     mean: float
     """Of what was measured. [unit]"""
 
-    @classmethod
-    def of(cls, quality: RunQuality) -> HeldRun:
-        """From a prediction."""
-        experiment, channel = quality.experiment, quality.experiment[quality.channel]
-        return cls(
-            experiment.name,
-            experiment.maneuver,
-            quality.channel,
-            channel.unit,
-            quality.measures,
-            float(channel.values[channel.used].mean()),
-        )
-
 
 @dataclass(frozen=True)
 class Fold(Result):
     """One part of the runs, and the fit to the others."""
-
-    # files of earlier releases hold estimates of each fold as well
-    __pydantic_config__ = {"extra": "ignore"}  # noqa: RUF012
 
     number: int
     """From 0."""
@@ -90,11 +77,16 @@ class CrossValidation(Result):
     @property
     def measures(self) -> dict[str, Measures]:
         """Measures of each channel over all runs, each predicted by a fit that did not see it."""
-        runs = [run for fold in self.folds for run in fold.runs]
-        return {
-            name: _pooled([run for run in runs if run.channel == name])
-            for name in dict.fromkeys(run.channel for run in runs)
-        }
+        runs, made = [run for fold in self.folds for run in fold.runs], {}
+        for name in dict.fromkeys(run.channel for run in runs):
+            alike = [run for run in runs if run.channel == name]
+            samples = np.array([run.measures.samples for run in alike])
+            share, means = samples / samples.sum(), np.array([run.mean for run in alike])
+            rmse, spread = (np.array(x) for x in zip(*(r.measures[1:] for r in alike), strict=True))
+            # as if all samples were of one run: about the mean of all
+            variance = float(share @ (spread**2 + (means - share @ means) ** 2))
+            made[name] = Measures(int(samples.sum()), sqrt(share @ rmse**2), sqrt(variance))
+        return made
 
     @property
     def units(self) -> dict[str, str]:
@@ -119,17 +111,6 @@ class CrossValidation(Result):
                     "not reliable."
                 )
         return tuple(said)
-
-
-def _pooled(runs: list[HeldRun]) -> Measures:
-    """As if all samples were of one run: about the mean of all."""
-    samples = np.array([run.measures.samples for run in runs], dtype=np.float64)
-    share = samples / samples.sum()
-    means = np.array([run.mean for run in runs])
-    squares = float(share @ np.array([run.measures.rmse for run in runs]) ** 2)
-    within = np.array([run.measures.spread for run in runs]) ** 2
-    variance = float(share @ (within + (means - share @ means) ** 2))
-    return Measures(int(samples.sum()), sqrt(squares), sqrt(variance))
 
 
 LEFT = 0.01
@@ -211,24 +192,17 @@ def deal(experiments: Sequence[Experiment], folds: int, seed: int) -> tuple[tupl
         )
     strata: dict[tuple[str, str], list[int]] = {}
     for place, each in enumerate(experiments):
-        strata.setdefault((each.maneuver.split(" ")[0], _direction(each)), []).append(place)
+        high, low = max(each.input.values.max(), 0.0), max(-each.input.values.min(), 0.0)
+        way = "plus" if high >= low else "minus"
+        way = "both" if min(high, low) > ONE_WAY * max(high, low) else way
+        strata.setdefault((each.maneuver.split(" ")[0], way), []).append(place)
     random = np.random.default_rng(seed)
-    parts: list[list[int]] = [[] for _ in range(folds)]
     order = random.permutation(folds)
-    dealt = 0
-    for _, places in sorted(strata.items()):
-        for place in random.permutation(places):
-            parts[order[dealt % folds]].append(int(place))
-            dealt += 1
+    dealt = [int(p) for _, places in sorted(strata.items()) for p in random.permutation(places)]
+    parts: list[list[int]] = [[] for _ in range(folds)]
+    for number, place in enumerate(dealt):
+        parts[order[number % folds]].append(place)
     return tuple(tuple(sorted(part)) for part in parts)
-
-
-def _direction(experiment: Experiment) -> str:
-    values = experiment.input.values
-    high, low = max(float(values.max()), 0.0), max(-float(values.min()), 0.0)
-    if min(high, low) > ONE_WAY * max(high, low):
-        return "both"
-    return "plus" if high >= low else "minus"
 
 
 def _fold(
@@ -243,25 +217,30 @@ def _fold(
         result = fit(nominal, others, setup, loss=loss, threads=threads, search=Search(0))
         if result.stages[-1].solution.interrupted:
             raise KeyboardInterrupt
-        runs = tuple(HeldRun.of(each) for each in with_speeds(predict(result.parameters, held)))
+        predicted = with_speeds(predict(result.parameters, held))
     except (InputError, DomainError) as error:
         return Fold(number, names, (), (), False, str(error))
+    runs = []
+    for each in predicted:
+        run, channel = each.experiment, each.experiment[each.channel]
+        mean = float(channel.values[channel.used].mean())
+        named = (run.name, run.maneuver, each.channel, channel.unit)
+        runs.append(HeldRun(*named, each.measures, mean))
     converged = all(each.solution.converged for each in result.stages)
-    return Fold(number, names, _lost(result, held, threads), runs, converged, "")
+    return Fold(number, names, _lost(result, held, threads), tuple(runs), converged, "")
 
 
 def _lost(result: Fit, held: Sequence[Experiment], threads: int | None) -> tuple[str, ...]:
     """Unknowns that the runs held out tell, and those left in do not."""
     lost, before = [], smooth(result.nominal)
     for stage in result.stages:
+        parameters, before = before, stage.parameters
         try:
-            apart = stage_problem(stage.stage, before, held, threads=threads)
-            # in the units of all runs: information in other units cannot be compared
-            apart = replace(apart, scales=stage.problem.scales)
+            apart = stage_problem(stage.stage, parameters, held, threads=threads)
         except InputError:  # none of them has a channel of this stage
-            before = stage.parameters
             continue
-        before = stage.parameters
+        # in the units of all runs: information in other units cannot be compared
+        apart = replace(apart, scales=stage.problem.scales)
         left, there = (
             np.sum(problem.evaluate(vector).jacobian ** 2, axis=0)
             for problem, vector in (

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from importlib.resources import files
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -23,8 +24,10 @@ from swashplate.identification.problem import Problem, noise_scales
 from swashplate.identification.solving import solve
 from swashplate.identification.unknowns import Unknown, Unknowns
 from swashplate.parameters.definitions import find
+from swashplate.parameters.parameter_set import ParameterSet
 from swashplate.results import Result, short
 
+Array = NDArray[np.float64]
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 Positive = Annotated[PositiveFloat, Field(allow_inf_nan=False)]
 Pair = tuple[Finite, Finite]
@@ -34,7 +37,7 @@ StandardUncertainty = (
 )
 """A standard uncertainty: in SI units, or as "5 %" of the value."""
 COEFFICIENTS = ("Z19", "Z20", "Z21", "Z22")
-"""Of the solenoids: what `GivenForces` stand for."""
+"""Of the solenoids: what forces stand for."""
 
 
 class Entry(BaseModel):
@@ -81,17 +84,76 @@ class Free(Entry):
         return self
 
 
-class GivenForces(Entry):
-    """Effective currents at which the solenoids' forces are the unknowns, instead of Z19 to Z22."""
+class Forces(Entry):
+    """Forces at four effective currents each way, as magnitudes: unknowns instead of Z19 to Z22.
 
-    plus: tuple[PositiveFloat, PositiveFloat, PositiveFloat, PositiveFloat]
-    minus: tuple[PositiveFloat, PositiveFloat, PositiveFloat, PositiveFloat]
+    ``"force_plus_1"`` is the force at the first of `plus`; the effective current is what is left
+    of the current beyond the dead zone Z17.
+    """
+
+    plus: tuple[PositiveFloat, PositiveFloat, PositiveFloat, PositiveFloat] = Field(
+        description="Effective currents of the positive direction, increasing [A]."
+    )
+    minus: tuple[PositiveFloat, PositiveFloat, PositiveFloat, PositiveFloat] = Field(
+        description="Of the negative direction, as magnitudes [A]."
+    )
     relative: Pair = Field((0.5, 2.0), description="Bounds as factors on the nominal forces.")
 
     @model_validator(mode="after")
-    def _bounded(self) -> GivenForces:
+    def _bounded(self) -> Forces:
         check_rising(relative=self.relative)
         return self
+
+    @cached_property
+    def names(self) -> tuple[str, ...]:
+        """Names of the eight forces."""
+        return tuple(f"force_{side}_{k}" for side in ("plus", "minus") for k in (1, 2, 3, 4))
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """The parameters that they stand for."""
+        return tuple(f"{symbol}_{side}" for side in ("plus", "minus") for symbol in COEFFICIENTS)
+
+    @cached_property
+    def _maps(self) -> dict[str, Array]:
+        """For each direction the (4, 4) map from forces to coefficients."""
+        signs = {"plus": np.ones(4), "minus": np.array([1.0, -1.0, 1.0, -1.0])}
+        return {
+            side: np.linalg.inv(
+                np.power.outer(np.array(getattr(self, side)), np.arange(1, 5)) * signs[side]
+            )
+            for side in ("plus", "minus")
+        }
+
+    def values(self, parameters: ParameterSet) -> dict[str, float]:
+        """The forces of a parameter set, by name. [N]"""
+        forces = {}
+        for side, map_ in self._maps.items():
+            coefficients = [parameters.numbers[f"{symbol}_{side}"] for symbol in COEFFICIENTS]
+            for k, force in enumerate(np.linalg.solve(map_, coefficients), start=1):
+                forces[f"force_{side}_{k}"] = float(force)
+        return forces
+
+    def coefficients(
+        self, values: Mapping[str, float], parameters: ParameterSet
+    ) -> dict[str, float]:
+        """Coefficients for some forces; those not named are as in the parameter set. [N/Aᵏ]"""
+        forces = {**self.values(parameters), **{k: v for k, v in values.items() if k in self.names}}
+        made = {}
+        for side, map_ in self._maps.items():
+            of_side = np.array([forces[f"force_{side}_{k}"] for k in (1, 2, 3, 4)])
+            for symbol, coefficient in zip(COEFFICIENTS, map_ @ of_side, strict=True):
+                made[f"{symbol}_{side}"] = float(coefficient)
+        return made
+
+    def slopes(self, name: str) -> dict[str, float]:
+        """Derivatives of the coefficients by one force. [1/Aᵏ]"""
+        _, side, number = name.split("_")
+        column = self._maps[side][:, int(number) - 1]
+        return {
+            f"{symbol}_{side}": float(slope)
+            for symbol, slope in zip(COEFFICIENTS, column, strict=True)
+        }
 
 
 class InputWeight(Window):
@@ -131,17 +193,12 @@ class Stage(Entry):
     current_scale: Positive = Field(1.0, description="Factor on the measured current.")
     channels: tuple[ChannelKind, ...] = Field((), description="Kinds to fit; all if empty.")
     free: dict[str, Free] = Field(min_length=1)
-    forces: GivenForces | None = None
+    forces: Forces | None = None
     weights: dict[ChannelKind, tuple[Weight, ...]] = Field(
         {}, description="Windows that count more or less, besides those of the campaign."
     )
     weights_by_input: dict[ChannelKind, tuple[InputWeight, ...]] = Field(
         {}, description="Weights by the size of the command, besides those of the campaign."
-    )
-    clock_offsets: dict[ChannelKind, Positive] = Field(
-        {},
-        description="Largest offset of a channel's clock against the input's, free and the same in "
-        "all runs [s].",
     )
     start_pressure: Positive | None = Field(
         None,
@@ -254,9 +311,6 @@ class Setup(Entry):
             weights_by_input={
                 kind: w for each in self.stages for kind, w in each.weights_by_input.items()
             },
-            clock_offsets={
-                kind: most for each in self.stages for kind, most in each.clock_offsets.items()
-            },
             start_pressure=max(pressures, default=None),
         )
         return self.model_copy(update={"stages": (stage,)})
@@ -331,7 +385,6 @@ def setup_text(setup: Setup) -> str:
 # --- models of one's own --------------------------------------------------------------------------
 
 
-Array = NDArray[np.float64]
 Range = tuple[float, float, float] | tuple[float, float, float, str]
 """Lower bound, nominal value, upper bound, and the unit if it is said."""
 START = "start."

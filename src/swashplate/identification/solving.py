@@ -113,8 +113,6 @@ class Progress(NamedTuple):
     vector: Array
     seconds: float
     evaluations: int = 0
-    most_evaluations: int = 0
-    """How many it is given."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -207,7 +205,8 @@ def solve(
     # a robust loss looks at each residual, which the triangular factor has mixed
     memory = _Memory(objective, compressed=loss == "linear")
     vector = np.clip(objective.start if start is None else start, *objective.bounds)
-    start_cost = objective.cost(vector)
+    at_start = memory(vector).residuals
+    start_cost = 0.5 * float(at_start @ at_start)
     iteration = 0
 
     def told(intermediate_result) -> None:  # type: ignore[no-untyped-def]
@@ -215,8 +214,8 @@ def solve(
         iteration += 1
         if watch is not None:
             now, seconds = intermediate_result, perf_counter() - begun
-            spent = memory.evaluations, max_evaluations
-            watch(Progress(iteration, float(now.cost), now.x.copy(), seconds, *spent))
+            cost, spent = float(now.cost), memory.evaluations
+            watch(Progress(iteration, cost, now.x.copy(), seconds, spent))
 
     def ended(vector: Array, cost: float, message: str, ending: int) -> Solution:
         how = memory.evaluations, ending > 0, ending < 0, message, perf_counter() - begun, loss
@@ -229,7 +228,7 @@ def solve(
     try:
         while True:
             found = least_squares(
-                lambda vector: memory(vector).residuals,
+                lambda vector: memory(vector).residuals.copy(),
                 begin,
                 jac=lambda vector, fixed=fixed: np.where(fixed, 0.0, memory(vector).jacobian),
                 bounds=objective.bounds,

@@ -29,7 +29,6 @@ from swashplate.tables import (
     listed,
     percent,
     plain,
-    quantity,
     spread,
 )
 from swashplate.units import chosen_unit, display_unit
@@ -39,7 +38,6 @@ if TYPE_CHECKING:
     from swashplate.identification.assessment import Assessment
     from swashplate.identification.fitting import Fit, StageFit
     from swashplate.identification.resampling import Bootstrap, CrossValidation
-    from swashplate.identification.unknowns import Unknown
     from swashplate.identification.validation import Measures, RunQuality
     from swashplate.identification.verdict import Verdict
     from swashplate.parameters.parameter_set import ParameterSet
@@ -177,8 +175,6 @@ def meaning_of(name: str, stage: StageFit | None = None) -> str:
     kind, _, channel = name.partition(" ")
     if kind == "offset":
         return f"free zero of {channel}"
-    if kind == "clock":
-        return f"lead of the input's clock before that of {channel}"
     if stage is not None and stage.stage.part == "model":
         return "number of the state at the first sample" if name.startswith("start.") else ""
     if name == START_PRESSURE:
@@ -257,33 +253,6 @@ def fixed_line(fit: Fit) -> str:
     plain_names = (n.removesuffix("_plus").removesuffix("_minus") for n in fit.nominal.numbers)
     kept = [name for name in dict.fromkeys(plain_names) if not _is_moved(name, moved)]
     return f"Fixed at their nominal values: {', '.join(kept) or 'none'}."
-
-
-def bounds_table(fit: StageFit) -> Table:
-    """Within which bounds each unknown could move, and what was known of it beforehand."""
-    made = Table(
-        f"Bounds of stage {fit.stage.name}",
-        (
-            Column("parameter"),
-            Column("start", ".5g"),
-            Column("lowest", ".5g"),
-            Column("highest", ".5g"),
-            UNIT,
-            Column("moved by"),
-            Column("prior"),
-        ),
-        si=True,
-    )
-    for each in fit.problem.unknowns:
-        if each.run is None:
-            by = "logarithm" if each.log else "value"
-            made.add(each.name, each.start, each.low, each.high, by, _prior(each), unit=each.unit)
-    return made
-
-
-def _prior(unknown: Unknown) -> str:
-    prior = unknown.prior
-    return "" if prior is None else f"{plain(prior.mean)} ± {plain(prior.deviation)}"
 
 
 # --- runs -----------------------------------------------------------------------------------------
@@ -370,19 +339,6 @@ def ignored_words(experiment: Experiment, channel: Channel) -> str:
         # to the millisecond: jitter of the stamps is no information
         said.append(f"{round(first, 3) + 0.0:g} to {round(last, 3):g} s{why}")
     return "; ".join(said) or "nothing"
-
-
-def conditions(runs: Sequence[Experiment], channel: str) -> str:
-    """Initial states and ignored windows of several runs in a few words, for beside a fit %."""
-    starts = list(dict.fromkeys(start_words(each) for each in runs))
-    parts = [ignored_words(each, each[channel]) for each in runs]
-    left_out = [words for words in dict.fromkeys(parts) if words != "nothing"]
-    ignored = "nothing ignored"
-    if len(left_out) == 1 and "nothing" not in parts:
-        ignored = f"ignored {left_out[0]}"
-    elif left_out:
-        ignored = "ignored windows differ by run and stand in the table of runs"
-    return f"start {listed(starts)}; {ignored}"
 
 
 def residual_table(qualities: Sequence[RunQuality]) -> Table:
@@ -539,14 +495,6 @@ def _error(error: float) -> str:
 
 
 # --- sentences ------------------------------------------------------------------------------------
-
-
-def measures_words(name: str, unit: str, found: Measures) -> str:
-    """``current: fit 96.1 % (RMSE 7.6 mA, R² 0.9985)``."""
-    rmse = f"RMSE {quantity(found.rmse, unit)}"
-    if found.fit_percent is None or found.r_squared is None:
-        return f"{name}: {rmse}; what was measured is constant, so there is no fit %"
-    return f"{name}: fit {found.fit_percent:.2f} % ({rmse}, R² {found.r_squared:.4f})"
 
 
 def scales_words(fit: StageFit) -> str:

@@ -13,11 +13,10 @@ from scipy.fft import irfft, next_fast_len, rfft
 from swashplate.campaign.experiment import Channel, Experiment
 from swashplate.campaign.speed import speed_of
 from swashplate.errors import InputError
-from swashplate.identification.drive_model import SIGNALS, DriveModel, current_record
+from swashplate.identification.drive_model import SIGNALS, DriveModel, Parameters, current_record
 from swashplate.identification.noise import LONGEST, Grid, correlation_length, grid_of, pair_sums
 from swashplate.identification.problem import Problem
 from swashplate.identification.setup import ModelParameters
-from swashplate.identification.staging import Parameters
 from swashplate.parameters.parameter_set import HasParameters, set_of
 from swashplate.results import Result
 
@@ -58,8 +57,6 @@ class ResidualTest(Result):
     input."""
     duration: float
     """Time over which the residuals stay correlated; 0 if they are white. [s]"""
-    verdict: str
-    """In words."""
 
     @property
     def white(self) -> bool:
@@ -76,6 +73,18 @@ class ResidualTest(Result):
     def follows(self) -> bool:
         """Whether the residuals follow the input by as much as counts as model error."""
         return abs(self.peak[1]) >= min(max(FOLLOWS, BANDS * self.cross_band), SURE)
+
+    @property
+    def verdict(self) -> str:
+        """Both in words."""
+        (lag, value), own = self.peak, f"stay correlated over {self.duration:.2g} s"
+        own = "are white" if self.white else own
+        if not self.follows:
+            return f"The residuals {own} and do not follow the input."
+        return (
+            f"The residuals {own} and follow the input (correlation {value:+.2f}, {lag:+.2g} s "
+            "after it): the model leaves out something that the input causes."
+        )
 
 
 def residual_test(
@@ -99,13 +108,11 @@ def residual_test(
 
     Notes
     -----
-    The band of the cross-correlation is 1.96 √(Σ ρ_r ρ_u/n): two coloured signals without any
-    relation show large correlations by chance (Bartlett's formula), and a band of 1.96/√n would
-    call every one of them a finding.
+    The band of the cross-correlation is 1.96 √(Σ ρ_r ρ_u/n), Bartlett's: two coloured signals
+    without any relation show large correlations by chance.
     """
     if time.size < 8:
         raise InputError(f"{time.size} samples show no correlation; at least 8 are needed.")
-    first = float(residual[0])
     grid = grid_of(time)
     most = max(int(LONGEST * grid.size), 1)
     shown = min(most, max(int(longest / grid.step), 1))
@@ -128,31 +135,7 @@ def residual_test(
     both = np.concatenate([-lags[:0:-1], lags])
     white = DEVIATIONS / float(np.sqrt(time.size))
     duration = length * grid.step
-    made = ResidualTest(lags, own[: shown + 1], white, both, cross, band, duration, "")
-    return replace(made, verdict=_in_words(made, first))
-
-
-def _in_words(test: ResidualTest, first: float) -> str:
-    if not test.autocorrelation[1:].any():
-        what = "exactly zero" if first == 0.0 else f"{first:.4g} throughout"
-        return f"The residuals are {what}: there is no noise to test."
-    colour = (
-        "The residuals are white"
-        if test.white
-        else f"The residuals stay correlated over {test.duration:.2g} s"
-    )
-    if not test.cross_correlation.any():
-        return f"{colour}; the input is constant and explains nothing."
-    lag, value = test.peak
-    if not test.follows:
-        return f"{colour} and do not follow the input (correlation {value:+.2f})."
-    when = (
-        f"{abs(lag):.2g} s {'after' if lag > 0.0 else 'before'} it" if lag else "at the same time"
-    )
-    return (
-        f"{colour} and follow the input (correlation {value:+.2f} {when}): the model leaves out "
-        "something that the input causes."
-    )
+    return ResidualTest(lags, own[: shown + 1], white, both, cross, band, duration)
 
 
 def _autocorrelation(samples: Array, grid: Grid, lags: int) -> tuple[Array, Array]:
@@ -188,36 +171,31 @@ class Measures(NamedTuple):
         """1 - NRMSE²."""
         return None if self.nrmse is None else 1.0 - self.nrmse**2
 
-    @property
-    def sentence(self) -> str:
-        """The verdict for a table's cell or a line of text."""
-        if self.fit_percent is None:
-            return f"RMSE {self.rmse:.4g}; what was measured is constant, so there is no fit %"
-        return f"RMSE {self.rmse:.4g}, fit {self.fit_percent:.1f} %, R² {self.r_squared:.4f}"
 
-
-def measures(measured: Array, simulated: Array, weight: Array | None = None) -> Measures:
-    """Measures of one channel of one run.
+def measures(*runs: tuple[Array, Array, Array | None]) -> Measures:
+    """Measures of one channel over one run, or over several, about the mean of all.
 
     Parameters
     ----------
-    measured, simulated : (n,) arrays
-        In the channel's unit.
-    weight : (n,) array, optional
-        Factors on the squared errors, of which those that are 0 say which samples do not count. The
-        others weigh nothing here: a window of weight ten would otherwise pass for the whole run.
+    *runs : (measured, simulated, weight)
+        (n,) samples in the channel's unit, and factors on the squared errors, None for none. Those
+        that are 0 say which samples do not count. The others weigh nothing here: a window of weight
+        ten would otherwise pass for the whole run.
 
     Raises
     ------
     InputError
-        If lengths differ, no sample counts, one that does is not finite, or a weight is negative.
+        If no sample counts, or one that does is not finite.
     """
-    return pooled_measures([(measured, simulated, weight)])
-
-
-def pooled_measures(runs: list[tuple[Array, Array, Array | None]]) -> Measures:
-    """Measures of one channel over several runs, each about the mean of all; else as `measures`."""
-    parts = [_counting(*run) for run in runs]
+    parts = []
+    for of_one in runs:
+        used = np.ones(of_one[0].shape, np.bool_) if of_one[2] is None else of_one[2] > 0.0
+        for what, samples in (("measured", of_one[0]), ("simulated", of_one[1])):
+            bad = used & ~np.isfinite(samples)
+            if bad.any():
+                row = int(np.argmax(bad)) + 1
+                raise InputError(f"Sample {row} of what was {what} is not finite; ignore it.")
+        parts.append((of_one[0][used], of_one[1][used]))
     measured, simulated = (np.concatenate(column) for column in zip(*parts, strict=True))
     if not measured.size:
         raise InputError("No sample counts: all are ignored or have weight 0.")
@@ -227,26 +205,6 @@ def pooled_measures(runs: list[tuple[Array, Array, Array | None]]) -> Measures:
     about[np.abs(about) <= 4.0 * np.finfo(np.float64).eps * abs(mean)] = 0.0
     rmse, spread = (float(np.sqrt(np.mean(each**2))) for each in (simulated - measured, about))
     return Measures(measured.size, rmse, spread)
-
-
-def _counting(measured: Array, simulated: Array, weight: Array | None) -> tuple[Array, Array]:
-    """The samples that count."""
-    factor = np.ones(measured.shape) if weight is None else weight
-    if measured.shape != simulated.shape or measured.shape != factor.shape:
-        raise InputError(
-            f"{measured.size} measured and {simulated.size} simulated samples with {factor.size} "
-            "weights cannot be compared; simulate at the measurement's stamps."
-        )
-    if not (factor >= 0.0).all():
-        raise InputError(
-            "A weight is negative or not a number; a factor on a squared error is 0 or more."
-        )
-    used = factor > 0.0
-    for what, samples in (("measured", measured), ("simulated", simulated)):
-        if not np.isfinite(samples[used]).all():
-            row = int(np.flatnonzero(used & ~np.isfinite(samples))[0])
-            raise InputError(f"Sample {row + 1} of what was {what} is not finite; ignore it.")
-    return measured[used], simulated[used]
 
 
 @dataclass(frozen=True, eq=False)
@@ -284,7 +242,7 @@ def compared(experiment: Experiment, name: str, simulated: Array) -> RunQuality:
     if np.count_nonzero(used) >= 8:
         time, residual = channel.time[used], (simulated - channel.values)[used]
         test = residual_test(time, residual, experiment.input.at(time))
-    found = measures(channel.values, simulated, channel.weight)
+    found = measures((channel.values, simulated, channel.weight))
     return RunQuality(experiment, name, simulated, found, test)
 
 
@@ -359,13 +317,40 @@ def pooled(qualities: Iterable[RunQuality]) -> dict[str, Measures]:
     channels: dict[str, list[RunQuality]] = {}
     for each in qualities:
         channels.setdefault(each.channel, []).append(each)
-    made = {}
-    for name, alike in channels.items():
-        parts: list[tuple[Array, Array, Array | None]] = [
-            (q.experiment[name].values, q.simulated, q.experiment[name].weight) for q in alike
-        ]
-        made[name] = pooled_measures(parts)
-    return made
+    return {
+        name: measures(
+            *((q.experiment[name].values, q.simulated, q.experiment[name].weight) for q in alike)
+        )
+        for name, alike in channels.items()
+    }
+
+
+def range_of(qualities: Sequence[RunQuality]) -> float:
+    """Largest less smallest value that was measured of a channel in some runs."""
+    counted = [x.values[x.used] for x in (each.experiment[each.channel] for each in qualities)]
+    return max(float(x.max()) for x in counted) - min(float(x.min()) for x in counted)
+
+
+def part_of_range(qualities: Sequence[RunQuality], channel: str) -> float | None:
+    """RMSE of a channel over the range that was measured of it, all runs together.
+
+    None where nothing moved.
+    """
+    alike = [each for each in qualities if each.channel == channel]
+    reach = range_of(alike)
+    return pooled(alike)[channel].rmse / reach if reach > 0.0 else None
+
+
+def percent(part: float) -> str:
+    """A part in per cent, two digits."""
+    number = 100.0 * part
+    return f"{number:.0f} %" if number >= 9.95 else f"{number:.2g} %"
+
+
+def following(qualities: Sequence[RunQuality], name: str) -> tuple[int, list[float]]:
+    """Runs of a channel that were tested, and correlations of those that follow the input."""
+    tests = [each.test for each in qualities if each.channel == name and each.test is not None]
+    return len(tests), [each.peak[1] for each in tests if each.follows]
 
 
 def ignored_windows(channel: Channel) -> tuple[tuple[float, float], ...]:
@@ -404,6 +389,6 @@ def _speed_quality(quality: RunQuality) -> RunQuality | None:
         experiment,
         speed.name,
         same.speed,
-        measures(speed.values, same.speed, speed.weight),
+        measures((speed.values, same.speed, speed.weight)),
         None,
     )

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from math import inf, isfinite
 from typing import TYPE_CHECKING, Literal, NamedTuple
 
@@ -14,6 +14,7 @@ from swashplate.errors import DomainError, InputError
 from swashplate.identification.data_checks import contradicting_runs
 from swashplate.identification.drive_model import DriveModel, limits_reached
 from swashplate.identification.identifiability import WIDE
+from swashplate.identification.intervals import open_unknowns
 from swashplate.identification.lack_of_fit import (
     LOSS,
     Fault,
@@ -22,7 +23,15 @@ from swashplate.identification.lack_of_fit import (
     measurement_error,
 )
 from swashplate.identification.solving import StartResult
-from swashplate.identification.validation import FOLLOWS, pooled, with_speeds
+from swashplate.identification.validation import (
+    FOLLOWS,
+    following,
+    part_of_range,
+    percent,
+    pooled,
+    range_of,
+    with_speeds,
+)
 from swashplate.results import Result
 from swashplate.tables import listed
 
@@ -63,10 +72,6 @@ DRIFTS, DRIFTS_AWAY = 0.01, 0.03
 which no one set of parameters holds."""
 SAME = 1e-6
 """Costs that differ by less than this part are the same optimum."""
-OPEN = 0.01
-"""Part of a channel's range that a prediction moves by, for 10 % of an unknown, from which it
-depends on that unknown."""
-
 LIMITS: Mapping[str, str] = {
     "Z13": "the swash plate's stop Z13",
     "Z14": "the spool's stop Z14",
@@ -230,28 +235,6 @@ def _fitted_runs(assessments: Sequence[Assessment]) -> list[Experiment]:
     return list({e.name: e for a in assessments for e in a.stage.problem.experiments}.values())
 
 
-def range_of(qualities: Sequence[RunQuality]) -> float:
-    """Largest less smallest value that was measured of a channel in some runs."""
-    counted = [x.values[x.used] for x in (each.experiment[each.channel] for each in qualities)]
-    return max(float(x.max()) for x in counted) - min(float(x.min()) for x in counted)
-
-
-def part_of_range(qualities: Sequence[RunQuality], channel: str) -> float | None:
-    """RMSE of a channel over the range that was measured of it, all runs together.
-
-    None where nothing moved.
-    """
-    alike = [each for each in qualities if each.channel == channel]
-    reach = range_of(alike)
-    return pooled(alike)[channel].rmse / reach if reach > 0.0 else None
-
-
-def percent(part: float) -> str:
-    """A part in per cent, two digits."""
-    number = 100.0 * part
-    return f"{number:.0f} %" if number >= 9.95 else f"{number:.2g} %"
-
-
 def starts_of(
     assessments: Sequence[Assessment], starts: Sequence[StartResult] = ()
 ) -> dict[str, Sequence[StartResult]]:
@@ -275,12 +258,6 @@ def weak_unknowns(assessment: Assessment) -> list[str]:
     return [name for name in machine if found.get(name, inf) > WIDE and name not in bounds]
 
 
-def following(qualities: Sequence[RunQuality], name: str) -> tuple[int, list[float]]:
-    """Runs of a channel that were tested, and correlations of those that follow the input."""
-    tests = [each.test for each in qualities if each.channel == name and each.test is not None]
-    return len(tests), [each.peak[1] for each in tests if each.follows]
-
-
 # --- criteria -------------------------------------------------------------------------------------
 
 
@@ -297,8 +274,8 @@ def _convergence(assessments: Sequence[Assessment], planned: Sequence[str]) -> I
             state = "not converged"
             failure = f"stage {name} did not converge ({solution.message})"
         yield Criterion(f"convergence of {name}", state, "converged", why, "use", failure)
-    done = {each.stage.stage.name for each in assessments}
-    missing = [name for name in planned if name not in done] if assessments else []
+    done = [each.stage.stage.name for each in assessments]
+    missing = [name for name in planned if name not in done] if done else []
     if missing:
         failure = f"{listed(missing)} {'were' if len(missing) > 1 else 'was'} never fitted"
         yield Criterion("stages", f"{len(missing)} missing", "all", why, "use", failure)
@@ -307,17 +284,13 @@ def _convergence(assessments: Sequence[Assessment], planned: Sequence[str]) -> I
 def _followed(qualities: Sequence[RunQuality], which: str) -> Criterion:
     """That each channel follows the movement at all."""
     errors = {k: m.nrmse for k, m in pooled(qualities).items() if m.nrmse is not None}
-    clauses = [
-        f"{name} "
-        + (
-            "is simulated no better than by its mean"
-            if error >= 1.0
-            else "misses at least half of the movement"
-        )
-        + f" in the {which} runs (fit {100.0 * (1.0 - error):z.0f} %)"
-        for name, error in errors.items()
-        if error >= POOR
-    ]
+    clauses = []
+    for name, error in errors.items():
+        words = "misses at least half of the movement"
+        words = "is simulated no better than by its mean" if error >= 1.0 else words
+        if error >= POOR:
+            fits = 100.0 * (1.0 - error)
+            clauses.append(f"{name} {words} in the {which} runs (fit {fits:z.0f} %)")
     return Criterion(
         f"RMSE / standard deviation, {which}",
         percent(max(errors.values(), default=0.0)),
@@ -462,7 +435,9 @@ def _bounded_predictions(
         why = "no run was held out" if not predicted else "the model is none of a drive"
         return Criterion(name, "-", "none", why, judged=False)
     runs = {each.experiment.name: each.experiment for each in predicted}.values()
-    names = listed(list(dict.fromkeys(n for each in assessments for n in _open(each, runs))))
+    names = listed(
+        list(dict.fromkeys(n for each in assessments for n in open_unknowns(each, runs)))
+    )
     return Criterion(
         name,
         names or "none",
@@ -471,49 +446,6 @@ def _bounded_predictions(
         "use",
         f"predictions depend on {names}, which the fitted runs leave open" if names else "",
     )
-
-
-def _open(assessment: Assessment, experiments: Iterable[Experiment]) -> Iterator[str]:
-    """Unknowns without an interval on which the prediction of some runs depends.
-
-    Only a prediction that leaves the directions which the fitted runs determine is open: of two
-    unknowns of which the fit tells the product, it depends on the product alone.
-    """
-    stage, found = assessment.stage, assessment.uncertainty
-    model, unknowns, vector = stage.problem.model, stage.problem.unknowns, stage.solution.vector
-    assert isinstance(model, DriveModel)
-    status = [estimate.status for estimate in found.estimates]
-    undetermined = np.array(
-        [s == "undetermined" and u.run is None for s, u in zip(status, unknowns, strict=True)]
-    )
-    # a better optimum that was met says nothing of how far an unknown can go
-    one_ended = np.zeros(len(unknowns), dtype=np.bool_)
-    one_ended[[e.number for e in found.ends if np.isinf(e.distance) and e.better is None]] = True
-    if not (undetermined | one_ended).any():
-        return
-    lengths = np.linalg.norm(assessment.linearised.triangle, axis=0)
-    lengths[lengths == 0.0] = 1.0
-    # directions that the fitted runs determine, in units of their effect there
-    told = np.linalg.qr(lengths[:, None] * assessment.linearised.whitening)[0]
-    chain = DriveModel(stage.drive.parameters, "card" if model.part == "card" else "chain")
-    chain = replace(chain, forces=model.forces)
-    targets = [t for u in unknowns if u.run is None for t in u.targets]
-    values = {t: v for t, v in unknowns.targets(vector, "").items() if t in targets}
-    by_name = unknowns.chain(vector, targets, "")
-    for experiment in experiments:
-        if experiment.input.kind != "voltage" or not chain.signals_of(experiment):
-            continue
-        for name, part in chain.linearise(values, experiment, targets).items():
-            channel = experiment[name]
-            rows = part.by[channel.used] @ by_name
-            if channel.is_position:
-                rows = rows - rows.mean(axis=0)
-            beyond = rows / lengths
-            beyond = (beyond - (beyond @ told) @ told.T) * lengths
-            moved = 0.1 * np.where(undetermined, np.abs(beyond).max(axis=0), 0.0)
-            moved += 0.1 * np.where(one_ended, np.abs(rows).max(axis=0), 0.0)
-            reach = float(np.ptp(channel.values[channel.used]))
-            yield from (unknowns.names[k] for k in np.flatnonzero(moved > OPEN * reach))
 
 
 def _misfit_criteria(

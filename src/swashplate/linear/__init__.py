@@ -5,8 +5,6 @@ from swashplate.linear.drive import OUTPUTS as OUTPUTS
 from swashplate.linear.drive import linearize_drive as linearize_drive
 from swashplate.linear.drive import model_tables as model_tables
 from swashplate.linear.drive import slowest_lag as slowest_lag
-from swashplate.linear.frequency_response import FEWEST_STEPS as FEWEST_STEPS
-from swashplate.linear.frequency_response import SLOWEST_CYCLE as SLOWEST_CYCLE
 from swashplate.linear.frequency_response import FrequencyResponse as FrequencyResponse
 from swashplate.linear.frequency_response import SweptInput as SweptInput
 from swashplate.linear.frequency_response import SweptOutput as SweptOutput

@@ -373,8 +373,46 @@ def model_tables(
     loop_gain : float, optional
         Of a proportional speed loop. [V, A or N / (rad/s)]
     """
-    tables = [_point_table(model), _motion_table(model, frequency), _pole_table(model)]
-    return tables if loop_gain is None else [*tables, _loop_table(model, loop_gain)]
+    point, poles = model.operating_point, model.poles
+    made, moving = _key_values("Operating point"), _key_values("Small motion")
+    if point.voltage is not None:
+        made.add("voltage", point.voltage, unit="V")
+    made.add("current", Cell(point.current, f"{point.current:z.4f}"), unit="A")
+    made.add("swash angle", point.swash_angle, unit="rad", spec="z.3f")
+    made.add("shaft speed", point.shaft_speed, unit="rad/s", spec="z.3f")
+
+    unit, answer = UNITS[model.input], complex(model.response(frequency)[0])
+    moving.add("steady gain", model.gain, unit=f"rad/s/{unit}", spec="z.5g")
+    moving.add("time constant of the pump", model.time_constant, unit="s")
+    if model.input == "voltage":
+        delay = 1e3 * model.parameters.numbers["tau"]
+        moving.add("delay of the card", delay, unit="ms", spec="z.3f")
+    moving.add("bandwidth (-3 dB)", _finite(model.bandwidth), unit="Hz", spec=".4g")
+    at = f"at {frequency:g} Hz"
+    moving.add(f"gain {at}", abs(answer), unit=f"rad/s/{unit}", spec=".5g")
+    moving.add(f"phase {at}", float(np.angle(answer, deg=True)), unit="deg", spec="z.2f")
+    largest = _finite(model.largest_gain)
+    moving.add("largest proportional gain", largest, unit=f"{unit}/(rad/s)", spec=".4g")
+
+    heads = (("real", "z.5g"), ("imaginary", "s"), ("Hz", ".4g"), ("damping", ".3f"))
+    pole_table = Table("", (Column("Poles"), *(Column(*each) for each in heads)))
+    h = model.sample_time
+    for pole in poles[poles.imag >= 0.0]:  # its conjugate stands for both
+        s = pole if h is None else np.log(pole) / h
+        size = float(abs(s))
+        imaginary = f"±{pole.imag:.5g}" if pole.imag else ""
+        numbers = float(pole.real), imaginary, size / (2.0 * np.pi), float(-s.real) / size
+        pole_table.add("rad/s" if h is None else "z", *numbers)
+    tables = [made, moving, pole_table]
+    if loop_gain is None:
+        return tables
+    margins, shown = model.margins(loop_gain), display_unit(f"{unit}/(rad/s)")
+    loop = _key_values(f"Proportional loop, {shown.factor * loop_gain:g} {shown.name}")
+    loop.add("crossover", margins.crossover or Cell(None, "none"), unit="Hz", spec=".4g")
+    loop.add("phase margin", _finite(np.degrees(margins.phase_margin)), unit="deg", spec=".1f")
+    loop.add("delay margin", _finite(1e3 * margins.delay_margin), unit="ms", spec=".2f")
+    loop.add("gain margin", _finite(margins.gain_margin), spec=".3g")
+    return [*tables, loop]
 
 
 def _key_values(title: str) -> Table:
@@ -383,57 +421,3 @@ def _key_values(title: str) -> Table:
 
 def _finite(value: float) -> float | None:
     return None if np.isinf(value) else float(value)
-
-
-def _point_table(model: LinearDrive) -> Table:
-    point, made = model.operating_point, _key_values("Operating point")
-    if point.voltage is not None:
-        made.add("voltage", point.voltage, unit="V")
-    made.add("current", Cell(point.current, f"{point.current:z.4f}"), unit="A")
-    made.add("swash angle", point.swash_angle, unit="rad", spec="z.3f")
-    made.add("shaft speed", point.shaft_speed, unit="rad/s", spec="z.3f")
-    return made
-
-
-def _motion_table(model: LinearDrive, frequency: float) -> Table:
-    unit, made = UNITS[model.input], _key_values("Small motion")
-    answer = complex(model.response(frequency)[0])
-    made.add("steady gain", model.gain, unit=f"rad/s/{unit}", spec="z.5g")
-    made.add("time constant of the pump", model.time_constant, unit="s")
-    if model.input == "voltage":
-        delay = 1e3 * model.parameters.numbers["tau"]
-        made.add("delay of the card", delay, unit="ms", spec="z.3f")
-    made.add("bandwidth (-3 dB)", _finite(model.bandwidth), unit="Hz", spec=".4g")
-    at = f"at {frequency:g} Hz"
-    made.add(f"gain {at}", abs(answer), unit=f"rad/s/{unit}", spec=".5g")
-    made.add(f"phase {at}", float(np.angle(answer, deg=True)), unit="deg", spec="z.2f")
-    largest = _finite(model.largest_gain)
-    made.add("largest proportional gain", largest, unit=f"{unit}/(rad/s)", spec=".4g")
-    return made
-
-
-def _pole_table(model: LinearDrive) -> Table:
-    heads = (("real", "z.5g"), ("imaginary", "s"), ("Hz", ".4g"), ("damping", ".3f"))
-    made = Table("", (Column("Poles"), *(Column(*each) for each in heads)))
-    for pole in model.poles:
-        if pole.imag < 0.0:
-            continue  # its conjugate stands for both
-        s = pole if model.sample_time is None else np.log(pole) / model.sample_time
-        made.add(
-            "rad/s" if model.sample_time is None else "z",
-            float(pole.real),
-            f"±{pole.imag:.5g}" if pole.imag else "",
-            float(abs(s) / (2.0 * np.pi)),
-            float(-s.real / abs(s)),
-        )
-    return made
-
-
-def _loop_table(model: LinearDrive, loop_gain: float) -> Table:
-    margins, shown = model.margins(loop_gain), display_unit(f"{UNITS[model.input]}/(rad/s)")
-    made = _key_values(f"Proportional loop, {shown.factor * loop_gain:g} {shown.name}")
-    made.add("crossover", margins.crossover or Cell(None, "none"), unit="Hz", spec=".4g")
-    made.add("phase margin", _finite(np.degrees(margins.phase_margin)), unit="deg", spec=".1f")
-    made.add("delay margin", _finite(1e3 * margins.delay_margin), unit="ms", spec=".2f")
-    made.add("gain margin", _finite(margins.gain_margin), spec=".3g")
-    return made

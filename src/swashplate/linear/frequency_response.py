@@ -5,7 +5,7 @@ The drive is marched over whole cycles of each frequency until it repeats itself
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from math import ceil
 from typing import TYPE_CHECKING, Literal, get_args
 
@@ -108,19 +108,6 @@ class FrequencyResponse(Tabular):
             row[there] = np.unwrap(np.angle(ratio[there]))
         return phase
 
-    def at(self, frequency: float) -> FrequencyResponse:
-        """The part at one of the frequencies [Hz]; another is refused, nothing is interpolated."""
-        k = int(np.argmin(np.abs(self.frequencies - frequency)))
-        nearest = float(self.frequencies[k])
-        if not abs(nearest - frequency) <= 1e-9 * nearest:
-            raise InputError(
-                f"The response was not taken at {frequency:g} Hz; the nearest frequency is "
-                f"{nearest:.6g} Hz."
-            )
-        near = slice(k, k + 1)
-        rows = {n: getattr(self, n)[:, near] for n in ("ratio", "distortion", "mean", "cycles")}
-        return replace(self, frequencies=self.frequencies[near], **rows)
-
     def to_polars(self) -> polars.DataFrame:
         """Table in SI, a row for each amplitude and frequency; no phase where nothing moves."""
         import polars as pl
@@ -176,18 +163,18 @@ def sweep(
             if np.isfinite(bias)
             else f"The bias is {bias}, but must be a finite number."
         )
-    shape = (a.size, f.size)
-    ratio = np.zeros(shape, dtype=np.complex128)
-    distortion, mean, cycles = np.zeros(shape), np.zeros(shape), np.zeros(shape, dtype=np.int64)
+    found = np.zeros((4, a.size, f.size), dtype=np.complex128)
     block = 3.0 * slowest_lag(parameters)
     for j, frequency in enumerate(f.tolist()):
         steps = ceil(rate / frequency * (1.0 - 1e-12))
         wave = np.sin(2.0 * np.pi * np.arange(steps) / steps)
         for i, amplitude in enumerate(a.tolist()):
             command = bias + amplitude * wave
-            found = _settled(parameters, command, bias, frequency, block, input, output, tolerance)
-            ratio[i, j], distortion[i, j], mean[i, j], cycles[i, j] = found
-            ratio[i, j] /= amplitude
+            found[:, i, j] = _settled(
+                parameters, command, bias, frequency, block, input, output, tolerance
+            )
+    ratio = found[0] / a[:, np.newaxis]
+    distortion, mean, cycles = found[1:].real
     if not ratio.any():
         raise DomainError(
             f"{parameters.name}: nothing moves about {bias:g} {'V' if input == 'voltage' else 'A'} "
@@ -195,7 +182,8 @@ def sweep(
             "ones or another bias."
         )
     return FrequencyResponse(
-        parameters.name, input, output, float(bias), f, a, ratio, distortion, mean, cycles
+        *(parameters.name, input, output, float(bias), f, a, ratio, distortion, mean),
+        cycles.astype(np.int64),
     )
 
 
@@ -270,15 +258,19 @@ def _checked(values: ArrayLike, what: str) -> Array:
     return data
 
 
-def response_table(response: FrequencyResponse) -> Table:
+def response_table(response: FrequencyResponse, frequency: float) -> Table:
     """Gain, phase, lag and distortion of a drive by the amplitude of the sine.
 
-    Parameters
-    ----------
-    response : FrequencyResponse
-        From voltage to the shaft's speed, at one frequency (`FrequencyResponse.at`).
+    `response` is from voltage to the shaft's speed; at one of its frequencies [Hz]: another is
+    refused in an `InputError`, nothing is interpolated.
     """
-    (frequency,) = response.frequencies
+    at = int(np.argmin(np.abs(response.frequencies - frequency)))
+    nearest = float(response.frequencies[at])
+    if not abs(nearest - frequency) <= 1e-9 * nearest:
+        raise InputError(
+            f"The response was not taken at {frequency:g} Hz; the nearest frequency is "
+            f"{nearest:.6g} Hz."
+        )
     heads = (
         ("amplitude", "g", "V"),
         ("gain", ".3f", "rad/s/V", "none"),
@@ -288,12 +280,14 @@ def response_table(response: FrequencyResponse) -> Table:
         ("mean speed", "z.2f", "rad/s"),
     )
     made = Table("", tuple(Column(*each) for each in heads))
+    # the phase within a turn of itself, as of this frequency alone
+    phases = np.angle(response.ratio[:, at])
     for k, amplitude in enumerate(map(float, response.amplitudes)):
         answer: tuple[float | None, ...] = (None,) * 4
-        if response.moves[k, 0]:
-            phase = float(response.phase[k, 0])
+        if response.moves[k, at]:
+            phase = float(phases[k])
             lag = -1e3 * phase / (2.0 * np.pi * frequency)
-            distortion = 100.0 * float(response.distortion[k, 0])
-            answer = (float(response.gain[k, 0]), np.degrees(phase), lag, distortion)
-        made.add(amplitude, *answer, float(response.mean[k, 0]))
+            distortion = 100.0 * float(response.distortion[k, at])
+            answer = (float(response.gain[k, at]), np.degrees(phase), lag, distortion)
+        made.add(amplitude, *answer, float(response.mean[k, at]))
     return made

@@ -59,8 +59,7 @@ def largest_gain(response: Response, delay: float, fastest: float, gain: float) 
     sign = -1.0 if gain < 0.0 else 1.0
     level = 1e-6 * abs(gain)
     grid = _dense_grid(lambda f: np.asarray(response(f) / level), delay, fastest)
-    crossings = _negative_crossings(lambda f: np.asarray(sign * response(f)), grid)
-    return 1.0 / max(abs(value) for _, value in crossings) if crossings else inf
+    return _gain_margin(lambda f: np.asarray(sign * response(f)), grid)
 
 
 def loop_margins(loop: Response, delay: float, fastest: float, name: str) -> LoopMargins:
@@ -98,16 +97,13 @@ def loop_margins(loop: Response, delay: float, fastest: float, name: str) -> Loo
     def excess(frequency: Array) -> Array:
         return np.asarray(np.log(np.maximum(np.abs(loop(frequency)), 1e-300)))
 
-    level = np.log(np.maximum(np.abs(values), 1e-300))
     margins = [(inf, 0.0, inf)]
-    for k in np.flatnonzero(np.diff(np.signbit(level))):
+    for k in np.flatnonzero(np.diff(np.signbit(excess(grid)))):
         frequency = _root(excess, grid, int(k))
         phase = (float(np.angle(loop(np.array([frequency]))[0])) + pi) % (2.0 * pi)
         margins.append((phase / (2.0 * pi * frequency), frequency, phase))
     delay_margin, crossover, phase = min(margins)
-    inside = [abs(value) for _, value in _negative_crossings(loop, grid)]
-    gain_margin = 1.0 / max(inside) if inside else inf
-    return LoopMargins(crossover, phase, delay_margin, gain_margin)
+    return LoopMargins(crossover, phase, delay_margin, _gain_margin(loop, grid))
 
 
 def _check_gain(response: Response, gain: float, grid: Array) -> None:
@@ -138,21 +134,19 @@ def _dense_grid(loop: Response, delay: float, fastest: float) -> Array:
     return np.union1d(coarse, np.linspace(top / (points + 2.0), top, int(points) + 2))
 
 
-def _negative_crossings(response: Response, grid: Array) -> list[tuple[float, complex]]:
-    """Frequencies at which a response crosses the negative real axis, and its values there."""
+def _gain_margin(response: Response, grid: Array) -> float:
+    """1/|G| where a response crosses the negative real axis farthest out, infinite if nowhere."""
     values = response(grid)
 
     def imaginary(frequency: Array) -> Array:
         return np.asarray(response(frequency).imag)
 
-    found = []
-    for k in np.flatnonzero(np.diff(np.signbit(values.imag))):
-        if values[k].real < 0.0 and values[k + 1].real < 0.0:
-            frequency = _root(imaginary, grid, int(k))
-            found.append((frequency, complex(response(np.array([frequency]))[0])))
+    turns = np.flatnonzero(np.diff(np.signbit(values.imag)))
+    crossed = [int(k) for k in turns if (values[k : k + 2].real < 0.0).all()]
+    found = [abs(response(np.array([_root(imaginary, grid, k)]))[0]) for k in crossed]
     if values[-1].real < 0.0 and abs(values[-1].imag) <= 1e-9 * abs(values[-1]):
-        found.append((float(grid[-1]), complex(values[-1])))  # half the rate of a sampled model
-    return found
+        found.append(abs(values[-1]))  # half the rate of a sampled model
+    return float(1.0 / max(found)) if found else inf
 
 
 def _root(function: Callable[[Array], Array], grid: Array, k: int) -> float:

@@ -134,20 +134,23 @@ class Log:
     def _position(self, wanted: str) -> int:
         names = [column.name for column in self.columns]
         suffixed = re.compile(rf"{re.escape(wanted)}_\w+")
+        bare = [_without_unit(column) for column in self.columns]
         for matches in (
-            lambda column: column.name == wanted,
-            lambda column: _without_unit(column) == wanted,
-            lambda column: suffixed.fullmatch(column.name),
-            lambda column: _last(column.name) == wanted or _last(_without_unit(column)) == wanted,
+            [name == wanted for name in names],
+            [name == wanted for name in bare],
+            [bool(suffixed.fullmatch(name)) for name in names],
+            [
+                wanted in (_last(name), _last(other))
+                for name, other in zip(names, bare, strict=True)
+            ],
         ):
-            found = [place for place, column in enumerate(self.columns) if matches(column)]
-            if len(found) == 1:
-                return found[0]
-            if found:
-                several = _listed([names[place] for place in found])
+            if matches.count(True) > 1:
+                several = _listed([name for name, each in zip(names, matches, strict=True) if each])
                 raise InputError(
                     f"{self.path} has more than one '{wanted}': {several}; name the one."
                 )
+            if True in matches:
+                return matches.index(True)
         for name, reason in self.left_out.items():
             if wanted in (name, _last(name)):
                 raise FileError(f"{self.path}: '{name}' cannot be read as numbers: {reason}.")
@@ -343,17 +346,14 @@ def read_series(
         )
     check_stamps(log, time_column, time)
     check_finite(log, column, values)
-    stamps = check_duration(log, f"column '{time_column}'", _si(log, time_column, "s", time))
-    return Series(stamps, _si(log, column, unit, values))
-
-
-def _si(log: Log, wanted: str, si: str, values: Array) -> Array:
-    found = log.find(wanted)
-    unit = unit_of(found, wanted, si)
-    unit = speed_unit(unit) if si == "rad/s" else unit
-    what = f"{log.path}: column '{found.name}'"
-    factor, zero = scaling(unit, si, what)
-    return values * factor + zero
+    made = []
+    for name, si in ((time_column, "s"), (column, unit)):
+        found = log.find(name)
+        given = unit_of(found, name, si)
+        given = speed_unit(given) if si == "rad/s" else given
+        factor, zero = scaling(given, si, f"{log.path}: column '{found.name}'")
+        made.append(factor * read[name] + zero)
+    return Series(check_duration(log, f"column '{time_column}'", made[0]), made[1])
 
 
 # --- columns by name, and their units -------------------------------------------------------------
@@ -372,22 +372,10 @@ def split_unit(name: str) -> tuple[str, str | None]:
 
 
 def unit_of(column: Column, wanted: str, si: str) -> str:
-    """Unit that a column is in, as far as the log tells, or the SI unit.
+    """Unit of a column that `Log.find` returned: its own, the ending of its name, or else `si`.
 
-    Parameters
-    ----------
-    column : Column
-        What `Log.find` returned.
-    wanted : str
-        The name that it was asked by.
-    si : str
-        SI unit of what it shall be. A name like ``time_ms`` means milliseconds where that is a
-        unit of the same quantity, and is just a name otherwise.
-
-    Returns
-    -------
-    str
-        Its own unit; or the ending of its name; or `si` where the log has no unit.
+    A name like ``time_ms`` means milliseconds where that is a unit of the same quantity, or where
+    it was asked for as ``time``, and is just a name otherwise.
     """
     if column.unit is not None:
         return "1" if column.unit in _NO_UNIT else column.unit

@@ -1,7 +1,7 @@
 """Maneuvers: the voltage that a joystick commands over time, for tests of a drive.
 
-`step`, `ramp`, `sine`, `stairs`, `chirp`, `multisine`, `recorded`, `recorded_file` and `rest`
-make one; `+` puts one after another, a factor scales it, `superpose` adds voltages.
+`step`, `ramp`, `sine`, `stairs`, `chirp`, `multisine`, `recorded` and `rest` make one; `+` puts one
+after another, a factor scales it, `superpose` adds voltages.
 
 Most take three keywords, all in seconds: `start`, the rest before the command; `settle`, how long
 the cubic return to (0 V, 0 V/s) lasts at the end, None or 0 for none; `length`, the whole. Every
@@ -25,7 +25,6 @@ from swashplate.maneuvers.shapes import multisine as multisine
 from swashplate.maneuvers.shapes import parse as parse
 from swashplate.maneuvers.shapes import ramp as ramp
 from swashplate.maneuvers.shapes import recorded as recorded
-from swashplate.maneuvers.shapes import recorded_file as recorded_file
 from swashplate.maneuvers.shapes import rest as rest
 from swashplate.maneuvers.shapes import sine as sine
 from swashplate.maneuvers.shapes import source_tests as source_tests

@@ -4,14 +4,12 @@ import inspect
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import Literal, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from swashplate.errors import InputError
-from swashplate.logs import TextOptions, read_series
 from swashplate.maneuvers.pieces import (
     Array,
     Line,
@@ -246,36 +244,24 @@ def _band(band: Sequence[float], period: float) -> Array:
 
 
 @dataclass(frozen=True, eq=False)
-class _Held:
-    """Each of `volts` [V] from its one of `times` [s] until the next."""
+class _Rows:
+    """`volts` [V] at `times` [s]: `joined` by straight lines, or each until the next."""
 
     times: Array
     volts: Array
+    joined: bool
 
     def __call__(self, time: Array) -> Array:
+        if self.joined:
+            return np.interp(time, self.times, self.volts)
         return self.volts[interval(self.times, time)]
 
     def slope(self, time: Array) -> Array:
-        return np.zeros_like(time)
-
-
-@dataclass(frozen=True, eq=False)
-class _Joined:
-    """Straight lines through `volts` [V] at `times` [s]."""
-
-    times: Array
-    volts: Array
-
-    def __call__(self, time: Array) -> Array:
-        return np.interp(time, self.times, self.volts)
-
-    def slope(self, time: Array) -> Array:
-        # At the last row there is no line that follows: keep to the one before.
+        if not self.joined:
+            return np.zeros_like(time)
+        # at the last row there is no line that follows: keep to the one before
         slopes: Array = np.diff(self.volts) / np.diff(self.times)
         return slopes[interval(self.times[:-1], time)]
-
-
-_CURVES: dict[str, type[_Held | _Joined]] = {"previous": _Held, "linear": _Joined}
 
 
 def recorded(
@@ -302,7 +288,7 @@ def recorded(
     InputError
         If the rows are not such, or a number is not finite; it names the first row that is wrong.
     """
-    if interpolation not in _CURVES:
+    if interpolation not in ("previous", "linear"):
         raise InputError(f"interpolation must be 'previous' or 'linear', not {interpolation!r}.")
     stamps, volts = row("time", time), row("voltage", voltage)
     if stamps.size != volts.size or stamps.size < 2:
@@ -317,46 +303,11 @@ def recorded(
         raise InputError(
             f"time must increase, but row {late[0]} (first is 0) has {after} s after {before} s."
         )
-    curve = _CURVES[interpolation](times, volts)
+    curve = _Rows(times, volts, interpolation == "linear")
     end = float(times[-1]) if length is None else positive("length", length)
     return Maneuver(
         f"recorded {times.size} rows", end, (Piece(0.0, curve),), float(np.abs(volts).max())
     )
-
-
-def recorded_file(
-    path: str | Path,
-    *,
-    interpolation: Literal["previous", "linear"],
-    length: float | None = None,
-    column: str = "voltage",
-    time_column: str = "time",
-    options: TextOptions | None = None,
-) -> Maneuver:
-    """Voltage from a log's file, of any format that `logs.open_log` reads; see `recorded`.
-
-    Parameters
-    ----------
-    path : path
-        A log; a unit may stand in its header, as in ``voltage [mV]``.
-    column, time_column : str
-        Names of the columns.
-    interpolation, length :
-        As in `recorded`.
-    options : TextOptions, optional
-        How a text file is written, where that cannot be recognised from it.
-
-    Raises
-    ------
-    FileError
-        If the file cannot be read, a number is missing or time stamps do not increase; it names
-        file, column and row.
-    InputError
-        If a column is missing or its unit wrong, or as in `recorded`.
-    """
-    time, voltage = read_series(path, column, "V", time_column=time_column, options=options)
-    recording = recorded(time, voltage, interpolation=interpolation, length=length)
-    return replace(recording, name=Path(path).name)
 
 
 # --- source ---------------------------------------------------------------------------------------

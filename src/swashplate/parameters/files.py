@@ -134,17 +134,10 @@ def read_set(text: str, origin: str) -> ParameterSet:
     model = contents.model
     values = {symbol: each.values[0] for symbol, each in parameters.items()}
     return ParameterSet(
-        contents.name,
-        contents.title,
-        card_name,
-        parameters,
-        model.pressure_root,
-        model.coulomb_sign,
-        model.card_switch,
-        model.rate or rate,
+        *(contents.name, contents.title, card_name, parameters),
+        *(model.pressure_root, model.coulomb_sign, model.card_switch, model.rate or rate),
         options_of(values) if model.options is None else frozenset(model.options),
-        own,
-        motion=model.motion,
+        *(own, model.motion),
     )
 
 
@@ -172,9 +165,8 @@ def dump_set(parameters: ParameterSet) -> str:
     text.add("title", parameters.title)
     text.add("card", parameters.card)
     options = table()
-    options.add("pressure_root", parameters.pressure_root)
-    options.add("coulomb_sign", parameters.coulomb_sign)
-    options.add("card_switch", parameters.card_switch)
+    for name in ("pressure_root", "coulomb_sign", "card_switch"):
+        options.add(name, getattr(parameters, name))
     if parameters.rate is not None:
         options.add("rate", parameters.rate)
     if parameters.options != options_of(parameters.numbers):
@@ -185,14 +177,12 @@ def dump_set(parameters: ParameterSet) -> str:
         options.add("motion", parameters.motion)
     text.add("model", options)
     for block in ("control_card", "pump_motor", "refinements"):
-        if all(parameter.definition.block != block for parameter in parameters.values()):
-            continue
         entries = table()
-        for parameter in parameters.values():
-            if parameter.definition.block != block:
-                continue
-            entries.add(parameter.symbol, written(parameter))
-        text.add(block, entries)
+        for symbol, parameter in parameters.items():
+            if parameter.definition.block == block:
+                entries.add(symbol, written(parameter))
+        if entries:
+            text.add(block, entries)
     return dumps(text)
 
 

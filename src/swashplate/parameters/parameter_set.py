@@ -1,7 +1,7 @@
 """A parameter set: values with their origin, immutable, always valid."""
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from itertools import groupby
 from types import MappingProxyType
 from typing import Literal, NamedTuple, Protocol
@@ -10,7 +10,6 @@ from swashplate.equations.replacement import Replacement
 from swashplate.errors import ParameterError
 from swashplate.parameters.definitions import (
     CATALOGUE,
-    DEFAULTS,
     OWN,
     REFINEMENTS,
     SWITCHES,
@@ -154,13 +153,10 @@ class ParameterSet(Mapping[str, Parameter]):
     def __getitem__(self, symbol: str) -> Parameter:
         if symbol in self.parameters:
             return self.parameters[symbol]
-        if symbol in REFINEMENTS:
-            return Parameter(REFINEMENTS[symbol], DEFAULTS[symbol], status="inactive")
-        if symbol in OWN:
-            default = OWN[symbol].default
-            assert default is not None
-            return Parameter(OWN[symbol], default, status="inactive")
-        raise unknown_parameter(symbol)
+        definition = REFINEMENTS.get(symbol, OWN.get(symbol))
+        if definition is None or definition.default is None:
+            raise unknown_parameter(symbol)
+        return Parameter(definition, definition.default, status="inactive")
 
     def __contains__(self, symbol: object) -> bool:
         return symbol in self.parameters
@@ -176,18 +172,9 @@ class ParameterSet(Mapping[str, Parameter]):
 
     def __reduce__(self) -> tuple[object, ...]:
         # read-only views cannot be pickled, so a copy in another process is built anew
-        return ParameterSet, (
-            self.name,
-            self.title,
-            self.card,
-            dict(self.parameters),
-            self.pressure_root,
-            self.coulomb_sign,
-            self.card_switch,
-            self.rate,
-            self.options,
-            self.equations,
-            self.motion,
+        given = (getattr(self, each.name) for each in fields(self) if each.init)
+        return ParameterSet, tuple(
+            dict(each) if isinstance(each, MappingProxyType) else each for each in given
         )
 
     @property

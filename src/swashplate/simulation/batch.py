@@ -36,6 +36,7 @@ from swashplate.simulation.instance import (
     pump_options,
     step_limit,
 )
+from swashplate.simulation.result import check_output
 from swashplate.tables import write_whole
 
 Array = NDArray[np.float64]
@@ -46,17 +47,6 @@ OVERFLOW = (
     "the numbers grow beyond all bounds under this input: a parameter is far larger or smaller "
     "than any real drive's; compare the set with a packaged one."
 )
-OUTPUTS = (
-    "shaft_speed",
-    "shaft_position",
-    "current",
-    "current_sum",
-    "stroker_pressure",
-    "swash_angle",
-    "spool_position",
-    "orifice_opening",
-)
-"""Signals that a batch of drives can return or be compared by."""
 SAMPLES_A_FILE = 2**23
 """Samples of all sets of a file, 64 MB, unless a single block of sets has more."""
 
@@ -70,7 +60,7 @@ class SquaredError(Result):
     weight: ArrayLike = 1.0
     """(n,) or one number; samples of weight 0 do not count, whatever they are."""
     output: str = "shaft_speed"
-    """Signal that is compared; of a drive one of `OUTPUTS`."""
+    """Signal that is compared; of a drive one of `Simulation`, or ``"current_sum"``."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -359,12 +349,11 @@ def simulate_drives(
     numbers = {**held, **dict(columns)}
     failures = _failures(parameters, numbers, record.step, by_voltage)
     observed = cost.output if cost is not None else output
-    if observed not in OUTPUTS:
-        raise InputError(f"A batch has no output '{observed}'; it has {', '.join(OUTPUTS)}.")
     by_path = {PATHS[column]: values for column, values in numbers.items()}
     records = {"voltage" if by_voltage else "current": record.values}
     models = models_of(parameters.equations)
     model = models.drive if by_voltage else models.pump_drive
+    check_output(observed)
     shared = _Sets(model, by_path, record, records, observed, cost, Path(to) if to else None)
 
     def why(worst: float) -> str:

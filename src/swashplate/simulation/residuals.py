@@ -29,22 +29,13 @@ from swashplate.simulation.instance import (
     instance_of,
     path_of,
 )
-from swashplate.simulation.result import Named, Simulation
+from swashplate.simulation.result import Named, Simulation, check_output
 from swashplate.simulation.run import Driver, simulate_drive, start_states, started_at
 from swashplate.tables import count
 
 Array = NDArray[np.float64]
 
 CURRENTS = ("current", "current_sum", "current_positive", "current_negative")
-OBSERVABLE = (
-    *CURRENTS,
-    "shaft_speed",
-    "shaft_position",
-    "stroker_pressure",
-    "swash_angle",
-    "spool_position",
-)
-"""Signals that can be observed."""
 
 
 class Own(NamedTuple):
@@ -149,10 +140,7 @@ def made_ready(
     """The drive's model with its numbers, for some columns."""
     by_voltage = observed.driven_by == "voltage"
     for each in observed.observations:
-        if each.signal not in OBSERVABLE:
-            raise InputError(
-                f"'{each.signal}' cannot be observed; signals are {', '.join(OBSERVABLE)}."
-            )
+        check_output(each.signal)
     if by_voltage:
         check_filter_stability(parameters, observed.record.step)
     # what is differentiated by counts, at 0 as well, unless equations have derivatives for that

@@ -44,6 +44,8 @@ SIGNALS = (
 )
 """Signals of a simulation in the order of the chain."""
 MOTOR = ("motor_torque", "motor_pressure_drop")
+OUTPUTS = ("current_sum", *SIGNALS[1:], *MOTOR)
+"""Signals that can be observed, or returned and compared by a batch."""
 KEPT = (
     Stored(0, "signals", "current_positive"),
     Stored(0, "signals", "current_negative"),
@@ -70,6 +72,12 @@ class Limit(IntFlag):
     """The swash plate is at a stop: the speed limit."""
     RELIEF = 32
     """The relief valve holds the stroking pressure at ±Z15."""
+
+
+def check_output(signal: str) -> None:
+    """Refuse a signal that is none of `OUTPUTS`; states of the equations may stay at zero."""
+    if signal not in OUTPUTS:
+        raise InputError(f"A drive has no signal '{signal}'; it has {', '.join(OUTPUTS)}.")
 
 
 def read_only(array: NDArray[T]) -> NDArray[T]:

@@ -19,7 +19,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from swashplate.campaign.schema import ChannelKind
+from swashplate.campaign.schema import SIGNALS, ChannelKind
 from swashplate.errors import InputError
 from swashplate.simulation.result import Simulation
 
@@ -159,14 +159,6 @@ gaps and a counter that rolls over.
 
 COLUMNS: Mapping[str, str] = {"rectified_current": "current", "encoder_counts": "counts"}
 """Columns that are not called as the kind of their channel."""
-SIGNALS: Mapping[str, str] = {
-    "signed_current": "current",
-    "current_plus": "current_positive",
-    "current_minus": "current_negative",
-    "position": "shaft_position",
-    "encoder_counts": "shaft_position",
-}
-"""Simulated signals that are not called as the kind of their channel."""
 FULL_SCALE = 10.0
 """Range of the command's converters, either way. [V]"""
 FARTHEST = 0.4
@@ -205,12 +197,12 @@ def logged(
         assert signal is not None
         return signal if not tools.jitter else np.interp(instants, grid, signal)
 
-    def read(kind: str) -> Array:
+    def read(kind: ChannelKind | Literal["voltage"]) -> Array:
         chance = stream(seed, name, kind)
         if kind == "rectified_current":
             both = at_instants(truth.current_positive), at_instants(truth.current_negative)
             return read_current(instants, both, tools, chance)
-        signal: Array = getattr(truth, SIGNALS.get(kind, kind))
+        signal: Array = getattr(truth, "voltage" if kind == "voltage" else SIGNALS[kind])
         if kind in ("position", "encoder_counts") and tools.backlash:
             signal = play(signal, tools.backlash)
         signal = at_instants(signal)
@@ -222,7 +214,7 @@ def logged(
         noise = tools.transducer_noise * np.abs(signal).max() * chance.standard_normal(grid.size)
         return np.asarray(signal + noise)
 
-    columns = {COLUMNS.get(kind, kind): read(kind) for kind in ("voltage", *kinds)}
+    columns = {"voltage": read("voltage"), **{COLUMNS.get(k, k): read(k) for k in kinds}}
     for column, values in columns.items():
         chance = stream(seed, name, "empty", column)
         gaps = lost(grid.size, tools.empty_cells, tools.longest_gap, chance)

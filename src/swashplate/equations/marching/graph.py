@@ -123,7 +123,7 @@ class Graph:
     def _planned(self, name: str, text: str, names: Mapping[str, Any]) -> Planned:
         """A piece, in a module of its own."""
         file = f"{self.model.name}_{name}"
-        return Planned(lambda: module(file, text, {"piece": piece, **names})[name])
+        return generating(lambda: module(file, text, {"piece": piece, **names})[name])
 
     def _piece(
         self, name: str, says: str, lines: Sequence[str], names: Any = None, arguments: str = PIECE

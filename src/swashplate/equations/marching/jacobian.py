@@ -14,7 +14,7 @@ from swashplate.equations.marching.graph import Graph, Known, graph_of
 from swashplate.equations.marching.layout import Layout, layout_of, started_by
 from swashplate.equations.marching.observation import ObservedRecord, Own
 from swashplate.equations.marching.pieces import addresses
-from swashplate.equations.marching.rows import Sink, march_observed, room_for, rooms
+from swashplate.equations.marching.rows import Program, Sink, march_observed, room_for, rooms
 from swashplate.equations.marching.run import Instance, Start, arrays_of, begun, check_domain
 from swashplate.equations.marching.triangle import ROWS, aligned, upright
 from swashplate.errors import DomainError, InputError
@@ -40,20 +40,22 @@ def starting_slopes(
     return dict(zip(starting.moves, found[len(found) - len(starting.moves) :], strict=True))
 
 
-@generating
-def _rest_slopes(graph: Graph, instance: Instance, h: float) -> dict[tuple[Known, str], float]:
-    """Those of a start at rest, which depends on no record."""
-    return starting_slopes(graph, instance, {}, h, "rest")
-
-
-def tangents_of(
-    layout: Layout, slopes: Mapping[tuple[Known, str], float], own: Collection[str]
-) -> Array:
-    """Derivatives of the states at the first sample, in their places.
+def begun_columns(
+    layout: Layout,
+    instance: Instance,
+    first: Mapping[str, float],
+    h: float,
+    start: Start,
+    own: Collection[str],
+) -> tuple[Program, Array]:
+    """The layout's program with its numbers, and derivatives of the states at the first sample.
 
     `own` are paths of states that the run starts from as its own unknowns: nothing else moves them.
     """
-    tangent, model = np.zeros(layout.tangents), layout.model
+    model, slopes = layout.model, dict[tuple[Known, str], float]()
+    if layout.columns:
+        slopes = starting_slopes(layout.graph, instance, first, h, start)
+    tangent = np.zeros(layout.tangents)
     for (part, path), found in layout.places.items():
         free = f"{model.prefix(part)}{path}" in own
         for c, at in found.items():
@@ -61,7 +63,20 @@ def tangents_of(
                 tangent[at] = path in started_by(model, part, layout.columns[c])
             else:
                 tangent[at] = slopes.get((("state", part, path), layout.columns[c]), 0.0)
-    return tangent
+    places = instance.places(layout.graph.sampler.signals, h)
+    terms = layout.program.terms
+    scale = terms.scale.copy()
+    for at, slot in layout.slots:
+        scale[at] *= places.slope[slot] if isinstance(slot, int) else slopes[slot]
+    return layout.program._replace(terms=terms._replace(scale=scale)), tangent
+
+
+@generating
+def _at_rest(
+    layout: Layout, instance: Instance, h: float, own: tuple[str, ...]
+) -> tuple[Program, Array]:
+    """Those of a start at rest, which depends on no record."""
+    return begun_columns(layout, instance, {}, h, "rest", own)
 
 
 # --- what a fit asks for --------------------------------------------------------------------------
@@ -219,24 +234,15 @@ def _march(
     first = {name: float(values[0]) for name, values in records.items()}
     started = instance.start(first, h, start)
     states, places = begun(instance, started, own.start), instance.places(signals, h)
-    program, tangent = layout.program, np.zeros(layout.tangents)
-    if columns:
-        rest = start == "rest"
-        slopes = (
-            _rest_slopes(graph, instance, h)
-            if rest
-            else starting_slopes(graph, instance, first, h, start)
-        )
-        tangent = tangents_of(layout, slopes, own.start)
-        scale = program.terms.scale.copy()
-        for at, slot in layout.slots:
-            scale[at] *= places.slope[slot] if isinstance(slot, int) else slopes[slot]
-        program = program._replace(terms=program.terms._replace(scale=scale))
+    if start == "rest":
+        program, tangent = _at_rest(layout, instance, h, tuple(own.start))
+    else:
+        program, tangent = begun_columns(layout, instance, first, h, start, own.start)
     values, met = tuple(records.values()), np.array([np.inf])
     spare = rooms(layout, plan.kept.shape)
     room = room_for(spare, layout, plan)
     arrays = arrays_of(instance, values, started, places, states, met, room.flat)
     pieces = addresses(graph.pieces, layout.pieces)
-    march_observed(pieces, arrays, (values[0].size, h), tangent, program, plan, sink, room)
+    march_observed(pieces, arrays, (values[0].size, h), tangent.copy(), program, plan, sink, room)
     check_domain(instance, states, float(met[0]), observed.driven_by)
     spare.append(room)

@@ -8,7 +8,6 @@ compiled once, kept on disk, as is each piece for all models that share it.
 """
 
 from collections.abc import Callable, Container, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -20,7 +19,6 @@ from numba.extending import intrinsic
 from numpy.typing import NDArray
 
 from swashplate.equations.cache import kernel, on_disk
-from swashplate.equations.code import GENERATING
 from swashplate.equations.equation import JIT_OFF, known
 from swashplate.equations.syntax import plain
 
@@ -47,23 +45,8 @@ _TYPES = (
 
 Piece = Any
 """What `piece` returns."""
-
-
-@dataclass
-class Planned:
-    """A piece that is compiled when it is first needed: residuals alone need no derivatives."""
-
-    make: Callable[[], Piece]
-    _made: Piece = None
-
-    @property
-    def made(self) -> Piece:
-        """The piece; one thread at a time compiles."""
-        if self._made is None:
-            with GENERATING:
-                if self._made is None:
-                    self._made = self.make()
-        return self._made
+Planned = Callable[[], Piece]
+"""Compiles a piece when it is first needed (`generating`): residuals alone need no derivatives."""
 
 
 def piece(function: Callable[..., None]) -> Piece:
@@ -80,7 +63,7 @@ def piece(function: Callable[..., None]) -> Piece:
 
 def addresses(pieces: Sequence[Planned], needed: Container[int]) -> Any:
     """What `call` is given of each piece; the pieces themselves must be kept as well."""
-    made = [each.made if k in needed else None for k, each in enumerate(pieces)]
+    made = [each() if k in needed else None for k, each in enumerate(pieces)]
     if JIT_OFF:
         return made
     return np.array([0 if each is None else each.address for each in made], dtype=np.int64)

@@ -25,7 +25,7 @@ STRIDE = BLOCK + 16
 CARRIED = 8
 """Places of an observation's rows before the block's: the last two are the samples before it, the
 others only keep the block's first sample at the beginning of a cache line."""
-ABREAST = 4
+ABREAST = 8
 """Columns of a recurrence side by side: they fill the time that each waits for its last number."""
 
 
@@ -153,10 +153,12 @@ def _columns(observations: int, derived: int) -> Indices:
 
 
 @subroutine
-def combine(flat: Array, terms: Terms, first: int, end: int, count: int, into: Array) -> None:
-    """Make rows of `into` from rows of `flat`."""
+def combine(
+    flat: Array, terms: Terms, first: int, end: int, count: int, into: Array, shift: int
+) -> None:
+    """Make rows of `into`, `shift` behind their places, from rows of `flat`."""
     for t in range(first, end):
-        row = behind(into, terms.target[t])
+        row = behind(into, terms.target[t] + shift)
         if terms.first[t] == terms.first[t + 1]:
             for m in range(count):
                 row[m] = 0.0
@@ -189,19 +191,37 @@ def follow(a: Array, columns: Indices, width: int, flat: Array, count: int, tang
     last = columns[3 * width] != 0
     for c in range(0, width, ABREAST):
         to, at = behind(columns, c + width), behind(columns, c + 2 * width)
-        p0, p1, p2, p3 = at[0], at[1], at[2], at[3]
+        y0, y1, y2, y3 = tangent[at[0]], tangent[at[1]], tangent[at[2]], tangent[at[3]]
+        y4, y5, y6, y7 = tangent[at[4]], tangent[at[5]], tangent[at[6]], tangent[at[7]]
         g0, g1 = behind(flat, columns[c]), behind(flat, columns[c + 1])
         g2, g3 = behind(flat, columns[c + 2]), behind(flat, columns[c + 3])
-        d0, d1 = behind(flat, to[0]), behind(flat, to[1])
-        d2, d3 = behind(flat, to[2]), behind(flat, to[3])
-        y0, y1, y2, y3 = tangent[p0], tangent[p1], tangent[p2], tangent[p3]
+        g4, g5 = behind(flat, columns[c + 4]), behind(flat, columns[c + 5])
+        g6, g7 = behind(flat, columns[c + 6]), behind(flat, columns[c + 7])
+        d0, d1, d2, d3 = (
+            behind(flat, to[0]),
+            behind(flat, to[1]),
+            behind(flat, to[2]),
+            behind(flat, to[3]),
+        )
+        d4, d5, d6, d7 = (
+            behind(flat, to[4]),
+            behind(flat, to[5]),
+            behind(flat, to[6]),
+            behind(flat, to[7]),
+        )
         for m in range(count):
-            n0, n1 = a[m] * y0 + g0[m], a[m] * y1 + g1[m]
-            n2, n3 = a[m] * y2 + g2[m], a[m] * y3 + g3[m]
-            d0[m], d1[m] = n0 if last else y0, n1 if last else y1
-            d2[m], d3[m] = n2 if last else y2, n3 if last else y3
-            y0, y1, y2, y3 = n0, n1, n2, n3
-        tangent[p0], tangent[p1], tangent[p2], tangent[p3] = y0, y1, y2, y3
+            f = a[m]
+            n0, n1, n2, n3 = f * y0 + g0[m], f * y1 + g1[m], f * y2 + g2[m], f * y3 + g3[m]
+            n4, n5, n6, n7 = f * y4 + g4[m], f * y5 + g5[m], f * y6 + g6[m], f * y7 + g7[m]
+            if last:
+                d0[m], d1[m], d2[m], d3[m] = n0, n1, n2, n3
+                d4[m], d5[m], d6[m], d7[m] = n4, n5, n6, n7
+            else:
+                d0[m], d1[m], d2[m], d3[m] = y0, y1, y2, y3
+                d4[m], d5[m], d6[m], d7[m] = y4, y5, y6, y7
+            y0, y1, y2, y3, y4, y5, y6, y7 = n0, n1, n2, n3, n4, n5, n6, n7
+        tangent[at[0]], tangent[at[1]], tangent[at[2]], tangent[at[3]] = y0, y1, y2, y3
+        tangent[at[4]], tangent[at[5]], tangent[at[6]], tangent[at[7]] = y4, y5, y6, y7
 
 
 @pasted
@@ -244,13 +264,21 @@ def low_pass(kept: float, fresh: bool, count: int, room: Room, r: int, q: int) -
 
 @subroutine
 def place(
-    seen: Array, base: int, plan: Plan, r: int, at: int, count: int, sink: Sink, to: int
+    seen: Array,
+    base: int,
+    plan: Plan,
+    r: int,
+    where: tuple[int, int, int],
+    sink: Sink,
+    done: bool,
 ) -> None:
     """Weighted rows of the problem at some stamps of an observation, from its rows on the grid.
 
     `seen` holds the derivatives that the march gives, and the signal, from the grid's point `base`
-    on; `at` is the first of the stamps, `to` the first place in the rows of the sink.
+    on; `where` is the first of the stamps, how many there are, and the first place in the rows of
+    the sink. Are derivatives `done`, only what does not come from the march is left.
     """
+    at, count, to = where
     derived, long = sink.to.size, sink.rows.shape[1]
     cell, fraction, weight = (
         behind(plan.cell, at),
@@ -258,7 +286,7 @@ def place(
         behind(plan.weight, at),
     )
     begin = cell[0] - base
-    for c in range(derived):
+    for c in range(0 if not done else derived, derived):
         column, row = behind(sink.rows, sink.to[c] * long + to), behind(seen, c * STRIDE)
         if plan.regular[r]:
             row = behind(row, begin)
@@ -315,7 +343,7 @@ def rotate(
         count = 1
         while at + count < end and used + count < long and plan.weight[at + count] != 0.0:
             count += 1
-        place(seen, base, plan, r, at, count, sink, used)
+        place(seen, base, plan, r, (at, count, used), sink, False)
         at, used = at + count, used + count
         if used == long:
             absorb(sink.rows, sink.factor, products)
@@ -340,15 +368,21 @@ def deliver(
     """
     first, count, size = span
     derived = program.derived
-    targets = program.terms.target.size
-    combine(room.flat, program.terms, program.seen, targets, count, room.flat_seen)
+    terms, flat, seen = program.terms, behind(room.flat, 0), behind(room.flat_seen, 0)
+    out, long = behind(sink.rows, 0), sink.rows.shape[1]
     base, last = first - CARRIED, first + count == size
     for r in range(plan.first.size - 1):
         rows = behind(room.seen, r * (derived + 2) * STRIDE)
         signal = behind(rows, derived * STRIDE + CARRIED)
-        value = behind(room.flat, program.value[r] * STRIDE)
+        value = behind(flat, program.value[r] * STRIDE)
         for m in range(count):
             signal[m] = value[m]
+        first_term = program.seen + r * derived
+        # where nothing stands between a signal and its residuals, derivatives go there at once
+        straight = sink.factor.size == 0 and plan.regular[r] and plan.clock_column[r] < 0
+        straight = straight and not program.integral[r] and not plan.kept[r].any()
+        if not straight:
+            combine(flat, terms, first_term, first_term + derived, count, seen, 0)
         if program.integral[r]:
             for c in range(derived + 1):
                 row = behind(rows, c * STRIDE + CARRIED)
@@ -367,7 +401,18 @@ def deliver(
         if sink.factor.size > 0:
             used = rotate(rows, base, plan, r, (at, end), sink, used, room.products)
         elif end > at:
-            place(rows, base, plan, r, at, end - at, sink, at)
+            if straight:
+                begin, weight, even = plan.cell[at] - first, behind(plan.weight, at), True
+                for i in range(end - at):
+                    even = even and weight[i] == 1.0
+                for c in range(derived):
+                    t, to = first_term + c, sink.to[c] * long + at
+                    shift = to - terms.target[t]
+                    combine(behind(flat, begin), terms, t, t + 1, end - at, out, shift)
+                    column = behind(out, to)
+                    for i in range(0 if not even else end - at, end - at):
+                        column[i] *= weight[i]
+            place(rows, base, plan, r, (at, end - at, at), sink, straight)
     return used
 
 
@@ -390,7 +435,7 @@ def march_observed(
     last.
     """
     size, h = grid
-    used, count, flat = plan.first[0], 0, room.flat
+    used, count, flat, start = plan.first[0], 0, room.flat, behind(room.flat, 0)
     for first in range(0, size, BLOCK):
         for k in range(0, room.flat_seen.size, STRIDE):
             # what interpolation looks back at, from the end of the block before
@@ -403,7 +448,7 @@ def march_observed(
             if what == CALL:
                 call(pieces[a], count, first, h, arrays)
             elif what == COMBINE:
-                combine(flat, program.terms, a, b, count, flat)
+                combine(start, program.terms, a, b, count, start, 0)
             elif what == RECUR:
                 factor = behind(flat, program.columns[b])
                 follow(factor, taken, many // 4, flat, count, tangent)

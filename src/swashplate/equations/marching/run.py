@@ -292,7 +292,7 @@ def march_of(
     rows = {each: f"flat[{row} * count + n]" for row, each in enumerate(stored)}
     text, names = march_source(model, signals, options, rows)
     names["piece"] = piece
-    return Planned(lambda: module(f"{model.name}_march", text, names)["march"])
+    return generating(lambda: module(f"{model.name}_march", text, names)["march"])
 
 
 def marched(

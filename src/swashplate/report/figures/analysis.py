@@ -334,7 +334,7 @@ def plot_tornado(result: OneAtATime, *, title: str | None = None) -> Figure:
     Parameters
     ----------
     result : OneAtATime
-        See `analysis.sensitivity.one_at_a_time`.
+        See `analysis.one_at_a_time`.
     title : str, optional
         By default it says what is shown.
 

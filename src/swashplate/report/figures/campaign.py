@@ -54,65 +54,6 @@ from swashplate.units import DisplayUnit, display_unit
 if TYPE_CHECKING:
     from swashplate.campaign import Channel, Experiment, InputSignal
 
-# --- marks beside a measured signal ---------------------------------------------------------------
-
-WEIGHTED = "#e3b5cf"
-"""Colour of the weights at a panel's foot."""
-
-
-def mark_clipped(ax: Axes, time: Array, values: Array, limits: tuple[float, float] | None) -> None:
-    """Draw over clipped samples with a bar; all three in the panel's unit."""
-    if limits is None:
-        return
-    # what a conversion of units rounds away is no distance from the end
-    near = 1e-9 * (limits[1] - limits[0])
-    ends = (values <= limits[0] + near, values >= limits[1] - near)
-    for level, side in zip(limits, ends, strict=True):
-        first, last = merged(stretches(time, side)).T
-        if first.size:
-            how: dict[str, Any] = {"color": ORANGE, "linewidth": 4.0, "capstyle": "projecting"}
-            ax.hlines(np.full(first.size, level), first, last, zorder=1.9, label="clipped", **how)
-
-
-def mark_handles(axes: Sequence[Axes], reasons: Sequence[str]) -> list[Patch | Line2D]:
-    """Handles for a legend of the marks that are anywhere on these panels.
-
-    Parameters
-    ----------
-    axes : sequence of Axes
-        The panels.
-    reasons : sequence of str
-        Why stretches are ignored; named if they are few.
-    """
-    met = {
-        artist.get_label() for ax in axes for artist in (*ax.collections, *ax.lines, *ax.patches)
-    }
-    why = "; ".join(dict.fromkeys(reason for reason in reasons if reason))
-    words = f"ignored: {why}" if 0 < len(why) <= 60 else ""
-    handles: dict[str, Patch | Line2D] = {
-        "ignored": shade_handle(IGNORED, words),
-        "weight": Patch(facecolor=WEIGHTED, label="weight, relative to the largest"),
-        "clipped": Patch(facecolor=ORANGE, label="at the end of the instrument's range"),
-        GAP_MARK["label"]: Line2D([], [], **GAP_MARK),
-    }
-    return [handle for key, handle in handles.items() if key in met]
-
-
-WEIGHTS = 0.16
-"""Part of a panel's height that the largest weight takes."""
-
-
-def mark_weights(ax: Axes, time: Array, weight: Array) -> None:
-    """Draw weights that differ along a panel's foot."""
-    used = weight[weight > 0.0]
-    if used.size and used.max() > used.min():
-        turns = np.flatnonzero(np.diff(weight)) + 1
-        rows = np.unique(np.r_[0, turns - 1, turns, weight.size - 1])
-        foot: dict[str, Any] = {"transform": ax.get_xaxis_transform(), "label": "weight"}
-        height = WEIGHTS * weight[rows] / float(weight.max())
-        ax.fill_between(time[rows], height, color=WEIGHTED, linewidth=0.0, zorder=1.0, **foot)
-
-
 # --- pages of a campaign --------------------------------------------------------------------------
 
 RUNS = 8
@@ -120,14 +61,19 @@ RUNS = 8
 NARROWEST, BETWEEN = 2.2, 0.55
 PANEL, ABOVE = 0.86, 0.5
 """Widths of a panel and of a gap; heights of a panel, and of a run's heading and ticks. [inch]"""
+WEIGHTED, WEIGHTS = "#e3b5cf", 0.16
+"""Colour of the weights at a panel's foot, and the part of its height that the largest takes."""
+_ROOM = 0.08
+"""Empty share of a panel above and below its signal."""
+_NEAR_ZERO = 0.02
+"""A record that begins at less than this share of its length is shown from zero on."""
+_ROLES = {"fit": "for the fit", "validate": "for validation"}
 
 
 class Column(NamedTuple):
-    """What a column of panels shows."""
+    """What a column of panels shows: a channel by name and SI unit; the input has no name."""
 
     key: tuple[str, str]
-    """Name and SI unit of a channel; the input has no name."""
-    name: str
     words: str
     """What it shows, with the unit."""
     unit: DisplayUnit
@@ -138,59 +84,31 @@ class Column(NamedTuple):
     free: bool
     """Whether it is a position."""
 
-    def limits(self, values: Array) -> tuple[float, float]:
-        """Lowest and highest value to show of a run, in the displayed unit."""
-        middle = 0.5 * float(values.min() + values.max()) if self.free else 0.0
-        return middle + self.low, middle + self.high
 
-
-def signals_of(experiment: Experiment) -> dict[tuple[str, str], InputSignal | Channel]:
+def _signals(experiment: Experiment) -> dict[tuple[str, str], InputSignal | Channel]:
     """The input, whose name is empty, and the channels, by name and unit."""
-    signals: dict[tuple[str, str], InputSignal | Channel] = {
-        ("", experiment.input.unit): experiment.input
-    }
-    for name, channel in experiment.channels.items():
-        signals[(name, channel.unit)] = channel
-    return signals
+    channels = {(name, each.unit): each for name, each in experiment.channels.items()}
+    return {("", experiment.input.unit): experiment.input, **channels}
 
 
-def columns_of(experiments: Sequence[Experiment]) -> list[Column]:
-    """The columns that some runs of one axis need together, the input first."""
-    met: dict[tuple[str, str], list[InputSignal | Channel]] = {}
-    for experiment in experiments:
-        for key, signal in signals_of(experiment).items():
-            met.setdefault(key, []).append(signal)
-    inputs_first = sorted(met, key=lambda key: key[0] != "")
-    return [_column(key, met[key]) for key in inputs_first]
-
-
-def counted(signal: InputSignal | Channel) -> Array:
+def _counted(signal: InputSignal | Channel) -> Array:
     """Samples that are not ignored; all of them of an input, or where none is left."""
     used = getattr(signal, "used", None)
     return signal.values if used is None or not used.any() else signal.values[used]
 
 
 def _column(key: tuple[str, str], signals: Sequence[InputSignal | Channel]) -> Column:
-    name, si = key
     # what is ignored may leave the panel: one spike would flatten all runs
-    shown = [counted(signal) for signal in signals]
+    shown = [_counted(signal) for signal in signals]
     low, high = min(float(each.min()) for each in shown), max(float(each.max()) for each in shown)
-    kind = signals[0].kind
-    unit = display_unit(si, max(abs(low), abs(high)))
+    kind, unit = signals[0].kind, display_unit(key[1], max(abs(low), abs(high)))
     free = kind in ("position", "encoder_counts")
     if free:
         high = 0.5 * max(float(np.ptp(each)) for each in shown)
         low = -high
     words = {"encoder_counts": "encoder's angle", "other": signals[0].source.column}
-    return Column(
-        key,
-        name or "input",
-        unit.label(words.get(kind, kind.replace("_", " "))),
-        unit,
-        unit.factor * low,
-        unit.factor * high,
-        free,
-    )
+    label = unit.label(words.get(kind, kind.replace("_", " ")))
+    return Column(key, label, unit, unit.factor * low, unit.factor * high, free)
 
 
 def plot_campaign(experiments: Iterable[Experiment], *, title: str | None = None) -> list[Figure]:
@@ -231,7 +149,11 @@ def plot_campaign(experiments: Iterable[Experiment], *, title: str | None = None
         raise InputError("A page of a campaign needs at least one experiment.")
     figures = []
     for axis, of_axis in axes.items():
-        columns = columns_of(of_axis)
+        met: dict[tuple[str, str], list[InputSignal | Channel]] = {}
+        for each in of_axis:
+            for key, signal in _signals(each).items():
+                met.setdefault(key, []).append(signal)
+        columns = [_column(key, met[key]) for key in sorted(met, key=lambda key: key[0] != "")]
         pages = [of_axis[first : first + RUNS] for first in range(0, len(of_axis), RUNS)]
         for number, page in enumerate(pages, start=1):
             words = f"{title or 'Measured tests'}: {axis}"
@@ -244,91 +166,91 @@ def plot_campaign(experiments: Iterable[Experiment], *, title: str | None = None
 def _page(experiments: Sequence[Experiment], columns: Sequence[Column], title: str) -> Figure:
     rows, across = len(experiments), len(columns)
     width = max(WIDTH, across * (NARROWEST + BETWEEN))
-    panel = width / across - 1.3 * BETWEEN
+    room = width / across - 1.3 * BETWEEN
     figure = new_figure(width, HEAD + 2.0 * ROW + rows * (PANEL + ABOVE) + FOOT)
     grid = figure.subplots(rows, across, sharex="row", squeeze=False)
     for number, (row, experiment) in enumerate(zip(grid, experiments, strict=True)):
-        fill_row(list(row), columns, experiment)
-        # room for the heading, and in the first row for the columns' names
+        signals = _signals(experiment)
+        first = min(float(signal.time[0]) for signal in signals.values())
+        last = max(float(signal.time[-1]) for signal in signals.values())
+        if 0.0 < first < _NEAR_ZERO * (last - first):
+            first = 0.0
+        row[0].set_xlim(first, last if last > first else first + 1.0)
         for ax, column in zip(row, columns, strict=True):
-            heads = (_cut(column.name, panel, 0.085), _cut(column.words, panel, 0.066))
-            words, pad = ("\n".join(heads), 20.0) if number == 0 else (" ", 6.0)
+            dress(ax)
+            ax.xaxis.set_major_locator(MaxNLocator(5, steps=[1, 2, 5, 10]))
+            ax.yaxis.set_major_locator(MaxNLocator(4, steps=[1, 2, 5, 10]))
+            if column.key in signals:
+                _fill(ax, column, signals[column.key], experiment)
+            else:
+                ax.set_yticks([])
+                write(ax, "not measured", (0.5, 0.5), (0.0, 0.0), ha="center", va="center")
+            # room for the heading, and in the first row for the columns' names
+            heads = (column.key[0] or "input", 0.085), (column.words, 0.066)
+            cut = [shorten(each, room / letter) for each, letter in heads]
+            words, pad = ("\n".join(cut), 20.0) if number == 0 else (" ", 6.0)
             ax.set_title(words, loc="left", fontsize=SMALL, color=INK, pad=pad)
+        _heading(row[0], experiment)
     for ax in grid[-1]:
         label_below(ax, "time (s)")
-    reasons = [why for each in experiments for _, _, why in each.ignored]
-    handles = mark_handles(list(grid.flat), reasons)
+    why = "; ".join(dict.fromkeys(why for e in experiments for _, _, why in e.ignored if why))
+    handles: dict[str, Patch | Line2D] = {
+        "ignored": shade_handle(IGNORED, f"ignored: {why}" if 0 < len(why) <= 60 else ""),
+        "weight": Patch(facecolor=WEIGHTED, label="weight, relative to the largest"),
+        "clipped": Patch(facecolor=ORANGE, label="at the end of the instrument's range"),
+        GAP_MARK["label"]: Line2D([], [], **GAP_MARK),
+    }
+    met = {a.get_label() for ax in grid.flat for a in (*ax.collections, *ax.lines, *ax.patches)}
     write_title(figure, title)
-    if handles:
+    if shown := [handle for key, handle in handles.items() if key in met]:
         how = {"frameon": False, "fontsize": SMALL, "ncols": 2}
-        figure.legend(handles=handles, loc="outside lower left", **how)
+        figure.legend(handles=shown, loc="outside lower left", **how)
     return figure
 
 
-def _cut(words: str, room: float, letter: float) -> str:
-    """Words cut to a room. [inch]"""
-    most = int(room / letter)
-    return words if len(words) <= most else f"{words[: most - 1]}…"
-
-
-_ROOM = 0.08
-"""Empty share of a panel above and below its signal."""
-_NEAR_ZERO = 0.02
-"""A record that begins at less than this share of its length is shown from zero on."""
-_ROLES = {"fit": "for the fit", "validate": "for validation"}
-
-
-def fill_row(row: Sequence[Axes], columns: Sequence[Column], experiment: Experiment) -> None:
-    """Draw a run into a row of panels that share their abscissa."""
-    signals = signals_of(experiment)
-    first = min(float(signal.time[0]) for signal in signals.values())
-    last = max(float(signal.time[-1]) for signal in signals.values())
-    if 0.0 < first < _NEAR_ZERO * (last - first):
-        first = 0.0
-    row[0].set_xlim(first, last if last > first else first + 1.0)
-    for ax, column in zip(row, columns, strict=True):
-        dress(ax)
-        ax.xaxis.set_major_locator(MaxNLocator(5, steps=[1, 2, 5, 10]))
-        ax.yaxis.set_major_locator(MaxNLocator(4, steps=[1, 2, 5, 10]))
-        signal = signals.get(column.key)
-        if signal is None:
-            ax.set_yticks([])
-            write(ax, "not measured", (0.5, 0.5), (0.0, 0.0), ha="center", va="center")
-            continue
-        _fill(ax, column, signal, experiment)
-    _heading(row[0], experiment)
+def shorten(words: str, letters: float) -> str:
+    """Words cut to so many letters."""
+    return words if len(words) <= letters else f"{words[: int(letters) - 1]}…"
 
 
 def _fill(ax: Axes, column: Column, signal: InputSignal | Channel, experiment: Experiment) -> None:
-    from swashplate.campaign import Channel
-
-    factor = column.unit.factor
-    values = factor * signal.values
-    # the input has no weights, and a channel nothing that holds between its samples
-    weight, held = None, False
-    if isinstance(signal, Channel):
-        weight = signal.weight
-    else:
-        held = signal.interpolation == "previous"
+    """A signal, with marks where it is ignored, weighted, clipped or missing."""
+    time, factor = signal.time, column.unit.factor
+    values, counted = factor * signal.values, factor * _counted(signal)
     zero_line(ax)
-    low, high = column.limits(factor * counted(signal))
-    margin = _ROOM * (high - low) or 1.0
-    ax.set_ylim(low - margin, high + margin)
+    middle = 0.5 * float(counted.min() + counted.max()) if column.free else 0.0
+    margin = _ROOM * (column.high - column.low) or 1.0
+    ax.set_ylim(middle + column.low - margin, middle + column.high + margin)
+    # the input has no weights, and a channel nothing that is held between its samples
+    weight = getattr(signal, "weight", None)
+    held = getattr(signal, "interpolation", "") == "previous"
     if weight is None:
-        windows = sorted((start, stop) for start, stop, _ in experiment.ignored)
-        ends = (float(signal.time[0]), float(signal.time[-1]))
-        inside = np.clip(np.array(windows).reshape(-1, 2), *ends)
+        windows = np.array(sorted(each[:2] for each in experiment.ignored)).reshape(-1, 2)
+        inside = np.clip(windows, time[0], time[-1])
         shade(ax, inside[inside[:, 0] < inside[:, 1]], IGNORED)
     else:
-        shade(ax, stretches(signal.time, weight == 0.0), IGNORED)
-        mark_weights(ax, signal.time, weight)
+        shade(ax, stretches(time, weight == 0.0), IGNORED)
+        used = weight[weight > 0.0]
+        if used.size and used.max() > used.min():
+            turns = np.flatnonzero(np.diff(weight)) + 1
+            rows = np.unique(np.r_[0, turns - 1, turns, weight.size - 1])
+            foot: dict[str, Any] = {"transform": ax.get_xaxis_transform(), "label": "weight"}
+            height = WEIGHTS * weight[rows] / float(weight.max())
+            ax.fill_between(time[rows], height, color=WEIGHTED, linewidth=0.0, zorder=1.0, **foot)
     if signal.limits is not None:
-        mark_clipped(
-            ax, signal.time, values, (factor * signal.limits[0], factor * signal.limits[1])
-        )
-    mark_gaps(ax, signal.time)
+        ends = np.array(signal.limits)
+        # what a conversion of units rounds away is no distance from the end
+        near = np.abs(signal.values - ends[:, None]) <= 1e-9 * (ends[1] - ends[0])
+        beyond = np.stack((signal.values < ends[0], signal.values > ends[1]))
+        for level, side in zip(factor * ends, near | beyond, strict=True):
+            first, last = merged(stretches(time, side)).T
+            if first.size:
+                bar: dict[str, Any] = {"color": ORANGE, "linewidth": 4.0, "label": "clipped"}
+                level = np.full(first.size, level)
+                ax.hlines(level, first, last, zorder=1.9, capstyle="projecting", **bar)
+    mark_gaps(ax, time)
     color = INK if weight is None else BLUE
-    draw(ax, signal.time, values, color, held=held, width=THIN, columns=COARSE)
+    draw(ax, time, values, color, held=held, width=THIN, columns=COARSE)
 
 
 def _heading(ax: Axes, experiment: Experiment) -> None:
@@ -343,7 +265,7 @@ def _heading(ax: Axes, experiment: Experiment) -> None:
 
 def _stamps_in_words(experiment: Experiment) -> list[str]:
     """The rates, from the lowest to the highest, and the gaps of the signal that has most."""
-    stamps = [each.time for each in signals_of(experiment).values()]
+    stamps = [each.time for each in _signals(experiment).values()]
     rates = [1.0 / float(np.median(np.diff(time))) for time in stamps]
     ends = [f"{r:.0f}" if r >= 100.0 else f"{r:.3g}" for r in (min(rates), max(rates))]
     # stamps that jitter do not have quite the same rate

@@ -71,7 +71,6 @@ def plot_crane(
     sizes = {"swing_deg": 2.1, "slew_deg": 1.5, "boom_deg": 1.2}
     heights = [sizes[each] for each in heads] + ([1.5] if sea else [])
     heights += [0.17 * 2 * len(driven) + 0.25] if driven else []
-    assumed = [each for each in first.crane.quantities.values() if each.status == "assumed"]
     figure, axes = sheet(heights, title or first.crane.title, legend=legend, lines=1)
     for ax, (signal, label) in zip(axes, heads.items(), strict=False):
         _lines(ax, named, looks, signal, label)
@@ -86,10 +85,7 @@ def plot_crane(
         if first.stick_end > 0.0:
             ax.axvline(first.stick_end, color=FAINT, linewidth=0.8, zorder=1.0)
     says = ["grey line: the stick is back at zero"] if first.stick_end > 0.0 else []
-    if assumed:
-        says.append(
-            f"{len(assumed)} of {len(first.crane.quantities)} quantities of the crane are assumed"
-        )
+    says += [f"{first.crane.assumed} of the crane are assumed"] if first.crane.assumed else []
     axes[0].annotate(
         "; ".join(says),
         (0.0, 1.0),

@@ -46,12 +46,7 @@ HEIGHT = 3.3
 
 def assumed(crane: Crane) -> str:
     """A crane's name, and how much of its geometry is assumed."""
-    many = sum(each.status == "assumed" for each in crane.quantities.values())
-    return (
-        f"{crane.name}, {many} of {len(crane.quantities)} quantities assumed"
-        if many
-        else crane.name
-    )
+    return f"{crane.name}, {crane.assumed} assumed" if crane.assumed else crane.name
 
 
 def seaway_words(sea: Seaway) -> str:

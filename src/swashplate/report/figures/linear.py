@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -16,7 +16,6 @@ from swashplate.report.style import (
     FAINT,
     GREY,
     LINE,
-    Stroke,
     dress,
     handle,
     label_below,
@@ -81,54 +80,28 @@ def plot_bode(
     words = f"{response.name}: {response.input} to {output}, sines about {response.bias:g} {unit}"
     figure, axes = sheet([2.3, 2.3, 1.3], words if title is None else title, legend=legend)
     shown = display_unit(UNITS[response.output], float(response.gain.max()))
-    _draw(axes, response, list(looks.values()), shown)
+    swept = shown.factor * response.gain, np.degrees(response.phase), 100.0 * response.distortion
+    marker = "o" if response.frequencies.size == 1 else None
+    for ax, rows in zip(axes, swept, strict=True):
+        for row, moves, look in zip(rows, response.moves, looks.values(), strict=True):
+            how: dict[str, Any] = {"color": look.color, "ls": look.dashes, "lw": LINE}
+            shown_row = np.where(moves, row, np.nan)
+            ax.plot(response.frequencies, shown_row, marker=marker, ms=4.0, **how)
     if linear is not None:
-        _draw_linear(axes, linear, response.frequencies, shown)
+        highest = np.inf if linear.sample_time is None else 0.5 / linear.sample_time
+        low, high = response.frequencies[0], response.frequencies[-1]
+        fine = np.geomspace(low, min(high, highest), 400)
+        ratio = linear.response(fine)[0]
+        small = (shown.factor * np.abs(ratio), np.degrees(np.unwrap(np.angle(ratio))))
+        for ax, row in zip(axes, small, strict=False):
+            ax.plot(fine, row, color=GREY, linestyle="dashed", linewidth=LINE, zorder=1.8)
     _scale(axes, response, shown)
     if mark is not None and response.frequencies[0] <= mark <= response.frequencies[-1]:
         for ax in axes:
             ax.axvline(mark, color=FAINT, linewidth=1.0, zorder=1.3)
-        write(
-            axes[0],
-            f"{mark:g} Hz",
-            (mark, 0.0),
-            (3.0, 3.0),
-            coords=("data", "axes fraction"),
-            color=GREY,
-            ha="left",
-            va="bottom",
-        )
+        place: dict[str, Any] = {"coords": ("data", "axes fraction"), "va": "bottom"}
+        write(axes[0], f"{mark:g} Hz", (mark, 0.0), (3.0, 3.0), color=GREY, **place)
     return figure
-
-
-def _draw(
-    axes: list[Axes], response: FrequencyResponse, looks: Sequence[Stroke], shown: DisplayUnit
-) -> None:
-    phase = np.degrees(response.phase)
-    values = (shown.factor * response.gain, phase, 100.0 * response.distortion)
-    few = response.frequencies.size == 1
-    for ax, rows in zip(axes, values, strict=True):
-        for row, moves, look in zip(rows, response.moves, looks, strict=True):
-            ax.plot(
-                response.frequencies,
-                np.where(moves, row, np.nan),
-                color=look.color,
-                linestyle=look.dashes,
-                linewidth=LINE,
-                marker="o" if few else None,
-                markersize=4.0,
-            )
-
-
-def _draw_linear(
-    axes: list[Axes], linear: LinearDrive, frequencies: Array, shown: DisplayUnit
-) -> None:
-    highest = np.inf if linear.sample_time is None else 0.5 / linear.sample_time
-    fine = np.geomspace(frequencies[0], min(frequencies[-1], highest), 400)
-    ratio = linear.response(fine)[0]
-    rows = (shown.factor * np.abs(ratio), np.degrees(np.unwrap(np.angle(ratio))))
-    for ax, row in zip(axes, rows, strict=False):
-        ax.plot(fine, row, color=GREY, linestyle="dashed", linewidth=LINE, zorder=1.8)
 
 
 def _scale(axes: list[Axes], response: FrequencyResponse, shown: DisplayUnit) -> None:

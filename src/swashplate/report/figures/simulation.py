@@ -33,7 +33,6 @@ from swashplate.report.style import (
     BLUE,
     INK,
     VERMILION,
-    Stroke,
     dress,
     handle,
     label_below,
@@ -295,47 +294,31 @@ def plot_comparison(simulations: Mapping[str, Simulation], *, title: str | None 
     legend = [handle(name, *look) for name, look in looks.items()]
     heights = [1.2, 2.6, 1.6] if len(simulations) > 1 else [1.2, 2.6]
     figure, axes = sheet(heights, words, legend=legend)
-    _commands(axes[0], simulations, looks)
-    dress(axes[1], speed.label("shaft speed"))
-    zero_line(axes[1])
-    for name, each in simulations.items():
-        color, dashes = looks[name]
-        draw(axes[1], each.time, speed.factor * each.shaft_speed, color, dashes=dashes)
+    volts = all(each.driven_by_voltage for each in simulations.values())
+    labels = ("voltage (V)" if volts else "current (A)", speed.label("shaft speed"))
+    for ax, label in zip(axes, (*labels, speed.label("difference")), strict=False):
+        dress(ax, label)
+        zero_line(ax)
+    (reference, first), *_ = simulations.items()
+    commands = [
+        each.current if each.voltage is None or not volts else each.voltage
+        for each in simulations.values()
+    ]
+    for (name, each), command in zip(simulations.items(), commands, strict=True):
+        (color, dashes), time = looks[name], each.time
+        if each is first:
+            draw(axes[0], time, command, INK, zorder=3.0)
+        elif not np.array_equal(commands[0], command):
+            draw(axes[0], time, command, color, dashes=dashes)
+        draw(axes[1], time, speed.factor * each.shaft_speed, color, dashes=dashes)
+        both = (first.time >= time[0]) & (first.time <= time[-1])
+        if each is not first and both.any():
+            at = first.time[both]
+            difference = each.at(at, "shaft_speed") - first.shaft_speed[both]
+            draw(axes[2], at, speed.factor * difference, color, dashes=dashes)
     if len(simulations) > 1:
-        dress(axes[2], speed.label("difference"))
-        _differences(axes[2], simulations, looks, speed.factor)
-    fit_time(axes[-1], *(simulation.time for simulation in simulations.values()))
+        said = f"speed less that of {reference}"
+        write(axes[2], said, (0.0, 1.0), color=looks[reference].color)
+    fit_time(axes[-1], *(each.time for each in simulations.values()))
     label_below(axes[-1], "time (s)")
     return figure
-
-
-def _commands(ax: Axes, simulations: Mapping[str, Simulation], looks: Mapping[str, Stroke]) -> None:
-    """The voltage, or the current where not all were driven by voltage."""
-    volts = all(simulation.driven_by_voltage for simulation in simulations.values())
-    dress(ax, "voltage (V)" if volts else "current (A)")
-    zero_line(ax)
-    first: Array | None = None
-    for name, simulation in simulations.items():
-        voltage = simulation.voltage if volts else None
-        command = simulation.current if voltage is None else voltage
-        if first is None:
-            first = command
-            draw(ax, simulation.time, command, INK, zorder=3.0)
-        elif not np.array_equal(first, command):
-            look = looks[name]
-            draw(ax, simulation.time, command, look.color, dashes=look.dashes)
-
-
-def _differences(
-    ax: Axes, simulations: Mapping[str, Simulation], looks: Mapping[str, Stroke], factor: float
-) -> None:
-    """Speeds less the first one's, where both records have samples."""
-    (reference, first), *others = simulations.items()
-    zero_line(ax)
-    write(ax, f"speed less that of {reference}", (0.0, 1.0), color=looks[reference].color)
-    for name, other in others:
-        both = (first.time >= other.time[0]) & (first.time <= other.time[-1])
-        time, (color, dashes) = first.time[both], looks[name]
-        if time.size:
-            difference = other.at(time, "shaft_speed") - first.shaft_speed[both]
-            draw(ax, time, factor * difference, color, dashes=dashes)

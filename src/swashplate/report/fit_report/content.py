@@ -17,14 +17,14 @@ from swashplate.drive import Drive
 from swashplate.errors import InputError
 from swashplate.identification import tables
 from swashplate.identification.assessment import Assessment, Judged, StageProfile, motion_of
+from swashplate.identification.drive_model import Parameters
 from swashplate.identification.fitting import Fit, StageFit
 from swashplate.identification.identifiability import Identifiability
 from swashplate.identification.resampling import CrossValidation
 from swashplate.identification.setup import ModelParameters
 from swashplate.identification.solving import StartResult
-from swashplate.identification.staging import Parameters
-from swashplate.identification.validation import RunQuality, pooled
-from swashplate.identification.verdict import Verdict, percent, starts_of, verdict
+from swashplate.identification.validation import RunQuality, percent
+from swashplate.identification.verdict import Verdict, starts_of, verdict
 from swashplate.parameters.parameter_set import ParameterSet
 from swashplate.report.fit_report import charts
 from swashplate.report.fit_report.live import can_run, live_page
@@ -100,7 +100,7 @@ def write_fit_report(found: Judged, path: str | Path, *, truth: ParameterSet | N
             _starts_section(starts_of(assessed)),
             _folds_section(found.folds, assessed),
             shared[2],
-            _verdict_section(found.verdict, assessed, runs, head["findings"]),
+            _verdict_section(found.verdict, head["findings"]),
             shared[3],
             _setup_section(found.campaign, fit.nominal, fit.setup.title, found.notes, fit.stages),
         ]
@@ -152,7 +152,7 @@ def write_validation_report(
     sections = [
         summary_section(found, campaign, known, (), runs, head["findings"]),
         *shared[:3],
-        _verdict_section(found, (), runs, head["findings"]),
+        _verdict_section(found, head["findings"]),
         shared[3],
         _setup_section(campaign, drive, "", notes, ()),
     ]
@@ -348,11 +348,8 @@ def _setup_section(
             made.add(key, words)
     blocks = [Block("table", made, "notes")]
     for each in stages:
-        bounds = tables.bounds_table(each)
         blocks.append(Block("heading", f"Stage {each.stage.name}", "h3"))
         blocks += listed_block(_stage_words(each))
-        summary = f"Bounds of {count(len(bounds.rows), 'parameter')}"
-        blocks.append(Block("details", [Block("table", bounds, "bounds")], summary))
     return Section("setup", "Configuration", blocks)
 
 
@@ -387,15 +384,9 @@ def _window(weight: object) -> str:
 # --- verdict --------------------------------------------------------------------------------------
 
 
-def _verdict_section(
-    judged: Verdict, assessments: Sequence[Assessment], runs: Sequence[ShownRun], findings: int
-) -> Section:
+def _verdict_section(judged: Verdict, findings: int) -> Section:
     """The judgements, what each rests on, and the criteria."""
-    measured = {
-        "Agreement": quality_sentences(_qualities(runs, "fit" if assessments else None)),
-        "Validation": quality_sentences(_qualities(runs, "validate")),
-    }
-    said = [(subject, "plain", words) for subject, words in measured.items()]
+    said: list[tuple[str, str, Sequence[str]]] = []
     said.append(("Remarks", "look", judged.sentences))
     said.append(("Not judged", "look", judged.not_judged))
     said.append(("Range of validity", "plain", (judged.validity,) if judged.validity else ()))
@@ -408,19 +399,6 @@ def _verdict_section(
         made = tables.criteria_table(judged)
         blocks += [Block("heading", made.title, "h3"), Block("table", made, "criteria")]
     return Section("verdict", "Verdict in detail", blocks)
-
-
-def quality_sentences(qualities: Sequence[RunQuality]) -> tuple[str, ...]:
-    """One sentence for each channel: fit %, and what must stand beside it."""
-    said = []
-    for name, found in pooled(qualities).items():
-        runs = [each.experiment for each in qualities if each.channel == name]
-        words = tables.measures_words(name, runs[0][name].unit, found)
-        said.append(
-            f"{words} over {count(len(runs), 'run')}, {count(found.samples, 'sample')}; "
-            f"{tables.conditions(runs, name)}."
-        )
-    return tuple(said)
 
 
 # --- what the data tell ---------------------------------------------------------------------------

@@ -15,15 +15,19 @@ from swashplate.campaign import Campaign
 from swashplate.drive import Drive
 from swashplate.errors import SwashplateError
 from swashplate.identification.assessment import Assessment
-from swashplate.identification.validation import Measures, RunQuality, pooled
+from swashplate.identification.validation import (
+    Measures,
+    RunQuality,
+    following,
+    percent,
+    pooled,
+    range_of,
+)
 from swashplate.identification.verdict import (
     CARRIES_OVER,
     POOR,
     Grade,
     Verdict,
-    following,
-    percent,
-    range_of,
     weak_unknowns,
 )
 from swashplate.parameters.rules import FULL_VOLTAGE

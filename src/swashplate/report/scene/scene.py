@@ -60,11 +60,10 @@ def write_scene(runs: CraneRun | Mapping[str, CraneRun], path: str | Path) -> No
         lstrip_blocks=True,
     )
     folder = files("swashplate.report.scene")
-    assumed = sum(each.status == "assumed" for each in first.crane.quantities.values())
     made = environment.get_template("scene.html").render(
         title=first.crane.title,
         names=list(named),
-        assumed=f"{assumed} of {len(first.crane.quantities)}" if assumed else "",
+        assumed=first.crane.assumed,
         data=_script(_content(named)),
         css=Markup(folder.joinpath("scene.css").read_text("utf-8")),
         js=Markup(folder.joinpath("scene.js").read_text("utf-8")),

@@ -98,7 +98,7 @@ def _summary(judgment: Judgment, remedies: list[Table]) -> Section:
         Block("figure", svg(plot_judgment(judgment)), "Swing of each variant in each seaway"),
         *_tables(*remedies),
     ]
-    if judgment.tried:
+    if judgment.tried and judgment.remedies:  # else the verdict says so
         shown.append(text(f"Tried, and not enough: {listed(judgment.tried)}.", "remark"))
     return Section("summary", "Summary", [*shown, *listed_block(rests)])
 
