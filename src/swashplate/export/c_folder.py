@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
+from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
@@ -34,6 +35,8 @@ from swashplate.tables import write_text
 
 Array = NDArray[np.float64]
 LONGEST_STEP = 1.0 / SOURCE_RATE
+FURTHER = ("main.c", "CMakeLists.txt", "README.md")
+"""Files of a folder beside the model's own."""
 
 
 def exported_drive(drive: Drive | None = None) -> Exported:
@@ -172,6 +175,18 @@ def content_of(
     return Content(exported, instance, values, name, title, packaged, references, words)
 
 
+def source_text(name: str) -> str:
+    """A text of the package's folder ``sources``."""
+    return (files("swashplate.export") / "sources" / name).read_text("utf-8")
+
+
+def filled(text: str, words: Mapping[str, str]) -> str:
+    """A text with words in the place of their names, ``@name@``."""
+    for name, word in words.items():
+        text = text.replace(f"@{name}@", word)
+    return text
+
+
 # --- a folder -------------------------------------------------------------------------------------
 
 
@@ -229,10 +244,8 @@ def c(
     }
     title = what.parameters.title if isinstance(what, Drive) else ""
     texts[f"{name}_values.h"] = _initialiser(exported, values, name, title)
-    for file, text in FILES.items():
-        for key, value in words.items():
-            text = text.replace(f"@{key}@", value)
-        texts[file] = text
+    for file in FURTHER:
+        texts[file] = filled(source_text(f"folder/{file}"), words)
     to = Path(folder)
     try:
         to.mkdir(parents=True, exist_ok=True)
@@ -258,73 +271,3 @@ def _initialiser(exported: Exported, values: Array, name: str, title: str) -> st
     for value, what in zip(values.tolist(), names, strict=True):
         lines.append(f"    {literal(value)}, /* {what} */")
     return "\n".join([*lines, "};", "", "#endif", ""])
-
-
-FILES: Mapping[str, str] = {
-    "main.c": """\
-/* An example: two seconds of a constant command, a line for every tenth of a second. */
-#include "@file@.h"
-#include "@name@_values.h"
-
-#include <stdio.h>
-
-static @type@ model; /* some kilobytes: better not on a small stack */
-
-int main(void)
-{
-    int status = @p@_init(&model, @name@_values, sizeof @name@_values / sizeof @name@_values[0]);
-    const long samples = (long)(2.0 / @p@_get_step(&model));
-    const long every = samples >= 20 ? samples / 20 : 1;
-    for (long n = 0; n <= samples && status == @P@_OK; n++) {
-        status = @p@_step(&model@commands@);
-        if (n % every == 0) {
-            printf("%8.4f %.9g\\n", (double)n * @p@_get_step(&model),
-                @p@_output(&model, @P@_@output@));
-        }
-    }
-    if (status != @P@_OK) {
-        fprintf(stderr, "%s\\n", @p@_sentence(status));
-    }
-    return status;
-}
-""",
-    "CMakeLists.txt": """\
-cmake_minimum_required(VERSION 3.10)
-project(@name@ C)
-if(NOT CMAKE_BUILD_TYPE)
-  set(CMAKE_BUILD_TYPE Release)
-endif()
-
-add_library(@file@ STATIC @file@.c)
-set_target_properties(@file@ PROPERTIES C_STANDARD 99 C_EXTENSIONS OFF)
-target_include_directories(@file@ PUBLIC ${CMAKE_CURRENT_SOURCE_DIR})
-if(MSVC)
-  target_compile_options(@file@ PRIVATE /fp:precise)
-else()
-  target_compile_options(@file@ PRIVATE -ffp-contract=off)
-  target_link_libraries(@file@ PUBLIC m)
-endif()
-
-add_executable(example main.c)
-target_link_libraries(example @file@)
-""",
-    "README.md": """\
-# @name@ in C
-
-C99 from the equations of swashplate: `@file@.h` has the interface and `@file@.c` the equations, one
-function for each; `@name@_values.h` has the values of @name@ at a step of @step@ s; `main.c` is an
-example.
-
-    cmake -B build && cmake --build build && build/example
-
-or, without CMake,
-
-    cc -std=c99 -O3 -ffp-contract=off main.c @file@.c -lm -o example
-
-Keep `-ffp-contract=off` (gcc and clang) or `/fp:precise` (MSVC): fused operations change the last
-digits. `-D@P@_LINE=64` shortens the delay line, and with it the
-state. There is no allocation, no global variable and no input or output: a copy of the struct is a
-copy of the state.
-""",
-}
-"""Further files of a folder, with names in place of ``@name@``."""

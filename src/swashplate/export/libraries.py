@@ -25,7 +25,14 @@ from swashplate.drive import Drive
 from swashplate.equations.c_source import Exported, interface
 from swashplate.equations.model import Model
 from swashplate.errors import FileError, InputError
-from swashplate.export.c_folder import LONGEST_STEP, Content, content_of, exported_drive
+from swashplate.export.c_folder import (
+    LONGEST_STEP,
+    Content,
+    content_of,
+    exported_drive,
+    filled,
+    source_text,
+)
 from swashplate.export.variables import DRIVE, References, c_header
 from swashplate.tables import write_bytes
 
@@ -33,8 +40,6 @@ NAME = "swashplate_drive"
 """Stem of every library: FMI's model identifier."""
 MANIFEST = "manifest.toml"
 WASM = "drive.wasm"
-
-
 SMALL = ("-Os", "-mllvm", "-inline-threshold=5")
 
 
@@ -95,12 +100,8 @@ FLAGS = (
 )
 WASM_FLAGS = ("-std=c11", "-Os", "-g0", "-ffp-contract=off", "-fno-ident", "-DNDEBUG")
 FMI_HEADERS = (
-    "fmi2FunctionTypes.h",
-    "fmi2Functions.h",
-    "fmi2TypesPlatform.h",
-    "fmi3FunctionTypes.h",
-    "fmi3Functions.h",
-    "fmi3PlatformTypes.h",
+    *(f"fmi2{name}.h" for name in ("FunctionTypes", "Functions", "TypesPlatform")),
+    *(f"fmi3{name}.h" for name in ("FunctionTypes", "Functions", "PlatformTypes")),
 )
 FMI_SOURCES = ("fmi.h", "fmi.c", "fmi2.c", "fmi3.c")
 
@@ -167,7 +168,7 @@ def _made(exported: Exported, references: References) -> Sources:
     texts = interface(exported)
     layout = int(digest(texts)[:16], 16)
     header = c_header(exported, layout, references)
-    own = {name: _source(name) for name in (*FMI_SOURCES, "wasm.c")}
+    own = {name: source_text(name) for name in (*FMI_SOURCES, "wasm.c")}
     return Sources({**texts, "variables.h": header, **own}, f"{exported.file}.c", layout)
 
 
@@ -177,26 +178,8 @@ def one_unit(made: Sources, fmi: str, identifier: str) -> str:
     Whatever is not of the standard's is static, and the standard's functions begin with the model's
     identifier unless the importer says otherwise, so that several can be linked into one program.
     """
-    n = fmi[0]
-    return f"""\
-/* The FMU as one unit, of which FMI's functions alone are seen outside. Their names begin with the
- * model's identifier, as the standard has it for source code; an importer that makes a shared
- * library defines FMI{n}_FUNCTION_PREFIX itself as nothing, or FMI{n}_OVERRIDE_FUNCTION_PREFIX. */
-#if !defined(FMI{n}_FUNCTION_PREFIX) && !defined(FMI{n}_OVERRIDE_FUNCTION_PREFIX)
-#define FMI{n}_FUNCTION_PREFIX {identifier}_
-#endif
-#define SWP_API static inline
-#define SWP_FMU_API static inline
-
-#include "{made.model}"
-#include "fmi.c"
-#include "fmi{n}.c"
-"""
-
-
-@cache
-def _source(name: str) -> str:
-    return (files("swashplate.export") / "sources" / name).read_text("utf-8")
+    words = {"n": fmi[0], "identifier": identifier, "model": made.model}
+    return filled(source_text("fmu.c"), words)
 
 
 # --- the package's libraries ----------------------------------------------------------------------

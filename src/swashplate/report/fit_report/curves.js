@@ -58,36 +58,43 @@ function ticks(low, high, most) {
 }
 
 /** Points of a line: of many rows in one column of dots the first, lowest, highest and last. */
-function path(panel, values, first, after, x, y) {
+function path(panel, values, first, after, [start, scale], y) {
   const { time, breaks, held } = panel;
-  const parts = [];
-  let [pen, row] = ["M", first];
+  let [made, pen, row] = ["", "M", first];
   const go = (at) => {
-    if (held && pen === "L") parts.push(`H${x(time[at]).toFixed(1)}`);
-    parts.push(`${pen}${x(time[at]).toFixed(1)} ${y(values[at]).toFixed(1)}`);
+    const across = ((time[at] - start) * scale).toFixed(1);
+    if (held && pen === "L") made += `H${across}`;
+    made += `${pen}${across} ${y(values[at]).toFixed(1)}`;
     pen = "L";
   };
   while (row < after) {
-    const column = Math.floor(x(time[row]));
+    // the instant at which the column ends: a comparison a row is all that many rows cost
+    const end = start + (Math.floor((time[row] - start) * scale) + 1) / scale;
     let [last, lowest, highest] = [row, row, row];
-    while (!breaks.has(last) && last + 1 < after && Math.floor(x(time[last + 1])) === column) {
+    while (last + 1 < after && time[last + 1] < end && !(breaks.size && breaks.has(last))) {
       last++;
       if (values[last] < values[lowest]) lowest = last;
       if (values[last] > values[highest]) highest = last;
     }
-    for (const at of [...new Set([row, lowest, highest, last])].sort((a, b) => a - b)) go(at);
+    const [one, two] = lowest < highest ? [lowest, highest] : [highest, lowest];
+    const alone = pen === "M" && last === row;
+    go(row);
+    if (one > row) go(one);
+    if (two > one && two < last) go(two);
+    if (last > Math.max(row, one)) go(last);
     if (breaks.has(last)) {
-      if (parts.at(-1)[0] === "M") parts.push("h.01");
+      if (alone) made += "h.01";
       pen = "M";
     }
     row = last + 1;
   }
-  return parts.join("");
+  return made;
 }
 
 function drawPanel(svg, panel, kind, label, top, height, width, [start, end]) {
   const inner = width - LEFT - RIGHT;
-  const x = (time) => ((time - start) / (end - start)) * inner;
+  const scale = inner / (end - start);
+  const x = (time) => (time - start) * scale;
   const first = Math.max(rowAt(panel.time, start) - 1, 0);
   const after = Math.min(rowAt(panel.time, end) + 1, panel.time.length);
   let [low, high] = kind === "overlay" ? [Infinity, -Infinity] : [0, 0];
@@ -111,7 +118,7 @@ function drawPanel(svg, panel, kind, label, top, height, width, [start, end]) {
     put(axis, "text", { x: -7, y: y(value) + 4, "text-anchor": "end" }, words);
   }
   for (const [value] of ticks(start, end, inner / 75)) put(box, "line", { class: "grid", x1: x(value), x2: x(value), y1: 0, y2: height });
-  for (const [name, values] of panel.lines) put(box, "path", { class: name, d: path(panel, values, first, after, x, y) });
+  for (const [name, values] of panel.lines) put(box, "path", { class: name, d: path(panel, values, first, after, [start, scale], y) });
   const lines = label.split("\n");
   lines.forEach((words, k) => {
     const across = -LEFT + 11 + 13 * k;

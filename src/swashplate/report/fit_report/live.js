@@ -166,12 +166,13 @@ class LiveFigure extends Figure {
     const { showing: run, now, before } = this;
     const none = new Set();
     const made = [[{ time: run.grid, breaks: none, lines: [["input", run.voltage]] }, "input", "command\n(V)"]];
-    const line = (each, found) => found.seen[each].map((value) => value * run.shown[each].factor);
+    // in the units that are shown, once for what stays: the run before, and all where the pointer reads
+    const line = (each, found) => ((found.lines ??= [])[each] ??= found.seen[each].map((value) => value * run.shown[each].factor));
     run.shown.forEach((each, k) => {
       const lines = [["before", line(k, before)], ["simulated", line(k, now)]];
       const own = { time: each.stamps ?? run.grid, breaks: each.breaks ?? none, ignored: each.ignored, shades: this.spans(each.shaded) };
       if (each.values) {
-        const measured = each.values.map((value) => value * each.factor);
+        const measured = (each.line ??= each.values.map((value) => value * each.factor));
         made.push([{ ...own, lines: [["measured", measured], ...lines] }, "overlay", each.label]);
         const residual = lines[1][1].map((value, row) => value - measured[row]);
         made.push([{ ...own, shades: [], lines: [["residual", residual]] }, "residual", each.residual]);
