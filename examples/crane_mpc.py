@@ -92,7 +92,7 @@ class Axis:
             l=np.concatenate([least * ones, -speed - coming[:, 4]]),
             u=np.concatenate([most * ones, speed - coming[:, 4]]),
         )
-        return float(np.clip(self.solver.solve().x[0], least, most))
+        return float(np.clip(self.solver.solve(raise_error=True).x[0], least, most))
 
 
 # %% [markdown]

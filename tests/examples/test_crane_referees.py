@@ -28,13 +28,14 @@ def test_mujocos_equations_lead_the_load_along_the_same_path(run_example):
 
 
 @pytest.mark.slow
-def test_predictive_control_swings_less_than_the_clip_and_within_its_step(run_example):
+def test_predictive_control_swings_least_and_within_its_step(run_example):
     pytest.importorskip("osqp", reason="the example needs osqp")
     printed = run_example("crane_mpc", "--seeds", "1", "--length", "80").printed
     swing = {
         name: [float(each) for each in re.findall(rf"{name} +([\d.]+) deg", printed)]
         for name in ("shaper", "clip", "predictive")
     }
-    assert swing["predictive"][1] < swing["clip"][1] < swing["shaper"][1]
+    # in the rougher sea, where the drives cannot follow
+    assert swing["predictive"][1] < min(swing["clip"][1], swing["shaper"][1])
     taken = [float(each) for each in re.findall(r"takes ([\d.]+) ms", printed)]
     assert max(taken) < 1000.0 * 100 / 512  # a step lasts 100 samples

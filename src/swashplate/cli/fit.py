@@ -65,7 +65,8 @@ MEASURES = (
 RESIDUALS = (
     "'own' is how long residuals stay correlated, 'input' their largest correlation with the "
     "command, at that lag (positive: after it). Residuals unrelated to the command stay "
-    "within the band at 95 % of the lags; * marks what lies beyond, as the largest may by chance."
+    "within the band at 95 % of the lags. * marks a model error: 0.5 and a third beyond the band, "
+    "as the largest of all lags by chance is not, or 0.9."
 )
 
 Loss = Literal["linear", "soft_l1", "huber", "cauchy", "arctan"]

@@ -71,10 +71,11 @@ function path(panel, values, first, after, [start, scale], y) {
     // the instant at which the column ends: a comparison a row is all that many rows cost
     const end = start + (Math.floor((time[row] - start) * scale) + 1) / scale;
     let [last, lowest, highest] = [row, row, row];
+    let [low, high] = [values[row], values[row]];
     while (last + 1 < after && time[last + 1] < end && !(breaks.size && breaks.has(last))) {
-      last++;
-      if (values[last] < values[lowest]) lowest = last;
-      if (values[last] > values[highest]) highest = last;
+      const value = values[++last];
+      if (value < low) [low, lowest] = [value, last];
+      else if (value > high) [high, highest] = [value, last];
     }
     const [one, two] = lowest < highest ? [lowest, highest] : [highest, lowest];
     const alone = pen === "M" && last === row;
@@ -90,6 +91,9 @@ function path(panel, values, first, after, [start, scale], y) {
   }
   return made;
 }
+
+/** Points of lines as they were drawn last: a slider leaves most of them where they were. */
+const drawn = new WeakMap();
 
 function drawPanel(svg, panel, kind, label, top, height, width, [start, end]) {
   const inner = width - LEFT - RIGHT;
@@ -118,7 +122,13 @@ function drawPanel(svg, panel, kind, label, top, height, width, [start, end]) {
     put(axis, "text", { x: -7, y: y(value) + 4, "text-anchor": "end" }, words);
   }
   for (const [value] of ticks(start, end, inner / 75)) put(box, "line", { class: "grid", x1: x(value), x2: x(value), y1: 0, y2: height });
-  for (const [name, values] of panel.lines) put(box, "path", { class: name, d: path(panel, values, first, after, [start, scale], y) });
+  const place = [width, height, start, end, low, high].join();
+  for (const [name, values] of panel.lines) {
+    const known = drawn.get(values);
+    const d = known?.place === place ? known.d : path(panel, values, first, after, [start, scale], y);
+    drawn.set(values, { place, d });
+    put(box, "path", { class: name, d });
+  }
   const lines = label.split("\n");
   lines.forEach((words, k) => {
     const across = -LEFT + 11 + 13 * k;

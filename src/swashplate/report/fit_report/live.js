@@ -146,16 +146,18 @@ class LiveFigure extends Figure {
 
   spans(shaded) {
     const { grid, step } = this.showing;
+    const { limits } = this.now;
+    const wanted = data.limits.filter(([, name]) => shaded.includes(name));
+    const from = new Map();
     const made = [];
-    for (const [bit, name] of data.limits) {
-      if (!shaded.includes(name)) continue;
-      let from = null;
-      for (let row = 0; row <= grid.length; row++) {
-        const acts = row < grid.length && this.now.limits[row] & bit;
-        if (acts && from === null) from = grid[row] - 0.5 * step;
-        if (!acts && from !== null) {
-          made.push([from, grid[row - 1] + 0.5 * step, name]);
-          from = null;
+    for (let row = 0; row <= grid.length; row++) {
+      const acting = row < grid.length ? limits[row] : 0;
+      if (row < grid.length && acting === (row ? limits[row - 1] : 0)) continue;
+      for (const [bit, name] of wanted) {
+        if (acting & bit && !from.has(name)) from.set(name, grid[row] - 0.5 * step);
+        else if (!(acting & bit) && from.has(name)) {
+          made.push([from.get(name), grid[row - 1] + 0.5 * step, name]);
+          from.delete(name);
         }
       }
     }
