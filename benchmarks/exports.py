@@ -139,7 +139,7 @@ def numbers(words: list[str]) -> list[float]:
 def export_rows() -> Iterator[Row]:
     """Steps, writing, slider."""
     drive = Drive.preset("hoist")
-    with TemporaryDirectory() as place:
+    with TemporaryDirectory(ignore_cleanup_errors=True) as place:  # a browser ends by and by
         folder = Path(place)
         a_step = 1e9 / SAMPLES
         found = a_step * min(native_step(drive, folder))

@@ -6,6 +6,7 @@ by the same lines as a single one.
 
 from collections.abc import Callable, Iterator, Mapping
 from functools import partial
+from itertools import count
 from math import isfinite, isinf, isnan
 from typing import Any
 
@@ -14,7 +15,7 @@ from numba.np.unsafe.ndarray import to_fixed_tuple
 from numpy.typing import NDArray
 
 from swashplate.equations.cache import kernel
-from swashplate.equations.equation import JIT_OFF
+from swashplate.equations.equation import JIT_OFF, inlined, interpreted
 from swashplate.errors import ParameterError
 from swashplate.models.channel import Channel, channel_level
 from swashplate.models.displacement_control import (
@@ -40,6 +41,10 @@ Broken = tuple[Mask, Callable[[int], str]]
 FULL_VOLTAGE = 10.0  # Largest command, either way. [V]
 VOLTAGES = np.linspace(0.0, FULL_VOLTAGE, 101)
 """Commands at which the static rules are checked. [V]"""
+FIRST = 3
+"""Single sets that a process checks in plain Python: commands that read one or two and simulate
+nothing need not wait for machine code to be loaded."""
+_alone = count()
 SIDES = ("plus", "minus")
 N_CHANNEL, N_PUMP = len(Channel._fields), len(Pump._fields)
 
@@ -230,8 +235,29 @@ def _static(numbers: Mapping[str, Array]) -> tuple[Array, Array]:
         axis=1,
     )
     lowest, moment = np.empty((size, 2)), np.empty((size, 2))
-    static_extremes(channels, pumps, VOLTAGES, lowest, moment)
+    if size == 1 and next(_alone) < FIRST:
+        pump, extremes = Pump(*pumps[0].tolist()), interpreted(_extremes)
+        for side in range(2):
+            channel = Channel(*channels[0, side].tolist())
+            lowest[0, side], moment[0, side] = extremes(channel, pump, side, VOLTAGES.tolist())
+    else:
+        static_extremes(channels, pumps, VOLTAGES, lowest, moment)
     return lowest, moment
+
+
+@inlined
+def _extremes(channel: Channel, pump: Pump, side: int, voltages: Array) -> tuple[float, float]:
+    """Lowest steady current [A] and largest |sin φ| of one side within some voltages."""
+    solenoids = solenoids_of(pump)
+    least, most = np.inf, 0.0
+    for voltage in voltages:
+        current = channel_level(voltage, channel)
+        force = solenoid_force(-current if side == 1 else current, solenoids)
+        sine = abs(moment_sine(force, pump))
+        # what is no number stays
+        least = current if current < least or current != current else least
+        most = sine if sine > most or sine != sine else most
+    return least, most
 
 
 @kernel
@@ -253,16 +279,6 @@ def static_extremes(
     """
     for i in range(pumps.shape[0]):
         pump = Pump(*tuple_of(pumps[i], N_PUMP))
-        solenoids = solenoids_of(pump)
         for side in range(2):
             channel = Channel(*tuple_of(channels[i, side], N_CHANNEL))
-            least, most = np.inf, 0.0
-            for voltage in voltages:
-                current = channel_level(voltage, channel)
-                force = solenoid_force(-current if side == 1 else current, solenoids)
-                sine = abs(moment_sine(force, pump))
-                # what is no number stays
-                least = current if current < least or current != current else least
-                most = sine if sine > most or sine != sine else most
-            lowest[i, side] = least
-            moment[i, side] = most
+            lowest[i, side], moment[i, side] = _extremes(channel, pump, side, voltages)
