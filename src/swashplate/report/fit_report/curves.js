@@ -54,7 +54,7 @@ function ticks(low, high, most) {
   for (let k = Math.ceil(low / step - 1e-9); k * step <= high + 1e-9 * step; k++) {
     made.push([k * step, (k * step).toFixed(Math.min(decimals, 12)).replace(/^-(?=0\.?0*$)/, "").replace("-", "−")]);
   }
-  return made;
+  return made.length < 3 && most < 10 ? ticks(low, high, 2 * most) : made;
 }
 
 /** Points of a line: of many rows in one column of dots the first, lowest, highest and last. */
