@@ -39,7 +39,7 @@ def test_a_drive_is_held_against_the_runs_that_were_held_back(
     assert rows["speed from counts"]["correlation_with_input"] == ""
 
 
-def test_a_correlation_beyond_its_band_is_marked(
+def test_a_correlation_that_is_a_model_error_is_marked(
     run: Callable[..., Result], held_out: Path
 ) -> None:
     """A drive of too low a gain misses the more the larger the command."""
@@ -49,7 +49,7 @@ def test_a_correlation_beyond_its_band_is_marked(
         table = said[said.index("Residuals: correlation") : said.index("'own' is how long")]
         rows = [line for line in table.splitlines() if line.startswith("hoist_step")]
         assert {"*" in row for row in rows if " current " in row} == marks
-        assert "* marks what lies beyond" in " ".join(said.split())
+        assert "* marks a model error" in " ".join(said.split())
 
 
 def test_a_drive_that_is_not_usable_ends_with_1(
