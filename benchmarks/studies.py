@@ -40,11 +40,11 @@ def fit_study_rows() -> Iterator[Row]:
             found = Judged(campaign, fit(nominal, runs, setup), runs)
             fitted.append(time.perf_counter() - begin)
             begin = time.perf_counter()
+            # what a stage says is computed where it is asked for; the verdict judges held-out runs
             assessed = found.assessments
             for each in assessed:
-                # what a stage says is computed where it is asked for
-                each.identifiability, each.uncertainty, each.runs  # noqa: B018
-            found.verdict  # noqa: B018  held-out runs, predicted and judged
+                _ = each.identifiability, each.uncertainty, each.runs
+            _ = found.verdict
             judged.append(time.perf_counter() - begin)
             begin = time.perf_counter()
             page = Path(folder) / "report.html"

@@ -39,7 +39,7 @@ def test_selection_and_drive(campaign_folder: Path) -> None:
     with pytest.raises(InputError, match="no axis 'boom'; it has winch"):
         tests.select(axis="boom")
     with pytest.raises(InputError, match="no role 'train': runs have fit, validate, ignore"):
-        tests.select(role="train")  # type: ignore[arg-type]
+        tests.select(role="train")
     assert tests[0] is tests.experiments[0]
     with pytest.raises(InputError, match="no channel 'speed'; it has current, counts"):
         tests["up"]["speed"]

@@ -37,7 +37,7 @@ def write(folder: Path, name: str, **columns: np.ndarray | list[str]) -> Path:
 
 def drafted(folder: Path, *logs: Path, **options: object) -> Campaign:
     """What the draft of some logs is read as."""
-    text = draft_campaign(logs, folder, **options)  # type: ignore[arg-type]
+    text = draft_campaign(logs, folder, **options)
     (folder / "campaign.toml").write_text(text, "utf-8")
     return Campaign.from_toml(folder / "campaign.toml")
 

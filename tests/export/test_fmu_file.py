@@ -388,7 +388,7 @@ def test_clang_finds_nothing_to_warn_of(tmp_path):
     """Of the model, and of both standards' functions around it; gcc is asked by other tests."""
     libraries.written(libraries.sources().texts, tmp_path)
     headers = Path(fmpy.__file__).parent / "c-code"
-    flags = "-std=c99 -O2 -Wall -Wextra -Wconversion -pedantic -Werror -c".split()  # noqa: SIM905
+    flags = ("-std=c99", "-O2", "-Wall", "-Wextra", "-Wconversion", "-pedantic", "-Werror", "-c")
     for name in ("swashplate_drive.c", "fmi.c", "fmi2.c", "fmi3.c"):
         words = [sys.executable, "-m", "ziglang", "cc", *flags, "-isystem", headers, name]
         done = subprocess.run(words, cwd=tmp_path, capture_output=True, text=True, check=False)

@@ -211,7 +211,7 @@ def test_a_parameter_changed_on_the_way_is_a_stepper_that_goes_on(
     for voltage in COMMAND[:600].tolist():
         stepper.step(voltage)
         assert model.step(voltage) == OK
-    after = hoist.replace(**changes).stepper(interpolation="previous")  # type: ignore[arg-type]
+    after = hoist.replace(**changes).stepper(interpolation="previous")
     for name, value in changes.items():
         assert model.set(model.number("", name), value) == OK
     after.state = stepper.state
@@ -244,7 +244,7 @@ def test_options_and_step_set_are_those_of_another_drive(hoist: Drive, in_c: Any
         number = model.number("_option", option)
         assert model.set_option(number, True) == OK
         assert model.get_option(number)
-        parameters = replace(parameters, **form)  # type: ignore[arg-type]
+        parameters = replace(parameters, **form)
     assert model.set_step(0.001) == OK
     wanted = in_c(Drive(parameters), 0.001)
     one, two = model.run(COMMAND, NAMES), wanted.run(COMMAND, NAMES)
@@ -320,7 +320,7 @@ def test_feedthrough_is_what_a_jump_of_an_input_moves_at_once(
     in_c: Any, changes: dict[str, float]
 ) -> None:
     """Of the form that is exported: what moves is declared, and what is declared can move."""
-    drive = Drive.preset("hoist").replace(**changes)  # type: ignore[arg-type]
+    drive = Drive.preset("hoist").replace(**changes)
     content = content_of(drive, H)
     said = feedthrough(content.exported, content.instance, H)
     jumps = {"load_torque": 3e4, "pump_speed": 1.2, "supply_pressure": 1.2e7}

@@ -303,7 +303,7 @@ def test_a_folder_of_c_compiles_and_runs(compiled: Any, hoist: Drive, tmp_path: 
         (hoist, {}, hoist.steady_speed(9.0)),
         (valve, {"step": 0.01, "parameters": P, "given": STROKE}, None),
     ):
-        files = c(what, tmp_path / what.name, **numbers)  # type: ignore[arg-type]
+        files = c(what, tmp_path / what.name, **numbers)
         sources = {file.name: file.read_text("utf-8") for file in files}
         assert {"main.c", "CMakeLists.txt", "README.md", f"{what.name}_values.h"} <= set(sources)
         program = compiled(sources, program="example")

@@ -115,7 +115,7 @@ def compared(
     """Every output and limit of a run, in C and in Python; constants `anew` in C, or from there."""
     drive, command = case.drive(), case.command()
     inputs = case.inputs(command.size)
-    run = drive.simulate(command, case.rate, interpolation="previous", start=case.start, **inputs)  # type: ignore[arg-type]
+    run = drive.simulate(command, case.rate, interpolation="previous", start=case.start, **inputs)
     model = made(drive, 1.0 / case.rate, library)
     if anew:
         assert model.set_step(0.5 * model.get_step()) == 0
@@ -187,7 +187,7 @@ def test_another_library_of_functions_gives_the_same_to_1e_12(
     assert page.call("update") == 0
     places = [content.exported.names.index(name) for name in SIZES]
     found = page.run([command], H, places, int(start == "steady"))
-    run = drive.simulate(command, interpolation="previous", start=start)  # type: ignore[arg-type]
+    run = drive.simulate(command, interpolation="previous", start=start)
     for (name, size), values in zip(SIZES.items(), found, strict=True):
         wanted = getattr(run, name)
         assert np.ptp(wanted) > 0.1 * size

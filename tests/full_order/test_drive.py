@@ -202,7 +202,7 @@ def test_table(marched: FullOrderSimulation, tmp_path: Path) -> None:
 
 def test_wrong_options_are_sentences(hoist: FullOrderDrive, step: np.ndarray) -> None:
     with pytest.raises(InputError, match="start is 'warm'"):
-        hoist.simulate_current([0.1, 0.1], start="warm")  # type: ignore[arg-type]
+        hoist.simulate_current([0.1, 0.1], start="warm")
     with pytest.raises(DomainError, match="more than 20000; take a larger mass"):
         hoist.replace(oil_volume=1e-16).simulate(step)
     with pytest.raises(InputError, match="substeps is 5, but .* needs at least 6 to be stable"):

@@ -306,7 +306,7 @@ def test_runs_driven_by_a_current_are_counted() -> None:
 
 def looked(free: Mapping[str, Free], *runs: Experiment, **more: object) -> Outlook:
     return outlook(
-        Stage(name="pump", part="pump", free=free, **more),  # type: ignore[arg-type]
+        Stage(name="pump", part="pump", free=free, **more),
         HOIST.parameters,
         runs,
     )

@@ -167,7 +167,7 @@ def test_a_scale_that_is_off_is_named_with_the_fixed_value_that_looks_like_it(
     # 3 % more counts are a shaft that is 3 % faster
     faster = Drive.preset("slew").scale(Z10=1.03)
     change = {"drive": faster} if name == "counts" else {"logs": off}
-    assessments, found = fitted(tmp_path, **change)  # type: ignore[arg-type]
+    assessments, found = fitted(tmp_path, **change)
     assert found.grade == "Usable for prediction", found.headline
     assert f"{said} by +" in found.headline
     fault = lack_of_fit(assessments).fault(f"scale of {name}")

@@ -69,7 +69,7 @@ def test_a_nonlinear_model_agrees_with_a_root_search() -> None:
     time, measured, minimise = nonlinear()
     best = least_squares(lambda v: v[0] * np.exp(-v[1] * time) - measured, [1.0, 1.0])
     limit = 2.0 * best.cost / 38.0
-    found = profile(minimise, best.x, best.cost, 1, limit, 0.1)  # type: ignore[arg-type]
+    found = profile(minimise, best.x, best.cost, 1, limit, 0.1)
 
     def over(rate: float) -> float:
         shape = np.exp(-rate * time)

@@ -34,7 +34,7 @@ def step(**more: object) -> ComparedRun:
         "name": "hoistr6", "kind": "step", "quantity": "shaft_speed", "time": TIME,
         "command": command, "measured": measured, "simulated": simulated,
     }  # fmt: skip
-    return ComparedRun(**{**fields, **more})  # type: ignore[arg-type]
+    return ComparedRun(**{**fields, **more})
 
 
 def sine(frequency: float = 0.1, quantity: str = "shaft_speed", **more: object) -> ComparedRun:
@@ -44,7 +44,7 @@ def sine(frequency: float = 0.1, quantity: str = "shaft_speed", **more: object) 
         "command": 4.0 * np.sin(turn), "measured": 50.0 * np.sin(turn),
         "simulated": 55.0 * np.sin(turn), "frequency": frequency,
     }  # fmt: skip
-    return ComparedRun(**{**fields, **more})  # type: ignore[arg-type]
+    return ComparedRun(**{**fields, **more})
 
 
 def percent(table: ErrorTable) -> dict[str, float | None]:

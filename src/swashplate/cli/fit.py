@@ -111,7 +111,6 @@ def fit(
       out DIR: Folder for the fitted drive and its tables.
       joint: After the stages, estimate all parameters at once, through the whole drive.
       starts: More starts, spread over the bounds.
-      evaluations: Evaluations of the model that a search may take.
       folds: Cross-validate over so many parts of the runs; 0 = off.
       bootstrap: Fit again to so many draws of the noise.
       profile NAME: Profile the cost along this parameter, or 'all'; may be repeated.

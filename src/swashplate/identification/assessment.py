@@ -6,7 +6,7 @@ import platform
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from datetime import date
-from functools import cached_property
+from functools import cached_property, partial
 from hashlib import blake2b
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
@@ -365,11 +365,16 @@ def judge_fit(
             each,
             None if every else [name for name in wanted.profiles if name in own],
             executor=wanted.executor,
-            watch=lambda done, stage=stage: watch(f"{stage}: {done} profiles"),  # type: ignore[misc]
+            watch=partial(_profiled, watch, stage),
         )
         profiles += [StageProfile(stage, one) for one in found.values()]
     notes = {**versions(), "seed": str(wanted.seed), "campaign": str(campaign.path)}
     return Judged(campaign, result, runs, bootstraps, profiles, folds, notes, wanted.required)
+
+
+def _profiled(watch: Callable[[str], None], stage: str, done: int) -> None:
+    """Say how many parameters of a stage are profiled."""
+    watch(f"{stage}: {done} profiles")
 
 
 def versions() -> dict[str, str]:
