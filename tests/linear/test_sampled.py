@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from swashplate import DomainError, Drive, InputError
-from swashplate.linear import DeadZoneError, LinearDrive
+from swashplate.linear import LinearDrive
 
 FRICTION = {"spool_friction": 0.115, "spool_presliding": 5e-5}
 LINE = {"line_stiffness": 1e6, "load_inertia": 5e3, "motor_leakage": 1e-6, "load_torque": 3e4}
@@ -193,7 +193,7 @@ def test_the_line_s_resonance(hoist: Drive) -> None:
 def test_where_friction_or_hysteresis_holds(hoist: Drive) -> None:
     lagging = hoist.replace(solenoid_hysteresis=0.008)
     for where in ({"at": 4.0}, {"current": 0.45}):
-        with pytest.raises(DeadZoneError, match="the solenoids' hysteresis of ±0.008 A"):
+        with pytest.raises(DomainError, match="the solenoids' hysteresis of ±0.008 A"):
             lagging.linearize(**where)
     force = lagging.linearize(4.0, input="solenoid_force")
     assert force.gain == hoist.linearize(4.0, input="solenoid_force").gain
