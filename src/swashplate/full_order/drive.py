@@ -212,8 +212,7 @@ class FullOrderDrive:
         ParameterError
             For an unknown name, or if lumps contradict each other or a choice.
         """
-        title = drive.parameters.title
-        return cls(drive, from_lumped(drive.parameters, like, title=title, **chosen))
+        return cls(drive, from_lumped(drive.parameters, like, **chosen))
 
     def replace(self, **changes: Change) -> FullOrderDrive:
         """With other physical values in SI, e.g. ``replace(load_torque=2e3)``."""

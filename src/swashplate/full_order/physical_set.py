@@ -266,9 +266,6 @@ def chosen_over(
 def from_lumped(
     lumped: ParameterSet | HasParameters,
     like: str | None = None,
-    *,
-    name: str | None = None,
-    title: str = "",
     **chosen: Change | Parameter,
 ) -> PhysicalSet:
     """Complete a physical set from lumped parameters and a few chosen values.
@@ -280,8 +277,6 @@ def from_lumped(
     like : str, optional
         Packaged set whose assumed values count where nothing is chosen; by default see
         `nearest_set`.
-    name, title : str, optional
-        Of the set; by default the parameters' name.
     **chosen : float, (float, float) or Parameter
         Chosen values in SI: those that packaged sets assume, or any other quantity: an inertia or
         damping in place of a frequency or damping ratio, or one that follows from the lumps, which
@@ -290,7 +285,7 @@ def from_lumped(
     Returns
     -------
     PhysicalSet
-        Everything but what the user chose is marked as assumed.
+        Of the parameters' name; everything but what the user chose is marked as assumed.
 
     Raises
     ------
@@ -298,7 +293,7 @@ def from_lumped(
         If lumps contradict each other or a chosen value; the sentence names them.
     """
     parameters = set_of(lumped)
-    owner = parameters.name if name is None else name
+    owner = parameters.name
     assumed = _entries(_packaged(nearest_set(parameters.name) if like is None else like))
     given = chosen_over(assumed, chosen)
     for made_from, choice in IN_PLACE_OF.items():
@@ -319,7 +314,7 @@ def from_lumped(
                     f"{owner}: {column} is given as {value:.9g} {entry.unit}, but "
                     f"{expected:.9g} follows {made.source}; leave it out or change one of these."
                 )
-    return PhysicalSet(owner, title, found)
+    return PhysicalSet(owner, parameters.title, found)
 
 
 def _completed(
@@ -447,7 +442,8 @@ def _set_of(contents: PhysicalFile, origin: str) -> PhysicalSet:
         entries = _entries(contents)
         if contents.lumps is None:
             return PhysicalSet(name, title, entries)
-        return from_lumped(load_parameters(contents.lumps), name=name, title=title, **entries)
+        made = from_lumped(load_parameters(contents.lumps), None, **entries)
+        return replace(made, name=name, title=title)
     except (ParameterError, InputError) as error:
         raise ParameterError(f"{origin}: {error}") from None
 

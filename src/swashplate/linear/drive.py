@@ -333,7 +333,7 @@ def _matrices(
     if not isfinite(p.dither_time):
         del names["pump.deflection"]  # without dither nothing is left of it
     names |= {each: each for each in memory}
-    moving = B.any(axis=1)
+    moving = np.asarray(B.any(axis=1))
     moving[states.index("pump.pressure")] = True
     for _ in states:
         moving |= A[:, moving].any(axis=1)

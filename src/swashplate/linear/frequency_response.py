@@ -6,7 +6,7 @@ The drive is marched over whole cycles of each frequency until it repeats itself
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import ceil
+from math import ceil, sqrt
 from typing import TYPE_CHECKING, Literal, get_args
 
 import numpy as np
@@ -209,18 +209,19 @@ def _cycles(
     started = instance.start({input: float(record[0])}, step, "steady")
     seen, _ = output_of(instance.model, output)
     (signal,) = marched(instance, {input: record}, step, started, (seen,), input)
-    return signal.reshape(-1, steps)
+    return np.asarray(signal.reshape(-1, steps))
 
 
 def _size(pump: Pump, output: str) -> float:
     """Natural size of a signal, beside which rounding is told from motion."""
-    return {
+    sizes = {
         "shaft_speed": pump.Z10,
         "stroker_pressure": 1.0 / pump.Z1,
         "spool_position": pump.Z5,
         "orifice_opening": pump.Z5,
-        "solenoid_force": pump.Z4**0.5 / pump.Z5,
-    }.get(output, 1.0)
+        "solenoid_force": sqrt(pump.Z4) / pump.Z5,
+    }
+    return sizes.get(output, 1.0)
 
 
 def _harmonic(signal: Array, size: float) -> tuple[complex, float, float]:

@@ -183,7 +183,7 @@ def parameter_of(definition: Definition, entry: Entry) -> Parameter:
     if len(numbers) == 2 and not definition.directional:
         raise ParameterError(f"{what} has one value, not a plus and a minus one.")
     change = numbers if len(numbers) == 2 else numbers[0]
-    value = value_of(definition.symbol, definition, change)  # type: ignore[arg-type]
+    value = value_of(definition.symbol, definition, change)
     return Parameter(definition, value, entry.source, entry.status, bounds or None)  # type: ignore[arg-type]
 
 
@@ -226,5 +226,5 @@ def written(what: str, head: Mapping[str, object], parameters: Mapping[str, Para
             entry.append("bounds", list(each.own_bounds))
         blocks.setdefault(each.definition.block, {})[symbol] = entry
     for name, value in {"format": 1, **head, **blocks}.items():
-        text.add(name, value)  # type: ignore[arg-type]
+        text.add(name, value)
     return dumps(text)
