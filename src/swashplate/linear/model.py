@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from functools import cached_property
-from math import inf, log, pi
+from math import copysign, inf, log, pi
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
@@ -150,9 +150,6 @@ class LinearModel:
 
     # --- loops ------------------------------------------------------------------------------------
 
-    def _first(self, frequency: Array) -> ComplexArray:
-        return np.asarray(self.response(frequency)[0])
-
     def _fastest(self) -> float:
         """Frequency far beyond all poles, or half the rate of a sampled model. [Hz]"""
         if not self.is_stable:
@@ -164,15 +161,15 @@ class LinearModel:
             return 0.5 / self.sample_time
         return 1e3 * float(np.abs(self.poles).max())
 
-    def _following(self) -> Array:
-        """Frequencies to look at, of an output that follows a steady input. [Hz]"""
-        grid = _grid(self._fastest())
-        if abs(self.gain) <= 1e-9 * float(np.abs(self._first(grid)).max()):
+    def _size(self, grid: Array) -> float:
+        """Magnitude of the steady gain, of an output that follows a steady input."""
+        size = abs(self.gain)
+        if size <= 1e-9 * float(np.abs(self.response(grid)[0]).max()):
             raise DomainError(
                 "The output does not follow a steady input (its gain is 0), so it has neither a "
                 "bandwidth nor a largest gain; ask for another output."
             )
-        return grid
+        return size
 
     @property
     def bandwidth(self) -> float:
@@ -180,8 +177,9 @@ class LinearModel:
 
         Infinite where it never does, below half the rate of a sampled model.
         """
-        level = abs(self.gain) / np.sqrt(2.0)
-        falls = _roots(lambda f: np.abs(self._first(f)) - level, self._following())
+        grid = _grid(self._fastest())
+        level = self._size(grid) / np.sqrt(2.0)
+        falls = _roots(lambda f: np.abs(self.response(f)[0]) - level, grid)
         return falls[0] if falls else inf
 
     @property
@@ -190,9 +188,8 @@ class LinearModel:
 
         In the input's unit by the output's, positive; infinite where none does.
         """
-        grid = self._following()
-        way = -1.0 if self.gain < 0.0 else 1.0
-        return _gain_margin(lambda f: way * self._first(f), grid)
+        small = 1e-6 / self._size(_grid(self._fastest()))
+        return small * self.margins(copysign(small, self.gain)).gain_margin
 
     def margins(self, controller: float | Response) -> LoopMargins:
         """Margins of the loop u = K (r - y) closed over the first output.
@@ -209,7 +206,7 @@ class LinearModel:
 
         def loop(frequency: Array) -> ComplexArray:
             factor = controller(frequency) if callable(controller) else controller
-            return np.asarray(factor * self._first(frequency))
+            return np.asarray(factor * self.response(frequency)[0])
 
         return loop_margins(loop, self.delay, self._fastest(), self.name)
 
@@ -410,21 +407,17 @@ def loop_margins(loop: Response, delay: float, fastest: float, name: str) -> Loo
         phase = (float(np.angle(loop(np.array([frequency]))[0])) + pi) % (2.0 * pi)
         margins.append((phase / (2.0 * pi * frequency), frequency, phase))
     delay_margin, crossover, phase = min(margins)
-    return LoopMargins(crossover, phase, delay_margin, _gain_margin(loop, grid))
+    # where L crosses the negative real axis farthest out
+    turns = _roots(lambda f: loop(f).imag, grid, values.real < 0.0)
+    sizes = [abs(loop(np.array([frequency]))[0]) for frequency in turns]
+    if values[-1].real < 0.0 and abs(values[-1].imag) <= 1e-9 * abs(values[-1]):
+        sizes.append(abs(values[-1]))  # half the rate of a sampled model
+    gain_margin = float(1.0 / max(sizes)) if sizes else inf
+    return LoopMargins(crossover, phase, delay_margin, gain_margin)
 
 
 def _grid(fastest: float) -> Array:
     return np.asarray(np.geomspace(fastest * 10.0**-DECADES, fastest, POINTS))
-
-
-def _gain_margin(response: Response, grid: Array) -> float:
-    """1/|G| where a response crosses the negative real axis farthest out, infinite if nowhere."""
-    values = response(grid)
-    turns = _roots(lambda f: response(f).imag, grid, values.real < 0.0)
-    found = [abs(response(np.array([frequency]))[0]) for frequency in turns]
-    if values[-1].real < 0.0 and abs(values[-1].imag) <= 1e-9 * abs(values[-1]):
-        found.append(abs(values[-1]))  # half the rate of a sampled model
-    return float(1.0 / max(found)) if found else inf
 
 
 def _roots(
