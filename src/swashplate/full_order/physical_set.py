@@ -1,7 +1,7 @@
 """Physical sets: arms, springs, masses, areas, oil and load of one machine, always valid.
 
 The quantities are those that `swashplate.models.machine.Machine` declares. A set is given whole, or
-completed from lumped parameters and a few chosen values; TOML files have either.
+completed from lumped parameters and a few chosen values.
 """
 
 from __future__ import annotations
@@ -12,19 +12,18 @@ from difflib import get_close_matches
 from functools import cache
 from importlib.resources import files
 from math import pi, sqrt
-from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
 
-from swashplate.documents import parse_toml, read_text, validated
+from swashplate.documents import parse_toml, validated
 from swashplate.equations.equation import interpreted
 from swashplate.equations.fields import Flag, declared_by
-from swashplate.errors import InputError, ParameterError
+from swashplate.errors import ParameterError
 from swashplate.models import machine as equations
 from swashplate.models.machine import Machine
 from swashplate.parameters.definitions import Definition, definition_of
-from swashplate.parameters.files import AXES, Entry, FilePart, parameter_of, written
+from swashplate.parameters.files import AXES, Entry, FilePart, parameter_of
 from swashplate.parameters.files import load_preset as load_parameters
 from swashplate.parameters.parameter_set import (
     Change,
@@ -38,7 +37,7 @@ from swashplate.parameters.parameter_set import (
     value_of,
 )
 from swashplate.parameters.rules import Broken, Rule, applied, range_rule, refuse
-from swashplate.tables import Column, Table, write_text
+from swashplate.tables import Column, Table
 from swashplate.units import chosen_unit, unit_text
 
 QUANTITIES: Mapping[str, Definition] = {
@@ -115,21 +114,8 @@ class PhysicalSet(Entries):
     @classmethod
     def preset(cls, name: str) -> PhysicalSet:
         """An assumed set of one of Kruse's axes: ``"hoist"``, ``"slew"``, ``"luff"``."""
-        return _set_of(_packaged(name), f"{name}.toml")
-
-    @classmethod
-    def from_toml(cls, path: str | Path) -> PhysicalSet:
-        """A set from a file; a `ParameterError` names file, quantity and rule."""
-        origin = str(path)
-        return _set_of(validated(parse_toml(read_text(path), origin), PhysicalFile, origin), origin)
-
-    def to_toml(self, path: str | Path) -> None:
-        """Store all quantities; `from_toml` gives an equal set back.
-
-        If the file cannot be written (`FileError`), an older one stays as it was.
-        """
-        head = {"name": self.name, "title": self.title}
-        write_text(written("physical set", head, self), path)
+        title, _ = _assumed(name)
+        return replace(from_lumped(load_parameters(name), name), title=title)
 
     @property
     def machine(self) -> Machine:
@@ -294,7 +280,7 @@ def from_lumped(
     """
     parameters = set_of(lumped)
     owner = parameters.name
-    assumed = _entries(_packaged(nearest_set(parameters.name) if like is None else like))
+    _, assumed = _assumed(nearest_set(parameters.name) if like is None else like)
     given = chosen_over(assumed, chosen)
     for made_from, choice in IN_PLACE_OF.items():
         if made_from in given and choice in given:
@@ -408,52 +394,37 @@ def _motor_leakage(owner: str, Z: Mapping[str, float], n: Mapping[str, float]) -
     return leakages[0] if leakages else 0.0
 
 
-# --- files ----------------------------------------------------------------------------------------
+# --- packaged sets --------------------------------------------------------------------------------
 
 
 class PhysicalFile(FilePart):
-    """A physical set; with `lumps`, what is not given follows from a packaged parameter set."""
+    """What a packaged set assumes; the rest follows from the parameter set of its name."""
 
-    format: Literal[1] = 1
+    format: Literal[1]
     name: str
-    title: str = ""
-    lumps: str | None = None
+    title: str
     physical: dict[str, Entry]
 
 
 @cache
-def _packaged(name: str) -> PhysicalFile:
+def _assumed(name: str) -> tuple[str, Mapping[str, Parameter]]:
+    """Title of a packaged set, and the values that it assumes."""
     if name not in AXES:
         raise ParameterError(
             f"There is no packaged physical set '{name}'; there are {', '.join(AXES)}."
         )
     text = files("swashplate.full_order").joinpath("sets", f"{name}.toml").read_text("utf-8")
-    return validated(parse_toml(text, f"{name}.toml"), PhysicalFile, f"{name}.toml")
+    contents = validated(parse_toml(text, f"{name}.toml"), PhysicalFile, f"{name}.toml")
+    entries = {
+        name: parameter_of(chosen_quantity(name), entry)
+        for name, entry in contents.physical.items()
+    }
+    return contents.title, entries
 
 
 def nearest_set(name: str) -> str:
     """Name of the packaged set that a drive of this name is taken to be like: its own, or hoist."""
     return name if name in AXES else AXES[0]
-
-
-def _set_of(contents: PhysicalFile, origin: str) -> PhysicalSet:
-    name, title = contents.name, contents.title
-    try:
-        entries = _entries(contents)
-        if contents.lumps is None:
-            return PhysicalSet(name, title, entries)
-        made = from_lumped(load_parameters(contents.lumps), None, **entries)
-        return replace(made, name=name, title=title)
-    except (ParameterError, InputError) as error:
-        raise ParameterError(f"{origin}: {error}") from None
-
-
-def _entries(contents: PhysicalFile) -> dict[str, Parameter]:
-    known = quantity_of if contents.lumps is None else chosen_quantity
-    for name, entry in contents.physical.items():
-        if entry.bounds is not None:
-            raise ParameterError(f"{name} has bounds; leave them out, a fit is given its own.")
-    return {name: parameter_of(known(name), entry) for name, entry in contents.physical.items()}
 
 
 # --- for people -----------------------------------------------------------------------------------
@@ -473,7 +444,7 @@ def choices_table(axis: str, given: Mapping[str, Change]) -> Table:
     """What a physical set is completed from: assumed values, and given ones, counted."""
     columns = (Column("Physical value"), Column("", "s"), Column(""), Column(""))
     made = Table("What the drive's parameters do not say", columns)
-    entries = chosen_over(_entries(_packaged(axis)), given)
+    entries = chosen_over(_assumed(axis)[1], given)
     for name, entry in entries.items():
         unit, factor = SHOWN.get(entry.unit, (unit_text(entry.unit), 1.0))
         if chosen_unit(entry.unit).factor != 1.0:

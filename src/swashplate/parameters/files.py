@@ -192,6 +192,8 @@ def parameter_of(definition: Definition, entry: Entry) -> Parameter:
 
 def dump_set(parameters: ParameterSet) -> str:
     """A parameter set as TOML text that `read_set` turns back into an equal set."""
+    from tomlkit import comment, document, dumps, inline_table
+
     options: dict[str, object] = {
         name: getattr(parameters, name) for name in ("pressure_root", "coulomb_sign", "card_switch")
     }
@@ -203,21 +205,10 @@ def dump_set(parameters: ParameterSet) -> str:
         options["equations"] = [each.places for each in parameters.equations]
     if parameters.motion != "shaft":
         options["motion"] = parameters.motion
-    head = {"name": parameters.name, "title": parameters.title, "card": parameters.card}
-    return written("parameter set", head | {"model": options}, parameters)
-
-
-def written(what: str, head: Mapping[str, object], parameters: Mapping[str, Parameter]) -> str:
-    """TOML text of a file's first entries and of parameters, a table for each block."""
-    from tomlkit import comment, document, dumps, inline_table
-
-    text = document()
-    text.add(comment(f"swashplate {what}; SI units; [plus, minus] as magnitudes"))
-    blocks: dict[str, dict[str, object]] = {}
+    blocks: dict[str, dict[str, object]] = {"model": options}
     for symbol, each in parameters.items():
         entry = inline_table()
-        pair = isinstance(each.value, Pair)
-        entry.append("value", list(each.values) if pair else each.value)
+        entry.append("value", list(each.values) if isinstance(each.value, Pair) else each.value)
         entry.append("unit", each.unit)
         if each.source:
             entry.append("source", each.source)
@@ -225,6 +216,11 @@ def written(what: str, head: Mapping[str, object], parameters: Mapping[str, Para
         if each.own_bounds is not None:
             entry.append("bounds", list(each.own_bounds))
         blocks.setdefault(each.definition.block, {})[symbol] = entry
-    for name, value in {"format": 1, **head, **blocks}.items():
-        text.add(name, value)
+    text = document()
+    text.add(comment("swashplate parameter set; SI units; [plus, minus] as magnitudes"))
+    text.add("format", 1)
+    for name in ("name", "title", "card"):
+        text.add(name, getattr(parameters, name))
+    for block, entries in blocks.items():
+        text.add(block, entries)  # type: ignore[arg-type]
     return dumps(text)
