@@ -222,5 +222,5 @@ def dump_set(parameters: ParameterSet) -> str:
     for name in ("name", "title", "card"):
         text.add(name, getattr(parameters, name))
     for block, entries in blocks.items():
-        text.add(block, entries)  # type: ignore[arg-type]
+        text.add(block, entries)
     return dumps(text)
