@@ -135,11 +135,13 @@ class Sampler:
         """Names from outside that a part needs."""
         return part.code.reads(self.ends[part.part])
 
-    def ahead(self, parts: Iterable[PartCode] | None = None) -> list[str]:
+    def ahead(
+        self, parts: Iterable[PartCode] | None = None, needed: set[str] | None = None
+    ) -> list[str]:
         """Lines ahead of a loop: parameters, givens and constants that are needed."""
         lines = []
         for part in parts if parts is not None else self.used():
-            read = self.read(part)
+            read = self.read(part) if needed is None else needed
             constants = [node for _, node in leaves(part.known["k"])] if "k" in part.known else []
             wanted = [node for node in constants if node.reads & read]
             lines += self.given(part, read | part.prologue.reads(wanted))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from functools import cached_property, lru_cache
 from typing import Any, NamedTuple, get_type_hints
 
@@ -228,6 +228,18 @@ class PartCode:
         if self.own.limits is None:
             return []
         return [node for _, node in leaves(self._call(self.code, self.own.limits))]
+
+    def outside(self, signals: Collection[str]) -> dict[str, Stored]:
+        """Names of what a part reads of records: samples of taps, and inputs as they come."""
+        found = {}
+        for tap in self.taps:
+            for j, name in enumerate(self.tap_samples(tap)):
+                found[name] = Stored(self.part, "tap", f"{tap.input}.{j}")
+        for name in self.own.input_types:
+            signal = self.own.tap(name).signal
+            if signal in signals:
+                found[f"x_{signal}"] = Stored(self.part, "input", name)
+        return found
 
     def signal(self, path: str) -> Node:
         """A signal, or a number of the state, by its path."""
