@@ -18,7 +18,7 @@ from swashplate.equations.adjoints import Derivatives, Derived, derived_function
 from swashplate.equations.code import Code, Let, generating, leaves
 from swashplate.equations.expressions import Node
 from swashplate.equations.marching.march import Sampler, march_source, output_of
-from swashplate.equations.marching.part import PartCode, Stored, rest_of, settled_of
+from swashplate.equations.marching.part import PartCode, Stored
 from swashplate.equations.marching.pieces import PIECE, Planned, piece
 from swashplate.equations.marching.rows import STRIDE
 from swashplate.equations.marching.run import module
@@ -104,7 +104,7 @@ class Graph:
         self.partials: dict[Stored, dict[Stored, Term]] = {}
         self.pieces: list[Planned] = []  # The march, made last, comes first.
         # part by part, so that the pieces of the first ones are the same whatever follows
-        self.parts = [self._part(part) for part in self.sampler.used()]
+        self.parts = [self._part(part) for part in self.sampler.used]
         for place in places:
             if place.kind == "link":
                 self._keep(place)
@@ -149,8 +149,7 @@ class Graph:
         i, sampler = part.part, self.sampler
         observed = [place for place, _ in self.observed if place.part == i]
         needed = [self.number_of(source) for source in sampler.sources if source.part == i]
-        paths = [*sampler.carried[i], *(each.path for each in observed if each.kind == "state")]
-        states = {path: Stored(i, "state", path) for path in paths}
+        states = {path: Stored(i, "state", path) for path in sampler.carried[i]}
         following, here = dict(leaves(part.following)), dict(leaves(part.state))
         results = {state: following[path] for path, state in states.items()}
         behind: dict[Stored, Stored] = {}
@@ -166,7 +165,7 @@ class Graph:
         for source, number in zip((s for s in sampler.sources if s.part == i), needed, strict=True):
             self._keep(number, part.source(source))
         read = sampler.read(part)
-        for name, number in part.outside(sampler.signals).items():
+        for name, number in part.outside.items():
             if name in read:
                 self._keep(number, name)
         filled, rows = self._fill(part, results)
@@ -183,8 +182,7 @@ class Graph:
     def _fill(self, part: PartCode, results: Mapping[Stored, Node]) -> tuple[int | None, range]:
         """Piece that writes partial derivatives at known states into rows; places of these."""
         by = {name: Stored(part.part, "p", path) for name, path in part.parameters.items()}
-        constants = leaves(part.known["k"]) if "k" in part.known else ()
-        for name in {name for _, node in constants for name in node.reads} - by.keys():
+        for name in {name for node in part.constants for name in node.reads} - by.keys():
             by[name] = Stored(part.part, "k", name)
         by |= {node.value: Stored(part.part, "state", path) for path, node in leaves(part.state)}
         for tap in part.taps:
@@ -204,7 +202,7 @@ class Graph:
         taken, nodes = {*part.code.taken, *found.taken}, [*wanted.values()]
         writer = Writer(taken, found.items, nodes, found.hints, straight=True)
         names = set(writer.needed)
-        lines = self.sampler.ahead([part], names)
+        lines = self.sampler.ahead(part, names)
         lines += [
             f"{part.fraction(tap)} = fraction[{tap.number}]"
             for tap in part.taps
@@ -289,17 +287,16 @@ class Graph:
         return self._starting[start]
 
     def _started(self, start: str) -> Starting:
-        codes = self.sampler.used()
+        codes = self.sampler.used
         code = Code(codes[0].code.taken, ruled=True)
         results: dict[Stored, Node] = {}
         by: dict[str, str] = {}
         outside = {"h": Stored(0, "h")}
         for part in codes:
             i, prefix = part.part, self.model.prefix(part.part)
-            # what has no equation for a steady state has no state, and is always settled
-            begun = (settled_of(part) if start == "steady" else None) or rest_of(part)
-            begins, states = dict(leaves(begun.value)), dict(leaves(part.state))
-            code.items += [*part.prologue.items, *begun.code.items]
+            begun, value = part.begun(start)
+            begins, states = dict(leaves(value)), dict(leaves(part.state))
+            code.items += [*part.prologue.items, *begun.items]
             code.items += [Let(states[path].value, node) for path, node in begins.items()]
             code.items += part.code.items
             code.items += [

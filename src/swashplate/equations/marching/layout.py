@@ -120,7 +120,7 @@ class Layout:
             elif column in number:
                 by = self._by.setdefault(known, {})
                 by[number[column]] = Term(slot=(known, column))
-        for part in graph.sampler.used():
+        for part in graph.sampler.used:
             i, prefix = part.part, graph.model.prefix(part.part)
             for path in part.parameters.values():
                 if f"{prefix}{path}" in number:
@@ -154,9 +154,13 @@ class Layout:
                 return only
         if not terms or terms == [Term((), terms[0].scale)]:
             return Term((self._value(terms[0].scale if terms else 0.0),))
+        return Term((self._make(terms),))
+
+    def _make(self, terms: list[Term]) -> int:
+        """A new row that is a sum of terms."""
         row = self._row()
         self._sums.append((row, terms))
-        return Term((row,))
+        return row
 
     def _part(self, part: PartGraph) -> list[Todo]:
         """What is done for a part: its recurrences, and the signals that others need."""
@@ -213,12 +217,7 @@ class Layout:
         if not integral:
             return value, seen
         since, begun = len(self._sums), sum(what == INTEGRATE for what, *_ in integrals)
-        rows = [self._row() if terms else 0 for terms in ([Term((value,))], *seen)]
-        self._sums += [
-            (row, terms)
-            for row, terms in zip(rows, ([Term((value,))], *seen), strict=True)
-            if terms
-        ]
+        rows = [self._make(terms) if terms else 0 for terms in ([Term((value,))], *seen)]
         integrals += self._made(since)
         integrals += [(INTEGRATE, row, begun + k, 0) for k, row in enumerate(filter(None, rows))]
         return rows[0], [[Term((row,))] if row else [] for row in rows[1:]]
