@@ -45,8 +45,6 @@ class Own(NamedTuple):
     """δP at the first sample; None for that which belongs to the start. [Pa]"""
     offsets: Sequence[float] = ()
     """Offset of each observation, in its signal's unit; none given means none."""
-    clock_offsets: Sequence[float] = ()
-    """By how much the record's clock is ahead of each observation's; none given means none. [s]"""
     states: Mapping[str, float] = MappingProxyType({})
     """Numbers of the card's state at the first sample, by path; others are those of the start."""
 
@@ -155,7 +153,7 @@ def made_ready(
         raise InputError(f"{START_PRESSURE} is a column, so Own needs a value of it.")
     return Ready(
         instance,
-        EngineOwn(start, own.offsets, own.clock_offsets),
+        EngineOwn(start, own.offsets),
         _paths(tuple(names)),
         moved_by(parameters, observed, names),
     )
