@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, NamedTuple, TypedDict, Unpack, overload
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from swashplate.equations.marching.record import SOURCE_RATE, Interpolation, Record, record_of
+from swashplate.equations.marching.record import SOURCE_RATE, Interpolation
 from swashplate.equations.marching.run import Start
 from swashplate.equations.marching.stepping import CompiledStep, stored_of
 from swashplate.equations.model import Equation
@@ -28,7 +28,7 @@ from swashplate.simulation.instance import (
     with_equation,
 )
 from swashplate.simulation.result import Simulation
-from swashplate.simulation.run import check_voltage, measured_records, simulate_drive, steady_states
+from swashplate.simulation.run import drive_records, simulate_drive, steady_states
 from swashplate.simulation.stepper import Stepper
 
 if TYPE_CHECKING:
@@ -49,11 +49,14 @@ Array = NDArray[np.float64]
 
 
 class Given(TypedDict, total=False):
-    """How a record is given, see `Drive.simulate`."""
+    """How inputs are given, and what was measured beside the command; see `Drive.simulate`."""
 
     time: ArrayLike | None
     interpolation: Interpolation | None
     substeps: int | None
+    load_torque: ArrayLike | None
+    pump_speed: ArrayLike | None
+    supply_pressure: ArrayLike | None
 
 
 @dataclass(frozen=True)
@@ -205,10 +208,10 @@ class Drive(Result):
         substeps : int, optional
             Steps of the march a sample; by default so many that h ≤ 1/512 s.
         load_torque, pump_speed, supply_pressure : (n,) array_like or float, optional
-            What was measured beside the command: torque of the load at the shaft, positive against
-            positive speed [N m]; speed of the prime mover over that which Z10 belongs to [1];
-            supply pressure less static pressure, in place of Z9 [Pa]. By default the parameters
-            count.
+            What was measured beside the command, at its stamps: torque of the load at the shaft,
+            positive against positive speed [N m]; speed of the prime mover over that which Z10
+            belongs to [1]; supply pressure less static pressure, in place of Z9 [Pa]. By default
+            the parameters count.
 
         Returns
         -------
@@ -222,11 +225,19 @@ class Drive(Result):
         DomainError
             If the solenoid overpowers the feedback spring.
         """
-        record = _record(
-            voltage, rate, time=time, interpolation=interpolation, clip=clip, substeps=substeps
+        records = drive_records(
+            "voltage",
+            sampled(voltage, rate),
+            rate,
+            clip=clip,
+            time=time,
+            interpolation=interpolation,
+            substeps=substeps,
+            load_torque=load_torque,
+            pump_speed=pump_speed,
+            supply_pressure=supply_pressure,
         )
-        measured = measured_records(record, load_torque, pump_speed, supply_pressure)
-        return simulate_drive(self.parameters, record, start, measured=measured)
+        return simulate_drive(self.parameters, records, start)
 
     def simulate_current(
         self,
@@ -234,15 +245,11 @@ class Drive(Result):
         rate: float = SOURCE_RATE,
         *,
         start: Start = "rest",
-        load_torque: ArrayLike | None = None,
-        pump_speed: ArrayLike | None = None,
-        supply_pressure: ArrayLike | None = None,
         **options: Unpack[Given],
     ) -> Simulation:
         """Simulate pump and motor alone over a signed current [A]; arguments as `simulate`."""
-        record = record_of(current, rate, what="current", **options)
-        measured = measured_records(record, load_torque, pump_speed, supply_pressure)
-        return simulate_drive(self.parameters, record, start, measured=measured, driver="current")
+        records = drive_records("current", current, rate, **options)
+        return simulate_drive(self.parameters, records, start)
 
     def sensitivities(
         self,
@@ -254,7 +261,7 @@ class Drive(Result):
         clip: bool = False,
         **options: Unpack[Given],
     ) -> Sensitivities:
-        """Simulate with exact derivatives of currents, speed and position.
+        """Simulate with exact derivatives of any signal.
 
         Parameters
         ----------
@@ -262,12 +269,12 @@ class Drive(Result):
             Symbols (``"Z16"`` stands for both directions) or columns (``"Z16_plus"``) to
             differentiate by; by default all of card, pump and motor.
         voltage, rate, start, clip, **options :
-            As in `simulate`; `time`, `interpolation`, `substeps`.
+            As in `simulate`.
         """
         from swashplate.simulation.residuals import sensitivities
 
-        record = _record(voltage, rate, clip=clip, **options)
-        return sensitivities(self.parameters, record, "voltage", start, parameters)
+        records = drive_records("voltage", sampled(voltage, rate), rate, clip=clip, **options)
+        return sensitivities(self.parameters, records, start, parameters)
 
     def sensitivities_current(
         self,
@@ -281,8 +288,8 @@ class Drive(Result):
         """The same for pump and motor alone over a signed current. [A]"""
         from swashplate.simulation.residuals import sensitivities
 
-        record = record_of(current, rate, what="current", **options)
-        return sensitivities(self.parameters, record, "current", start, parameters)
+        records = drive_records("current", current, rate, **options)
+        return sensitivities(self.parameters, records, start, parameters)
 
     def simulate_many(
         self,
@@ -291,11 +298,11 @@ class Drive(Result):
         voltage: ArrayLike | Maneuver | None = None,
         current: ArrayLike | None = None,
         rate: float = SOURCE_RATE,
-        interpolation: Interpolation | None = None,
         cost: SquaredError | None = None,
         output: str = "shaft_speed",
         to: str | Path | None = None,
         executor: Executor | None = None,
+        **options: Unpack[Given],
     ) -> Batch:
         """Simulate many parameter sets over one record, from rest, on all cores.
 
@@ -305,14 +312,11 @@ class Drive(Result):
             Symbol or column to (m,) values, one for each set; other parameters are this drive's.
         voltage, current : (n,) array_like
             The record, one of the two. [V or A]
-        rate, interpolation :
+        rate, **options :
             As in `simulate`.
-        cost : SquaredError, optional
-            Reduce each set to one number on the fly, so that memory does not grow with the record.
         output : str
-            Without `cost`: the signal to return, ``"shaft_speed"``, ``"shaft_position"`` or
-            ``"current"``.
-        to, executor :
+            Without `cost`: the signal to return, such as ``"shaft_speed"`` or ``"current"``.
+        cost, to, executor :
             As in `swashplate.simulate_many`.
 
         Raises
@@ -324,15 +328,12 @@ class Drive(Result):
 
         if (voltage is None) == (current is None):
             raise InputError("A batch needs either a voltage or a current.")
-        if current is None:
-            assert voltage is not None
-            record = _record(voltage, rate, interpolation=interpolation)
+        if current is not None:
+            records = drive_records("current", current, rate, **options)
         else:
-            record = record_of(current, rate, what="current", interpolation=interpolation)
-        by_voltage = current is None
-        return simulate_drives(
-            self.parameters, changes, record, by_voltage, cost, output, to, executor
-        )
+            assert voltage is not None
+            records = drive_records("voltage", sampled(voltage, rate), rate, **options)
+        return simulate_drives(self.parameters, changes, records, output, cost, to, executor)
 
     def stepper(
         self,
@@ -504,11 +505,3 @@ class Drive(Result):
         if np.ndim(voltage) == 0:
             return float(current[0]), float(speed[0])
         return current.reshape(volts.shape), speed.reshape(volts.shape)
-
-
-def _record(
-    voltage: ArrayLike | Maneuver, rate: float, *, clip: bool = False, **options: Unpack[Given]
-) -> Record:
-    """A command on the march's grid."""
-    command = sampled(voltage, rate)
-    return check_voltage(record_of(command, rate, what="voltage", **options), clip)

@@ -144,7 +144,7 @@ def compared(
         assert (wanted == values).all(), (name, np.abs(wanted - values).max())
     for bit, name in enumerate(LIMITS):
         acts = ((flags >> bit) & 1).astype(bool)
-        wanted = run.rate_limited() if name == "current_rate" else run.active(name)
+        wanted = run.active(name, fine=name == "current_rate")
         assert (wanted == acts).all(), name
 
 

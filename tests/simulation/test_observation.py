@@ -6,7 +6,6 @@ import pytest
 from swashplate import Drive, InputError, maneuvers
 from swashplate.equations.marching.observation import Observation, ObservedRecord, Own
 from swashplate.equations.marching.record import Record, record_of
-from swashplate.simulation.residuals import Own as DriveOwn
 from swashplate.simulation.residuals import residuals
 
 pytestmark = pytest.mark.traced
@@ -75,7 +74,7 @@ def test_residuals_at_any_stamps(hoist: Drive) -> None:
         "offset of shaft_speed [1]",
     )
     assert observed.rows_of(1) == slice(7, 14)
-    found = residuals(hoist.parameters, observed, DriveOwn(None, (0.5, 0.0), (0.0, 0.25)))
+    found = residuals(hoist.parameters, observed, Own({}, (0.5, 0.0), (0.0, 0.25)))
     late = np.interp(time - 0.003, fine.time, fine.shaft_speed) + 0.5 - np.arange(7.0)
     ahead = np.interp(time + 0.25, fine.time, fine.shaft_speed)
     np.testing.assert_allclose(found[:7], 2.0 * late, rtol=0.0, atol=1e-12)

@@ -18,7 +18,7 @@ def test_bad_command_leaves_the_state(hoist: Drive) -> None:
 
 
 def test_state_of_another_rate_is_refused(hoist: Drive) -> None:
-    with pytest.raises(InputError, match="another drive, delay or rate"):
+    with pytest.raises(InputError, match="of another model, delay or rate"):
         hoist.stepper(1e-3).state = hoist.stepper(1e-4).state
 
 

@@ -6,10 +6,10 @@ Of each set its output, in memory or streamed to files, or only its cost.
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Unpack
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -19,9 +19,9 @@ from swashplate.equations.library import TAN_22_5
 from swashplate.equations.marching.lanes import LANES, lanes_of
 from swashplate.equations.marching.march import output_of
 from swashplate.equations.marching.observation import Observation
-from swashplate.equations.marching.record import Record
+from swashplate.equations.marching.record import Record, Sampling
 from swashplate.equations.marching.run import outside
-from swashplate.equations.marching.use import records_of
+from swashplate.equations.marching.use import inputs_of
 from swashplate.errors import FileError, InputError
 from swashplate.executors import Executor, Threads
 from swashplate.parameters.definitions import SWITCHES, columns_of
@@ -37,16 +37,11 @@ from swashplate.simulation.instance import (
     step_limit,
 )
 from swashplate.simulation.result import check_output
-from swashplate.tables import write_whole
+from swashplate.tables import write_table
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
 
-OVERPOWERED = "Z5·F/√Z4 reaches 1 under this input: the solenoid overpowers the feedback spring."
-OVERFLOW = (
-    "the numbers grow beyond all bounds under this input: a parameter is far larger or smaller "
-    "than any real drive's; compare the set with a packaged one."
-)
 SAMPLES_A_FILE = 2**23
 """Samples of all sets of a file, 64 MB, unless a single block of sets has more."""
 
@@ -82,6 +77,124 @@ class Batch(Result):
     marched, called by its number."""
 
 
+def simulate_many(
+    model: Model,
+    p: Any,
+    changes: Mapping[str, ArrayLike],
+    inputs: Mapping[str, ArrayLike],
+    rate: float,
+    *,
+    output: str = "",
+    cost: SquaredError | None = None,
+    to: str | Path | None = None,
+    options: Any = None,
+    given: Any = None,
+    executor: Executor | None = None,
+    **sampling: Unpack[Sampling],
+) -> Batch:
+    """Simulate many parameter sets of a model over one record, from rest or states of one's own.
+
+    Parameters
+    ----------
+    model, p, inputs, rate, options, given, **sampling :
+        As in `swashplate.equations.simulate`; `time`, `interpolation`, `substeps`.
+    changes : mapping of str to (m,) array_like
+        Values of parameters by path, one for each set; the others are those of `p`. With
+        ``start.`` before its path, a number of the state at the first sample, as `begin` of
+        `swashplate.equations.simulate`.
+    output : str
+        The signal to return; with `cost` it is not needed.
+    cost : SquaredError, optional
+        Reduce each set to one number on the fly, so that memory does not grow with the record.
+    to : path, optional
+        Empty folder that outputs are written to instead, file by file as they are ready, so that
+        memory does not grow with the number of sets: see `Batch.files`.
+    executor : Executor, optional
+        Where: by default `swashplate.executors.Threads`, one a core; or ``Processes``, ``Dask`` or
+        ``Serial``. The numbers do not depend on it. For other processes the model must stand in a
+        module, and on other machines the folder must be a common one.
+
+    Raises
+    ------
+    InputError
+        For what does not fit the model, or outputs that need more memory than there is.
+    FileError
+        If files cannot be written.
+    """
+    instance = instance_of(model, p, options=options, given=given)
+    records = inputs_of(instance, inputs, rate, **sampling)
+    paths = parameter_paths(model)
+    values, count = _given_sets(changes)
+    known = (*paths, *(f"start.{path}" for path in state_paths(model)))
+    for path in values:
+        if path not in known:
+            raise InputError(f"{model.name} has no parameter '{path}'; it has {', '.join(known)}.")
+    if cost is None and not output:
+        raise InputError(f"{model.name}: say which output of the sets is wanted, or give a cost.")
+    taps = [(i, tap) for i, part in enumerate(model.parts) for tap in part.taps.values()]
+    delays = {f"{model.prefix(i)}{tap.delay}" for i, tap in taps if tap.delay}
+    givens = [f"given {model.prefix(i)}{path}" for i, path in model.places("given")]
+    numbers = dict(zip((*paths, *givens), (*instance.params, *instance.given), strict=True))
+    failures: dict[int, str] = {}
+    for path, column in values.items():
+        late = path in delays
+        rule = "a finite number, at least 0" if late else "a finite number"
+        for i in np.flatnonzero(~np.isfinite(column) | (late & (column < 0.0))):
+            failures[int(i)] = f"{model.name}: {path} is {column[i]:g}, but must be {rule}."
+    columns = {path: np.full(count, number) for path, number in numbers.items()} | values
+    good = np.setdiff1d(np.arange(count), list(failures))
+    blocks = [(good[k : k + LANES], instance.options) for k in range(0, good.size, LANES)]
+    sets = _Sets(
+        model, columns, records, cost.output if cost else output, cost, Path(to) if to else None
+    )
+    return _run(sets, blocks, count, failures, (model.name, "input"), executor)
+
+
+def simulate_drives(
+    parameters: ParameterSet,
+    changes: Mapping[str, ArrayLike],
+    records: Mapping[str, Record],
+    output: str,
+    cost: SquaredError | None,
+    to: str | Path | None,
+    executor: Executor | None,
+) -> Batch:
+    """March many sets over one record; see `Drive.simulate_many`."""
+    given, count = _given_sets(changes)
+    numbers = {name: np.full(count, value) for name, value in parameters.numbers.items()}
+    changed = [(column, each) for name, each in given.items() for column in columns_of([name])]
+    for k, (column, values) in enumerate(changed):
+        if column in dict(changed[:k]):
+            raise InputError(f"{column} is given twice.")
+        numbers[column] = values
+    driver, record = next(iter(records.items()))
+    by_voltage, models = driver == "voltage", models_of(parameters.equations)
+    output = cost.output if cost else output
+    check_output(output)
+    name, failures, exact = parameters.name, dict[int, str](), parameters.rate is None
+    for mask, sentence in broken_rules(numbers):
+        for i in np.flatnonzero(mask):
+            failures.setdefault(int(i), f"{name}: {sentence(int(i))}")
+    why = "swings too fast for" if exact else "is unstable at"
+    for side in SIDES if by_voltage else ():
+        limit = step_limit(numbers[f"zeta_{side}"], exact)
+        said = f"{name}: the current filter of the {side} channel {why} this step."
+        for i in np.flatnonzero(~(numbers[f"omega_{side}"] * record.step < limit)):
+            failures.setdefault(int(i), said)
+    sets = _Sets(
+        models.drive if by_voltage else models.pump_drive,
+        {PATHS[column]: values for column, values in numbers.items()},
+        records,
+        output,
+        cost,
+        to,
+    )
+    blocks = _blocks(parameters, numbers, failures, given, by_voltage)
+    return _run(sets, blocks, count, failures, (name, driver), executor)
+
+
+# --- blocks of sets -------------------------------------------------------------------------------
+
 Block = tuple[Indices, tuple[Any, ...]]
 """Up to LANES sets, and the options that they share: kernels are compiled for those."""
 
@@ -92,16 +205,24 @@ class _Sets:
 
     model: Model
     numbers: Mapping[str, Array]  # (m,) each, by path; see `Lanes`
-    record: Record
-    records: Mapping[str, Array]  # external signals on the record's grid
+    records: Mapping[str, Record]  # external signals on the grid
     output: str
     cost: SquaredError | None
-    to: Path | None
+    to: str | Path | None
     place: Array | None = field(default=None, repr=False)  # (m, n), within this process
 
     def __getstate__(self) -> dict[str, Any]:
         """Without what other processes have no use for."""
         return {**self.__dict__, "place": None}
+
+    @property
+    def record(self) -> Record:
+        """The first input."""
+        return next(iter(self.records.values()))
+
+    def file(self, blocks: Sequence[Block]) -> Path:
+        """Where outputs of some blocks go."""
+        return Path(self.to or "") / f"{blocks[0][0][0]:08d}.parquet"
 
     def compared(self) -> tuple[Array, Array]:
         """Measured values and weights on the march's grid, zero weight between the samples."""
@@ -115,6 +236,31 @@ class _Sets:
         return measured, weight
 
 
+def _blocks(
+    parameters: ParameterSet,
+    numbers: Mapping[str, Array],
+    failures: Mapping[int, str],
+    changed: Iterable[str],
+    by_voltage: bool,
+) -> list[Block]:
+    """Blocks of a drive's sets that share the options which the kernels are compiled for."""
+    stops = np.tan(np.maximum(numbers["Z13_plus"], numbers["Z13_minus"]))
+    masks: dict[str, NDArray[np.bool_]] = {"steep": stops >= TAN_22_5}
+    for option in {SWITCHES[column] for column in changed if column in SWITCHES}:
+        own = [numbers[each] for each in SWITCHES if SWITCHES[each] == option and each in numbers]
+        masks[option] = np.any(own, axis=0)
+    kinds = np.stack(list(masks.values()), axis=1)
+    good = np.setdiff1d(np.arange(stops.size), list(failures))
+    base, card = pump_options(parameters), card_options(parameters) if by_voltage else None
+    found = []
+    for kind in np.unique(kinds[good], axis=0):
+        members = good[(kinds[good] == kind).all(axis=1)]
+        on = {name: True if each else None for name, each in zip(masks, kind, strict=True)}
+        options = card, base._replace(**on)
+        found += [(members[k : k + LANES], options) for k in range(0, members.size, LANES)]
+    return found
+
+
 def _march(
     shared: _Sets, blocks: Sequence[Block]
 ) -> list[tuple[Indices, Array | None, list[tuple[int, float]]]]:
@@ -125,18 +271,13 @@ def _march(
     """
     made, record, keep = [], shared.record, shared.cost is None
     measured, weight = shared.compared()
+    inputs = {name: each.values for name, each in shared.records.items()}
     table: dict[str, Array] = {}
     for sets, options in blocks:
         padded, size = np.resize(sets, LANES), sets.size
-        lanes = lanes_of(shared.model, tuple(shared.records), options, shared.output)
-        found = lanes(
-            {path: values[padded] for path, values in shared.numbers.items()},
-            shared.records,
-            record.step,
-            measured=measured,
-            weight=weight,
-            keep=keep,
-        )
+        lanes = lanes_of(shared.model, tuple(inputs), options, shared.output)
+        own = {path: values[padded] for path, values in shared.numbers.items()}
+        found = lanes(own, inputs, record.step, measured=measured, weight=weight, keep=keep)
         worst = found.worst[:size]
         bad = ~(np.isfinite(found.end[:size]) & (worst > 0.0))
         values: Array | None = np.where(bad, np.inf, found.cost[:size])
@@ -151,24 +292,10 @@ def _march(
                 values = None
         made.append((sets, values, list(zip(sets[bad].tolist(), worst[bad].tolist(), strict=True))))
     if shared.to is not None:
-        _write(_file(shared.to, blocks), {"time": record.time, **table})
+        import polars as pl
+
+        write_table(pl.DataFrame({"time": record.time, **table}), shared.file(blocks))
     return made
-
-
-def _file(folder: Path, blocks: Sequence[Block]) -> Path:
-    return folder / f"{blocks[0][0][0]:08d}.parquet"
-
-
-def _write(path: Path, columns: Mapping[str, Array]) -> None:
-    """Write a table beside its place, have it on the disk, and rename it."""
-    import polars as pl
-
-    def write(beside: Path) -> None:
-        pl.DataFrame(dict(columns)).write_parquet(beside)
-        with beside.open("rb+") as file:
-            os.fsync(file.fileno())
-
-    write_whole(path, write)
 
 
 def _run(
@@ -176,10 +303,11 @@ def _run(
     blocks: Sequence[Block],
     count: int,
     failures: dict[int, str],
-    why: Callable[[float], str],
+    names: tuple[str, str],
     executor: Executor | None,
 ) -> Batch:
-    """March all blocks wherever the executor runs them."""
+    """March all blocks wherever the executor runs them; `names` of the model and its driver."""
+    output_of(shared.model, shared.output)
     samples, several, keep = shared.record.time.size, 1, shared.cost is None
     values = None if keep else np.full(count, np.inf)
     if shared.to is not None:
@@ -187,7 +315,7 @@ def _run(
             raise InputError(
                 "Outputs are written to files, costs are not: leave out one of to and cost."
             )
-        _make_folder(shared.to)
+        _make_folder(Path(shared.to))
         several = max(SAMPLES_A_FILE // (samples * LANES), 1)
     elif keep:
         values = _outputs(count, samples)
@@ -196,11 +324,15 @@ def _run(
     # each block writes its own sets' places, so the result does not depend on who is first
     for _, made in (executor or Threads()).run(_march, shared, items):
         for sets, found, failed in made:
-            failures |= {number: why(margin) for number, margin in failed}
+            for number, worst in failed:
+                why = f"the numbers grow beyond all bounds under this {names[1]}."
+                if not worst > 0.0:
+                    why = outside(shared.model, worst, names[1])
+                failures[number] = f"{names[0]}: {why}"
             if found is not None:
                 assert values is not None
                 values[sets] = found
-    files = tuple(_file(shared.to, each) for each in items) if shared.to else ()
+    files = tuple(map(shared.file, items)) if shared.to else ()
     kept, costs = (values, None) if keep else (None, values)
     return Batch(costs, kept, dict(sorted(failures.items())), files)
 
@@ -240,172 +372,6 @@ def _make_folder(folder: Path) -> None:
         raise FileError(
             f"{folder} holds {there.name} already; name an empty folder for the outputs."
         )
-
-
-# --- models of one's own --------------------------------------------------------------------------
-
-
-def simulate_many(
-    model: Model,
-    p: Any,
-    changes: Mapping[str, ArrayLike],
-    inputs: Mapping[str, ArrayLike],
-    rate: float,
-    *,
-    output: str = "",
-    cost: SquaredError | None = None,
-    to: str | Path | None = None,
-    options: Any = None,
-    given: Any = None,
-    executor: Executor | None = None,
-) -> Batch:
-    """Simulate many parameter sets of a model over one record, from rest or states of one's own.
-
-    Parameters
-    ----------
-    model, p, inputs, rate, options, given :
-        As in `swashplate.equations.simulate`.
-    changes : mapping of str to (m,) array_like
-        Values of parameters by path, one for each set; the others are those of `p`. With
-        ``start.`` before its path, a number of the state at the first sample, as `begin` of
-        `swashplate.equations.simulate`.
-    output : str
-        The signal to return; with `cost` it is not needed.
-    cost : SquaredError, optional
-        Reduce each set to one number on the fly, so that memory does not grow with the record.
-    to : path, optional
-        Empty folder that outputs are written to instead, file by file as they are ready, so that
-        memory does not grow with the number of sets: see `Batch.files`.
-    executor : Executor, optional
-        Where: by default `swashplate.executors.Threads`, one a core; or ``Processes``, ``Dask`` or
-        ``Serial``. The numbers do not depend on it. For other processes the model must stand in a
-        module, and on other machines the folder must be a common one.
-
-    Raises
-    ------
-    InputError
-        For what does not fit the model, or outputs that need more memory than there is.
-    FileError
-        If files cannot be written.
-    """
-    instance = instance_of(model, p, options=options, given=given)
-    records = records_of(instance, inputs, rate)
-    paths = parameter_paths(model)
-    values, count = _given_sets(changes)
-    starts = [f"start.{path}" for path in state_paths(model)]
-    for path in values:
-        if path not in (*paths, *starts):
-            raise InputError(
-                f"{model.name} has no parameter '{path}'; it has {', '.join((*paths, *starts))}."
-            )
-    observed = cost.output if cost is not None else output
-    if not observed:
-        raise InputError(f"{model.name}: say which output of the sets is wanted, or give a cost.")
-    output_of(model, observed)
-    taps = [(i, tap) for i, part in enumerate(model.parts) for tap in part.taps.values()]
-    delays = {f"{model.prefix(i)}{tap.delay}" for i, tap in taps if tap.delay}
-    givens = [f"given {model.prefix(i)}{path}" for i, path in model.places("given")]
-    held = dict(zip((*paths, *givens), (*instance.params, *instance.given), strict=True))
-    numbers = {**{path: np.full(count, number) for path, number in held.items()}, **values}
-    failures: dict[int, str] = {}
-    for path, column in values.items():
-        late = path in delays
-        rule = "a finite number, at least 0" if late else "a finite number"
-        for i in np.flatnonzero(~np.isfinite(column) | (late & (column < 0.0))):
-            failures[int(i)] = f"{model.name}: {path} is {column[i]:g}, but must be {rule}."
-    good = np.setdiff1d(np.arange(count), list(failures))
-    record = Record(next(iter(records.values())), 0.0, float(rate), 1)
-    shared = _Sets(model, numbers, record, records, observed, cost, Path(to) if to else None)
-
-    def why(worst: float) -> str:
-        if worst > 0.0:
-            return f"{model.name}: the numbers grow beyond all bounds under this input."
-        return f"{model.name}: {outside(model, worst, 'input')}"
-
-    blocks = [(good[k : k + LANES], instance.options) for k in range(0, good.size, LANES)]
-    return _run(shared, blocks, count, failures, why, executor)
-
-
-# --- drives ---------------------------------------------------------------------------------------
-
-
-def simulate_drives(
-    parameters: ParameterSet,
-    changes: Mapping[str, ArrayLike],
-    record: Record,
-    by_voltage: bool,
-    cost: SquaredError | None,
-    output: str,
-    to: str | Path | None,
-    executor: Executor | None,
-) -> Batch:
-    """March many sets over one record; see `Drive.simulate_many`."""
-    given, count = _given_sets(changes)
-    columns = [(column, each) for name, each in given.items() for column in columns_of([name])]
-    twice = [column for k, (column, _) in enumerate(columns) if column in dict(columns[:k])]
-    if twice:
-        raise InputError(f"{twice[0]} is given twice.")
-    held = {name: np.full(count, value) for name, value in parameters.numbers.items()}
-    numbers = {**held, **dict(columns)}
-    failures = _failures(parameters, numbers, record.step, by_voltage)
-    observed = cost.output if cost is not None else output
-    by_path = {PATHS[column]: values for column, values in numbers.items()}
-    records = {"voltage" if by_voltage else "current": record.values}
-    models = models_of(parameters.equations)
-    model = models.drive if by_voltage else models.pump_drive
-    check_output(observed)
-    shared = _Sets(model, by_path, record, records, observed, cost, Path(to) if to else None)
-
-    def why(worst: float) -> str:
-        return f"{parameters.name}: {OVERFLOW if worst > 0.0 else OVERPOWERED}"
-
-    blocks = _blocks(parameters, numbers, failures, given, by_voltage)
-    return _run(shared, blocks, count, failures, why, executor)
-
-
-def _failures(
-    parameters: ParameterSet, numbers: Mapping[str, Array], step: float, by_voltage: bool
-) -> dict[int, str]:
-    """Sets that cannot be marched at all."""
-    name, failures, exact = parameters.name, dict[int, str](), parameters.rate is None
-    for mask, sentence in broken_rules(numbers):
-        for i in np.flatnonzero(mask):
-            failures.setdefault(int(i), f"{name}: {sentence(int(i))}")
-    why = "swings too fast for" if exact else "is unstable at"
-    for side in SIDES if by_voltage else ():
-        limit = step_limit(numbers[f"zeta_{side}"], exact)
-        said = f"{name}: the current filter of the {side} channel {why} this step."
-        for i in np.flatnonzero(~(numbers[f"omega_{side}"] * step < limit)):
-            failures.setdefault(int(i), said)
-    return failures
-
-
-def _blocks(
-    parameters: ParameterSet,
-    numbers: Mapping[str, Array],
-    failures: Mapping[int, str],
-    changed: Iterable[str],
-    by_voltage: bool,
-) -> list[Block]:
-    """Blocks of sets that share the options which the kernels are compiled for."""
-    stops = np.tan(np.maximum(numbers["Z13_plus"], numbers["Z13_minus"]))
-    masks: dict[str, NDArray[np.bool_]] = {"steep": stops >= TAN_22_5}
-    for option in {SWITCHES[column] for column in changed if column in SWITCHES}:
-        own = [numbers[each] for each in SWITCHES if SWITCHES[each] == option and each in numbers]
-        masks[option] = np.any(own, axis=0)
-    kinds = np.stack(list(masks.values()), axis=1)
-    good = np.setdiff1d(np.arange(stops.size), list(failures))
-    base, card = pump_options(parameters), card_options(parameters) if by_voltage else None
-    found = []
-    for kind in np.unique(kinds[good], axis=0):
-        members = good[(kinds[good] == kind).all(axis=1)]
-        on = {name: True if each else None for name, each in zip(masks, kind, strict=True)}
-        options = card, base._replace(**on)
-        found += [(members[k : k + LANES], options) for k in range(0, members.size, LANES)]
-    return found
-
-
-# --- what both have in common ---------------------------------------------------------------------
 
 
 def _given_sets(changes: Mapping[str, ArrayLike]) -> tuple[dict[str, Array], int]:

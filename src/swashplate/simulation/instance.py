@@ -187,21 +187,13 @@ def check_filter_stability(parameters: ParameterSet, step: float) -> None:
         steps = omega * step / float(step_limit(zeta, exact))
         if steps < 1.0:
             continue
-        channel = f"{parameters.name}: the current filter of the {side} channel (zeta = {zeta:g}"
-        if not steps < MOST_SUBSTEPS:
-            has, change = "has so little damping", "raise zeta"
-            if zeta >= 1.0:
-                has, change = "has so much damping", "lower zeta"
-            if exact:
-                has, change = f"swings so fast with omega = {omega:g} rad/s", "lower omega"
-            raise InputError(
-                f"{channel}) {has} that {MOST_SUBSTEPS} steps a sample would not do; {change}."
-            )
+        why = "swings too fast for" if exact else "is unstable at"
+        change = "a zeta nearer to 1 or a lower omega"
+        if steps < MOST_SUBSTEPS:
+            change = f"substeps={floor(steps) + 1} or more, a higher rate or a lower omega"
         raise InputError(
-            f"{channel}, omega = {omega:g} rad/s) "
-            f"{'swings too fast for' if exact else 'is unstable at'} a step of 1/{1.0 / step:g} s; "
-            f"simulate with substeps={floor(steps) + 1} or more or at a higher rate, or lower "
-            "omega."
+            f"{parameters.name}: the current filter of the {side} channel (zeta = {zeta:g}, omega "
+            f"= {omega:g} rad/s) {why} a step of 1/{1.0 / step:g} s; simulate with {change}."
         )
 
 

@@ -294,7 +294,7 @@ def plot_comparison(simulations: Mapping[str, Simulation], *, title: str | None 
     legend = [handle(name, *look) for name, look in looks.items()]
     heights = [1.2, 2.6, 1.6] if len(simulations) > 1 else [1.2, 2.6]
     figure, axes = sheet(heights, words, legend=legend)
-    volts = all(each.driven_by_voltage for each in simulations.values())
+    volts = all(each.voltage is not None for each in simulations.values())
     labels = ("voltage (V)" if volts else "current (A)", speed.label("shaft speed"))
     for ax, label in zip(axes, (*labels, speed.label("difference")), strict=False):
         dress(ax, label)
@@ -314,7 +314,7 @@ def plot_comparison(simulations: Mapping[str, Simulation], *, title: str | None 
         both = (first.time >= time[0]) & (first.time <= time[-1])
         if each is not first and both.any():
             at = first.time[both]
-            difference = each.at(at, "shaft_speed") - first.shaft_speed[both]
+            difference = np.interp(at, each.time, each.shaft_speed) - first.shaft_speed[both]
             draw(axes[2], at, speed.factor * difference, color, dashes=dashes)
     if len(simulations) > 1:
         said = f"speed less that of {reference}"
