@@ -27,5 +27,5 @@ from .simulation.batch import simulate_many as simulate_many
 from .simulation.residuals import Sensitivities as Sensitivities
 from .simulation.result import Limit as Limit
 from .simulation.result import Simulation as Simulation
-from .simulation.stepper import Sample as Sample
-from .simulation.stepper import Stepper as Stepper
+from .simulation.run import Sample as Sample
+from .simulation.run import Stepper as Stepper

@@ -16,7 +16,7 @@ from swashplate.equations.marching.stepping import CompiledStep, stored_of
 from swashplate.equations.model import Equation
 from swashplate.equations.replacement import Replacement
 from swashplate.errors import InputError
-from swashplate.maneuvers import Maneuver, sampled
+from swashplate.maneuvers import Maneuver
 from swashplate.parameters.files import dump_set, load_preset, load_set
 from swashplate.parameters.parameter_set import Change, Parameter, ParameterSet
 from swashplate.parameters.rules import FULL_VOLTAGE
@@ -28,8 +28,7 @@ from swashplate.simulation.instance import (
     with_equation,
 )
 from swashplate.simulation.result import Simulation
-from swashplate.simulation.run import drive_records, simulate_drive, steady_states
-from swashplate.simulation.stepper import Stepper
+from swashplate.simulation.run import Stepper, drive_records, simulate_drive, steady_states
 
 if TYPE_CHECKING:
     from swashplate.executors import Executor
@@ -51,6 +50,7 @@ Array = NDArray[np.float64]
 class Given(TypedDict, total=False):
     """How inputs are given, and what was measured beside the command; see `Drive.simulate`."""
 
+    clip: bool
     time: ArrayLike | None
     interpolation: Interpolation | None
     substeps: int | None
@@ -180,14 +180,8 @@ class Drive(Result):
         voltage: ArrayLike | Maneuver,
         rate: float = SOURCE_RATE,
         *,
-        time: ArrayLike | None = None,
-        interpolation: Interpolation | None = None,
         start: Start = "rest",
-        clip: bool = False,
-        substeps: int | None = None,
-        load_torque: ArrayLike | None = None,
-        pump_speed: ArrayLike | None = None,
-        supply_pressure: ArrayLike | None = None,
+        **given: Unpack[Given],
     ) -> Simulation:
         """Simulate the whole drive over a command.
 
@@ -197,12 +191,12 @@ class Drive(Result):
             Command; a maneuver is sampled at `rate`. [V]
         rate : float
             Samples a second, 10 Hz to 100 kHz; with `time`, rate of the result's grid. [Hz]
+        start : {"rest", "steady"}
+            From rest at 0 V, or settled at the first command.
         time : (n,) array_like, optional
             Increasing time stamps in any distances; `interpolation` must then be given. [s]
         interpolation : {"linear", "previous"}, optional
             What the command is between samples: a straight line (default) or held.
-        start : {"rest", "steady"}
-            From rest at 0 V, or settled at the first command.
         clip : bool
             Clip a command beyond ±10 V instead of refusing it.
         substeps : int, optional
@@ -225,18 +219,7 @@ class Drive(Result):
         DomainError
             If the solenoid overpowers the feedback spring.
         """
-        records = drive_records(
-            "voltage",
-            sampled(voltage, rate),
-            rate,
-            clip=clip,
-            time=time,
-            interpolation=interpolation,
-            substeps=substeps,
-            load_torque=load_torque,
-            pump_speed=pump_speed,
-            supply_pressure=supply_pressure,
-        )
+        records = drive_records("voltage", voltage, rate, **given)
         return simulate_drive(self.parameters, records, start)
 
     def simulate_current(
@@ -245,10 +228,10 @@ class Drive(Result):
         rate: float = SOURCE_RATE,
         *,
         start: Start = "rest",
-        **options: Unpack[Given],
+        **given: Unpack[Given],
     ) -> Simulation:
         """Simulate pump and motor alone over a signed current [A]; arguments as `simulate`."""
-        records = drive_records("current", current, rate, **options)
+        records = drive_records("current", current, rate, **given)
         return simulate_drive(self.parameters, records, start)
 
     def sensitivities(
@@ -258,8 +241,7 @@ class Drive(Result):
         *,
         parameters: Sequence[str] | None = None,
         start: Start = "rest",
-        clip: bool = False,
-        **options: Unpack[Given],
+        **given: Unpack[Given],
     ) -> Sensitivities:
         """Simulate with exact derivatives of any signal.
 
@@ -268,12 +250,12 @@ class Drive(Result):
         parameters : sequence of str, optional
             Symbols (``"Z16"`` stands for both directions) or columns (``"Z16_plus"``) to
             differentiate by; by default all of card, pump and motor.
-        voltage, rate, start, clip, **options :
+        voltage, rate, start, **given :
             As in `simulate`.
         """
         from swashplate.simulation.residuals import sensitivities
 
-        records = drive_records("voltage", sampled(voltage, rate), rate, clip=clip, **options)
+        records = drive_records("voltage", voltage, rate, **given)
         return sensitivities(self.parameters, records, start, parameters)
 
     def sensitivities_current(
@@ -283,12 +265,12 @@ class Drive(Result):
         *,
         parameters: Sequence[str] | None = None,
         start: Start = "rest",
-        **options: Unpack[Given],
+        **given: Unpack[Given],
     ) -> Sensitivities:
         """The same for pump and motor alone over a signed current. [A]"""
         from swashplate.simulation.residuals import sensitivities
 
-        records = drive_records("current", current, rate, **options)
+        records = drive_records("current", current, rate, **given)
         return sensitivities(self.parameters, records, start, parameters)
 
     def simulate_many(
@@ -302,7 +284,7 @@ class Drive(Result):
         output: str = "shaft_speed",
         to: str | Path | None = None,
         executor: Executor | None = None,
-        **options: Unpack[Given],
+        **given: Unpack[Given],
     ) -> Batch:
         """Simulate many parameter sets over one record, from rest, on all cores.
 
@@ -312,7 +294,7 @@ class Drive(Result):
             Symbol or column to (m,) values, one for each set; other parameters are this drive's.
         voltage, current : (n,) array_like
             The record, one of the two. [V or A]
-        rate, **options :
+        rate, **given :
             As in `simulate`.
         output : str
             Without `cost`: the signal to return, such as ``"shaft_speed"`` or ``"current"``.
@@ -326,13 +308,11 @@ class Drive(Result):
         """
         from swashplate.simulation.batch import simulate_drives
 
-        if (voltage is None) == (current is None):
+        commands = {"voltage": voltage, "current": current}
+        chosen = [(driver, each) for driver, each in commands.items() if each is not None]
+        if len(chosen) != 1:
             raise InputError("A batch needs either a voltage or a current.")
-        if current is not None:
-            records = drive_records("current", current, rate, **options)
-        else:
-            assert voltage is not None
-            records = drive_records("voltage", sampled(voltage, rate), rate, **options)
+        records = drive_records(*chosen[0], rate, **given)
         return simulate_drives(self.parameters, changes, records, output, cost, to, executor)
 
     def stepper(

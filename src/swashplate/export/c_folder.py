@@ -30,7 +30,7 @@ from swashplate.simulation.instance import (
     instance_of,
     models_of,
 )
-from swashplate.simulation.stepper import Sample
+from swashplate.simulation.run import Sample
 from swashplate.tables import write_text
 
 Array = NDArray[np.float64]

@@ -30,6 +30,7 @@ from swashplate.equations.marching.record import (
     record_of,
 )
 from swashplate.equations.marching.run import Instance, Part, Start
+from swashplate.equations.marching.use import Run, read_only
 from swashplate.errors import DomainError, InputError
 from swashplate.full_order.physical_set import PhysicalSet, from_lumped
 from swashplate.models import full_order as model
@@ -40,7 +41,7 @@ from swashplate.models.machine import Machine, fastest_rate
 from swashplate.parameters.parameter_set import Change
 from swashplate.results import Result, Tabular
 from swashplate.simulation.instance import PATHS, card_of, card_options, check_filter_stability
-from swashplate.simulation.result import Named, Signals, read_only
+from swashplate.simulation.result import Named
 from swashplate.tables import Cell, Column, Table
 
 if TYPE_CHECKING:
@@ -72,7 +73,7 @@ def path_of(name: str) -> str:
     )
 
 
-class FullOrderSimulation(Signals):
+class FullOrderSimulation(Run, Tabular):
     """Signals of one record, read-only arrays of the record's length, all SI.
 
     Signs are those of `swashplate.Simulation`. The record is the signed current. The motor's

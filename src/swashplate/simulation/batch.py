@@ -26,13 +26,12 @@ from swashplate.errors import FileError, InputError
 from swashplate.executors import Executor, Threads
 from swashplate.parameters.definitions import SWITCHES, columns_of
 from swashplate.parameters.parameter_set import ParameterSet
-from swashplate.parameters.rules import broken_rules
+from swashplate.parameters.rules import SIDES, broken_rules
 from swashplate.results import Result
 from swashplate.simulation.instance import (
-    PATHS,
-    SIDES,
     card_options,
     models_of,
+    path_of,
     pump_options,
     step_limit,
 )
@@ -183,7 +182,7 @@ def simulate_drives(
             failures.setdefault(int(i), said)
     sets = _Sets(
         models.drive if by_voltage else models.pump_drive,
-        {PATHS[column]: values for column, values in numbers.items()},
+        {path_of(column): values for column, values in numbers.items()},
         records,
         output,
         cost,
@@ -261,40 +260,38 @@ def _blocks(
     return found
 
 
-def _march(
-    shared: _Sets, blocks: Sequence[Block]
-) -> list[tuple[Indices, Array | None, list[tuple[int, float]]]]:
+def _march(shared: _Sets, blocks: Sequence[Block]) -> list[tuple[dict[int, float], Indices, Array]]:
     """March blocks of sets; their outputs go into one file if into any.
 
-    Of each block the sets, their costs or outputs unless these are in their place already, and
-    those that failed with their worst margin.
+    Of each block the worst margins of the sets that failed, and of those that have them, costs or
+    outputs: none where these are in their place already.
     """
     made, record, keep = [], shared.record, shared.cost is None
     measured, weight = shared.compared()
     inputs = {name: each.values for name, each in shared.records.items()}
-    table: dict[str, Array] = {}
+    table = {"time": record.time}
     for sets, options in blocks:
         padded, size = np.resize(sets, LANES), sets.size
         lanes = lanes_of(shared.model, tuple(inputs), options, shared.output)
         own = {path: values[padded] for path, values in shared.numbers.items()}
         found = lanes(own, inputs, record.step, measured=measured, weight=weight, keep=keep)
-        worst = found.worst[:size]
-        bad = ~(np.isfinite(found.end[:size]) & (worst > 0.0))
-        values: Array | None = np.where(bad, np.inf, found.cost[:size])
+        worst, values = found.worst[:size], found.cost[:size]
+        good = np.isfinite(found.end[:size]) & (worst > 0.0)
         if keep:
             values = found.outputs[:size, :: record.substeps]
-            values[bad] = np.nan
-            if shared.to is not None:
-                table |= {str(number): row for number, row in zip(sets, values, strict=True)}
-                values = None
-            elif shared.place is not None:
-                shared.place[sets] = values
-                values = None
-        made.append((sets, values, list(zip(sets[bad].tolist(), worst[bad].tolist(), strict=True))))
+        values[~good] = np.nan if keep else np.inf
+        if keep and shared.to is not None:
+            table |= {str(number): row for number, row in zip(sets, values, strict=True)}
+            values = values[:0]
+        elif shared.place is not None:
+            shared.place[sets] = values
+            values = values[:0]
+        failed = dict(zip(sets[~good].tolist(), worst[~good].tolist(), strict=True))
+        made.append((failed, sets[: len(values)], values))
     if shared.to is not None:
         import polars as pl
 
-        write_table(pl.DataFrame({"time": record.time, **table}), shared.file(blocks))
+        write_table(pl.DataFrame(table), shared.file(blocks))
     return made
 
 
@@ -323,14 +320,13 @@ def _run(
     items = [blocks[k : k + several] for k in range(0, len(blocks), several)]
     # each block writes its own sets' places, so the result does not depend on who is first
     for _, made in (executor or Threads()).run(_march, shared, items):
-        for sets, found, failed in made:
-            for number, worst in failed:
+        for failed, sets, found in made:
+            for number, worst in failed.items():
                 why = f"the numbers grow beyond all bounds under this {names[1]}."
                 if not worst > 0.0:
                     why = outside(shared.model, worst, names[1])
                 failures[number] = f"{names[0]}: {why}"
-            if found is not None:
-                assert values is not None
+            if values is not None:
                 values[sets] = found
     files = tuple(map(shared.file, items)) if shared.to else ()
     kept, costs = (values, None) if keep else (None, values)
@@ -338,21 +334,13 @@ def _run(
 
 
 def _outputs(count: int, samples: int) -> Array:
-    """Room for outputs in memory.
-
-    Raises
-    ------
-    InputError
-        If the machine has less.
-    """
+    """Room for outputs in memory, refused if the machine has less."""
     size = 8.0 * count * samples
     try:
-        memory = float(os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES"))
-    except (AttributeError, ValueError, OSError):  # not on Windows
-        memory = np.inf
-    try:
-        if size < memory:
+        if size < float(os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")):
             return np.full((count, samples), np.nan)
+    except (AttributeError, ValueError, OSError):  # not on Windows, which says so by a MemoryError
+        return np.full((count, samples), np.nan)
     except MemoryError:
         pass
     raise InputError(

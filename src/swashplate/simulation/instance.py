@@ -6,7 +6,7 @@ from cmath import log, sqrt
 from dataclasses import replace
 from functools import lru_cache
 from math import floor
-from typing import Any, Final, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -32,28 +32,17 @@ from swashplate.models.drive import (
 )
 from swashplate.parameters.definitions import OWN
 from swashplate.parameters.parameter_set import ParameterSet
+from swashplate.parameters.rules import SIDES
 
-SIDES: Final = ("plus", "minus")
 MOST_SUBSTEPS = 1000
 """Steps a sample that anyone would wait for."""
 
 
-class _Paths(dict[str, str]):
-    """Paths of columns, those of users' own equations among them."""
-
-    def __missing__(self, column: str) -> str:
-        if column not in OWN:
-            raise KeyError(column)
-        return f"pump.{column}"
-
-
-PATHS = _Paths(
-    {
-        **{path: f"pump.{path}" for path in floats_of(Pump)},
-        **{f"{name}_{side}": f"card.{side}.{name}" for side in SIDES for name in Channel._fields},
-        "tau": "card.tau",
-    }
-)
+PATHS = {
+    **{path: f"pump.{path}" for path in floats_of(Pump)},
+    **{f"{name}_{side}": f"card.{side}.{name}" for side in SIDES for name in Channel._fields},
+    "tau": "card.tau",
+}
 """Path in the model of every column such as ``Z16_plus``."""
 START_PRESSURE = "start_pressure"
 """Column of δP at the first sample, where it is an unknown of the experiment."""
@@ -63,6 +52,8 @@ def path_of(column: str) -> str:
     """Path in the model of a column, of the pressure at the start, or of a state at the start."""
     if column.startswith("start."):
         return column
+    if column in OWN:  # of an equation of one's own
+        return f"pump.{column}"
     return "start.pump.pressure" if column == START_PRESSURE else PATHS[column]
 
 

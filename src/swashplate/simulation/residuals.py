@@ -64,10 +64,9 @@ def jacobian(
     *,
     out: Array | None = None,
 ) -> Jacobian:
-    """The same residuals with their exact derivatives; see the engine's `jacobian`.
+    """The same residuals with their exact derivatives by symbols, columns, ``"start_pressure"``.
 
-    Columns are symbols (``"Z16"`` stands for both directions), columns (``"Z16_plus"``) and
-    ``"start_pressure"``. What the record does not depend on gives zeros.
+    What the record does not depend on gives zeros.
     """
     names = wanted_columns(tuple(columns))
     instance, inner, paths, moved = made_ready(parameters, observed, names, own)
@@ -223,7 +222,7 @@ def sensitivities(
         if isinstance(names, str) or not names:
             raise InputError("Name at least one parameter to differentiate by, in a list.")
         chosen = tuple(columns_of(list(names)))
-    foreign = [name for name in chosen if PATHS[name].startswith("card.")]
+    foreign = [name for name in chosen if path_of(name).startswith("card.")]
     if foreign and not by_voltage:
         raise InputError(
             f"{foreign[0]} belongs to the card, which a given current does not go through."

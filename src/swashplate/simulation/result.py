@@ -10,8 +10,7 @@ from typing import TYPE_CHECKING, Any, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from swashplate.equations.marching.use import Run, limits_of
-from swashplate.equations.marching.use import read_only as read_only
+from swashplate.equations.marching.use import Run, limits_of, read_only
 from swashplate.errors import InputError
 from swashplate.models.displacement_control import Pump
 from swashplate.results import Tabular, figures
@@ -81,11 +80,7 @@ class Named:
         return cast("Array", result[self._name])
 
 
-class Signals(Run, Tabular):
-    """Signals over one record, read-only arrays of the record's length, all SI."""
-
-
-class Simulation(Signals):
+class Simulation(Run, Tabular):
     """Signals of one simulated record, read-only arrays of the record's length, all SI.
 
     Signs: positive voltage, current, force, opening, angle and speed go together; positive speed

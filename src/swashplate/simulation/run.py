@@ -1,10 +1,10 @@
-"""Simulation of a drive: from a parameter set and inputs to a run, and its steady states."""
+"""A drive run: over records, one sample at a time, and where it settles."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import Any, Literal
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -12,7 +12,10 @@ from numpy.typing import ArrayLike, NDArray
 from swashplate.equations.marching.part import Stored
 from swashplate.equations.marching.record import Interpolation, Record, least_substeps, on_grid
 from swashplate.equations.marching.run import Instance, Start, Started, marched
+from swashplate.equations.marching.use import Stepper as ModelStepper
+from swashplate.equations.marching.use import StepperState
 from swashplate.errors import DomainError, InputError
+from swashplate.maneuvers import Maneuver, sampled
 from swashplate.parameters.parameter_set import ParameterSet
 from swashplate.parameters.rules import FULL_VOLTAGE
 from swashplate.simulation.instance import (
@@ -24,12 +27,11 @@ from swashplate.simulation.instance import (
 from swashplate.simulation.result import Simulation
 
 Array = NDArray[np.float64]
-Driver = Literal["voltage", "current"]
 
 
 def drive_records(
-    driver: Driver,
-    command: ArrayLike,
+    driver: str,
+    command: ArrayLike | Maneuver,
     rate: float,
     *,
     clip: bool = False,
@@ -46,7 +48,7 @@ def drive_records(
     between: dict[str, Interpolation | None] = {driver: interpolation}
     between |= dict.fromkeys(beside, "linear")
     steps = least_substeps(rate, substeps)
-    inputs = {driver: command, **beside}
+    inputs = {driver: sampled(command, rate), **beside}
     found = on_grid(inputs, rate, time=time, interpolation=between, substeps=steps)
     if driver == "voltage":
         found["voltage"] = check_voltage(found["voltage"], clip)
@@ -106,6 +108,83 @@ def start_states(instance: Instance, pressure: float, started: Started) -> dict[
         )
     paths = instance.model.parts[1].free_start["pressure"]
     return {f"pump.{path}": float(pressure) for path in paths}
+
+
+class Sample(NamedTuple):
+    """Signals at one sample, named and signed as in `Simulation`, SI."""
+
+    voltage: float
+    current_positive: float
+    current_negative: float
+    current: float
+    solenoid_force: float
+    spool_position: float
+    orifice_opening: float
+    stroker_pressure: float
+    swash_angle: float
+    shaft_speed: float
+    shaft_position: float
+
+
+class Stepper:
+    """A drive that takes a command and gives a sample, the same numbers as `Drive.simulate`.
+
+    Created by `Drive.stepper`. The first step gives the sample at time zero.
+    """
+
+    def __init__(
+        self, parameters: ParameterSet, h: float, interpolation: Interpolation, start: Start
+    ) -> None:
+        if not h > 0.0:
+            raise InputError(f"The sample interval is {h:g} s, but must be above 0.")
+        rate = 1.0 / h
+        if abs(rate - round(rate)) < 1e-9 * rate:
+            rate = float(round(rate))  # 1/(1/49) is not 49, but the user means 49 Hz
+        substeps = least_substeps(rate)
+        check_filter_stability(parameters, 1.0 / (rate * substeps))
+        self._stepper = ModelStepper(
+            instance_of(parameters, True),
+            ("voltage",),
+            Sample._fields[1:],
+            rate,
+            start,
+            interpolation=interpolation,
+            substeps=substeps,
+            cause="voltage",
+        )
+
+    @property
+    def state(self) -> StepperState:
+        """A copy of the present state; assign it to return to that instant."""
+        return self._stepper.state
+
+    @state.setter
+    def state(self, state: StepperState) -> None:
+        self._stepper.state = state
+
+    def step(self, voltage: float) -> Sample:
+        """Advance by one sample interval.
+
+        Parameters
+        ----------
+        voltage : float
+            Command at the new sample. [V]
+
+        Returns
+        -------
+        Sample
+            All signals at the new sample; at the first call, those at time zero.
+
+        Raises
+        ------
+        InputError
+            For a command that is not finite or beyond ±10 V; the state stays as it was.
+        DomainError
+            If the solenoid overpowers the feedback spring, or a number grows beyond all bounds.
+        """
+        if not -FULL_VOLTAGE <= voltage <= FULL_VOLTAGE:
+            raise InputError(f"The voltage is {voltage:g} V, but the card takes ±10 V.")
+        return Sample(**self._stepper.step(voltage))
 
 
 # --- steady states --------------------------------------------------------------------------------

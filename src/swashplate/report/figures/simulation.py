@@ -11,6 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from swashplate.equations import Run
 from swashplate.errors import InputError
 from swashplate.full_order import Comparison
 from swashplate.linear import UNITS
@@ -43,7 +44,7 @@ from swashplate.report.style import (
     write,
     zero_line,
 )
-from swashplate.simulation.result import Limit, Signals, Simulation
+from swashplate.simulation.result import Limit, Simulation
 from swashplate.units import display_unit
 
 Flags = NDArray[np.int8]
@@ -133,7 +134,7 @@ def plot_simulation(
 
 
 def plot_signals(
-    run: Signals,
+    run: Run,
     signals: Sequence[str],
     *,
     ax: Axes | Sequence[Axes] | None = None,
