@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from swashplate.equations.marching.record import SOURCE_RATE, Interpolation
 from swashplate.equations.marching.run import Start
 from swashplate.equations.marching.stepping import CompiledStep, stored_of
+from swashplate.equations.marching.use import Stepper
 from swashplate.equations.model import Equation
 from swashplate.equations.replacement import Replacement
 from swashplate.errors import InputError
@@ -28,7 +29,13 @@ from swashplate.simulation.instance import (
     with_equation,
 )
 from swashplate.simulation.result import Simulation
-from swashplate.simulation.run import Stepper, drive_records, simulate_drive, steady_states
+from swashplate.simulation.run import (
+    Sample,
+    drive_records,
+    drive_stepper,
+    simulate_drive,
+    steady_states,
+)
 
 if TYPE_CHECKING:
     from swashplate.executors import Executor
@@ -321,12 +328,12 @@ class Drive(Result):
         *,
         interpolation: Interpolation = "linear",
         start: Start = "rest",
-    ) -> Stepper:
+    ) -> Stepper[Sample]:
         """The drive one sample at a time: command in, sample out, numbers as in `simulate`.
 
         `h` is the interval between samples [s]; other arguments as in `simulate`.
         """
-        return Stepper(self.parameters, h, interpolation, start)
+        return drive_stepper(self.parameters, h, interpolation, start)
 
     def compiled_step(
         self,

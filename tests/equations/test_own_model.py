@@ -167,7 +167,7 @@ def test_a_stepper_gives_the_bits_of_the_run(way: str) -> None:
         assert [each[name] for each in samples + later] == run[name].tolist()
     for limit in Stops._fields:
         assert [each[limit] for each in samples + later] == run.active(limit).tolist()
-    with pytest.raises(InputError, match="a finite number for each of command, not"):
+    with pytest.raises(InputError, match="The command is nan, but must be a finite number"):
         made.step(np.nan)
 
 

@@ -12,8 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from swashplate.equations.marching.part import Stored
 from swashplate.equations.marching.record import Interpolation, Record, least_substeps, on_grid
 from swashplate.equations.marching.run import Instance, Start, Started, marched
-from swashplate.equations.marching.use import Stepper as ModelStepper
-from swashplate.equations.marching.use import StepperState
+from swashplate.equations.marching.use import Stepper
 from swashplate.errors import DomainError, InputError
 from swashplate.maneuvers import Maneuver, sampled
 from swashplate.parameters.parameter_set import ParameterSet
@@ -126,65 +125,28 @@ class Sample(NamedTuple):
     shaft_position: float
 
 
-class Stepper:
-    """A drive that takes a command and gives a sample, the same numbers as `Drive.simulate`.
-
-    Created by `Drive.stepper`. The first step gives the sample at time zero.
-    """
-
-    def __init__(
-        self, parameters: ParameterSet, h: float, interpolation: Interpolation, start: Start
-    ) -> None:
-        if not h > 0.0:
-            raise InputError(f"The sample interval is {h:g} s, but must be above 0.")
-        rate = 1.0 / h
-        if abs(rate - round(rate)) < 1e-9 * rate:
-            rate = float(round(rate))  # 1/(1/49) is not 49, but the user means 49 Hz
-        substeps = least_substeps(rate)
-        check_filter_stability(parameters, 1.0 / (rate * substeps))
-        self._stepper = ModelStepper(
-            instance_of(parameters, True),
-            ("voltage",),
-            Sample._fields[1:],
-            rate,
-            start,
-            interpolation=interpolation,
-            substeps=substeps,
-            cause="voltage",
-        )
-
-    @property
-    def state(self) -> StepperState:
-        """A copy of the present state; assign it to return to that instant."""
-        return self._stepper.state
-
-    @state.setter
-    def state(self, state: StepperState) -> None:
-        self._stepper.state = state
-
-    def step(self, voltage: float) -> Sample:
-        """Advance by one sample interval.
-
-        Parameters
-        ----------
-        voltage : float
-            Command at the new sample. [V]
-
-        Returns
-        -------
-        Sample
-            All signals at the new sample; at the first call, those at time zero.
-
-        Raises
-        ------
-        InputError
-            For a command that is not finite or beyond ±10 V; the state stays as it was.
-        DomainError
-            If the solenoid overpowers the feedback spring, or a number grows beyond all bounds.
-        """
-        if not -FULL_VOLTAGE <= voltage <= FULL_VOLTAGE:
-            raise InputError(f"The voltage is {voltage:g} V, but the card takes ±10 V.")
-        return Sample(**self._stepper.step(voltage))
+def drive_stepper(
+    parameters: ParameterSet, h: float, interpolation: Interpolation, start: Start
+) -> Stepper[Sample]:
+    """The drive one sample at a time; see `Drive.stepper`."""
+    if not h > 0.0:
+        raise InputError(f"The sample interval is {h:g} s, but must be above 0.")
+    rate = 1.0 / h
+    if abs(rate - round(rate)) < 1e-9 * rate:
+        rate = float(round(rate))  # 1/(1/49) is not 49, but the user means 49 Hz
+    substeps = least_substeps(rate)
+    check_filter_stability(parameters, 1.0 / (rate * substeps))
+    return Stepper(
+        instance_of(parameters, True),
+        ("voltage",),
+        Sample._fields[1:],
+        rate,
+        Sample,
+        start,
+        interpolation=interpolation,
+        substeps=substeps,
+        bound=FULL_VOLTAGE,
+    )
 
 
 # --- steady states --------------------------------------------------------------------------------

@@ -22,7 +22,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from difflib import get_close_matches
-from typing import Any, ClassVar, NamedTuple, Self, TypeVar, Unpack, get_type_hints
+from typing import Any, ClassVar, Generic, NamedTuple, Self, TypeVar, Unpack, get_type_hints
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -56,6 +56,7 @@ from swashplate.equations.syntax import plain
 from swashplate.errors import InputError
 
 Array = NDArray[np.float64]
+S = TypeVar("S")
 T = TypeVar("T", bound=np.generic)
 
 
@@ -366,10 +367,11 @@ class StepperState(NamedTuple):
     """Inputs of the sample before, None if there was none."""
 
 
-class Stepper:
+class Stepper(Generic[S]):
     """A model that takes a sample of its inputs and gives one, the same numbers as `simulate`.
 
-    Created by `stepper`. The first step gives the sample at time zero.
+    Created by `stepper`, and for drives by `Drive.stepper`. The first step gives the sample at time
+    zero.
     """
 
     def __init__(
@@ -378,16 +380,17 @@ class Stepper:
         inputs: Sequence[str],
         outputs: Sequence[str],
         rate: float,
+        sample: Callable[..., S],
         start: Start = "rest",
         *,
         interpolation: Between = None,
         substeps: int | None = None,
-        cause: str = "input",
+        bound: float = np.inf,
     ) -> None:
         check_start(start)
         check_rate(rate)
-        self._substeps, self._start, self._cause = checked_substeps(substeps), start, cause
-        self.inputs, limits = tuple(inputs), limits_of(instance.model)
+        self._substeps, self._start, self._bound = checked_substeps(substeps), start, bound
+        self._sample, self.inputs, limits = sample, tuple(inputs), limits_of(instance.model)
         between = each_between(inputs, interpolation)
         self._held = np.array([between[name] == "previous" for name in inputs])
         self._shown: dict[str, tuple[Stored, int | None]] = {}
@@ -428,7 +431,7 @@ class Stepper:
         )
         self._state = StepperState(machine, state.totals.copy(), state.last)
 
-    def step(self, *inputs: float) -> dict[str, float]:
+    def step(self, *inputs: float) -> S:
         """Advance by one sample interval.
 
         Parameters
@@ -438,21 +441,25 @@ class Stepper:
 
         Returns
         -------
-        dict
+        dict, or of a drive Sample
             Inputs and outputs at the new sample; at the first call, those at time zero.
 
         Raises
         ------
         InputError
-            For inputs that are not finite, or not as many; the state stays as it was.
+            For inputs that are not finite or beyond their bound, or not as many; the state stays as
+            it was.
         DomainError
             If the model leaves its domain, or a number grows beyond all bounds.
         """
         values = np.array(inputs, dtype=np.float64)
-        if values.shape != (len(self.inputs),) or not np.isfinite(values).all():
-            raise InputError(
-                f"A step takes a finite number for each of {', '.join(self.inputs)}, not {inputs}."
-            )
+        if values.shape != (len(self.inputs),):
+            raise InputError(f"A step takes a number for each of {', '.join(self.inputs)}.")
+        for name, value in zip(self.inputs, inputs, strict=True):
+            if not abs(value) <= self._bound or not np.isfinite(value):
+                raise InputError(
+                    f"The {name} is {value:g}, but must be a finite number within ±{self._bound:g}."
+                )
         machine, totals, last = self._state
         substeps = self._substeps
         if last is None:
@@ -464,14 +471,15 @@ class Stepper:
         worst = self._steps(before, values, self._held, substeps, machine, self._rates, totals)
         if last is None:
             totals[0] = 0.0
-        self._compiled.check(machine, worst, self._cause)
+        self._compiled.check(machine, worst, self.inputs[0])
         self._state = StepperState(machine, totals, values)
         out = machine.outputs.tolist()
         found = dict(zip(self.inputs, values.tolist(), strict=True))
         for name, (_, bit) in self._shown.items():
             value = out[self._at[name]]
             found[name] = value if bit is None else bool(int(value) >> bit & 1)
-        return found | dict(zip(self._integrals, totals[0].tolist(), strict=True))
+        found |= zip(self._integrals, totals[0].tolist(), strict=True)
+        return self._sample(**found)
 
 
 def stepper(
@@ -486,7 +494,7 @@ def stepper(
     options: Any = None,
     given: Any = None,
     start: Start = "rest",
-) -> Stepper:
+) -> Stepper[dict[str, float]]:
     """A model one sample at a time: inputs in, sample out, numbers as in `simulate`.
 
     Parameters
@@ -502,5 +510,5 @@ def stepper(
     if names is None:
         names = (*signals_of(model), *model.integrals, *limits_of(model))
     return Stepper(
-        instance, inputs, names, rate, start, interpolation=interpolation, substeps=substeps
+        instance, inputs, names, rate, dict, start, interpolation=interpolation, substeps=substeps
     )
