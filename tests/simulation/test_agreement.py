@@ -8,11 +8,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from tests.simulation.experiments import jacobian, residuals
 
 from swashplate import Drive, Simulation, maneuvers
 from swashplate.equations.marching.observation import Observation, ObservedRecord
 from swashplate.equations.marching.record import record_of
-from swashplate.simulation.residuals import jacobian, residuals
 
 SIGNALS = (
     "current_positive",

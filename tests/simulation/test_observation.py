@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
+from tests.simulation.experiments import residuals
 
 from swashplate import Drive, InputError, maneuvers
 from swashplate.equations.marching.observation import Observation, ObservedRecord, Own
 from swashplate.equations.marching.record import Record, record_of
-from swashplate.simulation.residuals import residuals
 
 pytestmark = pytest.mark.traced
 

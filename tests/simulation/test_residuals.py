@@ -10,18 +10,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scipy.signal import lfilter
+from tests.simulation.experiments import jacobian, residuals, triangle
 
 from swashplate import DomainError, Drive, InputError, Limit, ParameterError, maneuvers
 from swashplate.equations.marching.observation import Observation, ObservedRecord, Own
 from swashplate.equations.marching.record import record_of
 from swashplate.equations.marching.triangle import combine
-from swashplate.simulation.residuals import (
-    ALL_COLUMNS,
-    PUMP_COLUMNS,
-    jacobian,
-    residuals,
-    triangle,
-)
+from swashplate.simulation.residuals import ALL_COLUMNS, PUMP_COLUMNS
 from swashplate.simulation.run import simulate_drive
 
 RATE = 512.0

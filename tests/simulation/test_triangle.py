@@ -2,12 +2,12 @@
 
 import numpy as np
 import pytest
+from tests.simulation.experiments import triangle
 
 from swashplate import DomainError, Drive, InputError
 from swashplate.equations.marching.observation import Observation, ObservedRecord
 from swashplate.equations.marching.record import record_of
 from swashplate.equations.marching.triangle import ROWS, combine
-from swashplate.simulation.residuals import triangle
 
 pytestmark = pytest.mark.traced
 

@@ -11,8 +11,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swashplate.equations.marching import jacobian as engine
-from swashplate.equations.marching.jacobian import Jacobian as Jacobian
-from swashplate.equations.marching.jacobian import Triangle as Triangle
 from swashplate.equations.marching.observation import ObservedRecord, Own, every_sample
 from swashplate.equations.marching.record import Record
 from swashplate.equations.marching.run import Instance, Start
@@ -45,46 +43,18 @@ class Ready(NamedTuple):
     paths: Sequence[str] = ()  # Columns of derivatives.
     moved: Sequence[bool] | None = None  # Whether the record may depend on a column at all.
 
+    def residuals(self, observed: ObservedRecord) -> Array:
+        """(m,) weighted residuals of all observations; see the engine's."""
+        return engine.residuals(self.instance, observed, self.own)
 
-def residuals(parameters: ParameterSet, observed: ObservedRecord, own: Own = NOTHING_OWN) -> Array:
-    """(m,) weighted residuals of all observations, one after the other; see the engine's.
+    def jacobian(self, observed: ObservedRecord, out: Array | None = None) -> engine.Jacobian:
+        """The same residuals with their exact derivatives; see the engine's."""
+        moved = self.moved
+        return engine.jacobian(self.instance, observed, self.paths, self.own, moved=moved, out=out)
 
-    `own` are the experiment's own unknowns; among its starts ``"start_pressure"`` is δP at the
-    first sample. [Pa]
-    """
-    ready = made_ready(parameters, observed, (), own)
-    return engine.residuals(ready.instance, observed, ready.own)
-
-
-def jacobian(
-    parameters: ParameterSet,
-    observed: ObservedRecord,
-    columns: Sequence[str],
-    own: Own = NOTHING_OWN,
-    *,
-    out: Array | None = None,
-) -> Jacobian:
-    """The same residuals with their exact derivatives by symbols, columns, ``"start_pressure"``.
-
-    What the record does not depend on gives zeros.
-    """
-    names = wanted_columns(tuple(columns))
-    instance, inner, paths, moved = made_ready(parameters, observed, names, own)
-    found = engine.jacobian(instance, observed, paths, inner, moved=moved, out=out)
-    return found._replace(names=(*names, *observed.own_columns))
-
-
-def triangle(
-    parameters: ParameterSet,
-    observed: ObservedRecord,
-    columns: Sequence[str],
-    own: Own = NOTHING_OWN,
-) -> Triangle:
-    """Triangular factor of [J r]; arguments as in `jacobian`, which is never held."""
-    names = wanted_columns(tuple(columns))
-    instance, inner, paths, moved = made_ready(parameters, observed, names, own)
-    found = engine.triangle(instance, observed, paths, inner, moved=moved)
-    return found._replace(names=(*names, *observed.own_columns))
+    def triangle(self, observed: ObservedRecord) -> engine.Triangle:
+        """Triangular factor of [J r]; see the engine's."""
+        return engine.triangle(self.instance, observed, self.paths, self.own, moved=self.moved)
 
 
 @lru_cache(maxsize=256)
@@ -106,9 +76,17 @@ def _paths(names: tuple[str, ...]) -> list[str]:
 
 
 def made_ready(
-    parameters: ParameterSet, observed: ObservedRecord, names: Sequence[str], own: Own
+    parameters: ParameterSet,
+    observed: ObservedRecord,
+    columns: Sequence[str] = (),
+    own: Own = NOTHING_OWN,
 ) -> Ready:
-    """The drive's model with its numbers, for some columns."""
+    """The drive's model with its numbers, for some columns.
+
+    These are symbols (``"Z16"`` stands for both directions), columns (``"Z16_plus"``) and
+    ``"start_pressure"``, δP at the first sample, whose value is among the starts of `own`. [Pa]
+    """
+    names = wanted_columns(tuple(columns))
     by_voltage = observed.driven_by == "voltage"
     for each in observed.observations:
         check_output(each.signal)
@@ -134,7 +112,7 @@ def made_ready(
         "start.card.minus": True,
     }
     moved |= {"card": moved["card.plus"] or moved["card.minus"], "start.pump": moved["pump"]}
-    paths = _paths(tuple(names))
+    paths = _paths(names)
     return Ready(
         instance, own._replace(start=start), paths, [moved[p.rpartition(".")[0]] for p in paths]
     )
@@ -191,8 +169,8 @@ class Sensitivities(Result):
         (driver, record), *others = self.records.items()
         beside = {name: each.values for name, each in others}
         observed = every_sample(record, signal, driver, self.start, beside)
-        made = jacobian(self.parameters, observed, self.names).columns
-        return self.found.setdefault(signal, made)
+        made = made_ready(self.parameters, observed, self.names).jacobian(observed)
+        return self.found.setdefault(signal, made.columns)
 
     current_positive = Named()
     """(n, k) derivatives of the positive channel's current. [A/...]"""
