@@ -376,11 +376,10 @@ class Drive(Result):
     ) -> LinearDrive:
         """Linear model of small motions about a steady state, from the exact partial derivatives.
 
-        Refinements count as their equations say of motions that are small enough. Friction is that
-        of presliding, whose memory is a state, ``"spool_deflection"``; damping and the line add
-        their states. The cam ring's ripple counts with the mean of a turn: not at all. Within the
-        solenoids' hysteresis a current moves nothing: only the force, or what is measured beside
-        the command, has a model there.
+        Refinements count: friction as presliding, with the state ``"spool_deflection"``; damping
+        and the line with their states; the cam ring's ripple with its mean over a turn, zero.
+        Within the solenoids' hysteresis a current moves nothing: only the force, or what is
+        measured beside the command, has a model there.
 
         Parameters
         ----------

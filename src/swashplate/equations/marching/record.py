@@ -74,8 +74,7 @@ def on_grid(
         For an empty, non-finite or unsorted record, naming the sample, for more points than anyone
         means, and for options that there are not.
     """
-    check_rate(rate)
-    substeps, between = checked_substeps(substeps), each_between(inputs, interpolation)
+    between, substeps = checked_sampling(inputs, rate, interpolation, substeps)
     data = {name: column(v, f"The {name}") for name, v in inputs.items() if not is_real(v)}
     sizes = {name: samples.size for name, samples in data.items()}
     if len(set(sizes.values())) != 1:
@@ -154,25 +153,21 @@ def check_rate(rate: float) -> None:
         raise InputError(f"The rate is {rate!r} Hz, but must be a number above 0.")
 
 
-def checked_substeps(substeps: int | None) -> int:
-    """Steps a sample, one where none are said."""
+def checked_sampling(
+    names: Iterable[str], rate: float, interpolation: Between, substeps: int | None
+) -> tuple[dict[str, Interpolation | None], int]:
+    """What each input is between two samples, and the steps a sample, one where none are said."""
+    check_rate(rate)
     if substeps is not None and (substeps < 1 or substeps != int(substeps)):
         raise InputError(f"substeps is {substeps!r}, but must be a whole number, at least 1.")
-    return int(substeps or 1)
-
-
-def each_between(
-    names: Iterable[str], interpolation: Between
-) -> Mapping[str, Interpolation | None]:
-    """What each input is between two samples, checked."""
     if isinstance(interpolation, Mapping):
         found = {name: interpolation.get(name) for name in names}
     else:
         found = dict.fromkeys(names, interpolation)
-    for each in found.values():
-        if each not in (None, "linear", "previous"):
-            raise InputError(f"interpolation is '{each}'; it is 'linear' or 'previous'.")
-    return found
+    for way in found.values():
+        if way not in (None, "linear", "previous"):
+            raise InputError(f"interpolation is '{way}'; it is 'linear' or 'previous'.")
+    return found, int(substeps or 1)
 
 
 def column(values: ArrayLike, what: str, *, finite: bool = True) -> Array:

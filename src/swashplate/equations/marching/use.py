@@ -37,9 +37,7 @@ from swashplate.equations.marching.record import (
     Between,
     Record,
     Sampling,
-    check_rate,
-    checked_substeps,
-    each_between,
+    checked_sampling,
     on_grid,
 )
 from swashplate.equations.marching.run import (
@@ -388,10 +386,9 @@ class Stepper(Generic[S]):
         bound: float = np.inf,
     ) -> None:
         check_start(start)
-        check_rate(rate)
-        self._substeps, self._start, self._bound = checked_substeps(substeps), start, bound
+        between, self._substeps = checked_sampling(inputs, rate, interpolation, substeps)
+        self._start, self._bound = start, bound
         self._sample, self.inputs, limits = sample, tuple(inputs), limits_of(instance.model)
-        between = each_between(inputs, interpolation)
         self._held = np.array([between[name] == "previous" for name in inputs])
         self._shown: dict[str, tuple[Stored, int | None]] = {}
         integrals: dict[str, Stored] = {}
