@@ -126,6 +126,24 @@ def test_a_batch_by_current_gives_the_same_bits(hoist: Drive) -> None:
     assert np.array_equal(pumps[0], alone.shaft_speed)
 
 
+def test_stamps_and_a_measured_load_count_everywhere(hoist: Drive) -> None:
+    """In a batch and in derivatives as in a simulation, at the command's stamps."""
+    drive = hoist.replace(**LOAD)
+    given = {"time": np.cumsum(0.003 + 0.001 * np.sin(np.arange(500)))}
+    given |= {"interpolation": "linear", "load_torque": 3e4 * np.sin(np.arange(500) / 60.0)}
+    voltage = 6.0 * np.sin(np.arange(500) / 80.0)
+    ends = [1.02 * drive["Z8"].value, 0.98 * drive["Z8"].value]
+    runs = [drive.replace(Z8=each).simulate(voltage, 256.0, **given) for each in ends]
+    batch = drive.simulate_many({"Z8": ends}, voltage=voltage, rate=256.0, **given)
+    for row, run in zip(batch.output, runs, strict=True):
+        assert np.array_equal(row, run.shaft_speed)
+    still = drive.simulate(voltage, 256.0, **{**given, "load_torque": 0.0})
+    assert np.abs(still.shaft_speed - runs[0].shaft_speed).max() > 0.01
+    by = drive.sensitivities(voltage, 256.0, parameters=["Z8"], **given)["swash_angle"][:, 0]
+    slope = (runs[0].swash_angle - runs[1].swash_angle) / (ends[0] - ends[1])
+    assert np.abs(by - slope).max() < 0.01 * np.abs(by).max()
+
+
 @pytest.mark.parametrize("interpolation", ["linear", "previous"])
 @pytest.mark.parametrize("rate", [49.0, 100.0, 512.0, 1000.0])
 def test_stepper_sub_steps_alike(hoist: Drive, rate: float, interpolation: str) -> None:

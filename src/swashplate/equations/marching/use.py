@@ -1,21 +1,4 @@
-"""A model with numbers in use: simulated, differentiated, one sample at a time.
-
-Examples
---------
->>> class Valve(NamedTuple):
-...     lag: float
-...     gain: float
->>> class Rod(NamedTuple):
-...     opening: float
-...     position: float
->>> @equation
-... def step(state: Rod, command: float, p: Valve, h: float) -> Rod:
-...     opening = state.opening + (1.0 - exp(-h / p.lag)) * (command - state.opening)
-...     return Rod(opening, state.position + h * p.gain * opening)
->>> valve = Model("valve", parameters=Valve, state=Rod, step=step)
->>> run = simulate(valve, Valve(0.05, 0.1), {"command": command}, rate=100.0)
->>> run["position"]
-"""
+"""A model with numbers in use: simulated, differentiated, one sample at a time."""
 
 from __future__ import annotations
 
