@@ -63,6 +63,8 @@ CASES = {
     "no line, physical root": ({**RIPPLE, **LOAD, "swash_damping": 0.02}, "physical root"),
 }
 """Every option of card, pump and refinements, alone or together, and without the line."""
+RICHEST = ("all terms, other forms", "everything", "no line, physical root")
+"""Those that have all options between them; plain drives' residuals are in test_residuals."""
 
 
 @pytest.fixture(params=CASES.values(), ids=CASES.keys())
@@ -105,6 +107,7 @@ def test_side_by_side_gives_the_same_bits(drive: Drive) -> None:
         assert np.array_equal(batch.output[i], one.simulate(voltage).shaft_position)
 
 
+@pytest.mark.parametrize("drive", [CASES[name] for name in RICHEST], ids=RICHEST, indirect=True)
 def test_residuals_carry_the_same_bits(drive: Drive) -> None:
     voltage, seen = command()[:900], ("shaft_speed", "shaft_position", "current")
     time, run = np.arange(900) / 512.0, drive.simulate(voltage)

@@ -26,14 +26,14 @@ from swashplate.errors import FileError, InputError
 from swashplate.executors import Executor, Threads
 from swashplate.parameters.definitions import SWITCHES, columns_of
 from swashplate.parameters.parameter_set import ParameterSet
-from swashplate.parameters.rules import SIDES, broken_rules
+from swashplate.parameters.rules import broken_rules
 from swashplate.results import Result
 from swashplate.simulation.instance import (
     card_options,
     models_of,
     path_of,
     pump_options,
-    step_limit,
+    unstable_filters,
 )
 from swashplate.simulation.result import check_output
 from swashplate.tables import write_table
@@ -171,15 +171,10 @@ def simulate_drives(
     output = cost.output if cost else output
     check_output(output)
     name, failures, exact = parameters.name, dict[int, str](), parameters.rate is None
-    for mask, sentence in broken_rules(numbers):
+    unstable = unstable_filters(numbers, record.step, exact) if by_voltage else ()
+    for mask, sentence in (*broken_rules(numbers), *unstable):
         for i in np.flatnonzero(mask):
             failures.setdefault(int(i), f"{name}: {sentence(int(i))}")
-    why = "swings too fast for" if exact else "is unstable at"
-    for side in SIDES if by_voltage else ():
-        limit = step_limit(numbers[f"zeta_{side}"], exact)
-        said = f"{name}: the current filter of the {side} channel {why} this step."
-        for i in np.flatnonzero(~(numbers[f"omega_{side}"] * record.step < limit)):
-            failures.setdefault(int(i), said)
     sets = _Sets(
         models.drive if by_voltage else models.pump_drive,
         {path_of(column): values for column, values in numbers.items()},

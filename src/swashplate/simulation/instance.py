@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from cmath import log, sqrt
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from functools import lru_cache
 from math import floor
@@ -32,7 +33,9 @@ from swashplate.models.drive import (
 )
 from swashplate.parameters.definitions import OWN
 from swashplate.parameters.parameter_set import ParameterSet
-from swashplate.parameters.rules import SIDES
+from swashplate.parameters.rules import SIDES, Broken
+
+Array = NDArray[np.float64]
 
 MOST_SUBSTEPS = 1000
 """Steps a sample that anyone would wait for."""
@@ -155,12 +158,32 @@ def without_ripple(instance: Instance) -> Instance:
     return Instance(instance.model, (card, smooth), instance.name)
 
 
-def step_limit(zeta: ArrayLike, exact: bool) -> NDArray[np.float64]:
+def step_limit(zeta: ArrayLike, exact: bool) -> Array:
     """Largest ωh that the card's filter bears, for each ζ; see the equation of that name."""
     damping = np.asarray(zeta, dtype=np.float64)
     limit = interpreted(filter_limit)
     found = [limit(each, True if exact else None) for each in damping.reshape(-1).tolist()]
     return np.array(found).reshape(damping.shape)
+
+
+def unstable_filters(numbers: Mapping[str, Array], step: float, exact: bool) -> Iterator[Broken]:
+    """Sets at whose step the filter would settle on wrong values without a word, as rules are."""
+    for side in SIDES:
+        zeta, omega = numbers[f"zeta_{side}"], numbers[f"omega_{side}"]
+        steps = omega * step / step_limit(zeta, exact)
+
+        def sentence(i: int, side: str = side, steps: Array = steps) -> str:
+            zeta, omega = numbers[f"zeta_{side}"][i], numbers[f"omega_{side}"][i]
+            change = "a zeta nearer to 1 or a lower omega"
+            if steps[i] < MOST_SUBSTEPS:
+                change = f"substeps={floor(steps[i]) + 1} or more, a higher rate or a lower omega"
+            return (
+                f"the current filter of the {side} channel (zeta = {zeta:g}, omega = {omega:g} "
+                f"rad/s) {'swings too fast for' if exact else 'is unstable at'} a step of "
+                f"1/{1.0 / step:g} s; simulate with {change}."
+            )
+
+        yield ~(steps < 1.0), sentence
 
 
 @lru_cache(maxsize=256)
@@ -172,20 +195,11 @@ def check_filter_stability(parameters: ParameterSet, step: float) -> None:
     InputError
         Unless ωh is below `step_limit`; the sentence says how many steps a sample would do.
     """
-    numbers, exact = parameters.numbers, parameters.rate is None
-    for side in SIDES:
-        zeta, omega = numbers[f"zeta_{side}"], numbers[f"omega_{side}"]
-        steps = omega * step / float(step_limit(zeta, exact))
-        if steps < 1.0:
-            continue
-        why = "swings too fast for" if exact else "is unstable at"
-        change = "a zeta nearer to 1 or a lower omega"
-        if steps < MOST_SUBSTEPS:
-            change = f"substeps={floor(steps) + 1} or more, a higher rate or a lower omega"
-        raise InputError(
-            f"{parameters.name}: the current filter of the {side} channel (zeta = {zeta:g}, omega "
-            f"= {omega:g} rad/s) {why} a step of 1/{1.0 / step:g} s; simulate with {change}."
-        )
+    names = [f"{name}_{side}" for name in ("zeta", "omega") for side in SIDES]
+    numbers = {name: np.array([parameters.numbers[name]]) for name in names}
+    for broken, sentence in unstable_filters(numbers, step, parameters.rate is None):
+        if broken[0]:
+            raise InputError(f"{parameters.name}: {sentence(0)}")
 
 
 def at_every_rate(parameters: ParameterSet) -> ParameterSet:
