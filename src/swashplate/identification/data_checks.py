@@ -298,10 +298,9 @@ def motions(experiments: Sequence[Experiment], parameters: ParameterSet) -> dict
 
 
 def _simulated(simulation: Simulation, signal: str, time: Array) -> Array:
-    if signal == "current_sum":
-        plus, minus = (simulation.at(time, f"current_{side}") for side in ("positive", "negative"))
-        return plus + minus
-    return simulation.at(time, signal)
+    names = ("current_positive", "current_negative") if signal == "current_sum" else (signal,)
+    found = [np.interp(time, simulation.time, simulation[name]) for name in names]
+    return np.asarray(sum(found[1:], found[0]))
 
 
 def _rms(values: Array) -> float:
