@@ -6,15 +6,13 @@ Each is made once; the terminal, the report's page and the files render it.
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
-from math import isfinite
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from swashplate.errors import InputError
-from swashplate.identification.drive_model import DriveModel
-from swashplate.identification.experiment_design import Advice, Gain, Outlook
-from swashplate.identification.identifiability import GAUGES, SCALES, moved_columns, true_values
+from swashplate.identification.drive_model import DriveModel, true_value
+from swashplate.identification.identifiability import GAUGES
 from swashplate.identification.intervals import Estimate
 from swashplate.identification.setup import ModelParameters
 from swashplate.identification.validation import ignored_windows, pooled, with_speeds
@@ -39,7 +37,6 @@ if TYPE_CHECKING:
     from swashplate.identification.fitting import Fit, StageFit
     from swashplate.identification.resampling import Bootstrap, CrossValidation
     from swashplate.identification.validation import Measures, RunQuality
-    from swashplate.identification.verdict import Verdict
     from swashplate.parameters.parameter_set import ParameterSet
 
 # --- estimates ------------------------------------------------------------------------------------
@@ -67,7 +64,10 @@ def estimates_table(
     """
     stage = assessment.stage
     unknowns = stage.problem.unknowns
-    true = {} if truth is None else true_values(stage, truth)
+    true: dict[str, float | None] = {}
+    if truth is not None:
+        assert isinstance(stage.problem.model, DriveModel)
+        true = {each.name: true_value(each, stage.problem.model, truth) for each in unknowns}
     refitted = None if bootstrap is None else bootstrap.intervals()
     level, quoted = _intervals(assessment)
     ends = f"{100.0 * level:g} %"
@@ -236,11 +236,22 @@ def _why_fixed(parameters: ParameterSet, column: str, symbol: str, moved: set[st
     for gauge in GAUGES:
         fixed = next((each for each in gauge.fix if not _is_moved(each, moved)), None)
         others = [each for each in gauge.moves if each != symbol and _is_moved(each, moved)]
-        if gauge.name in SCALES and fixed == symbol and others:
+        if fixed == symbol and others:
             return f"fixes the {gauge.name}: {gauge.determined}"
     if parameters[symbol].status == "inactive":
         return "inactive: no test reaches it"
     return "0: this effect is left out" if parameters.numbers[column] == 0.0 else ""
+
+
+def moved_columns(fit: Fit) -> set[str]:
+    """Columns of the drive's parameters that some stage moved."""
+    moved: set[str] = set()
+    for each in fit.stages:
+        for unknown in each.problem.unknowns:
+            moved |= set(unknown.targets)
+        if isinstance(each.problem.model, DriveModel) and each.problem.model.forces is not None:
+            moved |= set(each.problem.model.forces.columns)
+    return moved
 
 
 def _is_moved(symbol: str, moved: Collection[str]) -> bool:
@@ -341,44 +352,6 @@ def ignored_words(experiment: Experiment, channel: Channel) -> str:
     return "; ".join(said) or "nothing"
 
 
-def residual_table(qualities: Sequence[RunQuality]) -> Table:
-    """How long residuals stay correlated, and how far they follow the input."""
-    made = Table(
-        "Residuals: correlation with themselves and with the input",
-        (
-            Column("run", wrap=True),
-            Column("role", of="p"),
-            Column("channel"),
-            Column("own", ".2g", "s"),
-            Column("input", "+.2f"),
-            Column(""),
-            Column("95 % band", ".2f"),
-            Column("lag", "+.2f", "s"),
-            Column("verdict", of="p"),
-        ),
-    )
-    for each in qualities:
-        if (test := each.test) is None:
-            continue
-        lag, value = test.peak
-        star = "*" if test.follows else ""
-        run = each.experiment
-        start = (run.name, run.role, each.channel, test.duration, value, star)
-        made.add(*start, test.cross_band, lag, test.verdict)
-    return made
-
-
-def criteria_table(verdict: Verdict) -> Table:
-    """The acceptance criteria, those that are not met first, then those that were not judged."""
-    columns = (Column("criterion", wrap=True), Column("value", "s"), Column("limit", "s"))
-    made = Table("Acceptance criteria", (*columns, Column(""), Column("reason", of="p")))
-    order = ("not met", "not judged", "met")
-    for each in sorted(verdict.criteria, key=lambda each: order.index(each.state)):
-        state = "NOT MET" if each.failure else each.state
-        made.add(each.name, each.value, each.limit, state, each.reason, look=state != "met")
-    return made
-
-
 # --- cross-validation -----------------------------------------------------------------------------
 
 
@@ -415,83 +388,6 @@ def folds_tables(found: CrossValidation, assessments: Sequence[Assessment]) -> l
         )
         folds.add(fold.number + 1, ", ".join(fold.held), state, ", ".join(fits) or NONE)
     return [held_out, folds]
-
-
-# --- information of runs and of tests to come -----------------------------------------------------
-
-_LETTERS = {"most": "#", "some": "+", "none": "."}
-
-
-def outlook_table(look: Outlook, runs: Sequence[str]) -> Table:
-    """What runs can tell of each unknown of a stage, one letter a run; in a file their shares."""
-    made = Table(
-        f"Stage {look.stage.name}",
-        (
-            Column("stage", of="f"),
-            Column("parameter"),
-            Column("needs", wrap=True),
-            Column("effect", ".3g"),
-            Column("runs"),
-            *(Column(run, ".6g", of="f") for run in runs),
-        ),
-    )
-    for name in look.names:
-        letters = {run: _LETTERS[m] for run, m in zip(look.runs, look.marks(name), strict=True)}
-        marks = "".join(letters.get(run, "-") for run in runs)
-        shares = look.shares[:, look.linearised.variables.index(name)]
-        parts = {run: float(share) for run, share in zip(look.runs, shares, strict=True)}
-        cells = (look.need(name), look.effect(name), marks)
-        made.add(look.stage.name, name, *cells, *(parts.get(run) for run in runs))
-    return made
-
-
-NAMED = 4
-"""Unknowns that a row of advice names."""
-WORTH = 1e-3
-"""Relative gain below which none is shown."""
-
-
-def advice_table(title: str, judged: Sequence[Advice]) -> Table:
-    """Tests in the order given, what each would tell, and in a file all errors with it."""
-    new = any(each.newly_determined for each in judged)
-    made = Table(
-        title,
-        (
-            Column("test", wrap=not new),
-            Column("s", "g"),
-            Column("first to determine", wrap=True, of="tpf" if new else ""),
-            Column("gains most"),
-            Column("better", "s"),
-            *(Column(f"error of {gain.name}", ".6g", of="f") for gain in judged[0].gains),
-        ),
-    )
-    for each in judged:
-        first = ", ".join(each.newly_determined[:NAMED])
-        more = len(each.newly_determined) - NAMED
-        first = f"{first} + {more}" if more > 0 else first
-        best, times = each.best, f"{each.d_gain:.2f}x" if each.d_gain > 1.0 + WORTH else ""
-        gained = (
-            "" if best is None else f"{best.name} {_error(best.before)} to {_error(best.after)}"
-        )
-        errors = (gain.after if isfinite(gain.after) else None for gain in each.gains)
-        made.add(each.candidate, each.duration, first, gained, times, *errors)
-    return made
-
-
-def best_tests_table(gains: Sequence[Gain], best: Mapping[str, tuple[str, Gain]]) -> Table:
-    """What is known of each unknown, and which test would tell most of it."""
-    errors = (Column("error now", "s"), Column("then", "s"))
-    made = Table(
-        "For each parameter", (Column("parameter"), *errors, Column("best test", wrap=True))
-    )
-    for gain in gains:
-        test, after = best.get(gain.name, ("no further information", gain))
-        made.add(gain.name, _error(gain.before), _error(after.after), test)
-    return made
-
-
-def _error(error: float) -> str:
-    return f"{100.0 * error:.2g} %" if error <= 1.0 else "-"
 
 
 # --- sentences ------------------------------------------------------------------------------------
