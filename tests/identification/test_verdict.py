@@ -166,8 +166,8 @@ def test_wide_intervals_ask_for_attention(stage) -> None:
     # gain and lag are known to about a per cent
     assert not any("not determined" in each for each in verdict([assessment], []).sentences)
     known = assessment.uncertainty
-    quoted = replace(known.quoted, matrix=1e6 * known.quoted.matrix)
-    vars(assessment)["uncertainty"] = replace(known, quoted=quoted)
+    own = replace(known.own, matrix=1e6 * known.own.matrix)
+    vars(assessment)["uncertainty"] = replace(known, own=own)
     wide = verdict([assessment], []).sentences
     assert "rise: not determined to within ±10 %: gain and lag." in wide
 

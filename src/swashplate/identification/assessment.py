@@ -105,7 +105,7 @@ class Assessment(Result):
         found = replace(found, priors=prior_sentences(problem.unknowns, vector, found.quoted))
         if not found.noisy:
             return found
-        half, fit = reach(found.own, found.level), released(self.linearised)
+        half, fit = reach(found.own), released(self.linearised)
         first = [each.targets[0].startswith(tuple(LIMITS)) for each in problem.unknowns]
         ends = checked_ends(problem, vector, fit, half, np.flatnonzero(first).tolist())
         return replace(found, ends=tuple(ends))
