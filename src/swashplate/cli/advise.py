@@ -117,7 +117,6 @@ def advise(
     from swashplate.drive import Drive
     from swashplate.identification.experiment_design import (
         advice_table,
-        best_for_each,
         best_tests_table,
         default_maneuvers,
         in_turn,
@@ -137,10 +136,11 @@ def advise(
     show(advice_table("Tests", ranked[:top]))
     if plan:
         show(advice_table("A plan, each test chosen in addition to those before it", plan))
-        undetermined = [gain.name for gain in plan[-1].gains if not gain.after <= 1.0]
+        errors = zip(plan[-1].names, plan[-1].after, strict=True)
+        undetermined = [name for name, error in errors if not error <= 1.0]
         if undetermined:
             say(f"- After these, {', '.join(undetermined)} would still not be known to 100 %.")
-    show(best_tests_table(ranked[0].gains, best_for_each(ranked)))
+    show(best_tests_table(ranked))
     for sensor in bench.sensors:
         note(_described(sensor))
     say(

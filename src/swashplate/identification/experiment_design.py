@@ -6,7 +6,7 @@ and `advise` rank tests to come by what they would add.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from math import inf
@@ -375,52 +375,34 @@ class Candidate(NamedTuple):
     """How long it takes, if that is to count. [s]"""
 
 
-class Gain(NamedTuple):
-    """What a candidate would do for one unknown."""
-
-    name: str
-    before: float
-    """Standard error of the solver's number now; inf if undetermined."""
-    after: float
-    """And with the candidate."""
-
-    @property
-    def ratio(self) -> float:
-        """After over before: 1 is no gain, 0 determines what was not."""
-        if self.before == self.after:
-            return 1.0
-        return 0.0 if self.before == inf else self.after / self.before
-
-
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Advice(Result):
     """One candidate, judged."""
 
     candidate: str
-    gains: tuple[Gain, ...]
-    """For each free unknown."""
+    duration: float | None
+    names: tuple[str, ...]
+    """Free unknowns."""
+    before: Array
+    """(k,) standard errors of the solver's numbers now; inf if undetermined."""
+    after: Array
+    """(k,) and with the candidate."""
     ranks: int
     """How many more combinations would be determined."""
     d_gain: float
     """Mean factor by which standard errors shrink along the directions determined already
     (D-criterion), 1 is none."""
-    duration: float | None
 
     @property
     def newly_determined(self) -> tuple[str, ...]:
         """Unknowns whose standard error it would be the first to bring below 100 %."""
-        return tuple(each.name for each in self.gains if each.after <= KNOWN < each.before)
+        new = (self.after <= KNOWN) & (self.before > KNOWN)
+        return tuple(name for name, first in zip(self.names, new, strict=True) if first)
 
     @property
     def rank(self) -> tuple[int, int, float]:
         """Least for the best: unknowns newly determined, combinations, D-gain."""
         return -len(self.newly_determined), -self.ranks, -self.d_gain
-
-    @property
-    def best(self) -> Gain | None:
-        """The unknown that gains most, of those that are then known to better than 100 %."""
-        known = [gain for gain in self.gains if gain.after <= KNOWN]
-        return min(known, key=lambda gain: gain.ratio) if known else None
 
 
 def advise(
@@ -456,19 +438,19 @@ def advise(
                 f"{name}: derivatives by {variables.count} parameters are so many columns of "
                 f"finite numbers, not {rows.shape}."
             )
-    free, names, made = variables.free, variables.names, []
+    free, made = variables.free, []
+    names = tuple(variables.names[k] for k in np.flatnonzero(free))
     now, known_now = whitening(present, free, TOLERANCE)
     before = np.where(known_now, np.linalg.norm(now, axis=1), inf)
     for each in candidates:
         then, known = whitening(np.vstack([present, each.derivatives]), free, TOLERANCE)
         after = np.minimum(np.where(known, np.linalg.norm(then, axis=1), inf), before)
-        gains = [Gain(names[k], float(before[k]), float(after[k])) for k in np.flatnonzero(free)]
         # errors then along the directions known now, in which they are 1 and independent now
         along = (present @ now).T @ (present @ then)
         shrinking = -np.linalg.slogdet(along @ along.T)[1]
         d_gain = float(np.exp(0.5 * shrinking / max(now.shape[1], 1)))
-        ranks = then.shape[1] - now.shape[1]
-        made.append(Advice(each.name, tuple(gains), ranks, d_gain, each.duration))
+        errors, ranks = (before[free], after[free]), then.shape[1] - now.shape[1]
+        made.append(Advice(each.name, each.duration, names, *errors, ranks, d_gain))
     return tuple(sorted(made, key=lambda each: each.rank))
 
 
@@ -490,17 +472,16 @@ def in_turn(
     return tuple(chosen)
 
 
-def best_for_each(judged: Sequence[Advice]) -> dict[str, tuple[str, Gain]]:
-    """For each unknown the candidate after which its standard error is least, and the gain.
+def best_for_each(judged: Sequence[Advice]) -> dict[str, Advice]:
+    """For each unknown the candidate after which its standard error is least.
 
     Unknowns that none would tell more of are left out.
     """
-    best: dict[str, tuple[str, Gain]] = {}
-    for advice in judged:
-        for gain in advice.gains:
-            least = best[gain.name][1].after if gain.name in best else inf
-            if gain.ratio < 1.0 - WORTH and gain.after < least:
-                best[gain.name] = (advice.candidate, gain)
+    best = {}
+    for k, name in enumerate(judged[0].names):
+        least = min(judged, key=lambda each, k=k: each.after[k])
+        if least.after[k] < (1.0 - WORTH) * least.before[k]:
+            best[name] = least
     return best
 
 
@@ -532,27 +513,40 @@ def advice_table(title: str, judged: Sequence[Advice]) -> Table:
             Column("first to determine", wrap=True, of="tpf" if new else ""),
             Column("gains most"),
             Column("better", "s"),
-            *(Column(f"error of {gain.name}", ".6g", of="f") for gain in judged[0].gains),
+            *(Column(f"error of {name}", ".6g", of="f") for name in judged[0].names),
         ),
     )
     for each in judged:
-        first = ", ".join(each.newly_determined[:NAMED])
-        more = len(each.newly_determined) - NAMED
-        first = f"{first} + {more}" if more > 0 else first
-        best, times = each.best, f"{each.d_gain:.2f}x" if each.d_gain > 1.0 + WORTH else ""
-        gained = f"{best.name} {_error(best.before)} to {_error(best.after)}" if best else ""
-        errors = (gain.after if gain.after < inf else None for gain in each.gains)
-        made.add(each.candidate, each.duration, first, gained, times, *errors)
+        first, more = each.newly_determined[:NAMED], len(each.newly_determined) - NAMED
+        # the unknown whose error shrinks most, of those that are then known
+        pairs = zip(each.names, each.before.tolist(), each.after.tolist(), strict=True)
+        known = [pair for pair in pairs if pair[2] <= KNOWN]
+        gained = ""
+        if known:
+            name, now, then = min(known, key=lambda pair: pair[2] / pair[1])
+            gained = f"{name} {_error(now)} to {_error(then)}"
+        made.add(
+            each.candidate,
+            each.duration,
+            ", ".join(first) + (f" + {more}" if more > 0 else ""),
+            gained,
+            f"{each.d_gain:.2f}x" if each.d_gain > 1.0 + WORTH else "",
+            *(error if error < inf else None for error in each.after.tolist()),
+        )
     return made
 
 
-def best_tests_table(gains: Sequence[Gain], best: Mapping[str, tuple[str, Gain]]) -> Table:
+def best_tests_table(judged: Sequence[Advice]) -> Table:
     """What is known of each unknown, and which test would tell most of it."""
     columns = (Column("parameter"), Column("error now", "s"), Column("then", "s"))
     made = Table("For each parameter", (*columns, Column("best test", wrap=True)))
-    for gain in gains:
-        test, after = best.get(gain.name, ("no further information", gain))
-        made.add(gain.name, _error(gain.before), _error(after.after), test)
+    best = best_for_each(judged)
+    for k, name in enumerate(judged[0].names):
+        found, now = best.get(name), judged[0].before[k]
+        then, test = (now, "no further information")
+        if found is not None:
+            then, test = found.after[k], found.candidate
+        made.add(name, _error(now), _error(then), test)
     return made
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from math import inf, log
@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swashplate.identification.drive_model import DriveModel
+from swashplate.identification.model import Model
 from swashplate.identification.model import linearised as linearised_model
 from swashplate.identification.noise import (
     Covariance,
@@ -158,6 +159,14 @@ class Handed(NamedTuple):
     """(K, K_earlier) by how much the later stage's vector follows the earlier one's."""
 
 
+def follows_card(stage: StageFit, earlier: StageFit) -> bool:
+    """Whether a stage takes the current from the card that an earlier one estimated."""
+    model, voltage = stage.problem.model, [e.input.kind for e in stage.problem.experiments]
+    driven = stage.stage.current == "simulated" and "voltage" in voltage
+    pump = isinstance(model, DriveModel) and model.part == "pump"
+    return pump and driven and earlier.stage.part == "card"
+
+
 def slopes_by_earlier(
     stage: StageFit, earlier: StageFit, linearised: LinearisedFit
 ) -> Array | None:
@@ -184,10 +193,7 @@ def slopes_by_earlier(
     second step of a two-step estimate (Murphy and Topel 1985). Gauss-Newton's approximation, as
     everywhere here: second derivatives times residuals are left out.
     """
-    model = stage.problem.model
-    if not isinstance(model, DriveModel) or model.part != "pump" or earlier.stage.part != "card":
-        return None
-    if not any(_driven_by_card(stage, each) for each in stage.problem.experiments):
+    if not follows_card(stage, earlier):
         return None
     unknowns, vector = earlier.problem.unknowns, earlier.solution.vector
     names = [name for each in unknowns if each.run is None for name in each.targets]
@@ -204,9 +210,20 @@ def slopes_by_fixed(stage: StageFit, linearised: LinearisedFit) -> Array:
     return _slopes(stage, linearised, names, deviations)
 
 
-def _driven_by_card(stage: StageFit, experiment: Experiment) -> bool:
-    """Whether the pump is driven by what the card makes of a voltage."""
-    return stage.stage.current == "simulated" and experiment.input.kind == "voltage"
+def source_of(stage: StageFit) -> Callable[[Experiment], Model]:
+    """The model that makes a run of a stage from its input, at the estimates.
+
+    That is the whole chain where the pump is driven by what the card makes of a voltage.
+    """
+    model = stage.problem.model
+    if not isinstance(model, DriveModel):
+        return lambda experiment: model
+    own, chain = (
+        DriveModel(stage.drive.parameters, part, model.currents, model.forces)
+        for part in (model.part, "chain")
+    )
+    by_card = model.part == "pump" and stage.stage.current == "simulated"
+    return lambda run: chain if by_card and run.input.kind == "voltage" else own
 
 
 def _slopes(stage: StageFit, linearised: LinearisedFit, names: Sequence[str], by: Array) -> Array:
@@ -215,20 +232,11 @@ def _slopes(stage: StageFit, linearised: LinearisedFit, names: Sequence[str], by
     `names` are those of the numbers, in the model; `by` (len(names), F) their own derivatives.
     """
     problem, vector = stage.problem, stage.solution.vector
-    model, machine = problem.model, dict(problem.unknowns.targets(vector, ""))
-    chain = model
-    if isinstance(model, DriveModel) and model.part == "pump":
-        chain = DriveModel(model.parameters_at(machine), "chain")
-    products = np.zeros((linearised.rank, by.shape[1]))
+    products, source = np.zeros((linearised.rank, by.shape[1])), source_of(stage)
     rows = {(run.name, run.channel): run for run in linearised.runs}
     for number, experiment in enumerate(problem.experiments):
-        if chain is model or not _driven_by_card(stage, experiment):
-            values = problem.model_values(vector, number)
-            moved = linearised_model(model, values, experiment, names)
-        else:
-            values = problem.unknowns.targets(vector, experiment.name)
-            own = {name: value for name, value in values.items() if name not in machine}
-            moved = linearised_model(chain, own, experiment, names)
+        values = problem.model_values(vector, number)
+        moved = linearised_model(source(experiment), values, experiment, names)
         for name, weight in problem.weights[number].items():
             used = weight > 0.0
             if used.any():

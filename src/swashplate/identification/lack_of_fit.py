@@ -14,6 +14,7 @@ from swashplate.campaign.experiment import Channel, Experiment
 from swashplate.identification import faults
 from swashplate.identification.drive_model import DriveModel
 from swashplate.identification.faults import FIXED, SAME_DIRECTION, Fault, Kind, measurement_error
+from swashplate.identification.intervals import follows_card, source_of
 from swashplate.identification.model import Model, linearised
 from swashplate.identification.problem import TOLERANCE, triangular_factor
 from swashplate.parameters.definitions import CATALOGUE, COLUMNS, columns_of
@@ -203,24 +204,21 @@ def lack_of_fit(assessments: Sequence[Assessment]) -> LackOfFit:
 def _blocks(assessment: Assessment, assessments: Sequence[Assessment]) -> Iterator[_Block]:
     """One for each channel of each run of a stage: by its own and earlier estimates, by faults."""
     stage, problem = assessment.stage, assessment.stage.problem
-    vector, numbers, model = stage.solution.vector, stage.parameters.numbers, problem.model
-    earlier: list[Assessment] = []
+    vector, numbers, source = stage.solution.vector, stage.parameters.numbers, source_of(stage)
+    before = assessments[: assessments.index(assessment)]
+    earlier = [each for each in before if follows_card(stage, each.stage)]
     fixed = [name for together in problem.uncertain for name in together]
-    if isinstance(model, DriveModel):
-        part, voltages = model.part, all(e.input.kind == "voltage" for e in problem.experiments)
-        if part == "pump" and stage.stage.current == "simulated" and voltages:
-            part, before = "chain", assessments[: assessments.index(assessment)]
-            earlier = [each for each in before if each.stage.stage.part == "card"]
-        model = DriveModel(stage.drive.parameters, part, model.currents, model.forces)
-        fixed = _constants(numbers, part, assessments)
+    if isinstance(problem.model, DriveModel):
+        sources = [source(each) for each in problem.experiments]
+        parts = {each.part for each in sources if isinstance(each, DriveModel)}
+        fixed = _constants(numbers, "chain" if "chain" in parts else parts.pop(), assessments)
     runs = {(run.name, run.channel): run for run in assessment.linearised.runs}
     noise, free = _noise_units(assessment), assessment.linearised.variables.free
     fastest = {name: faults.fastest(name, problem.experiments) for name in problem.channels}
     for number, experiment in enumerate(problem.experiments):
-        outputs = problem.outputs(vector, number)
-        others = _by_others(
-            model, problem.model_values(vector, number), experiment, numbers, fixed, earlier
-        )
+        outputs, model = problem.outputs(vector, number), source(experiment)
+        values = problem.model_values(vector, number)
+        others = _by_others(model, values, experiment, numbers, fixed, earlier)
         targets = problem.unknowns.targets(vector, experiment.name)
         commanded = faults.of_command(model, targets, experiment)
         place = number / max(len(problem.experiments) - 1, 1) - 0.5

@@ -427,11 +427,12 @@ def without_lines(fit: LinearisedFit) -> tuple[LinearisedFit, tuple[SpectralLine
         whole = sum(float(np.sum(unweighted(runs[k]) ** 2)) for k in alike)
         members = [k for k in alike if runs[k].time.size >= FEWEST]
         left = {k: unweighted(runs[k]) for k in members}
-        grids = {k: grid_of(runs[k].time) for k in members}
-        for frequency in _frequencies([*left.values()], [*grids.values()]):
+        grids = [grid_of(runs[k].time) for k in members]
+        for frequency in _frequencies([*left.values()], grids):
             taken = 0.0
             for k in members:
-                waves = _waves(frequency, runs[k].time, grids[k])
+                turn = 2.0 * np.pi * frequency * runs[k].time
+                waves = np.stack([np.cos(turn), np.sin(turn)])
                 products = waves @ left[k]
                 amplitudes = np.linalg.solve(waves @ waves.T, products)
                 left[k] = left[k] - amplitudes @ waves
@@ -441,19 +442,6 @@ def without_lines(fit: LinearisedFit) -> tuple[LinearisedFit, tuple[SpectralLine
             weight = runs[k].weight
             runs[k] = runs[k]._replace(residual=left[k] if weight is None else weight * left[k])
     return (replace(fit, runs=tuple(runs)) if found else fit), tuple(found)
-
-
-def _waves(frequency: float, time: Array, grid: Grid) -> Array:
-    """(2, n) cosine and sine of a frequency at a run's stamps."""
-    turn = 2.0 * np.pi * frequency
-    if np.abs(time - time[0] - grid.step * grid.places).max() > 1e-9 * grid.step:
-        return np.stack([np.cos(turn * time), np.sin(turn * time)])
-    # on an even grid from products of few: cosines and sines take most of the time
-    few = int(np.sqrt(grid.size)) + 1
-    steps = grid.step * np.arange(few)
-    coarse, fine = np.exp(1j * turn * (time[0] + few * steps)), np.exp(1j * turn * steps)
-    waves = np.outer(coarse, fine).ravel()[grid.places]
-    return np.stack([waves.real, waves.imag])
 
 
 def line_sentences(lines: Sequence[SpectralLine]) -> tuple[str, ...]:

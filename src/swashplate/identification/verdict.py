@@ -36,27 +36,24 @@ if TYPE_CHECKING:
 
 Grade = Literal["Usable", "Usable for prediction", "Not usable"]
 
-POOR = 0.5
-"""NRMSE from which a drive is not usable: a constant gain does better on a step's record."""
-SERIOUS = 0.2
-"""NRMSE below which held-out runs that are simulated less well than fitted ones are still of use:
-80 % of the movement is followed, about what Kruse (2001) reached on his worst kind of test."""
+POOR, SERIOUS = 0.5, 0.2
+"""NRMSE from which a drive is not usable, as a constant gain does better on a step's record; and
+below which held-out runs that are simulated less well than fitted ones are still of use: 80 % of
+the movement is followed, about what Kruse (2001) reached on his worst kind of test."""
 CARRIES_OVER, FAR = 1.5, 3.0
 """Factors on the fitted runs' RMSE: up to the first held-out runs count as simulated alike, as
 maneuvers differ that much among the fitted ones; from twice that the fit does not carry over."""
-REQUIRED = 0.10
-"""Largest error of held-out runs over their range, where the user requires nothing else."""
-MOST = 0.5
-"""Share of parameters without a value of their own from which a fit has found nothing."""
+REQUIRED, MOST = 0.10, 0.5
+"""Largest error of held-out runs over their range, where the user requires nothing else; share of
+parameters without a value of their own from which a fit has found nothing."""
 MOVES, STANDS_OUT = 0.05, 5.0
 """A run that moves by less than this part of the channel's movement is not judged by itself; where
 the measurement error is known, by less than five times that beyond the range of the noise alone."""
-MISFIT = 1.2
+MISFIT, MODEL_ERROR = 1.2, 0.01
 """Residuals over their known measurement error from which there is lack of fit: 37 of 39 sound
-campaigns of slew lay between 0.97 and 1.02; in two the search ended in another optimum."""
-MODEL_ERROR = 0.01
-"""Error of held-out runs over their range from which lack of fit rules out prediction: what is
-wrong is not small on known maneuvers, and larger on others."""
+campaigns of slew lay between 0.97 and 1.02, in two the search ended in another optimum; and the
+error of held-out runs over their range from which it rules out prediction, as what is wrong is not
+small on known maneuvers and larger on others."""
 DRIFTS, DRIFTS_AWAY = 0.01, 0.03
 """Change of a channel over the campaign from which values are those of a mean machine, and from
 which no one set of parameters holds."""
@@ -538,8 +535,6 @@ def _remarks(
     for name, found in (fitted.measures or out.measures).items():
         if found.nrmse is None:
             yield f"{name}: the measured signal never moves, so nothing can be judged."
-    if assessments and not out.qualities:
-        yield "No run was held out: the prediction of other tests was not checked."
     for name, (ratio, _) in _ratios(fitted, out).items():
         if ratio > CARRIES_OVER:
             yield (
@@ -550,10 +545,7 @@ def _remarks(
         if wide := weak_unknowns(each):
             name = each.stage.stage.name
             yield f"{name}: not determined to within ±{percent(WIDE)}: {listed(wide)}."
-    if misfit is not None:
-        if misfit.likely and any(ratio > MISFIT for ratio in misfit.ratios.values()):
-            yield f"Likely cause of the lack of fit: {misfit.likely}."
-        yield from misfit.clipped
+    yield from misfit.clipped if misfit is not None else ()
     for name in dict.fromkeys(each.channel for each in own):
         tests, related = following(own, name)
         if related:
