@@ -319,7 +319,6 @@ def judge_fit(
         if name != "all" and name not in known:
             machine = ", ".join(each for each in known if "(" not in each)
             raise InputError(f"There is no parameter '{name}'; there are {machine}.")
-    refits = {"executor": executor, "seed": seed}
     validated = bootstraps = None
     if folds:
         validated = cross_validate(
@@ -329,14 +328,16 @@ def judge_fit(
             folds=folds,
             loss=loss,
             watch=lambda _, done: watch(f"{done} of {folds} folds"),
-            **refits,
+            executor=executor,
+            seed=seed,
         )
     if bootstrap:
         bootstraps = bootstraps_of(
             assessments,
             bootstrap,
             watch=lambda done: watch(f"{done} of {bootstrap} fits to new noise"),
-            **refits,
+            executor=executor,
+            seed=seed,
         )
     made = []
     for each in assessments if profiles else ():

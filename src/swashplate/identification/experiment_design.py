@@ -479,7 +479,7 @@ def best_for_each(judged: Sequence[Advice]) -> dict[str, Advice]:
     """
     best = {}
     for k, name in enumerate(judged[0].names):
-        least = min(judged, key=lambda each, k=k: each.after[k])
+        least = judged[int(np.argmin([each.after[k] for each in judged]))]
         if least.after[k] < (1.0 - WORTH) * least.before[k]:
             best[name] = least
     return best

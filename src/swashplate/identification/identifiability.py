@@ -267,7 +267,11 @@ def identifiability(
     places = np.flatnonzero(moving)
 
     def direction(
-        moved: Array, places: Array, place: int, gauge: Gauge | None = None, half: float = inf
+        moved: Array,
+        places: NDArray[np.intp],
+        place: int,
+        gauge: Gauge | None = None,
+        half: float = inf,
     ) -> Direction:
         """From changes (k,) of some of the solver's numbers, one of which is to be fixed."""
         # a short column needs a large change for the same effect: judged by effect, not by size

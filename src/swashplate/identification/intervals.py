@@ -87,7 +87,8 @@ def reach(covariance: Covariance) -> Array:
 
     known = covariance.determined & covariance.variables.free
     quantiles = stdtrit(covariance.degrees_of_freedom, 0.5 + 0.5 * LEVEL)
-    return quantiles * np.where(known, covariance.standard_errors, 0.0)
+    half: Array = quantiles * np.where(known, covariance.standard_errors, 0.0)
+    return half
 
 
 def estimates(
@@ -470,8 +471,8 @@ def open_unknowns(assessment: Assessment, experiments: Iterable[Experiment]) -> 
     lengths[lengths == 0.0] = 1.0
     # directions that the fitted runs determine, in units of their effect there
     told = np.linalg.qr(lengths[:, None] * fit.whitening)[0]
-    part = "card" if model.part == "card" else "chain"
-    chain = DriveModel(stage.drive.parameters, part, forces=model.forces)
+    chain = DriveModel(stage.drive.parameters, "card" if model.part == "card" else "chain")
+    chain = replace(chain, forces=model.forces)
     targets = [t for u in unknowns if u.run is None for t in u.targets]
     values = {t: v for t, v in unknowns.targets(vector, "").items() if t in targets}
     by_name = unknowns.chain(vector, targets, "")

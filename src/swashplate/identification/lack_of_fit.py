@@ -237,9 +237,12 @@ def _blocks(assessment: Assessment, assessments: Sequence[Assessment]) -> Iterat
             for together in problem.uncertain:
                 known = [each for each in together if (CONSTANT, each) in columns]
                 if known:
-                    columns[ESTIMATE, f"{UNCERTAIN}{', '.join(known)}"] = sum(
-                        columns.pop((CONSTANT, each)) * (together[each] / abs(numbers[each]))
-                        for each in known
+                    columns[ESTIMATE, f"{UNCERTAIN}{', '.join(known)}"] = np.sum(
+                        [
+                            columns.pop((CONSTANT, c)) * (together[c] / abs(numbers[c]))
+                            for c in known
+                        ],
+                        axis=0,
                     )
             effects = faults.of_instrument(experiment, name, outputs[name], place, fastest[name])
             effects |= commanded.get(name, {})
