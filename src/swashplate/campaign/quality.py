@@ -198,9 +198,13 @@ def _moves_against(drive: InputSignal, channel: Channel) -> bool:
         middle, motion = time, values
     else:
         return False
-    driven = drive.at(middle) - drive.values[0]
-    scale = float(np.std(driven) * np.std(motion))
-    return scale > 0.0 and float(np.mean(driven * motion)) < -0.5 * scale
+    return turned(drive.at(middle) - drive.values[0], motion)
+
+
+def turned(driven: Array, motion: Array) -> bool:
+    """Whether a motion (n,) goes against what it should be (n,), both about zero: clearly so."""
+    size = float(np.linalg.norm(driven) * np.linalg.norm(motion))
+    return float(driven @ motion) < -0.5 * size
 
 
 # --- currents with and without a sign -------------------------------------------------------------
