@@ -87,7 +87,7 @@ def test_rows_and_cells_are_lost() -> None:
         ({"jitter": -1.0}, "jitter must be 0 or more, not -1."),
         ({"dither": float("nan")}, "dither must be finite, not nan."),
         ({"lost_rows": 2.0}, "lost_rows must be a share, at most 1, not 2."),
-        ({"full_current": 0.0}, "full_current must be positive, not 0."),
+        ({"dither_frequency": 0.0}, "dither_frequency must be positive, not 0."),
     ],
 )
 def test_impossible_instruments_are_refused(change: dict[str, float], sentence: str) -> None:
