@@ -139,6 +139,26 @@ def test_a_spike_is_found_with_the_line_that_leaves_it_out(tmp_path: Path) -> No
     assert quality.high < 1.0
 
 
+def test_a_spike_of_the_command_is_found_and_left_out(tmp_path: Path) -> None:
+    command = SINE + np.random.default_rng(4).normal(0.0, 0.002, TIME.size)
+    command[900] = -9.0
+    log = write(tmp_path, "log.csv", time=TIME, voltage=command, speed=lagged(SINE))
+    tests = drafted(tmp_path, log)
+    (said,) = findings(tests)
+    assert said.startswith("1 spike, up to -9 V: leave out with axes.drive.input.ignore = ")
+    line = said.removeprefix("1 spike, up to -9 V: leave out with ").removesuffix(" in this run")
+    tests.path.write_text(tests.path.read_text("utf-8") + line + "\n", "utf-8")
+    mended = Campaign.from_toml(tests.path)
+    assert findings(mended) == []
+    assert mended["log"].input.at(TIME[900:901]) == pytest.approx(command[899:900])
+
+
+def test_a_tap_of_the_command_is_no_spike(tmp_path: Path) -> None:
+    command = 5.0 * ((TIME > 1.0) & (TIME < 1.019)) - 3.0 * (TIME > 4.0)
+    log = write(tmp_path, "log.csv", time=TIME, voltage=command, speed=lagged(command))
+    assert findings(drafted(tmp_path, log)) == []
+
+
 def test_a_drop_out_while_the_command_stands_still_is_a_spike(tmp_path: Path) -> None:
     speed = lagged(BOTH) + np.random.default_rng(1).normal(0.0, 0.01, TIME.size)
     speed[500] = 0.0

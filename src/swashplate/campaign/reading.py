@@ -131,6 +131,8 @@ def _samples(
     if time.size != numbers.size:
         raise FileError(f"{said} has {numbers.size} samples, but its time {time.size}.")
     kept = np.ones(numbers.size, dtype=np.bool_) if span is None else inside(span, time)
+    for window in signal.ignore if isinstance(signal, schema.Input) else ():
+        kept &= ~inside(window, time)
     missing = kept & ~np.isfinite(numbers)
     if missing.any() and signal.missing == "refuse":
         rows = np.flatnonzero(missing) + 1 + columns.log.first
