@@ -13,8 +13,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from swashplate.campaign.campaign import read_run
 from swashplate.campaign.quality import has_sign
+from swashplate.campaign.reading import read_run
 from swashplate.campaign.recognition import recognise
 from swashplate.campaign.samples import rolls_over_at
 from swashplate.campaign.schema import (
