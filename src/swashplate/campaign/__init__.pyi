@@ -16,10 +16,10 @@ from .quality import Quality as Quality
 from .quality import beyond_the_card as beyond_the_card
 from .quality import campaign_findings as campaign_findings
 from .quality import examine as examine
-from .quality import goes_against as goes_against
 from .quality import quality_table as quality_table
 from .quality import spiked as spiked
 from .quality import spikes as spikes
+from .quality import turned as turned
 from .quality import unsigned_currents as unsigned_currents
 from .recognition import Recognised as Recognised
 from .recognition import recognise as recognise

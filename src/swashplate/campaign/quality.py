@@ -178,20 +178,20 @@ def _of_channel(experiment: Experiment, channel: Channel, signed: bool) -> Itera
     directed = ("signed_current", "shaft_speed", "swash_angle", "spool_position")
     driven = drive.at(at) - drive.values[0]
     directional = signed and (channel.is_position or channel.kind in directed)
-    if directional and goes_against(motion, driven):
+    if directional and turned(driven, motion):
         yield "moves against the input: should its sign be -1?"
     if outside := int(np.count_nonzero((time < drive.time[0]) | (time > drive.time[-1]))):
         lie = _counted(outside, "sample lies", "samples lie")
         yield f"{lie} before or after the input's record"
 
 
-def goes_against(signal: Array, other: Array) -> bool:
-    """Whether one signal (n,) goes down where another (n,) goes up, in any units.
+def turned(driven: Array, motion: Array) -> bool:
+    """Whether a motion (n,) goes against what it should be (n,), in any units, both about zero.
 
-    Their correlation about zero is below -0.5.
+    Their correlation is below -0.5.
     """
-    size = float(np.linalg.norm(signal) * np.linalg.norm(other))
-    return float(signal @ other) < -AGAINST * size
+    size = float(np.linalg.norm(driven) * np.linalg.norm(motion))
+    return float(driven @ motion) < -AGAINST * size
 
 
 # --- currents with and without a sign -------------------------------------------------------------
