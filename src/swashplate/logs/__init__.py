@@ -6,6 +6,7 @@ SI. A file that is damaged or hostile ends in one sentence, and nothing half-rea
 
 from swashplate.logs.apart import LONG as LONG
 from swashplate.logs.apart import in_parts as in_parts
+from swashplate.logs.dialect import TextOptions as TextOptions
 from swashplate.logs.log import SUFFIXES as SUFFIXES
 from swashplate.logs.log import Column as Column
 from swashplate.logs.log import Log as Log
@@ -15,4 +16,3 @@ from swashplate.logs.log import check_stamps as check_stamps
 from swashplate.logs.log import open_log as open_log
 from swashplate.logs.log import read_series as read_series
 from swashplate.logs.log import unit_of as unit_of
-from swashplate.logs.text import TextOptions as TextOptions

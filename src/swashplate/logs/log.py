@@ -15,7 +15,7 @@ from swashplate.errors import FileError, InputError
 from swashplate.units import scaling, speed_unit, to_si
 
 if TYPE_CHECKING:
-    from swashplate.logs.text import TextOptions
+    from swashplate.logs.dialect import TextOptions
 
 Array = NDArray[np.float64]
 
