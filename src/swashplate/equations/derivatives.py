@@ -40,7 +40,7 @@ def declared(function: Any) -> Callable[[F], F]:
     """
 
     def decorate(rule: F) -> F:
-        parsed(rule, typed=False)
+        parsed(rule)
         compiled: F = inlined(rule)
         RULES[plain(function)] = compiled
         _made.clear()
