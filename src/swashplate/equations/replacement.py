@@ -128,7 +128,8 @@ def _part(part: Model, old: Equation, new: Equation, parameters: Any) -> Model:
     leading = _leading(part, old)
     if not leading:
         return part
-    kind = _extended(part.parameters, parameters) if parameters else part.parameters
+    own: Any = part.parameters
+    kind = _extended(own, parameters) if parameters else own
     names = {part.parameters.__name__: kind}
     made = {plain(old): _called_like(old, new, part.name, kind)}
     rebuilt = {name: _rebuilt(each, old, made, names) for name, each in leading.items()}

@@ -79,8 +79,6 @@ INSTEAD: dict[type[ast.AST], tuple[str, str]] = {
     ast.LShift: ("<<", "multiply"),
     ast.RShift: (">>", "divide"),
     ast.Invert: ("~", "write `not`"),
-    ast.In: ("`in`", "compare with == and or"),
-    ast.NotIn: ("`in`", "compare with == and or"),
 }
 """What to write in place of statements, expressions and operators that an equation may not use."""
 INSTEAD_OF_BUILTIN = {
@@ -126,6 +124,8 @@ def _refused(node: ast.AST) -> tuple[str, str] | None:
                 none = isinstance(right, ast.Constant) and right.value is None
                 if isinstance(op, ast.Is | ast.IsNot) and not none:
                     return "`is` with anything but None", "write `==`"
+                if type(op) not in (*COMPARISONS, ast.Is, ast.IsNot):
+                    return "`in`", "compare with == and or"
         case ast.Call(keywords=keywords) if any(each.arg is None for each in keywords):
             return "an argument with **", "write the arguments out"
         case ast.Call(func=called) if not isinstance(called, ast.Name | ast.Attribute):
