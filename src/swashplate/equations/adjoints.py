@@ -94,7 +94,6 @@ class Derivatives:
         self.taken, self.active = {*code.taken}, set(by)
         self.links: dict[str, Bars] = {}
         """Results that are names, with their derivatives."""
-        self.meaning: dict[str, Node] = {}
         self.divisors: set[Node] = set()
         self.said: set[Node] = set()
         """Expressions of the forward sweep."""
@@ -163,7 +162,6 @@ class Derivatives:
                 continue
             if isinstance(each, Let):
                 self.note(each.node)
-                self.meaning[each.name] = each.node
                 out.append(each)
                 moved: Moved = {each.name: [(ONE, each.node)]}
             elif isinstance(each, Call):
@@ -301,9 +299,7 @@ class Derivatives:
 
     def over(self, node: Node) -> Node:
         """1 over something not negative; 0 where it is zero, if it can be."""
-        if node in self.divisors or ex.positive(node, self.meaning.get):
-            return ex.inverse(node)
-        return ex.finite_inverse(node)
+        return ex.inverse(node) if node in self.divisors else ex.finite_inverse(node)
 
 
 def _arc(a: Node, over: Callable[[Node], Node]) -> Node:
