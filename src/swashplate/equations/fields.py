@@ -6,7 +6,7 @@ A parameter is defined once, on the field that holds its value:
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from enum import Enum
 from functools import cache
@@ -131,14 +131,16 @@ def declared_by(parameters: Any) -> Iterator[Declared]:
 # --- numbers by dotted paths ----------------------------------------------------------------------
 
 
-@cache
-def floats_of(kind: Any) -> tuple[str, ...]:
+def _floats_of(kind: Any) -> tuple[str, ...]:
     """Dotted paths of all floats below a named tuple, e.g. ``plus.V_dz``, in its order."""
     hints = get_type_hints(kind)
     below = {n: floats_of(hints[n]) for n in kind._fields if is_named_tuple(hints[n])}
     own = {n: ("",) for n in kind._fields if hints[n] is float}
     paths = [(name, path) for name in kind._fields for path in {**below, **own}.get(name, ())]
     return tuple(f"{name}.{path}".rstrip(".") for name, path in paths)
+
+
+floats_of: Callable[[Any], tuple[str, ...]] = cache(_floats_of)
 
 
 def is_real(value: object) -> bool:
