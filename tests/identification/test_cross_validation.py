@@ -160,7 +160,7 @@ def test_a_fold_that_loses_an_unknown_says_so(found: CrossValidation) -> None:
     (fold,) = losing
     assert fold.lost == ("J_minus",)
     assert fold.held[0].endswith("-4_V")
-    assert any("loses J_minus: only the held-out runs determine it" in s for s in found.sentences())
+    assert any("loses J_minus, on which no other run depends" in s for s in found.sentences())
 
 
 def test_the_result_does_not_depend_on_where_it_is_computed(

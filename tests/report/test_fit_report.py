@@ -19,7 +19,7 @@ from swashplate.identification.fitting import Fit, fit
 from swashplate.identification.profile import Point, Profile
 from swashplate.identification.resampling import CrossValidation, Fold, HeldRun
 from swashplate.identification.setup import Setup
-from swashplate.identification.solving import StartResult
+from swashplate.identification.solving import Solution
 from swashplate.identification.validation import Measures, predict
 from swashplate.identification.verdict import verdict
 from swashplate.report.fit_report import print_report, write_fit_report, write_validation_report
@@ -102,7 +102,7 @@ def validation(judged: Judged):
 
 
 STARTS = tuple(
-    StartResult(number, (0.0,), (0.0,), 9.0, cost, 10, number != 2, "done", 0.1)
+    Solution(np.zeros(1), cost, 9.0, 10, number != 2, False, "done", 0.1, number=number)
     for number, cost in enumerate((3.0, 3.0, 70.0, float("inf")))
 )
 HEADS = ("run", "parameter", "channel", "fold", "quantity")

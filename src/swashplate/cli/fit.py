@@ -47,7 +47,7 @@ if TYPE_CHECKING:
     from swashplate.campaign import Campaign
     from swashplate.identification.assessment import Judged
     from swashplate.identification.drive_model import Parameters
-    from swashplate.identification.solving import Progress, StartResult
+    from swashplate.identification.solving import Progress, Solution
     from swashplate.identification.verdict import Verdict
     from swashplate.parameters.parameter_set import ParameterSet
 
@@ -69,7 +69,7 @@ RESIDUALS = (
     "as the largest of all lags by chance is not, or 0.9."
 )
 
-Loss = Literal["linear", "soft_l1", "huber", "cauchy", "arctan"]
+Loss = Literal["linear", "soft_l1", "cauchy"]
 Role = Literal["validate", "fit", "all"]
 CAMPAIGN = Path("campaign.toml")
 
@@ -167,7 +167,7 @@ def fit(
                 f"{evaluations}, cost {now.cost:.6g}"
             )
 
-        def ended(stage: str, one: StartResult, done: int) -> None:
+        def ended(stage: str, one: Solution, done: int) -> None:
             words = f"{stage}: {done} of {starts + 1} starts, the last to cost {one.cost:.6g}"
             shown(words, done / (starts + 1))
 

@@ -9,7 +9,7 @@ from datetime import date
 from functools import cached_property, partial
 from hashlib import blake2b
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,7 +20,12 @@ from swashplate.campaign.campaign import Campaign
 from swashplate.campaign.experiment import Experiment
 from swashplate.documents import read_json
 from swashplate.errors import FileError, InputError
-from swashplate.identification.drive_model import Parameters, stage_problem, with_estimates
+from swashplate.identification.drive_model import (
+    Parameters,
+    stage_problem,
+    start_currents_of,
+    with_estimates,
+)
 from swashplate.identification.fitting import Fit, StageFit, smooth
 from swashplate.identification.identifiability import Identifiability, identifiability
 from swashplate.identification.intervals import (
@@ -42,7 +47,7 @@ from swashplate.identification.resampling import (
     cross_validate,
 )
 from swashplate.identification.setup import ModelParameters, ModelSetup, Setup
-from swashplate.identification.solving import Solution, StartResult
+from swashplate.identification.solving import Solution
 from swashplate.identification.unknowns import Unknown, Unknowns
 from swashplate.identification.validation import RunQuality, predict, run_qualities
 from swashplate.identification.verdict import LIMITS, REQUIRED, Verdict, verdict
@@ -55,7 +60,7 @@ from swashplate.tables import write_text
 if TYPE_CHECKING:
     from swashplate.campaign import Campaign, Experiment
     from swashplate.executors import Executor
-    from swashplate.identification.solving import Loss
+    from swashplate.identification.problem import Loss
     from swashplate.tables import Table
 
 Array = NDArray[np.float64]
@@ -402,7 +407,7 @@ class StoredStage(Entry):
     unknowns: tuple[Unknown, ...]
     """With what their priors are worth."""
     solution: Solution
-    starts: tuple[StartResult, ...]
+    starts: tuple[Solution, ...]
 
 
 class FitFile(Entry):
@@ -465,11 +470,11 @@ def load_fit(
         nominal = model.nominal(experiments)
     if isinstance(nominal, ModelParameters) and nominal.setup.setup != file.setup:
         raise InputError(f"{path} is the fit of another model, or of other bounds: fit again.")
-    parameters, stages = smooth(nominal), list[StageFit]()
+    parameters, stages, starts = smooth(nominal), list[StageFit](), dict[str, Any]()
     for stage, entry in zip(file.setup.stages, file.stages, strict=False):
         uncertain = file.setup.standard_uncertainty
         problem = stage_problem(
-            stage, parameters, experiments, threads=threads, uncertain=uncertain
+            stage, parameters, experiments, threads=threads, uncertain=uncertain, starts=starts
         )
         known, theirs = problem.unknowns.items, entry.unknowns
         if (stage.name, [(each.name, each.run) for each in known]) != (
@@ -482,6 +487,7 @@ def load_fit(
             )
         problem = replace(problem, unknowns=Unknowns(theirs))
         parameters = with_estimates(parameters, problem, entry.solution.vector)
+        starts |= start_currents_of(problem, entry.solution.vector)
         stages.append(StageFit(stage, problem, entry.solution, parameters, entry.starts))
     found = Fit(file.setup, nominal, tuple(stages))
     return Judged(campaign, found, experiments, {}, file.profiles, file.folds, file.notes)

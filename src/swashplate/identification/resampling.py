@@ -18,14 +18,15 @@ from swashplate.executors import Executor, Serial
 from swashplate.identification.drive_model import (
     DriveModel,
     Parameters,
+    Starts,
     simulated_current,
-    stage_problem,
+    start_currents_of,
 )
-from swashplate.identification.fitting import Fit, Search, StageFit, fit, smooth
+from swashplate.identification.fitting import Search, StageFit, fit
 from swashplate.identification.noise import grid_of, noise_colours, unweighted, without_lines
-from swashplate.identification.problem import LinearisedFit, Problem
+from swashplate.identification.problem import LinearisedFit, Loss, Problem
 from swashplate.identification.setup import Setup
-from swashplate.identification.solving import Loss, solve
+from swashplate.identification.solving import NO_EFFECT, solve
 from swashplate.identification.unknowns import Unknowns
 from swashplate.identification.validation import Measures, predict, with_speeds
 from swashplate.parameters.parameter_set import ParameterSet
@@ -58,7 +59,7 @@ class Fold(Result):
     held: tuple[str, ...]
     """Names of the runs that were held out."""
     lost: tuple[str, ...]
-    """Unknowns that only the runs held out tell of: this fold's fit does not determine them."""
+    """Unknowns on which no run left in the fold depends: where its fit leaves them is chance."""
     runs: tuple[HeldRun, ...]
     converged: bool
     failure: str
@@ -106,15 +107,12 @@ class CrossValidation(Result):
                 said.append(f"{name} did not converge.")
             if fold.lost:
                 said.append(
-                    f"{name} loses {', '.join(fold.lost)}: only the held-out runs "
-                    f"determine {'them' if len(fold.lost) > 1 else 'it'}, so their prediction is "
-                    "not reliable."
+                    f"{name} loses {', '.join(fold.lost)}, on which no other run depends: its "
+                    "prediction is not reliable."
                 )
         return tuple(said)
 
 
-LEFT = 0.01
-"""Share of what all runs tell of an unknown, below which the runs left in a fold do not tell it."""
 ONE_WAY = 0.25
 """A command whose smaller extreme is below this part of the larger one goes one way."""
 
@@ -227,34 +225,16 @@ def _fold(
         named = (run.name, run.maneuver, each.channel, channel.unit)
         runs.append(HeldRun(*named, each.measures, mean))
     converged = all(each.solution.converged for each in result.stages)
-    return Fold(number, names, _lost(result, held, threads), tuple(runs), converged, "")
-
-
-def _lost(result: Fit, held: Sequence[Experiment], threads: int | None) -> tuple[str, ...]:
-    """Unknowns that the runs held out tell, and those left in do not."""
-    lost, before = [], smooth(result.nominal)
+    lost = list[str]()
     for stage in result.stages:
-        parameters, before = before, stage.parameters
-        try:
-            apart = stage_problem(stage.stage, parameters, held, threads=threads)
-        except InputError:  # none of them has a channel of this stage
-            continue
-        # in the units of all runs: information in other units cannot be compared
-        apart = replace(apart, scales=stage.problem.scales)
-        left, there = (
-            np.sum(problem.evaluate(vector).jacobian ** 2, axis=0)
-            for problem, vector in (
-                (stage.problem, stage.solution.vector),
-                (apart, apart.unknowns.vector_of(stage.values)),
-            )
-        )
-        told = dict(zip(apart.unknowns.names, there, strict=True))
-        lost += [
-            unknown.name
-            for unknown, kept in zip(stage.problem.unknowns, left, strict=True)
-            if unknown.run is None and kept < LEFT * (kept + told.get(unknown.name, 0.0))
-        ]
-    return tuple(lost)
+        effects = np.linalg.norm(stage.problem.evaluate(stage.solution.vector).jacobian, axis=0)
+        least = NO_EFFECT * effects.max()
+        each_one = zip(stage.problem.unknowns, effects, strict=True)
+        lost += [each.name for each, effect in each_one if each.run is None and effect <= least]
+    return Fold(number, names, tuple(lost), tuple(runs), converged, "")
+
+
+# --- bootstrap ------------------------------------------------------------------------------------
 
 
 class NoiseDraws:
@@ -363,9 +343,6 @@ class Bootstrap(Result):
         return tuple(said)
 
 
-_Stages = Sequence[tuple[StageFit, NoiseDraws]]
-
-
 def bootstraps_of(
     assessments: Sequence[Assessment],
     draws: int = 1000,
@@ -424,21 +401,26 @@ def bootstraps_of(
     return made
 
 
-def _refitted(shared: _Stages, number: int) -> tuple[Array, ...] | None:
+def _refitted(
+    shared: Sequence[tuple[StageFit, NoiseDraws]], number: int
+) -> tuple[Array, ...] | None:
     """The vectors of all stages fitted to one draw; None if a fit did not end."""
     vectors: list[Array] = []
-    parameters: ParameterSet | None = None
+    card: tuple[ParameterSet, Starts] | None = None
     for stage, noise in shared:
         problem = _redrawn(stage, noise, number)
         model = problem.model
-        if parameters is not None and isinstance(model, DriveModel):
+        if card is not None and isinstance(model, DriveModel):
             # another card, whose current drives the pump where it did before
+            parameters, starts = card
             currents = {
-                each.name: simulated_current(each, parameters)
+                each.name: simulated_current(each, parameters, starts.get(each.name, {}))
                 for each in problem.experiments
-                if stage.stage.current == "simulated" and each.input.kind == "voltage"
+                if model.currents
+                and stage.stage.current == "simulated"
+                and each.input.kind == "voltage"
             }
-            currents = {**model.currents, **(currents if model.currents else {})}
+            currents = {**model.currents, **currents}
             model = DriveModel(parameters, model.part, currents, model.forces)
             problem = replace(problem, model=model)
         try:
@@ -449,7 +431,8 @@ def _refitted(shared: _Stages, number: int) -> tuple[Array, ...] | None:
             return None
         vectors.append(solution.vector)
         if isinstance(model, DriveModel) and model.part == "card":
-            parameters = model.parameters_at(problem.unknowns.targets(solution.vector, ""))
+            found = model.parameters_at(problem.unknowns.targets(solution.vector, ""))
+            card = found, start_currents_of(problem, solution.vector)
     return tuple(vectors)
 
 

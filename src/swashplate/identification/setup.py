@@ -11,7 +11,14 @@ from typing import Annotated, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict, Field, PositiveFloat, model_validator
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    ConfigDict,
+    Field,
+    PositiveFloat,
+    model_validator,
+)
 
 from swashplate.campaign import ChannelKind
 from swashplate.campaign.experiment import Experiment
@@ -19,7 +26,7 @@ from swashplate.campaign.schema import NotNegative, Weight, Window
 from swashplate.documents import parse_toml, read_text, validated
 from swashplate.equations import Model as Equations
 from swashplate.errors import FileError, InputError, ParameterError
-from swashplate.identification.model import OFFSET, Model, OwnModel, simulated
+from swashplate.identification.model import OFFSET, START, Model, OwnModel, simulated
 from swashplate.identification.problem import Problem, noise_scales
 from swashplate.identification.solving import solve
 from swashplate.identification.unknowns import Unknown, Unknowns
@@ -28,6 +35,7 @@ from swashplate.parameters.parameter_set import ParameterSet
 from swashplate.results import Result, short
 
 Array = NDArray[np.float64]
+_SETUPS = files("swashplate.identification").joinpath("setups")
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 Positive = Annotated[PositiveFloat, Field(allow_inf_nan=False)]
 Pair = tuple[Finite, Finite]
@@ -38,6 +46,8 @@ StandardUncertainty = (
 """A standard uncertainty: in SI units, or as "5 %" of the value."""
 COEFFICIENTS = ("Z19", "Z20", "Z21", "Z22")
 """Of the solenoids: what forces stand for."""
+ORDERS = np.arange(1, 5)
+"""Powers of the effective current that they multiply."""
 
 
 class Entry(BaseModel):
@@ -53,23 +63,26 @@ class GivenPrior(Entry):
     deviation: PositiveFloat
 
 
-def check_rising(**pairs: tuple[float, float] | None) -> None:
-    """Refuse, in a ValueError, bounds of which the lower one does not stand first."""
-    for name, pair in pairs.items():
-        if pair is not None and not pair[0] < pair[1]:
-            low, high = sorted(pair)
-            raise ValueError(
-                f"{name} = [{pair[0]:g}, {pair[1]:g}] must rise: write [{low:g}, {high:g}]"
-                if low < high
-                else f"{name} = [{pair[0]:g}, {pair[1]:g}] leaves nothing between its ends"
-            )
+def rising(pair: tuple[float, float]) -> tuple[float, float]:
+    """A pair of bounds; refused, in a ValueError, unless the lower one stands first."""
+    if not pair[0] < pair[1]:
+        low, high = sorted(pair)
+        raise ValueError(
+            f"[{pair[0]:g}, {pair[1]:g}] must rise: write [{low:g}, {high:g}]"
+            if low < high
+            else f"[{pair[0]:g}, {pair[1]:g}] leaves nothing between its ends"
+        )
+    return pair
+
+
+Bounds = Annotated[Pair, AfterValidator(rising)]
 
 
 class Free(Entry):
     """How a parameter is free: both directions apart, unless tied."""
 
-    relative: Pair | None = Field(None, description="Bounds as factors on the nominal value.")
-    bounds: Pair | None = Field(None, description="Bounds in SI units.")
+    relative: Bounds | None = Field(None, description="Bounds as factors on the nominal value.")
+    bounds: Bounds | None = Field(None, description="Bounds in SI units.")
     log: bool = Field(False, description="Move the logarithm: for positive numbers.")
     tied: bool = Field(False, description="One value for both directions.")
     prior: GivenPrior | None = Field(
@@ -80,7 +93,6 @@ class Free(Entry):
     def _bounded(self) -> Free:
         if (self.relative is None) == (self.bounds is None):
             raise ValueError("give either relative bounds or bounds")
-        check_rising(relative=self.relative, bounds=self.bounds)
         return self
 
 
@@ -97,63 +109,52 @@ class Forces(Entry):
     minus: tuple[PositiveFloat, PositiveFloat, PositiveFloat, PositiveFloat] = Field(
         description="Of the negative direction, as magnitudes [A]."
     )
-    relative: Pair = Field((0.5, 2.0), description="Bounds as factors on the nominal forces.")
-
-    @model_validator(mode="after")
-    def _bounded(self) -> Forces:
-        check_rising(relative=self.relative)
-        return self
-
-    @cached_property
-    def names(self) -> tuple[str, ...]:
-        """Names of the eight forces."""
-        return tuple(f"force_{side}_{k}" for side in ("plus", "minus") for k in (1, 2, 3, 4))
-
-    @property
-    def columns(self) -> tuple[str, ...]:
-        """The parameters that they stand for."""
-        return tuple(f"{symbol}_{side}" for side in ("plus", "minus") for symbol in COEFFICIENTS)
+    relative: Bounds = Field((0.5, 2.0), description="Bounds as factors on the nominal forces.")
 
     @cached_property
     def _maps(self) -> dict[str, Array]:
         """For each direction the (4, 4) map from forces to coefficients."""
-        signs = {"plus": np.ones(4), "minus": np.array([1.0, -1.0, 1.0, -1.0])}
+        signs = {"plus": 1.0, "minus": -1.0}
         return {
-            side: np.linalg.inv(
-                np.power.outer(np.array(getattr(self, side)), np.arange(1, 5)) * signs[side]
-            )
-            for side in ("plus", "minus")
+            side: np.linalg.inv(np.power.outer(getattr(self, side), ORDERS) * sign ** (ORDERS + 1))
+            for side, sign in signs.items()
         }
+
+    @cached_property
+    def names(self) -> tuple[str, ...]:
+        """Names of the eight forces."""
+        return tuple(f"force_{side}_{k}" for side in self._maps for k in ORDERS)
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """The parameters that they stand for."""
+        return tuple(f"{symbol}_{side}" for side in self._maps for symbol in COEFFICIENTS)
 
     def values(self, parameters: ParameterSet) -> dict[str, float]:
         """The forces of a parameter set, by name. [N]"""
-        forces = {}
+        found: list[float] = []
         for side, map_ in self._maps.items():
             coefficients = [parameters.numbers[f"{symbol}_{side}"] for symbol in COEFFICIENTS]
-            for k, force in enumerate(np.linalg.solve(map_, coefficients), start=1):
-                forces[f"force_{side}_{k}"] = float(force)
-        return forces
+            found += np.linalg.solve(map_, coefficients).tolist()
+        return dict(zip(self.names, found, strict=True))
 
     def coefficients(
         self, values: Mapping[str, float], parameters: ParameterSet
     ) -> dict[str, float]:
         """Coefficients for some forces; those not named are as in the parameter set. [N/Aᵏ]"""
-        forces = {**self.values(parameters), **{k: v for k, v in values.items() if k in self.names}}
-        made = {}
+        forces, made = self.values(parameters), dict[str, float]()
         for side, map_ in self._maps.items():
-            of_side = np.array([forces[f"force_{side}_{k}"] for k in (1, 2, 3, 4)])
-            for symbol, coefficient in zip(COEFFICIENTS, map_ @ of_side, strict=True):
-                made[f"{symbol}_{side}"] = float(coefficient)
+            names = [f"force_{side}_{k}" for k in ORDERS]
+            found = map_ @ np.array([values.get(name, forces[name]) for name in names])
+            for symbol, coefficient in zip(COEFFICIENTS, found.tolist(), strict=True):
+                made[f"{symbol}_{side}"] = coefficient
         return made
 
     def slopes(self, name: str) -> dict[str, float]:
         """Derivatives of the coefficients by one force. [1/Aᵏ]"""
         _, side, number = name.split("_")
-        column = self._maps[side][:, int(number) - 1]
-        return {
-            f"{symbol}_{side}": float(slope)
-            for symbol, slope in zip(COEFFICIENTS, column, strict=True)
-        }
+        column = self._maps[side][:, int(number) - 1].tolist()
+        return {f"{symbol}_{side}": b for symbol, b in zip(COEFFICIENTS, column, strict=True)}
 
 
 class InputWeight(Window):
@@ -214,42 +215,21 @@ class Stage(Entry):
             raise ValueError("a card alone has no start_pressure")
         return self
 
-    def widened(self, unknown: Unknown, side: int) -> str | None:
-        """The line that moves a bound of an unknown outwards, and the table that it stands in.
-
-        `side` is 1 for the upper bound, -1 for the lower one. None where nothing lies beyond: at
-        the least or greatest value that the parameter may have.
-        """
-        name = unknown.name
-        if name.startswith("force_") and self.forces is not None:
-            pair = _moved(self.forces.relative, side, ratio=True)
-            return f"relative = [{pair[0]:.4g}, {pair[1]:.4g}] under [stages.forces]"
-        if self.part == "model" or (name not in self.free and _symbol(name) not in self.free):
-            low, high = _moved((unknown.low, unknown.high), side, ratio=unknown.log)
-            if self.part != "model":
-                return None
-            return f'"{name}": ({low:.4g}, {unknown.start:.4g}, {high:.4g}) in free of the model'
-        key = name if name in self.free else _symbol(name)
-        limits, entry = find(name), self.free[key]
-        bound = unknown.high if side > 0 else unknown.low
-        lowest = limits.lower if limits.least is None else limits.least
-        if bound >= limits.upper if side > 0 else bound <= lowest:
-            return None
-        if entry.relative is not None:
-            # of a negative nominal value the larger factor makes the lower bound
-            way = side if unknown.start > 0.0 else -side
-            pair = _moved(entry.relative, way, ratio=min(entry.relative) > 0.0)
-            words = [f"relative = [{pair[0]:.4g}, {pair[1]:.4g}]"]
+    def beyond(self, unknown: Unknown, side: int) -> str:
+        """What to do about an unknown of the machine at its lower (-1) or upper (1) bound."""
+        name, table = unknown.name, "free"
+        if self.part == "model":
+            return f"to let it go on, widen '{name}' in free of the model and fit again"
+        if self.forces is not None and name in self.forces.names:
+            name, table = "relative", "forces"
         else:
-            assert entry.bounds is not None
-            low, high = _moved(entry.bounds, side, ratio=entry.log)
-            low, high = max(low, lowest), min(high, limits.upper)
-            words = [f"bounds = [{low:.4g}, {high:.4g}]"]
-        words += [f"{flag} = true" for flag in ("log", "tied") if getattr(entry, flag)]
-        if entry.prior is not None:
-            mean, off = entry.prior.mean, entry.prior.deviation
-            words.append(f"prior = {{ mean = {mean!r}, deviation = {off!r} }}")
-        return f"{key} = {{ {', '.join(words)} }} under [stages.free]"
+            limits = find(name)
+            least = limits.lower if limits.least is None else limits.least
+            if unknown.high >= limits.upper if side > 0 else unknown.low <= least:
+                return f"the {'greatest' if side > 0 else 'least'} value that it may have"
+            name = name if name in self.free else _symbol(name)
+        where = f"{name} under [stages.{table}] of the stage '{self.name}'"
+        return f"to let it go on, widen {where} and fit again"
 
 
 class Setup(Entry):
@@ -289,40 +269,23 @@ class Setup(Entry):
             If two stages free the same parameter, or one is driven by a scaled current, which no
             chain makes.
         """
-        free: dict[str, Free] = {}
+        merged: dict[str, dict[str, Any]] = {"free": {}, "weights": {}, "weights_by_input": {}}
         for stage in self.stages:
             if stage.current_scale != 1.0:
                 raise ParameterError(
                     f"The stage '{stage.name}' is driven by {stage.current_scale:g} times the "
                     "measured current, so no joint fit through the card can stand for it."
                 )
-            twice = sorted(set(free) & set(stage.free))
+            twice = sorted(set(merged["free"]) & set(stage.free))
             if twice:
                 raise ParameterError(f"{twice[0]} is free in two stages; a joint fit needs one.")
-            free |= stage.free
+            for key, together in merged.items():
+                together |= getattr(stage, key)
         forces = next((each.forces for each in self.stages if each.forces is not None), None)
         pressures = [each.start_pressure for each in self.stages if each.start_pressure is not None]
-        stage = Stage(
-            name="chain",
-            part="chain",
-            free=free,
-            forces=forces,
-            weights={kind: w for each in self.stages for kind, w in each.weights.items()},
-            weights_by_input={
-                kind: w for each in self.stages for kind, w in each.weights_by_input.items()
-            },
-            start_pressure=max(pressures, default=None),
-        )
+        most = max(pressures, default=None)
+        stage = Stage(name="chain", part="chain", forces=forces, start_pressure=most, **merged)
         return self.model_copy(update={"stages": (stage,)})
-
-
-def _moved(pair: Pair, side: int, *, ratio: bool) -> Pair:
-    """A pair with one end moved outwards: by a factor of two, or by as much as lies between."""
-    low, high = pair
-    reach = high - low
-    if side > 0:
-        return low, 2.0 * high if ratio else high + reach
-    return 0.5 * low if ratio else low - reach, high
 
 
 def _symbol(name: str) -> str:
@@ -338,14 +301,8 @@ def deviation(uncertainty: float | str, value: float) -> float:
 
 def setup_names() -> tuple[str, ...]:
     """Names of the packaged set-ups."""
-    folder = files("swashplate.identification").joinpath("setups")
-    return tuple(
-        sorted(
-            each.name.removesuffix(".toml")
-            for each in folder.iterdir()
-            if each.name.endswith(".toml")
-        )
-    )
+    names = (each.name for each in _SETUPS.iterdir())
+    return tuple(sorted(n.removesuffix(".toml") for n in names if n.endswith(".toml")))
 
 
 def load_setup(name: str | Path) -> Setup:
@@ -363,10 +320,9 @@ def load_setup(name: str | Path) -> Setup:
     if name not in setup_names():
         raise ParameterError(
             f"There is no packaged fit configuration '{name}'; there are "
-            f"{', '.join(setup_names())}, or give "
-            "a .toml file."
+            f"{', '.join(setup_names())}, or give a .toml file."
         )
-    text = files("swashplate.identification").joinpath("setups", f"{name}.toml").read_text("utf-8")
+    text = _SETUPS.joinpath(f"{name}.toml").read_text("utf-8")
     return validated(parse_toml(text, f"{name}.toml"), Setup, f"{name}.toml")
 
 
@@ -387,8 +343,6 @@ def setup_text(setup: Setup) -> str:
 
 Range = tuple[float, float, float] | tuple[float, float, float, str]
 """Lower bound, nominal value, upper bound, and the unit if it is said."""
-START = "start."
-"""What the name of a number of the state at the first sample begins with."""
 BY_ORDER = 10.0
 """Ratio of positive bounds from which a range is searched by the logarithm."""
 
@@ -486,23 +440,16 @@ class ModelSetup(Result):
         return cls(module.model, module.free, **more)
 
     @property
-    def stage(self) -> Stage:
-        """The set-up as the only stage of a fit."""
+    def setup(self) -> Setup:
+        """The set-up as that of a fit in stages, of which it has one."""
         free = {}
         for name, each in self._free.items():
             known = each.prior
-            prior = (
-                None if known is None else GivenPrior(mean=known.mean, deviation=known.deviation)
-            )
+            prior = known and GivenPrior(mean=known.mean, deviation=known.deviation)
             free[name] = Free(bounds=(each.low, each.high), log=each.log, prior=prior)
-        return Stage(name=self.name, part="model", free=free)
-
-    @property
-    def setup(self) -> Setup:
-        """The set-up as that of a fit in stages."""
         return Setup(
             title=self.name,
-            stages=(self.stage,),
+            stages=(Stage(name=self.name, part="model", free=free),),
             standard_uncertainty=dict(self.standard_uncertainty),
         )
 

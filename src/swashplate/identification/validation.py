@@ -13,7 +13,7 @@ from scipy.fft import irfft, next_fast_len, rfft
 from swashplate.campaign.experiment import Channel, Experiment
 from swashplate.campaign.speed import speed_of
 from swashplate.errors import InputError
-from swashplate.identification.drive_model import SIGNALS, DriveModel, Parameters, current_record
+from swashplate.identification.drive_model import SIGNALS, DriveModel, Parameters, measured_current
 from swashplate.identification.noise import LONGEST, Grid, correlation_length, grid_of, pair_sums
 from swashplate.identification.problem import Problem
 from swashplate.identification.setup import ModelParameters
@@ -188,22 +188,22 @@ def measures(*runs: tuple[Array, Array, Array | None]) -> Measures:
         If no sample counts, or one that does is not finite.
     """
     parts = []
-    for of_one in runs:
-        used = np.ones(of_one[0].shape, np.bool_) if of_one[2] is None else of_one[2] > 0.0
-        for what, samples in (("measured", of_one[0]), ("simulated", of_one[1])):
+    for values, simulated, weight in runs:
+        used = np.ones(values.shape, np.bool_) if weight is None else weight > 0.0
+        for what, samples in (("measured", values), ("simulated", simulated)):
             bad = used & ~np.isfinite(samples)
             if bad.any():
                 row = int(np.argmax(bad)) + 1
                 raise InputError(f"Sample {row} of what was {what} is not finite; ignore it.")
-        parts.append((of_one[0][used], of_one[1][used]))
-    measured, simulated = (np.concatenate(column) for column in zip(*parts, strict=True))
+        parts.append(np.stack([values[used], simulated[used]]))
+    measured, errors = np.hstack(parts)
     if not measured.size:
         raise InputError("No sample counts: all are ignored or have weight 0.")
-    mean = float(measured.mean())
+    errors, mean = errors - measured, float(measured.mean())
     # a constant channel's own mean is off by rounding
     about = measured - mean
     about[np.abs(about) <= 4.0 * np.finfo(np.float64).eps * abs(mean)] = 0.0
-    rmse, spread = (float(np.sqrt(np.mean(each**2))) for each in (simulated - measured, about))
+    rmse, spread = (float(np.sqrt(np.mean(each**2))) for each in (errors, about))
     return Measures(measured.size, rmse, spread)
 
 
@@ -280,20 +280,20 @@ def predict(
             if each[name].used.any()
         )
     made = []
-    for experiment in experiments:
-        if not any(channel.kind in SIGNALS for channel in experiment.channels.values()):
-            raise InputError(f"{experiment.name} has no channel that a drive has.")
-        if experiment.input.kind == "current":
-            model = DriveModel(parameters, "pump", {experiment.name: current_record(experiment)})
-        else:
-            model = DriveModel(parameters, "chain")
-        for name, simulated in model.simulate({}, experiment).items():
-            channel = experiment[name]
-            if channel.is_position and channel.used.any():
+    for each in experiments:
+        if not any(channel.kind in SIGNALS for channel in each.channels.values()):
+            raise InputError(f"{each.name} has no channel that a drive has.")
+        own = DriveModel(parameters)
+        if each.input.kind == "current":
+            own = DriveModel(parameters, "pump", {each.name: measured_current(each)})
+        for name, simulated in own.simulate({}, each).items():
+            channel = each[name]
+            if not channel.used.any():
+                continue
+            zero = 0.0
+            if channel.is_position:
                 zero = np.average(channel.values - simulated, weights=channel.weight)
-                simulated = simulated + zero
-            if channel.used.any():
-                made.append(compared(experiment, name, simulated))
+            made.append(compared(each, name, simulated + zero))
     return tuple(made)
 
 
@@ -306,9 +306,20 @@ def with_speeds(qualities: Iterable[RunQuality]) -> tuple[RunQuality, ...]:
     made: list[RunQuality] = []
     for each in qualities:
         made.append(each)
-        if each.experiment[each.channel].is_position:
-            speed = _speed_quality(each)
-            made += [speed] if speed is not None else []
+        channel = each.experiment[each.channel]
+        if not channel.is_position:
+            continue
+        unread = replace(channel, noise=None, limits=None, encoder=None, counts=None)
+        try:
+            found = speed_of(channel, "exact").speed
+            same = speed_of(replace(unread, values=each.simulated), "exact").speed
+        except InputError:
+            continue
+        name, unit = f"speed from {channel.name}", f"{channel.unit}/s"
+        speed = replace(unread, name=name, kind="shaft_speed", unit=unit, values=found)
+        run = replace(each.experiment, channels={**each.experiment.channels, name: speed})
+        # the residuals of a filtered signal are coloured by the filter: there is no test of them
+        made.append(RunQuality(run, name, same, measures((found, same, speed.weight)), None))
     return tuple(made)
 
 
@@ -360,35 +371,4 @@ def ignored_windows(channel: Channel) -> tuple[tuple[float, float], ...]:
     return tuple(
         (float(channel.time[first]), float(channel.time[after - 1]))
         for first, after in zip(edges[::2], edges[1::2], strict=True)
-    )
-
-
-def _speed_quality(quality: RunQuality) -> RunQuality | None:
-    channel = quality.experiment[quality.channel]
-    plain = replace(channel, values=quality.simulated, encoder=None, counts=None)
-    try:
-        found, same = speed_of(channel, "exact"), speed_of(plain, "exact")
-    except InputError:
-        return None
-    speed = replace(
-        channel,
-        name=f"speed from {channel.name}",
-        kind="shaft_speed",
-        unit=f"{channel.unit}/s",
-        values=found.speed,
-        noise=None,
-        limits=None,
-        encoder=None,
-        counts=None,
-    )
-    experiment = replace(
-        quality.experiment, channels={**quality.experiment.channels, speed.name: speed}
-    )
-    # the residuals of a filtered signal are coloured by the filter: there is no test of them
-    return RunQuality(
-        experiment,
-        speed.name,
-        same.speed,
-        measures((speed.values, same.speed, speed.weight)),
-        None,
     )

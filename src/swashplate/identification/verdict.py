@@ -22,7 +22,7 @@ from swashplate.identification.lack_of_fit import (
     lack_of_fit,
     measurement_error,
 )
-from swashplate.identification.solving import StartResult
+from swashplate.identification.solving import Solution
 from swashplate.identification.validation import (
     FOLLOWS,
     following,
@@ -236,10 +236,10 @@ def _fitted_runs(assessments: Sequence[Assessment]) -> list[Experiment]:
 
 
 def starts_of(
-    assessments: Sequence[Assessment], starts: Sequence[StartResult] = ()
-) -> dict[str, Sequence[StartResult]]:
+    assessments: Sequence[Assessment], starts: Sequence[Solution] = ()
+) -> dict[str, Sequence[Solution]]:
     """Starts by stage, of the stages that had several; or those given, under no name."""
-    own: dict[str, Sequence[StartResult]] = {
+    own: dict[str, Sequence[Solution]] = {
         each.stage.stage.name: each.stage.starts
         for each in assessments
         if len(each.stage.starts) > 1

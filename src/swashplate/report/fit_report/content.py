@@ -22,7 +22,7 @@ from swashplate.identification.fitting import Fit, StageFit
 from swashplate.identification.identifiability import Identifiability
 from swashplate.identification.resampling import CrossValidation
 from swashplate.identification.setup import ModelParameters
-from swashplate.identification.solving import StartResult
+from swashplate.identification.solving import Solution
 from swashplate.identification.validation import RunQuality, percent
 from swashplate.identification.verdict import Verdict, starts_of, verdict
 from swashplate.parameters.parameter_set import ParameterSet
@@ -487,7 +487,7 @@ def _correlations(assessment: Assessment, general: Sequence[bool]) -> list[Block
     return blocks
 
 
-def _starts_section(several: Mapping[str, Sequence[StartResult]]) -> Section:
+def _starts_section(several: Mapping[str, Sequence[Solution]]) -> Section:
     blocks = []
     for stage, results in several.items():
         failed = sum(not each.cost < 1e300 for each in results)
