@@ -187,7 +187,7 @@ def test_refusals(refused: Words, campaign: Path, tmp_path: Path) -> None:
     assert "no parameter 'Z61'" in refused(*fit, "--setup", "bad.toml")
     (tmp_path / "bad.toml").write_text(SETUP.replace("[0.5, 2.0]", "[2.0, 0.5]", 1), "utf-8")
     said = refused(*fit, "--setup", "bad.toml")
-    assert "bad.toml: stages 1.free.J: relative = [2, 0.5] must rise: write [0.5, 2]" in said
+    assert "bad.toml: stages 1.free.J.relative: [2, 0.5] must rise: write [0.5, 2]" in said
     (tmp_path / "bad.toml").write_text(SETUP.replace("relative", "relativ", 1), "utf-8")
     assert "perhaps 'relative' is meant" in refused(*fit, "--setup", "bad.toml")
     text = campaign.read_text("utf-8").replace('role = "fit"', 'role = "ignore"')

@@ -8,7 +8,13 @@ import pytest
 
 from swashplate import Campaign, Channel, Drive, Experiment
 from swashplate.campaign import InputSignal, Source, rig
-from swashplate.identification.drive_model import DriveModel, at_rate_of, stage_problem
+from swashplate.identification.drive_model import (
+    DriveModel,
+    at_rate_of,
+    simulated_current,
+    stage_problem,
+    start_currents_of,
+)
 from swashplate.identification.fitting import fit, smooth
 from swashplate.identification.setup import Free, Setup, Stage, load_setup, setup_names
 from swashplate.identification.unknowns import Unknown
@@ -164,6 +170,12 @@ def test_a_run_cut_out_of_a_rising_current_has_a_current_of_its_own(rate: float 
     assert found.values["start_current_plus (cut)"] == pytest.approx(
         simulated.current[563], abs=0.005
     )
+    begun = start_currents_of(found.problem, found.solution.vector)["cut"]
+    for start, off in ((begun, 0.005), ({}, 0.2)):
+        driving = simulated_current(runs[0], found.parameters, start)
+        error = np.abs(driving.values[:: driving.substeps] - simulated.current[563:]).max()
+        # a settled card is far off: what drives the pump begins where the card's fit found it
+        assert error < off if start else error > off
     samples = found.problem.samples
     assert 2.0 * found.solution.cost == pytest.approx(samples, abs=5.0 * np.sqrt(2.0 * samples))
 

@@ -152,7 +152,7 @@ def fit(
         nominal: Parameters
         if model is not None:
             nominal = ModelSetup.from_file(model).nominal(runs)
-            plan = nominal.setup.setup
+            plan = nominal.setup
         else:
             plan = setup_of(campaign, chosen, setup)
             drive = campaign.drive(chosen) if begin is None else None
@@ -260,12 +260,12 @@ def _written(found: Judged, out: Path) -> list[str]:
     from tomlkit import dumps
 
     from swashplate.drive import Drive
-    from swashplate.identification.setup import ModelParameters, setup_text
+    from swashplate.identification.setup import ModelSetup, setup_text
     from swashplate.identification.tables import estimates_table
 
     made_folder(out)
     parameters = found.result.parameters
-    if isinstance(parameters, ModelParameters):
+    if isinstance(parameters, ModelSetup):
         numbers = {name: float(value) for name, value in parameters.numbers.items()}
         write_text(dumps({parameters.name: numbers}), out / NUMBERS)
         lines = [f"Numbers:   {out / NUMBERS}"]

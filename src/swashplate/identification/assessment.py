@@ -46,7 +46,7 @@ from swashplate.identification.resampling import (
     bootstraps_of,
     cross_validate,
 )
-from swashplate.identification.setup import ModelParameters, ModelSetup, Setup
+from swashplate.identification.setup import ModelSetup, Setup
 from swashplate.identification.solving import Solution
 from swashplate.identification.unknowns import Unknown, Unknowns
 from swashplate.identification.validation import RunQuality, predict, run_qualities
@@ -242,7 +242,7 @@ class Judged(Result):
             axis=self.runs[0].axis,
             campaign=str(self.campaign.path),
             runs={each.name: fingerprint(each) for each in self.runs},
-            nominal=dict(start.numbers) if isinstance(start, ModelParameters) else dump_set(start),
+            nominal=dict(start.numbers) if isinstance(start, ModelSetup) else dump_set(start),
             setup=self.result.setup,
             stages=stages,
             profiles=tuple(self.profiles),
@@ -468,7 +468,7 @@ def load_fit(
         raise InputError(f"{path} is the fit of a model of your own: give that, with --model FILE.")
     else:
         nominal = model.nominal(experiments)
-    if isinstance(nominal, ModelParameters) and nominal.setup.setup != file.setup:
+    if isinstance(nominal, ModelSetup) and nominal.setup != file.setup:
         raise InputError(f"{path} is the fit of another model, or of other bounds: fit again.")
     parameters, stages, starts = smooth(nominal), list[StageFit](), dict[str, Any]()
     for stage, entry in zip(file.setup.stages, file.stages, strict=False):

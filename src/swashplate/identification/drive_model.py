@@ -25,7 +25,7 @@ from swashplate.identification.model import START, EquationModel
 from swashplate.identification.problem import Problem, noise_scales
 from swashplate.identification.setup import (
     Forces,
-    ModelParameters,
+    ModelSetup,
     Setup,
     Stage,
     deviation,
@@ -44,7 +44,7 @@ from swashplate.simulation.run import check_voltage, simulate_drive, simulate_pu
 Array = NDArray[np.float64]
 Part = Literal["card", "pump", "chain"]
 """What of the drive is simulated: the card alone, pump and motor over a current, or all."""
-Parameters = ParameterSet | ModelParameters
+Parameters = ParameterSet | ModelSetup
 """The numbers of what is fitted: a drive, or a model of one's own."""
 Starts = Mapping[str, Mapping[str, float]]
 """For some experiments by name the currents at the first sample, as `START_CURRENTS` has them."""
@@ -360,7 +360,7 @@ def stage_problem(
     ----------
     stage : Stage
         What is free and what is fitted.
-    parameters : ParameterSet or ModelParameters
+    parameters : ParameterSet or ModelSetup
         Nominal values, those of earlier stages already found.
     experiments : sequence of Experiment
         The runs to fit.
@@ -380,8 +380,8 @@ def stage_problem(
         If a free parameter is unknown or its bounds are wrong.
     """
     threads = threads or available_cores()
-    if isinstance(parameters, ModelParameters):
-        return parameters.setup.problem(experiments, threads=threads)
+    if isinstance(parameters, ModelSetup):
+        return parameters.problem(experiments, threads=threads)
     if stage.part == "model":
         raise InputError("part = 'model' needs a model of your own, not a drive.")
     kinds = stage.channels or kinds_of(stage.part)
@@ -453,9 +453,8 @@ def with_estimates(parameters: Parameters, problem: Problem, vector: Array) -> P
         If a value breaks a rule.
     """
     found = problem.unknowns.targets(vector, "")
-    if isinstance(parameters, ModelParameters):
-        numbers = {**parameters.numbers, **found}
-        return ModelParameters(parameters.setup, numbers, problem.scales)
+    if isinstance(parameters, ModelSetup):
+        return replace(parameters, numbers={**parameters.numbers, **found}, scales=problem.scales)
     assert isinstance(problem.model, DriveModel)
     return problem.model.parameters_at(found)
 

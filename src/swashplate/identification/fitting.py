@@ -38,7 +38,7 @@ from swashplate.identification.intervals import weighed
 from swashplate.identification.lack_of_fit import measurement_error
 from swashplate.identification.model import Model, OwnModel
 from swashplate.identification.problem import Loss, Problem
-from swashplate.identification.setup import ModelParameters, ModelSetup, Range, Setup, Stage
+from swashplate.identification.setup import ModelSetup, Range, Setup, Stage
 from swashplate.identification.solving import Progress, Solution, sobol_starts, solve, solve_from
 from swashplate.identification.unknowns import Unknown
 from swashplate.parameters.definitions import columns_of
@@ -115,7 +115,7 @@ class StageFit(Result):
         InputError
             If it is a model of one's own.
         """
-        if isinstance(self.parameters, ModelParameters):
+        if isinstance(self.parameters, ModelSetup):
             raise InputError(f"{self.parameters.name} is a model of your own, no drive.")
         return Drive(self.parameters)
 
@@ -174,7 +174,7 @@ class Fit(Result):
 
 
 def fit(
-    model: Drive | Parameters | ModelSetup | Model | Equations,
+    model: Drive | Parameters | Model | Equations,
     tests: Campaign | Sequence[Experiment],
     free: Setup | Mapping[str, Range | Unknown] | None = None,
     *,
@@ -242,14 +242,12 @@ def fit(
         nominal, changed = at_rate_of(runs, nominal)
         doubts += changed
     else:
-        if not isinstance(nominal, ModelParameters):
-            own = nominal
-            if not isinstance(own, ModelSetup):
-                entries = free if isinstance(free, Mapping) else {}
-                own = ModelSetup(own, entries, "", tuple(channels), noise or {}, fixed or {})
-            doubts += refuse_unsound(check_model(runs, own))
-            nominal = own.nominal(runs)
-        setup = nominal.setup.setup
+        if not isinstance(nominal, ModelSetup):
+            entries = free if isinstance(free, Mapping) else {}
+            nominal = ModelSetup(nominal, entries, "", tuple(channels), noise or {}, fixed or {})
+        doubts += refuse_unsound(check_model(runs, nominal))
+        nominal = nominal if nominal.numbers else nominal.nominal(runs)
+        setup = nominal.setup
     parameters, stages, starts = smooth(nominal), list[StageFit](), dict[str, Mapping[str, float]]()
     for stage in setup.stages:
         uncertain = setup.standard_uncertainty

@@ -13,10 +13,9 @@ from numpy.typing import NDArray
 from swashplate.campaign.experiment import Experiment
 from swashplate.equations import Model as Equations
 from swashplate.equations import instance_of, parameter_paths, state_paths
-from swashplate.equations.fields import made, numbers_of
+from swashplate.equations.fields import made
 from swashplate.equations.marching.jacobian import jacobian, residuals
 from swashplate.equations.marching.layout import started_by
-from swashplate.equations.marching.march import output_of
 from swashplate.equations.marching.observation import Observation, ObservedRecord
 from swashplate.equations.marching.observation import Own as EngineOwn
 from swashplate.equations.marching.record import Record, even_rate, gridded
@@ -155,27 +154,26 @@ def simulated(
 
 def _check(made: object, experiment: Experiment, names: int | None = None) -> None:
     """Refuse what a model must not return: arrays, or with `names` Linearised by so many."""
-    method, each = ("simulate", "an array of floats") if names is None else ("linearise", "")
+    method, each = "linearise", "a Linearised"
+    if names is None:
+        method, each = "simulate", "an array of floats"
 
-    def refuse(must: str, other: object) -> None:
-        said = {type(None): "None (is a return missing?)"}.get(type(other))
+    def refused(must: str, other: object) -> InputError:
+        said = "None (is a return missing?)" if other is None else f"a {type(other).__name__}"
         if isinstance(other, np.ndarray):
             said = f"an array of {other.dtype.name}"
-        said = said or f"a {type(other).__name__}"
-        raise InputError(f"{experiment.name}: {method} must return {must}, not {said}.")
+        return InputError(f"{experiment.name}: {method} must return {must}, not {said}.")
 
     if not isinstance(made, Mapping):
         first = next(iter(experiment.channels), "speed")
-        each = each or "a Linearised"
-        refuse(f"a mapping of channel names to {each}, such as {{'{first}': ...}}", made)
-        return
+        raise refused(f"a mapping of channel names to {each}, such as {{'{first}': ...}}", made)
     for name, part in made.items():
         if names is not None and not isinstance(part, Linearised):
-            refuse(f"a Linearised for {name}", part)
+            raise refused(f"a Linearised for {name}", part)
         for k, array in enumerate((part,) if names is None else part):
-            shape = experiment[name].time.shape + ((names,) if k else ())
             if not isinstance(array, np.ndarray) or array.dtype.kind not in "fiu":
-                refuse(f"a NumPy array of real numbers for {name}", array)
+                raise refused(f"a NumPy array of real numbers for {name}", array)
+            shape = experiment[name].time.shape + ((names,) if k else ())
             if array.shape != shape:
                 columns = ", and a column for each name asked for" if k else ""
                 raise InputError(
@@ -309,33 +307,20 @@ class OwnModel(Result, EquationModel):
     """
 
     model: Equations
-    p: Any = None
-    """Values of what is neither unknown nor fixed by the problem: the model's parameters."""
     rate: float | None = None
     """Steps a second; by default the input's samples. Needed where its stamps are not even. [Hz]"""
     options: Any = None
     given: Any = None
     """The model's givens, or a mapping of them by the experiments' names."""
-    signals: Mapping[str, str] = field(default_factory=dict)
-    """The model's signal for a channel of another name."""
     begin: Mapping[str, str] = field(default_factory=dict)
     """Channel that says where a number of the state begins, by its path: at the first sample that
     counts."""
 
     def signals_of(self, experiment: Experiment) -> Mapping[str, str]:
-        """Signal of the model for each channel that it gives.
-
-        Raises
-        ------
-        InputError
-            If the model has no such signal, or gives none of the channels.
-        """
+        """Signal of the model for each channel that it gives; one of none is refused."""
         known = [name for part in self.model.parts for name in part.signal_names]
         known += [*self.model.links, *self.model.integrals]
-        found = {name: self.signals.get(name, name) for name in experiment.channels}
-        found = {k: v for k, v in found.items() if k in self.signals or v in known}
-        for signal in found.values():
-            output_of(self.model, signal)
+        found = {name: name for name in experiment.channels if name in known}
         if not found:
             raise InputError(
                 f"{experiment.name} has the channels {', '.join(experiment.channels)}, of which "
@@ -393,8 +378,7 @@ class OwnModel(Result, EquationModel):
         """
         model, given = self.model, self.given
         paths, states = parameter_paths(model), state_paths(model)
-        numbers = {} if self.p is None else dict(zip(paths, numbers_of(self.p), strict=True))
-        begin = {}
+        numbers, begin = dict[str, float](), dict[str, float]()
         for path, channel in self.begin.items():
             measured = experiment[channel]
             begin[path] = float(measured.values[int(np.argmax(measured.used))])
@@ -419,7 +403,7 @@ class OwnModel(Result, EquationModel):
             p = made(model.parameters, numbers)
         except KeyError as error:
             raise InputError(
-                f"{model.name} has no value of {error.args[0]}: let it be free, fix it, or give p."
+                f"{model.name} has no value of {error.args[0]}: let it be free, or fix it."
             ) from None
         if isinstance(given, Mapping):
             if experiment.name not in given:

@@ -26,7 +26,7 @@ from swashplate.campaign.schema import NotNegative, Weight, Window
 from swashplate.documents import parse_toml, read_text, validated
 from swashplate.equations import Model as Equations
 from swashplate.errors import FileError, InputError, ParameterError
-from swashplate.identification.model import OFFSET, START, Model, OwnModel, simulated
+from swashplate.identification.model import OFFSET, START, OwnModel, simulated
 from swashplate.identification.problem import Problem, noise_scales
 from swashplate.identification.solving import solve
 from swashplate.identification.unknowns import Unknown, Unknowns
@@ -349,7 +349,7 @@ BY_ORDER = 10.0
 
 @dataclass(frozen=True, eq=False)
 class ModelSetup(Result):
-    """What is to be found of a model of one's own: to it what `Setup` is to a drive.
+    """A model of one's own and what is to be found of it, as set and `Setup` of a drive.
 
     Parameters
     ----------
@@ -369,39 +369,42 @@ class ModelSetup(Result):
         Values of names that are not free.
     standard_uncertainty : mapping of str to float or str
         What values of `fixed` may be off by, one standard deviation, also as ``"5 %"``.
+    numbers : mapping of str to float
+        The model's numbers, nominal or fitted, those of single runs left out; see `nominal`.
+    scales : mapping of str to float
+        What one unit of residual is, by channel: its noise. [unit]
     """
 
-    model: Model | Equations
+    model: Any
     free: Mapping[str, Range | Unknown]
     name: str = ""
     channels: tuple[str, ...] = ()
     noise: Mapping[str, float] = field(default_factory=dict)
     fixed: Mapping[str, float] = field(default_factory=dict)
     standard_uncertainty: Mapping[str, StandardUncertainty] = field(default_factory=dict)
+    numbers: Mapping[str, float] = field(default_factory=dict)
+    scales: Mapping[str, float] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        model = self.model
-        own = OwnModel(model) if isinstance(model, Equations) else model
+        own = OwnModel(self.model) if isinstance(self.model, Equations) else self.model
         if not callable(getattr(own, "simulate", None)):
             raise InputError(
-                f"A {type(model).__name__} is no model: give a Model of equations, or an object "
-                "with simulate(values, experiment)."
+                f"A {type(own).__name__} is no model: give a Model of equations, or an object with "
+                "simulate(values, experiment)."
             )
         equations = own.model if isinstance(own, OwnModel) else own
-        object.__setattr__(self, "model", own)
-        if not self.name:
-            name = getattr(equations, "name", None)
-            object.__setattr__(self, "name", str(name or type(equations).__name__).lower())
+        name = self.name or getattr(equations, "name", None) or type(equations).__name__
         if not self.free:
-            raise InputError(f"Nothing of {self.name} is free: name what is to be found.")
-        unfixed = [name for name in self.standard_uncertainty if name not in self.fixed]
-        if unfixed:
-            raise InputError(
-                f"{unfixed[0]} has a standard uncertainty but no value: name it in fixed, or give "
-                "it a prior if it is free."
-            )
-        free = {name: _unknown(name, entry) for name, entry in self.free.items()}
-        object.__setattr__(self, "free", free)
+            raise InputError(f"Nothing of {name} is free: name what is to be found.")
+        for each in self.standard_uncertainty:
+            if each not in self.fixed:
+                raise InputError(
+                    f"{each} has a standard uncertainty but no value: name it in fixed, or give "
+                    "it a prior if it is free."
+                )
+        object.__setattr__(self, "model", own)
+        object.__setattr__(self, "name", self.name or str(name).lower())
+        object.__setattr__(self, "free", {k: _unknown(k, each) for k, each in self.free.items()})
 
     @classmethod
     def from_file(cls, path: str | Path) -> ModelSetup:
@@ -429,12 +432,12 @@ class ModelSetup(Result):
         module = import_module(file.stem)
         if module.__file__ is None or Path(module.__file__).resolve() != file:
             raise FileError(f"{path}: another module is called {file.stem}; rename the file.")
-        missing = [name for name in ("model", "free") if not hasattr(module, name)]
-        if missing:
-            raise InputError(
-                f"{path} has no '{missing[0]}': it needs model = Model(...) and free = "
-                "{'lag': (0.005, 0.06, 0.5), ...}, lower bound, nominal value and upper bound."
-            )
+        for name in ("model", "free"):
+            if not hasattr(module, name):
+                raise InputError(
+                    f"{path} has no '{name}': it needs model = Model(...) and free = "
+                    "{'lag': (0.005, 0.06, 0.5), ...}, lower bound, nominal value and upper bound."
+                )
         known = ("name", "channels", "noise", "fixed", "standard_uncertainty")
         more = {key: getattr(module, key) for key in known if hasattr(module, key)}
         return cls(module.model, module.free, **more)
@@ -443,21 +446,25 @@ class ModelSetup(Result):
     def setup(self) -> Setup:
         """The set-up as that of a fit in stages, of which it has one."""
         free = {}
-        for name, each in self._free.items():
+        for each in self._unknowns:
             known = each.prior
             prior = known and GivenPrior(mean=known.mean, deviation=known.deviation)
-            free[name] = Free(bounds=(each.low, each.high), log=each.log, prior=prior)
+            free[each.name] = Free(bounds=(each.low, each.high), log=each.log, prior=prior)
         return Setup(
             title=self.name,
             stages=(Stage(name=self.name, part="model", free=free),),
             standard_uncertainty=dict(self.standard_uncertainty),
         )
 
-    def nominal(self, experiments: Sequence[Experiment]) -> ModelParameters:
-        """The model's numbers before a fit to some runs."""
+    @property
+    def _unknowns(self) -> list[Unknown]:
+        return list(self.free.values())  # type: ignore[arg-type]  # made so at the beginning
+
+    def nominal(self, experiments: Sequence[Experiment]) -> ModelSetup:
+        """The set-up with the numbers before a fit to some runs."""
         problem = self.problem(experiments)
         numbers = {**self.fixed, **problem.unknowns.targets(problem.start, "")}
-        return ModelParameters(self, numbers, problem.scales)
+        return replace(self, numbers=numbers, scales=problem.scales)
 
     def problem(self, experiments: Sequence[Experiment], *, threads: int = 1) -> Problem:
         """The problem that it states for some runs.
@@ -469,6 +476,7 @@ class ModelSetup(Result):
         """
         own = {each.name: self.own(each) for each in experiments}
         of_runs = {each.name for unknowns in own.values() for each in unknowns}
+        had = tuple(dict.fromkeys(name for each in experiments for name in each.channels))
         channels = self.channels or self._given(experiments)
         runs = tuple(
             self._with_noise(each)
@@ -476,23 +484,21 @@ class ModelSetup(Result):
             if any(name in each.channels for name in channels)
         )
         if not runs:
-            had = ", ".join(dict.fromkeys(name for each in experiments for name in each.channels))
             raise InputError(
                 f"{self.name} is fitted to {', '.join(channels) or 'nothing'}, but the runs have "
-                f"{had or 'no channel'}."
+                f"{', '.join(had) or 'no channel'}."
             )
-        machine = [each for each in self._free.values() if each.name not in of_runs]
-        unknowns = (*machine, *(unknown for each in runs for unknown in own[each.name]))
+        machine = [each for each in self._unknowns if each.name not in of_runs]
         return Problem(
-            self.model,  # type: ignore[arg-type]  # made one that simulates at the beginning
+            self.model,
             runs,
-            Unknowns(unknowns),
+            Unknowns((*machine, *(unknown for each in runs for unknown in own[each.name]))),
             channels,
             noise_scales(runs, channels),
             dict(self.fixed),
             tuple(
-                {name: deviation(uncertainty, self.fixed[name])}
-                for name, uncertainty in self.standard_uncertainty.items()
+                {name: deviation(each, self.fixed[name])}
+                for name, each in self.standard_uncertainty.items()
             ),
             threads if isinstance(self.model, OwnModel) else 1,
         )
@@ -503,47 +509,9 @@ class ModelSetup(Result):
         states = isinstance(self.model, OwnModel)
         return tuple(
             replace(each, run=experiment.name)
-            for each in self._free.values()
+            for each in self._unknowns
             if each.run is None and (each.name in zeros or (states and each.name.startswith(START)))
         )
-
-    def _with_noise(self, experiment: Experiment) -> Experiment:
-        """The run with the noise of channels that the campaign does not state."""
-        stated = {
-            name: replace(channel, noise=self.noise[name])
-            for name, channel in experiment.channels.items()
-            if channel.noise is None and name in self.noise
-        }
-        return replace(experiment, channels={**experiment.channels, **stated})
-
-    @property
-    def _free(self) -> dict[str, Unknown]:
-        return self.free  # type: ignore[return-value]  # made unknowns at the beginning
-
-    def _given(self, experiments: Sequence[Experiment]) -> tuple[str, ...]:
-        """Names of the channels that the model gives."""
-        if isinstance(self.model, OwnModel):
-            given = [self.model.signals_of(each) for each in experiments]
-            return tuple(dict.fromkeys(name for each in given for name in each))
-        values = {name: each.start for name, each in self._free.items()} | dict(self.fixed)
-        made = [simulated(self.model, values, each) for each in experiments]  # type: ignore[arg-type]
-        return tuple(dict.fromkeys(name for each in made for name in each))
-
-
-@dataclass(frozen=True, eq=False)
-class ModelParameters(Result):
-    """The numbers of a model of one's own: to it what `ParameterSet` is to a drive."""
-
-    setup: ModelSetup
-    numbers: Mapping[str, float]
-    """By the model's names, those of single runs left out."""
-    scales: Mapping[str, float]
-    """What one unit of residual is, by channel: its noise. [unit]"""
-
-    @property
-    def name(self) -> str:
-        """Of the model."""
-        return self.setup.name
 
     def predicted(self, experiment: Experiment) -> Mapping[str, Array]:
         """A run predicted from its input: for each channel (m,) samples at its stamps. [unit]
@@ -551,14 +519,33 @@ class ModelParameters(Result):
         What is free in each run by itself, a beginning of the state or the zero of a sensor, is
         estimated from this run; everything else is as it is.
         """
-        own = tuple(each for each in self.setup.own(experiment) if each.name not in self.numbers)
+        own = tuple(each for each in self.own(experiment) if each.name not in self.numbers)
         channels = tuple(name for name in self.scales if name in experiment.channels)
-        model: Any = self.setup.model
         if not own:
-            found = simulated(model, self.numbers, experiment)
+            found = simulated(self.model, self.numbers, experiment)
             return {name: found[name] for name in channels}
-        problem = Problem(model, (experiment,), Unknowns(own), channels, self.scales, self.numbers)
+        fixed, unknowns = self.numbers, Unknowns(own)
+        problem = Problem(self.model, (experiment,), unknowns, channels, self.scales, fixed)
         return problem.outputs(solve(problem).vector, 0)
+
+    def _with_noise(self, experiment: Experiment) -> Experiment:
+        """The run with the noise of channels that the campaign does not state."""
+        channels = dict(experiment.channels)
+        for name, channel in channels.items():
+            if channel.noise is None and name in self.noise:
+                channels[name] = replace(channel, noise=self.noise[name])
+        return replace(experiment, channels=channels)
+
+    def _given(self, experiments: Sequence[Experiment]) -> tuple[str, ...]:
+        """Names of the channels that the model gives."""
+        values = {each.name: each.start for each in self._unknowns} | dict(self.fixed)
+        given = (
+            self.model.signals_of(each)
+            if isinstance(self.model, OwnModel)
+            else simulated(self.model, values, each)
+            for each in experiments
+        )
+        return tuple(dict.fromkeys(name for each in given for name in each))
 
 
 def _unknown(name: str, entry: Range | Unknown) -> Unknown:

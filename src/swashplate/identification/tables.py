@@ -16,7 +16,7 @@ from swashplate.identification.drive_model import DriveModel
 from swashplate.identification.experiment_design import Advice, Gain, Outlook
 from swashplate.identification.identifiability import GAUGES, SCALES, moved_columns, true_values
 from swashplate.identification.intervals import Estimate
-from swashplate.identification.setup import ModelParameters
+from swashplate.identification.setup import ModelSetup
 from swashplate.identification.validation import ignored_windows, pooled, with_speeds
 from swashplate.parameters.definitions import CATALOGUE, COLUMNS
 from swashplate.simulation.instance import START_PRESSURE
@@ -216,7 +216,7 @@ def fixed_table(fit: Fit, truth: ParameterSet | None = None) -> Table:
         si=True,
     )
     moved, parameters = moved_columns(fit), fit.parameters
-    if isinstance(parameters, ModelParameters):
+    if isinstance(parameters, ModelSetup):
         for name, value in parameters.numbers.items():
             if name not in moved:
                 made.add(name, "", value, None, "given with the model", "")

@@ -16,7 +16,7 @@ from swashplate.errors import InputError
 from swashplate.identification.drive_model import SIGNALS, DriveModel, Parameters, measured_current
 from swashplate.identification.noise import LONGEST, Grid, correlation_length, grid_of, pair_sums
 from swashplate.identification.problem import Problem
-from swashplate.identification.setup import ModelParameters
+from swashplate.identification.setup import ModelSetup
 from swashplate.parameters.parameter_set import HasParameters, set_of
 from swashplate.results import Result
 
@@ -253,7 +253,7 @@ def predict(
 
     Parameters
     ----------
-    model : Drive, ParameterSet or ModelParameters
+    model : Drive, ParameterSet or ModelSetup
         The drive, or a model of one's own with its numbers.
     experiments : sequence of Experiment
         Runs that it was not fitted to. A voltage goes through the whole chain, a current through
@@ -271,8 +271,8 @@ def predict(
     DomainError
         If the model does not hold under a run's input.
     """
-    parameters = model if isinstance(model, ModelParameters) else set_of(model)
-    if isinstance(parameters, ModelParameters):
+    parameters = model if isinstance(model, ModelSetup) else set_of(model)
+    if isinstance(parameters, ModelSetup):
         return tuple(
             compared(each, name, simulated)
             for each in experiments

@@ -21,7 +21,7 @@ from swashplate.identification.drive_model import Parameters
 from swashplate.identification.fitting import Fit, StageFit
 from swashplate.identification.identifiability import Identifiability
 from swashplate.identification.resampling import CrossValidation
-from swashplate.identification.setup import ModelParameters
+from swashplate.identification.setup import ModelSetup
 from swashplate.identification.solving import Solution
 from swashplate.identification.validation import RunQuality, percent
 from swashplate.identification.verdict import Verdict, starts_of, verdict
@@ -122,7 +122,7 @@ def write_validation_report(
 
     Parameters
     ----------
-    drive : ParameterSet or ModelParameters
+    drive : ParameterSet or ModelSetup
         The drive, or the model of one's own, that was held against the runs.
     campaign : Campaign
         The tests.
@@ -184,7 +184,7 @@ def _shared(
     for number, (run, _) in enumerate(found, start=1):
         findings.setdefault(run, []).append(number)
     words = f"Drive {drive.name}"
-    if isinstance(drive, ModelParameters):
+    if isinstance(drive, ModelSetup):
         words = f"Model {drive.name}"
     elif drive.title:
         words += f" ({drive.title})"
@@ -337,7 +337,7 @@ def _setup_section(
 ) -> Section:
     made = Table("", (Column(""), Column("")))
     made.add("campaign", str(campaign.path))
-    if isinstance(drive, ModelParameters):
+    if isinstance(drive, ModelSetup):
         made.add("model", drive.name)
     else:
         made.add("drive", f"{drive.name}, card {drive.card}" if drive.card else drive.name)
