@@ -48,8 +48,8 @@ SETUP = Setup.model_validate(
     }
 )
 STARTS = (
-    Solution(np.array([0.3, 0.4]), 3.0, 9.0, 10, True, False, "done", 0.1),
-    Solution(np.ones(2), np.inf, np.inf, 1, False, False, "left", 0.0, number=1),
+    Solution(np.array([0.3, 0.4]), 3.0, 10, True, False, "done"),
+    Solution(np.ones(2), np.inf, 1, False, False, "left", number=1),
 )
 
 

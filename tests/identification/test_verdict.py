@@ -197,7 +197,7 @@ def test_an_interrupted_fit_is_not_usable(experiment, measured, stage) -> None:
 
 
 def start(cost: float) -> Solution:
-    return Solution(np.zeros(1), cost, 9.0, 10, True, False, "done", 0.1)
+    return Solution(np.zeros(1), cost, 10, True, False, "done")
 
 
 def test_starts_that_agree_and_starts_that_do_not(stage) -> None:

@@ -102,7 +102,7 @@ def validation(judged: Judged):
 
 
 STARTS = tuple(
-    Solution(np.zeros(1), cost, 9.0, 10, number != 2, False, "done", 0.1, number=number)
+    Solution(np.zeros(1), cost, 10, number != 2, False, "done", number=number)
     for number, cost in enumerate((3.0, 3.0, 70.0, float("inf")))
 )
 HEADS = ("run", "parameter", "channel", "fold", "quantity")

@@ -354,22 +354,11 @@ def stage_problem(
     uncertain: Mapping[str, float | str] = MappingProxyType({}),
     starts: Starts = MappingProxyType({}),
 ) -> Problem:
-    """The problem of a stage.
+    """The problem of a stage, over the runs that have a channel of it.
 
-    Parameters
-    ----------
-    stage : Stage
-        What is free and what is fitted.
-    parameters : ParameterSet or ModelSetup
-        Nominal values, those of earlier stages already found.
-    experiments : sequence of Experiment
-        The runs to fit.
-    threads : int, optional
-        Threads over experiments; all cores by default.
-    uncertain : mapping of str to float or str, optional
-        Standard uncertainties of what stays fixed, as of `Setup`.
-    starts : mapping of str to mapping, optional
-        Currents at the first sample of runs that a stage before estimated: `start_currents_of`.
+    `parameters` are the nominal values, those of earlier stages already found; `uncertain` standard
+    uncertainties of what stays fixed, as of `Setup`; `starts` currents at the first sample that a
+    stage before estimated, see `start_currents_of`. Threads are all cores by default.
 
     Raises
     ------

@@ -296,7 +296,7 @@ def _solved(
         if len(several) <= OTHERS:
             solution = _stopped(several, 1 + OTHERS)
         elif best.number:
-            solution = replace(solved(problem, best.vector), start_cost=solution.start_cost)
+            solution = solved(problem, best.vector)
     if any(each.prior is not None for each in problem.unknowns) and not solution.interrupted:
         # what the residuals are worth is known only now
         problem = weighed(problem, solution.vector)

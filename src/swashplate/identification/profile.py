@@ -110,20 +110,9 @@ def profile(
 ) -> Profile:
     """Profile of one unknown: outwards from the optimum both ways, each point from the last.
 
-    Parameters
-    ----------
-    minimise : callable
-        See `Minimise`. It may raise DomainError where the model does not hold.
-    vector, cost :
-        The optimum (K,), and its half sum of squares.
-    index : int
-        Number of the unknown.
-    rise : float
-        Of the cost at which the interval ends.
-    step : float
-        About one standard error of the unknown's number, positive: how far the first step goes.
-    bounds : (float, float)
-        Of the unknown's number.
+    The optimum is a vector (K,) with its half sum of squares; the interval ends where that has
+    risen by `rise`. `step`, positive, is about one standard error of the unknown's number in the
+    vector, `bounds` are those of the number. `minimise` may raise DomainError.
 
     Raises
     ------
@@ -390,21 +379,10 @@ def profiles_of(
     executor: Executor | None = None,
     watch: Callable[[int], None] | None = None,
 ) -> dict[str, Profile]:
-    """Profile likelihoods of a stage's unknowns.
+    """Profile likelihoods of a stage's unknowns by name, in their order.
 
-    Parameters
-    ----------
-    assessment : Assessment
-        Of the stage.
-    names : sequence of str, optional
-        Which unknowns; by default all of the machine that have an interval.
-    executor, watch :
-        Where they are followed, here by default; told how many are done.
-
-    Returns
-    -------
-    dict of str to Profile
-        In the order of the unknowns. What earlier stages do not know is not in them.
+    By default of all unknowns of the machine that have an interval. What earlier stages do not know
+    is not in them. `watch` is told how many are done.
 
     Raises
     ------

@@ -132,20 +132,15 @@ def cross_validate(
 
     Parameters
     ----------
-    experiments : sequence of Experiment
-        The runs of the fit.
-    nominal : ParameterSet or ModelParameters
-        Where each fit begins: not at the fit to all runs, which has seen those that are held out.
-    setup : Setup
-        Stages and free parameters.
+    experiments, nominal, setup, loss :
+        As of `fitting.fit`: each fit begins at nominal values, not at the fit to all runs, which
+        has seen those that are held out.
     folds : int
         Parts, at least 2 and at most as many as there are runs: then each run is one.
     seed : int
         Of the dealing; the same seed, the same folds.
     executor : Executor, optional
-        Where the fits run; here, one after another, by default. The results do not depend on it.
-    loss : Loss
-        As of `fitting.fit`.
+        Where the fits run; here by default. The results do not depend on it.
     watch : callable, optional
         Told of each fold and how many there are by now. Ctrl-C ends it; folds that are done are
         returned.
@@ -353,23 +348,8 @@ def bootstraps_of(
 ) -> dict[str, Bootstrap]:
     """Fit all stages again and again to what they simulate with other noise of the same colour.
 
-    Parameters
-    ----------
-    assessments : sequence of Assessment
-        Of the stages. In each draw a pump is driven by the current of the card of that draw.
-    draws : int
-        How many times, at least 2.
-    seed : int
-        Of the noise; draw k is the same on any executor.
-    executor : Executor, optional
-        Where the fits run; here by default.
-    watch : callable, optional
-        Told how many are done.
-
-    Returns
-    -------
-    dict of str to Bootstrap
-        By stage.
+    Results by stage. In each draw a pump is driven by the current of the card of that draw; draw k
+    of a seed is the same on any executor. `watch` is told how many are done.
 
     Raises
     ------

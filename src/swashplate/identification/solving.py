@@ -6,7 +6,6 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
-from time import perf_counter
 from typing import Annotated, NamedTuple
 
 import numpy as np
@@ -58,9 +57,7 @@ class Progress(NamedTuple):
 
     iteration: int
     cost: float
-    vector: Array
-    seconds: float
-    evaluations: int = 0
+    evaluations: int
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,14 +67,12 @@ class Solution(Result):
     vector: Vector
     cost: Cost
     """Half the weighted sum of squares; with a robust loss, of the loss."""
-    start_cost: Cost
     evaluations: int
     """Of the residuals, each with its Jacobian."""
     converged: bool
     interrupted: bool
     message: str
     """Why it stopped, in words."""
-    seconds: Finite
     loss: Loss = "linear"
     """What of each residual was summed."""
     number: int = 0
@@ -162,25 +157,21 @@ def solve(
     """
     from scipy.optimize import least_squares
 
-    begun = perf_counter()
     # a robust loss looks at each residual, which the triangular factor has mixed
     memory = _Memory(problem, fixed or {}, compressed=loss == "linear")
     begin = np.delete(problem.start if start is None else start, memory.places)
     best = begin = np.clip(begin, *memory.bounds)
-    at_start = memory(begin).residuals
-    start_cost, iteration = 0.5 * float(at_start @ at_start), 0
+    iteration = 0
 
     def seen(intermediate_result) -> None:  # type: ignore[no-untyped-def]
         nonlocal iteration
         iteration += 1
         if watch is not None:
-            now, seconds = intermediate_result, perf_counter() - begun
-            spent = memory.evaluations
-            watch(Progress(iteration, float(now.cost), memory.whole(now.x), seconds, spent))
+            watch(Progress(iteration, float(intermediate_result.cost), memory.evaluations))
 
     def ended(vector: Array, cost: float, message: str, ending: int) -> Solution:
-        how = memory.evaluations, ending > 0, ending < 0, message, perf_counter() - begun, loss
-        return Solution(memory.whole(vector), float(cost), start_cost, *how)
+        how = memory.evaluations, ending > 0, ending < 0, message, loss
+        return Solution(memory.whole(vector), float(cost), *how)
 
     lowest, spent, before, returns = np.inf, 0, np.inf, 0
     # an unknown that got its effect back is fixed for a leg, in which the others follow
@@ -263,16 +254,9 @@ def _returned(memory: _Memory, vector: Array) -> tuple[Array | None, NDArray[np.
 
 
 def sobol_starts(problem: Problem, count: int, seed: int) -> Iterator[Array]:
-    """Points spread evenly over the bounds; where the model does not hold, others are drawn.
+    """So many points (K,) spread evenly over the bounds; others where the model does not hold.
 
-    Parameters
-    ----------
-    problem : Problem
-        Whose bounds and domain.
-    count : int
-        How many points.
-    seed : int
-        Of the scrambling: the same seed, the same points, however many are asked for.
+    The same seed gives the same points, however many are asked for.
 
     Raises
     ------
@@ -379,7 +363,7 @@ def _solve_one(
     try:
         solution = solved(problem, start)
     except DomainError as error:
-        solution = Solution(start, np.inf, np.inf, 1, False, False, str(error), 0.0)
+        solution = Solution(start, np.inf, 1, False, False, str(error))
     if solution.interrupted:
         raise KeyboardInterrupt
     return replace(solution, number=number)
