@@ -111,50 +111,41 @@ class Forces(Entry):
     )
     relative: Bounds = Field((0.5, 2.0), description="Bounds as factors on the nominal forces.")
 
-    @cached_property
-    def _maps(self) -> dict[str, Array]:
-        """For each direction the (4, 4) map from forces to coefficients."""
-        signs = {"plus": 1.0, "minus": -1.0}
-        return {
-            side: np.linalg.inv(np.power.outer(getattr(self, side), ORDERS) * sign ** (ORDERS + 1))
-            for side, sign in signs.items()
-        }
-
-    @cached_property
+    @property
     def names(self) -> tuple[str, ...]:
         """Names of the eight forces."""
-        return tuple(f"force_{side}_{k}" for side in self._maps for k in ORDERS)
+        return tuple(f"force_{side}_{k}" for side in ("plus", "minus") for k in ORDERS)
 
     @property
     def columns(self) -> tuple[str, ...]:
         """The parameters that they stand for."""
-        return tuple(f"{symbol}_{side}" for side in self._maps for symbol in COEFFICIENTS)
+        return tuple(f"{symbol}_{side}" for side in ("plus", "minus") for symbol in COEFFICIENTS)
+
+    @cached_property
+    def _inverse(self) -> Array:
+        """(8, 8) map from forces to coefficients, of F = Z19 i + Z20 i² + Z21 i³ + Z22 i⁴."""
+        zero = np.zeros((4, 4))
+        plus = np.power.outer(self.plus, ORDERS)
+        minus = np.power.outer(self.minus, ORDERS) * (-1.0) ** (ORDERS + 1)
+        return np.linalg.inv(np.block([[plus, zero], [zero, minus]]))
 
     def values(self, parameters: ParameterSet) -> dict[str, float]:
         """The forces of a parameter set, by name. [N]"""
-        found: list[float] = []
-        for side, map_ in self._maps.items():
-            coefficients = [parameters.numbers[f"{symbol}_{side}"] for symbol in COEFFICIENTS]
-            found += np.linalg.solve(map_, coefficients).tolist()
-        return dict(zip(self.names, found, strict=True))
+        found = np.linalg.solve(self._inverse, [parameters.numbers[c] for c in self.columns])
+        return dict(zip(self.names, found.tolist(), strict=True))
 
     def coefficients(
         self, values: Mapping[str, float], parameters: ParameterSet
     ) -> dict[str, float]:
         """Coefficients for some forces; those not named are as in the parameter set. [N/Aᵏ]"""
-        forces, made = self.values(parameters), dict[str, float]()
-        for side, map_ in self._maps.items():
-            names = [f"force_{side}_{k}" for k in ORDERS]
-            found = map_ @ np.array([values.get(name, forces[name]) for name in names])
-            for symbol, coefficient in zip(COEFFICIENTS, found.tolist(), strict=True):
-                made[f"{symbol}_{side}"] = coefficient
-        return made
+        forces = self.values(parameters)
+        found = self._inverse @ np.array([values.get(name, forces[name]) for name in forces])
+        return dict(zip(self.columns, found.tolist(), strict=True))
 
     def slopes(self, name: str) -> dict[str, float]:
-        """Derivatives of the coefficients by one force. [1/Aᵏ]"""
-        _, side, number = name.split("_")
-        column = self._maps[side][:, int(number) - 1].tolist()
-        return {f"{symbol}_{side}": b for symbol, b in zip(COEFFICIENTS, column, strict=True)}
+        """Derivatives by one force of the coefficients of its direction. [1/Aᵏ]"""
+        column = self._inverse[:, self.names.index(name)].tolist()
+        return {each: slope for each, slope in zip(self.columns, column, strict=True) if slope}
 
 
 class InputWeight(Window):
