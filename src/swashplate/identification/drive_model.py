@@ -71,8 +71,8 @@ def _record(signal: InputSignal) -> Record:
     """A signal on the march's grid, its own where its stamps are even."""
     what, interpolation, rate = str(signal.kind), signal.interpolation, even_rate(signal.time)
     if rate is None or rate < SLOWEST:
-        put = {"what": what, "time": signal.time, "interpolation": interpolation}
-        return record_of(signal.values, SOURCE_RATE, **put)
+        time, rate = signal.time, SOURCE_RATE
+        return record_of(signal.values, rate, what=what, time=time, interpolation=interpolation)
     own = record_of(signal.values, rate, what=what, interpolation=interpolation)
     # the march joins the points of its grid by straight lines: of a command that is held, each
     # stands for the step after it
@@ -195,8 +195,12 @@ def at_rate_of(
     It then has the filter's differential equation, if a run is marched at another rate than the one
     that its recursion belongs to.
     """
-    for each in experiments if parameters.rate is not None else ():
-        rate = 1.0 / voltage_record(each).step if each.input.kind == "voltage" else parameters.rate
+    if parameters.rate is None:
+        return parameters, ()
+    for each in experiments:
+        rate = parameters.rate
+        if each.input.kind == "voltage":
+            rate = 1.0 / voltage_record(each).step
         if abs(rate / parameters.rate - 1.0) > OTHER_RATE:
             return at_every_rate(parameters), (
                 f"{each.name} is simulated at {rate:.4g} Hz, but the card's filter of "

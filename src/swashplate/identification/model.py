@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
@@ -252,9 +252,9 @@ class EquationModel(ABC):
                 plain = Observation(signals[name], channel.time, np.zeros(channel.time.size))
                 observations.append(plain)
                 continue
-            free = ("offset",) if f"{OFFSET}{name}" in offsets else ()
-            seen = signals[name], channel.time, channel.values, weights[name]
-            observations.append(Observation(*seen, unknown=free))
+            seen = Observation(signals[name], channel.time, channel.values, weights[name])
+            free = f"{OFFSET}{name}" in offsets
+            observations.append(replace(seen, unknown=("offset",)) if free else seen)
         by, record, others = self.driven(experiment)
         return ObservedRecord(record, observations, by, experiment.begins, others)
 

@@ -260,7 +260,7 @@ class Setup(Entry):
             If two stages free the same parameter, or one is driven by a scaled current, which no
             chain makes.
         """
-        merged: dict[str, dict[str, Any]] = {"free": {}, "weights": {}, "weights_by_input": {}}
+        merged: dict[str, Any] = {"free": {}, "weights": {}, "weights_by_input": {}}
         for stage in self.stages:
             if stage.current_scale != 1.0:
                 raise ParameterError(
@@ -270,8 +270,8 @@ class Setup(Entry):
             twice = sorted(set(merged["free"]) & set(stage.free))
             if twice:
                 raise ParameterError(f"{twice[0]} is free in two stages; a joint fit needs one.")
-            for key, together in merged.items():
-                together |= getattr(stage, key)
+            for key in merged:
+                merged[key] = merged[key] | getattr(stage, key)
         forces = next((each.forces for each in self.stages if each.forces is not None), None)
         pressures = [each.start_pressure for each in self.stages if each.start_pressure is not None]
         most = max(pressures, default=None)
@@ -438,8 +438,9 @@ class ModelSetup(Result):
         """The set-up as that of a fit in stages, of which it has one."""
         free = {}
         for each in self._unknowns:
-            known = each.prior
-            prior = known and GivenPrior(mean=known.mean, deviation=known.deviation)
+            prior = None
+            if each.prior is not None:
+                prior = GivenPrior(mean=each.prior.mean, deviation=each.prior.deviation)
             free[each.name] = Free(bounds=(each.low, each.high), log=each.log, prior=prior)
         return Setup(
             title=self.name,

@@ -96,6 +96,11 @@ class Unknown:
         """Names in the model that take its value."""
         return self.sets or (self.name,)
 
+    def to_value(self, number: float) -> float:
+        """The value for a solver's number, kept within the bounds against rounding."""
+        value = exp(number) if self.log else number * self.scale
+        return min(max(value, self.low), self.high)
+
 
 def bounded(
     name: str,
@@ -257,10 +262,8 @@ class Unknowns(Result):
         return np.where(self.logarithmic, logarithms, values / self.scales)
 
     def _within(self, vector: Array) -> list[float]:
-        """K values, kept within the bounds against rounding. [unit]"""
         numbers = zip(self.items, vector.tolist(), strict=True)
-        values = (exp(number) if each.log else number * each.scale for each, number in numbers)
-        return [min(max(v, e.low), e.high) for v, e in zip(values, self.items, strict=True)]
+        return [each.to_value(number) for each, number in numbers]
 
     def values(self, vector: Array) -> dict[str, float]:
         """Values by name, within the bounds."""
