@@ -299,7 +299,7 @@ def runs_tables(
             run, test = each.experiment, each.test
             tested: tuple[float | None, ...] = (None,) * 4
             if test is not None:
-                tested = (test.duration, test.peak[1], test.cross_band, test.peak[0])
+                tested = (test.duration, test.peak[1], test.band, test.peak[0])
             table.add(
                 *(run.name, run.maneuver, run.role, name, start_words(run)),
                 Cell(
@@ -364,7 +364,7 @@ def residual_table(qualities: Sequence[RunQuality]) -> Table:
         star = "*" if test.follows else ""
         run = each.experiment
         start = (run.name, run.role, each.channel, test.duration, value, star)
-        made.add(*start, test.cross_band, lag, test.verdict)
+        made.add(*start, test.band, lag, test.verdict)
     return made
 
 

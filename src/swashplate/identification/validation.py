@@ -24,7 +24,9 @@ Array = NDArray[np.float64]
 
 
 LONGEST_SHOWN = 2.0
-"""Largest lag of the curves. [s]"""
+"""Largest lag of the correlation with the input. [s]"""
+FEWEST = 8
+"""Samples that a test of residuals needs."""
 
 DEVIATIONS = 1.96
 """Half width of the bands, in standard deviations: 95 %."""
@@ -40,45 +42,35 @@ SURE = 0.9
 
 @dataclass(frozen=True, eq=False)
 class ResidualTest(Result):
-    """Whiteness of the residuals of one channel of one run, and independence of the input."""
+    """Correlation of the residuals of one channel of one run, with the input above all."""
 
     lags: Array
-    """(m,) from 0. [s]"""
-    autocorrelation: Array
-    """(m,) of the residuals."""
-    white_band: float
-    """Half width of the 95 % band of white noise."""
-    cross_lags: Array
     """(2 m - 1,) positive where the residual comes after the input. [s]"""
-    cross_correlation: Array
+    correlation: Array
     """(2 m - 1,) of the residuals with the input."""
-    cross_band: float
+    band: float
     """Half width of the 95 % band of residuals, coloured as these are, without relation to the
     input."""
     duration: float
-    """Time over which the residuals stay correlated; 0 if they are white. [s]"""
-
-    @property
-    def white(self) -> bool:
-        """Whether nothing but white noise is left."""
-        return self.duration == 0.0
+    """Time over which the residuals stay correlated with themselves; 0 if they are white. [s]"""
 
     @property
     def peak(self) -> tuple[float, float]:
-        """Lag of the largest cross-correlation [s], and its value."""
-        place = int(np.argmax(np.abs(self.cross_correlation)))
-        return float(self.cross_lags[place]), float(self.cross_correlation[place])
+        """Lag of the largest correlation [s], and its value."""
+        place = int(np.argmax(np.abs(self.correlation)))
+        return float(self.lags[place]), float(self.correlation[place])
 
     @property
     def follows(self) -> bool:
         """Whether the residuals follow the input by as much as counts as model error."""
-        return abs(self.peak[1]) >= min(max(FOLLOWS, BANDS * self.cross_band), SURE)
+        return abs(self.peak[1]) >= min(max(FOLLOWS, BANDS * self.band), SURE)
 
     @property
     def verdict(self) -> str:
         """Both in words."""
-        (lag, value), own = self.peak, f"stay correlated over {self.duration:.2g} s"
-        own = "are white" if self.white else own
+        (lag, value), own = self.peak, "are white"
+        if self.duration:
+            own = f"stay correlated over {self.duration:.2g} s"
         if not self.follows:
             return f"The residuals {own} and do not follow the input."
         return (
@@ -90,7 +82,7 @@ class ResidualTest(Result):
 def residual_test(
     time: Array, residual: Array, command: Array, *, longest: float = LONGEST_SHOWN
 ) -> ResidualTest:
-    """Test the residuals of one channel of one run.
+    """Test of the residuals of one channel of one run.
 
     Parameters
     ----------
@@ -99,7 +91,7 @@ def residual_test(
     residual, command : (n,) arrays
         Simulated less measured, weights left out, and the input at the same stamps.
     longest : float
-        Largest lag of the curves; at most a quarter of the run is shown. [s]
+        Largest lag; at most a quarter of the run is looked at. [s]
 
     Raises
     ------
@@ -108,11 +100,11 @@ def residual_test(
 
     Notes
     -----
-    The band of the cross-correlation is 1.96 √(Σ ρ_r ρ_u/n), Bartlett's: two coloured signals
-    without any relation show large correlations by chance.
+    The band is 1.96 √(Σ ρ_r ρ_u/n), Bartlett's: two coloured signals without any relation show
+    large correlations by chance.
     """
-    if time.size < 8:
-        raise InputError(f"{time.size} samples show no correlation; at least 8 are needed.")
+    if time.size < FEWEST:
+        raise InputError(f"{time.size} samples show no correlation; at least {FEWEST} are needed.")
     grid = grid_of(time)
     most = max(int(LONGEST * grid.size), 1)
     shown = min(most, max(int(longest / grid.step), 1))
@@ -121,21 +113,17 @@ def residual_test(
     length = correlation_length(own, counts)
     # beyond the residuals' own length their estimated correlation is chance
     kept = slice(1, max(length, 1) + 1)
-    theirs = _autocorrelation(command, grid, most)[0]
+    theirs, _ = _autocorrelation(command, grid, most)
     inflation = max(1.0, 1.0 + 2.0 * float(own[kept] @ theirs[kept]))
     band = min(DEVIATIONS * float(np.sqrt(inflation / time.size)), 1.0)
-    cross = np.zeros(2 * shown + 1)
+    lags, correlation = np.arange(-shown, shown + 1.0) * grid.step, np.zeros(2 * shown + 1)
     scale = float(np.linalg.norm(residual) * np.linalg.norm(command))
     if scale > 0.0:
         size = next_fast_len(grid.size + shown, real=True)
         spectra = rfft(grid.spread(command), size).conj() * rfft(grid.spread(residual), size)
         products = irfft(spectra, size)
-        cross = np.concatenate([products[size - shown :], products[: shown + 1]]) / scale
-    lags: Array = np.arange(shown + 1.0) * grid.step
-    both = np.concatenate([-lags[:0:-1], lags])
-    white = DEVIATIONS / float(np.sqrt(time.size))
-    duration = length * grid.step
-    return ResidualTest(lags, own[: shown + 1], white, both, cross, band, duration)
+        correlation = np.concatenate([products[size - shown :], products[: shown + 1]]) / scale
+    return ResidualTest(lags, correlation, band, length * grid.step)
 
 
 def _autocorrelation(samples: Array, grid: Grid, lags: int) -> tuple[Array, Array]:
@@ -239,7 +227,7 @@ def compared(experiment: Experiment, name: str, simulated: Array) -> RunQuality:
     """Quality of one channel of one run, simulated at its stamps."""
     channel = experiment[name]
     used, test = channel.used, None
-    if np.count_nonzero(used) >= 8:
+    if np.count_nonzero(used) >= FEWEST:
         time, residual = channel.time[used], (simulated - channel.values)[used]
         test = residual_test(time, residual, experiment.input.at(time))
     found = measures((channel.values, simulated, channel.weight))

@@ -304,27 +304,18 @@ def _live_section(fit: Fit, campaign: Campaign, runs: Sequence[ShownRun]) -> Sec
 
 def _residual_section(runs: Sequence[ShownRun]) -> Section:
     words = (
-        "Left: correlation of the residuals with themselves, and the 95 % band of white noise. "
-        "Right: with the input, positive lags where the residual comes after it, and the 95 % "
-        "band of residuals, coloured as these are, that have no relation to the input."
+        "Correlation of the residuals with the input, positive lags where the residual comes after "
+        "it, and the 95 % band of residuals, coloured as these are, that have no relation to it."
     )
-    heads = ("run", "role", "channel", "autocorrelation", "cross-correlation with the input")
+    heads = ("run", "role", "channel", "correlation with the input")
     made = Table("", tuple(map(Column, (*heads, "verdict"))))
     for each in _qualities(runs):
         if (test := each.test) is not None:
             lag, value = test.peak
-            said = (
-                f"autocorrelation over {test.lags[-1]:.2g} s",
-                f"cross-correlation, largest {value:+.2f} at {lag:.2g} s",
-            )
-            drawn = (
-                charts.lags_chart(test.lags, test.autocorrelation, test.white_band, said[0]),
-                charts.lags_chart(
-                    test.cross_lags, test.cross_correlation, test.cross_band, said[1]
-                ),
-            )
+            said = f"correlation with the input, largest {value:+.2f} at {lag:.2g} s"
+            drawn = charts.lags_chart(test.lags, test.correlation, test.band, said)
             run = each.experiment
-            made.add(run.name, run.role, each.channel, *drawn, test.verdict)
+            made.add(run.name, run.role, each.channel, drawn, test.verdict)
     return Section("residuals", "Residuals", [text(words), Block("table", made, "residuals")])
 
 
