@@ -169,7 +169,7 @@ def test_a_result_that_is_of_no_use_ends_with_1(
     assert result.stderr.startswith("Not usable: ")
     assert "bound" in result.stderr
     said = " ".join(result.stdout.split())
-    assert "write J = { relative = [0.99, 2.02] } under [stages.free] of the stage 'card'" in said
+    assert "widen J under [stages.free] of the stage 'card' and fit again." in said
     # whoever takes the drive along hears of it, and so do those who get the files
     said = run("export", "fitted", "--c", "folder").stdout
     assert "! The fit of this drive says: Not usable: " in said
