@@ -18,7 +18,7 @@ from swashplate.identification.assessment import (
 )
 from swashplate.identification.fitting import Fit, fit
 from swashplate.identification.profile import Point, Profile
-from swashplate.identification.resampling import CrossValidation, Fold, HeldRun
+from swashplate.identification.resampling import CrossValidation, Fold
 from swashplate.identification.setup import Setup
 from swashplate.identification.solving import Solution
 from swashplate.identification.validation import Measures
@@ -101,9 +101,9 @@ def test_profiles_folds_and_notes_come_back(
 ) -> None:
     points = tuple(Point(x, 3.0 + x * x, np.array([x, 0.5])) for x in (-0.1, 0.0, 0.1))
     profile = Profile(0, 3.0, points, 1.0, -0.1, None, ("crossed", "bound"), points[0])
-    held = HeldRun("a", "step +4 V", "current", "A", Measures(10, 0.1, 0.5), 0.2)
-    fold = Fold(0, ("a",), ("J",), (held,), True, "")
-    folds = CrossValidation(3, 2, (fold,))
+    held = {"current": Measures(10, 0.1, 0.5)}
+    fold = Fold(0, ("a",), ("J",), held, True)
+    folds = CrossValidation(3, 2, (fold,), held, {"current": "A"})
     path = tmp_path / "fit.json"
     kept = [StageProfile("card", profile)]
     runs = campaign.experiments

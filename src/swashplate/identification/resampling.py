@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from copy import copy
-from dataclasses import dataclass, replace
-from math import sqrt
-from typing import TYPE_CHECKING, NamedTuple
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,7 +27,7 @@ from swashplate.identification.problem import LinearisedFit, Loss, Problem
 from swashplate.identification.setup import Setup
 from swashplate.identification.solving import NO_EFFECT, solve
 from swashplate.identification.unknowns import Unknowns
-from swashplate.identification.validation import Measures, predict, with_speeds
+from swashplate.identification.validation import Measures, measures, predict, with_speeds
 from swashplate.parameters.parameter_set import ParameterSet
 from swashplate.results import Result
 
@@ -36,18 +35,6 @@ if TYPE_CHECKING:
     from swashplate.identification.assessment import Assessment
 
 Array = NDArray[np.float64]
-
-
-class HeldRun(NamedTuple):
-    """How well one channel of a run is predicted by a fit that did not see it."""
-
-    run: str
-    maneuver: str
-    channel: str
-    unit: str
-    measures: Measures
-    mean: float
-    """Of what was measured. [unit]"""
 
 
 @dataclass(frozen=True)
@@ -58,11 +45,12 @@ class Fold(Result):
     """From 0."""
     held: tuple[str, ...]
     """Names of the runs that were held out."""
-    lost: tuple[str, ...]
+    lost: tuple[str, ...] = ()
     """Unknowns on which no run left in the fold depends: where its fit leaves them is chance."""
-    runs: tuple[HeldRun, ...]
-    converged: bool
-    failure: str
+    measures: Mapping[str, Measures] = field(default_factory=dict)
+    """Measures of each channel over the runs that were held out."""
+    converged: bool = False
+    failure: str = ""
     """Why there is no fit, or empty."""
 
 
@@ -74,25 +62,10 @@ class CrossValidation(Result):
     planned: int
     """How many folds there were to be."""
     folds: tuple[Fold, ...]
-
-    @property
-    def measures(self) -> dict[str, Measures]:
-        """Measures of each channel over all runs, each predicted by a fit that did not see it."""
-        runs, made = [run for fold in self.folds for run in fold.runs], {}
-        for name in dict.fromkeys(run.channel for run in runs):
-            alike = [run for run in runs if run.channel == name]
-            samples = np.array([run.measures.samples for run in alike])
-            share, means = samples / samples.sum(), np.array([run.mean for run in alike])
-            rmse, spread = (np.array(x) for x in zip(*(r.measures[1:] for r in alike), strict=True))
-            # as if all samples were of one run: about the mean of all
-            variance = float(share @ (spread**2 + (means - share @ means) ** 2))
-            made[name] = Measures(int(samples.sum()), sqrt(share @ rmse**2), sqrt(variance))
-        return made
-
-    @property
-    def units(self) -> dict[str, str]:
-        """SI unit of each channel."""
-        return {run.channel: run.unit for fold in self.folds for run in fold.runs}
+    measures: Mapping[str, Measures]
+    """Measures of each channel over all runs, each predicted by a fit that did not see it."""
+    units: Mapping[str, str]
+    """SI unit of each channel."""
 
     def sentences(self) -> tuple[str, ...]:
         """What must be known besides the numbers."""
@@ -154,16 +127,29 @@ def cross_validate(
     here = executor or Serial()
     # fits run side by side elsewhere, so each of them runs on one thread
     shared = tuple(experiments), nominal, setup, loss, None if isinstance(here, Serial) else 1
-    done: dict[int, Fold] = {}
+    done: dict[int, tuple[Fold, list[_Held]]] = {}
     try:
-        for _, fold in here.run(_fold, shared, list(enumerate(parts))):
-            done[fold.number] = fold
+        for place, found in here.run(_fold, shared, list(enumerate(parts))):
+            done[place] = found
             if watch is not None:
-                watch(fold, len(done))
+                watch(found[0], len(done))
     except KeyboardInterrupt:
         if not done:
             raise
-    return CrossValidation(seed, len(parts), tuple(done[number] for number in sorted(done)))
+    ended = [done[place] for place in sorted(done)]
+    held = [each for _, of_fold in ended for each in of_fold]
+    units, folds = {name: unit for name, unit, *_ in held}, tuple(fold for fold, _ in ended)
+    return CrossValidation(seed, len(parts), folds, _measured(held), units)
+
+
+_Held = tuple[str, str, Array, Array]
+"""Channel, unit, and what was measured and predicted of the samples that count in one run."""
+
+
+def _measured(held: Sequence[_Held]) -> dict[str, Measures]:
+    """Measures of each channel over some runs."""
+    names = dict.fromkeys(name for name, *_ in held)
+    return {n: measures(*((*pair, None) for name, _, *pair in held if name == n)) for n in names}
 
 
 def deal(experiments: Sequence[Experiment], folds: int, seed: int) -> tuple[tuple[int, ...], ...]:
@@ -201,32 +187,31 @@ def deal(experiments: Sequence[Experiment], folds: int, seed: int) -> tuple[tupl
 def _fold(
     shared: tuple[tuple[Experiment, ...], Parameters, Setup, Loss, int | None],
     item: tuple[int, tuple[int, ...]],
-) -> Fold:
+) -> tuple[Fold, list[_Held]]:
     (experiments, nominal, setup, loss, threads), (number, part) = shared, item
-    held = [experiments[place] for place in part]
+    left_out = [experiments[place] for place in part]
     others = [each for place, each in enumerate(experiments) if place not in part]
-    names = tuple(each.name for each in held)
+    names = tuple(each.name for each in left_out)
     try:
         result = fit(nominal, others, setup, loss=loss, threads=threads, search=Search(0))
         if result.stages[-1].solution.interrupted:
             raise KeyboardInterrupt
-        predicted = with_speeds(predict(result.parameters, held))
+        predicted = with_speeds(predict(result.parameters, left_out))
     except (InputError, DomainError) as error:
-        return Fold(number, names, (), (), False, str(error))
-    runs = []
+        return Fold(number, names, failure=str(error)), []
+    held = []
     for each in predicted:
-        run, channel = each.experiment, each.experiment[each.channel]
-        mean = float(channel.values[channel.used].mean())
-        named = (run.name, run.maneuver, each.channel, channel.unit)
-        runs.append(HeldRun(*named, each.measures, mean))
-    converged = all(each.solution.converged for each in result.stages)
+        channel = each.experiment[each.channel]
+        samples = channel.values[channel.used], each.simulated[channel.used]
+        held.append((each.channel, channel.unit, *samples))
     lost = list[str]()
     for stage in result.stages:
         effects = np.linalg.norm(stage.problem.evaluate(stage.solution.vector).jacobian, axis=0)
         least = NO_EFFECT * effects.max()
         each_one = zip(stage.problem.unknowns, effects, strict=True)
         lost += [each.name for each, effect in each_one if each.run is None and effect <= least]
-    return Fold(number, names, tuple(lost), tuple(runs), converged, "")
+    converged = all(each.solution.converged for each in result.stages)
+    return Fold(number, names, tuple(lost), _measured(held), converged), held
 
 
 # --- bootstrap ------------------------------------------------------------------------------------

@@ -55,6 +55,9 @@ class Entry(BaseModel):
 
     model_config = ConfigDict(extra="forbid", frozen=True, populate_by_name=True)
 
+    def __repr__(self) -> str:
+        return short(self)
+
 
 class GivenPrior(Entry):
     """What is known beforehand: mean and standard deviation."""
@@ -168,9 +171,6 @@ class InputWeight(Window):
 class Stage(Entry):
     """One fit: a part of the drive against its channels."""
 
-    def __repr__(self) -> str:
-        return short(self)
-
     name: str
     part: Literal["card", "pump", "chain", "model"] = Field(
         description="What is simulated: the control card, pump and motor, the whole chain; 'model' "
@@ -225,9 +225,6 @@ class Stage(Entry):
 
 class Setup(Entry):
     """A fit in one stage or several, each starting from what the ones before found."""
-
-    def __repr__(self) -> str:
-        return short(self)
 
     title: str = ""
     stages: tuple[Stage, ...] = Field(min_length=1)

@@ -408,10 +408,9 @@ def folds_tables(found: CrossValidation, assessments: Sequence[Assessment]) -> l
     for fold in found.folds:
         state = "not fitted" if fold.failure else "converged" if fold.converged else "not converged"
         state = f"{state}; loses {', '.join(fold.lost)}" if fold.lost else state
-        measured = type(found)(found.seed, 1, (fold,)).measures
         fits = (
             f"{name} {'-' if each.fit_percent is None else f'{each.fit_percent:.2f}'} %"
-            for name, each in measured.items()
+            for name, each in fold.measures.items()
         )
         folds.add(fold.number + 1, ", ".join(fold.held), state, ", ".join(fits) or NONE)
     return [held_out, folds]
