@@ -271,6 +271,10 @@ class NoiseDraws:
         return tuple(made)
 
 
+FEWEST_DRAWS = 40
+"""Draws that reach the ends of a 95 % interval."""
+
+
 @dataclass(frozen=True, eq=False)
 class Bootstrap(Result):
     """Estimates from other noise."""
@@ -289,23 +293,21 @@ class Bootstrap(Result):
         """(draws, K) in their own units."""
         return self.variables.to_values(self.vectors)
 
-    def intervals(self, level: float = 0.95) -> tuple[tuple[float, float] | None, ...]:
-        """Percentile intervals in own units; None for what is fixed or undetermined.
+    def intervals(self) -> tuple[tuple[float, float] | None, ...]:
+        """Percentile intervals of 95 % in own units; None for what is fixed or undetermined.
 
         Raises
         ------
         InputError
-            If the level is not between 0 and 1, or too few draws reach its ends.
+            If too few draws reach their ends.
         """
-        if not 0.0 < level < 1.0:
-            raise InputError(f"The level {level:g} of an interval must lie between 0 and 1.")
         draws = self.vectors.shape[0]
-        if 0.5 * (1.0 - level) * draws < 1.0:
+        if draws < FEWEST_DRAWS:
             raise InputError(
-                f"{draws} draws do not reach the ends of a {100.0 * level:g} % interval; take "
-                f"{int(np.ceil(2.0 / (1.0 - level)))} or more."
+                f"{draws} draws do not reach the ends of a 95 % interval; take {FEWEST_DRAWS} or "
+                "more."
             )
-        ends = np.quantile(self.values, [0.5 - 0.5 * level, 0.5 + 0.5 * level], axis=0)
+        ends = np.quantile(self.values, [0.025, 0.975], axis=0)
         return tuple(
             (float(low), float(high)) if known else None
             for low, high, known in zip(*ends, self.determined, strict=True)
