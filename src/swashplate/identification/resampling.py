@@ -138,8 +138,9 @@ def cross_validate(
             raise
     ended = [done[place] for place in sorted(done)]
     held = [each for _, of_fold in ended for each in of_fold]
-    units, folds = {name: unit for name, unit, *_ in held}, tuple(fold for fold, _ in ended)
-    return CrossValidation(seed, len(parts), folds, _measured(held), units)
+    units = {name: unit for name, unit, *_ in held}
+    made = tuple(fold for fold, _ in ended)
+    return CrossValidation(seed, len(parts), made, _measured(held), units)
 
 
 _Held = tuple[str, str, Array, Array]
@@ -149,7 +150,7 @@ _Held = tuple[str, str, Array, Array]
 def _measured(held: Sequence[_Held]) -> dict[str, Measures]:
     """Measures of each channel over some runs."""
     names = dict.fromkeys(name for name, *_ in held)
-    return {n: measures(*((*pair, None) for name, _, *pair in held if name == n)) for n in names}
+    return {n: measures(*((a, b, None) for name, _, a, b in held if name == n)) for n in names}
 
 
 def deal(experiments: Sequence[Experiment], folds: int, seed: int) -> tuple[tuple[int, ...], ...]:
