@@ -25,6 +25,7 @@ def test_show_marks_what_is_assumed_and_its_file_is_a_crane(tmp_path):
     assert Crane.from_toml(mine).geometry == Crane.preset("tg3637").geometry
 
 
+@pytest.mark.slow
 def test_run_compares_variants_and_writes_signals_and_a_figure(tmp_path):
     words = ["--slew", "1", "--until", "slew_deg=45", "--length", "50"]
     both = said(
@@ -64,6 +65,7 @@ def test_judge_ends_with_the_verdict_as_its_exit_code(tmp_path):
     assert "luff orifice ×4" in page.read_text("utf-8")
 
 
+@pytest.mark.slow
 def test_follow_and_sectors_print_their_tables(tmp_path):
     found = said("follow", "tg3637", "--sea", "ss3", "--plot", str(tmp_path / "follow.png"))
     rows = {each.split()[0]: each.split()[1:] for each in found.stdout.splitlines() if each.strip()}

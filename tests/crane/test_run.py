@@ -301,6 +301,7 @@ def leaking(crane):
     )
 
 
+@pytest.mark.slow
 def test_loaded_hoist_lowers_faster_by_its_leakage(leaking):
     stick = Stick.trapezoid(hoist=-1.0, duration=10.0, length=12.0)
     plain, loaded = (
@@ -339,6 +340,7 @@ def test_stepper_takes_the_samples_of_a_loaded_run_with_a_hook(leaking):
     assert stretched.mean() == pytest.approx(0.121, abs=0.01)
 
 
+@pytest.mark.slow
 def test_loads_that_no_drive_can_take_are_refused(crane, leaking, slewed):
     with refuse("No drive of tg3637 feels a load: give one a motor_leakage"):
         crane.simulate(slewed, loaded=True)

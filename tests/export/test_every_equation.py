@@ -116,7 +116,14 @@ SETS = {
     "own": equations_of(globals()),
 }
 CASES = [
-    pytest.param(word, key, on, id=f"{key}-{'on' if on else 'off'}")
+    pytest.param(
+        word,
+        key,
+        on,
+        id=f"{key}-{'on' if on else 'off'}",
+        # a compiled twin of each: the model's C as a whole is compared by the quick tests
+        marks=[pytest.mark.slow] if word == "packaged" else [],
+    )
     for word, equations in SETS.items()
     for key, each in equations.items()
     for on in ((False, True) if flagged(each) else (False,))

@@ -166,6 +166,7 @@ SIZES = {  # of what each signal is compared with
 }  # fmt: skip
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("start", ["rest", "steady"])
 @pytest.mark.parametrize(
     "changes",

@@ -230,6 +230,7 @@ def test_residuals_of_a_fit_tell_the_noise() -> None:
         bench(HOIST.parameters, setup("Z10"), [run("exact", 5.0)], fitted=True)
 
 
+@pytest.mark.slow
 def test_what_is_known_is_what_a_fit_of_the_same_tests_knows(hoist_tests: Campaign) -> None:
     """Coloured residuals and free zeros of the encoder: neither makes the errors another story."""
     setup = load_setup("hoist")

@@ -34,6 +34,7 @@ def campaign(tmp_path_factory: pytest.TempPathFactory) -> Campaign:
     return Campaign.from_toml(rig.write(virtual, tmp_path_factory.mktemp("t") / "virtual"))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("number", "name", "deviation"), [(0, "Z9", 0.03), (1, "tau", 1e-3)])
 def test_estimates_follow_a_fixed_number_as_in_a_fit_with_another(
     campaign: Campaign, number: int, name: str, deviation: float

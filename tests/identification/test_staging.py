@@ -85,6 +85,7 @@ def test_what_is_freed_is_on_and_stays_above_off(campaign: Campaign) -> None:
     assert nominal.options == {"ripple"}
 
 
+@pytest.mark.slow
 def test_a_recursion_of_another_rate_gives_way_to_its_equation() -> None:
     """Runs of 200 Hz are marched at 600 Hz: ζ and ω are found as they mean at every rate."""
     truth = Drive.preset("hoist").at_every_rate().scale(omega=1.05, zeta=0.95)
@@ -148,7 +149,7 @@ def test_a_run_cut_out_of_a_motion_begins_with_a_settled_card() -> None:
     assert off["estimated"] < 0.005
 
 
-@pytest.mark.parametrize("rate", [512.0, None])
+@pytest.mark.parametrize("rate", [512.0, pytest.param(None, marks=pytest.mark.slow)])
 def test_a_run_cut_out_of_a_rising_current_has_a_current_of_its_own(rate: float | None) -> None:
     """From 0.1 s after a step of 9 V on the rate limit acts: no settled card begins like that."""
     drive = Drive(replace(smooth(Drive.preset("hoist").parameters), rate=rate))

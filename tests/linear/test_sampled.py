@@ -57,7 +57,7 @@ def motion(size: int, seed: int = 5) -> np.ndarray:
 
 
 @pytest.mark.parametrize("at", [-3.0, 4.0])
-@pytest.mark.parametrize("rate", [100.0, 512.0])
+@pytest.mark.parametrize("rate", [100.0, pytest.param(512.0, marks=pytest.mark.slow)])
 @pytest.mark.parametrize(("changes", "forms"), VARIANTS.values(), ids=VARIANTS.keys())
 def test_small_motions_of_the_simulation(
     hoist: Drive, changes: dict, forms: dict, rate: float, at: float
@@ -212,6 +212,7 @@ def test_small_sines_of_a_refined_drive_agree_with_the_linear_model(hoist: Drive
 # --- what moves beside the command ----------------------------------------------------------------
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["leakage", "all"])
 @pytest.mark.parametrize("rate", [100.0, 512.0])
 def test_inputs_beside_the_voltage(hoist: Drive, name: str, rate: float) -> None:

@@ -10,7 +10,7 @@ NAMES = ["V_dz", "J", "G1", "tau"]
 
 
 @pytest.mark.parametrize("name", ["hoist", "slew"])
-@pytest.mark.parametrize("off", [0.9, 1.1])
+@pytest.mark.parametrize("off", [0.9, pytest.param(1.1, marks=pytest.mark.slow)])
 def test_static_curve_and_delay_are_recovered(name: str, off: float) -> None:
     """Started 10 % off; possible only because the jump's share and the sign are continuous."""
     truth = Drive.preset(name)

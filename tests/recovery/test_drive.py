@@ -40,7 +40,7 @@ def determined(assessment: Assessment) -> list[str]:
 
 
 @pytest.mark.parametrize("joint", [False, True], ids=["staged", "joint"])
-@pytest.mark.parametrize("seed", [0, 4])
+@pytest.mark.parametrize("seed", [0, pytest.param(4, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("axis", AXES)
 def test_the_truth_is_recovered(axis: str, seed: int, joint: bool, tmp_path: Path) -> None:
     setup = load_setup(axis)
@@ -73,7 +73,7 @@ def test_counts_and_noise_leave_small_errors(tmp_path: Path) -> None:
         assert fitted.steady_speed(volts) == pytest.approx(true.steady_speed(volts), rel=2e-3)
 
 
-@pytest.mark.parametrize("seed", [1, 39, 77])
+@pytest.mark.parametrize("seed", [1, *(pytest.param(n, marks=pytest.mark.slow) for n in (39, 77))])
 def test_a_stop_that_the_search_loses_is_found_again(seed: int, tmp_path: Path) -> None:
     """From the published values a descent leaves these machines' stop, and finds none back."""
     axis, setup = "slew", load_setup("slew")

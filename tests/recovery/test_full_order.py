@@ -124,6 +124,7 @@ def problem_of(model: Differences, campaign: Campaign, begun: Mapping[str, float
     )
 
 
+@pytest.mark.slow
 def test_two_most_visible_masses_are_found(truth: FullOrderDrive, campaign: Campaign) -> None:
     """In the logarithm, with dampings, valve and oil unknown beside them."""
     problem = problem_of(Exact(truth), campaign, {**MASSES, **BESIDE})

@@ -59,6 +59,7 @@ def fitted(campaign: Campaign, start: Drive, stage: Stage) -> StageFit:
     return found
 
 
+@pytest.mark.slow
 def test_all_refinements_are_recovered_at_once(tmp_path: Path) -> None:
     """Friction, hysteresis, damping, cam ring, leakage and line, with Z1, from a position alone."""
     truth = Drive.preset("hoist").replace(**ALL)
@@ -73,6 +74,7 @@ def test_all_refinements_are_recovered_at_once(tmp_path: Path) -> None:
     assert found.parameters.options == set(OPTIONS) - {"leaky", "loaded"}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("begin", ["15 % off", "switched off"])
 def test_what_is_on_is_found_from_beside_it_and_from_nothing(begin: str, tmp_path: Path) -> None:
     """From off, where the difference is one-sided."""
@@ -88,6 +90,7 @@ def test_what_is_on_is_found_from_beside_it_and_from_nothing(begin: str, tmp_pat
         assert found.values[name] == pytest.approx(WITHOUT_LINE[name], rel=1e-6), name
 
 
+@pytest.mark.slow
 def test_what_is_not_there_goes_to_next_to_nothing(tmp_path: Path) -> None:
     """It stays on, at the least that its equations take: what is off has no derivative."""
     truth = Drive.preset("hoist").replace(**LOAD)

@@ -67,7 +67,16 @@ RICHEST = ("all terms, other forms", "everything", "no line, physical root")
 """Those that have all options between them; plain drives' residuals are in test_residuals."""
 
 
-@pytest.fixture(params=CASES.values(), ids=CASES.keys())
+RICH = (*RICHEST, "all terms")
+"""Cases that take seconds to compile."""
+
+
+@pytest.fixture(
+    params=[
+        pytest.param(case, id=name, marks=[pytest.mark.slow] if name in RICH else [])
+        for name, case in CASES.items()
+    ]
+)
 def drive(request: pytest.FixtureRequest, hoist: Drive) -> Drive:
     changes, form = request.param
     return variant(hoist.replace(**changes), form)
@@ -107,6 +116,7 @@ def test_side_by_side_gives_the_same_bits(drive: Drive) -> None:
         assert np.array_equal(batch.output[i], one.simulate(voltage).shaft_position)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("drive", [CASES[name] for name in RICHEST], ids=RICHEST, indirect=True)
 def test_residuals_carry_the_same_bits(drive: Drive) -> None:
     voltage, seen = command()[:900], ("shaft_speed", "shaft_position", "current")
@@ -155,6 +165,7 @@ def test_stepper_sub_steps_alike(hoist: Drive, rate: float, interpolation: str) 
     same(stepped(hoist, voltage, rate, interpolation=interpolation), run)
 
 
+@pytest.mark.slow
 def test_the_filters_equation_gives_the_same_bits_every_way(hoist: Drive) -> None:
     """March, stepper, lanes and residuals, at 512 Hz and with sub-steps."""
     drive = hoist.replace(C=3.0).at_every_rate()
@@ -182,6 +193,7 @@ def test_the_filters_equation_gives_the_same_bits_every_way(hoist: Drive) -> Non
         assert wrong.mean() < 0.01, name
 
 
+@pytest.mark.slow
 def test_a_refinement_comes_on_in_some_sets_of_a_batch(hoist: Drive) -> None:
     voltage = command()[:900]
     changes = {"swash_damping": [0.0, 0.02, 0.0, 0.04], "cam_ripple": [0.0, 0.0, 0.01, 0.02]}
@@ -223,6 +235,7 @@ np.savez(sys.argv[2], **{name: getattr(run, name) for name in sys.argv[3:]}, by=
 """
 
 
+@pytest.mark.slow
 def test_interpreted_run_agrees(tmp_path: Path) -> None:
     """The same sources without the JIT, in a process of their own, within 1e-12."""
     voltage = command()[:1100]

@@ -117,6 +117,7 @@ def test_a_filter_that_no_step_would_do_for_is_refused(zeta: float) -> None:
         recursive(zeta).simulate(np.ones(10))
 
 
+@pytest.mark.slow
 def test_the_differential_equation_bears_half_a_swing_in_a_step() -> None:
     """By hand: ωh √(1 - ζ²) = π at ω = 512 π/0.8 = 2011 rad/s and ζ = 0.6."""
     drive, voltage = Drive.preset("neutral").replace(zeta=0.6, omega=2012.0), np.full(512, 5.0)

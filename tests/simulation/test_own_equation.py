@@ -58,6 +58,7 @@ def test_its_parameter_is_one_of_the_drive() -> None:
         PLAIN.replace(test_seal=1e-5)
 
 
+@pytest.mark.slow
 def test_march_stepper_and_lanes_give_the_same_bits() -> None:
     assert np.array_equal(SEALED.simulate(COMMAND).shaft_speed, PLAIN.simulate(COMMAND).shaft_speed)
     run = DRAGGED.simulate(COMMAND)
@@ -78,6 +79,7 @@ def test_derivatives_are_those_of_differences() -> None:
     assert np.abs(by - (up - down) / (2.0 * step)).max() < 1e-6 * np.abs(by).max()
 
 
+@pytest.mark.slow
 def test_steady_states_are_those_that_a_march_comes_to() -> None:
     held = DRAGGED.simulate(np.full(8000, 5.0)).shaft_speed[-1]
     assert DRAGGED.steady_speed(5.0) == pytest.approx(held, rel=1e-9)
@@ -111,6 +113,7 @@ def straight_map(command: float, share: float, p: Channel) -> float:
     return 0.1 * max(command, 0.0)
 
 
+@pytest.mark.slow
 def test_the_cards_equations_can_be_replaced() -> None:
     drive = PLAIN.with_equation(steady_current, straight_map).replace(C=0.0)
     assert drive.steady_current([4.0, -2.0, 0.0]) == pytest.approx([0.4, -0.2, 0.0])
@@ -151,6 +154,7 @@ def proportional(command: float, share: float, p: Channel) -> float:
     return p.G1 * max(command, 0.0)
 
 
+@pytest.mark.slow
 def test_a_replaced_equation_of_the_card_goes_into_stepper_and_fit(tmp_path: Path) -> None:
     truth = PLAIN.at_every_rate().with_equation(steady_current, proportional).replace(G1=0.08)
     run = truth.simulate(COMMAND)

@@ -141,7 +141,9 @@ OWN = Own(
 )
 
 
-@pytest.mark.parametrize("name", ["hoist, hard", "everything"])
+@pytest.mark.parametrize(
+    "name", ["hoist, hard", pytest.param("everything", marks=pytest.mark.slow)]
+)
 def test_derivatives_are_those_of_differences(name: str) -> None:
     """By an experiment's own unknowns and some parameters; by all of them: test_sensitivities."""
     command, changes, start = SCENES[name]

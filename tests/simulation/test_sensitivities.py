@@ -107,7 +107,23 @@ def differences(scene: Scene, drive: Drive, name: str) -> list[np.ndarray]:
     return found
 
 
-@pytest.mark.parametrize("scene", SCENES.values(), ids=SCENES.keys())
+COMPILED_LONG = (
+    "all refinements",
+    "all without the line",
+    "physical root, leaking",
+    "decay from within a step",
+    "steep",
+    "steady start, leaking",
+)
+
+
+@pytest.mark.parametrize(
+    "scene",
+    [
+        pytest.param(scene, id=name, marks=[pytest.mark.slow] if name in COMPILED_LONG else [])
+        for name, scene in SCENES.items()
+    ],
+)
 def test_every_parameter(scene: Scene) -> None:
     drive = scene.drive()
     by = drive.sensitivities(scene.voltage, start=scene.start, parameters=scene.columns)
