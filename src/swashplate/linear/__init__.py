@@ -6,8 +6,6 @@ from swashplate.linear.drive import Input as Input
 from swashplate.linear.drive import linearize_drive as linearize_drive
 from swashplate.linear.drive import model_tables as model_tables
 from swashplate.linear.frequency_response import FrequencyResponse as FrequencyResponse
-from swashplate.linear.frequency_response import SweptInput as SweptInput
-from swashplate.linear.frequency_response import SweptOutput as SweptOutput
 from swashplate.linear.frequency_response import response_table as response_table
 from swashplate.linear.frequency_response import sweep as sweep
 from swashplate.linear.model import LINEAR_MODEL as LINEAR_MODEL

@@ -73,7 +73,6 @@ FORCE = {"Z17": 0.0, "Z19_plus": 1.0, "Z19_minus": 1.0} | dict.fromkeys(
     ("Z20_plus", "Z20_minus", "Z21_plus", "Z21_minus", "Z22_plus", "Z22_minus"), 0.0
 )
 """Solenoids whose force is the current, for a model whose input is the force."""
-VOLTAGES = 4001  # Among which a speed is looked for, before the place is found exactly.
 DECIMALS = 4
 """Of the voltage that is proposed; rounded away from 0 V, so that it does have a model."""
 CLOSED = 64.0 * float(np.finfo(float).eps)
@@ -84,7 +83,6 @@ def linearize_drive(
     parameters: ParameterSet,
     voltage: float | None = None,
     current: float | None = None,
-    speed: float | None = None,
     input: Input | Sequence[Input] | None = None,
     outputs: Sequence[str] = ("shaft_speed",),
     coulomb: Coulomb = "ignored",
@@ -119,7 +117,7 @@ def linearize_drive(
             "The literal sign of the card's Coulomb term has no slope; linearise with "
             "coulomb='ignored'."
         )
-    point = operating_point(parameters, inputs[0], voltage, current, speed)
+    point = operating_point(parameters, inputs[0], voltage, current)
     matrices, states, _, _ = _matrices(parameters, point, inputs, names, coulomb)
     delay = parameters.numbers["tau"] if inputs[0] == "voltage" else 0.0
     kept = point, coulomb, parameters
@@ -134,11 +132,10 @@ def operating_point(
     input: str,
     voltage: float | None = None,
     current: float | None = None,
-    speed: float | None = None,
 ) -> OperatingPoint:
     """Steady state at which small motions of an input, one of `INPUTS`, have an answer.
 
-    Given by one of voltage [V], current [A] and speed [rad/s].
+    Given by either of voltage [V] and current [A].
 
     Raises
     ------
@@ -149,20 +146,13 @@ def operating_point(
         swash plate, at the relief pressure, behind a saturated orifice, in the grip of a friction
         without presliding; or where the solenoid overpowers the feedback spring.
     """
-    given = {"voltage": voltage, "current": current, "speed": speed}
-    chosen = {name: value for name, value in given.items() if value is not None}
-    if len(chosen) != 1:
-        raise InputError("Linearise at a voltage, a current or a speed; give exactly one of them.")
-    ((kind, value),) = chosen.items()
-    if not isfinite(value):
-        raise InputError(f"The {kind} to linearise at is {value}, but must be a finite number.")
-    if input == "voltage" and current is not None:
-        raise InputError(
-            "A model from the voltage needs a voltage or a speed to linearise at, not a current."
-        )
-    name = parameters.name
-    if speed is not None:
-        voltage = _voltage_of(parameters, speed)
+    name, given = parameters.name, current if voltage is None else voltage
+    if given is None or (voltage is not None and current is not None):
+        raise InputError("Linearise at a voltage or a current; give exactly one of them.")
+    if not isfinite(given):
+        raise InputError(f"Linearise at a finite number of volts or amperes, not {given}.")
+    if input == "voltage" and voltage is None:
+        raise InputError("A model from the voltage needs a voltage to linearise at, not a current.")
     if voltage is not None:
         if abs(voltage) > FULL_VOLTAGE:
             raise InputError(f"The voltage is {voltage:g} V, but the card takes ±10 V.")
@@ -241,30 +231,6 @@ def _beyond(parameters: ParameterSet, voltage: float) -> str:
         first = steps[int(np.argmax(answers))]
         instead = f"linearise at {sign}{first:.{DECIMALS}f} V or beyond"
     return f"{instead}, or the pump alone at current 0 with input solenoid_force"
-
-
-def _voltage_of(parameters: ParameterSet, speed: float) -> float:
-    """The voltage nearest to zero that settles at a speed."""
-    from scipy.optimize import brentq
-
-    def error(volts: float) -> float:
-        return float(steady_states(parameters, np.array([volts]))[1][0] - speed)
-
-    volts = np.linspace(-FULL_VOLTAGE, FULL_VOLTAGE, VOLTAGES)
-    _, speeds = steady_states(parameters, volts)
-    crossing = np.flatnonzero(np.diff(np.signbit(speeds - speed)))
-    size = max(abs(float(speeds[0])), abs(float(speeds[-1])))
-    found = [float(brentq(error, volts[k], volts[k + 1], xtol=1e-14)) for k in crossing]
-    # where the speed jumps, the dead zone's end, brentq finds the jump
-    roots = [each for each in found if abs(error(each)) <= 1e-9 * size]
-    if not roots:
-        lowest, highest = float(np.degrees(speeds.min())), float(np.degrees(speeds.max()))
-        raise InputError(
-            f"{parameters.name}: no constant voltage settles at {float(np.degrees(speed)):.6g} "
-            f"deg/s; speeds lie between {lowest:.6g} and {highest:.6g} deg/s, without what the "
-            "jump at the end of the dead zone leaves out."
-        )
-    return min(roots, key=abs)
 
 
 # --- matrices -------------------------------------------------------------------------------------
