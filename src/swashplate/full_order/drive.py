@@ -54,9 +54,8 @@ RESOLUTION = 1.0  # Largest product of a sub-step and the fastest natural freque
 STABLE = 2.0  # The same where the march is no longer stable.
 LEAST_SUBSTEPS = 8  # Sub-steps a sample that kinks of the flow, at the orifices' limits, are worth.
 MOST_SUBSTEPS = 20_000  # Sub-steps a sample, beyond which the machine is too stiff for the march.
-
-
 KEPT = tuple(Stored(1, "signals", name) for name in PlantSignals._fields)
+"""What a march leaves: all signals of the machine."""
 
 
 def path_of(name: str) -> str:
