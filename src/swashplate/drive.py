@@ -44,8 +44,6 @@ if TYPE_CHECKING:
         FrequencyResponse,
         Input,
         LinearDrive,
-        SweptInput,
-        SweptOutput,
     )
     from swashplate.simulation.batch import Batch, SquaredError
     from swashplate.simulation.residuals import Sensitivities
@@ -369,7 +367,6 @@ class Drive(Result):
         at: float | None = None,
         *,
         current: float | None = None,
-        speed: float | None = None,
         input: Input | Sequence[Input] | None = None,
         outputs: Sequence[str] = ("shaft_speed",),
         coulomb: Coulomb = "ignored",
@@ -383,9 +380,8 @@ class Drive(Result):
 
         Parameters
         ----------
-        at, current, speed : float
-            Where, one of the three: a constant voltage [V], a constant signed current [A], or the
-            speed [rad/s] that a voltage settles at.
+        at, current : float
+            Where, one of the two: a constant voltage [V], or a constant signed current [A].
         input : str or sequence of str, optional
             What moves the model: ``"voltage"``, ``"current"``, ``"solenoid_force"``; by default the
             voltage, or the current where one is given. With another than the voltage it is the pump
@@ -415,7 +411,7 @@ class Drive(Result):
         """
         from swashplate.linear import linearize_drive
 
-        return linearize_drive(self.parameters, at, current, speed, input, outputs, coulomb)
+        return linearize_drive(self.parameters, at, current, input, outputs, coulomb)
 
     def frequency_response(
         self,
@@ -423,8 +419,8 @@ class Drive(Result):
         amplitudes: ArrayLike,
         *,
         bias: float = 0.0,
-        input: SweptInput = "voltage",
-        output: SweptOutput = "shaft_speed",
+        input: str = "voltage",
+        output: str = "shaft_speed",
         rate: float = SOURCE_RATE,
         tolerance: float = 1e-4,
     ) -> FrequencyResponse:

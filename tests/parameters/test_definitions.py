@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from swashplate import Drive
-from swashplate.parameters import CATALOGUE, DEFAULTS, REFINEMENTS, broken_rules
+from swashplate.parameters import CATALOGUE, REFINEMENTS, broken_rules
 
 
 def test_every_parameter_says_what_it_is() -> None:
@@ -24,7 +24,7 @@ def test_what_is_switched_on_can_be_estimated() -> None:
             assert each.least is not None, symbol
             assert 0.0 < each.least < each.upper
         if each.switch:
-            assert DEFAULTS[symbol] == 0.0
+            assert each.default == 0.0
 
 
 @pytest.mark.parametrize(

@@ -45,7 +45,7 @@ def test_a_file_may_have_them(hoist: Drive, tmp_path: Path) -> None:
     assert drive.parameters.refinements == ("spool_friction",)
     assert drive["spool_presliding"].value == pytest.approx(5e-5)
     assert drive["dither_time"].value == pytest.approx(0.6)
-    assert drive["dither_time"].bounds == pytest.approx((0.1, 2.0))
+    assert drive["dither_time"].own_bounds == pytest.approx((0.1, 2.0))
     assert drive["load_torque"].value == pytest.approx(3e4)
     assert drive["spool_friction"].source == "step of 4 V"
     assert drive["spool_friction"].status == "assumed"

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import degrees, radians
+from math import degrees
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
@@ -25,7 +25,6 @@ def linearize(
     *,
     at: float | None = None,
     current: float | None = None,
-    speed_deg_s: float | None = None,
     input: Input | None = None,
     sample_time: float | None = None,
     interpolation: Interpolation = "linear",
@@ -33,7 +32,7 @@ def linearize(
     frequency: float = 0.3,
     out: Path | None = None,
 ) -> None:
-    """Linearise a drive at a voltage, a current or a speed.
+    """Linearise a drive at a voltage or a current.
 
     Prints the operating point, the gain, the lag of the pump, the poles, the
     bandwidth and what a speed loop closed over the drive can bear. The model is
@@ -42,7 +41,6 @@ def linearize(
     Options:
       at V: Linearise at this constant voltage.
       current A: Or at this constant signed current.
-      speed_deg_s DEG/S: Or at the voltage that settles at this speed.
       input: What moves the model; by default the voltage, or the current with --current.
       sample_time S: Sample the model, with the recurrences of the simulation.
       interpolation: The input between samples: linear, or zero-order hold.
@@ -52,24 +50,22 @@ def linearize(
 
     For example:
       swashplate linearize hoist --at 4
-      swashplate linearize hoist --speed-deg-s -50 --loop-gain 0.1
+      swashplate linearize hoist --at -2 --loop-gain 0.1
       swashplate linearize slew --at 2 --sample-time 0.01 --out slew.toml
       swashplate linearize luff --current 0 --input solenoid_force
     """
     from swashplate.linear import LINEAR_MODEL, model_tables
 
     files = Outputs((out, LINEAR_MODEL))
-    if sum(each is not None for each in (at, current, speed_deg_s)) != 1:
+    if (at is None) == (current is None):
         raise InputError(
-            "A drive is linearised at a voltage, a current or a speed: give one of --at, --current "
-            "and --speed-deg-s."
+            "A drive is linearised at a voltage or a current: give one of --at and --current."
         )
     if current is not None and input == "voltage":
-        raise InputError("--input voltage needs --at or --speed-deg-s, not --current.")
+        raise InputError("--input voltage needs --at, not --current.")
     with working("Linearising"):
         chosen = drive.chosen
-        speed = None if speed_deg_s is None else radians(speed_deg_s)
-        model = chosen.linearize(at, current=current, speed=speed, input=input)
+        model = chosen.linearize(at, current=current, input=input)
         if sample_time is not None:
             model = model.discrete(sample_time, interpolation)
         gain = None if loop_gain is None else degrees(loop_gain)

@@ -66,21 +66,17 @@ def linearize(
                 f"{instance.name}: '{name}' is no input at the operating point; there are "
                 f"{', '.join(each for each in instance.model.external if each in at)}."
             )
-    started = standing(instance, at, h) if states is None else instance.start(at, h, chosen=states)
     model = instance.model
+    if states is None:
+        # what belongs to the first sample alone has passed
+        known = instance.start(at, h, "steady").arguments
+        states = [called(part.step, each) for part, each in zip(model.parts, known, strict=True)]
+    started = instance.start(at, h, "steady", states)
     named = tuple(model.outputs) or tuple(model.parts[-1].outputs)
     named = tuple(each for each in named if each not in model.integrals)
     wanted = (named or model.parts[-1].signal_names) if outputs is None else tuple(outputs)
     matrices, names, memory, whole = recurrence(instance, started, h, moving, wanted)
     return LinearModel(*matrices, names, moving, wanted, whole * h, h, instance.name, memory)
-
-
-def standing(instance: Instance, at: Mapping[str, float], h: float) -> Started:
-    """Model that has stood at its steady state for a sample: what belongs to the first is past."""
-    settled = instance.start(at, h, "steady")
-    steps = (part.step for part in instance.model.parts)
-    states = [called(step, each) for step, each in zip(steps, settled.arguments, strict=True)]
-    return instance.start(at, h, "steady", states)
 
 
 def recurrence(

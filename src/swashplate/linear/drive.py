@@ -7,8 +7,8 @@ card's rate limits.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
-from math import ceil, isfinite, nextafter
+from dataclasses import asdict, dataclass, replace
+from math import ceil, isfinite, log, nextafter
 from typing import Any, Literal, get_args
 
 import numpy as np
@@ -19,14 +19,7 @@ from swashplate.equations.marching.record import SOURCE_RATE, Interpolation, lea
 from swashplate.equations.marching.run import Instance, called
 from swashplate.errors import DomainError, InputError
 from swashplate.linear.discrete import recurrence
-from swashplate.linear.model import (
-    UNITS,
-    Coulomb,
-    LinearDrive,
-    Matrices,
-    OperatingPoint,
-    with_line,
-)
+from swashplate.linear.model import UNITS, LinearModel, Matrices, with_line
 from swashplate.models.card import Card
 from swashplate.models.displacement_control import moment_sine, solenoid_force
 from swashplate.models.pump import overpowered
@@ -44,6 +37,7 @@ from swashplate.tables import UNIT, Cell, Column, Table
 from swashplate.units import display_unit
 
 Array = NDArray[np.float64]
+Coulomb = Literal["ignored", "tangent"]
 Input = Literal[
     "voltage", "current", "solenoid_force", "load_torque", "pump_speed", "supply_pressure"
 ]
@@ -62,6 +56,8 @@ OUTPUTS = (
     "motor_pressure_drop",
 )
 """Signals that a linear model can have as outputs."""
+PLATE_STATES = ("stroker_pressure", "plate_pressure", "spool_deflection")
+"""States between current and swash angle."""
 NO_GAIN = {
     "swash_stop": "the swash plate is at its stop",
     "relief": "the pressure is at its limit Z15",
@@ -73,18 +69,113 @@ FORCE = {"Z17": 0.0, "Z19_plus": 1.0, "Z19_minus": 1.0} | dict.fromkeys(
     ("Z20_plus", "Z20_minus", "Z21_plus", "Z21_minus", "Z22_plus", "Z22_minus"), 0.0
 )
 """Solenoids whose force is the current, for a model whose input is the force."""
-VOLTAGES = 4001  # Among which a speed is looked for, before the place is found exactly.
 DECIMALS = 4
 """Of the voltage that is proposed; rounded away from 0 V, so that it does have a model."""
 CLOSED = 64.0 * float(np.finfo(float).eps)
 """By this much tan α_sw stands below a closed spool, on the side of positive opening."""
 
 
+@dataclass(frozen=True)
+class OperatingPoint:
+    """A steady state; signs as everywhere: positive goes with more speed."""
+
+    voltage: float | None
+    """None where a current was given. [V]"""
+    current: float
+    """Signed. [A]"""
+    solenoid_force: float
+    """[N]"""
+    stroker_pressure: float
+    """δP. [Pa]"""
+    orifice_opening: float
+    """x_eff: zero, unless the stroking piston leaks. [m]"""
+    swash_angle: float
+    """[rad]"""
+    shaft_speed: float
+    """The mean of a turn. [rad/s]"""
+    one_sided: tuple[str, ...] = ()
+    """Switches that the point lies on, and the side whose slope is taken."""
+
+
+@dataclass(frozen=True, eq=False)
+class LinearDrive(LinearModel):
+    """Small motions of a drive about an operating point."""
+
+    operating_point: OperatingPoint
+    coulomb: Coulomb
+    """Whether the card's Coulomb term is left out or counts with its slope at rest."""
+    parameters: ParameterSet
+    """The drive that was linearised."""
+
+    __repr__ = LinearModel.__repr__
+
+    def content(self) -> dict[str, Any]:
+        """What is written of a model; see `LinearModel.content`."""
+        point = {k: v for k, v in asdict(self.operating_point).items() if v is not None}
+        sides = {"coulomb": self.coulomb, "one_sided": list(point.pop("one_sided"))}
+        # tables last, as TOML has them
+        return {**super().content(), **sides, "operating_point": point}
+
+    @property
+    def time_constant(self) -> float:
+        """Time constant of the pump's lag, from current to swash angle. [s]
+
+        At rest without plussing τ = (1 + Z6)/(Z1 Z3 Z5 Z8 √(Z9/2)); Kruse (2001), eqs. 6.72-6.74
+        with errata 4 and 23. Of a sampled model that of the lag with the same pole; one that is
+        shorter than its step is refused in a `DomainError`. Where friction or damping give it more
+        poles than one, that of the slowest.
+        """
+        slowest = self.poles_of(*PLATE_STATES)[0]
+        if self.sample_time is None:
+            return -1.0 / float(slowest.real)
+        pole = float(abs(slowest) if slowest.imag else slowest.real)
+        if not 0.0 < pole < 1.0:
+            raise DomainError(
+                f"{self.name}: sampled at {self.sample_time:g} s the pump's pole is at z = "
+                f"{pole:g}, which is no lag's; take a smaller sample time."
+            )
+        return -self.sample_time / log(pole)
+
+    def discrete(self, sample_time: float, interpolation: Interpolation = "linear") -> LinearDrive:
+        """The model at a sample time of 10 µs to 0.1 s, with the recurrences of the march. [s]
+
+        Between samples the input is a straight line or held, as in `Drive.simulate`; above 1/512 s
+        the march's own sub-steps are taken. Agrees with a small motion of `Drive.simulate` or
+        `Drive.stepper` sample for sample.
+
+        Raises
+        ------
+        InputError
+            For another sample time, or one at which the card's filter is unstable.
+        """
+        if interpolation not in ("linear", "previous"):
+            raise InputError(f"interpolation is '{interpolation}'; it is 'linear' or 'previous'.")
+        if not sample_time > 0.0:
+            raise InputError(f"The sample time is {sample_time:g} s, but must be above 0.")
+        rate = 1.0 / sample_time
+        substeps = least_substeps(round(rate) if abs(rate - round(rate)) < 1e-9 * rate else rate)
+        step = sample_time / substeps
+        if self.input == "voltage":
+            check_filter_stability(self.parameters, step)
+        at = self.parameters, self.operating_point, self.inputs, self.outputs, self.coulomb
+        matrices, states, memory, whole = _matrices(*at, step)
+        delay = whole * step
+        if substeps > 1:
+            line = tuple(f"{self.input}_{k}" for k in range(1, whole + 1))
+            last = tuple(f"{name}_last" for name in self.inputs)
+            # what is measured beside the command goes straight from sample to sample
+            held = [interpolation == "previous", *(False for _ in self.inputs[1:])]
+            matrices = _lifted(*with_line(matrices, whole), substeps, held)
+            states, memory, delay = (*line, *states, *last), (*line, *memory, *last), 0.0
+        A, B, C, D = matrices
+        found = replace(self, A=A, B=B, C=C, D=D, states=states, memory=memory)
+        return replace(found, delay=delay, sample_time=sample_time)
+
+
 def linearize_drive(
     parameters: ParameterSet,
     voltage: float | None = None,
     current: float | None = None,
-    speed: float | None = None,
     input: Input | Sequence[Input] | None = None,
     outputs: Sequence[str] = ("shaft_speed",),
     coulomb: Coulomb = "ignored",
@@ -119,7 +210,7 @@ def linearize_drive(
             "The literal sign of the card's Coulomb term has no slope; linearise with "
             "coulomb='ignored'."
         )
-    point = operating_point(parameters, inputs[0], voltage, current, speed)
+    point = operating_point(parameters, inputs[0], voltage, current)
     matrices, states, _, _ = _matrices(parameters, point, inputs, names, coulomb)
     delay = parameters.numbers["tau"] if inputs[0] == "voltage" else 0.0
     kept = point, coulomb, parameters
@@ -134,11 +225,10 @@ def operating_point(
     input: str,
     voltage: float | None = None,
     current: float | None = None,
-    speed: float | None = None,
 ) -> OperatingPoint:
     """Steady state at which small motions of an input, one of `INPUTS`, have an answer.
 
-    Given by one of voltage [V], current [A] and speed [rad/s].
+    Given by either of voltage [V] and current [A].
 
     Raises
     ------
@@ -149,20 +239,13 @@ def operating_point(
         swash plate, at the relief pressure, behind a saturated orifice, in the grip of a friction
         without presliding; or where the solenoid overpowers the feedback spring.
     """
-    given = {"voltage": voltage, "current": current, "speed": speed}
-    chosen = {name: value for name, value in given.items() if value is not None}
-    if len(chosen) != 1:
-        raise InputError("Linearise at a voltage, a current or a speed; give exactly one of them.")
-    ((kind, value),) = chosen.items()
-    if not isfinite(value):
-        raise InputError(f"The {kind} to linearise at is {value}, but must be a finite number.")
-    if input == "voltage" and current is not None:
-        raise InputError(
-            "A model from the voltage needs a voltage or a speed to linearise at, not a current."
-        )
-    name = parameters.name
-    if speed is not None:
-        voltage = _voltage_of(parameters, speed)
+    name, given = parameters.name, current if voltage is None else voltage
+    if given is None or (voltage is not None and current is not None):
+        raise InputError("Linearise at a voltage or a current; give exactly one of them.")
+    if not isfinite(given):
+        raise InputError(f"Linearise at a finite number of volts or amperes, not {given}.")
+    if input == "voltage" and voltage is None:
+        raise InputError("A model from the voltage needs a voltage to linearise at, not a current.")
     if voltage is not None:
         if abs(voltage) > FULL_VOLTAGE:
             raise InputError(f"The voltage is {voltage:g} V, but the card takes ±10 V.")
@@ -241,30 +324,6 @@ def _beyond(parameters: ParameterSet, voltage: float) -> str:
         first = steps[int(np.argmax(answers))]
         instead = f"linearise at {sign}{first:.{DECIMALS}f} V or beyond"
     return f"{instead}, or the pump alone at current 0 with input solenoid_force"
-
-
-def _voltage_of(parameters: ParameterSet, speed: float) -> float:
-    """The voltage nearest to zero that settles at a speed."""
-    from scipy.optimize import brentq
-
-    def error(volts: float) -> float:
-        return float(steady_states(parameters, np.array([volts]))[1][0] - speed)
-
-    volts = np.linspace(-FULL_VOLTAGE, FULL_VOLTAGE, VOLTAGES)
-    _, speeds = steady_states(parameters, volts)
-    crossing = np.flatnonzero(np.diff(np.signbit(speeds - speed)))
-    size = max(abs(float(speeds[0])), abs(float(speeds[-1])))
-    found = [float(brentq(error, volts[k], volts[k + 1], xtol=1e-14)) for k in crossing]
-    # where the speed jumps, the dead zone's end, brentq finds the jump
-    roots = [each for each in found if abs(error(each)) <= 1e-9 * size]
-    if not roots:
-        lowest, highest = float(np.degrees(speeds.min())), float(np.degrees(speeds.max()))
-        raise InputError(
-            f"{parameters.name}: no constant voltage settles at {float(np.degrees(speed)):.6g} "
-            f"deg/s; speeds lie between {lowest:.6g} and {highest:.6g} deg/s, without what the "
-            "jump at the end of the dead zone leaves out."
-        )
-    return min(roots, key=abs)
 
 
 # --- matrices -------------------------------------------------------------------------------------
@@ -369,40 +428,6 @@ def _names(side: str, step: float, options: Any) -> dict[str, str]:
 
 
 # --- at a sample time -----------------------------------------------------------------------------
-
-
-def sampled(
-    model: LinearDrive, sample_time: float, interpolation: Interpolation = "linear"
-) -> LinearDrive:
-    """Linear model at a sample time; see `LinearDrive.discrete`.
-
-    Raises
-    ------
-    InputError
-        For a sample time outside 10 µs to 0.1 s, or one at which the card's filter is unstable.
-    """
-    if interpolation not in ("linear", "previous"):
-        raise InputError(f"interpolation is '{interpolation}'; it is 'linear' or 'previous'.")
-    if not sample_time > 0.0:
-        raise InputError(f"The sample time is {sample_time:g} s, but must be above 0.")
-    rate = 1.0 / sample_time
-    substeps = least_substeps(round(rate) if abs(rate - round(rate)) < 1e-9 * rate else rate)
-    step = sample_time / substeps
-    if model.input == "voltage":
-        check_filter_stability(model.parameters, step)
-    at = model.parameters, model.operating_point, model.inputs, model.outputs, model.coulomb
-    matrices, states, memory, whole = _matrices(*at, step)
-    delay = whole * step
-    if substeps > 1:
-        line = tuple(f"{model.input}_{k}" for k in range(1, whole + 1))
-        last = tuple(f"{name}_last" for name in model.inputs)
-        # what is measured beside the command goes straight from sample to sample
-        held = [interpolation == "previous", *(False for _ in model.inputs[1:])]
-        matrices = _lifted(*with_line(matrices, whole), substeps, held)
-        states, memory, delay = (*line, *states, *last), (*line, *memory, *last), 0.0
-    A, B, C, D = matrices
-    found = replace(model, A=A, B=B, C=C, D=D, states=states, memory=memory)
-    return replace(found, delay=delay, sample_time=sample_time)
 
 
 def _lifted(

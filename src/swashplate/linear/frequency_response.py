@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from math import ceil, sqrt
-from typing import TYPE_CHECKING, Literal, get_args
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -16,6 +16,7 @@ from swashplate.equations.marching.march import output_of
 from swashplate.equations.marching.record import FASTEST, SOURCE_RATE
 from swashplate.equations.marching.run import Instance, marched
 from swashplate.errors import DomainError, InputError
+from swashplate.linear.drive import OUTPUTS
 from swashplate.models.displacement_control import Pump
 from swashplate.parameters.parameter_set import ParameterSet
 from swashplate.parameters.rules import FULL_VOLTAGE
@@ -29,19 +30,7 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
 Counts = NDArray[np.int64]
-SweptInput = Literal["voltage", "current"]
-SweptOutput = Literal[
-    "shaft_speed",
-    "swash_angle",
-    "stroker_pressure",
-    "orifice_opening",
-    "spool_position",
-    "solenoid_force",
-    "current",
-]
-
-SWEPT_OUTPUTS: tuple[SweptOutput, ...] = get_args(SweptOutput)
-
+SWEPT_OUTPUTS = OUTPUTS[:7]  # Without the motor's.
 SLOWEST_CYCLE = 1e-3  # Lowest frequency. [Hz]
 FEWEST_STEPS, MOST_STEPS = 8, 1_000_000
 """Steps of a cycle, which bound the frequencies from both sides."""
@@ -130,8 +119,8 @@ def sweep(
     frequencies: ArrayLike,
     amplitudes: ArrayLike,
     bias: float = 0.0,
-    input: SweptInput = "voltage",
-    output: SweptOutput = "shaft_speed",
+    input: str = "voltage",
+    output: str = "shaft_speed",
     rate: float = SOURCE_RATE,
     tolerance: float = 1e-4,
 ) -> FrequencyResponse:

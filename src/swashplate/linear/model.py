@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from functools import cached_property
-from math import copysign, inf, log, pi
+from math import copysign, inf, pi
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from swashplate.equations.marching.record import Interpolation
 from swashplate.errors import DomainError, InputError
-from swashplate.parameters.parameter_set import ParameterSet
 from swashplate.tables import Form, ending, write_text
 
 if TYPE_CHECKING:
@@ -24,10 +22,7 @@ Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
 Matrices = tuple[Array, Array, Array, Array]
 Response = Callable[[Array], ComplexArray]
-Coulomb = Literal["ignored", "tangent"]
 
-PLATE_STATES = ("stroker_pressure", "plate_pressure", "spool_deflection")
-"""States between current and swash angle."""
 UNITS = {
     "voltage": "V",
     "current": "A",
@@ -262,79 +257,6 @@ class LinearModel:
             from tomlkit import dumps as dump_toml
 
             write_text(dump_toml(self.content()), path)
-
-
-@dataclass(frozen=True)
-class OperatingPoint:
-    """A steady state; signs as everywhere: positive goes with more speed."""
-
-    voltage: float | None
-    """None where a current was given. [V]"""
-    current: float
-    """Signed. [A]"""
-    solenoid_force: float
-    """[N]"""
-    stroker_pressure: float
-    """δP. [Pa]"""
-    orifice_opening: float
-    """x_eff: zero, unless the stroking piston leaks. [m]"""
-    swash_angle: float
-    """[rad]"""
-    shaft_speed: float
-    """The mean of a turn. [rad/s]"""
-    one_sided: tuple[str, ...] = ()
-    """Switches that the point lies on, and the side whose slope is taken."""
-
-
-@dataclass(frozen=True, eq=False)
-class LinearDrive(LinearModel):
-    """Small motions of a drive about an operating point."""
-
-    operating_point: OperatingPoint
-    coulomb: Coulomb
-    """Whether the card's Coulomb term is left out or counts with its slope at rest."""
-    parameters: ParameterSet
-    """The drive that was linearised."""
-
-    __repr__ = LinearModel.__repr__
-
-    def content(self) -> dict[str, Any]:
-        """What is written of a model; see `LinearModel.content`."""
-        point = {k: v for k, v in asdict(self.operating_point).items() if v is not None}
-        sides = {"coulomb": self.coulomb, "one_sided": list(point.pop("one_sided"))}
-        # tables last, as TOML has them
-        return {**super().content(), **sides, "operating_point": point}
-
-    @property
-    def time_constant(self) -> float:
-        """Time constant of the pump's lag, from current to swash angle. [s]
-
-        At rest without plussing τ = (1 + Z6)/(Z1 Z3 Z5 Z8 √(Z9/2)); Kruse (2001), eqs. 6.72-6.74
-        with errata 4 and 23. Of a sampled model that of the lag with the same pole; one that is
-        shorter than its step is refused in a `DomainError`. Where friction or damping give it more
-        poles than one, that of the slowest.
-        """
-        slowest = self.poles_of(*PLATE_STATES)[0]
-        if self.sample_time is None:
-            return -1.0 / float(slowest.real)
-        pole = float(abs(slowest) if slowest.imag else slowest.real)
-        if not 0.0 < pole < 1.0:
-            raise DomainError(
-                f"{self.name}: sampled at {self.sample_time:g} s the pump's pole is at z = "
-                f"{pole:g}, which is no lag's; take a smaller sample time."
-            )
-        return -self.sample_time / log(pole)
-
-    def discrete(self, sample_time: float, interpolation: Interpolation = "linear") -> LinearDrive:
-        """The model at a sample time of 10 µs to 0.1 s, with the recurrences of the march. [s]
-
-        Between samples the input is a straight line or held, as in `Drive.simulate`; above 1/512 s
-        the march's own sub-steps are taken. Agrees with a small motion of `Drive.simulate` or
-        `Drive.stepper` sample for sample.
-        """
-        from swashplate.linear.drive import sampled
-
-        return sampled(self, sample_time, interpolation)
 
 
 def with_line(matrices: Matrices, whole: int) -> Matrices:

@@ -47,7 +47,7 @@ def tone(
     return amplitude * np.sin(angle), amplitude * speed * np.cos(angle)
 
 
-def homeward(time: Array, level: float, rise: float, duration: float) -> tuple[Array, Array]:
+def cubic_return(time: Array, level: float, rise: float, duration: float) -> tuple[Array, Array]:
     """Cubic from voltage `level` [V] and slope `rise` [V/s] to (0, 0) at `duration` [s]."""
     done = time / duration
     # written with the time left as a factor, it ends at exactly zero
@@ -107,7 +107,7 @@ def return_within(amplitude: float, level: float, rise: float, duration: float) 
     for _ in range(HALVINGS):
         middle = 0.5 * (low + high)
         low, high = (middle, high) if stays(middle) else (low, middle)
-    return partial(homeward, level=level, rise=low * rise, duration=duration)
+    return partial(cubic_return, level=level, rise=low * rise, duration=duration)
 
 
 # --- checks ---------------------------------------------------------------------------------------

@@ -1,6 +1,5 @@
 from .definitions import CATALOGUE as CATALOGUE
 from .definitions import COLUMNS as COLUMNS
-from .definitions import DEFAULTS as DEFAULTS
 from .definitions import OPTIONS as OPTIONS
 from .definitions import OWN as OWN
 from .definitions import REFINEMENTS as REFINEMENTS

@@ -69,9 +69,6 @@ COLUMNS: dict[str, str] = {
 }
 """Symbol of every single value that every set has, e.g. ``Z16_plus`` → ``Z16``."""
 
-DEFAULTS: dict[str, float] = {s: d.default for s, d in REFINEMENTS.items() if d.default is not None}
-"""What a refinement is where a set does not give it."""
-
 SWITCHES: dict[str, str] = {each.symbol: each.switch for each in _ALL if each.switch}
 """Option of the pump (`PumpOptions` of `swashplate.models.displacement_control`) that a parameter
 belongs to, by symbol; each has one value."""

@@ -53,11 +53,6 @@ class Parameter(Result):
     """Bounds that the set's author gives, within the catalogue's; both ends allowed."""
 
     @property
-    def bounds(self) -> tuple[float, float]:
-        """Lowest and highest value: the set's own bounds, or else the catalogue's range."""
-        return self.own_bounds or (self.definition.lower, self.definition.upper)
-
-    @property
     def symbol(self) -> str:
         """Symbol in Kruse (2001), e.g. ``Z16``."""
         return self.definition.symbol

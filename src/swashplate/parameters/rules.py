@@ -22,7 +22,7 @@ from swashplate.models.displacement_control import (
     solenoid_force,
     solenoids_of,
 )
-from swashplate.parameters.definitions import DEFAULTS, OPTIONS, SWITCHES, Definition, find
+from swashplate.parameters.definitions import OPTIONS, SWITCHES, Definition, find
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -152,7 +152,8 @@ def broken_rules(numbers: Mapping[str, Array]) -> Iterator[Broken]:
     n["rest"], n["ceiling"] = n["Z2"] / n["Z1"], np.minimum(n["Z9"], n["Z15"])
     size = n["rest"].size
     # a refinement that is not given is what it is without
-    n |= {name: np.full(size, value) for name, value in DEFAULTS.items() if name not in numbers}
+    off = Pump._field_defaults.items()
+    n |= {name: np.full(size, value) for name, value in off if name not in numbers}
     n["depth"] = n["cam_ripple"] + n["cam_ripple_per_torque"] * np.abs(n["load_torque"])
     for rule in (*OF_REFINEMENTS, AT_REST):
         yield applied(rule, n)
@@ -201,9 +202,7 @@ def _static(n: Values, size: int) -> tuple[Array, Array]:
     """Lowest steady current [A] and largest sin φ of every set (rows) and side (columns)."""
     sides = [[n[f"{name}_{side}"] for name in Channel._fields] for side in SIDES]
     channels = np.moveaxis(np.array(sides), -1, 0)
-    pumps = np.column_stack(
-        [n.get(name, np.full(size, Pump._field_defaults.get(name))) for name in Pump._fields]
-    )
+    pumps = np.column_stack([n[name] for name in Pump._fields])
     lowest, moment = np.empty((size, 2)), np.empty((size, 2))
     if size == 1:
         # commands that read a set and simulate nothing need not wait for machine code
