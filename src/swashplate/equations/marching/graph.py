@@ -4,7 +4,7 @@ A column of the Jacobian is the derivative of every state by one parameter, over
 follows the linear recurrence ds[n+1] = A[n] ds[n] + b[n]. The partial derivatives A and b are known
 once the states are (`fill` kernels, without a wait between samples); which of them are zero
 whatever the numbers is known when the code is generated. So states fall into groups that wait for
-each other (`recur` kernels: strongly connected components), each behind those that it needs.
+each other (strongly connected components, a `recurrence` each), behind those that they need.
 """
 
 from __future__ import annotations
