@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
+from tests.simulation.experiments import residuals
 
 from swashplate import Drive, InputError, maneuvers
-from swashplate.equations.marching.observation import Observation, ObservedRecord
+from swashplate.equations.marching.observation import Observation, ObservedRecord, Own
 from swashplate.equations.marching.record import Record, record_of
-from swashplate.simulation.residuals import Own, residuals
 
 pytestmark = pytest.mark.traced
 
@@ -64,7 +64,7 @@ def test_residuals_at_any_stamps(hoist: Drive) -> None:
     )
     assert observed.own_columns == ("offset of shaft_speed [0]", "offset of shaft_speed [1]")
     assert observed.rows_of(1) == slice(7, 14)
-    found = residuals(hoist.parameters, observed, Own(None, (0.5, 0.0)))
+    found = residuals(hoist.parameters, observed, Own({}, (0.5, 0.0)))
     seen = np.interp(time, fine.time, fine.shaft_speed)
     expected = 2.0 * (seen + 0.5 - np.arange(7.0))
     np.testing.assert_allclose(found[:7], expected, rtol=0.0, atol=1e-12)

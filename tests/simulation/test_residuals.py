@@ -9,18 +9,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from tests.simulation.experiments import jacobian, residuals, triangle
 
 from swashplate import DomainError, Drive, InputError, Limit, ParameterError, maneuvers
-from swashplate.equations.marching.observation import Observation, ObservedRecord
+from swashplate.equations.marching.observation import Observation, ObservedRecord, Own
 from swashplate.equations.marching.record import record_of
-from swashplate.simulation.residuals import (
-    ALL_COLUMNS,
-    PUMP_COLUMNS,
-    Own,
-    jacobian,
-    residuals,
-    triangle,
-)
+from swashplate.simulation.residuals import ALL_COLUMNS, PUMP_COLUMNS
 from swashplate.simulation.run import simulate_drive
 
 RATE = 512.0
@@ -142,7 +136,7 @@ def everything_observed(command: np.ndarray, start: str = "rest") -> ObservedRec
 
 
 OWN = Own(
-    start_pressure=2e4,
+    {"start_pressure": 2e4},
     offsets=(0.0, 0.0, 0.0, 0.0, 0.1, -0.2, 0.0, 0.0, 0.0),
 )
 
@@ -159,7 +153,7 @@ def test_derivatives_are_those_of_differences(name: str) -> None:
 
     def at(column: str, offset: float) -> np.ndarray:
         if column == "start_pressure":
-            own = OWN._replace(start_pressure=OWN.start_pressure + offset)
+            own = OWN._replace(start={"start_pressure": 2e4 + offset})
         elif column in observed.own_columns:
             values = list(OWN.offsets)
             values[int(column[-2])] += offset
@@ -188,9 +182,9 @@ def test_derivatives_are_those_of_differences(name: str) -> None:
 @pytest.mark.traced
 @pytest.mark.parametrize("start", ["rest", "steady"])
 def test_a_start_pressure_is_that_of_a_simulation(hoist: Drive, start: str) -> None:
-    observed, own = observed_at_samples(3.0 + SWING, start), Own(start_pressure=-5e4)
+    observed, own = observed_at_samples(3.0 + SWING, start), Own({"start_pressure": -5e4})
     found = residuals(hoist.parameters, observed, own)
-    run = simulate_drive(hoist.parameters, observed.record, start, -5e4)
+    run = simulate_drive(hoist.parameters, {"voltage": observed.record}, start, -5e4)
     assert run.stroker_pressure[0] == -5e4
     for number, signal in enumerate(OBSERVABLE):
         assert np.array_equal(found[observed.rows_of(number)], simulated(run, signal)), signal
@@ -299,9 +293,9 @@ def test_refusals(hoist: Drive) -> None:
     with pytest.raises(InputError, match="start_pressure is a column, so Own needs a value"):
         jacobian(hoist.parameters, observed, ["start_pressure"])
     with pytest.raises(InputError, match="must be a finite number, not nan"):
-        residuals(hoist.parameters, observed, Own(start_pressure=np.nan))
+        residuals(hoist.parameters, observed, Own({"start_pressure": np.nan}))
     with pytest.raises(DomainError, match="the pressure at the start is 1e\\+07 Pa, but"):
-        residuals(hoist.parameters, observed, Own(start_pressure=1e7))
+        residuals(hoist.parameters, observed, Own({"start_pressure": 1e7}))
     current = ObservedRecord(
         record_of([0.0, 3.0, 3.0], RATE, what="current"),
         [Observation("shaft_speed", [0.0], [0.0])],

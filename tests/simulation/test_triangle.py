@@ -4,13 +4,13 @@ from typing import NamedTuple
 
 import numpy as np
 import pytest
+from tests.simulation.experiments import triangle
 
 from swashplate import DomainError, Drive
 from swashplate.equations import Model, equation, instance_of
 from swashplate.equations.marching import jacobian as engine
 from swashplate.equations.marching.observation import Observation, ObservedRecord
 from swashplate.equations.marching.record import Record, record_of
-from swashplate.simulation.residuals import triangle
 
 pytestmark = pytest.mark.traced
 

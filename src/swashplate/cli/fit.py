@@ -47,7 +47,7 @@ if TYPE_CHECKING:
     from swashplate.campaign import Campaign
     from swashplate.identification.assessment import Judged
     from swashplate.identification.drive_model import Parameters
-    from swashplate.identification.solving import Progress, StartResult
+    from swashplate.identification.solving import Progress, Solution
     from swashplate.identification.verdict import Verdict
     from swashplate.parameters.parameter_set import ParameterSet
 
@@ -62,14 +62,8 @@ MEASURES = (
     "NRMSE is the RMSE over the standard deviation of what was measured, fit % is 100 (1 - NRMSE); "
     "'of its range' below means RMSE over the largest less the smallest value measured."
 )
-RESIDUALS = (
-    "'own' is how long residuals stay correlated, 'input' their largest correlation with the "
-    "command, at that lag (positive: after it). Residuals unrelated to the command stay "
-    "within the band at 95 % of the lags. * marks a model error: 0.5 and a third beyond the band, "
-    "as the largest of all lags by chance is not, or 0.9."
-)
 
-Loss = Literal["linear", "soft_l1", "huber", "cauchy", "arctan"]
+Loss = Literal["linear", "soft_l1", "cauchy"]
 Role = Literal["validate", "fit", "all"]
 CAMPAIGN = Path("campaign.toml")
 
@@ -141,7 +135,7 @@ def fit(
         raise InputError(f"{model} says what is free and where it begins: leave out the others.")
     with working("Starting"):
         from swashplate.executors import Dask, Processes
-        from swashplate.identification.assessment import Wanted, judge_fit
+        from swashplate.identification.assessment import judge_fit
         from swashplate.identification.drive_model import setup_of
         from swashplate.identification.fitting import Search
         from swashplate.identification.fitting import fit as fitted
@@ -152,7 +146,7 @@ def fit(
         nominal: Parameters
         if model is not None:
             nominal = ModelSetup.from_file(model).nominal(runs)
-            plan = nominal.setup.setup
+            plan = nominal.setup
         else:
             plan = setup_of(campaign, chosen, setup)
             drive = campaign.drive(chosen) if begin is None else None
@@ -167,7 +161,7 @@ def fit(
                 f"{evaluations}, cost {now.cost:.6g}"
             )
 
-        def ended(stage: str, one: StartResult, done: int) -> None:
+        def ended(stage: str, one: Solution, done: int) -> None:
             words = f"{stage}: {done} of {starts + 1} starts, the last to cost {one.cost:.6g}"
             shown(words, done / (starts + 1))
 
@@ -193,9 +187,22 @@ def fit(
             "command with --resume goes on; nothing is written but the starts."
         )
         raise typer.Exit(INTERRUPTED)
-    wanted = Wanted(folds, bootstrap, tuple(profile or ()), seed, executor, loss, require / 100.0)
     with working("Judging") as status:
-        found = judge_fit(campaign, runs, nominal, plan, result, wanted, status.update)
+        found = judge_fit(
+            campaign,
+            runs,
+            nominal,
+            plan,
+            result,
+            folds=folds,
+            bootstrap=bootstrap,
+            profiles=profile or (),
+            seed=seed,
+            executor=executor,
+            loss=loss,
+            required=require / 100.0,
+            watch=status.update,
+        )
         verdict = found.verdict
     judged = perf_counter()
     lines = _written(found, out)
@@ -260,12 +267,12 @@ def _written(found: Judged, out: Path) -> list[str]:
     from tomlkit import dumps
 
     from swashplate.drive import Drive
-    from swashplate.identification.setup import ModelParameters, setup_text
+    from swashplate.identification.setup import ModelSetup, setup_text
     from swashplate.identification.tables import estimates_table
 
     made_folder(out)
     parameters = found.result.parameters
-    if isinstance(parameters, ModelParameters):
+    if isinstance(parameters, ModelSetup):
         numbers = {name: float(value) for name, value in parameters.numbers.items()}
         write_text(dumps({parameters.name: numbers}), out / NUMBERS)
         lines = [f"Numbers:   {out / NUMBERS}"]
@@ -300,9 +307,7 @@ def _say_verdict(verdict: Verdict) -> None:
     Exit
         With code 1 if what was judged is not usable.
     """
-    from swashplate.identification.tables import criteria_table
-
-    show(criteria_table(verdict))
+    show(verdict.table())
     bullets(verdict.not_judged)
     if verdict.assumed:
         say("Assumed, cannot be checked from these logs:")
@@ -380,8 +385,6 @@ def validate(
     note(f"{campaign.title}{virtual}, {chosen}: {parameters.name} from {drive}")
     show(*tables.runs_tables(qualities))
     say(MEASURES)
-    show(tables.residual_table(predicted))
-    say(RESIDUALS)
     bullets(judged.sentences)
     if out is not None:
         note(f"Measures:  {out / 'measures.csv'}")
@@ -478,7 +481,7 @@ def demo(*, out: Path = Path("demo"), seed: int = 1) -> None:
     """
     from swashplate.campaign import Campaign, rig
     from swashplate.drive import Drive
-    from swashplate.identification.assessment import Wanted, judge_fit
+    from swashplate.identification.assessment import judge_fit
     from swashplate.identification.fitting import drawn, fit
     from swashplate.identification.setup import load_setup
     from swashplate.identification.tables import estimates_table, runs_tables, truth_count
@@ -500,7 +503,7 @@ def demo(*, out: Path = Path("demo"), seed: int = 1) -> None:
         result = fit(start, runs, setup)
         searched = perf_counter()
         begin("computing intervals and verdict")
-        found = judge_fit(campaign, runs, start, setup, result, Wanted(seed=seed))
+        found = judge_fit(campaign, runs, start, setup, result, seed=seed)
         verdict = found.verdict
         judged = perf_counter()
         tables = [estimates_table(each, truth=truth.parameters) for each in found.assessments]

@@ -25,11 +25,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swashplate.equations.code import generating
-from swashplate.equations.fields import is_real
 from swashplate.equations.marching.march import output_of, step_source
 from swashplate.equations.marching.part import Stored
-from swashplate.equations.marching.run import Instance, Start, check_domain, module
-from swashplate.equations.marching.use import instance_of
+from swashplate.equations.marching.record import check_rate
+from swashplate.equations.marching.run import Instance, Start, check_domain, instance_of, module
 from swashplate.equations.model import Model
 from swashplate.errors import InputError
 
@@ -161,8 +160,7 @@ def compiled_step(
     InputError
         For numbers that do not fit the model, and signals that it does not have.
     """
-    if not is_real(rate) or not 0.0 < rate < np.inf:
-        raise InputError(f"The rate is {rate!r} Hz, but must be a number above 0.")
+    check_rate(rate)
     instance = instance_of(model, p, options=options, given=given)
     return CompiledStep(instance, inputs, stored_of(model, outputs), 1.0 / rate)
 
