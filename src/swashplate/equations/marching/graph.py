@@ -4,13 +4,14 @@ A column of the Jacobian is the derivative of every state by one parameter, over
 follows the linear recurrence ds[n+1] = A[n] ds[n] + b[n]. The partial derivatives A and b are known
 once the states are (`fill` kernels, without a wait between samples); which of them are zero
 whatever the numbers is known when the code is generated. So states fall into groups that wait for
-each other (`recur` kernels: strongly connected components), each behind those that it needs.
+each other (strongly connected components, a `recurrence` each), behind those that they need.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from graphlib import TopologicalSorter
+from itertools import product
 from typing import Any, NamedTuple
 
 from swashplate.equations import expressions as ex
@@ -26,9 +27,6 @@ from swashplate.equations.model import Model, Source, arguments_of
 from swashplate.equations.reading import read
 from swashplate.equations.writing import Writer, function_source, indented
 from swashplate.errors import InputError
-
-PAIR = 2
-"""Columns of a generated recurrence side by side."""
 
 Moved = tuple[Stored, str]
 """A number, and the column that it is derived by."""
@@ -51,7 +49,8 @@ class Group(NamedTuple):
     """States of a part that wait for each other, in one recurrence."""
 
     states: tuple[Stored, ...]
-    piece: int | None  # Piece that runs it; None for one state, which a library kernel does.
+    factors: list[int]  # Places of their partial derivatives by each other.
+    piece: int  # See `recurrence`.
 
 
 class PartGraph(NamedTuple):
@@ -110,26 +109,14 @@ class Graph:
                 self._keep(place)
                 self.partials[place] = self._link(place.path)
         kept = {each: f"flat[{row} + n - first]" for each, row in self.row_of.items()}
-        self.pieces.insert(0, self._planned("march", *march_source(model, signals, options, kept)))
+        text, names = march_source(model, signals, options, kept)
+        self.pieces.insert(0, _planned(f"{model.name}_march", "march", text, names))
         self._starting: dict[str, Starting] = {}
 
     def number_of(self, source: Source) -> Stored:
         """A signal of a part, or of its state."""
         state = source.signal in dict(leaves(self.sampler.parts[source.part].state))
         return Stored(source.part, "state" if state else "signals", source.signal)
-
-    def _planned(self, name: str, text: str, names: Mapping[str, Any]) -> Planned:
-        """A piece, in a module of its own."""
-        file = f"{self.model.name}_{name}"
-        return generating(lambda: module(file, text, {"piece": piece, **names})[name])
-
-    def _piece(
-        self, name: str, says: str, lines: Sequence[str], names: Any = None, arguments: str = PIECE
-    ) -> int:
-        """Number of a new piece."""
-        text = function_source(f"{name}({arguments})", says, lines, "@piece")
-        self.pieces.append(self._planned(name, text, {**self.sampler.names, **(names or {})}))
-        return len(self.pieces)
 
     def _row(self) -> int:
         self.size += STRIDE
@@ -173,10 +160,14 @@ class Graph:
             state: {by for by in self.partials[state] if by in states.values()}
             for state in states.values()
         }
-        groups = [
-            Group(each, self._recurrence(part, each) if len(each) > 1 else None)
-            for each in _strongly_connected(flows)
-        ]
+        groups = []
+        for group in _strongly_connected(flows):
+            none = Term((), 0.0)
+            own = [[self.partials[into].get(by, none) for by in group] for into in group]
+            pattern = tuple(tuple(None if t.rows else t.scale for t in row) for row in own)
+            factors = [place for row in own for term in row for place in term.rows]
+            self.pieces.append(recurrence(pattern))
+            groups.append(Group(group, factors, len(self.pieces)))
         return PartGraph(filled, rows, groups, needed, behind)
 
     def _fill(self, part: PartCode, results: Mapping[Stored, Node]) -> tuple[int | None, range]:
@@ -201,14 +192,14 @@ class Graph:
             return None, range(0)
         taken, nodes = {*part.code.taken, *found.taken}, [*wanted.values()]
         writer = Writer(taken, found.items, nodes, found.hints, straight=True)
-        names = set(writer.needed)
-        lines = self.sampler.ahead(part, names)
+        read = set(writer.needed)
+        lines = self.sampler.ahead(part, read)
         lines += [
             f"{part.fraction(tap)} = fraction[{tap.number}]"
             for tap in part.taps
-            if part.fraction(tap) in names
+            if part.fraction(tap) in read
         ]
-        inner = [f"{n} = flat[{self._named[n]} + m]" for n in sorted(names & self._named.keys())]
+        inner = [f"{n} = flat[{self._named[n]} + m]" for n in sorted(read & self._named.keys())]
         # what only one side of a choice makes would carry its value from one sample to the next, as
         # far as a compiler can know, and the loop would not become vector instructions
         inner += [f"{name} = {value}" for name, value in writer.inner.items()]
@@ -216,8 +207,11 @@ class Graph:
         inner += [f"flat[{k} + m] = {t}" for k, t in zip(wanted, writer.texts, strict=True)]
         says = "Partial derivatives at known states."
         lines += ["for m in range(count):", *indented(inner)]
-        number = self._piece(f"fill_{part.own.name}", says, lines, writer.functions)
-        return number, range(first, self.size)
+        name = f"fill_{part.own.name}"
+        text = function_source(f"{name}({PIECE})", says, lines, "@piece")
+        names = {**self.sampler.names, **writer.functions}
+        self.pieces.append(_planned(f"{self.model.name}_{name}", name, text, names))
+        return len(self.pieces), range(first, self.size)
 
     def _link(self, name: str) -> dict[Stored, Term]:
         """Partial derivatives of a link: numbers, or refused."""
@@ -238,45 +232,6 @@ class Graph:
             known[arguments[inp]]: Term((), float(node.value))
             for (_, inp), node in zip(derived.entries, derived.partials, strict=True)
         }
-
-    def _recurrence(self, part: PartCode, group: Sequence[Stored]) -> int:
-        """Piece that runs y[n+1] = A[n] y[n] + g[n] for some columns, PAIR of them side by side.
-
-        Its second argument is the length of `lanes`, which it takes in place of ``whole``: for each
-        state and all columns the places of inputs g and results y in ``flat``, and of y in
-        ``tangent``; that vector it takes in place of ``params``.
-        """
-        states, abreast = range(len(group)), range(PAIR)
-        ahead, loads, inner, after = [], {}, [], []
-        for i in states:
-            for j in abreast:
-                for k, what in enumerate(("g", "d", "p")):
-                    ahead.append(f"{what}{i}_{j} = lanes[{3 * i + k} * width + c + {j}]")
-                ahead.append(f"y{i}_{j} = tangent[p{i}_{j}]")
-                terms = [f"flat[g{i}_{j} + m]"]
-                for l in states:
-                    partial = self.partials[group[i]].get(group[l])
-                    if partial is not None and partial.rows:
-                        loads[f"a{i}_{l}"] = f"a{i}_{l} = flat[{partial.rows[0]} + m]"
-                        terms.append(f"a{i}_{l} * y{l}_{j}")
-                    elif partial is not None:
-                        terms.append(f"{partial.scale!r} * y{l}_{j}")
-                inner.append(f"n{i}_{j} = {_sum(terms)}")
-                after += [f"flat[d{i}_{j} + count] = y{i}_{j}", f"tangent[p{i}_{j}] = y{i}_{j}"]
-        inner += [f"flat[d{i}_{j} + m] = y{i}_{j}" for i in states for j in abreast]
-        inner += [f"y{i}_{j} = n{i}_{j}" for i in states for j in abreast]
-        body = [*ahead, "for m in range(count):", *indented([*loads.values(), *inner]), *after]
-        head = PIECE.replace("first", "size").replace("whole", "lanes")
-        return self._piece(
-            f"recur_{part.own.name}_{group[0].path.replace('.', '_')}",
-            f"Derivatives of {', '.join(state.path for state in group)}.",
-            [
-                f"width = size // {3 * len(group)}",
-                f"for c in range(0, width, {PAIR}):",
-                *indented(body),
-            ],
-            arguments=head.replace("params", "tangent"),
-        )
 
     # -- where it starts -----------------------------------------------------------------------
 
@@ -339,6 +294,51 @@ def graph_of(
 ) -> Graph:
     """A model's structure for some observed signals, made once."""
     return Graph(model, signals, options, observed)
+
+
+def abreast(states: int) -> int:
+    """Columns of a recurrence side by side: they fill the time that one waits for itself."""
+    return 8 if states == 1 else 2
+
+
+@generating
+def recurrence(pattern: tuple[tuple[float | None, ...], ...]) -> Planned:
+    """Piece that runs y[n+1] = A[n] y[n] + g[n] for some columns, a few side by side.
+
+    Of A `pattern` has what does not change, and None for what does. The second argument is the
+    length of `lanes`, which stand in place of ``whole``: the places in ``flat`` of what changes in
+    A, row by row; then for each state and all columns the places of inputs g and results y, from
+    the block's first sample to the one behind it, and of y in ``tangent``, in place of ``params``.
+    """
+    size, together = len(pattern), range(abreast(len(pattern)))
+    changing = [(i, l) for i in range(size) for l in range(size) if pattern[i][l] is None]
+    lines = [f"at{i}_{l} = lanes[{k}]" for k, (i, l) in enumerate(changing)]
+    ahead, after = list[str](), list[str]()
+    inner = [f"a{i}_{l} = flat[at{i}_{l} + m]" for i, l in changing]
+    for i, j in product(range(size), together):
+        for k, what in enumerate(("g", "d", "p")):
+            place = f"{len(changing)} + {3 * i + k} * width + c + {j}"
+            ahead.append(f"{what}{i}_{j} = lanes[{place}]")
+        ahead.append(f"y{i}_{j} = tangent[p{i}_{j}]")
+        terms = [f"flat[g{i}_{j} + m]"]
+        for l, each in enumerate(pattern[i]):
+            if each != 0.0:
+                terms.append(f"{f'a{i}_{l}' if each is None else repr(each)} * y{l}_{j}")
+        inner.append(f"n{i}_{j} = {_sum(terms)}")
+        after += [f"flat[d{i}_{j} + count] = y{i}_{j}", f"tangent[p{i}_{j}] = y{i}_{j}"]
+    inner += [f"flat[d{i}_{j} + m] = y{i}_{j}" for i, j in product(range(size), together)]
+    inner += [f"y{i}_{j} = n{i}_{j}" for i, j in product(range(size), together)]
+    lines += [f"width = (size - {len(changing)}) // {3 * size}"]
+    lines += [f"for c in range(0, width, {len(together)}):"]
+    lines += indented([*ahead, "for m in range(count):", *indented(inner), *after])
+    name, says = f"recurrence_{size}", f"Derivatives of {size} states that wait for each other."
+    head = PIECE.replace("first", "size").replace("whole", "lanes").replace("params", "tangent")
+    return _planned(name, name, function_source(f"{name}({head})", says, lines, "@piece"), {})
+
+
+def _planned(file: str, name: str, text: str, names: Mapping[str, Any]) -> Planned:
+    """A piece, in a module of its own."""
+    return generating(lambda: module(file, text, {"piece": piece, **names})[name])
 
 
 def _sum(terms: Sequence[str]) -> str:

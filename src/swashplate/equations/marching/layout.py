@@ -9,12 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swashplate.equations.code import generating
-from swashplate.equations.marching.graph import PAIR, Graph, Group, Moved, PartGraph, Term
+from swashplate.equations.marching.graph import Graph, Group, Moved, PartGraph, Term, abreast
 from swashplate.equations.marching.part import Stored
 from swashplate.equations.marching.rows import (
-    ABREAST,
     CALL,
-    CHAIN,
     COMBINE,
     INTEGRATE,
     RECUR,
@@ -85,7 +83,7 @@ class Layout:
             value=np.array(values, dtype=np.int64),
             integrals=sum(what == INTEGRATE for what, *_ in todo),
         )
-        self.pieces = {piece for what, piece, *_ in todo if what in (CALL, CHAIN)}
+        self.pieces = {piece for what, piece, *_ in todo if what in (CALL, RECUR)}
         self.slots = [(k, term.slot) for k, term in enumerate(terms) if term.slot is not None]
 
     def taken(self) -> Array:
@@ -182,7 +180,7 @@ class Layout:
 
     def _group(self, group: Group) -> list[Todo]:
         """Columns of a recurrence, and rows that they need, if there are any."""
-        since, begin, first = len(self._sums), len(self._lanes), group.states[0]
+        since, begin = len(self._sums), len(self._lanes)
         found: list[list[tuple[int, int, int]]] = []
         made: dict[Stored, dict[int, Term]] = {state: {} for state in group.states}
         for c, column in enumerate(self.columns):
@@ -195,19 +193,15 @@ class Layout:
                     found[-1].append((row, taken, self.tangents))
                     made[state][c] = Term((taken,))
                     self.tangents += 1
-        own = self.graph.partials[first].get(first, Term((), 0.0))
         self._by |= made
         if not found:
             return []
         idle = [(self._value(0.0), 0, 0)] * len(group.states)
-        found += [idle] * (-len(found) % (ABREAST if group.piece is None else PAIR))
+        found += [idle] * (-len(found) % abreast(len(group.states)))
+        self._lanes += group.factors
         for lanes in zip(*found, strict=True):
             self._lanes += [place for each in zip(*lanes, strict=True) for place in each]
-        if group.piece is None:
-            run = (RECUR, own.rows[0] if own.rows else self._value(own.scale))
-        else:
-            run = (CHAIN, group.piece)
-        return [*self._made(since), (*run, begin, len(self._lanes))]
+        return [*self._made(since), (RECUR, group.piece, begin, len(self._lanes))]
 
     def _observed(self, number: int, integrals: list[Todo]) -> tuple[int, list[list[Term]]]:
         """Row of an observed signal, and what its derivatives are."""

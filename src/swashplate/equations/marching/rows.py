@@ -21,8 +21,6 @@ BLOCK = 512
 STRIDE = BLOCK + 16
 """From one row to the next: not a power of two, so that rows do not share places in a cache; and
 room before and behind a row for the samples next to the block."""
-ABREAST = 8
-"""Columns of a recurrence side by side: they fill the time that each waits for its last number."""
 
 
 class Program(NamedTuple):
@@ -34,21 +32,20 @@ class Program(NamedTuple):
     - CALL, number of a piece: call it;
     - COMBINE, first and end of the sums: make rows of the block;
     - INTEGRATE, place of a row, its number among all: make it its integral;
-    - RECUR, place of the factor, first place and end in `lanes`: a recurrence of one state;
-    - CHAIN, number of a piece, first place and end in `lanes`: one of several states.
+    - RECUR, number of a piece, first place and end in `lanes`: run a recurrence.
     """
     target: Indices  # (t,) rows that are sums; those that are observed last, which have no place.
     first: Indices  # (t + 1,) first term of each, and how many there are.
     a: Indices  # (s,) row of a term's first factor.
     b: Indices  # (s,) row of its second factor, -1 for none.
     scale: Array  # (s,) number that multiplies a term.
-    lanes: Indices  # For each recurrence the `lanes` of `follow`.
+    lanes: Indices  # For each recurrence its `graph.recurrence`'s.
     seen: int  # Number of the first sum that is observed: of each observation one for each column.
     value: Indices  # (r,) row of each observation's signal.
     integrals: int  # Rows that become integrals.
 
 
-CALL, COMBINE, INTEGRATE, RECUR, CHAIN = range(5)
+CALL, COMBINE, INTEGRATE, RECUR = range(4)
 
 
 class Plan(NamedTuple):
@@ -98,36 +95,6 @@ def combine(flat: Array, program: Program, t: int, shift: int, count: int, row: 
         else:
             for m in range(count):
                 row[m] += scale * a[m]
-
-
-@subroutine
-def follow(a: Array, lanes: Indices, width: int, flat: Array, count: int, tangent: Array) -> None:
-    """Run y[n+1] = a[n] y[n] + g[n], several columns side by side.
-
-    `lanes` are, `width` each, the places of the inputs g and of the results y, from the block's
-    first sample to the one behind it, in `flat`, and of y in `tangent`.
-    """
-    for c in range(0, width, ABREAST):
-        to, at = behind(lanes, c + width), behind(lanes, c + 2 * width)
-        y0, y1, y2, y3 = tangent[at[0]], tangent[at[1]], tangent[at[2]], tangent[at[3]]
-        y4, y5, y6, y7 = tangent[at[4]], tangent[at[5]], tangent[at[6]], tangent[at[7]]
-        g0, g1 = behind(flat, lanes[c]), behind(flat, lanes[c + 1])
-        g2, g3 = behind(flat, lanes[c + 2]), behind(flat, lanes[c + 3])
-        g4, g5 = behind(flat, lanes[c + 4]), behind(flat, lanes[c + 5])
-        g6, g7 = behind(flat, lanes[c + 6]), behind(flat, lanes[c + 7])
-        d0, d1, d2 = behind(flat, to[0]), behind(flat, to[1]), behind(flat, to[2])
-        d3, d4, d5 = behind(flat, to[3]), behind(flat, to[4]), behind(flat, to[5])
-        d6, d7 = behind(flat, to[6]), behind(flat, to[7])
-        for m in range(count):
-            f = a[m]
-            d0[m], d1[m], d2[m], d3[m] = y0, y1, y2, y3
-            d4[m], d5[m], d6[m], d7[m] = y4, y5, y6, y7
-            y0, y1, y2, y3 = f * y0 + g0[m], f * y1 + g1[m], f * y2 + g2[m], f * y3 + g3[m]
-            y4, y5, y6, y7 = f * y4 + g4[m], f * y5 + g5[m], f * y6 + g6[m], f * y7 + g7[m]
-        d0[count], d1[count], d2[count], d3[count] = y0, y1, y2, y3
-        d4[count], d5[count], d6[count], d7[count] = y4, y5, y6, y7
-        tangent[at[0]], tangent[at[1]], tangent[at[2]], tangent[at[3]] = y0, y1, y2, y3
-        tangent[at[4]], tangent[at[5]], tangent[at[6]], tangent[at[7]] = y4, y5, y6, y7
 
 
 @pasted
@@ -229,8 +196,6 @@ def march_observed(
         count = min(BLOCK, size - first)
         for step in range(program.todo.shape[0]):
             what, a, b = program.todo[step, 0], program.todo[step, 1], program.todo[step, 2]
-            end = program.todo[step, 3]
-            lanes = behind(program.lanes, b)
             if what == CALL:
                 call(pieces[a], count, first, h, arrays)
             elif what == COMBINE:
@@ -238,11 +203,10 @@ def march_observed(
                     combine(flat, program, t, 0, count, behind(flat, program.target[t]))
             elif what == INTEGRATE:
                 integrate(behind(flat, a), count, h, integrals[b])
-            elif what == RECUR:
-                follow(behind(flat, a), lanes, (end - b) // 3, flat, count, tangent)
             else:
+                lanes = behind(program.lanes, b)
                 given = (arrays[0], arrays[1], lanes, arrays[3], tangent, *arrays[5:])
-                call(pieces[a], count, end - b, h, given)
+                call(pieces[a], count, program.todo[step, 3] - b, h, given)
         for r in range(progress.size):
             # off the grid the point behind the stamp must be known as well
             known = first + count - (first + count < size and not plan.regular[r])
