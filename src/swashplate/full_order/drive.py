@@ -385,7 +385,7 @@ class FullOrderDrive:
         self, record: Record, held: bool, start: Start, substeps: int | None
     ) -> FullOrderSimulation:
         instance = self._machine(self.substeps(record.step, substeps), held)
-        return FullOrderSimulation(instance, {"current": record}, start).marched("current")
+        return FullOrderSimulation(instance, {"current": record}, start).marched()
 
 
 # --- natural modes --------------------------------------------------------------------------------

@@ -84,7 +84,7 @@ def simulate_drive(
     run = Simulation(instance_of(parameters, driver == "voltage"), records, start)
     if start_pressure is not None:
         run = replace(run, begin=start_states(run.instance, start_pressure, run.started))
-    return run.marched(driver)
+    return run.marched()
 
 
 def start_states(instance: Instance, pressure: float, started: Started) -> dict[str, float]:

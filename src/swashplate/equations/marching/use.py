@@ -90,18 +90,18 @@ class Run:
     later: ClassVar[tuple[str, ...]] = ()
     """Signals that the second one leaves, besides limits."""
 
-    def marched(self, cause: str = "input") -> Self:
-        """The run with its first march done; `cause` is what drives the model, for messages."""
-        self._march(self.kept or signals_of(self.instance.model), (), cause)
+    def marched(self) -> Self:
+        """The run with its first march done."""
+        self._march(self.kept or signals_of(self.instance.model))
         return self
 
-    def _march(self, names: Iterable[str], limits: Sequence[int], cause: str) -> None:
+    def _march(self, names: Iterable[str], limits: Iterable[int] = ()) -> None:
         """Find signals, and all limits of some parts."""
         places = {name: output_of(self.instance.model, name)[0] for name in names}
         places |= {f"limits {part}": Stored(part, "limits") for part in limits}
         records = {name: each.values for name, each in self.records.items()}
-        kept, step = tuple(places.values()), self.record.step
-        out = marched(self.instance, records, step, self.started, kept, cause, self.begin)
+        start, kept, cause = self.started, tuple(places.values()), self.driven_by
+        out = marched(self.instance, records, self.record.step, start, kept, cause, self.begin)
         self.found.update(zip(places, out, strict=True))
 
     @property
@@ -171,7 +171,7 @@ class Run:
             total = found[signal] = np.zeros_like(rate)
             np.cumsum(0.5 * step * (rate[:-1] + rate[1:]), out=total[1:])
         if signal not in found:
-            self._march_again()
+            self._march_again(self.later if signal in self.later else (signal,))
         return found[signal]
 
     def sampled(self, fine: NDArray[T]) -> NDArray[T]:
@@ -191,13 +191,13 @@ class Run:
             raise InputError(f"There is no limit '{limit}'; there are {', '.join(limits)}.")
         part, bit = limits[limit]
         if f"limits {part}" not in self.found:
-            self._march_again()
+            self._march_again(self.later)
         acts = (self.found[f"limits {part}"].astype(np.int64) & (1 << bit)) != 0
         return acts if fine else self.sampled(acts)
 
-    def _march_again(self) -> None:
-        parts = sorted({part for part, _ in limits_of(self.instance.model).values()})
-        self._march(self.later, parts, "input")
+    def _march_again(self, names: Iterable[str]) -> None:
+        parts = {part for part, _ in limits_of(self.instance.model).values()}
+        self._march(names, sorted(parts))
 
 
 def inputs_of(
