@@ -94,7 +94,7 @@ class FullOrderSimulation(Run, Tabular):
         found: PlantConstants = self.started.arguments[1]["k"]
         return found
 
-    @property
+    @cached_property
     def names(self) -> tuple[str, ...]:
         """The signals that it has: ``"time"`` and `SIGNALS`."""
         return ("time", *SIGNALS)

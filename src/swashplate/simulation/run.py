@@ -141,7 +141,7 @@ def drive_stepper(
         ("voltage",),
         Sample._fields[1:],
         rate,
-        Sample,
+        Sample._make,
         start,
         interpolation=interpolation,
         substeps=substeps,
