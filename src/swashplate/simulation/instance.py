@@ -32,7 +32,7 @@ from swashplate.models.drive import (
 )
 from swashplate.parameters.definitions import OWN
 from swashplate.parameters.parameter_set import ParameterSet
-from swashplate.parameters.rules import Broken, applied
+from swashplate.parameters.rules import Broken, Rule, applied
 
 Array = NDArray[np.float64]
 
@@ -173,21 +173,19 @@ def unstable_filters(numbers: Mapping[str, Array], step: float, exact: bool) -> 
         f"{'swings too fast for' if exact else 'is unstable at'} a step of 1/{1.0 / step:g} s; "
         "simulate with "
     )
+    rules: tuple[Rule, ...] = (
+        (lambda n: ~(n["steps"] < MOST_SUBSTEPS), f"{words}a zeta nearer to 1 or a lower omega."),
+        (
+            lambda n: ~(n["steps"] < 1.0),
+            f"{words}substeps={{least:.0f}} or more, a higher rate or a lower omega.",
+        ),
+    )
     for side in SIDES:
         zeta, omega = numbers[f"zeta_{side}"], numbers[f"omega_{side}"]
         steps = omega * step / step_limit(zeta, exact)
-        n = {
-            "side": side,
-            "zeta": zeta,
-            "omega": omega,
-            "steps": steps,
-            "least": steps // 1.0 + 1.0,
-        }
-        for most, change in (
-            (MOST_SUBSTEPS, "a zeta nearer to 1 or a lower omega."),
-            (1, "substeps={least:.0f} or more, a higher rate or a lower omega."),
-        ):
-            yield applied((lambda n, most=most: ~(n["steps"] < most), f"{words}{change}"), n)
+        own = {"zeta": zeta, "omega": omega, "steps": steps, "least": steps // 1.0 + 1.0}
+        for rule in rules:
+            yield applied(rule, {"side": side, **own})
 
 
 @lru_cache(maxsize=256)
