@@ -32,11 +32,10 @@ from swashplate.models.drive import (
 )
 from swashplate.parameters.definitions import OWN
 from swashplate.parameters.parameter_set import ParameterSet
-from swashplate.parameters.rules import Broken, Rule, applied
+from swashplate.parameters.rules import SIDES, Broken, Rule, applied
 
 Array = NDArray[np.float64]
 
-SIDES = ("plus", "minus")
 MOST_SUBSTEPS = 1000
 """Steps a sample that anyone would wait for."""
 
