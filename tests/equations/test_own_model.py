@@ -440,7 +440,7 @@ OUTSIDE = {
             "domain": room,
             "outside": lambda margin, cause: f"{-margin:g} m too high by the {cause}.",
         },
-        r"tank: 1 m too high by the input\.$",
+        r"tank: 1 m too high by the flow\.$",
     ),
     "constants": ({"step": drained, "constants": shares}, "tank: shares cannot be computed"),
     "rest": ({"rest": full}, r"full cannot be computed for these numbers \(.*zero\)"),

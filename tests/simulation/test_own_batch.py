@@ -116,7 +116,7 @@ def test_each_set_is_what_it_is_alone_to_the_last_bit() -> None:
         assert (simulate(valve, p, INPUTS, RATE, given=STROKE)["position"] == row).all()
     assert list(found.failures) == FAILED
     assert found.failures[5] == "valve: gain is nan, but must be a finite number."
-    assert found.failures[7] == "valve: the valve bursts under this input."
+    assert found.failures[7] == "valve: the valve bursts under this command."
     assert found.failures[9] == "valve: delay is -0.01, but must be a finite number, at least 0."
     assert found.output[20].max() == STROKE.high
 

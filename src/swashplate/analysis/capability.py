@@ -17,7 +17,6 @@ from swashplate.models.pump import PumpState
 from swashplate.parameters.rules import FULL_VOLTAGE
 from swashplate.results import Result, Tabular, short
 from swashplate.simulation.instance import instance_of
-from swashplate.simulation.run import pump_arguments
 from swashplate.tables import UNIT, Cell, Column, Table
 
 if TYPE_CHECKING:
@@ -124,7 +123,7 @@ def acceleration_curve(drive: Drive, voltage: float, points: int = 201) -> Accel
 
 def speed_limits(drive: Drive) -> tuple[float, float]:
     """Lowest and highest speed that the swash plate's stops, or Z15, allow at all. [rad/s]"""
-    k = pump_arguments(instance_of(drive.parameters, False), 0.0)["k"]
+    k = instance_of(drive.parameters, False).start({"current": 0.0}, 1.0).arguments[1]["k"]
     low, high = _curve(drive, 0.0, np.array([k.lower, k.upper])).speed
     return float(low), float(high)
 
@@ -152,7 +151,7 @@ def _curve(drive: Drive, voltage: float, pressure: Array) -> AccelerationCurve:
     forms = PumpOptions(symmetric=options.symmetric, steep=options.steep, leakage=leaks)
     still = Part(p._replace(Z12=0.0, load_inertia=0.0), forms)
     instance = Instance(instance.model, (front, still), instance.name)
-    known = pump_arguments(instance, drive.steady_current(voltage))
+    known = instance.start({"current": drive.steady_current(voltage)}, 1.0).arguments[1]
     pump: Any = instance.model.parts[1]
     found = [called(pump.sample, {**known, "state": PumpState(each)}) for each in pressure.tolist()]
     speed, rate, free = np.array([(s.shaft_speed, s.swash_rate, s.spool_free) for s in found]).T

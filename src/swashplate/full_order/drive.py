@@ -91,7 +91,7 @@ class FullOrderSimulation(Run, Tabular):
         found: PlantConstants = self.started.arguments[1]["k"]
         return found
 
-    @property
+    @cached_property
     def names(self) -> tuple[str, ...]:
         """The signals that it has: ``"time"`` and `SIGNALS`."""
         return ("time", *SIGNALS)
@@ -313,7 +313,7 @@ class FullOrderDrive:
         """
         record = replace(run.record, values=run.fine("current"))
         instance = self.instance(record.step, substeps=substeps, card=False)
-        return FullOrderSimulation(instance, {"current": record}, start).marched("current")
+        return FullOrderSimulation(instance, {"current": record}, start).marched()
 
     def modes(self, current: float = 0.0) -> Modes:
         """Natural modes about the equilibrium under a constant signed current, no limit holding.

@@ -146,7 +146,7 @@ def simulate_many(
     sets = _Sets(
         model, columns, records, cost.output if cost else output, cost, Path(to) if to else None
     )
-    return _run(sets, blocks, count, failures, (model.name, "input"), executor)
+    return _run(sets, blocks, count, failures, model.name, executor)
 
 
 def simulate_drives(
@@ -184,7 +184,7 @@ def simulate_drives(
         to,
     )
     blocks = _blocks(parameters, numbers, failures, given, by_voltage)
-    return _run(sets, blocks, count, failures, (name, driver), executor)
+    return _run(sets, blocks, count, failures, name, executor)
 
 
 # --- blocks of sets -------------------------------------------------------------------------------
@@ -295,11 +295,12 @@ def _run(
     blocks: Sequence[Block],
     count: int,
     failures: dict[int, str],
-    names: tuple[str, str],
+    name: str,
     executor: Executor | None,
 ) -> Batch:
-    """March all blocks wherever the executor runs them; `names` of the model and its driver."""
+    """March all blocks wherever the executor runs them; `name` is for messages."""
     output_of(shared.model, shared.output)
+    driver = next(iter(shared.records))
     samples, several, keep = shared.record.time.size, 1, shared.cost is None
     values = None if keep else np.full(count, np.inf)
     if shared.to is not None:
@@ -317,10 +318,10 @@ def _run(
     for _, made in (executor or Threads()).run(_march, shared, items):
         for failed, sets, found in made:
             for number, worst in failed.items():
-                why = f"the numbers grow beyond all bounds under this {names[1]}."
+                why = f"the numbers grow beyond all bounds under this {driver}."
                 if not worst > 0.0:
-                    why = outside(shared.model, worst, names[1])
-                failures[number] = f"{names[0]}: {why}"
+                    why = outside(shared.model, worst, driver)
+                failures[number] = f"{name}: {why}"
             if values is not None:
                 values[sets] = found
     files = tuple(map(shared.file, items)) if shared.to else ()

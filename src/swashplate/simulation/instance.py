@@ -6,7 +6,6 @@ from cmath import log, sqrt
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from functools import lru_cache
-from math import floor
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -33,7 +32,7 @@ from swashplate.models.drive import (
 )
 from swashplate.parameters.definitions import OWN
 from swashplate.parameters.parameter_set import ParameterSet
-from swashplate.parameters.rules import SIDES, Broken
+from swashplate.parameters.rules import SIDES, Broken, Rule, applied
 
 Array = NDArray[np.float64]
 
@@ -168,22 +167,24 @@ def step_limit(zeta: ArrayLike, exact: bool) -> Array:
 
 def unstable_filters(numbers: Mapping[str, Array], step: float, exact: bool) -> Iterator[Broken]:
     """Sets at whose step the filter would settle on wrong values without a word, as rules are."""
+    words = (
+        "the current filter of the {side} channel (zeta = {zeta:g}, omega = {omega:g} rad/s) "
+        f"{'swings too fast for' if exact else 'is unstable at'} a step of 1/{1.0 / step:g} s; "
+        "simulate with "
+    )
+    rules: tuple[Rule, ...] = (
+        (lambda n: ~(n["steps"] < MOST_SUBSTEPS), f"{words}a zeta nearer to 1 or a lower omega."),
+        (
+            lambda n: ~(n["steps"] < 1.0),
+            f"{words}substeps={{least:.0f}} or more, a higher rate or a lower omega.",
+        ),
+    )
     for side in SIDES:
         zeta, omega = numbers[f"zeta_{side}"], numbers[f"omega_{side}"]
         steps = omega * step / step_limit(zeta, exact)
-
-        def sentence(i: int, side: str = side, steps: Array = steps) -> str:
-            zeta, omega = numbers[f"zeta_{side}"][i], numbers[f"omega_{side}"][i]
-            change = "a zeta nearer to 1 or a lower omega"
-            if steps[i] < MOST_SUBSTEPS:
-                change = f"substeps={floor(steps[i]) + 1} or more, a higher rate or a lower omega"
-            return (
-                f"the current filter of the {side} channel (zeta = {zeta:g}, omega = {omega:g} "
-                f"rad/s) {'swings too fast for' if exact else 'is unstable at'} a step of "
-                f"1/{1.0 / step:g} s; simulate with {change}."
-            )
-
-        yield ~(steps < 1.0), sentence
+        own = {"zeta": zeta, "omega": omega, "steps": steps, "least": steps // 1.0 + 1.0}
+        for rule in rules:
+            yield applied(rule, {"side": side, **own})
 
 
 @lru_cache(maxsize=256)

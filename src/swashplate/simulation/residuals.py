@@ -201,8 +201,8 @@ def sensitivities(
         if isinstance(names, str) or not names:
             raise InputError("Name at least one parameter to differentiate by, in a list.")
         chosen = tuple(columns_of(list(names)))
-    foreign = [name for name in chosen if path_of(name).startswith("card.")]
-    if foreign and not by_voltage:
+    foreign = [] if by_voltage else [n for n in chosen if path_of(n).startswith("card.")]
+    if foreign:
         raise InputError(
             f"{foreign[0]} belongs to the card, which a given current does not go through."
         )

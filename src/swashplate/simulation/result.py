@@ -94,7 +94,7 @@ class Simulation(Run, Tabular):
         samples = f"{self.time.size} samples at {self.record.rate:g} Hz"
         return f"Simulation({self.name!r}, {samples})"
 
-    @property
+    @cached_property
     def names(self) -> tuple[str, ...]:
         """The signals that it has: `SIGNALS`, with refinements the motor's, behind ``"time"``."""
         there = SIGNALS if self.driven_by == "voltage" else SIGNALS[1:]

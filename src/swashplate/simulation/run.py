@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -84,7 +84,7 @@ def simulate_drive(
     run = Simulation(instance_of(parameters, driver == "voltage"), records, start)
     if start_pressure is not None:
         run = replace(run, begin=start_states(run.instance, start_pressure, run.started))
-    return run.marched(driver)
+    return run.marched()
 
 
 def start_states(instance: Instance, pressure: float, started: Started) -> dict[str, float]:
@@ -141,7 +141,7 @@ def drive_stepper(
         ("voltage",),
         Sample._fields[1:],
         rate,
-        Sample,
+        Sample._make,
         start,
         interpolation=interpolation,
         substeps=substeps,
@@ -160,8 +160,3 @@ def steady_states(parameters: ParameterSet, voltage: Array) -> tuple[Array, Arra
     begun = Started((), {"voltage": 0.0}, ())
     current, speed = marched(settled, {"voltage": voltage}, 1.0, begun, wanted)
     return current, speed
-
-
-def pump_arguments(instance: Instance, current: float) -> dict[str, Any]:
-    """What the pump's equations take under a constant current, by the arguments' names."""
-    return {**instance.start({"current": current}, 1.0).arguments[1]}

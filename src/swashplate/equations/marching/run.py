@@ -386,14 +386,15 @@ def check_domain(instance: Instance, states: Array, worst: float, cause: str) ->
     """
     if not worst > 0.0:
         raise DomainError(f"{instance.name}: {outside(instance.model, worst, cause)}")
-    bad = np.flatnonzero(~np.isfinite(states))
-    if bad.size:
-        part, path = instance.model.places("state")[bad[0]]
-        raise DomainError(
-            f"{instance.name}: {instance.model.parts[part].name}'s {path} is {states[bad[0]]} at "
-            f"the end of the record: the numbers overflow under this {cause}; check the size of "
-            "the parameters."
-        )
+    if np.isfinite(states).all():
+        return
+    bad = int(np.argmax(~np.isfinite(states)))
+    part, path = instance.model.places("state")[bad]
+    whose = f"{instance.name}: {instance.model.parts[part].name}'s"
+    raise DomainError(
+        f"{whose} {path} is {states[bad]} at the end of the record: the numbers overflow under "
+        f"this {cause}; check the size of the parameters."
+    )
 
 
 def outside(model: Model, worst: float, cause: str) -> str:

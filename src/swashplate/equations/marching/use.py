@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+import sys
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from difflib import get_close_matches
+from functools import cached_property, lru_cache
 from typing import Any, ClassVar, Generic, NamedTuple, Self, TypeVar, Unpack, get_type_hints
 
 import numpy as np
@@ -41,12 +43,14 @@ S = TypeVar("S")
 T = TypeVar("T", bound=np.generic)
 
 
+@lru_cache(maxsize=64)
 def signals_of(model: Model) -> tuple[str, ...]:
     """Signals of all parts and numbers of their states, and links; integrals apart."""
     own = [name for part in model.parts for name in part.signal_names]
     return tuple(dict.fromkeys([*own, *model.links]))
 
 
+@lru_cache(maxsize=64)
 def limits_of(model: Model) -> dict[str, tuple[int, int]]:
     """Part and bit of every limit, by its name."""
     found: dict[str, tuple[int, int]] = {}
@@ -55,6 +59,16 @@ def limits_of(model: Model) -> dict[str, tuple[int, int]]:
             fields = get_type_hints(plain(part.limits))["return"]._fields
             found |= {name: (i, bit) for bit, name in enumerate(fields)}
     return found
+
+
+@lru_cache(maxsize=256)
+def stored_of(
+    model: Model, names: tuple[str, ...], limits: tuple[int, ...]
+) -> tuple[tuple[str, ...], tuple[Stored, ...]]:
+    """What a march leaves for some signals, and for all limits of some parts: names and places."""
+    places = {name: output_of(model, name)[0] for name in names}
+    places |= {f"limits {part}": Stored(part, "limits") for part in limits}
+    return tuple(places), tuple(places.values())
 
 
 def read_only(array: NDArray[T]) -> NDArray[T]:
@@ -90,19 +104,18 @@ class Run:
     later: ClassVar[tuple[str, ...]] = ()
     """Signals that the second one leaves, besides limits."""
 
-    def marched(self, cause: str = "input") -> Self:
-        """The run with its first march done; `cause` is what drives the model, for messages."""
-        self._march(self.kept or signals_of(self.instance.model), (), cause)
+    def marched(self) -> Self:
+        """The run with its first march done."""
+        self._march(self.kept or signals_of(self.instance.model))
         return self
 
-    def _march(self, names: Iterable[str], limits: Sequence[int], cause: str) -> None:
+    def _march(self, names: tuple[str, ...], limits: tuple[int, ...] = ()) -> None:
         """Find signals, and all limits of some parts."""
-        places = {name: output_of(self.instance.model, name)[0] for name in names}
-        places |= {f"limits {part}": Stored(part, "limits") for part in limits}
+        left, places = stored_of(self.instance.model, names, limits)
         records = {name: each.values for name, each in self.records.items()}
-        kept, step = tuple(places.values()), self.record.step
-        out = marched(self.instance, records, step, self.started, kept, cause, self.begin)
-        self.found.update(zip(places, out, strict=True))
+        start, step, cause = self.started, self.record.step, self.driven_by
+        out = marched(self.instance, records, step, start, places, cause, self.begin)
+        self.found.update(zip(left, out, strict=True))
 
     @property
     def started(self) -> Started:
@@ -130,7 +143,7 @@ class Run:
         """Time stamps. [s]"""
         return self["time"]
 
-    @property
+    @cached_property
     def names(self) -> tuple[str, ...]:
         """All signals, behind ``"time"`` and the inputs."""
         model = self.instance.model
@@ -171,7 +184,7 @@ class Run:
             total = found[signal] = np.zeros_like(rate)
             np.cumsum(0.5 * step * (rate[:-1] + rate[1:]), out=total[1:])
         if signal not in found:
-            self._march_again()
+            self._march_again(self.later if signal in self.later else (signal,))
         return found[signal]
 
     def sampled(self, fine: NDArray[T]) -> NDArray[T]:
@@ -191,13 +204,14 @@ class Run:
             raise InputError(f"There is no limit '{limit}'; there are {', '.join(limits)}.")
         part, bit = limits[limit]
         if f"limits {part}" not in self.found:
-            self._march_again()
-        acts = (self.found[f"limits {part}"].astype(np.int64) & (1 << bit)) != 0
-        return acts if fine else self.sampled(acts)
+            self._march_again(self.later)
+        bits = self.found[f"limits {part}"]
+        acts = (bits if fine else self.sampled(bits)).astype(np.uint32) & np.uint32(1 << bit)
+        return np.asarray(acts != 0)
 
-    def _march_again(self) -> None:
-        parts = sorted({part for part, _ in limits_of(self.instance.model).values()})
-        self._march(self.later, parts, "input")
+    def _march_again(self, names: tuple[str, ...]) -> None:
+        parts = {part for part, _ in limits_of(self.instance.model).values()}
+        self._march(names, tuple(sorted(parts)))
 
 
 def inputs_of(
@@ -317,17 +331,17 @@ def _steps(step: Callable[[Machine], float]) -> Callable[..., float]:
 
     @kernel
     def steps(
-        last: Array, values: Array, held: NDArray[np.bool_], substeps: int, machine: Machine,
+        inputs: Array, held: NDArray[np.bool_], substeps: int, machine: Machine,
         rates: NDArray[np.int64], totals: Array,
     ) -> float:  # fmt: skip
-        """Advance by one sample of the inputs; `totals` are integrals, and their rates."""
+        """Advance by one sample, from the inputs before to these; `totals` as in `StepperState`."""
         worst = np.inf
         for j in range(substeps):
-            for i in range(values.size):
-                machine.inputs[i] = values[i]
+            for i in range(held.size):
+                machine.inputs[i] = inputs[1, i]
                 if j < substeps - 1:
                     rise = 0.0 if held[i] else (j + 1) / substeps
-                    machine.inputs[i] = last[i] + rise * (values[i] - last[i])
+                    machine.inputs[i] = inputs[0, i] + rise * (inputs[1, i] - inputs[0, i])
             worst = min(worst, step(machine))
             for r in range(rates.size):
                 rate = machine.outputs[rates[r]]
@@ -344,8 +358,15 @@ class StepperState(NamedTuple):
     machine: Machine
     totals: Array
     """Integrals so far, and their rates at the sample."""
-    last: Array | None
-    """Inputs of the sample before, None if there was none."""
+    inputs: Array
+    """Inputs of the sample before, and of this one."""
+    begun: bool
+    """Whether there was a sample."""
+
+    def copied(self) -> StepperState:
+        """The state with a memory of its own."""
+        machine, totals, inputs, begun = self
+        return StepperState(machine.copied(), totals.copy(), inputs.copy(), begun)
 
 
 class Stepper(Generic[S]):
@@ -361,36 +382,37 @@ class Stepper(Generic[S]):
         inputs: Sequence[str],
         outputs: Sequence[str],
         rate: float,
-        sample: Callable[..., S],
+        sample: Callable[[list[float]], S],
         start: Start = "rest",
         *,
         interpolation: Between = None,
         substeps: int | None = None,
-        bound: float = np.inf,
+        bound: float = sys.float_info.max,
     ) -> None:
         check_start(start)
         between, self._substeps = checked_sampling(inputs, rate, interpolation, substeps)
-        self._start, self._bound = start, bound
-        self._sample, self.inputs, limits = sample, tuple(inputs), limits_of(instance.model)
+        self._start, self._sample, self._bound = start, sample, bound
+        self.inputs, limits = tuple(inputs), limits_of(instance.model)
+        found = [
+            (Stored(limits[name][0], "limits"), False)
+            if name in limits
+            else output_of(instance.model, name)
+            for name in outputs
+        ]
+        stored = list(dict.fromkeys(place for place, _ in found))
+        rates = [stored.index(place) for place, integral in found if integral]
+        self._rates = np.array(rates, dtype=np.int64)
+        # of each output its place among inputs, numbers of the step and integrals in a row
+        integrals = iter(range(len(inputs) + len(stored), len(inputs) + len(stored) + len(rates)))
+        self._order = [*range(len(inputs))]
+        for place, integral in found:
+            at = next(integrals) if integral else len(inputs) + stored.index(place)
+            self._order.append(at)
         self._held = np.array([between[name] == "previous" for name in inputs])
-        self._shown: dict[str, tuple[Stored, int | None]] = {}
-        integrals: dict[str, Stored] = {}
-        for name in outputs:
-            if name in limits:
-                part, bit = limits[name]
-                self._shown[name] = Stored(part, "limits"), bit
-                continue
-            place, integral = output_of(instance.model, name)
-            self._shown[name] = place, None
-            integrals |= {name: place} if integral else {}
-        stored = list(dict.fromkeys(place for place, _ in self._shown.values()))
         self._compiled = CompiledStep(instance, inputs, stored, 1.0 / (rate * self._substeps))
         self._steps = _steps(self._compiled.step)
-        self._at = {name: stored.index(place) for name, (place, _) in self._shown.items()}
-        self._integrals = tuple(integrals)
-        self._rates = np.array([self._at[name] for name in integrals], dtype=np.int64)
-        totals = np.zeros((2, self._rates.size))
-        self._state = StepperState(self._compiled.machine(), totals, None)
+        totals, values = np.zeros((2, len(rates))), np.zeros((2, len(inputs)))
+        self._state = StepperState(self._compiled.machine(), totals, values, False)
 
     def __repr__(self) -> str:
         return f"Stepper({self._compiled!r})"
@@ -398,18 +420,15 @@ class Stepper(Generic[S]):
     @property
     def state(self) -> StepperState:
         """A copy of the present state; assign it to return to that instant."""
-        machine, totals, last = self._state
-        return StepperState(machine.copied(), totals.copy(), last)
+        return self._state.copied()
 
     @state.setter
     def state(self, state: StepperState) -> None:
-        own, given = self._state.machine, state.machine.copied()
+        own, given = self._state.machine, state.machine
         if given.lines.shape != own.lines.shape or given.states.size != own.states.size:
             raise InputError("This state belongs to a stepper of another model, delay or rate.")
-        machine = own._replace(
-            states=given.states, outputs=given.outputs, lines=given.lines, inputs=given.inputs
-        )
-        self._state = StepperState(machine, state.totals.copy(), state.last)
+        memory = {name: getattr(given, name) for name in ("states", "outputs", "lines", "inputs")}
+        self._state = state._replace(machine=own._replace(**memory)).copied()
 
     def step(self, *inputs: float) -> S:
         """Advance by one sample interval.
@@ -432,34 +451,27 @@ class Stepper(Generic[S]):
         DomainError
             If the model leaves its domain, or a number grows beyond all bounds.
         """
-        values = np.array(inputs, dtype=np.float64)
-        if values.shape != (len(self.inputs),):
-            raise InputError(f"A step takes a number for each of {', '.join(self.inputs)}.")
+        bound = self._bound
         for name, value in zip(self.inputs, inputs, strict=True):
-            if not abs(value) <= self._bound or not np.isfinite(value):
+            if not -bound <= value <= bound:
                 raise InputError(
-                    f"The {name} is {value:g}, but must be a finite number within ±{self._bound:g}."
+                    f"The {name} is {value:g}, but must be a finite number within ±{bound:g}."
                 )
-        machine, totals, last = self._state
-        substeps = self._substeps
-        if last is None:
-            substeps = 1
+        machine, totals, values, begun = self._state
+        values[0] = values[1]
+        values[1] = inputs
+        if not begun:
             if self._start == "steady":
                 first = dict(zip(self.inputs, inputs, strict=True))
                 machine = self._compiled.machine(first, "steady")
-        before = values if last is None else last
-        worst = self._steps(before, values, self._held, substeps, machine, self._rates, totals)
-        if last is None:
+            self._state = StepperState(machine, totals, values, True)
+        substeps = self._substeps if begun else 1
+        worst = self._steps(values, self._held, substeps, machine, self._rates, totals)
+        if not begun:
             totals[0] = 0.0
         self._compiled.check(machine, worst, self.inputs[0])
-        self._state = StepperState(machine, totals, values)
-        out = machine.outputs.tolist()
-        found = dict(zip(self.inputs, values.tolist(), strict=True))
-        for name, (_, bit) in self._shown.items():
-            value = out[self._at[name]]
-            found[name] = value if bit is None else bool(int(value) >> bit & 1)
-        found |= zip(self._integrals, totals[0].tolist(), strict=True)
-        return self._sample(**found)
+        row = [*inputs, *machine.outputs.tolist(), *totals[0].tolist()]
+        return self._sample([row[at] for at in self._order])
 
 
 def stepper(
@@ -486,9 +498,23 @@ def stepper(
     outputs : sequence of str, optional
         Signals that come out, and limits by their names, true where they act; by default all.
     """
-    instance, names = instance_of(model, p, options=options, given=given), outputs
-    if names is None:
-        names = (*signals_of(model), *model.integrals, *limits_of(model))
+    instance, limits = instance_of(model, p, options=options, given=given), limits_of(model)
+    if outputs is None:
+        outputs = (*signals_of(model), *model.integrals, *limits)
+    names = (*inputs, *outputs)
+
+    def sample(values: list[float]) -> dict[str, float]:
+        found = dict(zip(names, values, strict=True))
+        acting = {name: limits[name][1] for name in names if name in limits}
+        return found | {name: bool(int(found[name]) >> bit & 1) for name, bit in acting.items()}
+
     return Stepper(
-        instance, inputs, names, rate, dict, start, interpolation=interpolation, substeps=substeps
+        instance,
+        inputs,
+        outputs,
+        rate,
+        sample,
+        start,
+        interpolation=interpolation,
+        substeps=substeps,
     )
