@@ -114,24 +114,18 @@ def test_kernels_are_kept_until_what_they_reach_changes(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("damage", ["empty index", "cut data", "garbage", "a changed byte"])
-def test_damaged_files_are_dropped(tmp_path: Path, damage: str) -> None:
+def test_damaged_files_are_dropped(tmp_path: Path) -> None:
     run(tmp_path)
-    for path in (tmp_path / "cache").rglob("*.nbi" if damage == "empty index" else "*.nbc"):
-        content = path.read_bytes()
-        middle = len(content) // 2
-        path.write_bytes(
-            {
-                "empty index": b"",
-                "cut data": content[:middle],
-                "garbage": b"\x80\x05" + bytes(range(256)) * 8,
-                "a changed byte": content[:middle]
-                + bytes([content[middle] ^ 1])
-                + content[middle + 1 :],
-            }[damage]
-        )
-    after = run(tmp_path)
-    assert (after["march"], after["march hits"]) == (46.0, 0)
+    for pattern, damaged in (
+        ("*.nbi", lambda content: b""),
+        ("*.nbc", lambda content: content[: len(content) // 2]),
+        ("*.nbc", lambda content: b"\x80\x05" + bytes(range(256)) * 8),
+        ("*.nbc", lambda content: content[:-9] + bytes([content[-9] ^ 1]) + content[-8:]),
+    ):
+        for path in (tmp_path / "cache").rglob(pattern):
+            path.write_bytes(damaged(path.read_bytes()))
+        after = run(tmp_path)
+        assert (after["march"], after["march hits"]) == (46.0, 0)
     again = run(tmp_path)
     assert (again["march"], again["march hits"], again["other hits"]) == (46.0, 1, 1)
 

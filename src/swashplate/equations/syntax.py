@@ -193,7 +193,8 @@ class Parsed:
         """What a call calls; `NameError` or `AttributeError` if nothing."""
         if isinstance(function, ast.Attribute):
             return getattr(self.called(function.value), function.attr)
-        assert isinstance(function, ast.Name)
+        if not isinstance(function, ast.Name):
+            raise NameError(ast.unparse(function))
         return self.resolve(function.id)
 
     def refuse(self, node: ast.AST | None, what: str, instead: str) -> NoReturn:
