@@ -354,7 +354,7 @@ def _capytaine(path: str | Path) -> Iterator[Amplitude]:
 
 def _gathered(path: str | Path, amplitudes: Iterable[Amplitude]) -> TransferFunctions:
     """A table of all amplitudes, each grid rising, headings from 0 to 180 degrees."""
-    turned = ((v, h % 360.0, *rest) for v, h, *rest in amplitudes)
+    turned = [(v, heading % 360.0, w, i, z) for v, heading, w, i, z in amplitudes]
     found = [each for each in turned if each[1] <= 180.0 + 1e-9]
     if not found:
         raise FileError(f"{path} has no motions in waves from 0 to 180 deg.")
