@@ -140,20 +140,14 @@ HEADER = ",".join(["heading_deg,omega", *(f"{each}_re,{each}_im" for each in MOT
 def write_table(path, ship, headings=(0.0, 90.0, 180.0), frequencies=(0.1, 0.5, 1.0)):
     rows = [HEADER]
     for heading in headings:
-        for omega in frequencies:
-            found = ship.response(np.array([omega]), np.array([radians(heading)]))[:, 0]
-            rows.append(
-                ",".join(
-                    map(
-                        repr,
-                        [
-                            heading,
-                            omega,
-                            *(x for z in found for x in (float(z.real), float(z.imag))),
-                        ],
-                    )
-                )
-            )
+        found = ship.response(np.array(frequencies), np.full(len(frequencies), radians(heading)))
+        for omega, motions in zip(frequencies, found.T, strict=True):
+            numbers = [
+                heading,
+                omega,
+                *(part for z in motions.tolist() for part in (z.real, z.imag)),
+            ]
+            rows.append(",".join(map(repr, numbers)))
     path.write_text("\n".join(rows), "utf-8")
 
 
@@ -187,17 +181,10 @@ def wamit_lines(length=80.0):
         for heading in (*HEADINGS, 270.0):
             motions = small_body(radians(heading), omega) * [1, 1, 1, length, length, length]
             for i, z in enumerate(motions.tolist(), 1):
-                parts = (
-                    2 * pi / omega,
-                    heading,
-                    i,
-                    abs(z),
-                    np.degrees(np.angle(z)),
-                    z.real,
-                    z.imag,
-                )
+                size, phase = abs(z), np.degrees(np.angle(z))
                 lines.append(
-                    "{:14.6e} {:13.6e} {:6d} {:14.6e} {:14.6e} {:14.6e} {:14.6e}".format(*parts)
+                    f"{2 * pi / omega:14.6e} {heading:13.6e} {i:6d} {size:14.6e} {phase:14.6e} "
+                    f"{z.real:14.6e} {z.imag:14.6e}"
                 )
     return lines
 

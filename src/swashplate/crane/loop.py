@@ -9,7 +9,7 @@ One sample after the other, at the drives' own rate:
 4. shafts move the tip, the ship moves the crane, the tip leads the load.
 
 A stepper is the same kernel over one sample. In open loop nothing of a sample acts on the drives:
-they are marched before, and the kernel finds their speeds in its output.
+they are marched before.
 """
 
 from __future__ import annotations
@@ -57,14 +57,14 @@ Array = NDArray[np.float64]
 
 IDEAL, VOLTS, INVERSE, DIRECT, MARCHED = range(5)
 """Actuation: speeds at once; 10 V for full speed; the inverse map's voltage; voltages as given;
-voltages, speeds and limits that stand in the output already."""
+voltages, speeds and limits of drives that were marched before."""
 ROWS = (
     *("voltage_hoist", "voltage_slew", "voltage_luff"),
     *("speed_hoist", "speed_slew", "speed_luff"),
     *("limits_hoist", "limits_slew", "limits_luff"),
     *("shaft_hoist", "shaft_slew", "shaft_luff"),
     *("tip_x", "tip_y", "tip_z", "load_x", "load_y", "load_z", "hook_x", "hook_y", "hook_z"),
-    *("pull", "rope", "wanted_x", "wanted_y", "boom_cos", "boom_sin"),
+    *("pull", "rope", "boom_cos", "boom_sin"),
     *("torque_hoist", "torque_slew", "torque_luff"),
 )
 """What the loop leaves of each sample, SI; the torques are those that the drives have taken."""
@@ -121,6 +121,8 @@ class Plant(NamedTuple):
     """Delayed signals, a row each: three commands, wanted tip x and y, swing x and y."""
     margins: Array
     """Worst margins of the domains of the drives and the law."""
+    marched: Array
+    """(9, n) voltages, speeds and limits of drives that were marched before the loop."""
 
 
 class State(NamedTuple):
@@ -288,6 +290,7 @@ def loop_of(hoist: Any, slew: Any, luff: Any, law: Any) -> Callable[..., tuple[S
         """Take the stick's samples; the state behind the last, and how the pass ended."""
         inverses, settings, actuation = fixed.inverses, fixed.settings, fixed.actuation
         laws, picks, memory, margins = plant.law, plant.picks, plant.memory, plant.margins
+        given = plant.marched
         g, home, loaded = fixed.geometry, fixed.home, fixed.loaded
         moving = ship.shape[1] > 1
         last = memory.shape[1] - 1
@@ -320,7 +323,6 @@ def loop_of(hoist: Any, slew: Any, luff: Any, law: Any) -> Callable[..., tuple[S
             wanted = Shafts(
                 limited(u[0], inverses[0]), limited(u[1], inverses[1]), limited(u[2], inverses[2])
             )
-            path_x, path_y = in_ship.x, in_ship.y
             if settings.path:
                 if sample > 0:
                     operator = advanced(operator, wish, wanted, h)
@@ -376,7 +378,7 @@ def loop_of(hoist: Any, slew: Any, luff: Any, law: Any) -> Callable[..., tuple[S
             # actuation
             if actuation == MARCHED:
                 for i in range(3):
-                    volts[i], omega[i], limits[i] = out[m, i], out[m, 3 + i], out[m, 6 + i]
+                    volts[i], omega[i], limits[i] = given[i, m], given[3 + i, m], given[6 + i, m]
             elif actuation == IDEAL:
                 omega[0] = min(max(wanted.hoist, inverses[0].low), inverses[0].high)
                 omega[1] = min(max(wanted.slew, inverses[1].low), inverses[1].high)
@@ -445,9 +447,8 @@ def loop_of(hoist: Any, slew: Any, luff: Any, law: Any) -> Callable[..., tuple[S
             out[m, 15], out[m, 16], out[m, 17] = hung.load.x, hung.load.y, hung.load.z
             out[m, 18], out[m, 19], out[m, 20] = hung.hook.x, hung.hook.y, hung.hook.z
             out[m, 21], out[m, 22] = hung.pull, rope
-            out[m, 23], out[m, 24] = path_x, path_y
-            out[m, 25], out[m, 26] = boom.cos, boom.sin
-            out[m, 27], out[m, 28], out[m, 29] = torques.hoist, torques.slew, torques.luff
+            out[m, 23], out[m, 24] = boom.cos, boom.sin
+            out[m, 25], out[m, 26], out[m, 27] = torques.hoist, torques.slew, torques.luff
             if loaded:
                 tension = fixed.mass * hung.pull
                 along = moved(hung.hook, -1.0, tip)

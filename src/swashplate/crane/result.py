@@ -46,7 +46,7 @@ class CraneRun(Tabular):
     ship: Array
     """(n, 6) surge, sway, heave [m], roll, pitch, yaw [rad]; (n, 1) zeros for a ship at rest."""
     out: Array = field(repr=False)
-    """(n, 30) signals by `loop.ROWS`, SI."""
+    """(n, 28) signals by `loop.ROWS`, SI."""
     home: Home
     """Where it began."""
     actuation: str

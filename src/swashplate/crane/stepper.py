@@ -32,7 +32,7 @@ from swashplate.crane.loop import (
 from swashplate.crane.rope import AIR, GRAVITY, Hung, Suspension, too_fast
 from swashplate.crane.stick import AXES
 from swashplate.drive import Drive
-from swashplate.equations import compiled_step
+from swashplate.equations import CompiledStep, Machine, compiled_step
 from swashplate.equations.marching.run import marched
 from swashplate.equations.marching.stepping import stored_of
 from swashplate.errors import DomainError, InputError
@@ -139,9 +139,9 @@ class CraneStepper:
         settings, law = settings_of(how["control"])
         self.fixed = fixed = _fixed(crane, how, settings)
         given = ("voltage", "load_torque") if fixed.loaded else ("voltage",)
-        drives = [getattr(crane, axis) for axis in AXES]
-        self._steps = [each.compiled_step(OUTPUTS, inputs=given, rate=RATE) for each in drives]
-        hoist, slew, luff = (each.machine() for each in self._steps)
+        compiled = [_compiled(getattr(crane, axis), given) for axis in AXES]
+        self._steps = [step for step, _ in compiled]
+        hoist, slew, luff = (machine.copied() for _, machine in compiled)
         own, picks = hoist, np.zeros(0, dtype=np.int64)
         if law is not None:
             seen = law.model.external
@@ -164,7 +164,8 @@ class CraneStepper:
         longest = 2.0 * pi * sqrt(fixed.ropes[1] / GRAVITY) * RATE + 4.0
         memory = np.zeros((7, 1 << int(longest).bit_length()))
         memory[3:5] = [[tip.x], [tip.y]]
-        self._plant = Plant((hoist, slew, luff), own, picks, memory, np.full(4, np.inf))
+        drives, best = (hoist, slew, luff), np.full(4, np.inf)
+        self._plant = Plant(drives, own, picks, memory, best, np.zeros((9, 0)))
 
     def step(
         self, command: tuple[float, float, float], ship: ArrayLike | None = None
@@ -213,7 +214,7 @@ class CraneStepper:
 
         Returns
         -------
-        (n, 30) array
+        (n, 28) array
             Signals, a column for each that `step` returns.
 
         Raises
@@ -237,19 +238,16 @@ class CraneStepper:
         if not self._open:
             return self.take(commands, ship)
         out = np.empty((len(commands), len(ROWS)))
+        given, h = np.empty((9, len(commands))), 1.0 / RATE
         for i, axis in enumerate(AXES):
-            instance = instance_of(getattr(self._crane, axis).parameters, by_voltage=True)
-            begun = instance.start({"voltage": 0.0}, 1.0 / RATE, "rest")
             stick = np.ascontiguousarray(commands[:, i])
-            out[:, i] = open_voltages(stick, self.fixed.inverses[i], self.fixed.actuation)
-            out[:, 3 + i], out[:, 6 + i] = marched(
-                instance,
-                {"voltage": out[:, i]},
-                1.0 / RATE,
-                begun,
-                stored_of(instance.model, OUTPUTS),
-                "command",
-            )
+            volts = open_voltages(stick, self.fixed.inverses[i], self.fixed.actuation)
+            instance = instance_of(getattr(self._crane, axis).parameters, by_voltage=True)
+            begun = instance.start({"voltage": 0.0}, h, "rest")
+            wanted = stored_of(instance.model, OUTPUTS)
+            made = marched(instance, {"voltage": volts}, h, begun, wanted, "command")
+            given[i], given[3 + i], given[6 + i] = volts, *made
+        self._plant = self._plant._replace(marched=given)
         self._pass(self.fixed._replace(actuation=MARCHED), commands, ship, out)
         return out
 
@@ -329,6 +327,13 @@ def _check_loaded(crane: Crane, actuation: str, mass: float, suspension: Suspens
                 f"sample, since its motor_leakage costs {lost[axis]:.3g} rad/s for each N m: "
                 "take an elastic rope, suspension=Suspension(stiffness=6e7)."
             )
+
+
+@lru_cache(maxsize=64)
+def _compiled(drive: Drive, inputs: tuple[str, ...]) -> tuple[CompiledStep, Machine]:
+    """A drive's step, and a machine at its start to copy."""
+    made = drive.compiled_step(OUTPUTS, inputs=inputs, rate=RATE)
+    return made, made.machine()
 
 
 @lru_cache(maxsize=64)

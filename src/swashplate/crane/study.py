@@ -20,7 +20,7 @@ from swashplate.crane.crane import Crane
 from swashplate.crane.loop import ROWS
 from swashplate.crane.result import PUMPS, CraneRun
 from swashplate.crane.sea import Seaway, Spectrum
-from swashplate.crane.stepper import RATE, Actuation, Start
+from swashplate.crane.stepper import RATE, Actuation, Setup, Start
 from swashplate.crane.stick import AXES, Stick
 from swashplate.equations import kernel
 from swashplate.errors import DomainError, InputError
@@ -103,7 +103,7 @@ class Case(NamedTuple):
 
     def run(self, number: int, motion: Array | None) -> CraneRun:
         """Its run in a seaway by the seaway's number, in that motion of the ship."""
-        how: dict[str, Any] = {"control": self.control, "actuation": self.actuation, **self.where}
+        how: Setup = {"control": self.control, "actuation": self.actuation, **self.where}
         sea = motion if motion is None or self.height == 1.0 else self.height * motion
         return self.cranes[number % len(self.cranes)].simulate(self.stick, sea=sea, **how)
 
@@ -195,7 +195,8 @@ class Study(Result):
             If a case cannot begin as it is asked to.
         """
         for case in cases:  # said here, once, and not by a worker
-            stepper = case.cranes[0].stepper(control=case.control, **case.where)
+            how: Setup = {"control": case.control, "actuation": case.actuation, **case.where}
+            stepper = case.cranes[0].stepper(**how)
             case.stick.sample(case.cranes[0], stepper.fixed.home, RATE)
         chosen = range(len(self.seeds)) if numbers is None else numbers
         made = np.full((len(chosen), len(cases), len(COUNTED)), np.nan)

@@ -13,7 +13,6 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from math import isfinite, pi
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -190,19 +189,9 @@ def _weights(grid: Array, at: Array) -> Iterator[tuple[NDArray[np.int64], Array]
 # --- files ----------------------------------------------------------------------------------------
 
 
-class Amplitude(NamedTuple):
-    """One number of a file: a motion for each metre of one wave."""
-
-    speed: float
-    """[m/s]"""
-    heading: float
-    """Where the waves run, from x to y. [deg]"""
-    omega: float
-    """[rad/s]"""
-    motion: int
-    """Place in `MOTIONS`."""
-    value: complex
-    """[m/m] or [rad/m], by e^{+iωt}."""
+Amplitude = tuple[float, float, float, int, complex]
+"""Of one motion in one wave: speed [m/s], heading from x to y [deg], frequency [rad/s], place in
+`MOTIONS`, [m/m] or [rad/m] by e^{+iωt}."""
 
 
 def read_ship(path: str | Path, length: float | None = None) -> TransferFunctions:
@@ -285,7 +274,7 @@ def _veres(path: str | Path) -> Iterator[Amplitude]:
                 for _ in MOTIONS:
                     motion, real, imaginary = following("motion, real part, imaginary part")
                     value = complex(real, imaginary)
-                    yield Amplitude(speed, heading, omega, int(motion) - 1, value)
+                    yield speed, heading, omega, int(motion) - 1, value
 
 
 def _wamit(path: str | Path, length: float) -> Iterator[Amplitude]:
@@ -308,7 +297,7 @@ def _wamit(path: str | Path, length: float) -> Iterator[Amplitude]:
                 "infinite frequency."
             )
         value /= length if motion > 3 else 1.0
-        yield Amplitude(0.0, heading, 2.0 * pi / period, int(motion) - 1, value)
+        yield 0.0, heading, 2.0 * pi / period, int(motion) - 1, value
 
 
 def _csv(path: str | Path) -> Iterator[Amplitude]:
@@ -318,7 +307,7 @@ def _csv(path: str | Path) -> Iterator[Amplitude]:
         words = [{"speed": "0", **cells}.get(name) for name in wanted.split(", ")]
         speed, heading, omega, *values = _numbers(path, row, words, wanted)
         for motion, pair in enumerate(zip(values[::2], values[1::2], strict=True)):
-            yield Amplitude(speed, heading, omega, motion, complex(*pair))
+            yield speed, heading, omega, motion, complex(*pair)
 
 
 def _capytaine(path: str | Path) -> Iterator[Amplitude]:
@@ -360,16 +349,13 @@ def _capytaine(path: str | Path) -> Iterator[Amplitude]:
     for (m, f, i), value in np.ndenumerate(made):
         if names[i] in MOTIONS:
             heading = float(np.degrees(directions[m]))
-            yield Amplitude(0.0, heading, float(omega[f]), MOTIONS.index(names[i]), complex(value))
+            yield 0.0, heading, float(omega[f]), MOTIONS.index(names[i]), complex(value)
 
 
 def _gathered(path: str | Path, amplitudes: Iterable[Amplitude]) -> TransferFunctions:
     """A table of all amplitudes, each grid rising, headings from 0 to 180 degrees."""
-    found = [
-        each._replace(heading=each.heading % 360.0)
-        for each in amplitudes
-        if each.heading % 360.0 <= 180.0 + 1e-9
-    ]
+    turned = [(v, heading % 360.0, w, i, z) for v, heading, w, i, z in amplitudes]
+    found = [each for each in turned if each[1] <= 180.0 + 1e-9]
     if not found:
         raise FileError(f"{path} has no motions in waves from 0 to 180 deg.")
     columns = [np.array(column) for column in zip(*found, strict=True)]

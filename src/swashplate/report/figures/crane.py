@@ -14,32 +14,8 @@ from numpy.typing import NDArray
 from swashplate.crane import Crane, CraneRun, Followable, Judgment, Seaway, Sweep
 from swashplate.crane.judgment import mean_of
 from swashplate.errors import InputError
+from swashplate.report import style
 from swashplate.report.lines import SHADES, draw, fit_time, shade_handle, stretches
-from swashplate.report.style import (
-    BLUE,
-    FAINT,
-    FOOT,
-    GREY,
-    GRID,
-    HEAD,
-    INK,
-    NORMAL,
-    ROW,
-    SMALL,
-    VERMILION,
-    WIDTH,
-    Stroke,
-    dress,
-    handle,
-    label_below,
-    legend_rows,
-    new_figure,
-    put_legend,
-    sheet,
-    strokes,
-    write,
-    write_title,
-)
 from swashplate.simulation.result import Limit
 
 Array = NDArray[np.float64]
@@ -72,18 +48,18 @@ def seaway_words(sea: Seaway | None, height: bool = True) -> str:
 def remark(ax: Axes, *said: str, rows: int = 0, right: bool = False) -> None:
     """Write grey words above a panel, over so many rows of a legend."""
     words, side = "; ".join(filter(None, said)), 1.0 if right else 0.0
-    how = {"fontsize": SMALL, "color": GREY, "ha": "right" if right else "left"}
+    how = {"fontsize": style.SMALL, "color": style.GREY, "ha": "right" if right else "left"}
     place = {"xycoords": "axes fraction", "textcoords": "offset points"}
     ax.annotate(words, (side, 1.0), xytext=(0.0, 5.0 + 13.0 * rows), **place, **how)  # type: ignore[arg-type]
 
 
 def _panels(
-    heights: list[float], title: str, looks: Mapping[str, Stroke], *said: str
+    heights: list[float], title: str, looks: Mapping[str, style.Stroke], *said: str
 ) -> tuple[Figure, list[Axes]]:
     """Panels with a legend of lines, where there are several, and a remark."""
-    legend = [handle(name, *look) for name, look in looks.items()] if len(looks) > 1 else []
-    figure, axes = sheet(heights, title, legend=legend, lines=1)
-    remark(axes[0], *said, rows=legend_rows(legend) if legend else 0)
+    legend = [style.handle(name, *look) for name, look in looks.items()] if len(looks) > 1 else []
+    figure, axes = style.sheet(heights, title, legend=legend, lines=1)
+    remark(axes[0], *said, rows=style.legend_rows(legend) if legend else 0)
     return figure, axes
 
 
@@ -124,7 +100,7 @@ def plot_crane(
     named = {runs.actuation: runs} if isinstance(runs, CraneRun) else dict(runs)
     if not 0 < len(named) <= MOST_RUNS:
         raise InputError(f"A figure shows 1 to {MOST_RUNS} runs of a crane, not {len(named)}.")
-    first, looks = next(iter(named.values())), strokes(named)
+    first, looks = next(iter(named.values())), style.strokes(named)
     driven = {name: run for name, run in named.items() if run.actuation != "ideal"}
     shown = [("swing_deg", "swing (deg)", 2.1, named)]
     for signal, label, height in (("slew_deg", "slew (deg)", 1.5), ("boom_deg", "boom (deg)", 1.2)):
@@ -136,7 +112,7 @@ def plot_crane(
     back = "grey line: the stick is back at zero" if first.stick_end > 0.0 else ""
     figure, axes = _panels(heights, title or first.crane.title, looks, back, assumed(first.crane))
     for ax, (signal, label, _, lines) in zip(axes, shown, strict=False):
-        dress(ax, label)
+        style.dress(ax, label)
         for name, run in lines.items():
             draw(ax, run.time, getattr(run, signal), looks[name].color, dashes=looks[name].dashes)
         if signal == "swing_deg":
@@ -146,12 +122,12 @@ def plot_crane(
     for ax in axes:
         fit_time(ax, first.time)
         if first.stick_end > 0.0:
-            ax.axvline(first.stick_end, color=FAINT, linewidth=0.8, zorder=1.0)
-    label_below(axes[-1], "time (s)")
+            ax.axvline(first.stick_end, color=style.FAINT, linewidth=0.8, zorder=1.0)
+    style.label_below(axes[-1], "time (s)")
     return figure
 
 
-def _acting(ax: Axes, runs: Mapping[str, CraneRun], looks: Mapping[str, Stroke]) -> None:
+def _acting(ax: Axes, runs: Mapping[str, CraneRun], looks: Mapping[str, style.Stroke]) -> None:
     """Bars where limits of slew and luff act, a row for each run and axis."""
     rows = [(name, axis) for name in runs for axis in ("slew", "luff")]
     ax.set_ylim(len(rows) - 0.4, -0.6)
@@ -162,13 +138,13 @@ def _acting(ax: Axes, runs: Mapping[str, CraneRun], looks: Mapping[str, Stroke])
             bars = [(start, end - start) for start, end in spans]
             color = SHADES[limit].color
             ax.broken_barh(bars, (row - 0.36, 0.72), facecolors=color, edgecolor="none")
-    dress(ax)
+    style.dress(ax)
     ax.grid(False, axis="y")
-    ax.set_yticks(range(len(rows)), [axis for _, axis in rows], fontsize=SMALL)
+    ax.set_yticks(range(len(rows)), [axis for _, axis in rows], fontsize=style.SMALL)
     for (name, _), text in zip(rows, ax.get_yticklabels(), strict=True):
-        text.set_color(looks[name].color if len(runs) > 1 else INK)
-    ax.set_ylabel("limits", fontsize=NORMAL, color=INK)
-    put_legend(ax, [shade_handle(SHADES[limit]) for limit in ACTING])
+        text.set_color(looks[name].color if len(runs) > 1 else style.INK)
+    ax.set_ylabel("limits", fontsize=style.NORMAL, color=style.INK)
+    style.put_legend(ax, [shade_handle(SHADES[limit]) for limit in ACTING])
 
 
 # --- studies --------------------------------------------------------------------------------------
@@ -214,7 +190,7 @@ def plot_sweep(result: Sweep, *, limit_deg: float = 3.0, title: str = "") -> Fig
     shows the share of seaways in which the largest swing stays below a limit; over the stick the
     residual swing, and where the slew ends.
     """
-    look, looks, points = LOOKS[result.over], strokes(result.names), result.points
+    look, looks, points = LOOKS[result.over], style.strokes(result.names), result.points
     words = title or look.title.format(limit_deg)
     sea = seaway_words(result.sea, result.over != "height")
     said = (sea, look.remark.format(len(result.values)), assumed(result.crane))
@@ -235,31 +211,33 @@ def plot_sweep(result: Sweep, *, limit_deg: float = 3.0, title: str = "") -> Fig
             middle, low, high = np.maximum(found, LEAST).T
             ax.fill_between(points, low, high, color=color, alpha=0.15, linewidth=0.0)
             ax.plot(points, middle, **how)
-    dress(ax, look.label)
+    style.dress(ax, look.label)
     if result.over == "height":
         ax.set_ylim(0.0, 100.0)
         ax.set_xlim(left=0.0)
     elif stick:
         _logarithmic(ax, LEAST, 1.3 * float(np.nanmax(values[..., 1])))
-        dress(ends[0], "slew reached (deg)")
+        style.dress(ends[0], "slew reached (deg)")
     else:
         mean = values[..., 0].mean(axis=0)
         low = max(LEAST, 0.5 * float(np.nanmin(mean)))
         _logarithmic(ax, low, 1.6 * float(np.nanmax(mean)))
-        ax.axvline(1.0, color=FAINT, linewidth=0.8, zorder=1.0)
-        write(ax, "as built", (1.0, low), (4.0, 4.0), coords="data", color=GREY)
+        ax.axvline(1.0, color=style.FAINT, linewidth=0.8, zorder=1.0)
+        style.write(ax, "as built", (1.0, low), (4.0, 4.0), coords="data", color=style.GREY)
         ax.set_xlim(points[0], points[-1])
-    label_below(ends[0] if ends else ax, look.below)
+    style.label_below(ends[0] if ends else ax, look.below)
     return figure
 
 
-def _polar(result: Sweep, title: str, looks: dict[str, Stroke], *said: str) -> Figure:
+def _polar(result: Sweep, title: str, looks: dict[str, style.Stroke], *said: str) -> Figure:
     """Swing over the bearing around the ship."""
-    legend = [handle(name, *look) for name, look in looks.items()]
-    rows = legend_rows(legend)
-    figure = new_figure(WIDTH, HEAD + ROW * (rows + 1) + 5.4 + FOOT, layout="none")
-    write_title(figure, title)
-    top = 1.0 - (HEAD + ROW * (rows + 1) + 0.05) / float(figure.get_figheight())
+    legend = [style.handle(name, *look) for name, look in looks.items()]
+    rows = style.legend_rows(legend)
+    figure = style.new_figure(
+        style.WIDTH, style.HEAD + style.ROW * (rows + 1) + 5.4 + style.FOOT, layout="none"
+    )
+    style.write_title(figure, title)
+    top = 1.0 - (style.HEAD + style.ROW * (rows + 1) + 0.05) / float(figure.get_figheight())
     ax: Any = figure.add_axes((0.16, 0.06, 0.68, top - 0.11), projection="polar")
     ax.set_theta_zero_location("N")
     ax.set_theta_direction(-1)
@@ -275,23 +253,23 @@ def _polar(result: Sweep, title: str, looks: dict[str, Stroke], *said: str) -> F
     names = {0: "bow", 90: "starboard", 180: "stern", 270: "port"}
     angles = range(0, 360, 30)
     ax.set_xticks(np.radians(angles), [names.get(each, f"{each}°") for each in angles])
-    ax.tick_params(labelsize=SMALL, labelcolor=INK)
+    ax.tick_params(labelsize=style.SMALL, labelcolor=style.INK)
     ax.tick_params(axis="x", pad=8.0)
     for angle, text in zip(angles, ax.get_xticklabels(), strict=True):
         side: Literal["left", "right"] = "left" if angle < 180 else "right"
         text.set_horizontalalignment("center" if angle % 180 == 0 else side)
-    ax.grid(True, color=GRID, linewidth=0.6)
-    ax.spines["polar"].set_color(FAINT)
+    ax.grid(True, color=style.GRID, linewidth=0.6)
+    ax.spines["polar"].set_color(style.FAINT)
     above = figure.add_axes((0.012, top + 0.01, 0.9, 0.001))
     above.set_axis_off()
-    put_legend(above, legend)
+    style.put_legend(above, legend)
     remark(above, *said, rows=rows)
     return figure
 
 
 def plot_follow(result: Followable, *, title: str = "") -> Figure:
     """Figure of the amplitude that each axis can follow over the period, with seas as points."""
-    looks = strokes(("hoist, up", "slew, across the boom", "luff, along the boom"))
+    looks = style.strokes(("hoist, up", "slew, across the boom", "luff, along the boom"))
     said = f"boom at {result.boom_deg:.0f}°; points: what holding the tip asks of the luff"
     words = title or "What the axes can follow"
     figure, (ax,) = _panels([3.3], words, looks, said, assumed(result.crane))
@@ -299,14 +277,14 @@ def plot_follow(result: Followable, *, title: str = "") -> Figure:
         ax.plot(result.periods, values, color=color, linestyle=dashes, linewidth=1.4)
     asked = {name: (each.period, each.amplitude[2]) for name, each in result.seas.items()}
     for name, place in asked.items():
-        ax.plot(*place, "D", color=INK, ms=4.5)
+        ax.plot(*place, "D", color=style.INK, ms=4.5)
         box = {"facecolor": "white", "edgecolor": "none", "pad": 0.6}
-        write(ax, name, place, (6.0, -3.0), coords="data", bbox=box)
-    dress(ax, "amplitude (m)")
+        style.write(ax, name, place, (6.0, -3.0), coords="data", bbox=box)
+    style.dress(ax, "amplitude (m)")
     every = [*result.amplitude.ravel(), *(amplitude for _, amplitude in asked.values())]
     _logarithmic(ax, 0.8 * min(every), 1.25 * max(every))
     ax.set_xlim(result.periods[0], result.periods[-1])
-    label_below(ax, "period (s)")
+    style.label_below(ax, "period (s)")
     return figure
 
 
@@ -314,7 +292,7 @@ def plot_judgment(result: Judgment, *, title: str = "") -> Figure:
     """Figure of a judgment: swing of every variant in every seaway, and what limits its drives."""
     names, study = list(reversed(result.names)), result.study
     words = title or f"Swing in {len(study.seeds)} seaways"
-    figure, (ax,) = sheet([0.42 * len(names) + 0.3], words, lines=1)
+    figure, (ax,) = style.sheet([0.42 * len(names) + 0.3], words, lines=1)
     said = "bars: mean with its 95 % interval"
     remark(ax, seaway_words(study.sea), said, assumed(study.crane), right=True)
     random = np.random.default_rng(0)
@@ -324,18 +302,20 @@ def plot_judgment(result: Judgment, *, title: str = "") -> Figure:
         known = values[np.isfinite(values)]
         edge = max(edge, float(known.max(initial=0.0)))
         share = result.worse(name) if name in result.names[1:] else 0.0
-        color = VERMILION if share > result.allowed else BLUE
+        color = style.VERMILION if share > result.allowed else style.BLUE
         spread = row + random.uniform(-0.25, 0.25, known.size)
         ax.plot(known, spread, "o", color=color, ms=2.6, alpha=0.35, mew=0.0)
         mean = mean_of(known)
-        ax.plot([mean.low, mean.high], [row, row], color=INK, linewidth=3.0, solid_capstyle="butt")
-        ax.plot([mean.value] * 2, [row - 0.3, row + 0.3], color=INK, linewidth=1.6)
+        ax.plot(
+            [mean.low, mean.high], [row, row], color=style.INK, linewidth=3.0, solid_capstyle="butt"
+        )
+        ax.plot([mean.value] * 2, [row - 0.3, row + 0.3], color=style.INK, linewidth=1.6)
         worse = f"\nworse than none: {100.0 * share:.0f} %" if name in result.names[1:] else ""
         labels.append(name + worse)
-    dress(ax)
+    style.dress(ax)
     ax.grid(False, axis="y")
-    ax.set_yticks(range(len(names)), labels, fontsize=NORMAL)
+    ax.set_yticks(range(len(names)), labels, fontsize=style.NORMAL)
     ax.set_ylim(-0.6, len(names) - 0.4)
     ax.set_xlim(0.0, 1.05 * edge)
-    label_below(ax, "swing, RMS of a seaway (deg)")
+    style.label_below(ax, "swing, RMS of a seaway (deg)")
     return figure
