@@ -33,8 +33,8 @@ from swashplate.identification.drive_model import (
     stage_problem,
     with_estimates,
 )
+from swashplate.identification.faults import measurement_error
 from swashplate.identification.intervals import weighed
-from swashplate.identification.lack_of_fit import measurement_error
 from swashplate.identification.model import Model, OwnModel
 from swashplate.identification.problem import Problem
 from swashplate.identification.setup import ModelParameters, ModelSetup, Range, Setup, Stage
