@@ -38,22 +38,14 @@ def parquet(path: Path) -> None:
     pl.DataFrame(table).write_parquet(path)
 
 
-def matlab4(path: Path) -> None:
-    scipy.io.savemat(path, {"time": TIME, "voltage": VOLTS}, format="4")
-
-
-def matlab5(path: Path, packed: bool = False) -> None:
+def matlab5(path: Path) -> None:
     contents = {
         "time": TIME,
         "voltage": VOLTS,
         "z": TIME * 1j,
         "cell": np.array(["a"], dtype=object),
     }
-    scipy.io.savemat(path, contents, do_compression=packed)
-
-
-def matlab5_packed(path: Path) -> None:
-    matlab5(path, packed=True)
+    scipy.io.savemat(path, contents)
 
 
 def hdf5(path: Path) -> None:
@@ -176,54 +168,32 @@ DAMAGED = [
         text("time,u\n" + "10:00:00.5,1\n" * 200_000 + "7,1\n8,1\n"),
         "'7', which is no date ... row 200001 (line 200002)",
     ),
-    (
-        "long_cell.csv",
-        rows("0.25," + "9x" * 500),
-        "'9x9x9x9x9x9x9x9x9x9x9x9x9x9x9x9x9x9x9... data row 3",
-    ),
     ("control.csv", rows("0.25,\x1b[2J"), "control.csv has the byte 0x1b in line 4"),
     ("short.csv", rows("0.25"), "data row 3 (line 4) has 1 field instead of 2"),
     ("gap.txt", text("a b c\n1 2 3\n1   3\n"), "data row 2 (line 3) has 2 fields instead of 3"),
     ("names.csv", text("time,a,b\n0,1\n1,2\n2,3\n"), "3 names in line 1, but 2 fields in the rows"),
-    ("cut.csv", text("time,voltage\n0,1\n1,2\n2"), "data row 3 (line 4) has 1 field instead of 2"),
     (
         "nuls.csv",
         text("time,u\n" + "0,1\n" * 20000 + "\0" * 50 + "\n"),
         "NUL byte in data row 20001 (line 20002)",
     ),
-    ("dots.csv", text("a;b\n0,5;1,5\n1.5;2,5\n"), "'a' holds '1.5', ... in data row 2 (line 3)"),
     ("thousands.csv", text("a;b\n1,234;5\n2,345;6\n"), "'1,234', where the comma may be a decimal"),
     ("either.csv", text("voltage\n0,5\n1,5\n"), "has no column 'voltage'; it has 'column 1',"),
     ("open.csv", text('a,b\n1,"2\n3,4\n'), "misplaced quotes in data row 1 (line 2)"),
-    ("quotes.csv", text('a,b\n1,2\n3,"4"5\n'), "misplaced quotes in data row 2 (line 3)"),
     ("wide.csv", text("time,u\n0,1\n".encode("utf-16")[:-1]), "is no text in utf-16-le"),
     ("excel.csv", text(b"PK\x03\x04" + bytes(50)), "ends in '.csv' but holds Excel or zip"),
     ("parquet.csv", table_of(".parquet"), "ends in '.csv' but holds Parquet"),
     # Parquet
     ("text.parquet", text("time,voltage\n0,1\n"), "cannot be read as Parquet"),
-    ("hdf5.parquet", table_of(".h5"), "ends in '.parquet' but holds HDF5"),
     ("cut.parquet", cut(parquet, 0.6), "cut.parquet"),
-    (
-        "list.parquet",
-        lambda path: pl.DataFrame({"a": [[1.0]]}).write_parquet(path),
-        "no columns of numbers",
-    ),
     ("note.parquet", parquet, "'note' cannot be read as numbers: it is of the type String"),
     # MATLAB
     ("text.mat", text("time,voltage\n0,1\n"), "cannot be read as MATLAB"),
     ("head.mat", text(b"MATLAB 5.0 MAT-file".ljust(124) + b"\x00\x01IM"), "no vectors of numbers"),
-    ("four.mat", cut(matlab4, 0.7), "cannot be read as MATLAB"),
     ("five.mat", cut(matlab5, 0.5), "five.mat"),
-    (
-        "five_size.mat",
-        changed(matlab5, 132, b"\xff\xff\xff\x7f"),
-        "five_size.mat",
-    ),
-    ("zlib.mat", changed(matlab5_packed, 400, b"\xff" * 9), "cannot be read as MATLAB"),
     ("bomb.mat", bomb, "cannot be read as MATLAB"),
     ("cell.mat", matlab5, "'cell' cannot be read as numbers: it holds text"),
     ("complex.mat", matlab5, "'z' cannot be read as numbers: it holds complex numbers"),
-    ("seven.mat", text(b"MATLAB 7.3 MAT-file".ljust(124) + b"\x00\x02IM"), "seven.mat"),
     # HDF5
     ("text.h5", text("time,voltage\n0,1\n"), "cannot be read as HDF5"),
     ("cut.h5", cut(hdf5, 0.7), "cut.h5 cannot be read as HDF5, it is damaged ...truncated"),
@@ -241,25 +211,16 @@ DAMAGED = [
     ("unwritten.h5", unwritten, "'/voltage' has only 1 of its 4 blocks"),
     ("external.h5", external, "'/voltage' cannot be read as numbers: its numbers are in"),
     ("linked.h5", linked, "linked.h5 has no column 'voltage'; it has '/time'"),
-    ("complex.h5", hdf5_of(voltage={"data": TIME * 1j}), "'/voltage': it holds complex numbers"),
     # TDMS
     ("text.tdms", text("time,voltage\n0,1\n"), "cannot be read as TDMS"),
     ("cut.tdms", cut(tdms, 0.9), "as TDMS, it is ...: Last segment of file has less data"),
-    ("next.tdms", changed(tdms, 12, b"\x40"), "next.tdms cannot be read as TDMS"),
     ("open.tdms", changed(tdms, 12, b"\xff" * 8), "Last segment of file has less data"),
-    (
-        "count.tdms",
-        changed(tdms, b"\x14\x00\x00\x00\x0a\x00\x00\x00\x01\x00\x00\x00", b"\x50"),
-        "count.tdms cannot be read as TDMS",
-    ),
     ("note.tdms", tdms, "'note' cannot be read as numbers: it holds text"),
     # MDF
     ("text.mf4", text("time,voltage\n0,1\n"), "text.mf4 is no MDF file"),
     ("three.mf4", text(b"MDF     3.30    ".ljust(64, b"\0")), "is MDF '3.30'; convert it to MDF 4"),
     ("unfinished.mf4", text(b"UnFinMF 4.10    ".ljust(64, b"\0")), "was not finished by"),
     ("cut.mf4", cut(mdf, 0.5), "cut.mf4"),
-    ("cut_data.mf4", cut(mdf, 0.05), "cut_data.mf4"),
-    ("rows.mf4", changed(mdf, b"##CG", b"\xff" * 90), "rows.mf4"),
 ]
 
 

@@ -21,9 +21,7 @@ from swashplate.campaign.schema import (
     CHANNEL_KINDS,
     KINDS,
     CampaignFile,
-    axis_lines,
     conversion,
-    run_lines,
 )
 from swashplate.documents import parse_toml, toml_key, toml_string, validated
 from swashplate.errors import FileError, InputError
@@ -208,7 +206,7 @@ def draft_campaign(
     ]
     _hold_back(runs)
     for each in runs:
-        lines += run_lines(each.file, each.role, each.more, seen=each.seen, why=each.why)
+        lines += _run_lines(each)
     return "\n".join(lines).rstrip() + "\n"
 
 
@@ -317,7 +315,11 @@ def _axis(
     channels = {
         channel: _signal(each, values, counts_per_turn) for channel, each in _channels(ours).items()
     } or {"measured": [kind, f"{left_open} was measured?"]}
-    return axis_lines(name, own, given, channels)
+    table = f"axes.{toml_key(name)}"
+    lines = [f"[{table}]", *own, "", f"[{table}.input]", *given, ""]
+    for channel, entries in channels.items():
+        lines += [f"[{table}.channels.{toml_key(channel)}]", *entries, ""]
+    return lines
 
 
 def _time(log: Log, guesses: Mapping[str, ColumnGuess]) -> ColumnGuess | None:
@@ -415,15 +417,22 @@ def _run(
     if tested and len(tested) < len(axes):
         more.insert(0, f"only = [{', '.join(toml_string(axis) for axis in tested)}]")
     role, why = ("fit", "") if tested else ("ignore", "it has no input")
+    made = _Draft(file, more, role, why, *_seen(values, _time(log, guesses), axes))
     if tested and f'column = "{FIXME}"' not in text:
         one = text.replace("# counts_per_turn = 1000", "counts_per_turn = 1000")
-        one = "\n".join([one, *run_lines(file, role, more)])
+        one = "\n".join([one, *_run_lines(made)])
         try:
             read = validated(parse_toml(one, "the draft"), CampaignFile, "the draft")
             list(read_run("the draft", "run", read.runs[0], read.axes, log))
         except (FileError, InputError) as error:
-            role, why = "ignore", f"{FIXME}: {error}"
-    return _Draft(file, more, role, why, *_seen(values, _time(log, guesses), axes))
+            made.role, made.why = "ignore", f"{FIXME}: {error}"
+    return made
+
+
+def _run_lines(run: _Draft) -> list[str]:
+    why = f"    # {run.why}" if run.why else ""
+    file = f"file = {toml_string(run.file)}    # {run.seen}"
+    return ["[[runs]]", file, f'role = "{run.role}"{why}', *run.more, ""]
 
 
 def _seen(

@@ -50,11 +50,17 @@ def read_run(
         For the first thing that is wrong; the sentence names file, column and row.
     """
     tested = _axes_of(place, run, axes)
-    for part in _windows(tested, log, run.span):
+    for part, cut, resumes in _windows(tested, log, run.span):
         columns = _Columns(part, tested)
         for key, axis in tested.items():
             full = f"{name} {key}" if len(axes) > 1 else name
-            yield from _experiments(full, name, key, run, axis, columns)
+            for each in _experiments(full, name, key, run, axis, columns):
+                if cut:
+                    begins = f"{full} from {each.input.time[0]:.6g} s"
+                    each = replace(each, name=begins, notes=(cut, *each.notes))
+                if resumes:
+                    each = replace(each, start="estimated", start_pressure=None)
+                yield each
 
 
 def _axes_of(
@@ -116,7 +122,7 @@ class _Columns:
     ) -> None:
         self.log, self.found = log, _found(log, axes, only)
         self.values = log.read(list(self.found))
-        first = log.between(0, 1).read(list(self.found)) if log.first else self.values
+        first = replace(log, first=0, last=1).read(list(self.found)) if log.first else self.values
         self._begins = {name: values[:1] for name, values in first.items()}
         self._stamps: dict[tuple[schema.Clock, int], Array] = {}
 
@@ -229,7 +235,7 @@ def _experiments(
     log, signals, cuts = columns.log, dict[str, Channel](), dict[float, str]()
     parts, _ = columns.samples("the input", axis.input, axis, run)
     drive = InputSignal(**parts, interpolation=axis.input.interpolation)
-    notes = [log.cut] if log.cut else []
+    notes = list[str]()
     for channel, entry in axis.channels.items():
         parts, factor = columns.samples(f"channel '{channel}'", entry, axis, run)
         if not parts:
@@ -265,17 +271,16 @@ def _experiments(
         said = list(notes) if part == 0 else []
         if np.isfinite(end):
             said.append(f"split at {end:.4g} s, from where it is a run of its own: {cuts[end]}")
-        split = part > 0 or log.resumes
         recognised = recognise(given.time, given.values, unit=unit)
         maneuver = run.maneuver or recognised.name
         ignored = applying((*axis.ignore, *run.ignore), maneuver)
         yield Experiment(
-            f"{name} from {given.time[0]:.6g} s" if part or log.cut else name,
+            f"{name} from {given.time[0]:.6g} s" if part else name,
             key,
             run_name,
             run.role,
-            "estimated" if split else run.start or axis.start,
-            None if split else run.start_pressure,
+            "estimated" if part else run.start or axis.start,
+            None if part else run.start_pressure,
             given,
             {
                 each: _finished(axis.channels[each], read, given, maneuver, ignored, run)
@@ -344,24 +349,28 @@ PIECE = 60_000
 """A longer motion is cut into pieces of so many rows, of which the later ones begin in motion."""
 
 
-def _windows(axes: Mapping[str, schema.Axis], log: Log, span: schema.Window | None) -> list[Log]:
+def _windows(
+    axes: Mapping[str, schema.Axis], log: Log, span: schema.Window | None
+) -> Iterator[tuple[Log, str, bool]]:
     """The log itself or, of one of more rows than `LONG`, its windows in which an input moves.
 
     Within the span of the run, if it has one. The log is looked through once, block after block,
     its stamps checked. A window takes in 2 s of rest before and 5 s after the motion; if all
-    together have more rows than `HELD`, one in several is taken, evenly over the log.
+    together have more rows than `HELD`, one in several is taken, evenly over the log. Beside each,
+    which one it is, empty for a whole log, and whether it begins in the midst of a motion.
     """
     names = list(_found(log, axes))
     log = in_parts(log, names)
     rows = log.rows_of(names)
     if rows is None or rows <= LONG:
-        return [log]
+        yield log, "", False
+        return
     moving, period = np.zeros(-(-rows // GRAIN), dtype=np.bool_), np.inf
     for key, axis in axes.items():
         extremes, step = np.empty((moving.size, 2)), BLOCK // GRAIN * GRAIN
         for begin in range(0, rows, step):
             # with the row before, so that stamps are compared across blocks
-            part = log.between(max(begin - 1, 0), min(begin + step, rows))
+            part = replace(log, first=max(begin - 1, 0), last=min(begin + step, rows))
             block = _Columns(part, {key: axis}, axis.input)
             time, values = block.stamps(axis.input, axis), block.values[axis.input.column]
             period = min(period, float(np.median(np.diff(time[:BLOCK]))))
@@ -396,12 +405,10 @@ def _windows(axes: Mapping[str, schema.Axis], log: Log, span: schema.Window | No
     said += f", of which 1 in {every} is taken" * (every > 1)
     if log.table is not None:
         said += f"; its {rows} rows are read from {log.table.name}, written beside it"
-    found, taken = list[Log](), pieces[::every]
+    taken = pieces[::every]
     for number, (begin, end, within) in enumerate(taken, 1):
-        part = log.between(begin, end)
-        cut = f"window {number} of {len(taken)}: {part.cut}{said * (number == 1)}"
-        found.append(replace(part, cut=cut, resumes=within))
-    return found
+        cut = f"window {number} of {len(taken)}: rows {begin + 1} to {end} of {rows}"
+        yield replace(log, first=begin, last=end), cut + said * (number == 1), within
 
 
 def _moves(extremes: Array) -> NDArray[np.bool_]:

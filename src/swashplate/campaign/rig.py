@@ -32,15 +32,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swashplate.__about__ import __version__
-from swashplate.campaign.schema import (
-    CHANNEL_KINDS,
-    KINDS,
-    SIGNALS,
-    ChannelKind,
-    axis_lines,
-    run_lines,
-)
-from swashplate.documents import toml_string
+from swashplate.campaign.schema import CHANNEL_KINDS, KINDS, SIGNALS, ChannelKind
 from swashplate.drive import Drive
 from swashplate.equations.marching.record import SOURCE_RATE
 from swashplate.errors import FileError, InputError, ParameterError
@@ -564,14 +556,10 @@ def write(tests: VirtualTests, folder: str | Path, *, overwrite: bool = False) -
     if tests.preset is None:
         tests.nominal.to_toml(place / DRIVE_FILE)
     tests.drive.to_toml(place / "truth" / DRIVE_FILE)
-    write_text(_truth_text(tests), place / "truth" / "truth.toml")
-    campaign = place / "campaign.toml"
-    write_text(_campaign_text(tests), campaign)
+    texts, campaign = _texts(tests), place / "campaign.toml"
+    write_text(texts[1], place / "truth" / "truth.toml")
+    write_text(texts[0], campaign)
     return campaign
-
-
-def _refinements(tests: VirtualTests) -> str:
-    return ", ".join(tests.drive.parameters.refinements) or "none"
 
 
 def _write_log(tests: VirtualTests, run: VirtualRun, path: Path) -> None:
@@ -585,56 +573,46 @@ def _write_log(tests: VirtualTests, run: VirtualRun, path: Path) -> None:
     with path.open("wb") as file:
         note = (
             f"# virtual: simulated by swashplate {__version__}, no measurement; axis {tests.axis}, "
-            f"{run.name}, instruments {tests.severity}, refinements {_refinements(tests)}, "
+            f"{run.name}, instruments {tests.severity}, {_refinements(tests)}, "
             f"seed {tests.seed}\n"
         )
         file.write(note.encode())
         table.write_csv(file)
 
 
-def _campaign_text(tests: VirtualTests) -> str:
-    """Text of the campaign file.
+def _texts(tests: VirtualTests) -> tuple[str, str]:
+    """Text of the campaign file, and of the truth: instruments, seed and versions.
 
     The input is joined by straight lines, because that is what was simulated between two samples.
     """
-    missing = ['missing = "drop"    # cells without a number'] * bool(tests.instruments.empty_cells)
-    own = [
-        f'drive = "{tests.preset or DRIVE_FILE}"    # the model that a fit starts from',
-        'time = { column = "time", unit = "s" }',
-        'start = "rest"',
-    ]
-    given = ['kind = "voltage"', 'column = "voltage"', 'unit = "V"', 'interpolation = "linear"']
-    channels = {}
-    for kind in tests.channels:
-        column = COLUMNS.get(kind, kind)
-        entries = [f'kind = "{kind}"', f'column = "{column}"']
-        if kind == "encoder_counts":
-            entries.append(f"counts_per_turn = {tests.counts_per_turn!r}    # of the shaft")
-            if tests.instruments.counter_bits:
-                entries.append(f"rolls_over_at = {2**tests.instruments.counter_bits}")
-        else:
-            entries.append(f'unit = "{KINDS[kind].units[0]}"')
-        channels[column] = [*entries, *missing]
-    lines = [
-        f"# Virtual tests, simulated by swashplate {__version__}: nothing here was measured.",
-        f"# Instruments: {tests.severity}; refinements: {_refinements(tests)}; seed {tests.seed}.",
-        "# What was simulated stands in truth/truth.toml: open it only after the fit.",
-        f"title = {toml_string(f'Virtual tests, {tests.axis}')}",
-        "virtual = true",
-        "",
-        *axis_lines(tests.axis, own, [*given, *missing], channels),
-    ]
-    for run in tests.runs.values():
-        lines += run_lines(f"{run.stem}.csv", run.role)
-    return "\n".join(lines)
-
-
-def _truth_text(tests: VirtualTests) -> str:
-    """What was simulated: instruments, seed and versions; the drive has its own file."""
     from tomlkit import dumps
 
-    packages = ("numpy", "numba")
+    tools, drop = tests.instruments, {"missing": "drop"} if tests.instruments.empty_cells else {}
+    channels = dict[str, dict[str, object]]()
+    for kind in tests.channels:
+        column = COLUMNS.get(kind, kind)
+        entry = channels[column] = {"kind": kind, "column": column, **drop}
+        if kind != "encoder_counts":
+            entry["unit"] = KINDS[kind].units[0]
+            continue
+        entry["counts_per_turn"] = tests.counts_per_turn
+        if tools.counter_bits:
+            entry["rolls_over_at"] = 2**tools.counter_bits
+    given = {"kind": "voltage", "column": "voltage", "unit": "V", "interpolation": "linear", **drop}
+    axis = {
+        "drive": tests.preset or DRIVE_FILE,
+        "time": {"column": "time", "unit": "s"},
+        "start": "rest",
+        "input": given,
+        "channels": channels,
+    }
     content = {
+        "title": f"Virtual tests, {tests.axis}",
+        "virtual": True,
+        "axes": {tests.axis: axis},
+        "runs": [{"file": f"{each.stem}.csv", "role": each.role} for each in tests.runs.values()],
+    }
+    truth = {
         "virtual": True,
         "axis": tests.axis,
         "drive": DRIVE_FILE,
@@ -642,8 +620,17 @@ def _truth_text(tests: VirtualTests) -> str:
         "seed": tests.seed,
         "counts_per_turn": tests.counts_per_turn,
         "runs": list(tests.runs),
-        "instruments": asdict(tests.instruments),
+        "instruments": asdict(tools),
         "versions": {"swashplate": __version__, "python": python_version()}
-        | {each: version(each) for each in packages},
+        | {each: version(each) for each in ("numpy", "numba")},
     }
-    return f"# The truth behind the virtual tests beside this folder.\n{dumps(content)}"
+    header = (
+        f"# Virtual tests, simulated by swashplate {__version__}: nothing here was measured.\n"
+        f"# Instruments: {tests.severity}; {_refinements(tests)}; seed {tests.seed}.\n"
+        "# What was simulated stands in truth/truth.toml: open it only after the fit.\n"
+    )
+    return header + dumps(content), "# The truth behind the virtual tests.\n" + dumps(truth)
+
+
+def _refinements(tests: VirtualTests) -> str:
+    return f"refinements {', '.join(tests.drive.parameters.refinements) or 'none'}"

@@ -47,19 +47,19 @@ class StampStatistics(NamedTuple):
 
 
 def increasing(time: ArrayLike) -> Array:
-    """Copy stamps [s] to a row; they must increase from each of two or more to the next.
+    """Stamps [s] as a row, two or more, each later than the one before it.
 
     Raises
     ------
     InputError
-        If one is not finite or not later than the one before it; the sentence names its row.
+        If they are not; the sentence names the row.
     """
     stamps = row("time", time)
     if stamps.size < 2:
         raise InputError("time must have two rows at least, not 1.")
-    wrong = np.flatnonzero(stamps[1:] <= stamps[:-1])
+    wrong = np.flatnonzero(stamps[1:] <= stamps[:-1]) + 1
     if wrong.size:
-        at = int(wrong[0]) + 1
+        at = int(wrong[0])
         raise InputError(
             f"time must increase, but row {at} (the first is 0) has {stamps[at]} s after "
             f"{stamps[at - 1]} s."
@@ -78,9 +78,8 @@ def stamps_of(time: ArrayLike) -> tuple[Array, float | None]:
     stamps = increasing(time)
     period = float(stamps[-1] - stamps[0]) / (stamps.size - 1)
     grid = stamps[0] + period * np.arange(stamps.size)
-    if np.max(np.abs(stamps - grid)) > TOLERANCE * period:
-        return stamps, None
-    return grid, period
+    even = np.max(np.abs(stamps - grid)) <= TOLERANCE * period
+    return (grid, period) if even else (stamps, None)
 
 
 def stamp_statistics(stamps: Array) -> StampStatistics:
@@ -88,15 +87,11 @@ def stamp_statistics(stamps: Array) -> StampStatistics:
     intervals = np.diff(stamps)
     median = float(np.median(intervals))
     wide = intervals > GAP * median
-    return StampStatistics(
-        rows=stamps.size,
-        rate=1.0 / median,
-        period=median,
-        jitter=float(np.sqrt(np.mean((intervals[~wide] - median) ** 2))),
-        longest=float(intervals.max()),
-        gaps=np.flatnonzero(wide) + 1,
-        missing=int(np.sum(np.round(intervals[wide] / median) - 1.0)),
-    )
+    jitter = float(np.sqrt(np.mean((intervals[~wide] - median) ** 2)))
+    missing = int(np.sum(np.round(intervals[wide] / median) - 1.0))
+    gaps = np.flatnonzero(wide) + 1
+    longest = float(intervals.max())
+    return StampStatistics(stamps.size, 1.0 / median, median, jitter, longest, gaps, missing)
 
 
 def signal(name: str, values: ArrayLike, rows: int) -> Array:

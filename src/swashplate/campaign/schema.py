@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, PositiveFloat, PositiveInt, model_validator
 
-from swashplate.documents import toml_key, toml_string
 from swashplate.errors import InputError
 from swashplate.logs import TextOptions
 from swashplate.results import short
@@ -335,28 +334,3 @@ class CampaignFile(Entry):
     )
     axes: dict[str, Axis] = Field(min_length=1, description="The drives, by name.")
     runs: tuple[Run, ...] = Field(min_length=1, description="Their tests, a log each.")
-
-
-# --- its text -------------------------------------------------------------------------------------
-
-
-def axis_lines(
-    name: str,
-    own: Iterable[str],
-    given: Iterable[str],
-    channels: Mapping[str, Iterable[str]],
-) -> list[str]:
-    """Lines of an axis in a campaign file: its own entries, those of its input and its channels."""
-    table = f"axes.{toml_key(name)}"
-    lines = [f"[{table}]", *own, "", f"[{table}.input]", *given, ""]
-    for channel, entries in channels.items():
-        lines += [f"[{table}.channels.{toml_key(channel)}]", *entries, ""]
-    return lines
-
-
-def run_lines(
-    file: str, role: str, more: Iterable[str] = (), *, seen: str = "", why: str = ""
-) -> list[str]:
-    """Lines of a run in a campaign file, with what was seen of its log and why it has its role."""
-    first = f"file = {toml_string(file)}" + (f"    # {seen}" if seen else "")
-    return ["[[runs]]", first, f'role = "{role}"' + (f"    # {why}" if why else ""), *more, ""]

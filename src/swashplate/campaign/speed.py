@@ -73,19 +73,9 @@ def speed_of(channel: Channel, method: Method = "exact") -> Speed:
 
 
 def speed_from_angle(time: ArrayLike, angle: ArrayLike) -> Array:
-    """Speed from angles (or any positions): low pass, then band-limited differentiator.
+    """Speed (n,) from positions (n,) at stamps [s], even or not: low pass, then differentiator.
 
-    Parameters
-    ----------
-    time : array_like, shape (n,)
-        Stamps, even or not. [s]
-    angle : array_like, shape (n,)
-        Position, its staircase interpolated; at rest before the first row. [rad]
-
-    Returns
-    -------
-    array, shape (n,)
-        Speed, 1/a + 1/b late; 0 in the first row. [rad/s]
+    At rest before the first row; 1/a + 1/b late. [rad/s]
 
     Raises
     ------

@@ -15,7 +15,7 @@ from typing import Any, ClassVar, Literal, NamedTuple
 from swashplate.errors import FileError, InputError
 from swashplate.logs.log import Column, check_kind, printable, split_unit
 
-_DELIMITERS = {"comma": ",", "semicolon": ";", "tab": "\t", "space": " ", "bar": "|"}
+_NAMED = {"comma": ",", "semicolon": ";", "tab": "\t", "space": " ", "spaces": " ", "bar": "|"}
 _COMMENTS = ("#", "%", "//")
 
 
@@ -56,7 +56,7 @@ class TextOptions:
 
     def __post_init__(self) -> None:
         """Check them."""
-        mark = _DELIMITERS.get(self.delimiter or "comma", self.delimiter) or ""
+        mark = "," if self.delimiter is None else _NAMED.get(self.delimiter, self.delimiter)
         wrong = ""
         if len(mark) != 1 or not mark.isascii() or mark in '\r\n"\0':
             wrong = f"delimiter must be one character, 'tab' or 'space', not {mark!r}"
@@ -245,7 +245,7 @@ def find_layout(lines: Sequence[str], options: TextOptions, path: Path) -> Layou
     """
     quoted = any('"' in line for line in lines)
     given = {key: getattr(options, key) for key in ("delimiter", "decimal")}
-    mark = options.delimiter and _DELIMITERS.get(options.delimiter, options.delimiter)
+    mark = options.delimiter and _NAMED.get(options.delimiter, options.delimiter)
     trials = [
         trial
         for delimiter in ([mark] if mark else [",", ";", "\t", " ", "|"])

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -52,11 +52,7 @@ class Log:
     """Where its rows are read from in place of the file."""
     first: int = 0
     last: int | None = None
-    """Rows that `read` gives, where they are not all of them."""
-    cut: str = ""
-    """Of a part of a file, which one it is; else empty."""
-    resumes: bool = False
-    """Of a part, whether it begins in the midst of a motion."""
+    """Rows that `read` gives, from the first to before the last one; None is the end."""
 
     def __post_init__(self) -> None:
         """Make all that may get into a sentence printable: names are what a file says they are."""
@@ -78,8 +74,31 @@ class Log:
         ------
         InputError
             If there is none or more than one; the sentence lists what there is.
+        FileError
+            If it is there, but holds no numbers.
         """
-        return self.columns[self._position(wanted)]
+        names = {column.name: _without_unit(column) for column in self.columns}
+        suffixed = re.compile(rf"{re.escape(wanted)}_\w+")
+        matches: list[str] = []
+        for found in (
+            [name for name in names if name == wanted],
+            [name for name, bare in names.items() if bare == wanted],
+            [name for name in names if suffixed.fullmatch(name)],
+            [name for name, bare in names.items() if wanted in (_last(name), _last(bare))],
+        ):
+            matches = matches or found
+        for name, reason in self.left_out.items():
+            if not matches and wanted in (name, _last(name)):
+                raise FileError(f"{self.path}: '{name}' cannot be read as numbers: {reason}.")
+        listed = ", ".join(map(repr, (matches or list(names))[:_LISTED]))
+        listed += f" and {len(names) - _LISTED} more" if len(matches or names) > _LISTED else ""
+        if not matches:
+            raise InputError(
+                f"{self.path} has no column '{wanted}'; it has {listed}: name the one to take."
+            )
+        if len(matches) > 1:
+            raise InputError(f"{self.path} has more than one '{wanted}': {listed}; name the one.")
+        return next(column for column in self.columns if column.name == matches[0])
 
     def read(self, names: Sequence[str]) -> dict[str, Array]:
         """Read columns, in the file's own units.
@@ -104,61 +123,25 @@ class Log:
         InputError
             If a column is missing.
         """
-        names = (names,) if isinstance(names, str) else names
-        positions = {name: self._position(name) for name in names}
+        positions = {name: self.columns.index(self.find(name)) for name in names}
         unique = list(dict.fromkeys(positions.values()))
         if not unique:
             return {}
-        if self.last is None and self.lengths:
-            count = sum(self.lengths[position] for position in unique)
-            if count > MOST:
-                raise FileError(
-                    f"{self.path} has {count} numbers in the {len(unique)} columns that are wanted,"
-                    f" more than the {MOST} that are read at once; cut it into shorter logs, or "
-                    "sample it more slowly."
-                )
+        count = sum(self.lengths[position] for position in unique) if self.lengths else 0
+        if self.last is None and count > MOST:
+            raise FileError(
+                f"{self.path} has {count} numbers in the {len(unique)} columns that are wanted,"
+                f" more than the {MOST} that are read at once; cut it into shorter logs, or "
+                "sample it more slowly."
+            )
         arrays = dict(zip(unique, self.load(unique, self.first, self.last), strict=True))
         return {name: arrays[position] for name, position in positions.items()}
 
     def rows_of(self, names: Iterable[str]) -> int | None:
         """Rows of some columns, None where they differ in length or it is not known."""
-        counts = {self.lengths[self._position(name)] for name in names if self.lengths}
+        places = [self.columns.index(self.find(name)) for name in names if self.lengths]
+        counts = {self.lengths[place] for place in places}
         return counts.pop() if len(counts) == 1 else None
-
-    def between(self, first: int, last: int) -> Log:
-        """The log of a part of the rows, from the first (counted from 0) to before the last."""
-        rows = max(self.lengths, default=0)
-        cut = f"rows {first + 1} to {last} of {rows}"
-        return replace(self, first=first, last=last, cut=cut, stream=None)
-
-    def _position(self, wanted: str) -> int:
-        names = [column.name for column in self.columns]
-        bare = [_without_unit(column) for column in self.columns]
-        suffixed = re.compile(rf"{re.escape(wanted)}_\w+")
-        matches: list[str] = []
-        for found in (
-            [name for name in names if name == wanted],
-            [name for name, other in zip(names, bare, strict=True) if other == wanted],
-            [name for name in names if suffixed.fullmatch(name)],
-            [
-                name
-                for name, other in zip(names, bare, strict=True)
-                if wanted in (_last(name), _last(other))
-            ],
-        ):
-            matches = matches or found
-        if len(matches) > 1:
-            raise InputError(
-                f"{self.path} has more than one '{wanted}': {_listed(matches)}; name the one."
-            )
-        if matches:
-            return names.index(matches[0])
-        for name, reason in self.left_out.items():
-            if wanted in (name, _last(name)):
-                raise FileError(f"{self.path}: '{name}' cannot be read as numbers: {reason}.")
-        raise InputError(
-            f"{self.path} has no column '{wanted}'; it has {_listed(names)}: name the one to take."
-        )
 
 
 MOST = 100_000_000
@@ -332,7 +315,7 @@ def read_series(
             "they must have as many."
         )
     check_stamps(log, time_column, time)
-    check_finite(log, column, values)
+    _check_finite(log, column, values)
     made = []
     for name, si in ((time_column, "s"), (column, unit)):
         found = log.find(name)
@@ -387,11 +370,6 @@ def _last(name: str) -> str:
     return name.rpartition("/")[2]
 
 
-def _listed(names: Sequence[str]) -> str:
-    shown = ", ".join(repr(each) for each in names[:_LISTED])
-    return shown if len(names) <= _LISTED else f"{shown} and {len(names) - _LISTED} more"
-
-
 # --- numbers that can be computed with ------------------------------------------------------------
 
 
@@ -403,17 +381,15 @@ def check_stamps(log: Log, column: str, stamps: Array) -> None:
     FileError
         The sentence names file, column and data row; the first row is 1.
     """
-    check_finite(log, column, stamps)
+    _check_finite(log, column, stamps)
     late = np.flatnonzero(np.diff(stamps) <= 0.0)
     if not late.size:
         return
     before, after = map(float, stamps[late[0] : late[0] + 2])
     row = log.first + int(late[0])
-    what = (
-        f"has {before!r} twice, in data rows {row + 1} and {row + 2}"
-        if before == after
-        else f"goes back from {before!r} to {after!r} in data row {row + 2}"
-    )
+    what = f"goes back from {before!r} to {after!r} in data row {row + 2}"
+    if before == after:
+        what = f"has {before!r} twice, in data rows {row + 1} and {row + 2}"
     others = f", the first of {late.size} such rows" if late.size > 1 else ""
     raise FileError(f"{log.path}: column '{column}' {what}{others}; time stamps must increase.")
 
@@ -439,34 +415,20 @@ def check_duration(log: Log, source: str, time: Array) -> Array:
     return time
 
 
-def check_finite(log: Log, column: str, values: Array) -> None:
-    """Refuse a column (n,) without rows, with a number missing, or one that is not finite.
-
-    Raises
-    ------
-    FileError
-        The sentence names file, column and data row; the first row is 1.
-    """
+def _check_finite(log: Log, column: str, values: Array) -> None:
+    """Refuse a column (n,) without rows, with a number missing, or one that is not finite."""
+    wrong = np.flatnonzero(np.isnan(values))
+    what, right = "is empty or NaN", "a number must be in every row"
+    if not wrong.size:
+        wrong = np.flatnonzero(np.isinf(values))
+        what, right = f"holds {values[wrong[:1]].sum()}", "numbers must be finite"
     if not values.size:
         raise FileError(f"{log.path}: column '{column}' has no rows.")
-    missing = np.flatnonzero(np.isnan(values))
-    if missing.size:
-        raise FileError(
-            f"{log.path}: column '{column}' is empty or NaN in {_rows(log, missing)}; "
-            "a number must be in every row."
-        )
-    infinite = np.flatnonzero(np.isinf(values))
-    if infinite.size:
-        raise FileError(
-            f"{log.path}: column '{column}' holds {float(values[infinite[0]])!r} in "
-            f"{_rows(log, infinite)}; numbers must be finite."
-        )
-
-
-def _rows(log: Log, wrong: NDArray[np.intp]) -> str:
-    """The first run of rows, and how many there are besides."""
-    first = log.first + int(wrong[0])
-    gaps = np.flatnonzero(np.diff(wrong) > 1)
-    run = int(gaps[0]) + 1 if gaps.size else wrong.size
-    rows = f"data row {first + 1}" if run == 1 else f"data rows {first + 1} to {first + run}"
-    return rows if run == wrong.size else f"{rows} and {wrong.size - run} more"
+    if wrong.size:
+        # the first run of rows, and how many there are besides
+        first = log.first + int(wrong[0]) + 1
+        gaps = np.flatnonzero(np.diff(wrong) > 1)
+        run = int(gaps[0]) + 1 if gaps.size else wrong.size
+        rows = f"row {first}" if run == 1 else f"rows {first} to {first + run - 1}"
+        rows += f" and {wrong.size - run} more" if run < wrong.size else ""
+        raise FileError(f"{log.path}: column '{column}' {what} in data {rows}; {right}.")

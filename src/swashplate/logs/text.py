@@ -105,7 +105,9 @@ def _pieces(path: Path, encoding: str, skipped: int) -> Iterator[str]:
                 # old programs end a text with a mark
                 yield text if text.endswith("\n") else text.rstrip("\x1a") + "\n"
         except UnicodeError as error:
-            raise FileError(f"{path} is no text in {encoding}: {error}.") from None
+            # the error's position is within the bytes that were read last
+            why = getattr(error, "reason", error)
+            raise FileError(f"{path} is no text in {encoding}: {why}.") from None
 
 
 # --- rows -----------------------------------------------------------------------------------------
