@@ -34,7 +34,6 @@ from swashplate.full_order import compare
 from swashplate.identification import (
     Fit,
     Stage,
-    Wanted,
     fit,
     judge_fit,
     load_setup,
@@ -70,7 +69,7 @@ def work(tmp_path_factory: pytest.TempPathFactory) -> Work:
     runs = campaign.select(role="fit")
     hoist = Drive.preset("hoist")
     fitted = fit(hoist, campaign, setup)
-    judged = judge_fit(campaign, runs, hoist.parameters, setup, fitted, Wanted())
+    judged = judge_fit(campaign, runs, hoist.parameters, setup, fitted)
     return Work(campaign, fitted, judged)
 
 

@@ -88,16 +88,8 @@ def test_a_fitted_drive_brings_its_noise(done: Words, campaign: str, tmp_path: P
     assert "(residuals of the drive)" in done("advise", campaign, *words)
 
 
-def test_a_parameter_more(done: Words, campaign: str) -> None:
-    words = ("--setup", "setup.toml", *TRIALS[:2], "--free", "Z9")
-    said = done("advise", campaign, *words)
-    assert "Z9" in section(said, "For each parameter")
-
-
-def test_refusals(refused: Words, campaign: str) -> None:
+def test_refusals(refused: Words) -> None:
     assert "--axis belongs to a campaign" in refused("advise", "hoist", "--axis", "hoist")
-    assert "Z10 is free" in refused("advise", campaign, "--setup", "setup.toml", "--free", "Z10")
-    assert "no parameter 'Z99'" in refused("advise", "hoist", "--free", "Z99")
 
 
 # --- excite ---------------------------------------------------------------------------------------

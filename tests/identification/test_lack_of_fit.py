@@ -11,8 +11,9 @@ from swashplate import Campaign, Drive
 from swashplate.campaign import rig
 from swashplate.campaign.experiment import Experiment
 from swashplate.identification.assessment import Assessment, assess
+from swashplate.identification.faults import clipped_channels
 from swashplate.identification.fitting import fit
-from swashplate.identification.lack_of_fit import clipped_channels, lack_of_fit
+from swashplate.identification.lack_of_fit import lack_of_fit
 from swashplate.identification.setup import load_setup
 from swashplate.identification.validation import predict
 from swashplate.identification.verdict import Verdict, verdict
@@ -151,7 +152,7 @@ def test_a_counter_that_does_not_follow_is_no_stop_of_the_machine(tmp_path: Path
     assert found.grade == "Not usable"
     assert "loss at the largest speeds of counts" in failed(found)
     assert "counts does not follow the largest speeds" in found.headline
-    assert lack_of_fit(assessments).causes[0].lost
+    assert lack_of_fit(assessments).causes[0].name == "loss at the largest speeds of counts"
 
 
 @pytest.mark.parametrize(

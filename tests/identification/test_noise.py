@@ -11,11 +11,9 @@ from swashplate.errors import InputError
 from swashplate.identification import uncertainty
 from swashplate.identification.noise import (
     NoiseColour,
-    SpectralLine,
     band_score_covariance,
     coloured_noise_covariance,
     grid_of,
-    line_sentences,
     noise_colours,
     pair_sums,
     spectral_covariance,
@@ -201,21 +199,6 @@ def test_errors_are_those_of_the_noise_under_a_ripple() -> None:
     scatter = np.sqrt(np.mean(np.square(estimates), axis=0))
     # 60 draws tell a standard deviation to 9 %
     np.testing.assert_allclose(np.mean(errors, axis=0), scatter, rtol=0.3)
-
-
-def test_lines_are_told_channel_by_channel() -> None:
-    said = line_sentences(
-        [
-            SpectralLine("counts", 21.5, 0.089),
-            SpectralLine("current", 98.0, 0.9),
-            SpectralLine("counts", 255.0, 0.004),
-        ]
-    )
-    assert said == (
-        "2 spectral lines between 21.5 and 255 Hz make 9.3 % of the residuals' variance of counts, "
-        "the largest 8.9 % at 21.5 Hz.",
-        "A spectral line at 98 Hz makes 90 % of the residuals' variance of current.",
-    )
 
 
 # --- errors ---------------------------------------------------------------------------------------

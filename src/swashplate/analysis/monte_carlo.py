@@ -124,7 +124,7 @@ def drives(assessments: Sequence[Assessment], draws: int = 200, seed: int = 0) -
             earlier: each.slopes
             for each in found.handed
             for earlier in range(number)
-            if known[earlier].quoted is each.covariance
+            if known[earlier].sampled is each.covariance
         }
         for number, found in enumerate(known)
     ]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -56,7 +55,6 @@ def excitation(
     from swashplate.identification.drive_model import setup_of
     from swashplate.identification.experiment_design import outlook
     from swashplate.identification.fitting import smooth
-    from swashplate.identification.tables import outlook_table
 
     files = Outputs((out, TABLE))
     with working(f"Reading {path}"):
@@ -68,7 +66,7 @@ def excitation(
         doubts = refuse_unsound(check_runs(runs, smooth(drive)))
         looks = [outlook(stage, smooth(drive), runs) for stage in plan.stages]
     names = [each.name for each in runs]
-    shown = [outlook_table(look, names) for look in looks]
+    shown = [look.table(names) for look in looks]
     files.write(out, "Table", joined(shown).write)
     for sentence in doubts:
         say(f"! {sentence}")
@@ -93,7 +91,6 @@ def advise(
     drive: str | None = None,
     axis: AxisName = None,
     setup: str | None = None,
-    free: list[str] | None = None,
     maneuver: list[str] | None = None,
     top: int = 10,
     tests: int = 4,
@@ -108,7 +105,6 @@ def advise(
     Options:
       word CAMPAIGN.toml|AXIS|SET.toml: Tests made so far; or only a drive, for a fresh plan.
       drive SET.toml: The fitted drive: noise is then that of its residuals.
-      free SYMBOL: A further parameter to determine, such as Z9. May be repeated.
       maneuver MANEUVER: A test to judge instead of the usual ones. May be repeated.
       top: Tests to list.
       tests: Tests in the plan.
@@ -117,34 +113,34 @@ def advise(
       swashplate advise hoist                                      a fresh plan
       swashplate advise harbour/campaign.toml --drive fitted/drive.toml
       swashplate advise harbour/campaign.toml --maneuver step:-9 --top 1
-      swashplate advise hoist --free Z9
     """
     from swashplate.drive import Drive
-    from swashplate.identification import tables
-    from swashplate.identification.experiment_design import advise as judged
     from swashplate.identification.experiment_design import (
-        best_for_each,
+        advice_table,
+        best_tests_table,
         default_maneuvers,
         in_turn,
     )
+    from swashplate.identification.experiment_design import advise as judged
 
     files = Outputs((out, TABLE))
     with working("Judging tests"):
-        bench = _bench(word, drive, axis, setup, free or [])
+        bench = _bench(word, drive, axis, setup)
         machine = Drive(bench.parameters)
         named = [maneuver_of(each, machine) for each in maneuver or []] or default_maneuvers()
         trials = list({each.name: each for each in named}.values())
-        at_hand = [bench.candidate(each, bench.sensors) for each in trials]
+        at_hand = [bench.candidate(each) for each in trials]
         ranked = judged(bench.present, at_hand, bench.variables)
         plan = in_turn(bench.present, at_hand, bench.variables, tests)
-    files.write(out, "Table", tables.advice_table("", ranked).write)
-    show(tables.advice_table("Tests", ranked[:top]))
+    files.write(out, "Table", advice_table("", ranked).write)
+    show(advice_table("Tests", ranked[:top]))
     if plan:
-        show(tables.advice_table("A plan, each test chosen in addition to those before it", plan))
-        undetermined = [gain.name for gain in plan[-1].gains if not gain.after <= 1.0]
+        show(advice_table("A plan, each test chosen in addition to those before it", plan))
+        errors = zip(plan[-1].names, plan[-1].after, strict=True)
+        undetermined = [name for name, error in errors if not error <= 1.0]
         if undetermined:
             say(f"- After these, {', '.join(undetermined)} would still not be known to 100 %.")
-    show(tables.best_tests_table(ranked[0].gains, best_for_each(ranked)))
+    show(best_tests_table(ranked))
     for sensor in bench.sensors:
         note(_described(sensor))
     say(
@@ -171,11 +167,9 @@ def _bench(
     drive: str | None,
     axis: str | None,
     setup: str | None,
-    free: Sequence[str],
 ) -> Bench:
-    from swashplate.drive import Drive
     from swashplate.identification.drive_model import setup_of
-    from swashplate.identification.experiment_design import bench, default_sensors
+    from swashplate.identification.experiment_design import bench
     from swashplate.identification.fitting import smooth
     from swashplate.identification.setup import load_setup
 
@@ -184,10 +178,9 @@ def _bench(
             raise InputError("--axis belongs to a campaign; a drive is one axis.")
         parameters = parameters_of(drive or word)
         plan = load_setup(configuration_of(word, setup, parameters.name))
-        usual = default_sensors(Drive(parameters))
-        return bench(smooth(parameters), plan, free=free, sensors=usual)
+        return bench(smooth(parameters), plan)
     campaign, chosen = campaign_of(Path(word), axis)
     plan = setup_of(campaign, chosen, setup)
     runs = runs_to_fit(campaign, chosen)
     parameters = parameters_of(drive) if drive else campaign.drive(chosen).parameters
-    return bench(smooth(parameters), plan, runs, fitted=drive is not None, free=free)
+    return bench(smooth(parameters), plan, runs, fitted=drive is not None)

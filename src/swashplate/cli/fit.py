@@ -62,12 +62,6 @@ MEASURES = (
     "NRMSE is the RMSE over the standard deviation of what was measured, fit % is 100 (1 - NRMSE); "
     "'of its range' below means RMSE over the largest less the smallest value measured."
 )
-RESIDUALS = (
-    "'own' is how long residuals stay correlated, 'input' their largest correlation with the "
-    "command, at that lag (positive: after it). Residuals unrelated to the command stay "
-    "within the band at 95 % of the lags. * marks a model error: 0.5 and a third beyond the band, "
-    "as the largest of all lags by chance is not, or 0.9."
-)
 
 Loss = Literal["linear", "soft_l1", "cauchy"]
 Role = Literal["validate", "fit", "all"]
@@ -141,7 +135,7 @@ def fit(
         raise InputError(f"{model} says what is free and where it begins: leave out the others.")
     with working("Starting"):
         from swashplate.executors import Dask, Processes
-        from swashplate.identification.assessment import Wanted, judge_fit
+        from swashplate.identification.assessment import judge_fit
         from swashplate.identification.drive_model import setup_of
         from swashplate.identification.fitting import Search
         from swashplate.identification.fitting import fit as fitted
@@ -193,9 +187,22 @@ def fit(
             "command with --resume goes on; nothing is written but the starts."
         )
         raise typer.Exit(INTERRUPTED)
-    wanted = Wanted(folds, bootstrap, tuple(profile or ()), seed, executor, loss, require / 100.0)
     with working("Judging") as status:
-        found = judge_fit(campaign, runs, nominal, plan, result, wanted, status.update)
+        found = judge_fit(
+            campaign,
+            runs,
+            nominal,
+            plan,
+            result,
+            folds=folds,
+            bootstrap=bootstrap,
+            profiles=profile or (),
+            seed=seed,
+            executor=executor,
+            loss=loss,
+            required=require / 100.0,
+            watch=status.update,
+        )
         verdict = found.verdict
     judged = perf_counter()
     lines = _written(found, out)
@@ -300,9 +307,7 @@ def _say_verdict(verdict: Verdict) -> None:
     Exit
         With code 1 if what was judged is not usable.
     """
-    from swashplate.identification.tables import criteria_table
-
-    show(criteria_table(verdict))
+    show(verdict.table())
     bullets(verdict.not_judged)
     if verdict.assumed:
         say("Assumed, cannot be checked from these logs:")
@@ -380,8 +385,6 @@ def validate(
     note(f"{campaign.title}{virtual}, {chosen}: {parameters.name} from {drive}")
     show(*tables.runs_tables(qualities))
     say(MEASURES)
-    show(tables.residual_table(predicted))
-    say(RESIDUALS)
     bullets(judged.sentences)
     if out is not None:
         note(f"Measures:  {out / 'measures.csv'}")
@@ -478,7 +481,7 @@ def demo(*, out: Path = Path("demo"), seed: int = 1) -> None:
     """
     from swashplate.campaign import Campaign, rig
     from swashplate.drive import Drive
-    from swashplate.identification.assessment import Wanted, judge_fit
+    from swashplate.identification.assessment import judge_fit
     from swashplate.identification.fitting import drawn, fit
     from swashplate.identification.setup import load_setup
     from swashplate.identification.tables import estimates_table, runs_tables, truth_count
@@ -500,7 +503,7 @@ def demo(*, out: Path = Path("demo"), seed: int = 1) -> None:
         result = fit(start, runs, setup)
         searched = perf_counter()
         begin("computing intervals and verdict")
-        found = judge_fit(campaign, runs, start, setup, result, Wanted(seed=seed))
+        found = judge_fit(campaign, runs, start, setup, result, seed=seed)
         verdict = found.verdict
         judged = perf_counter()
         tables = [estimates_table(each, truth=truth.parameters) for each in found.assessments]

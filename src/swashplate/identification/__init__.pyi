@@ -1,6 +1,5 @@
 from .assessment import Assessment as Assessment
 from .assessment import Judged as Judged
-from .assessment import Wanted as Wanted
 from .assessment import assess as assess
 from .assessment import judge_fit as judge_fit
 from .assessment import load_fit as load_fit

@@ -6,7 +6,7 @@ import platform
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from datetime import date
-from functools import cached_property, partial
+from functools import cached_property
 from hashlib import blake2b
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -20,6 +20,7 @@ from swashplate.campaign.campaign import Campaign
 from swashplate.campaign.experiment import Experiment
 from swashplate.documents import read_json
 from swashplate.errors import FileError, InputError
+from swashplate.identification import tables
 from swashplate.identification.drive_model import (
     Parameters,
     stage_problem,
@@ -38,7 +39,7 @@ from swashplate.identification.intervals import (
     slopes_by_fixed,
     uncertainty,
 )
-from swashplate.identification.problem import LinearisedFit, linearised_fit
+from swashplate.identification.problem import LinearisedFit, Loss, linearised_fit
 from swashplate.identification.profile import Profile, checked_ends, profiles_of
 from swashplate.identification.resampling import (
     Bootstrap,
@@ -55,13 +56,10 @@ from swashplate.parameters.definitions import find
 from swashplate.parameters.files import dump_set, read_set
 from swashplate.parameters.parameter_set import Motion, ParameterSet
 from swashplate.results import Result
-from swashplate.tables import write_text
+from swashplate.tables import Table, write_text
 
 if TYPE_CHECKING:
-    from swashplate.campaign import Campaign, Experiment
     from swashplate.executors import Executor
-    from swashplate.identification.problem import Loss
-    from swashplate.tables import Table
 
 Array = NDArray[np.float64]
 
@@ -76,67 +74,51 @@ class Assessment(Result):
 
     def tables(self) -> list[Table]:
         """Estimates with their intervals, then the errors of each run."""
-        from swashplate.identification.tables import estimates_table, runs_tables
-
-        return [estimates_table(self), *runs_tables(self.runs)]
-
-    @property
-    def _vector(self) -> Array:
-        return self.stage.solution.vector
+        return [tables.estimates_table(self), *tables.runs_tables(self.runs)]
 
     @cached_property
     def linearised(self) -> LinearisedFit:
         """Residuals and derivatives at the optimum."""
-        return linearised_fit(self.stage.problem, self._vector, self.stage.solution.loss)
+        solution = self.stage.solution
+        return linearised_fit(self.stage.problem, solution.vector, solution.loss)
 
     @cached_property
     def identifiability(self) -> Identifiability:
         """Which unknowns the tests determine."""
-        problem = self.stage.problem
-        fixed = {
-            name: value
-            for name, value in self.stage.parameters.numbers.items()
-            if name not in problem.unknowns.names
-        }
+        fit, names = self.linearised, self.stage.problem.unknowns.names
+        fixed = {k: v for k, v in self.stage.parameters.numbers.items() if k not in names}
         try:
-            covariance = self.uncertainty.quoted.matrix
+            quoted = self.uncertainty.quoted.matrix
         except InputError:  # too few samples to tell the noise from
-            covariance = None
+            quoted = None
         return identifiability(
-            self.linearised.triangle,
-            self.linearised.variables,
-            covariance=covariance,
-            tolerance=self.linearised.tolerance,
-            fixed=fixed,
+            fit.triangle, fit.variables, covariance=quoted, tolerance=fit.tolerance, fixed=fixed
         )
 
     @cached_property
     def uncertainty(self) -> Uncertainty:
         """Errors of the estimates, for coloured residuals, those of earlier stages taken in."""
-        handed = []
+        problem, vector, handed = self.stage.problem, self.stage.solution.vector, []
         fixed = slopes_by_fixed(self.stage, self.linearised)
         for each in self.earlier:
             slopes = slopes_by_earlier(self.stage, each.stage, self.linearised)
             if slopes is not None:
-                before = each.uncertainty
-                handed.append(Handed(before.sampled, slopes))
+                handed.append(Handed(each.uncertainty.sampled, slopes))
                 # a fixed number acts on this stage by itself, and through what it does to others
-                fixed = fixed + slopes @ before.fixed
+                fixed = fixed + slopes @ each.uncertainty.fixed
         found = uncertainty(self.linearised, handed=handed, fixed=fixed)
-        said = prior_sentences(self.stage.problem.unknowns, self._vector, found.quoted)
-        found = replace(found, priors=said)
+        found = replace(found, priors=prior_sentences(problem.unknowns, vector, found.quoted))
         if not found.noisy:
             return found
-        half, fit = reach(found.own, found.level), released(self.linearised)
-        unknowns = enumerate(self.stage.problem.unknowns)
-        limits = [number for number, each in unknowns if each.targets[0].startswith(tuple(LIMITS))]
-        ends = checked_ends(self.stage.problem, self._vector, fit, half, limits)
+        half, fit = reach(found.own), released(self.linearised)
+        first = [each.targets[0].startswith(tuple(LIMITS)) for each in problem.unknowns]
+        ends = checked_ends(problem, vector, fit, half, np.flatnonzero(first).tolist())
         return replace(found, ends=tuple(ends))
 
     @cached_property
     def runs(self) -> tuple[RunQuality, ...]:
         """Quality of each channel of each run that was fitted."""
-        return run_qualities(self.stage.problem, self._vector)
+        return run_qualities(self.stage.problem, self.stage.solution.vector)
 
 
 def assess(stages: Sequence[StageFit]) -> tuple[Assessment, ...]:
@@ -147,19 +129,11 @@ def assess(stages: Sequence[StageFit]) -> tuple[Assessment, ...]:
     return tuple(made)
 
 
-@dataclass(frozen=True)
-class Wanted:
-    """What was asked for besides the fit."""
+class StageProfile(NamedTuple):
+    """A profile, and the stage whose unknown it is of."""
 
-    folds: int = 0
-    bootstrap: int = 0
-    profiles: tuple[str, ...] = ()
-    """Unknowns by name, or ``"all"``."""
-    seed: int = 0
-    executor: Executor | None = None
-    loss: Loss = "linear"
-    required: float = REQUIRED
-    """Largest error of held-out runs over their range."""
+    stage: str
+    profile: Profile
 
 
 @dataclass(frozen=True, eq=False)
@@ -188,8 +162,8 @@ class Judged(Result):
     def predicted(self) -> tuple[RunQuality, ...]:
         """Runs of the axis that were held out, predicted."""
         names = {each.name for each in self.runs}
-        held = self.campaign.select(axis=self.runs[0].axis, role="validate")
-        return predict(self.result.parameters, [each for each in held if each.name not in names])
+        out = self.campaign.select(axis=self.runs[0].axis, role="validate")
+        return predict(self.result.parameters, [each for each in out if each.name not in names])
 
     @cached_property
     def verdict(self) -> Verdict:
@@ -199,12 +173,10 @@ class Judged(Result):
 
     def tables(self) -> list[Table]:
         """Criteria of the verdict, then the fit's tables and the errors of held-out runs."""
-        from swashplate.identification.tables import criteria_table, runs_tables
-
         return [
-            criteria_table(self.verdict),
+            self.verdict.table(),
             *self.result.tables(),
-            *(runs_tables(self.predicted) if self.predicted else ()),
+            *tables.runs_tables(self.predicted),
         ]
 
     @property
@@ -227,15 +199,6 @@ class Judged(Result):
         FileError
             If the file cannot be written.
         """
-        stages = tuple(
-            StoredStage(
-                name=each.stage.name,
-                unknowns=each.problem.unknowns.items,
-                solution=each.solution,
-                starts=each.starts,
-            )
-            for each in self.result.stages
-        )
         start = self.result.nominal
         content = FitFile(
             swashplate=__version__,
@@ -244,7 +207,15 @@ class Judged(Result):
             runs={each.name: fingerprint(each) for each in self.runs},
             nominal=dict(start.numbers) if isinstance(start, ModelSetup) else dump_set(start),
             setup=self.result.setup,
-            stages=stages,
+            stages=tuple(
+                StoredStage(
+                    name=each.stage.name,
+                    unknowns=each.problem.unknowns.items,
+                    solution=each.solution,
+                    starts=each.starts,
+                )
+                for each in self.result.stages
+            ),
             profiles=tuple(self.profiles),
             folds=self.folds,
             notes=dict(self.notes),
@@ -260,17 +231,15 @@ class Judged(Result):
         found, nominal = self.result.drive.parameters, self.result.nominal
         assert isinstance(nominal, ParameterSet)
         today, ends = f"{date.today():%d %b %Y}", _interval_words(self.assessments, found)
-        parameters = {}
-        for symbol, parameter in found.parameters.items():
+        parameters = dict(found.parameters)
+        for symbol, parameter in parameters.items():
             if symbol in ends:
-                words = "; ".join(ends[symbol])
-                source = f"{self.campaign.path.name}, {today}; 95 %: {words}"
-                parameter = replace(parameter, status="fitted", source=source)
+                source = f"{self.campaign.path.name}, {today}; 95 %: {'; '.join(ends[symbol])}"
+                parameters[symbol] = replace(parameter, status="fitted", source=source)
             elif parameter.status != "inactive":
-                before = nominal.parameters.get(symbol, parameter)
-                source = f"{nominal.name}: {before.source}" if before.source else nominal.name
-                parameter = replace(parameter, status="fixed", source=source)
-            parameters[symbol] = parameter
+                before = nominal.parameters.get(symbol, parameter).source
+                source = f"{nominal.name}: {before}" if before else nominal.name
+                parameters[symbol] = replace(parameter, status="fixed", source=source)
         fitted = len(self.result.stages[0].problem.experiments)
         title = f"{self.campaign.title}: fitted to {fitted} runs, {today}"
         if not self.verdict.usable:
@@ -291,19 +260,16 @@ def _interval_words(assessments: Sequence[Assessment], found: ParameterSet) -> d
     for each in assessments:
         unknowns = each.stage.problem.unknowns
         for estimate, unknown in zip(each.uncertainty.estimates, unknowns, strict=True):
-            if unknown.run is not None:
-                continue
-            if unknown.name.startswith("force_"):
+            if unknown.run is None and unknown.name.startswith("force_"):
                 forces = ("Z19", "Z20", "Z21", "Z22")
                 words |= {symbol: ["from the fitted forces"] for symbol in forces}
-                continue
-            low, high = estimate.lower, estimate.upper
-            ends: str = estimate.status
-            if low is not None or high is not None:
-                ends = f"{'none below' if low is None else f'{low:.5g}'} to "
-                ends += "none above" if high is None else f"{high:.5g}"
-            for target in unknown.targets:
-                if target in found.numbers:
+            elif unknown.run is None:
+                low, high = estimate.lower, estimate.upper
+                ends: str = estimate.status
+                if low is not None or high is not None:
+                    ends = f"{'none below' if low is None else f'{low:.5g}'} to "
+                    ends += "none above" if high is None else f"{high:.5g}"
+                for target in (each for each in unknown.targets if each in found.numbers):
                     side = target.rpartition("_")[2]
                     side = f"{side} " if side in ("plus", "minus") else ""
                     words.setdefault(find(target).symbol, []).append(f"{side}{ends}")
@@ -316,7 +282,14 @@ def judge_fit(
     nominal: Parameters,
     plan: Setup,
     result: Fit,
-    wanted: Wanted,
+    *,
+    folds: int = 0,
+    bootstrap: int = 0,
+    profiles: Sequence[str] = (),
+    seed: int = 0,
+    executor: Executor | None = None,
+    loss: Loss = "linear",
+    required: float = REQUIRED,
     watch: Callable[[str], None] = lambda _: None,
 ) -> Judged:
     """A fit with what was asked for besides: folds, bootstrap, profiles.
@@ -327,10 +300,18 @@ def judge_fit(
         What was fitted, from where, and how.
     result : Fit
         What was found.
-    wanted : Wanted
-        Folds, bootstrap, profiles.
+    folds : int
+        Of the cross-validation; 0 for none.
+    bootstrap : int
+        Refits to new noise.
+    profiles : sequence of str
+        Unknowns by name, or ``"all"``.
+    seed, executor, loss :
+        Of the refits.
+    required : float
+        Largest error of held-out runs over their range. [1]
     watch : callable
-        Is told in words how far the work is.
+        Is given in words how far the work is.
 
     Raises
     ------
@@ -339,47 +320,42 @@ def judge_fit(
     """
     assessments = result.assessments
     known = [name for each in assessments for name in each.stage.problem.unknowns.names]
-    for name in wanted.profiles:
+    for name in profiles:
         if name != "all" and name not in known:
-            machine = [each for each in known if "(" not in each]
-            raise InputError(f"There is no parameter '{name}'; there are {', '.join(machine)}.")
-    folds, bootstraps, profiles = None, {}, list[StageProfile]()
-    if wanted.folds:
-        folds = cross_validate(
+            machine = ", ".join(each for each in known if "(" not in each)
+            raise InputError(f"There is no parameter '{name}'; there are {machine}.")
+    validated = bootstraps = None
+    if folds:
+        validated = cross_validate(
             runs,
             nominal,
             plan,
-            folds=wanted.folds,
-            loss=wanted.loss,
-            watch=lambda _, done: watch(f"{done} of {wanted.folds} folds"),
-            executor=wanted.executor,
-            seed=wanted.seed,
+            folds=folds,
+            loss=loss,
+            watch=lambda _, done: watch(f"{done} of {folds} folds"),
+            executor=executor,
+            seed=seed,
         )
-    if wanted.bootstrap:
+    if bootstrap:
         bootstraps = bootstraps_of(
             assessments,
-            wanted.bootstrap,
-            watch=lambda done: watch(f"{done} of {wanted.bootstrap} fits to new noise"),
-            executor=wanted.executor,
-            seed=wanted.seed,
+            bootstrap,
+            watch=lambda done: watch(f"{done} of {bootstrap} fits to new noise"),
+            executor=executor,
+            seed=seed,
         )
-    for each in assessments if wanted.profiles else ():
+    made = []
+    for each in assessments if profiles else ():
         stage, own = each.stage.stage.name, each.stage.problem.unknowns.names
-        every = "all" in wanted.profiles
-        found = profiles_of(
-            each,
-            None if every else [name for name in wanted.profiles if name in own],
-            executor=wanted.executor,
-            watch=partial(_profiled, watch, stage),
-        )
-        profiles += [StageProfile(stage, one) for one in found.values()]
-    notes = {**versions(), "seed": str(wanted.seed), "campaign": str(campaign.path)}
-    return Judged(campaign, result, runs, bootstraps, profiles, folds, notes, wanted.required)
 
+        def profiled(done: int, stage: str = stage) -> None:
+            watch(f"{stage}: {done} profiles")
 
-def _profiled(watch: Callable[[str], None], stage: str, done: int) -> None:
-    """Say how many parameters of a stage are profiled."""
-    watch(f"{stage}: {done} profiles")
+        names = None if "all" in profiles else [name for name in profiles if name in own]
+        found = profiles_of(each, names, executor=executor, watch=profiled)
+        made += [StageProfile(stage, one) for one in found.values()]
+    notes = {**versions(), "seed": str(seed), "campaign": str(campaign.path)}
+    return Judged(campaign, result, runs, bootstraps or {}, made, validated, notes, required)
 
 
 def versions() -> dict[str, str]:
@@ -387,11 +363,7 @@ def versions() -> dict[str, str]:
     return {"swashplate": __version__, "Python": platform.python_version()}
 
 
-class StageProfile(NamedTuple):
-    """A profile, and the stage whose unknown it is of."""
-
-    stage: str
-    profile: Profile
+# --- files ----------------------------------------------------------------------------------------
 
 
 class Entry(BaseModel):
@@ -443,7 +415,7 @@ def load_fit(
     campaign : Campaign
         The tests that were fitted.
     model : ModelSetup, optional
-        The model of one's own that was fitted; the file does not hold it.
+        The model of one's own that was fitted; the file does not have it.
     threads : int, optional
         As of `fitting.fit`.
 
@@ -460,7 +432,20 @@ def load_fit(
         raise FileError(
             f"{path} was written by swashplate {file.swashplate}, this is {__version__}: fit again."
         )
-    experiments = tuple(_same(campaign, name, mark, path) for name, mark in file.runs.items())
+    runs = {each.name: each for each in campaign}
+    for name, mark in file.runs.items():
+        if name not in runs:
+            raise InputError(
+                f"{path} was fitted to the run '{name}', which {campaign.path} has not: give the "
+                "campaign of the fit, or fit again."
+            )
+        if fingerprint(runs[name]) != mark:
+            raise InputError(
+                f"The run '{name}' of {campaign.path} is not as it was when {path} was fitted (its "
+                "samples, weights or ignored windows differ): name the campaign that was fitted, "
+                "or fit again."
+            )
+    experiments = tuple(runs[name] for name in file.runs)
     nominal: Parameters
     if isinstance(file.nominal, str):
         nominal = read_set(file.nominal, str(path))
@@ -476,16 +461,16 @@ def load_fit(
         problem = stage_problem(
             stage, parameters, experiments, threads=threads, uncertain=uncertain, starts=starts
         )
-        known, theirs = problem.unknowns.items, entry.unknowns
-        if (stage.name, [(each.name, each.run) for each in known]) != (
-            entry.name,
-            [(each.name, each.run) for each in theirs],
-        ) or entry.solution.vector.size != len(known):
+        ours, theirs = (
+            (name, [(unknown.name, unknown.run) for unknown in unknowns])
+            for name, unknowns in ((stage.name, problem.unknowns), (entry.name, entry.unknowns))
+        )
+        if ours != theirs or entry.solution.vector.size != len(entry.unknowns):
             raise FileError(
                 f"{path}: stage {entry.name} has other parameters than its fit configuration "
                 "makes: fit again."
             )
-        problem = replace(problem, unknowns=Unknowns(theirs))
+        problem = replace(problem, unknowns=Unknowns(entry.unknowns))
         parameters = with_estimates(parameters, problem, entry.solution.vector)
         starts |= start_currents_of(problem, entry.solution.vector)
         stages.append(StageFit(stage, problem, entry.solution, parameters, entry.starts))
@@ -505,20 +490,3 @@ def fingerprint(experiment: Experiment) -> str:
     for array in arrays:
         digest.update(np.ascontiguousarray(array).tobytes())
     return digest.hexdigest()
-
-
-def _same(campaign: Campaign, name: str, mark: str, path: str | Path) -> Experiment:
-    """A run of the campaign, if it is the one that was fitted."""
-    experiment = next((each for each in campaign if each.name == name), None)
-    if experiment is None:
-        raise InputError(
-            f"{path} was fitted to the run '{name}', which {campaign.path} has not: give the "
-            "campaign of the fit, or fit again."
-        )
-    if fingerprint(experiment) != mark:
-        raise InputError(
-            f"The run '{name}' of {campaign.path} is not as it was when {path} was fitted (its "
-            "samples, weights or ignored windows differ): name the campaign that was fitted, or "
-            "fit again."
-        )
-    return experiment

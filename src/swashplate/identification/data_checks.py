@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from dataclasses import replace
 from functools import partial
 from itertools import chain
 from typing import Literal, NamedTuple
@@ -12,7 +13,7 @@ from numpy.typing import NDArray
 
 from swashplate.campaign.campaign import Campaign
 from swashplate.campaign.experiment import Channel, Experiment
-from swashplate.campaign.quality import beyond_the_card, spiked, unsigned_currents
+from swashplate.campaign.quality import beyond_the_card, spiked, turned, unsigned_currents
 from swashplate.errors import InputError
 from swashplate.identification.drive_model import SIGNALS, simulated_run
 from swashplate.identification.model import EquationModel
@@ -20,25 +21,22 @@ from swashplate.identification.problem import Loss, Problem
 from swashplate.identification.setup import ModelSetup
 from swashplate.parameters.parameter_set import ParameterSet
 from swashplate.parameters.rules import FULL_VOLTAGE
-from swashplate.simulation.result import Simulation
 
 Array = NDArray[np.float64]
-
-Severity = Literal["refuse", "warn"]
 
 WINDOW = 0.2
 """Time over which the speed behind a position is taken. [s]"""
 MOVING = 0.1
 """Of the largest motion in any run, from which a run's own can be judged."""
-ALIKE = 0.5
-"""Correlation below minus which a signal is that of the drive turned round."""
 FAR_OFF = 3.0
 """By which a channel should not differ from the nominal drive."""
-FROZEN = 1.0
-"""Time for which no position stands still while its drive runs. [s]"""
-DEAD = 0.2
-"""Part of a channel's largest simulated range that a run must have for a still sensor to be
-broken."""
+FROZEN, DEAD = 1.0, 0.2
+"""Time for which no position stands still while its drive runs [s]; and the part of a channel's
+largest simulated range that a run must have for a still sensor to be broken."""
+COARSE = 0.01
+"""Interval of an input from which it matters what it is between samples. [s]"""
+BETTER = 0.7
+"""Error of the other interpolation, over that of the stated one, below which it is meant."""
 NAMED = 8
 """Unknowns that a sentence names."""
 
@@ -46,7 +44,7 @@ NAMED = 8
 class Finding(NamedTuple):
     """Something that stands in the way of a fit."""
 
-    severity: Severity
+    severity: Literal["refuse", "warn"]
     """"refuse" where no result could mean anything; "warn" where some of it could."""
     run: str | None
     """The experiment's name; None for the campaign or its set-up."""
@@ -73,25 +71,18 @@ def check_runs(experiments: Sequence[Experiment], nominal: ParameterSet) -> list
     for each in experiments:
         found += _samples(each, [n for n, c in each.channels.items() if c.kind in SIGNALS])
     if not _refused(found):
-        found += idle_commands(experiments, nominal)
-    if _refused(found):
-        return found
-    of_channels = motions(experiments, nominal)
-    for check in (_still_sensors, _frozen_positions, contradictions):
-        said = {(each.run, each.channel) for each in found}
-        left = {
-            name: [
-                each
-                for each in ours
-                if said.isdisjoint({(each.experiment.name, name), (each.experiment.name, None)})
-            ]
-            for name, ours in of_channels.items()
-        }
-        found += check(left)
+        found += _idle_commands(experiments, nominal)
+    if not _refused(found):
+        for name, ours in motions(experiments, nominal).items():
+            idle = {each.run for each in found if each.channel is None}
+            still = [*_still(name, [each for each in ours if each.run not in idle])]
+            seen = idle | {each.run for each in still}
+            found += still
+            found += contradictions({name: [each for each in ours if each.run not in seen]})
     return sorted(found, key=lambda each: each.severity != "refuse")
 
 
-def check_model(experiments: Sequence[Experiment], setup: ModelSetup) -> tuple[Finding, ...]:
+def check_model(experiments: Sequence[Experiment], setup: ModelSetup) -> list[Finding]:
     """What stands in the way of a fit of a model of one's own, as `check_runs` of a drive.
 
     Whatever the model: samples that are no numbers, sensors that stand still while their input
@@ -101,7 +92,7 @@ def check_model(experiments: Sequence[Experiment], setup: ModelSetup) -> tuple[F
     for each in experiments:
         found += _samples(each, setup.channels or tuple(each.channels))
     if _refused(found):
-        return tuple(found)
+        return found
     problem = setup.problem(experiments)
     moving = {n for e in experiments for n, c in e.channels.items() if np.ptp(c.values) > 0.0}
     for each in problem.experiments:
@@ -109,17 +100,16 @@ def check_model(experiments: Sequence[Experiment], setup: ModelSetup) -> tuple[F
         arrays = [each.input.values, *(each[name].values for name in names)]
         first = seen.setdefault(b"".join(array.tobytes() for array in arrays), each.name)
         if first != each.name:
-            said = (
-                f"{each.name} has the samples of {first}, to the last bit, and counts twice; leave"
-            )
-            found.append(warning(each.name, None, f'{said} one of them out with role = "ignore".'))
+            said = f"{each.name} has the samples of {first}, to the last bit, and counts twice; "
+            said += 'leave one of them out with role = "ignore".'
+            found.append(warning(each.name, None, said))
         for name in names if np.ptp(each.input.values) > 0.0 else ():
             used = each[name].values[each[name].used]
             if name in moving and used.size and np.ptp(used) == 0.0:
                 said = f"{each.name}: '{name}' never changes, though the input does and it moves in"
-                also = "other runs; look at the sensor, or ignore the channel in this run."
-                found.append(warning(each.name, name, f"{said} {also}"))
-    return tuple(sorted(found, key=lambda each: each.severity != "refuse"))
+                said += " other runs; look at the sensor, or ignore the channel in this run."
+                found.append(warning(each.name, name, said))
+    return found
 
 
 def contradicting_runs(
@@ -159,53 +149,40 @@ def _refused(found: Sequence[Finding]) -> bool:
     return any(each.severity == "refuse" for each in found)
 
 
-# --- samples --------------------------------------------------------------------------------------
+# --- samples and commands -------------------------------------------------------------------------
 
 
-def _samples(experiment: Experiment, fitted: Collection[str]) -> list[Finding]:
+def _samples(experiment: Experiment, fitted: Collection[str]) -> Iterator[Finding]:
     """Runs without two samples, and numbers that are none."""
-    name, signal = experiment.name, experiment.input
+    run, signal = experiment.name, experiment.input
     bad = ~(np.isfinite(signal.values) & np.isfinite(signal.time))
     if signal.values.size < 2:
         said = f"its input has {_count(signal.values.size)}; at least two are needed, and a run "
-        return [refusal(name, None, f"{name}: {said}with motion has hundreds.")]
+        yield refusal(run, None, f"{run}: {said}with motion has hundreds.")
+        return
     if bad.any():
-        said = f"{name}: its input is not finite at sample {int(np.argmax(bad))}; mend the log or "
-        return [refusal(name, None, f"{said}cut the run with a span.")]
-    channels = (each for key, each in experiment.channels.items() if key in fitted)
-    return [finding for each in channels for finding in _of_channel(name, each)]
-
-
-def _of_channel(run: str, channel: Channel) -> list[Finding]:
-    used, name = channel.used, channel.name
-    if channel.values.size and not used.any():
-        return []
-    bad = used & ~(np.isfinite(channel.values) & np.isfinite(channel.time))
-    samples = int(np.count_nonzero(used))
-    if bad.any():
-        said = (
-            f"is not finite in {_count(int(np.count_nonzero(bad)))}, the first at "
-            f'{channel.time[np.argmax(bad)]:.6g} s; say missing = "drop", or ignore a window, the '
-            "channel or the run."
-        )
-    elif samples < 2:
-        said = (
-            f"has {_count(samples)} that can count, which shows no motion; leave the run "
-            'out with role = "ignore".'
-        )
-    else:
-        return []
-    return [refusal(run, name, f"{run}: '{name}' {said}")]
+        said = f"{run}: its input is not finite at sample {int(np.argmax(bad))}; mend the log or "
+        yield refusal(run, None, f"{said}cut the run with a span.")
+        return
+    for name, channel in experiment.channels.items():
+        used, samples = channel.used, int(np.count_nonzero(channel.used))
+        if name not in fitted or (channel.values.size and not samples):
+            continue
+        bad = used & ~(np.isfinite(channel.values) & np.isfinite(channel.time))
+        if bad.any():
+            said = f"is not finite in {_count(int(np.count_nonzero(bad)))}, the first at "
+            said += f'{channel.time[np.argmax(bad)]:.6g} s; say missing = "drop", or ignore a '
+            yield refusal(run, name, f"{run}: '{name}' {said}window, the channel or the run.")
+        elif samples < 2:
+            said = f"has {_count(samples)} that can count, which shows no motion; leave the run "
+            yield refusal(run, name, f"{run}: '{name}' {said}out with role = \"ignore\".")
 
 
 def _count(samples: int) -> str:
     return f"{samples} sample{'' if samples == 1 else 's'}"
 
 
-# --- commands -------------------------------------------------------------------------------------
-
-
-def idle_commands(experiments: Sequence[Experiment], nominal: ParameterSet) -> list[Finding]:
+def _idle_commands(experiments: Sequence[Experiment], nominal: ParameterSet) -> list[Finding]:
     """Commands that move nothing."""
     idle, numbers = {}, nominal.numbers
     symbols = {"voltage": ("V_dz", "V_dz_minus", "V_dz_plus"), "current": ("Z17", "Z17", "Z17")}
@@ -216,26 +193,20 @@ def idle_commands(experiments: Sequence[Experiment], nominal: ParameterSet) -> l
         low, high = -numbers[minus], numbers[plus]
         least, most, unit = each.input.values.min(), each.input.values.max(), each.input.unit
         if low <= least and most <= high:
-            idle[each.name] = (
-                f"its command stays between {least:.3g} and {most:.3g} {unit}, within the dead "
-                f"zone {symbol} ({low:.3g} to {high:.3g} {unit})"
-            )
-    if idle and len(idle) == len(experiments):
-        first, why = next(iter(idle.items()))
-        others = ", and so it is in all other runs" if len(idle) > 1 else ""
-        peak = 1e3 * max(float(np.abs(each.input.values).max()) for each in experiments)
+            zone = f"the dead zone {symbol} ({low:.3g} to {high:.3g} {unit})"
+            idle[each.name] = f"stays between {least:.3g} and {most:.3g} {unit}, within {zone}"
+    if not idle or len(idle) < len(experiments):
+        also = "; it shows the drive at rest only."
+        return [warning(run, None, f"{run}: its command {why}{also}") for run, why in idle.items()]
+    first, why = next(iter(idle.items()))
+    others = ", and so it is in all other runs" if len(idle) > 1 else ""
+    said = f"{first}: its command {why}{others}; a drive that does not move cannot be identified: "
+    said += "use larger commands"
+    peak = 1e3 * max(float(np.abs(each.input.values).max()) for each in experiments)
+    if experiments[0].input.kind == "voltage" and 1.0 <= peak <= FULL_VOLTAGE:
         # a thousandth of a usual command, in volts that were declared as millivolts
-        meant = f' or, if the log is in V, write unit = "V": it then reaches {peak:.3g} V'
-        millivolts = experiments[0].input.kind == "voltage" and 1.0 <= peak <= FULL_VOLTAGE
-        said = (
-            f"{first}: {why}{others}; a drive that does not move cannot be identified: "
-            f"use larger commands{meant * millivolts}."
-        )
-        return [refusal(first, None, said)]
-    return [
-        warning(run, None, f"{run}: {why}; it shows the drive at rest only.")
-        for run, why in idle.items()
-    ]
+        said += f', or, if the log is in V, write unit = "V": it then reaches {peak:.3g} V'
+    return [refusal(first, None, f"{said}.")]
 
 
 # --- what channels do beside the nominal drive ----------------------------------------------------
@@ -244,7 +215,7 @@ def idle_commands(experiments: Sequence[Experiment], nominal: ParameterSet) -> l
 class Motion(NamedTuple):
     """What a channel did in a run, measured and simulated, where it counts."""
 
-    experiment: Experiment
+    run: str
     channel: Channel
     time: Array
     """(n,) [s]"""
@@ -259,9 +230,11 @@ class Motion(NamedTuple):
         return float(self.measured @ self.simulated / (self.simulated @ self.simulated))
 
     @property
-    def correlation(self) -> float:
-        """Of measured and simulated about zero, -1 to 1."""
-        return _correlation(self.measured, self.simulated)
+    def unlike(self) -> float:
+        """Share of the measured square sum that the best multiple of the simulated one leaves."""
+        total = float(self.measured @ self.measured)
+        left = self.measured - self.gain * self.simulated
+        return float(left @ left) / total if total > 0.0 else 1.0
 
 
 def motions(experiments: Sequence[Experiment], parameters: ParameterSet) -> dict[str, list[Motion]]:
@@ -275,7 +248,11 @@ def motions(experiments: Sequence[Experiment], parameters: ParameterSet) -> dict
             if signal is None or driven or np.count_nonzero(used) < 2:
                 continue
             time, measured = channel.time[used], channel.values[used]
-            simulated = _simulated(simulation, signal, time)
+            both = ("current_positive", "current_negative")
+            parts = both if signal == "current_sum" else (signal,)
+            simulated = np.sum(
+                [np.interp(time, simulation.time, simulation[each]) for each in parts], axis=0
+            )
             if channel.is_position:
                 # mean speeds in short windows: where a position drifts to says little
                 windows = max(int((time[-1] - time[0]) / WINDOW), 4)
@@ -285,119 +262,69 @@ def motions(experiments: Sequence[Experiment], parameters: ParameterSet) -> dict
                     for each in (measured, simulated)
                 )
                 time = 0.5 * (grid[1:] + grid[:-1])
-            found.setdefault(name, []).append(
-                Motion(experiment, channel, time, measured, simulated)
-            )
-    moving = {}
-    for name, ours in found.items():
-        sizes = [_rms(each.simulated) for each in ours]
-        pairs = zip(ours, sizes, strict=True)
-        moving[name] = [m for m, size in pairs if size > 0.0 and size >= MOVING * max(sizes)]
-    return moving
-
-
-def _simulated(simulation: Simulation, signal: str, time: Array) -> Array:
-    if signal == "current_sum":
-        plus, minus = (simulation.at(time, f"current_{side}") for side in ("positive", "negative"))
-        return plus + minus
-    return simulation.at(time, signal)
-
-
-def _rms(values: Array) -> float:
-    return float(np.sqrt(np.mean(np.square(values)))) if values.size else 0.0
-
-
-def _correlation(first: Array, second: Array) -> float:
-    size = float(np.linalg.norm(first) * np.linalg.norm(second))
-    return float(first @ second) / size if size > 0.0 else 0.0
-
-
-def _still_sensors(of_channels: Mapping[str, Sequence[Motion]]) -> list[Finding]:
-    """Sensors that show nothing while the drive moves."""
-    found = []
-    for name, ours in of_channels.items():
-        largest = max((float(np.ptp(each.simulated)) for each in ours), default=0.0)
-        for each in ours:
-            moves, run = float(np.ptp(each.simulated)), each.experiment.name
-            unit = f"{each.channel.unit}/s" if each.channel.is_position else each.channel.unit
-            if float(np.ptp(each.measured)) == 0.0 and moves > DEAD * largest:
-                said = f"never changes, though the drive should move it by about {moves:.3g} {unit}"
-                also = "look at the sensor, and ignore the channel in this run."
-                found.append(refusal(run, name, f"{run}: '{name}' {said}; {also}"))
+            ours = Motion(experiment.name, channel, time, measured, simulated)
+            found.setdefault(name, []).append(ours)
+    for name, each in found.items():
+        sizes = [float(np.sqrt(np.mean(np.square(one.simulated)))) for one in each]
+        least = MOVING * max(sizes)
+        kept = zip(each, sizes, strict=True)
+        found[name] = [one for one, size in kept if size > 0.0 and size >= least]
     return found
 
 
-def _frozen_positions(of_channels: Mapping[str, Sequence[Motion]]) -> list[Finding]:
-    """Positions that stay the same to the last count for a while in which the drive runs."""
-    found = []
-    for name, ours in of_channels.items():
-        fastest = max((float(np.abs(each.simulated).max()) for each in ours), default=0.0)
-        for each in (each for each in ours if each.channel.is_position):
-            frozen = (each.measured == 0.0) & (np.abs(each.simulated) > DEAD * fastest)
-            edges = np.flatnonzero(np.diff(np.concatenate([[False], frozen, [False]])))
-            half = 0.5 * float(np.median(np.diff(each.time)))
-            windows = [
-                (each.time[first] - half, each.time[stop - 1] + half)
-                for first, stop in zip(edges[::2], edges[1::2], strict=True)
-            ]
-            long = [window for window in windows if window[1] - window[0] > FROZEN]
-            if long:
-                (begin, end), run = long[0], each.experiment.name
-                said = (
-                    f"{run}: '{name}' stands still from {begin:.4g} to {end:.4g} s, though the "
-                    "drive should move it; look at the sensor and at the machine's stops, and "
-                    "ignore that window."
-                )
-                found.append(warning(run, name, said))
-    return found
-
-
-# --- runs beside each other -----------------------------------------------------------------------
+def _still(name: str, ours: Sequence[Motion]) -> Iterator[Finding]:
+    """Sensors that show nothing while the drive moves, and positions that freeze for a while."""
+    ranges = [float(np.ptp(each.simulated)) for each in ours]
+    fastest = max((float(np.abs(each.simulated).max()) for each in ours), default=0.0)
+    for each, moves in zip(ours, ranges, strict=True):
+        where, position = f"{each.run}: '{name}'", each.channel.is_position
+        if np.ptp(each.measured) == 0.0 and moves > DEAD * max(ranges):
+            unit = f"{each.channel.unit}/s" if position else each.channel.unit
+            said = f"never changes, though the drive should move it by about {moves:.3g} {unit}"
+            also = "look at the sensor, and ignore the channel in this run."
+            yield refusal(each.run, name, f"{where} {said}; {also}")
+            continue
+        frozen = (each.measured == 0.0) & (np.abs(each.simulated) > DEAD * fastest) & position
+        edges = np.flatnonzero(np.diff(np.concatenate([[False], frozen, [False]])))
+        half = 0.5 * float(np.median(np.diff(each.time)))
+        for first, stop in zip(edges[::2], edges[1::2], strict=True):
+            begin, end = each.time[first] - half, each.time[stop - 1] + half
+            if end - begin > FROZEN:
+                said = f"stands still from {begin:.4g} to {end:.4g} s, though the drive should move"
+                also = "it; look at the sensor and at the machine's stops, and ignore that window."
+                yield warning(each.run, name, f"{where} {said} {also}")
+                break
 
 
 def contradictions(of_channels: Mapping[str, Sequence[Motion]]) -> list[Finding]:
     """Runs whose sign or scale beside the drive cannot be right, or a channel's as a whole."""
-    found: list[Finding] = []
-    for name, ours in of_channels.items():
-        turned = [each for each in ours if each.correlation < -ALIKE]
-        found += _turned(name, turned, len(ours))
-        found += _scales(name, [each for each in ours if each not in turned])
-    return found
+    return [each for name, ours in of_channels.items() for each in _contradictions(name, ours)]
 
 
-def _turned(name: str, turned: Sequence[Motion], runs: int) -> list[Finding]:
-    if runs > 1 and len(turned) == runs:
-        said = f"In all {runs} runs '{name}' goes against the command: reverse it with "
-        return [refusal(None, name, f"{said}sign = -1 in its channel, or the input's.")]
-    others = "" if runs == 1 else ", in the other runs with it"
-    return [
-        refusal(
-            each.experiment.name,
-            name,
-            f"In {each.experiment.name} '{name}' goes against the command{others}: reverse it "
-            'with sign = -1 for this run, or leave the run out with role = "ignore".',
-        )
-        for each in turned
-    ]
-
-
-def _scales(name: str, ours: Sequence[Motion]) -> list[Finding]:
-    gains = np.array([abs(each.gain) for each in ours])
-    middle = float(np.median(gains)) if ours else 1.0
+def _contradictions(name: str, ours: Sequence[Motion]) -> Iterator[Finding]:
+    against = [turned(each.simulated, each.measured) for each in ours]
+    if len(ours) > 1 and all(against):
+        said = f"In all {len(ours)} runs '{name}' goes against the command: reverse it with "
+        yield refusal(None, name, f"{said}sign = -1 in its channel, or the input's.")
+        return
+    others = "" if len(ours) == 1 else ", in the other runs with it"
+    for each in (each for each, wrong in zip(ours, against, strict=True) if wrong):
+        said = f"In {each.run} '{name}' goes against the command{others}: reverse it with "
+        said += 'sign = -1 for this run, or leave the run out with role = "ignore".'
+        yield refusal(each.run, name, said)
+    left = [each for each, wrong in zip(ours, against, strict=True) if not wrong]
+    gains = np.array([abs(each.gain) for each in left])
+    middle = float(np.median(gains)) if left else 1.0
     hint = "check its unit, scale, counts_per_turn (quadrature included) and the drive."
     if not 1.0 / FAR_OFF < middle < FAR_OFF:
         said = f"'{name}' moves {middle:.3g} times as far as in the nominal drive: {hint}"
-        return [warning(None, name, said)]
-    return [
-        warning(
-            each.experiment.name,
-            name,
-            f"In {each.experiment.name} '{name}' moves {gain:.3g} times as far as in the nominal "
-            f"drive, in the other runs {middle:.3g} times: {hint}",
-        )
-        for each, gain in zip(ours, gains, strict=True)
-        if not 1.0 / FAR_OFF < gain / middle < FAR_OFF
-    ]
+        yield warning(None, name, said)
+        return
+    for each, gain in zip(left, gains, strict=True):
+        if not 1.0 / FAR_OFF < gain / middle < FAR_OFF:
+            said = f"In {each.run} '{name}' moves {gain:.3g} times as far as in the nominal drive, "
+            said += f"in the other runs {middle:.3g} times: {hint}"
+            yield warning(each.run, name, said)
 
 
 # --- what the runs determine ----------------------------------------------------------------------
@@ -424,16 +351,39 @@ def beside_the_drives(campaign: Campaign) -> list[str]:
     for name, axis in campaign.axes.items():
         if axis.drive is None:
             continue
-        nominal = smooth(campaign.drive(name).parameters)
-        runs = campaign.select(axis=name)
-        beyond = {each.name: beyond_the_card(each) for each in runs}
-        found += [
-            f"{said}; this run is not compared with the drive"
-            for said in chain.from_iterable(beyond.values())
-        ]
-        runs = tuple(each for each in runs if not beyond[each.name])
+        nominal, runs = smooth(campaign.drive(name).parameters), []
+        for each in campaign.select(axis=name):
+            beyond = beyond_the_card(each)
+            found += [f"{said}; this run is not compared with the drive" for said in beyond]
+            runs += [] if beyond else [each]
         # a drive that is made up says nothing of what a machine does
         made_up = all(each.status == "assumed" for each in nominal.values())
         if runs and not made_up and all(each.input.kind != "other" for each in runs):
             found += [each.sentence.rstrip(".") for each in check_runs(runs, nominal)]
+            found += _other_interpolation(name, runs, nominal)
     return found
+
+
+def _other_interpolation(axis: str, runs: Sequence[Experiment], nominal: ParameterSet) -> list[str]:
+    """A sentence if coarsely sampled commands fit much better straight than held, or held.
+
+    A held command acts half a sample later, which a delay takes: the best of three delays counts.
+    """
+    step = float(np.median([np.median(np.diff(each.input.time)) for each in runs]))
+    stated = runs[0].input.interpolation
+    other: Literal["previous", "linear"] = "linear" if stated == "previous" else "previous"
+    left = dict.fromkeys((stated, other), np.inf)
+    for kind in left if step >= COARSE else ():
+        ours = [replace(each, input=replace(each.input, interpolation=kind)) for each in runs]
+        for later in (-0.5 * step, 0.0, 0.5 * step):
+            delayed = nominal.replace({"tau": max(nominal.numbers["tau"] + later, 0.0)})
+            of_channels = chain.from_iterable(motions(ours, delayed).values())
+            unlike = [each.unlike for each in of_channels]
+            left[kind] = min(left[kind], float(np.sqrt(np.mean(unlike or [1.0]))))
+    if not left[other] < BETTER * left[stated] < np.inf:
+        return []
+    return [
+        f"the input of the axis '{axis}' seems to be {other!r} between samples: the drive differs "
+        f"from the runs by {100.0 * left[other]:.2g} % then, now by {100.0 * left[stated]:.2g} %; "
+        f'try interpolation = "{other}" in [axes.{axis}.input]'
+    ]

@@ -17,7 +17,7 @@ from swashplate.campaign.samples import signed_by_command
 from swashplate.campaign.schema import SIGNALS as SIGNALS
 from swashplate.drive import Drive
 from swashplate.equations.marching.jacobian import residuals
-from swashplate.equations.marching.observation import Observation, ObservedRecord
+from swashplate.equations.marching.observation import Observation, ObservedRecord, Own
 from swashplate.equations.marching.record import SLOWEST, SOURCE_RATE, Record, even_rate, record_of
 from swashplate.errors import DomainError, InputError, ParameterError
 from swashplate.executors import available_cores
@@ -37,9 +37,9 @@ from swashplate.parameters.parameter_set import ParameterSet
 from swashplate.parameters.rules import FULL_VOLTAGE
 from swashplate.results import Result
 from swashplate.simulation.instance import START_PRESSURE, at_every_rate
-from swashplate.simulation.residuals import Own, Ready, made_ready
+from swashplate.simulation.residuals import Ready, made_ready
 from swashplate.simulation.result import Limit, Simulation
-from swashplate.simulation.run import check_voltage, simulate_drive, simulate_pump
+from swashplate.simulation.run import check_voltage, simulate_drive
 
 Array = NDArray[np.float64]
 Part = Literal["card", "pump", "chain"]
@@ -163,11 +163,12 @@ def simulated_run(experiment: Experiment, parameters: ParameterSet) -> Simulatio
     DomainError
         If the model does not hold under it.
     """
-    begins = experiment.begins, experiment.start_pressure
     try:
         if experiment.input.kind == "current":
-            return simulate_pump(parameters, measured_current(experiment), *begins)
-        return simulate_drive(parameters, voltage_record(experiment), *begins)
+            records = {"current": measured_current(experiment)}
+        else:
+            records = {"voltage": voltage_record(experiment)}
+        return simulate_drive(parameters, records, experiment.begins, experiment.start_pressure)
     except InputError as error:
         raise InputError(f"{experiment.input.source}: {error}") from None
 
@@ -268,7 +269,9 @@ class DriveModel(Result, EquationModel):
             if name in values
             for path in self.moves(name)
         }
-        own = Own(values.get(START_PRESSURE), offsets, states=states)
+        if START_PRESSURE in values:
+            states[START_PRESSURE] = values[START_PRESSURE]
+        own = Own(states, offsets)
         try:
             return made_ready(self.parameters_at(values), observed, columns, own)
         except InputError as error:  # a filter that is unstable at this step

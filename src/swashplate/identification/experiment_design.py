@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from math import inf
 from pathlib import Path
-from typing import Literal, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,12 +21,7 @@ from swashplate.campaign.experiment import Channel, Experiment, InputSignal, Sou
 from swashplate.campaign.rig import COUNTS_PER_TURN
 from swashplate.drive import Drive
 from swashplate.errors import InputError
-from swashplate.identification.drive_model import (
-    CURRENTS,
-    SIGNALS,
-    DriveModel,
-    stage_problem,
-)
+from swashplate.identification.drive_model import CURRENTS, DriveModel, stage_problem
 from swashplate.identification.identifiability import Identifiability, identifiability
 from swashplate.identification.intervals import uncertainty
 from swashplate.identification.problem import (
@@ -37,38 +32,22 @@ from swashplate.identification.problem import (
     triangular_factor,
     whitening,
 )
-from swashplate.identification.setup import Forces, Free, Setup, Stage
+from swashplate.identification.setup import Setup, Stage
 from swashplate.identification.unknowns import Unknowns
 from swashplate.maneuvers import Maneuver, multisine, ramp, sine, stairs, step
-from swashplate.parameters.definitions import CATALOGUE, COLUMNS, find
+from swashplate.parameters.definitions import CATALOGUE, COLUMNS
 from swashplate.parameters.parameter_set import HasParameters, ParameterSet, set_of
 from swashplate.parameters.rules import FULL_VOLTAGE
 from swashplate.results import Result, short
-from swashplate.tables import listed
+from swashplate.tables import Column, Table, listed
 
 Array = NDArray[np.float64]
 
 # --- what the runs tell ---------------------------------------------------------------------------
 
-OTHERS = "a tilted swash plate"
-"""What parameters need that say nothing of it, and single runs' numbers."""
-
-
-def need_of(name: str, forces: Forces | None = None) -> str:
-    """What an unknown needs, in words."""
-    if forces is not None and name in forces.names:
-        _, side, number = name.split("_")
-        return f"{getattr(forces, side)[int(number) - 1]:g} A beyond Z17"
-    symbol = COLUMNS.get(name, name)
-    return (CATALOGUE[symbol].needs if symbol in CATALOGUE else "") or OTHERS
-
-
-Mark = Literal["most", "some", "none"]
-
-ALONE = 0.9
-"""Share of a single run from which an unknown is said to rest on it."""
-MOST = 0.2
-"""Share of a run's information from which it is one of those that tell most."""
+MOST, ALONE = 0.2, 0.9
+"""Share of a run's information from which it is one of those that tell most of an unknown, and from
+which the unknown is said to rest on that run."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,81 +64,82 @@ class Outlook(Result):
         return tuple(each.name for each in self.problem.unknowns if each.run is None)
 
     @property
-    def runs(self) -> tuple[str, ...]:
-        """Names of the runs that the stage fits."""
-        return tuple(each.name for each in self.problem.experiments)
-
-    @property
     def _model(self) -> DriveModel:
         assert isinstance(self.problem.model, DriveModel)
         return self.problem.model
 
-    def need(self, name: str) -> str:
-        """What an unknown needs, in words."""
-        return need_of(name, self._model.forces)
-
     @cached_property
     def identifiability(self) -> Identifiability:
         """Which unknowns the runs determine, and directions that change nothing."""
-        taken = {target for each in self.problem.unknowns for target in each.targets}
-        return identifiability(
-            self.linearised.triangle,
-            self.linearised.variables,
-            tolerance=self.linearised.tolerance,
-            fixed={k: v for k, v in self._model.parameters.numbers.items() if k not in taken},
-        )
+        fit, taken = self.linearised, {t for each in self.problem.unknowns for t in each.targets}
+        numbers = self._model.parameters.numbers
+        fixed = {name: value for name, value in numbers.items() if name not in taken}
+        return identifiability(fit.triangle, fit.variables, tolerance=fit.tolerance, fixed=fixed)
 
     @cached_property
-    def shares(self) -> Array:
-        """(runs, K) part of what is known of an unknown from each run, its channels together."""
-        runs = self.runs
-        squares = np.zeros((len(runs), self.linearised.variables.count))
-        for run in self.linearised.runs:
-            squares[runs.index(run.name)] += np.sum(run.jacobian**2, axis=0)
-        total = squares.sum(axis=0)
-        shares: Array = np.divide(squares, total, out=np.zeros_like(squares), where=total > 0.0)
-        return shares
+    def shares(self) -> dict[str, dict[str, float]]:
+        """Part of what is known of an unknown, by name, from each run, its channels together."""
+        squares = dict.fromkeys((each.name for each in self.problem.experiments), 0.0)
+        squares |= {
+            name: sum(np.sum(r.jacobian**2, axis=0) for r in self.linearised.runs if r.name == name)
+            for name in squares
+        }
+        total = np.maximum(sum(squares.values()), 1e-300)
+        places = {name: self.linearised.variables.index(name) for name in self.names}
+        return {
+            name: {run: float((own / total)[k]) for run, own in squares.items()}
+            for name, k in places.items()
+        }
 
     def effect(self, name: str) -> float:
         """Length of the change of all weighted residuals for 1 % of an unknown; 1 is one noise."""
         return float(self.identifiability.sensitivity[self.linearised.variables.index(name)])
 
-    def marks(self, name: str) -> tuple[Mark, ...]:
-        """Whether each run tells most of an unknown, some, or none."""
-        share = self.shares[:, self.linearised.variables.index(name)]
-        return tuple("most" if s >= MOST else "some" if s > 0.0 else "none" for s in share)
+    def need(self, name: str) -> str:
+        """What an unknown needs, in words; parameters that say nothing of it tilt the plate."""
+        forces = self._model.forces
+        if forces is not None and name in forces.names:
+            _, side, number = name.split("_")
+            return f"{getattr(forces, side)[int(number) - 1]:g} A beyond Z17"
+        definition = CATALOGUE.get(COLUMNS.get(name, name))
+        return (definition.needs if definition is not None else "") or "a tilted swash plate"
 
     def sentences(self) -> tuple[str, ...]:
         """What no run tells of, why, and what rests on one run alone."""
         groups: dict[str, list[str]] = {}
         for name in self.identifiability.unexcited:
             if name in self.names:
-                groups.setdefault(self._missing(name), []).append(name)
+                force = name.startswith("force_")
+                need = "currents of their size beyond Z17" if force else self.need(name)
+                side = next((f" ({s})" for s in ("plus", "minus") if f"_{s}" in name), "")
+                instead = "ask for forces at smaller currents" if force else "fix it"
+                why = f"{need}{side}, which no sample shows: {instead}, or add a test that has it."
+                groups.setdefault(why, []).append(name)
         said = [
-            f"{listed(names)} need{'s' if len(names) == 1 else ''} {why}."
+            f"{listed(names)} need{'s' if len(names) == 1 else ''} {why}"
             for why, names in groups.items()
         ]
-        runs = self.runs
-        for name in self.names if len(runs) > 1 else ():
-            share = self.shares[:, self.linearised.variables.index(name)]
-            most = int(np.argmax(share))
-            if share[most] >= ALONE:
-                said.append(
-                    f"{name}: {100.0 * share[most]:.0f} % of its information is from {runs[most]} "
-                    "alone."
-                )
+        for name, shares in self.shares.items() if len(self.problem.experiments) > 1 else ():
+            run = max(shares, key=lambda each: shares[each])
+            if shares[run] >= ALONE:
+                part = f"{100.0 * shares[run]:.0f} %"
+                said.append(f"{name}: {part} of its information is from {run} alone.")
         return tuple(said)
 
-    def _missing(self, name: str) -> str:
-        """What an unknown that no sample depends on needs."""
-        need = self.need(name)
-        if name.startswith("force_"):
-            need = "currents of their size beyond Z17"
-        side = next((each for each in ("plus", "minus") if f"_{each}" in name), None)
-        need = need if side is None else f"{need} ({side})"
-        forces = name.startswith("force_")
-        instead = "ask for forces at smaller currents" if forces else "fix it"
-        return f"{need}, which no sample shows: {instead}, or add a test that has it"
+    def table(self, runs: Sequence[str] = ()) -> Table:
+        """What runs tell of each unknown, one letter a run; in a file their shares."""
+        named = runs or [each.name for each in self.problem.experiments]
+        columns = (Column("parameter"), Column("needs", wrap=True), Column("effect", ".3g"))
+        shown = (Column("stage", of="f"), *columns, Column("runs"))
+        made = Table(
+            f"Stage {self.stage.name}", (*shown, *(Column(run, ".6g", of="f") for run in named))
+        )
+        for name, shares in self.shares.items():
+            parts = [shares.get(run) for run in named]
+            letters = ["-" if p is None else "#" if p >= MOST else "+" if p else "." for p in parts]
+            cells = (self.need(name), self.effect(name), "".join(letters))
+            made.add(self.stage.name, name, *cells, *parts)
+        return made
 
 
 def outlook(
@@ -183,19 +163,20 @@ def outlook(
     DomainError
         If the model does not hold at the nominal values.
     """
-    parameters = set_of(nominal)
-    problem = stage_problem(stage, parameters, experiments)
+    problem = stage_problem(stage, set_of(nominal), experiments)
     return Outlook(stage, problem, linearised_fit(problem, problem.start))
 
 
-# --- tests to come --------------------------------------------------------------------------------
+# --- what is known so far -------------------------------------------------------------------------
 
 RATE = 512.0
 """At which tests to come are simulated. [Hz]"""
-TRANSDUCER = 0.005
-"""Noise that is assumed of a sensor, over the largest value that the drive makes it read. [1]"""
-MEMORY = 0.1
-"""Time over which errors of a measurement are assumed to stay correlated. [s]"""
+TRANSDUCER, MEMORY = 0.005, 0.1
+"""Noise that is assumed of a sensor, over the largest value that the drive makes it read [1], and
+the time over which errors of a measurement are assumed to stay correlated [s]."""
+NOISELESS, FARTHEST = 1e-9, 0.05
+"""Residuals, over their channel's noise, that are rounding; and those, over the range of what is
+measured, of a drive that nobody would call fitted."""
 
 
 class Sensor(NamedTuple):
@@ -209,100 +190,27 @@ class Sensor(NamedTuple):
     origin: str = "stated"
     """Where the noise is known from, for people."""
 
-    @property
-    def deviation(self) -> float:
-        """Of a sample of the candidates, so that each counts as an independent one."""
-        return self.noise * float(np.sqrt(max(self.memory * RATE, 1.0)))
+    def deviation(self, step: float) -> float:
+        """Of a sample every `step` [s], so that each counts as an independent one."""
+        return self.noise * float(np.sqrt(max(self.memory / step, 1.0)))
 
 
 def default_sensors(drive: Drive) -> tuple[Sensor, ...]:
-    """Those of Kruse's tests: an ammeter around both leads and, where known, its encoder."""
-    if drive.name not in COUNTS_PER_TURN:
-        return assumed_sensors(drive, ("rectified_current", "shaft_speed"))
-    rounding = 2.0 * np.pi / COUNTS_PER_TURN[drive.name] / np.sqrt(12.0)
-    encoder = Sensor("encoder_counts", float(rounding), origin="rounding of Kruse's encoder")
-    return (*assumed_sensors(drive, ("rectified_current",)), encoder)
+    """Those of Kruse's tests: an ammeter around both leads and, where known, its encoder.
 
-
-def assumed_sensors(drive: Drive, kinds: Sequence[ChannelKind]) -> tuple[Sensor, ...]:
-    """Sensors of which nothing is known: noise of 0.5 % of what full command makes them read.
-
-    Raises
-    ------
-    InputError
-        If a kind is none that the drive has.
+    Of the others noise is assumed, 0.5 % of what full command makes them read.
     """
     full = [drive.simulate(step(sign * FULL_VOLTAGE).sample(RATE), RATE) for sign in (1.0, -1.0)]
-    made = []
-    for kind in kinds:
-        if kind not in SIGNALS:
-            raise InputError(f"There is no sensor '{kind}'; there are {', '.join(SIGNALS)}.")
-        signal = "current" if kind in ("rectified_current", "signed_current") else SIGNALS[kind]
-        largest = max(float(np.abs(getattr(run, signal)).max()) for run in full)
-        made.append(
-            Sensor(kind, TRANSDUCER * largest, origin=f"assumed, {100.0 * TRANSDUCER:g} % of range")
-        )
-    return tuple(made)
-
-
-def measurable(part: str, kinds: Sequence[ChannelKind]) -> tuple[ChannelKind, ...]:
-    """Kinds of sensor that tell of a part of the drive."""
-    return tuple(
-        kind for kind in kinds if part == "chain" or (kind in CURRENTS) == (part == "card")
+    current, speed = (
+        TRANSDUCER * max(float(np.abs(getattr(run, name)).max()) for run in full)
+        for name in ("current", "shaft_speed")
     )
-
-
-NOISELESS = 1e-9
-"""Residuals, over their channel's noise, that are rounding."""
-FARTHEST = 0.05
-"""Residuals, over the range of what is measured, of a drive that nobody would call fitted."""
-
-
-def measured_sensors(
-    problem: Problem, machine: Sequence[int], *, fitted: bool
-) -> dict[str, Sensor]:
-    """The campaign's own sensors, by channel, with the noise that it states.
-
-    If the drive at which the problem begins is `fitted`, its residuals are the noise; `machine` are
-    the places of the unknowns that belong to no single run.
-
-    Raises
-    ------
-    InputError
-        If they are zero, or so large that the drive was not fitted to these tests.
-    """
-    fit, made = linearised_fit(problem, problem.start) if fitted else None, {}
-    for name in problem.channels:
-        measured = [each[name] for each in problem.experiments if name in each.channels]
-        sensor = Sensor(measured[0].kind, problem.scales[name], origin="as in the campaign")
-        if fit is not None:
-            left = []
-            for run in (run for run in fit.runs if run.channel == name):
-                # with free zeros and other unknowns of single runs fitted
-                own = np.delete(run.jacobian, list(machine), axis=1)
-                shift = np.linalg.lstsq(own, -run.residual, rcond=None)[0]
-                left.append(run._replace(residual=run.residual + own @ shift))
-            square = np.concatenate([run.residual for run in left]) ** 2
-            noise = sensor.noise * float(np.sqrt(np.mean(square)))
-            share = noise / max(float(np.ptp(each.values)) for each in measured)
-            if not NOISELESS * sensor.noise < noise or share > FARTHEST:
-                raise InputError(
-                    f"The drive misses '{name}' by {100.0 * share:.2g} % of its range, so that its "
-                    "residuals are no noise; give a drive that was fitted to these tests, or none."
-                )
-            said = uncertainty(replace(fit, runs=tuple(left)))
-            # not of all that the residuals hold, but of what meets the unknowns' derivatives
-            worth = float(np.median(said.inflation[said.own.determined]))
-            memory = worth * interval(problem, name)
-            sensor = Sensor(sensor.kind, noise, memory, "residuals of the drive")
-        made[name] = sensor
-    return made
-
-
-def interval(problem: Problem, channel: str) -> float:
-    """Median interval between samples of a channel. [s]"""
-    runs = [each[channel].time for each in problem.experiments if channel in each.channels]
-    return float(np.median(np.concatenate([np.diff(time) for time in runs])))
+    assumed = f"assumed, {100.0 * TRANSDUCER:g} % of range"
+    turned = Sensor("shaft_speed", speed, origin=assumed)
+    if drive.name in COUNTS_PER_TURN:
+        rounding = 2.0 * np.pi / COUNTS_PER_TURN[drive.name] / np.sqrt(12.0)
+        turned = Sensor("encoder_counts", float(rounding), origin="rounding of Kruse's encoder")
+    return Sensor("rectified_current", current, origin=assumed), turned
 
 
 @dataclass(frozen=True, eq=False)
@@ -319,19 +227,15 @@ class Bench(Result):
     sensors: tuple[Sensor, ...]
     """Those of the campaign, or of a fresh plan."""
 
-    def rows(self, maneuver: Maneuver, sensor: Sensor) -> Array:
-        """(<= K, K) factor of what one sensor would tell in a test, its free zero spent."""
+    def candidate(self, maneuver: Maneuver, sensors: Sequence[Sensor] = ()) -> Candidate:
+        """A test with some sensors, by default those of the bench; free zeros are spent."""
         # what is known beforehand counts once, not once a test
         free = {k: v.model_copy(update={"prior": None}) for k, v in self.stage.free.items()}
-        stage = self.stage.model_copy(update={"free": free})
-        return _machine_rows(stage_problem(stage, self.parameters, [_imagined(maneuver, sensor)]))
-
-    def candidate(
-        self, maneuver: Maneuver, sensors: Sequence[Sensor], name: str | None = None
-    ) -> Candidate:
-        """A test with some sensors."""
-        rows = np.vstack([self.rows(maneuver, each) for each in sensors])
-        return Candidate(name or maneuver.name, rows, duration=maneuver.length)
+        stage, rows = self.stage.model_copy(update={"free": free}), []
+        for each in sensors or self.sensors:
+            imagined = _imagined(maneuver, each)
+            rows.append(_machine_rows(stage_problem(stage, self.parameters, [imagined])))
+        return Candidate(maneuver.name, triangular_factor(np.vstack(rows)), maneuver.length)
 
 
 def bench(
@@ -340,7 +244,6 @@ def bench(
     experiments: Sequence[Experiment] = (),
     *,
     fitted: bool = False,
-    free: Sequence[str] = (),
     sensors: Sequence[Sensor] = (),
 ) -> Bench:
     """What is known of a drive before the next test.
@@ -350,107 +253,112 @@ def bench(
     parameters : ParameterSet
         The drive, best a fitted one.
     setup : Setup
-        What is free; its stages are taken together.
+        What is free; its stages are taken together, through the whole chain unless they all belong
+        to one part of it.
     experiments : sequence of Experiment
         Tests made so far; none for a fresh plan.
     fitted : bool
         Whether the drive is fitted to them: noise and its colour are then those of the residuals.
         Else noise is as the campaign states it, correlated over `MEMORY`.
-    free : sequence of str
-        Symbols or columns that are fixed in the set-up and count as unknown here.
     sensors : sequence of Sensor
-        Of a fresh plan; beside experiments they replace those of the same kind.
+        Of a fresh plan; by default `default_sensors`.
+
+    Raises
+    ------
+    InputError
+        If no sensor tells of the stage's part of the drive; or a drive that is said to be fitted
+        leaves residuals that are zero, or too large to be noise.
     """
-    stage = _together(setup, free, parameters)
-    if not experiments:
-        asked = {each.kind: each for each in sensors or default_sensors(Drive(parameters))}
-        chosen = tuple(asked[kind] for kind in measurable(stage.part, list(asked)))
-        if not chosen:
-            raise InputError(
-                f"A {stage.part} shows nothing to {', '.join(asked)}: name another sensor."
-            )
-        problem = stage_problem(stage, parameters, [_imagined(step(1.0), chosen[0])])
-        variables, machine = _machine(problem)
-        _, prior = problem.unknowns.prior_rows(problem.start)
-        return Bench(parameters, stage, variables, prior[:, machine], chosen)
-    problem = stage_problem(stage, parameters, experiments)
-    variables, machine = _machine(problem)
-    known = measured_sensors(problem, machine, fitted=fitted)
-    own = {each.kind: each for each in sensors}
-    named = {}
-    for name, sensor in known.items():
-        named[name] = own.pop(sensor.kind, sensor)
-    # an independent sample every so often: the others are worth nothing
-    scales = {
-        name: sensor.noise * float(np.sqrt(max(sensor.memory / interval(problem, name), 1.0)))
-        for name, sensor in named.items()
-    }
-    present = _machine_rows(replace(problem, scales=scales))
-    kept = {sensor.kind: sensor for sensor in named.values()}
-    return Bench(parameters, stage, variables, present, (*kept.values(), *own.values()))
-
-
-def _together(setup: Setup, free: Sequence[str], parameters: ParameterSet) -> Stage:
-    """One stage of all unknowns, through the whole chain unless they belong to one part of it."""
     (stage,) = setup.joint().stages
     parts = {each.part for each in setup.stages}
-    if len(parts) == 1:
-        stage = stage.model_copy(update={"part": parts.pop()})
-    more: dict[str, Free] = {}
-    for name in free:
-        symbol = find(name).symbol
-        if {name, symbol} & set(stage.free) or (
-            stage.forces is not None and symbol in ("Z19", "Z20", "Z21", "Z22")
-        ):
-            raise InputError(f"{name} is free in the fit configuration already.")
-        columns = CATALOGUE[symbol].columns if name == symbol else (name,)
-        if any(not np.isfinite(parameters.numbers[column]) for column in columns):
-            raise InputError(f"{name} is off in the drive, so no test can determine it.")
-        positive = all(parameters.numbers[column] > 0.0 for column in columns)
-        zero = any(parameters.numbers[column] == 0.0 for column in columns)
-        more[name] = Free(bounds=(-1.0, 1.0)) if zero else Free(relative=(0.5, 2.0), log=positive)
-    return stage.model_copy(update={"free": {**stage.free, **more}})
+    stage = stage.model_copy(update={"part": parts.pop()}) if len(parts) == 1 else stage
+    if not experiments:
+        asked, part = sensors or default_sensors(Drive(parameters)), stage.part
+        own = [e for e in asked if part == "chain" or (e.kind in CURRENTS) == (part == "card")]
+        if not own:
+            kinds = ", ".join(each.kind for each in asked)
+            raise InputError(f"A {part} shows nothing to {kinds}: name another sensor.")
+        problem = stage_problem(stage, parameters, [_imagined(step(1.0), own[0])])
+        _, prior = problem.unknowns.prior_rows(problem.start)
+        machine = _machine(problem)
+        variables = Unknowns(tuple(problem.unknowns[k] for k in machine))
+        return Bench(parameters, stage, variables, prior[:, machine], tuple(own))
+    problem = stage_problem(stage, parameters, experiments)
+    fit, known, scales = linearised_fit(problem, problem.start) if fitted else None, [], {}
+    for name in problem.channels:
+        channels = [each[name] for each in problem.experiments if name in each.channels]
+        apart = float(np.median(np.concatenate([np.diff(each.time) for each in channels])))
+        sensor = Sensor(channels[0].kind, problem.scales[name], origin="as in the campaign")
+        if fit is not None:
+            largest = max(float(np.ptp(each.values)) for each in channels)
+            sensor = _of_residuals(fit, name, sensor, apart, largest, _machine(problem))
+        # an independent sample every so often: the others are worth nothing
+        scales[name] = sensor.deviation(apart)
+        known.append(sensor)
+    variables = Unknowns(tuple(problem.unknowns[k] for k in _machine(problem)))
+    kept = {sensor.kind: sensor for sensor in known}
+    present = _machine_rows(replace(problem, scales=scales))
+    return Bench(parameters, stage, variables, present, tuple(kept.values()))
+
+
+def _of_residuals(
+    fit: LinearisedFit,
+    name: str,
+    stated: Sensor,
+    step: float,
+    largest: float,
+    machine: Sequence[int],
+) -> Sensor:
+    """A channel's sensor with the noise that the residuals of a fitted drive show."""
+    left = []
+    for run in (run for run in fit.runs if run.channel == name):
+        # with free zeros and other unknowns of single runs fitted
+        own = np.delete(run.jacobian, list(machine), axis=1)
+        shift = np.linalg.lstsq(own, -run.residual, rcond=None)[0]
+        left.append(run._replace(residual=run.residual + own @ shift))
+    square = np.concatenate([run.residual for run in left]) ** 2
+    noise = stated.noise * float(np.sqrt(np.mean(square)))
+    if not NOISELESS * stated.noise < noise or noise > FARTHEST * largest:
+        raise InputError(
+            f"The drive misses '{name}' by {100.0 * noise / largest:.2g} % of its range, so that "
+            "its residuals are no noise; give a drive that was fitted to these tests, or none."
+        )
+    said = uncertainty(replace(fit, runs=tuple(left)))
+    # not of all that the residuals hold, but of what meets the unknowns' derivatives
+    worth = float(np.median(said.inflation[said.own.determined]))
+    return Sensor(stated.kind, noise, worth * step, "residuals of the drive")
 
 
 def _imagined(maneuver: Maneuver, sensor: Sensor) -> Experiment:
     """A test that has not been made: only its stamps count, not its values."""
-    time = maneuver.time(RATE)
-    source = Source(Path("none"), sensor.kind)
-    channel = Channel(
-        sensor.kind,
-        sensor.kind,
-        KINDS[sensor.kind].units[0],
-        time,
-        np.zeros_like(time),
-        np.ones_like(time),
-        source,
-        noise=sensor.deviation,
-    )
+    time, source = maneuver.time(RATE), Source(Path("none"), sensor.kind)
+    kind, unit = sensor.kind, KINDS[sensor.kind].units[0]
+    ones, noise = np.ones_like(time), sensor.deviation(1.0 / RATE)
+    channel = Channel(kind, kind, unit, time, 0.0 * ones, ones, source, noise=noise)
     command = InputSignal("voltage", "V", time, maneuver.sample(RATE), "linear", source)
     name = maneuver.name
     return Experiment(name, "", name, "fit", "rest", None, command, {sensor.kind: channel})
 
 
-def _machine(problem: Problem) -> tuple[Unknowns, list[int]]:
-    """The unknowns that are no run's own, and their places."""
-    places = [k for k, each in enumerate(problem.unknowns) if each.run is None]
-    return Unknowns(tuple(problem.unknowns[k] for k in places)), places
+def _machine(problem: Problem) -> list[int]:
+    """Places of the unknowns that are no run's own."""
+    return [k for k, each in enumerate(problem.unknowns) if each.run is None]
 
 
 def _machine_rows(problem: Problem) -> Array:
     """(<= K, K) factor of the derivatives by the machine's unknowns, those of single runs spent."""
-    derivatives = problem.evaluate(problem.start).jacobian
-    _, machine = _machine(problem)
+    derivatives, machine = problem.evaluate(problem.start).jacobian, _machine(problem)
     own = [k for k in range(derivatives.shape[1]) if k not in machine]
-    factor = triangular_factor(np.column_stack([derivatives[:, own], derivatives[:, machine]]))
-    return np.asarray(factor[len(own) :, len(own) :])
+    return triangular_factor(derivatives[:, [*own, *machine]])[len(own) :, len(own) :]
 
 
-KNOWN = 1.0
-"""Standard error of a solver's number, 100 %, up to which an unknown counts as determined."""
+# --- tests to come --------------------------------------------------------------------------------
 
-WORTH = 1e-3
-"""Relative gain below which nothing is said of it."""
+KNOWN, WORTH = 1.0, 1e-3
+"""Standard error of a solver's number, 100 %, up to which an unknown counts as determined; relative
+gain below which nothing is said of it."""
+NAMED = 4
+"""Unknowns that a row of advice names."""
 
 
 class Candidate(NamedTuple):
@@ -466,55 +374,35 @@ class Candidate(NamedTuple):
     duration: float | None = None
     """How long it takes, if that is to count. [s]"""
 
-    @property
-    def rows(self) -> Array:
-        """(<= K, K) triangular factor."""
-        return triangular_factor(self.derivatives)
 
-
-class Gain(NamedTuple):
-    """What a candidate would do for one unknown."""
-
-    name: str
-    before: float
-    """Standard error of the solver's number now; inf if undetermined."""
-    after: float
-    """And with the candidate."""
-
-    @property
-    def ratio(self) -> float:
-        """After over before: 1 is no gain, 0 determines what was not."""
-        if self.before == self.after:
-            return 1.0
-        return 0.0 if self.before == inf else self.after / self.before
-
-
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Advice(Result):
     """One candidate, judged."""
 
     candidate: str
-    gains: tuple[Gain, ...]
-    """For each free unknown."""
-    newly_determined: tuple[str, ...]
-    """Unknowns whose standard error it would be the first to bring below 100 %."""
+    duration: float | None
+    names: tuple[str, ...]
+    """Free unknowns."""
+    before: Array
+    """(k,) standard errors of the solver's numbers now; inf if undetermined."""
+    after: Array
+    """(k,) and with the candidate."""
     ranks: int
     """How many more combinations would be determined."""
     d_gain: float
     """Mean factor by which standard errors shrink along the directions determined already
     (D-criterion), 1 is none."""
-    duration: float | None
+
+    @property
+    def newly_determined(self) -> tuple[str, ...]:
+        """Unknowns whose standard error it would be the first to bring below 100 %."""
+        new = (self.after <= KNOWN) & (self.before > KNOWN)
+        return tuple(name for name, first in zip(self.names, new, strict=True) if first)
 
     @property
     def rank(self) -> tuple[int, int, float]:
         """Least for the best: unknowns newly determined, combinations, D-gain."""
         return -len(self.newly_determined), -self.ranks, -self.d_gain
-
-    @property
-    def best(self) -> Gain | None:
-        """The unknown that gains most, of those that are then known to better than 100 %."""
-        known = [gain for gain in self.gains if gain.after <= KNOWN]
-        return min(known, key=lambda gain: gain.ratio) if known else None
 
 
 def advise(
@@ -550,93 +438,117 @@ def advise(
                 f"{name}: derivatives by {variables.count} parameters are so many columns of "
                 f"finite numbers, not {rows.shape}."
             )
-    judged = [_judge(present, each, variables) for each in candidates]
-    return tuple(sorted(judged, key=lambda each: each.rank))
-
-
-def _judge(present: Array, candidate: Candidate, variables: Unknowns) -> Advice:
-    free = variables.free
+    free, made = variables.free, []
+    names = tuple(variables.names[k] for k in np.flatnonzero(free))
     now, known_now = whitening(present, free, TOLERANCE)
-    then, known_then = whitening(np.vstack([present, candidate.rows]), free, TOLERANCE)
-    before = np.where(known_now, np.sqrt(np.sum(now**2, axis=1)), inf)
-    after = np.where(known_then, np.sqrt(np.sum(then**2, axis=1)), inf)
-    names = variables.names
-    # errors afterwards along the directions known now, in which they are 1 and independent now
-    along = (present @ now).T @ (present @ then)
-    shrinking = -np.linalg.slogdet(along @ along.T)[1]
-    return Advice(
-        candidate.name,
-        tuple(
-            Gain(names[k], float(before[k]), float(min(after[k], before[k])))
-            for k in np.flatnonzero(free)
-        ),
-        tuple(names[k] for k in np.flatnonzero(free & (after <= KNOWN) & (before > KNOWN))),
-        then.shape[1] - now.shape[1],
-        float(np.exp(0.5 * shrinking / max(now.shape[1], 1))),
-        candidate.duration,
-    )
-
-
-def default_maneuvers() -> tuple[Maneuver, ...]:
-    """Small and large, slow and fast, both ways: what to choose from where nothing is named."""
-    both = (1.0, -1.0)
-    up_and_down = (2.0, 4.0, 6.0, 8.0, 10.0, 8.0, 6.0, 4.0, 2.0, 0.0)
-    return (
-        *(step(sign * volts) for volts in (2.0, 5.0, 9.0) for sign in both),
-        *(ramp(sign) for sign in both),
-        *(
-            replace(
-                stairs([sign * volts + 0.0 for volts in up_and_down], 2.0),
-                name=f"stairs to {10.0 * sign:g} V and back",
-            )
-            for sign in both
-        ),
-        stairs([5.0, -5.0, 5.0, -5.0, 0.0], 2.0),
-        stairs([9.0, -9.0, 0.0], 3.0),
-        *(sine(volts, 0.1, length=30.0) for volts in (2.0, 5.0, 9.0)),
-        sine(9.0, 0.3, length=20.0),
-        *(
-            replace(
-                multisine(volts, (0.05, 2.0, 8), length=60.0),
-                name=f"multisine {volts:g} V 0.05 to 2 Hz",
-            )
-            for volts in (4.0, 9.0)
-        ),
-    )
+    before = np.where(known_now, np.linalg.norm(now, axis=1), inf)
+    for each in candidates:
+        then, known = whitening(np.vstack([present, each.derivatives]), free, TOLERANCE)
+        after = np.minimum(np.where(known, np.linalg.norm(then, axis=1), inf), before)
+        # errors then along the directions known now, in which they are 1 and independent now
+        along = (present @ now).T @ (present @ then)
+        shrinking = -np.linalg.slogdet(along @ along.T)[1]
+        d_gain = float(np.exp(0.5 * shrinking / max(now.shape[1], 1)))
+        errors, ranks = (before[free], after[free]), then.shape[1] - now.shape[1]
+        made.append(Advice(each.name, each.duration, names, *errors, ranks, d_gain))
+    return tuple(sorted(made, key=lambda each: each.rank))
 
 
 def in_turn(
-    present: Array,
-    candidates: Sequence[Candidate],
-    variables: Unknowns,
-    count: int,
+    present: Array, candidates: Sequence[Candidate], variables: Unknowns, count: int
 ) -> tuple[Advice, ...]:
     """A plan of tests: the best one, then the best beside it, and so on, each at most once.
 
     As many as `count`, fewer if none of the others tells anything new; otherwise as `advise`.
     """
-    left, chosen = list(candidates), list[Advice]()
+    left, chosen = {each.name: each for each in candidates}, list[Advice]()
     while left and len(chosen) < count:
-        best = advise(present, left, variables)[0]
+        best = advise(present, [*left.values()], variables)[0]
         if not best.newly_determined and not best.ranks and best.d_gain < 1.0 + WORTH:
             break
-        taken = next(each for each in left if each.name == best.candidate)
-        left.remove(taken)
         chosen.append(best)
-        present = triangular_factor(np.vstack([present, taken.rows]))
+        taken = left.pop(best.candidate).derivatives
+        present = triangular_factor(np.vstack([present, taken]))
     return tuple(chosen)
 
 
-def best_for_each(judged: Sequence[Advice]) -> dict[str, tuple[str, Gain]]:
-    """For each unknown the candidate after which its standard error is least, and the gain.
+def best_for_each(judged: Sequence[Advice]) -> dict[str, Advice]:
+    """For each unknown the candidate after which its standard error is least.
 
     Unknowns that none would tell more of are left out.
     """
-    best: dict[str, tuple[str, Gain]] = {}
-    for advice in judged:
-        for gain in advice.gains:
-            if gain.ratio < 1.0 - WORTH and (
-                gain.name not in best or gain.after < best[gain.name][1].after
-            ):
-                best[gain.name] = (advice.candidate, gain)
+    best = {}
+    for k, name in enumerate(judged[0].names):
+        least = judged[int(np.argmin([each.after[k] for each in judged]))]
+        if least.after[k] < (1.0 - WORTH) * least.before[k]:
+            best[name] = least
     return best
+
+
+def default_maneuvers() -> tuple[Maneuver, ...]:
+    """Small and large, slow and fast, both ways: what to choose from where nothing is named."""
+    both, up_and_down = (1.0, -1.0), (2.0, 4.0, 6.0, 8.0, 10.0, 8.0, 6.0, 4.0, 2.0, 0.0)
+    climbs = {s: stairs([s * volts + 0.0 for volts in up_and_down], 2.0) for s in both}
+    many = {volts: multisine(volts, (0.05, 2.0, 8), length=60.0) for volts in (4.0, 9.0)}
+    return (
+        *(step(sign * volts) for volts in (2.0, 5.0, 9.0) for sign in both),
+        *(ramp(sign) for sign in both),
+        *(replace(m, name=f"stairs to {10.0 * s:g} V and back") for s, m in climbs.items()),
+        stairs([5.0, -5.0, 5.0, -5.0, 0.0], 2.0),
+        stairs([9.0, -9.0, 0.0], 3.0),
+        *(sine(volts, 0.1, length=30.0) for volts in (2.0, 5.0, 9.0)),
+        sine(9.0, 0.3, length=20.0),
+        *(replace(m, name=f"multisine {v:g} V 0.05 to 2 Hz") for v, m in many.items()),
+    )
+
+
+def advice_table(title: str, judged: Sequence[Advice]) -> Table:
+    """Tests in the order given, what each would tell, and in a file all errors with it."""
+    new = any(each.newly_determined for each in judged)
+    made = Table(
+        title,
+        (
+            Column("test", wrap=not new),
+            Column("s", "g"),
+            Column("first to determine", wrap=True, of="tpf" if new else ""),
+            Column("gains most"),
+            Column("better", "s"),
+            *(Column(f"error of {name}", ".6g", of="f") for name in judged[0].names),
+        ),
+    )
+    for each in judged:
+        first, more = each.newly_determined[:NAMED], len(each.newly_determined) - NAMED
+        # the unknown whose error shrinks most, of those that are then known
+        pairs = zip(each.names, each.before.tolist(), each.after.tolist(), strict=True)
+        known = [pair for pair in pairs if pair[2] <= KNOWN]
+        gained = ""
+        if known:
+            name, now, then = min(known, key=lambda pair: pair[2] / pair[1])
+            gained = f"{name} {_error(now)} to {_error(then)}"
+        made.add(
+            each.candidate,
+            each.duration,
+            ", ".join(first) + (f" + {more}" if more > 0 else ""),
+            gained,
+            f"{each.d_gain:.2f}x" if each.d_gain > 1.0 + WORTH else "",
+            *(error if error < inf else None for error in each.after.tolist()),
+        )
+    return made
+
+
+def best_tests_table(judged: Sequence[Advice]) -> Table:
+    """What is known of each unknown, and which test would tell most of it."""
+    columns = (Column("parameter"), Column("error now", "s"), Column("then", "s"))
+    made = Table("For each parameter", (*columns, Column("best test", wrap=True)))
+    best = best_for_each(judged)
+    for k, name in enumerate(judged[0].names):
+        found, now = best.get(name), judged[0].before[k]
+        then, test = (now, "no further information")
+        if found is not None:
+            then, test = found.after[k], found.candidate
+        made.add(name, _error(now), _error(then), test)
+    return made
+
+
+def _error(error: float) -> str:
+    return f"{100.0 * error:.2g} %" if error <= KNOWN else "-"

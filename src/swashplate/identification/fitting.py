@@ -34,8 +34,8 @@ from swashplate.identification.drive_model import (
     start_currents_of,
     with_estimates,
 )
+from swashplate.identification.faults import measurement_error
 from swashplate.identification.intervals import weighed
-from swashplate.identification.lack_of_fit import measurement_error
 from swashplate.identification.model import Model, OwnModel
 from swashplate.identification.problem import Loss, Problem
 from swashplate.identification.setup import ModelSetup, Range, Setup, Stage

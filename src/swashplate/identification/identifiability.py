@@ -3,47 +3,35 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
-from math import exp, inf, isfinite, sqrt
-from typing import TYPE_CHECKING, NamedTuple
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from math import inf, isfinite, sqrt
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import null_space, qr
 
 from swashplate.errors import InputError
-from swashplate.identification.drive_model import DriveModel, true_value
 from swashplate.identification.problem import TOLERANCE, triangular_factor, whitening
 from swashplate.identification.unknowns import Unknowns
-from swashplate.models.displacement_control import (
-    FORCE,
-    MOTION,
-    PRESSURE,
-    TRAVEL,
-    ZERO,
-)
+from swashplate.models.displacement_control import FORCE, MOTION, PRESSURE, TRAVEL, ZERO
 from swashplate.parameters.definitions import CATALOGUE
-from swashplate.parameters.parameter_set import ParameterSet
 from swashplate.results import Result
 from swashplate.tables import listed
 
-if TYPE_CHECKING:
-    from swashplate.identification.fitting import Fit, StageFit
-
 Array = NDArray[np.float64]
-
 Known = Mapping[str, float]
-Move = Callable[[float, float, Known], float]
-"""Value, t and all values by symbol to the value moved by t along the gauge; t = 0 leaves it."""
+Move = Callable[[float, Known], float]
+"""Derivative of a parameter along a gauge, from its value and those of all by symbol."""
 
-STEP = 1e-3
-"""Of the central differences along a gauge, extrapolated once: truncation 1e-13, rounding 1e-13."""
-
-
-def scaled(power: float) -> Move:
-    """Multiply by exp(power·t)."""
-    return lambda value, t, known: value * exp(power * t)
+WIDE = 0.1
+"""Half width of a 95 % interval, of the value or the scale, from which an unknown is weak. [1]"""
+HALF = 1.96
+"""Half width of a 95 % interval, in standard errors."""
+MENTIONED, NAMED = 0.02, 6
+"""Parts of a direction below this share of its largest, by effect, are not part of it; changes that
+a sentence names, the largest first."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,8 +45,6 @@ class Gauge:
     """What the tests can tell instead, as an engineer writes it."""
     fix: tuple[str, ...]
     """Symbols to fix, the best first; the others then follow."""
-    needs: frozenset[str] = frozenset()
-    """Symbols whose values the moves depend on."""
 
     def tangent(self, variables: Unknowns, fixed: Known | None = None) -> Array:
         """Derivative (K,) of the solver's vector along the gauge.
@@ -66,24 +52,15 @@ class Gauge:
         0 for what does not move, and throughout if a value that the gauge needs is neither among
         the unknowns nor among the `fixed` ones, by symbol.
         """
-        symbols = [symbol_of(name) for name in variables.names]
-        estimates = map(float, variables.estimates)
-        known = {**(fixed or {}), **dict(zip(symbols, estimates, strict=True))}
-        slopes = np.zeros(variables.count)
-        if not self.needs <= known.keys():
-            return slopes
-        for k, symbol in enumerate(symbols):
-            move = self.moves.get(symbol)
-            if move is None:
-                continue
-            value = float(variables.estimates[k])
-
-            def slope(step: float, move: Move = move, value: float = value) -> float:
-                return (move(value, step, known) - move(value, -step, known)) / (2.0 * step)
-
-            by_value = (4.0 * slope(0.5 * STEP) - slope(STEP)) / 3.0
-            slopes[k] = by_value / variables.slopes[k]
-        return slopes
+        symbols, values = [symbol_of(name) for name in variables.names], variables.estimates
+        known = {**(fixed or {}), **dict(zip(symbols, values.tolist(), strict=True))}
+        still: Move = lambda value, known: 0.0  # noqa: E731
+        pairs = zip(symbols, values.tolist(), strict=True)
+        try:
+            slopes = [self.moves.get(symbol, still)(value, known) for symbol, value in pairs]
+        except KeyError:
+            return np.zeros(variables.count)
+        return np.array(slopes) / variables.slopes
 
 
 def symbol_of(name: str) -> str:
@@ -92,74 +69,55 @@ def symbol_of(name: str) -> str:
     return re.sub(r"(_plus|_minus)?(_\d+)?$", "", bare)
 
 
-def _plus_one(power: float) -> Move:
-    """Multiply 1 + value by exp(power·t)."""
-    return lambda value, t, known: (1.0 + value) * exp(power * t) - 1.0
-
-
-def _tangent_offset(value: float, t: float, known: Known) -> float:
-    return value + known["Z1"] * known["Z9"] * (exp(t) - 1.0)
-
-
-def _powers(symmetry: str, *others: str) -> dict[str, Move]:
-    """Moves of the parameters along one of the models' symmetries, and of others in proportion."""
+def _gauge(
+    name: str, symmetry: str, determined: str, fix: str, *others: str, **more: Move
+) -> Gauge:
+    """A gauge along one of the models' symmetries, with others in proportion and `more` moves."""
     powers = {
-        symbol: definition.symmetry[symmetry]
-        for symbol, definition in CATALOGUE.items()
-        if symmetry in definition.symmetry
-    }
-    return {name: scaled(power) for name, power in (powers | dict.fromkeys(others, 1.0)).items()}
+        symbol: each.symmetry[symmetry]
+        for symbol, each in CATALOGUE.items()
+        if symmetry in each.symmetry
+    } | dict.fromkeys(others, 1.0)
+
+    def power(exponent: float) -> Move:
+        return lambda value, known: exponent * value
+
+    moves = {symbol: power(each) for symbol, each in powers.items()} | more
+    return Gauge(name, moves, f"only {determined} determined", tuple(fix.split()))
 
 
-_PRESSURES = ("initial pressure", "start_pressure", "start pressure")
-
-GAUGES: Sequence[Gauge] = (
-    Gauge(
+GAUGES = (
+    _gauge(
         "scale of pressure",
-        _powers(PRESSURE, *_PRESSURES),
-        "only Z1·Z9, Z1·Z15 and Z8·√Z1 are determined",
-        ("Z1", "Z9", "Z8"),
+        PRESSURE,
+        "Z1·Z9, Z1·Z15 and Z8·√Z1 are",
+        "Z1 Z9 Z8",
+        *("initial pressure", "start_pressure", "start pressure"),
     ),
-    Gauge(
+    _gauge(
         "zero of pressure",
-        {**_powers(ZERO), "Z2": _tangent_offset},
-        "only Z9 - Z2/Z1 is determined",
-        ("Z2", "Z9"),
-        frozenset({"Z1", "Z9"}),
+        ZERO,
+        "Z9 - Z2/Z1 is",
+        "Z2 Z9",
+        Z2=lambda value, known: known["Z1"] * known["Z9"],
     ),
-    Gauge(
+    _gauge(
         "scale of spool travel",
-        _powers(TRAVEL),
-        "only Z4/Z5², Z14/Z5, Z16/Z5, Z18/Z5 and Z8·Z5 are determined",
-        ("Z5", "Z8", "Z16"),
+        TRAVEL,
+        "Z4/Z5², Z14/Z5, Z16/Z5, Z18/Z5 and Z8·Z5 are",
+        "Z5 Z8 Z16",
     ),
-    Gauge(
-        "scale of force",
-        _powers(FORCE, "force"),
-        "only the solenoid force over √Z4 is determined",
-        ("Z4", "Z19", "force"),
-    ),
-    Gauge(
+    _gauge("scale of force", FORCE, "the solenoid force over √Z4 is", "Z4 Z19 force", "force"),
+    _gauge(
         "piston motion against flow gain",
-        {"Z6": _plus_one(1.0), **_powers(MOTION)},
-        "only Z8/(1+Z6) is determined",
-        ("Z6", "Z8"),
+        MOTION,
+        "Z8/(1+Z6) is",
+        "Z6 Z8",
+        Z6=lambda value, known: 1.0 + value,
     ),
 )
-"""Those of the model; the sentence on Z8/(1+Z6) holds away from the swash plate's stops."""
-
-
-MENTIONED = 0.02
-"""Parts of a direction below this share of its largest, by effect, are not part of it."""
-
-NAMED = 6
-"""Changes that a sentence names, the largest first."""
-
-WIDE = 0.1
-"""Half width of a 95 % interval, of the value or the scale, from which an unknown is weak. [1]"""
-
-HALF = 1.96
-"""Half width of a 95 % interval, in standard errors."""
+"""Those of the model, in an order in which none undoes an earlier one; the sentence on Z8/(1+Z6)
+holds away from the swash plate's stops."""
 
 
 class Direction(NamedTuple):
@@ -235,30 +193,21 @@ class Identifiability(Result):
     @property
     def at_bounds(self) -> dict[str, str]:
         """Unknowns at a bound, by name: ``"lower"`` or ``"upper"``."""
-        return {
-            name: "lower" if side < 0 else "upper"
-            for name, side in zip(self.variables.names, self.variables.at_bound, strict=True)
-            if side
-        }
+        sides = zip(self.variables.names, self.variables.at_bound, strict=True)
+        return {name: "lower" if side < 0 else "upper" for name, side in sides if side}
 
     def sentences(self) -> tuple[str, ...]:
         """The verdict in words, one sentence each."""
-        free = int(np.count_nonzero(self.variables.free))
-        noun = "combination" if self.rank == 1 else "combinations"
-        said = [
-            "All parameters are at a bound: there is nothing left to determine."
-            if not free
-            else "The tests determine none of the parameters."
-            if not self.rank
-            else f"The tests determine {self.rank} {noun} of {free} free parameters."
-            if self.rank < free
-            else f"The tests determine all {free} free parameters."
-        ]
+        free, rank = int(np.count_nonzero(self.variables.free)), self.rank
+        told = f"{rank} combination{'' if rank == 1 else 's'} of {free} free parameters"
+        told = f"all {free} free parameters" if rank == free else told
+        said = [f"The tests determine {told if rank else 'none of the parameters'}."]
+        if not free:
+            said = ["All parameters are at a bound: there is nothing left to determine."]
         if self.unexcited:
-            said.append(
-                f"No test exercises {', '.join(self.unexcited)}: fix "
-                f"{'them' if len(self.unexcited) > 1 else 'it'}, or add a test that does."
-            )
+            them = "them" if len(self.unexcited) > 1 else "it"
+            names = ", ".join(self.unexcited)
+            said.append(f"No test exercises {names}: fix {them}, or add a test that does.")
         said += [each.sentence for each in self.null]
         if len(self.weak) == 1:
             said.append(self.weak[0].sentence)
@@ -268,14 +217,12 @@ class Identifiability(Result):
                 f"Weak, each with those before it fixed: {listed(known)}. Add tests that determine "
                 "them, or fix those whose values you know."
             )
-        return (
-            *said,
-            *(
+        for name, side in self.at_bounds.items():
+            said.append(
                 f"{name} = {self.variables.estimates[self.variables.index(name)]:.4g} is at its "
                 f"{side} bound and has no interval; the intervals of the others let it change."
-                for name, side in self.at_bounds.items()
-            ),
-        )
+            )
+        return tuple(said)
 
 
 def identifiability(
@@ -308,157 +255,87 @@ def identifiability(
     InputError
         If a derivative is not finite.
     """
-    triangle = np.asarray(derivatives, dtype=np.float64)
+    triangle, names = np.asarray(derivatives, dtype=np.float64), variables.names
     if not np.isfinite(triangle).all():
         column = int(np.argwhere(~np.isfinite(triangle))[0][1])
-        raise InputError(f"The derivatives by {variables.names[column]} are not all finite.")
+        raise InputError(f"The derivatives by {names[column]} are not all finite.")
     if triangle.shape[0] > variables.count:
         triangle = triangular_factor(triangle)
     lengths = np.linalg.norm(triangle, axis=0)
     # a column of mere rounding is none
     moving = variables.free & (lengths > 1e-14 * lengths.max(initial=0.0))
-    unexcited = variables.free & ~moving
-    space = _Space(triangle, lengths, np.flatnonzero(moving), variables)
-    null, rank = space.null(tolerance, {each: each.tangent(variables, fixed) for each in GAUGES})
-    left = space.without([variables.names.index(each.fix) for each in null])
-    return Identifiability(
-        variables,
-        0.01 * lengths,
-        rank,
-        tuple(name for name, none in zip(variables.names, unexcited, strict=True) if none),
-        tuple(null),
-        tuple(left.weak(covariance)),
-    )
+    places = np.flatnonzero(moving)
 
-
-@dataclass(frozen=True, eq=False)
-class _Space:
-    """The unknowns that change anything."""
-
-    triangle: Array
-    """(m, K)"""
-    lengths: Array
-    """(K,) of the columns."""
-    places: NDArray[np.intp]
-    """(k,) numbers of these unknowns."""
-    variables: Unknowns
-
-    def without(self, numbers: Sequence[int]) -> _Space:
-        """The same without some unknowns."""
-        return replace(self, places=self.places[~np.isin(self.places, numbers)])
-
-    def null(
-        self, tolerance: float, tangents: Mapping[Gauge, Array]
-    ) -> tuple[list[Direction], int]:
-        """Directions that change nothing, known gauges first, and the rank of the others."""
-        if not self.places.size:
-            return [], 0
-        lengths = self.lengths[self.places]
-        _, sizes, rows = np.linalg.svd(self.triangle[:, self.places] / lengths, full_matrices=True)
-        rank = int(np.count_nonzero(sizes > tolerance * sizes[0]))
-        null, found, fixed = rows[rank:].T, list[Direction](), list[int]()
-        for gauge, tangent in tangents.items():
-            vector = tangent[self.places] * lengths
-            vector /= np.linalg.norm(vector) or 1.0
-            # as long as its part in the null space: it changes nothing
-            if np.linalg.norm(null.T @ vector) < 1.0 - 1e-6:
-                continue
-            place = self._place_to_fix(gauge, vector, null, fixed)
-            if place is not None:
-                fixed.append(place)
-                found.append(self._direction(vector / lengths, inf, gauge, place))
-        # what is left when those are fixed, with one unknown of its own for each direction
-        left = null if not fixed else null @ null_space(null[fixed])
-        if left.shape[1]:
-            order = qr(left.T, mode="r", pivoting=True)[1][: left.shape[1]]
-            for column, place in zip((left @ np.linalg.inv(left[order])).T, order, strict=True):
-                found.append(self._direction(column / lengths, inf, None, int(place)))
-        return found, rank
-
-    def weak(self, covariance: Array | None) -> list[Direction]:
-        """Directions along which an unknown's interval is wide, the widest first.
-
-        How the others follow an unknown is its column of the covariance, over its variance. Each
-        found is fixed, so that the next ones are what is left without it.
-        """
-        if covariance is None:
-            every = np.ones(self.places.size, dtype=np.bool_)
-            inverse, _ = whitening(self.triangle[:, self.places], every, TOLERANCE)
-            left = inverse @ inverse.T
-        else:
-            left = covariance[np.ix_(self.places, self.places)]
-        found, space = list[Direction](), self
-        machine = np.array([each.run is None for each in self.variables])
-        while space.places.size:
-            variances = np.where(machine[space.places], np.diag(left), 0.0)
-            place = int(np.argmax(variances))
-            half = HALF * sqrt(max(variances[place], 0.0))
-            if half <= WIDE:
-                break
-            vector = left[place] / left[place, place]
-            found.append(space._direction(vector, half, None, place))
-            rest = np.arange(space.places.size) != place
-            left = (left - np.outer(left[place], left[place]) / left[place, place])[rest][:, rest]
-            space = space.without([int(space.places[place])])
-        return found
-
-    def _place_to_fix(
-        self, gauge: Gauge, vector: Array, null: Array, fixed: Sequence[int]
-    ) -> int | None:
-        """The unknown that removes a gauge beside those fixed already; None if none does."""
-        symbols = [symbol_of(self.variables.names[k]) for k in self.places]
-        wanted = [k for symbol in gauge.fix for k, each in enumerate(symbols) if each == symbol]
-        for place in (*wanted, *np.argsort(-np.abs(vector))):
-            if abs(vector[place]) < 1e-3 or place in fixed:
-                continue
-            singular = np.linalg.svd(null[[*fixed, int(place)]], compute_uv=False)
-            if singular.size == len(fixed) + 1 and singular[-1] > 1e-6:
-                return int(place)
-        return None
-
-    def _direction(
-        self, moved: Array, half_width: float, gauge: Gauge | None, place: int
+    def direction(
+        moved: Array,
+        places: NDArray[np.intp],
+        place: int,
+        gauge: Gauge | None = None,
+        half: float = inf,
     ) -> Direction:
-        """From changes (k,) of the solver's numbers."""
+        """From changes (k,) of some of the solver's numbers, one of which is to be fixed."""
         # a short column needs a large change for the same effect: judged by effect, not by size
-        effect = np.abs(moved) * self.lengths[self.places]
+        effect = np.abs(moved) * lengths[places]
         least = MENTIONED * effect.max()
         order = [k for k in np.argsort(-effect, kind="stable") if effect[k] >= least]
         largest = max((float(moved[k]) for k in order), key=abs)
-        names = [self.variables.names[k] for k in self.places]
-        changes = {names[k]: float(moved[k]) / largest for k in order}
-        return Direction(changes, half_width, gauge, names[place])
+        changes = {names[places[k]]: float(moved[k]) / largest for k in order}
+        return Direction(changes, half, gauge, names[places[place]])
+
+    null, rank = [], 0
+    if places.size:
+        scale = lengths[places]
+        symbols = [symbol_of(names[k]) for k in places]
+        _, sizes, rows = np.linalg.svd(triangle[:, places] / scale, full_matrices=True)
+        rank = int(np.count_nonzero(sizes > tolerance * sizes[0]))
+        free, fixes = rows[rank:].T, list[int]()
+        for gauge in GAUGES:
+            vector = gauge.tangent(variables, fixed)[places] * scale
+            vector /= np.linalg.norm(vector) or 1.0
+            # as long as its part in the null space: it changes nothing
+            if np.linalg.norm(free.T @ vector) >= 1.0 - 1e-6:
+                wanted = [k for fix in gauge.fix for k, s in enumerate(symbols) if s == fix]
+                place = _fixing([*wanted, *np.argsort(-np.abs(vector))], vector, free, fixes)
+                if place is not None:
+                    fixes.append(place)
+                    null.append(direction(vector / scale, places, place, gauge))
+        # what is left when those are fixed, with one unknown of its own for each direction
+        left = free @ null_space(free[fixes]) if fixes else free
+        if left.shape[1]:
+            order = qr(left.T, mode="r", pivoting=True)[1][: left.shape[1]]
+            for column, place in zip((left @ np.linalg.inv(left[order])).T, order, strict=True):
+                null.append(direction(column / scale, places, int(place)))
+
+    # weak ones: how the others follow an unknown is its column of the covariance over its variance;
+    # each found is fixed, so that the next ones are what is left without it
+    weak, places = [], places[~np.isin(places, [names.index(each.fix) for each in null])]
+    if covariance is None:
+        every = np.ones(places.size, dtype=np.bool_)
+        inverse, _ = whitening(triangle[:, places], every, TOLERANCE)
+        left = inverse @ inverse.T
+    else:
+        left = covariance[np.ix_(places, places)]
+    machine = np.array([each.run is None for each in variables])
+    while places.size:
+        variances = np.where(machine[places], np.diag(left), 0.0)
+        place = int(np.argmax(variances))
+        half = HALF * sqrt(max(variances[place], 0.0))
+        if half <= WIDE:
+            break
+        follow = left[place] / left[place, place]
+        weak.append(direction(follow, places, place, half=half))
+        rest = np.arange(places.size) != place
+        left = (left - np.outer(left[place], follow))[rest][:, rest]
+        places = places[rest]
+    unexcited = tuple(names[k] for k in np.flatnonzero(variables.free & ~moving))
+    return Identifiability(variables, 0.01 * lengths, rank, unexcited, tuple(null), tuple(weak))
 
 
-SCALES = (
-    "scale of pressure",
-    "zero of pressure",
-    "scale of spool travel",
-    "scale of force",
-    "piston motion against flow gain",
-)
-"""Gauges along which nothing that is measured changes (the last one, away from the stops), in an
-order in which none undoes an earlier one."""
-
-
-def true_values(stage: StageFit, truth: ParameterSet) -> dict[str, float]:
-    """What the stage's unknowns of the machine really are, by name, in their units."""
-    model = stage.problem.model
-    assert isinstance(model, DriveModel)
-    unknowns = stage.problem.unknowns
-    found = {
-        name: true_value(unknown, model, truth)
-        for name, unknown in zip(unknowns.names, unknowns, strict=True)
-    }
-    return {name: value for name, value in found.items() if value is not None}
-
-
-def moved_columns(fit: Fit) -> set[str]:
-    """Columns of the drive's parameters that some stage moved."""
-    moved: set[str] = set()
-    for each in fit.stages:
-        for unknown in each.problem.unknowns:
-            moved |= set(unknown.targets)
-        if isinstance(each.problem.model, DriveModel) and each.problem.model.forces is not None:
-            moved |= set(each.problem.model.forces.columns)
-    return moved
+def _fixing(places: list[int], vector: Array, null: Array, fixed: list[int]) -> int | None:
+    """The first unknown that removes a gauge beside those fixed already; None if none does."""
+    for place in map(int, places):
+        if abs(vector[place]) >= 1e-3 and place not in fixed:
+            singular = np.linalg.svd(null[[*fixed, place]], compute_uv=False)
+            if singular.size == len(fixed) + 1 and singular[-1] > 1e-6:
+                return place
+    return None

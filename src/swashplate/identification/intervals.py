@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
 from math import inf, log
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Literal, NamedTuple
+from typing import TYPE_CHECKING, ClassVar, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from swashplate.errors import InputError
 from swashplate.identification.drive_model import DriveModel
+from swashplate.identification.model import Model
 from swashplate.identification.model import linearised as linearised_model
 from swashplate.identification.noise import (
     Covariance,
@@ -36,7 +37,6 @@ if TYPE_CHECKING:
     from swashplate.identification.fitting import StageFit
 
 Array = NDArray[np.float64]
-
 Status = Literal[
     "estimated",
     "at its lower bound",
@@ -46,10 +46,16 @@ Status = Literal[
     "no upper end",
 ]
 
-
+LEVEL = 0.95
 DECADES = 100.0
 """Factor each way from which an interval says nothing; for an unknown that is not logarithmic, half
 width in its scales."""
+LEAST = 1e-6
+"""Smallest worth of a prior: residuals that are all but zero leave it its say on what they leave
+open."""
+OPEN = 0.01
+"""Part of a channel's range that a prediction moves by, for 10 % of an unknown, from which it
+depends on that unknown."""
 
 
 class Estimate(NamedTuple):
@@ -75,47 +81,28 @@ class Estimate(NamedTuple):
         return 0.5 * (self.upper - self.lower) / abs(self.value)
 
 
-def reach(covariance: Covariance, level: float = 0.95) -> Array:
-    """(K,) half widths of the intervals in the solver's vector; 0 for unknowns without one.
-
-    Raises
-    ------
-    InputError
-        If the level is not between 0 and 1.
-    """
-    if not 0.0 < level < 1.0:
-        raise InputError(f"The level {level:g} of an interval must lie between 0 and 1.")
+def reach(covariance: Covariance) -> Array:
+    """(K,) half widths of the intervals in the solver's vector; 0 for unknowns without one."""
     from scipy.special import stdtrit  # of scipy.stats, without its second to load
 
-    quantiles = stdtrit(covariance.degrees_of_freedom, 0.5 + 0.5 * level)
-    errors = np.where(covariance.determined, covariance.standard_errors, 0.0)
     known = covariance.determined & covariance.variables.free
-    half: Array = np.where(known, quantiles * errors, 0.0)
+    quantiles = stdtrit(covariance.degrees_of_freedom, 0.5 + 0.5 * LEVEL)
+    half: Array = quantiles * np.where(known, covariance.standard_errors, 0.0)
     return half
 
 
 def estimates(
-    covariance: Covariance,
-    *,
-    level: float = 0.95,
-    ends: Mapping[tuple[int, bool], float] = MappingProxyType({}),
+    covariance: Covariance, ends: Mapping[tuple[int, bool], float] = MappingProxyType({})
 ) -> tuple[Estimate, ...]:
-    """Estimates with intervals from a covariance.
+    """Estimates with 95 % intervals from a covariance.
 
     Parameters
     ----------
     covariance : Covariance
         Of the solver's vector.
-    level : float
-        Probability of the intervals, between 0 and 1.
     ends : mapping, optional
         By unknown's number and side, True for the upper, distances of ends that differ from the
         covariance's, in the solver's vector; inf where there is none.
-
-    Raises
-    ------
-    InputError
-        If the level is not between 0 and 1.
 
     Notes
     -----
@@ -124,23 +111,22 @@ def estimates(
     the normal quantile, because the variance is itself estimated, from a number of independent
     stretches of residual that may be small.
     """
-    half = reach(covariance, level)
-    variables = covariance.variables
-    errors = covariance.standard_errors
+    half, variables, made = reach(covariance), covariance.variables, []
     down, up = (
-        np.array([ends.get((k, upper), half[k]) for k in range(half.size)])
+        np.array([ends.get((k, upper), each) for k, each in enumerate(half)])
         for upper in (False, True)
     )
     with np.errstate(invalid="ignore"):
         lower = variables.to_values(variables.vector - down)
         upper = variables.to_values(variables.vector + up)
-    made, most = [], np.where(variables.logarithmic, log(DECADES), DECADES)
+    errors = np.abs(variables.slopes) * covariance.standard_errors
+    vast = half > np.where(variables.logarithmic, log(DECADES), DECADES)
     for k, name in enumerate(variables.names):
         below, above = bool(np.isinf(down[k])), bool(np.isinf(up[k]))
         status: Status = "estimated"
         if side := variables.at_bound[k]:
             status = "at its lower bound" if side < 0 else "at its upper bound"
-        elif not covariance.determined[k] or (below and above) or half[k] > most[k]:
+        elif not covariance.determined[k] or (below and above) or vast[k]:
             status = "undetermined"
         elif below or above:
             status = "no lower end" if below else "no upper end"
@@ -150,13 +136,16 @@ def estimates(
                 name,
                 float(variables.estimates[k]),
                 status,
-                float(abs(variables.slopes[k]) * errors[k]) if status == "estimated" else None,
+                float(errors[k]) if status == "estimated" else None,
                 float(lower[k]) if told and not below else None,
                 float(upper[k]) if told and not above else None,
                 float(covariance.degrees_of_freedom[k]) if told else None,
             )
         )
     return tuple(made)
+
+
+# --- what is taken for granted --------------------------------------------------------------------
 
 
 class Handed(NamedTuple):
@@ -169,6 +158,14 @@ class Handed(NamedTuple):
     """Of the earlier stage's vector."""
     slopes: Array
     """(K, K_earlier) by how much the later stage's vector follows the earlier one's."""
+
+
+def follows_card(stage: StageFit, earlier: StageFit) -> bool:
+    """Whether a stage takes the current from the card that an earlier one estimated."""
+    model, voltage = stage.problem.model, [e.input.kind for e in stage.problem.experiments]
+    driven = stage.stage.current == "simulated" and "voltage" in voltage
+    pump = isinstance(model, DriveModel) and model.part == "pump"
+    return pump and driven and earlier.stage.part == "card"
 
 
 def slopes_by_earlier(
@@ -197,10 +194,7 @@ def slopes_by_earlier(
     second step of a two-step estimate (Murphy and Topel 1985). Gauss-Newton's approximation, as
     everywhere here: second derivatives times residuals are left out.
     """
-    model = stage.problem.model
-    if not isinstance(model, DriveModel) or model.part != "pump" or earlier.stage.part != "card":
-        return None
-    if not any(_driven_by_card(stage, each) for each in stage.problem.experiments):
+    if not follows_card(stage, earlier):
         return None
     unknowns, vector = earlier.problem.unknowns, earlier.solution.vector
     names = [name for each in unknowns if each.run is None for name in each.targets]
@@ -217,9 +211,20 @@ def slopes_by_fixed(stage: StageFit, linearised: LinearisedFit) -> Array:
     return _slopes(stage, linearised, names, deviations)
 
 
-def _driven_by_card(stage: StageFit, experiment: Experiment) -> bool:
-    """Whether the pump is driven by what the card makes of a voltage."""
-    return stage.stage.current == "simulated" and experiment.input.kind == "voltage"
+def source_of(stage: StageFit) -> Callable[[Experiment], Model]:
+    """The model that makes a run of a stage from its input, at the estimates.
+
+    That is the whole chain where the pump is driven by what the card makes of a voltage.
+    """
+    model = stage.problem.model
+    if not isinstance(model, DriveModel):
+        return lambda experiment: model
+    own, chain = (
+        DriveModel(stage.drive.parameters, part, model.currents, model.forces)
+        for part in (model.part, "chain")
+    )
+    by_card = model.part == "pump" and stage.stage.current == "simulated"
+    return lambda run: chain if by_card and run.input.kind == "voltage" else own
 
 
 def _slopes(stage: StageFit, linearised: LinearisedFit, names: Sequence[str], by: Array) -> Array:
@@ -228,20 +233,11 @@ def _slopes(stage: StageFit, linearised: LinearisedFit, names: Sequence[str], by
     `names` are those of the numbers, in the model; `by` (len(names), F) their own derivatives.
     """
     problem, vector = stage.problem, stage.solution.vector
-    model, machine = problem.model, dict(problem.unknowns.targets(vector, ""))
-    chain = model
-    if isinstance(model, DriveModel) and model.part == "pump":
-        chain = DriveModel(model.parameters_at(machine), "chain")
-    products = np.zeros((linearised.rank, by.shape[1]))
+    products, source = np.zeros((linearised.rank, by.shape[1])), source_of(stage)
     rows = {(run.name, run.channel): run for run in linearised.runs}
     for number, experiment in enumerate(problem.experiments):
-        if chain is model or not _driven_by_card(stage, experiment):
-            values = problem.model_values(vector, number)
-            moved = linearised_model(model, values, experiment, names)
-        else:
-            values = problem.unknowns.targets(vector, experiment.name)
-            own = {name: value for name, value in values.items() if name not in machine}
-            moved = linearised_model(chain, own, experiment, names)
+        values = problem.model_values(vector, number)
+        moved = linearised_model(source(experiment), values, experiment, names)
         for name, weight in problem.weights[number].items():
             used = weight > 0.0
             if used.any():
@@ -278,12 +274,16 @@ def with_handed(
     return replace(own, matrix=total, degrees_of_freedom=freedom)
 
 
+# --- all together ---------------------------------------------------------------------------------
+
+
 @dataclass(frozen=True, eq=False)
 class Uncertainty(Result):
     """Errors of a fit's estimates: those to quote, and what they rest on."""
 
-    quoted: Covariance
-    """That of the stage's own noise with what earlier stages handed on."""
+    level: ClassVar[float] = LEVEL
+    """Probability of the intervals."""
+
     own: Covariance
     """That of the stage's own noise."""
     inflation: Array
@@ -292,32 +292,36 @@ class Uncertainty(Result):
     colours: tuple[NoiseColour, ...]
     noisy: bool
     """Whether there are any residuals at all."""
-    level: float
-    handed: tuple[Handed, ...] = ()
+    handed: tuple[Handed, ...]
     """What earlier stages do not know."""
-    fixed: Array = field(default_factory=lambda: np.zeros((0, 0)))
+    fixed: Array
     """(K, F) changes of the solver's vector for a standard uncertainty of each fixed number."""
-    lines: tuple[SpectralLine, ...] = ()
+    lines: tuple[SpectralLine, ...]
     """Of the residuals, removed before it was judged how long they stay correlated."""
     ends: tuple[CheckedEnd, ...] = ()
     """Sides on which the cost does not rise as the covariance says."""
     priors: tuple[str, ...] = ()
     """What each prior adds, in words."""
 
-    @property
-    def estimates(self) -> tuple[Estimate, ...]:
-        """Values with the quoted intervals; ends that were checked stand in place of others."""
-        more = reach(self.quoted, self.level) ** 2 - reach(self.own, self.level) ** 2
-        ends = {
-            (end.number, end.upper): float(np.sqrt(end.distance**2 + max(more[end.number], 0.0)))
-            for end in self.ends
-        }
-        return estimates(self.quoted, level=self.level, ends=ends)
+    @cached_property
+    def quoted(self) -> Covariance:
+        """That of the stage's own noise with what is taken for granted."""
+        return with_handed(self.own, self.handed, self.fixed)
 
-    @property
+    @cached_property
     def sampled(self) -> Covariance:
         """That of all stages' noise: the quoted one without what fixed numbers may be off."""
         return with_handed(self.own, self.handed)
+
+    @cached_property
+    def estimates(self) -> tuple[Estimate, ...]:
+        """Values with the quoted intervals; ends that were checked stand in place of others."""
+        more = np.maximum(reach(self.quoted) ** 2 - reach(self.own) ** 2, 0.0)
+        ends = {
+            (end.number, end.upper): float(np.sqrt(end.distance**2 + more[end.number]))
+            for end in self.ends
+        }
+        return estimates(self.quoted, ends)
 
     def sentences(self) -> tuple[str, ...]:
         """What the errors rest on."""
@@ -334,15 +338,13 @@ class Uncertainty(Result):
         said += self.priors
         for end in self.ends:
             side, name = "upper" if end.upper else "lower", self.own.variables.names[end.number]
+            words = f"{name} has no {side} end: the cost does not rise enough on that side."
             if end.better is not None:
                 words = f"The profile of {name} found a better optimum, cost {end.better:.6g}"
-                said.append(f"{words}: fit from more starts.")
+                words += ": fit from more starts."
             elif np.isfinite(end.distance):
-                words = f"The {side} end of {name} is that of its profile"
-                said.append(f"{words}, which is asymmetric.")
-            else:
-                words = f"{name} has no {side} end"
-                said.append(f"{words}: the cost does not rise enough on that side.")
+                words = f"The {side} end of {name} is that of its profile, which is asymmetric."
+            said.append(words)
         known = self.own.determined & (np.diag(self.own.matrix) > 0.0)
         if known.any() and (self.handed or self.fixed.any()):
             what = ["the uncertainty of earlier stages"] * bool(self.handed)
@@ -359,11 +361,7 @@ class Uncertainty(Result):
 
 
 def uncertainty(
-    fit: LinearisedFit,
-    *,
-    level: float = 0.95,
-    handed: Sequence[Handed] = (),
-    fixed: Array | None = None,
+    fit: LinearisedFit, *, handed: Sequence[Handed] = (), fixed: Array | None = None
 ) -> Uncertainty:
     """Errors of a fit's estimates for coloured residuals.
 
@@ -371,8 +369,6 @@ def uncertainty(
     ----------
     fit : LinearisedFit
         The fit at its optimum.
-    level : float
-        Probability of the intervals.
     handed : sequence of Handed, optional
         What earlier stages do not know.
     fixed : (K, F) array, optional
@@ -381,7 +377,7 @@ def uncertainty(
     Raises
     ------
     InputError
-        If there are no more samples than unknowns, or the level is not between 0 and 1.
+        If there are no more samples than unknowns.
     """
     bounded, fit = fit.variables, released(fit)
     clean, lines = without_lines(fit)
@@ -389,34 +385,18 @@ def uncertainty(
     white = fit.squares / fit.spare_samples * np.sum(fit.whitening**2, axis=1)
     ratio = np.ones_like(white)
     np.divide(np.diag(own.matrix), white, out=ratio, where=own.determined & (white > 0.0))
-    made = Uncertainty(
-        with_handed(own, handed, fixed),
-        own,
-        np.maximum(ratio, 1.0),
-        noise_colours(clean),
-        fit.squares > 0.0,
-        level,
-        tuple(handed),
-        np.zeros((own.determined.size, 0)) if fixed is None else fixed,
-        lines,
-    )
-    made.estimates  # noqa: B018  refuses a wrong level
-    return made
+    fixed = np.zeros((white.size, 0)) if fixed is None else fixed
+    colours, noisy = noise_colours(clean), fit.squares > 0.0
+    return Uncertainty(own, np.maximum(ratio, 1.0), colours, noisy, tuple(handed), fixed, lines)
 
 
 def released(fit: LinearisedFit) -> LinearisedFit:
     """The fit with unknowns at a bound free to move.
 
     An interval of one unknown must allow for all that the others may be. One at its bound may lie
-    anywhere inside: held there, its partners would seem far better known than they are.
+    anywhere inside: kept there, its partners would seem far better known than they are.
     """
-    if fit.variables.free.all():
-        return fit
-    return replace(fit, variables=fit.variables.released)
-
-
-LEAST = 1e-6
-"""Smallest worth: residuals that are all but zero leave a prior its say on what they leave open."""
+    return fit if fit.variables.free.all() else replace(fit, variables=fit.variables.released)
 
 
 def weighed(problem: Problem, vector: Array) -> Problem:
@@ -440,10 +420,8 @@ def weighed(problem: Problem, vector: Array) -> Problem:
     InputError
         If there are no more samples than unknowns.
     """
-    bare = replace(problem, unknowns=problem.unknowns.with_worths(None))
-    fit = linearised_fit(bare, vector)
-    own = spectral_covariance(fit)
-    assumed = np.sum(fit.whitening**2, axis=1)
+    fit = linearised_fit(replace(problem, unknowns=problem.unknowns.with_worths(None)), vector)
+    own, assumed = spectral_covariance(fit), np.sum(fit.whitening**2, axis=1)
     known = own.determined & (assumed > 0.0)
     ratio = np.diag(own.matrix)[known] / assumed[known]
     found = np.full(known.size, float(np.median(ratio)) if known.any() else 1.0)
@@ -473,33 +451,26 @@ def prior_sentences(unknowns: Unknowns, vector: Array, quoted: Covariance) -> tu
     return tuple(said)
 
 
-OPEN = 0.01
-"""Part of a channel's range that a prediction moves by, for 10 % of an unknown, from which it
-depends on that unknown."""
-
-
 def open_unknowns(assessment: Assessment, experiments: Iterable[Experiment]) -> Iterator[str]:
     """Unknowns without an interval on which the prediction of some runs depends.
 
     Only a prediction that leaves the directions which the fitted runs determine is open: of two
     unknowns of which the fit tells the product, it depends on the product alone.
     """
-    stage, found = assessment.stage, assessment.uncertainty
+    stage, found, fit = assessment.stage, assessment.uncertainty, assessment.linearised
     model, unknowns, vector = stage.problem.model, stage.problem.unknowns, stage.solution.vector
     assert isinstance(model, DriveModel)
-    status = [estimate.status for estimate in found.estimates]
-    undetermined = np.array(
-        [s == "undetermined" and u.run is None for s, u in zip(status, unknowns, strict=True)]
-    )
+    pairs = zip(found.estimates, unknowns, strict=True)
+    undetermined = np.array([e.status == "undetermined" and u.run is None for e, u in pairs])
     # a better optimum that was met says nothing of how far an unknown can go
     one_ended = np.zeros(len(unknowns), dtype=np.bool_)
     one_ended[[e.number for e in found.ends if np.isinf(e.distance) and e.better is None]] = True
     if not (undetermined | one_ended).any():
         return
-    lengths = np.linalg.norm(assessment.linearised.triangle, axis=0)
+    lengths = np.linalg.norm(fit.triangle, axis=0)
     lengths[lengths == 0.0] = 1.0
     # directions that the fitted runs determine, in units of their effect there
-    told = np.linalg.qr(lengths[:, None] * assessment.linearised.whitening)[0]
+    told = np.linalg.qr(lengths[:, None] * fit.whitening)[0]
     chain = DriveModel(stage.drive.parameters, "card" if model.part == "card" else "chain")
     chain = replace(chain, forces=model.forces)
     targets = [t for u in unknowns if u.run is None for t in u.targets]
@@ -508,14 +479,14 @@ def open_unknowns(assessment: Assessment, experiments: Iterable[Experiment]) -> 
     for experiment in experiments:
         if experiment.input.kind != "voltage" or not chain.signals_of(experiment):
             continue
-        for name, part in chain.linearise(values, experiment, targets).items():
+        for name, moved in chain.linearise(values, experiment, targets).items():
             channel = experiment[name]
-            rows = part.by[channel.used] @ by_name
+            rows = moved.by[channel.used] @ by_name
             if channel.is_position:
                 rows = rows - rows.mean(axis=0)
             beyond = rows / lengths
             beyond = (beyond - (beyond @ told) @ told.T) * lengths
-            moved = 0.1 * np.where(undetermined, np.abs(beyond).max(axis=0), 0.0)
-            moved += 0.1 * np.where(one_ended, np.abs(rows).max(axis=0), 0.0)
-            reach = float(np.ptp(channel.values[channel.used]))
-            yield from (unknowns.names[k] for k in np.flatnonzero(moved > OPEN * reach))
+            depends = undetermined * np.abs(beyond).max(axis=0)
+            depends = depends + one_ended * np.abs(rows).max(axis=0)
+            least = OPEN * float(np.ptp(channel.values[channel.used]))
+            yield from (unknowns.names[k] for k in np.flatnonzero(0.1 * depends > least))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Any, NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
@@ -252,9 +252,8 @@ class EquationModel(ABC):
                 plain = Observation(signals[name], channel.time, np.zeros(channel.time.size))
                 observations.append(plain)
                 continue
-            seen = Observation(signals[name], channel.time, channel.values, weights[name])
-            free = f"{OFFSET}{name}" in offsets
-            observations.append(replace(seen, unknown=("offset",)) if free else seen)
+            seen, free = (channel.time, channel.values, weights[name]), f"{OFFSET}{name}" in offsets
+            observations.append(Observation(signals[name], *seen, free_offset=free))
         by, record, others = self.driven(experiment)
         return ObservedRecord(record, observations, by, experiment.begins, others)
 

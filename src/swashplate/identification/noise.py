@@ -33,18 +33,16 @@ class Covariance(Result):
 
     @property
     def standard_errors(self) -> Array:
-        """(K,) of the solver's numbers; inf where undetermined, 0 for one held at a bound."""
-        errors: Array = np.sqrt(np.maximum(np.diag(self.matrix), 0.0))
+        """(K,) of the solver's numbers; inf where undetermined, 0 for one at its bound."""
         known = self.determined | ~self.variables.free
-        standard: Array = np.where(known, errors, np.inf)
-        return standard
+        return np.where(known, np.sqrt(np.maximum(np.diag(self.matrix), 0.0)), np.inf)
 
     @property
     def correlation(self) -> Array:
         """(K, K) with 1 on the diagonal; 0 beside it for what has no variance."""
         errors = np.sqrt(np.maximum(np.diag(self.matrix), 0.0))
-        scaled = np.where(errors > 0.0, errors, 1.0)
-        correlation: Array = np.clip(self.matrix / np.outer(scaled, scaled), -1.0, 1.0)
+        errors[errors == 0.0] = 1.0
+        correlation: Array = np.clip(self.matrix / np.outer(errors, errors), -1.0, 1.0)
         np.fill_diagonal(correlation, 1.0)
         return correlation
 
@@ -56,20 +54,14 @@ def covariance_of(fit: LinearisedFit, matrix: Array, freedom: Array) -> Covarian
     return Covariance(fit.variables, np.where(known, symmetric, 0.0), fit.determined, freedom)
 
 
-Places = NDArray[np.intp]
+# --- correlation over time ------------------------------------------------------------------------
 
-LONGEST = 0.25
-"""Longest lag looked at, as a part of the longest run: beyond it too few pairs are left."""
-
-DRIFTING = 0.3
-"""Correlation length, as a part of the longest lag looked at, from which it is a model error."""
-
-IN_A_ROW = 5
-"""Lags in a row that must lie inside their band where a correlation is said to end."""
-
-STRAY = 0.2
-"""Share of those that follow that may lie outside."""
-
+LONGEST, DRIFTING = 0.25, 0.3
+"""Longest lag looked at, as a part of the longest run: beyond it too few pairs are left; and the
+correlation length, as a part of that lag, from which it is a model error."""
+IN_A_ROW, STRAY = 5, 0.2
+"""Lags in a row that must lie inside their band where a correlation is said to end, and the share
+of those that follow that may lie outside."""
 SAME_STEP = 0.01
 """Relative difference of two runs' sampling steps below which they are treated as one."""
 
@@ -77,21 +69,16 @@ SAME_STEP = 0.01
 class Grid(NamedTuple):
     """Even time grid that a run's samples lie on, its gaps left empty."""
 
-    places: Places
+    places: NDArray[np.intp]
     """(n,) place of each sample, from 0, increasing."""
     size: int
     """Places in all."""
     step: float
     """[s]"""
 
-    @property
-    def whole(self) -> bool:
-        """Whether there are no gaps."""
-        return self.size == self.places.size
-
     def spread(self, samples: Array) -> Array:
         """(size, ...) samples (n, ...) on the grid, 0 in the gaps."""
-        if self.whole:
+        if self.size == self.places.size:
             return samples
         spread = np.zeros((self.size, *samples.shape[1:]))
         spread[self.places] = samples
@@ -123,14 +110,11 @@ def pair_sums(samples: Array, grid: Grid, lags: int) -> tuple[Array, Array]:
     distance.
     """
     size = next_fast_len(grid.size + lags, real=True)
-    spectrum = rfft(grid.spread(samples), size)
-    sums = irfft(np.abs(spectrum) ** 2, size)[: lags + 1]
-    if grid.whole:
-        counts = np.maximum(grid.size - np.arange(lags + 1.0), 0.0)
-    else:
-        present = rfft(grid.spread(np.ones(samples.size)), size)
-        counts = np.rint(irfft(np.abs(present) ** 2, size)[: lags + 1])
-    return sums, counts
+    sums = irfft(np.abs(rfft(grid.spread(samples), size)) ** 2, size)[: lags + 1]
+    if grid.size == grid.places.size:
+        return sums, np.maximum(grid.size - np.arange(lags + 1.0), 0.0)
+    present = rfft(grid.spread(np.ones(samples.size)), size)
+    return sums, np.rint(irfft(np.abs(present) ** 2, size)[: lags + 1])
 
 
 def correlation_length(autocovariance: Array, counts: Array) -> int:
@@ -146,11 +130,10 @@ def correlation_length(autocovariance: Array, counts: Array) -> int:
     plug-in from the lag-one correlation (Andrews 1991) would miss a small slow part under white
     noise.
     """
-    variance = float(autocovariance[0])
-    if not variance > 0.0:
+    if not autocovariance[0] > 0.0:
         return 0
-    rho = autocovariance / variance
-    before = np.concatenate([[0.0], np.cumsum(rho[1:-1] ** 2)]) if rho.size > 1 else np.zeros(0)
+    rho = autocovariance / autocovariance[0]
+    before = np.concatenate([[0.0], np.cumsum(rho[1:-1] ** 2)])[: rho.size - 1]
     band = 2.0 * np.sqrt((1.0 + 2.0 * before) / np.maximum(counts[1:], 1.0))
     outside = np.abs(rho[1:]) > band  # of lag k at k - 1
     lengths = np.concatenate([[0], np.flatnonzero(outside) + 1])
@@ -193,12 +176,10 @@ class NoiseColour(Result):
         """How long the residuals stay correlated, and what that makes the samples worth."""
         if not self.length:
             return f"Residuals of {self.channel} are white."
-        worth = (
-            f"{self.inflation:.3g} samples count as one independent sample"
-            if self.inflation > 1.05
-            else "positive and negative correlations cancel, and the samples count as independent "
-            "ones"
-        )
+        worth = f"{self.inflation:.3g} samples count as one independent sample"
+        if self.inflation <= 1.05:
+            worth = "positive and negative correlations cancel, and the samples count as "
+            worth += "independent ones"
         during = f"{self.length * self.step:.3g} s"
         return f"Residuals of {self.channel} stay correlated over {during}: {worth}."
 
@@ -210,14 +191,21 @@ def unweighted(run: LinearisedRun) -> Array:
 
 def noise_colours(fit: LinearisedFit) -> tuple[NoiseColour, ...]:
     """Colours of the residuals of each channel, pooled over its runs of one sampling step."""
+    grids, groups = [grid_of(run.time) for run in fit.runs], list[list[int]]()
+    for k, run in enumerate(fit.runs):
+        for group in groups:
+            step = grids[group[0]].step
+            alike = abs(grids[k].step - step) <= SAME_STEP * step or run.time.size < 2
+            if fit.runs[group[0]].channel == run.channel and alike:
+                group.append(k)
+                break
+        else:
+            groups.append([k])
     colours = []
-    grids = [grid_of(run.time) for run in fit.runs]
-    for members in _alike(fit, grids):
+    for members in groups:
         longest = int(LONGEST * max(grids[k].size for k in members))
-        sums, counts = np.zeros(longest + 1), np.zeros(longest + 1)
-        for k in members:
-            added, pairs = pair_sums(unweighted(fit.runs[k]), grids[k], longest)
-            sums, counts = sums + added, counts + pairs
+        pairs = [pair_sums(unweighted(fit.runs[k]), grids[k], longest) for k in members]
+        sums, counts = (np.sum(part, axis=0) for part in zip(*pairs, strict=True))
         autocovariance = sums / np.maximum(counts, 1.0)
         length = correlation_length(autocovariance, counts)
         flat = min(length, longest // 2)  # the taper must have come down at the longest lag
@@ -226,37 +214,75 @@ def noise_colours(fit: LinearisedFit) -> tuple[NoiseColour, ...]:
         if autocovariance[0] > 0.0 and flat:
             # Politis's (2003) flat top, with a cosine in place of the straight flank: a spectral
             # line then leaks less into other frequencies
-            beyond = np.clip(lags / flat - 1.0, 0.0, 1.0)
-            taper = 0.5 * (1.0 + np.cos(np.pi * beyond))
+            taper = 0.5 * (1.0 + np.cos(np.pi * np.clip(lags / flat - 1.0, 0.0, 1.0)))
             correlation = autocovariance[: lags.size] / autocovariance[0] * taper
         channel, step = fit.runs[members[0]].channel, grids[members[0]].step
-        colours.append(NoiseColour(channel, members, step, correlation, length, longest))
+        colours.append(NoiseColour(channel, tuple(members), step, correlation, length, longest))
     return tuple(colours)
 
 
-def _alike(fit: LinearisedFit, grids: Sequence[Grid]) -> list[tuple[int, ...]]:
-    """Numbers of runs of the same channel and step."""
-    groups: list[list[int]] = []
-    for k, run in enumerate(fit.runs):
-        for group in groups:
-            first = grids[group[0]].step
-            same = abs(grids[k].step - first) <= SAME_STEP * first or run.time.size < 2
-            if fit.runs[group[0]].channel == run.channel and same:
-                group.append(k)
-                break
+# --- covariances ----------------------------------------------------------------------------------
+
+NEIGHBOURS, LEAST_LEFT = 21, 0.1
+"""Frequencies, of all runs of a channel together, over which a periodogram is averaged; and the
+part of them that the fit must have left for the noise to be known there."""
+BAND, FEWEST_BANDS = 10.0, 20.0
+"""Width of the bands within which noise may swell and fade in any way [Hz]; bands up to half the
+sampling rate, where that is low."""
+
+
+class _Spectrum:
+    """One run in the frequency domain, in directions whose derivatives are orthonormal."""
+
+    def __init__(self, run: LinearisedRun, whitening: Array) -> None:
+        grid = grid_of(run.time)
+        self.step, scale = grid.step, 1.0 / np.sqrt(grid.size)
+        directions, residual = run.jacobian @ whitening, unweighted(run)
+        weight = np.ones((1, 1)) if run.weight is None else run.weight[:, None]
+        self.derivatives = scale * rfft(grid.spread(weight * directions), axis=0)
+        """(F, rank) by which the noise enters the scores: with the weights twice."""
+        self.frequencies: Array = rfftfreq(grid.size, grid.step)
+        self.residual = scale * rfft(grid.spread(residual))
+        """(F,) without the weights."""
+        if weight.min() == weight.max():
+            by_estimate = self.derivatives / weight[:1] ** 2
         else:
-            groups.append([k])
-    return [tuple(group) for group in groups]
+            by_estimate = scale * rfft(grid.spread(directions / weight), axis=0)
+        products = (self.derivatives.conj() * by_estimate).real
+        self.left: Array = 1.0 - np.clip(np.sum(products, axis=1), 0.0, 1.0)
+        """(F,) part of the noise that the fit leaves."""
+        # a real signal's spectrum stands for its mirror image too, but at the ends
+        self.twice: Array = np.full(self.frequencies.size, 2.0)
+        self.twice[[0, -1] if grid.size % 2 == 0 else 0] = 1.0
+        self.level = float(np.mean(residual**2))
 
 
-NEIGHBOURS = 21
-"""Frequencies, of all runs of a channel together, over which a periodogram is averaged."""
-LEAST_LEFT = 0.1
-"""Part of them that the fit must have left for the noise to be told there."""
-BAND = 10.0
-"""Width of the bands, within which noise may swell and fade in any way. [Hz]"""
-FEWEST_BANDS = 20.0
-"""Bands up to half the sampling rate, where that is low."""
+class _Sandwich:
+    """(JᵀJ)⁻¹ M (JᵀJ)⁻¹ in the making: M, the unknowns' variances, the squares of their parts."""
+
+    def __init__(self, fit: LinearisedFit) -> None:
+        fit.check_spare_samples()
+        self.fit = fit
+        self.middle: Array = fit.whitening.T @ fit.prior_middle @ fit.whitening
+        self.total: Array = np.einsum("ki,ij,kj->k", fit.whitening, self.middle, fit.whitening)
+        self.squares: Array = np.zeros(fit.variables.count)
+
+    def add(self, middle: Array, parts: Array) -> None:
+        """Add to the middle (rank, rank), and parts (n, K) of the variances, all independent."""
+        self.middle = self.middle + middle
+        self.total += parts.sum(axis=0)
+        self.squares += np.sum(parts**2, axis=0)
+
+    def covariance(self, each: float, without: float) -> Covariance:
+        """The covariance, a part having `each` degrees of freedom; `without` any part."""
+        freedom = np.full_like(self.total, without)
+        np.divide(each * self.total**2, self.squares, out=freedom, where=self.squares > 0.0)
+        matrix = self.fit.whitening @ self.middle @ self.fit.whitening.T
+        return covariance_of(self.fit, matrix, np.maximum(freedom, 1.0))
+
+
+def _spectra(fit: LinearisedFit) -> list[_Spectrum]:
+    return [_Spectrum(run, fit.whitening) for run in fit.runs]
 
 
 def spectral_covariance(
@@ -284,18 +310,16 @@ def spectral_covariance(
     of squares are divided by sums of 1 - h, as in HC2 of MacKinnon and White (1985). Degrees of
     freedom follow from the frequencies that an unknown's variance is an average over.
     """
-    spectra = spectra or [_Spectrum(run, fit.whitening) for run in fit.runs]
-    sums = _Sums(fit)
+    sums, spectra = _Sandwich(fit), spectra or _spectra(fit)
     for channel in dict.fromkeys(run.channel for run in fit.runs):
         parts = [s for s, run in zip(spectra, fit.runs, strict=True) if run.channel == channel]
-        frequencies = np.concatenate([part.frequencies for part in parts])
-        order = np.argsort(frequencies, kind="stable")
-        level = np.concatenate([np.full(part.frequencies.size, part.level) for part in parts])
-        power = np.concatenate([part.power for part in parts]) / np.where(level > 0.0, level, 1.0)
-        left = np.concatenate([1.0 - part.leverage for part in parts])
-        seen, rest = _smoothed(power[order]), _smoothed(left[order])
+        order = np.argsort(np.concatenate([part.frequencies for part in parts]), kind="stable")
+        power = [np.abs(part.residual) ** 2 / (part.level or 1.0) for part in parts]
+        seen = np.concatenate(power)[order]
+        left = np.concatenate([part.left for part in parts])[order]
+        rest = np.maximum(_smoothed(left), LEAST_LEFT * NEIGHBOURS)
         shape = np.empty(order.size)
-        shape[order] = seen / np.maximum(rest, LEAST_LEFT * NEIGHBOURS)
+        shape[order] = _smoothed(seen) / rest
         weights, middle = [], np.zeros((fit.rank, fit.rank))
         ends = np.cumsum([part.frequencies.size for part in parts])[:-1]
         for part, spectrum in zip(parts, np.split(shape, ends), strict=True):
@@ -304,74 +328,18 @@ def spectral_covariance(
             across = np.abs(part.derivatives @ fit.whitening.T) ** 2
             weights.append(across * (part.level * part.twice)[:, None])
         # what each frequency's square adds to the variances: the smoothing the other way round
-        share = np.concatenate(weights)[order] / np.maximum(rest, LEAST_LEFT * NEIGHBOURS)[:, None]
-        sums.add(middle, _smoothed(share) * power[order][:, None])
+        share = np.concatenate(weights)[order] / rest[:, None]
+        sums.add(middle, _smoothed(share) * seen[:, None])
     return sums.covariance(4.0, np.inf)
-
-
-class _Sums:
-    """Sums of a sandwich: its middle, the unknowns' variances, and the squares of their parts."""
-
-    def __init__(self, fit: LinearisedFit) -> None:
-        fit.check_spare_samples()
-        self.fit = fit
-        self.middle: Array = fit.whitening.T @ fit.prior_middle @ fit.whitening
-        self.total: Array = np.einsum("ki,ij,kj->k", fit.whitening, self.middle, fit.whitening)
-        self.squares: Array = np.zeros(fit.variables.count)
-
-    def add(self, middle: Array, parts: Array) -> None:
-        """Add to the middle (rank, rank), and parts (n, K) of the variances, all independent."""
-        self.middle = self.middle + middle
-        self.total += parts.sum(axis=0)
-        self.squares += np.sum(parts**2, axis=0)
-
-    def covariance(self, each: float, without: float) -> Covariance:
-        """The covariance, a part having `each` degrees of freedom; `without` any part."""
-        freedom = np.full_like(self.total, without)
-        some = self.squares > 0.0
-        np.divide(each * self.total**2, self.squares, out=freedom, where=some)
-        matrix = self.fit.whitening @ self.middle @ self.fit.whitening.T
-        return covariance_of(self.fit, matrix, np.maximum(freedom, 1.0))
-
-
-class _Spectrum:
-    """One run in the frequency domain, in directions whose derivatives are orthonormal."""
-
-    def __init__(self, run: LinearisedRun, whitening: Array) -> None:
-        grid = grid_of(run.time)
-        self.step, scale = grid.step, 1.0 / np.sqrt(grid.size)
-        directions, residual = run.jacobian @ whitening, unweighted(run)
-        weight = np.ones((1, 1)) if run.weight is None else run.weight[:, None]
-        self.derivatives = scale * rfft(grid.spread(weight * directions), axis=0)
-        """(F, rank) by which the noise enters the scores: with the weights twice."""
-        self.frequencies: Array = rfftfreq(grid.size, grid.step)
-        self.residual = scale * rfft(grid.spread(residual))
-        """(F,) without the weights."""
-        self.power: Array = np.abs(self.residual) ** 2
-        if weight.min() == weight.max():
-            by_estimate = self.derivatives / weight[:1] ** 2
-        else:
-            by_estimate = scale * rfft(grid.spread(directions / weight), axis=0)
-        self.leverage: Array = np.clip(
-            np.sum((self.derivatives.conj() * by_estimate).real, axis=1), 0.0, 1.0
-        )
-        """(F,) part of the noise that the fit takes."""
-        # a real signal's spectrum stands for its mirror image too, but at the ends
-        self.twice: Array = np.full(self.frequencies.size, 2.0)
-        self.twice[0] = 1.0
-        if grid.size % 2 == 0:
-            self.twice[-1] = 1.0
-        self.level = float(np.mean(residual**2))
 
 
 def _smoothed(values: Array) -> Array:
     """Sums over each value and its neighbours (n, ...), mirrored at both ends."""
     near = min((NEIGHBOURS - 1) // 2, values.shape[0] - 1)
-    width = [(near, near)] + [(0, 0)] * (values.ndim - 1)
-    sums = np.cumsum(np.pad(values, width, mode="reflect"), axis=0)
-    first = np.concatenate([np.zeros((1, *values.shape[1:])), sums[: values.shape[0] - 1]])
-    made: Array = sums[2 * near :] - first
-    return made
+    others = [(0, 0)] * (values.ndim - 1)
+    sums = np.cumsum(np.pad(values, [(near, near), *others], mode="reflect"), axis=0)
+    sums = np.pad(sums, [(1, 0), *others])
+    return np.asarray(sums[2 * near + 1 :] - sums[: values.shape[0]])
 
 
 def band_score_covariance(
@@ -387,8 +355,8 @@ def band_score_covariance(
     at the same phase, counts in full. Degrees of freedom are those of a sum of squares, two for
     each band and run.
     """
-    sums = _Sums(fit)
-    for part in spectra or [_Spectrum(run, fit.whitening) for run in fit.runs]:
+    sums = _Sandwich(fit)
+    for part in spectra or _spectra(fit):
         products = part.derivatives.conj() * (part.twice * part.residual)[:, None]
         width = min(BAND, 0.5 / part.step / FEWEST_BANDS)
         band = (part.frequencies / width).astype(np.intp)
@@ -402,21 +370,21 @@ def coloured_noise_covariance(fit: LinearisedFit) -> Covariance:
     """Covariance to quote: the larger of both errors, unknown by unknown.
 
     A smoothed spectrum knows the noise well but takes it as alike all along a run; scores by bands
-    take in noise that is not, but are few. On the bench neither alone holds 93 to 97 % on every
+    take in noise that is not, but are few. On the bench neither alone covers 93 to 97 % on every
     axis, both together do (docs/calibration.md).
     """
-    spectra = [_Spectrum(run, fit.whitening) for run in fit.runs]
+    spectra = _spectra(fit)
     first, second = spectral_covariance(fit, spectra), band_score_covariance(fit, spectra)
     known = first.determined & (first.standard_errors > 0.0)
-    ratio = np.divide(
-        second.standard_errors, first.standard_errors, out=np.ones(known.size), where=known
-    )
+    ratio = np.ones(known.size)
+    np.divide(second.standard_errors, first.standard_errors, out=ratio, where=known)
     stretch = np.maximum(ratio, 1.0)
     freedom = np.where(ratio > 1.0, second.degrees_of_freedom, first.degrees_of_freedom)
-    return replace(
-        first, matrix=first.matrix * np.outer(stretch, stretch), degrees_of_freedom=freedom
-    )
+    matrix = first.matrix * np.outer(stretch, stretch)
+    return replace(first, matrix=matrix, degrees_of_freedom=freedom)
 
+
+# --- spectral lines -------------------------------------------------------------------------------
 
 HALF_BANDWIDTH = 4.0
 """Time-bandwidth product NW of the tapers, of which 2 NW - 1 are used (Thomson 1982)."""
@@ -424,13 +392,12 @@ LOWEST = 4.0
 """Half bandwidths of the shortest run below which no line is told from slow noise or drift."""
 FALSE_ALARM = 0.01
 """Probability that white noise has a line, over all frequencies of a channel together."""
-MOST = 40
-"""Lines of a channel that are removed, the strongest first."""
+MOST, FEWEST = 40, 256
+"""Lines of a channel that are removed, the strongest first; samples of a run from which they are
+sought."""
 PADDING = 4
 """Zeros beside a run, in its lengths, before its spectrum is taken; a parabola through the largest
 three values then tells a line's frequency to a hundredth of a bin."""
-FEWEST = 256
-"""Samples of a run from which lines are sought."""
 
 
 class SpectralLine(NamedTuple):
@@ -457,16 +424,14 @@ def without_lines(fit: LinearisedFit) -> tuple[LinearisedFit, tuple[SpectralLine
     runs, found = list(fit.runs), list[SpectralLine]()
     for channel in dict.fromkeys(run.channel for run in fit.runs):
         alike = [k for k, run in enumerate(fit.runs) if run.channel == channel]
-        members = [k for k in alike if fit.runs[k].time.size >= FEWEST]
-        if not members:
-            continue
-        whole = sum(float(np.sum(unweighted(fit.runs[k]) ** 2)) for k in alike)
-        left = {k: unweighted(fit.runs[k]) for k in members}
-        grids = [grid_of(fit.runs[k].time) for k in members]
+        whole = sum(float(np.sum(unweighted(runs[k]) ** 2)) for k in alike)
+        members = [k for k in alike if runs[k].time.size >= FEWEST]
+        left = {k: unweighted(runs[k]) for k in members}
+        grids = [grid_of(runs[k].time) for k in members]
         for frequency in _frequencies([*left.values()], grids):
             taken = 0.0
             for k in members:
-                turn = 2.0 * np.pi * frequency * fit.runs[k].time
+                turn = 2.0 * np.pi * frequency * runs[k].time
                 waves = np.stack([np.cos(turn), np.sin(turn)])
                 products = waves @ left[k]
                 amplitudes = np.linalg.solve(waves @ waves.T, products)
@@ -474,7 +439,7 @@ def without_lines(fit: LinearisedFit) -> tuple[LinearisedFit, tuple[SpectralLine
                 taken += float(products @ amplitudes)
             found.append(SpectralLine(channel, frequency, taken / whole))
         for k in members:
-            weight = fit.runs[k].weight
+            weight = runs[k].weight
             runs[k] = runs[k]._replace(residual=left[k] if weight is None else weight * left[k])
     return (replace(fit, runs=tuple(runs)) if found else fit), tuple(found)
 
@@ -499,6 +464,8 @@ def _frequencies(runs: Sequence[Array], grids: Sequence[Grid]) -> list[float]:
     """Frequencies of significant lines, the strongest first, no two within a bandwidth. [Hz]"""
     from scipy.special import fdtri
 
+    if not runs:
+        return []
     step = float(np.median([grid.step for grid in grids]))
     size = next_fast_len(PADDING * max(grid.size for grid in grids), real=True)
     count = round(2.0 * HALF_BANDWIDTH) - 1
@@ -526,17 +493,12 @@ def _frequencies(runs: Sequence[Array], grids: Sequence[Grid]) -> list[float]:
             break
         near = abs(np.array(chosen) - frequencies[place]) < bandwidth
         if not near.any():
-            chosen.append(float(frequencies[place] + _aside(explained, place) * frequencies[1]))
+            # the parabola through the maximum and its neighbours; 0 and the end are never told
+            low, middle, high = explained[place - 1 : place + 2]
+            bend = low - 2.0 * middle + high
+            aside = np.clip(0.5 * (low - high) / bend, -0.5, 0.5) if bend < 0.0 else 0.0
+            chosen.append(float(frequencies[place] + aside * frequencies[1]))
     return chosen
-
-
-def _aside(power: Array, place: int) -> float:
-    """How far beside a maximum the parabola through it and its neighbours has its own. [bin]"""
-    if not 0 < place < power.size - 1:
-        return 0.0
-    low, middle, high = power[place - 1 : place + 2]
-    bend = low - 2.0 * middle + high
-    return float(np.clip(0.5 * (low - high) / bend, -0.5, 0.5)) if bend < 0.0 else 0.0
 
 
 @lru_cache(maxsize=32)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from math import inf, isfinite
+from math import inf
 from typing import TYPE_CHECKING, Literal, NamedTuple
 
 import numpy as np
@@ -13,15 +13,10 @@ from swashplate.campaign.experiment import Experiment
 from swashplate.errors import DomainError, InputError
 from swashplate.identification.data_checks import contradicting_runs
 from swashplate.identification.drive_model import DriveModel, limits_reached
+from swashplate.identification.faults import DRIFT, LOSS, Fault, measurement_error
 from swashplate.identification.identifiability import WIDE
 from swashplate.identification.intervals import open_unknowns
-from swashplate.identification.lack_of_fit import (
-    LOSS,
-    Fault,
-    LackOfFit,
-    lack_of_fit,
-    measurement_error,
-)
+from swashplate.identification.lack_of_fit import LackOfFit, lack_of_fit
 from swashplate.identification.solving import Solution
 from swashplate.identification.validation import (
     FOLLOWS,
@@ -33,40 +28,32 @@ from swashplate.identification.validation import (
     with_speeds,
 )
 from swashplate.results import Result
-from swashplate.tables import listed
+from swashplate.tables import Column, Table, listed
 
 if TYPE_CHECKING:
     from swashplate.identification.assessment import Assessment
     from swashplate.identification.validation import Measures, RunQuality
-    from swashplate.tables import Table
 
 Grade = Literal["Usable", "Usable for prediction", "Not usable"]
-Rules = Literal["use", "values"]
 
-POOR = 0.5
-"""NRMSE from which a drive is not usable: a constant gain does better on a step's record."""
-SERIOUS = 0.2
-"""NRMSE below which held-out runs that are simulated less well than fitted ones are still of use:
-80 % of the movement is followed, about what Kruse (2001) reached on his worst kind of test."""
-CARRIES_OVER = 1.5
-"""Factor on the fitted runs' RMSE up to which held-out runs count as simulated alike: maneuvers
-differ that much among the fitted ones."""
-FAR = 3.0
-"""Factor from which the fit does not carry over: twice the normal difference between maneuvers."""
-REQUIRED = 0.10
-"""Largest error of held-out runs over their range, where the user requires nothing else."""
-MOST = 0.5
-"""Share of parameters without a value of their own from which a fit has found nothing."""
-MOVES = 0.05
+POOR, SERIOUS = 0.5, 0.2
+"""NRMSE from which a drive is not usable, as a constant gain does better on a step's record; and
+below which held-out runs that are simulated less well than fitted ones are still of use: 80 % of
+the movement is followed, about what Kruse (2001) reached on his worst kind of test."""
+CARRIES_OVER, FAR = 1.5, 3.0
+"""Factors on the fitted runs' RMSE: up to the first held-out runs count as simulated alike, as
+maneuvers differ that much among the fitted ones; from twice that the fit does not carry over."""
+REQUIRED, MOST = 0.10, 0.5
+"""Largest error of held-out runs over their range, where the user requires nothing else; share of
+parameters without a value of their own from which a fit has found nothing."""
+MOVES, STANDS_OUT = 0.05, 5.0
 """A run that moves by less than this part of the channel's movement is not judged by itself; where
 the measurement error is known, by less than five times that beyond the range of the noise alone."""
-STANDS_OUT = 5.0
-MISFIT = 1.2
+MISFIT, MODEL_ERROR = 1.2, 0.01
 """Residuals over their known measurement error from which there is lack of fit: 37 of 39 sound
-campaigns of slew lay between 0.97 and 1.02; in two the search ended in another optimum."""
-MODEL_ERROR = 0.01
-"""Error of held-out runs over their range from which lack of fit rules out prediction: what is
-wrong is not small on known maneuvers, and larger on others."""
+campaigns of slew lay between 0.97 and 1.02, in two the search ended in another optimum; and the
+error of held-out runs over their range from which it rules out prediction, as what is wrong is not
+small on known maneuvers and larger on others."""
 DRIFTS, DRIFTS_AWAY = 0.01, 0.03
 """Change of a channel over the campaign from which values are those of a mean machine, and from
 which no one set of parameters holds."""
@@ -90,10 +77,10 @@ class Criterion(NamedTuple):
     limit: str
     reason: str
     """Why the limit is where it is; of one that was not judged, why not."""
-    rules: Rules = "use"
-    """What is ruled out by a failure: any use, or the parameters' values."""
     failure: str = ""
     """Clause that says what is wrong; empty where nothing is."""
+    rules: Literal["use", "values"] = "use"
+    """What is ruled out by a failure: any use, or the parameters' values."""
     judged: bool = True
     """Whether the data allow to judge it."""
 
@@ -101,6 +88,11 @@ class Criterion(NamedTuple):
     def state(self) -> Literal["met", "not met", "not judged"]:
         """What came of it."""
         return "not met" if self.failure else "met" if self.judged else "not judged"
+
+
+def _open(name: str, limit: str, why: str) -> Criterion:
+    """A criterion that the data do not allow to judge."""
+    return Criterion(name, "-", limit, why, judged=False)
 
 
 @dataclass(frozen=True)
@@ -120,10 +112,14 @@ class Verdict(Result):
     """What is assumed and cannot be checked from these logs."""
 
     def table(self) -> Table:
-        """Its criteria."""
-        from swashplate.identification.tables import criteria_table
-
-        return criteria_table(self)
+        """Its criteria, those that are not met first, then those that were not judged."""
+        columns = (Column("criterion", wrap=True), Column("value", "s"), Column("limit", "s"))
+        made = Table("Acceptance criteria", (*columns, Column(""), Column("reason", of="p")))
+        order = ("not met", "not judged", "met")
+        for each in sorted(self.criteria, key=lambda each: order.index(each.state)):
+            state = "NOT MET" if each.failure else each.state
+            made.add(each.name, each.value, each.limit, state, each.reason, look=state != "met")
+        return made
 
     @property
     def usable(self) -> bool:
@@ -133,11 +129,42 @@ class Verdict(Result):
     @property
     def not_judged(self) -> tuple[str, ...]:
         """A sentence for each criterion that was not judged, with what would allow it."""
-        return tuple(
-            f"Not judged: {each.name}, as {each.reason}."
-            for each in self.criteria
-            if each.state == "not judged"
-        )
+        left = [each for each in self.criteria if each.state == "not judged"]
+        return tuple(f"Not judged: {each.name}, as {each.reason}." for each in left)
+
+
+class _Side(NamedTuple):
+    """Runs that were fitted, or predicted; speeds in place of the positions that have one.
+
+    Of a position nearly everything is its trend.
+    """
+
+    which: str
+    qualities: list[RunQuality]
+    measures: dict[str, Measures]
+    parts: dict[str, float | None]
+    """Error over range, by channel."""
+
+    @classmethod
+    def of(cls, which: str, qualities: Sequence[RunQuality]) -> _Side:
+        found = with_speeds(qualities)
+        named = {each.channel for each in found}
+        kept = [each for each in found if f"speed from {each.channel}" not in named]
+        kept.sort(key=lambda each: each.experiment[each.channel].kind != "shaft_speed")
+        measures = pooled(kept)
+        return cls(which, kept, measures, {name: part_of_range(kept, name) for name in measures})
+
+    @property
+    def accuracy(self) -> str:
+        """``speed to 1.2 % of its range (worst run 1.6 %) and current to 2.0 % (...)``."""
+        said = list[str]()
+        for name, part in self.parts.items():
+            alike = [each for each in self.qualities if each.channel == name]
+            if part is not None:
+                largest = max(each.measures.rmse for each in alike) / range_of(alike)
+                worst = f" (worst run {percent(largest)})" if len(alike) > 1 else ""
+                said.append(f"{name} to {percent(part)}{'' if said else ' of its range'}{worst}")
+        return listed(said) or "channels that never move"
 
 
 def verdict(
@@ -152,7 +179,7 @@ def verdict(
     Parameters
     ----------
     assessments : sequence of Assessment
-        One for each stage of the fit; none for a drive that is only held against runs.
+        One for each stage of the fit; none for a drive that is only compared with runs.
     predicted : sequence of RunQuality
         Of runs that were held out of the fit, as `validation.predict` gives them.
     planned : sequence of str
@@ -166,68 +193,62 @@ def verdict(
         "Not usable" where a criterion on the use fails, "Usable for prediction" where only those on
         the parameters' values do. A criterion that the data do not allow to judge rules out
         nothing, and says what would be needed.
-
-    Notes
-    -----
-    A position is judged by its speed where it has one: of a position nearly everything is its
-    trend.
     """
-    fitted = _judged([each for assessment in assessments for each in assessment.runs])
-    held = _judged(predicted)
-    own = [each for assessment in assessments for each in assessment.runs] or predicted
-    misfit = None
-    criteria = [*_convergence(assessments, planned)]
-    for which, qualities in (
-        ("fitted", fitted),
-        ("held-out" if assessments else "predicted", held),
-    ):
-        if qualities:
-            criteria += [_followed(qualities, which), _no_worse_than_mean(qualities, which)]
-    criteria.append(_required_accuracy(held, required))
+    runs = [each for assessment in assessments for each in assessment.runs]
+    fitted = _Side.of("fitted", runs)
+    out = _Side.of("held-out" if assessments else "predicted", predicted)
+    criteria, misfit = [*_convergence(assessments, planned)], None
+    for side in (fitted, out):
+        criteria += [_followed(side), _no_worse_than_mean(side)] if side.qualities else []
+    criteria.append(_required_accuracy(out, required))
     if assessments:
         criteria += [
-            _carried_over(fitted, held),
+            _carried_over(fitted, out),
             _consistent(assessments),
             _determined(assessments),
             _bounded_predictions(assessments, predicted),
         ]
         try:
             misfit = lack_of_fit(assessments)
-            criteria += _misfit_criteria(misfit, held or fitted, assessments)
         except InputError as error:
-            why = str(error).rstrip(".")
-            criteria.append(Criterion("lack of fit", "-", f"{MISFIT:g}", why, judged=False))
-    criteria.append(_model_error(own))
-    failed = {
-        rules: [each for each in criteria if each.failure and each.rules == rules]
-        for rules in ("use", "values")
-    }
-    grade: Grade = (
-        "Not usable" if failed["use"] else "Usable for prediction" if failed["values"] else "Usable"
+            criteria.append(_open("lack of fit", f"{MISFIT:g}", str(error).rstrip(".")))
+        else:
+            criteria += _fits(misfit, out if out.qualities else fitted, assessments)
+    criteria.append(_model_error(runs or predicted))
+
+    unusable, untrusted = (
+        "; ".join(each.failure for each in criteria if each.failure and each.rules == ruled)
+        for ruled in ("use", "values")
     )
+    grade: Grade = "Usable for prediction" if untrusted else "Usable"
+    grade = "Not usable" if unusable else grade
     tested = {each.name: each for each in _fitted_runs(assessments)}
-    tested |= {each.experiment.name: each.experiment for each in held}
-    experiments = list(tested.values())
-    words = _headline(bool(assessments), fitted, held, failed, experiments)
-    units = misfit.units if misfit is not None else ()
-    assumed = [f"The estimates are in units of the fixed {listed(units)}."] if units else []
-    assumed += [f"{each.assumption}." for each in (misfit.assumed if misfit is not None else ())]
+    tested |= {each.experiment.name: each.experiment for each in out.qualities}
+    assumed: list[str] = []
+    if misfit is not None:
+        units = f"The estimates are in units of the fixed {listed(misfit.units)}."
+        assumed = [units] * bool(misfit.units) + [f"{e.assumption}." for e in misfit.assumed]
+    if unusable:
+        headline = f"Not usable: {unusable}."
+    elif not assessments:
+        number = len({each.experiment.name for each in out.qualities})
+        headline = f"Predicts {out.accuracy} over {number} run{'s' if number > 1 else ''}."
+    elif untrusted:
+        accuracy = f"held-out {out.accuracy}" if out.qualities else f"fitted {fitted.accuracy}"
+        headline = f"Usable for prediction of {_maneuvers(tested)} ({accuracy}); parameter values "
+        headline += f"not to be trusted because {untrusted}."
+    elif out.qualities:
+        headline = f"Usable: predicts held-out {out.accuracy}."
+    else:
+        headline = f"Usable as far as tested: follows {fitted.accuracy}; no run was held out."
     return Verdict(
-        words,
+        headline,
         tuple(criteria),
         grade,
-        tuple(_remarks(assessments, fitted, held, own, misfit)),
-        _validity(assessments, experiments) if assessments else "",
+        tuple(_remarks(assessments, fitted, out, runs or predicted, misfit)),
+        _validity(assessments, tested) if assessments else "",
         tuple(assumed),
     )
-
-
-def _judged(qualities: Sequence[RunQuality]) -> list[RunQuality]:
-    """With speeds in place of the positions that have one, speeds first."""
-    found = with_speeds(qualities)
-    named = {each.channel for each in found}
-    kept = [each for each in found if f"speed from {each.channel}" not in named]
-    return sorted(kept, key=lambda each: each.experiment[each.channel].kind != "shaft_speed")
 
 
 def _fitted_runs(assessments: Sequence[Assessment]) -> list[Experiment]:
@@ -235,16 +256,10 @@ def _fitted_runs(assessments: Sequence[Assessment]) -> list[Experiment]:
     return list({e.name: e for a in assessments for e in a.stage.problem.experiments}.values())
 
 
-def starts_of(
-    assessments: Sequence[Assessment], starts: Sequence[Solution] = ()
-) -> dict[str, Sequence[Solution]]:
-    """Starts by stage, of the stages that had several; or those given, under no name."""
-    own: dict[str, Sequence[Solution]] = {
-        each.stage.stage.name: each.stage.starts
-        for each in assessments
-        if len(each.stage.starts) > 1
-    }
-    return own or ({"": starts} if len(starts) > 1 else {})
+def starts_of(assessments: Sequence[Assessment]) -> dict[str, Sequence[Solution]]:
+    """Starts by stage, of the stages that had several."""
+    stages = [each.stage for each in assessments]
+    return {each.stage.name: each.starts for each in stages if len(each.starts) > 1}
 
 
 def weak_unknowns(assessment: Assessment) -> list[str]:
@@ -263,7 +278,7 @@ def weak_unknowns(assessment: Assessment) -> list[str]:
 
 def _convergence(assessments: Sequence[Assessment], planned: Sequence[str]) -> Iterator[Criterion]:
     """That each stage came to its end."""
-    why = "before the optimum neither values nor intervals are meaningful"
+    why, done = "before the optimum neither values nor intervals are meaningful", []
     for each in assessments:
         name, solution = each.stage.stage.name, each.stage.solution
         state, failure = "converged", ""
@@ -271,120 +286,96 @@ def _convergence(assessments: Sequence[Assessment], planned: Sequence[str]) -> I
             state = "interrupted"
             failure = f"stage {name} was interrupted, and its best so far is no optimum"
         elif not solution.converged:
-            state = "not converged"
-            failure = f"stage {name} did not converge ({solution.message})"
-        yield Criterion(f"convergence of {name}", state, "converged", why, "use", failure)
-    done = [each.stage.stage.name for each in assessments]
+            state, failure = "not converged", f"stage {name} did not converge ({solution.message})"
+        done.append(name)
+        yield Criterion(f"convergence of {name}", state, "converged", why, failure)
     missing = [name for name in planned if name not in done] if done else []
     if missing:
         failure = f"{listed(missing)} {'were' if len(missing) > 1 else 'was'} never fitted"
-        yield Criterion("stages", f"{len(missing)} missing", "all", why, "use", failure)
+        yield Criterion("stages", f"{len(missing)} missing", "all", why, failure)
 
 
-def _followed(qualities: Sequence[RunQuality], which: str) -> Criterion:
+def _followed(side: _Side) -> Criterion:
     """That each channel follows the movement at all."""
-    errors = {k: m.nrmse for k, m in pooled(qualities).items() if m.nrmse is not None}
+    errors = {k: m.nrmse for k, m in side.measures.items() if m.nrmse is not None}
     clauses = []
     for name, error in errors.items():
         words = "misses at least half of the movement"
         words = "is simulated no better than by its mean" if error >= 1.0 else words
         if error >= POOR:
             fits = 100.0 * (1.0 - error)
-            clauses.append(f"{name} {words} in the {which} runs (fit {fits:z.0f} %)")
+            clauses.append(f"{name} {words} in the {side.which} runs (fit {fits:z.0f} %)")
     return Criterion(
-        f"RMSE / standard deviation, {which}",
+        f"RMSE / standard deviation, {side.which}",
         percent(max(errors.values(), default=0.0)),
         percent(POOR),
         "a constant gain does better on a step's record",
-        "use",
         "; ".join(clauses),
     )
 
 
-def _no_worse_than_mean(qualities: Sequence[RunQuality], which: str) -> Criterion:
+def _no_worse_than_mean(side: _Side) -> Criterion:
     """That no run that moves is simulated no better than by its own mean."""
-    found = pooled(qualities)
-    worse = [each for each in qualities if _is_worse(each, found[each.channel])]
     runs: dict[str, list[str]] = {}
-    for each in worse:
-        runs.setdefault(each.channel, []).append(each.experiment.name)
-    words = listed([f"{name} in {listed(names)}" for name, names in runs.items()])
-    return Criterion(
-        f"{which} runs worse than mean",
-        f"{len(worse)}",
-        "0",
-        "such a run belongs to another machine, or the model lacks what moves it",
-        "use",
-        f"simulated no better than by the mean of the run: {words}, which contradicts the other "
-        "runs, or shows what the model has not"
-        if worse
-        else "",
-    )
-
-
-def _is_worse(quality: RunQuality, pool: Measures) -> bool:
-    own, channel = quality.measures, quality.experiment[quality.channel]
-    error, values = measurement_error(channel), channel.values[channel.used]
-    if error is None:
-        moves = own.spread > MOVES * pool.spread
-    else:
+    for each in side.qualities:
+        own, channel = each.measures, each.experiment[each.channel]
+        error, values = measurement_error(channel), channel.values[channel.used]
         # what noise alone reaches both ways in so many samples is no movement
         noise = 2.0 * np.sqrt(2.0 * np.log(max(values.size, 2)))
-        moves = float(np.ptp(values)) > (STANDS_OUT + noise) * error
-    return moves and (own.nrmse or 0.0) >= 1.0
-
-
-def _required_accuracy(held: Sequence[RunQuality], required: float) -> Criterion:
-    """That the error of the runs predicted is what the user can live with."""
-    name, limit = "error / range, runs predicted", percent(required)
-    if not held:
-        why = 'no run was held out: set role = "validate" in one of its [[runs]]'
-        return Criterion(name, "-", limit, why, judged=False)
-    parts = {each: part_of_range(held, each) or 0.0 for each in pooled(held)}
-    worst = max(parts.values())
-    late = next((each for each, part in parts.items() if part > required), None)
+        if error is None:
+            moves = own.spread > MOVES * side.measures[each.channel].spread
+        else:
+            moves = float(np.ptp(values)) > (STANDS_OUT + noise) * error
+        if moves and (own.nrmse or 0.0) >= 1.0:
+            runs.setdefault(each.channel, []).append(each.experiment.name)
+    words = listed([f"{name} in {listed(names)}" for name, names in runs.items()])
+    failure = f"simulated no better than by the mean of the run: {words}, which contradicts the "
+    failure += "other runs, or shows what the model has not"
     return Criterion(
-        name,
-        percent(worst),
-        limit,
-        "what is required of the model (--require)",
-        "use",
-        "" if late is None else f"predicts {late} to {percent(worst)} of its range only",
+        f"{side.which} runs worse than mean",
+        f"{sum(map(len, runs.values()))}",
+        "0",
+        "such a run belongs to another machine, or the model lacks what moves it",
+        failure if runs else "",
     )
 
 
-def _held_over_fitted(
-    fitted: Sequence[RunQuality], held: Sequence[RunQuality]
-) -> dict[str, tuple[float, float]]:
+def _required_accuracy(out: _Side, required: float) -> Criterion:
+    """That the error of the runs predicted is what the user can live with."""
+    name, limit = "error / range, runs predicted", percent(required)
+    if not out.qualities:
+        why = 'no run was held out: set role = "validate" in one of its [[runs]]'
+        return _open(name, limit, why)
+    parts = {each: part or 0.0 for each, part in out.parts.items()}
+    worst = percent(max(parts.values()))
+    late = next((each for each, part in parts.items() if part > required), None)
+    failure = "" if late is None else f"predicts {late} to {worst} of its range only"
+    return Criterion(name, worst, limit, "what is required of the model (--require)", failure)
+
+
+def _ratios(fitted: _Side, out: _Side) -> dict[str, tuple[float, float]]:
     """RMSE of held-out over that of fitted runs, and NRMSE of held-out ones, by channel."""
-    reference = pooled(fitted)
     return {
-        name: (found.rmse / reference[name].rmse, found.nrmse)
-        for name, found in pooled(held).items()
-        if name in reference and reference[name].rmse > 0.0 and found.nrmse is not None
+        name: (found.rmse / fitted.measures[name].rmse, found.nrmse)
+        for name, found in out.measures.items()
+        if name in fitted.measures and fitted.measures[name].rmse > 0.0 and found.nrmse is not None
     }
 
 
-def _carried_over(fitted: Sequence[RunQuality], held: Sequence[RunQuality]) -> Criterion:
+def _carried_over(fitted: _Side, out: _Side) -> Criterion:
     """That runs that were held out are simulated about as well as those that were fitted."""
-    found = _held_over_fitted(fitted, held)
-    serious = {name: ratio for name, (ratio, nrmse) in found.items() if nrmse >= SERIOUS}
-    largest = max(serious.values(), default=0.0)
-    name, limit = "RMSE, held-out / fitted", f"{FAR:g}"
+    found, name, limit = _ratios(fitted, out), "RMSE, held-out / fitted", f"{FAR:g}"
     if not found:
-        return Criterion(name, "-", limit, "no held-out run moves", judged=False)
-    return Criterion(
-        name,
-        f"{largest:.2g}" if largest else "small",
-        limit,
-        "twice the normal difference between maneuvers",
-        "use",
-        "; ".join(
-            f"held-out {name} has {ratio:.1f} times the RMSE of the fitted runs"
-            for name, ratio in serious.items()
-            if ratio > FAR
-        ),
-    )
+        return _open(name, limit, "no held-out run moves")
+    serious = {name: ratio for name, (ratio, nrmse) in found.items() if nrmse >= SERIOUS}
+    clauses = [
+        f"held-out {name} has {ratio:.1f} times the RMSE of the fitted runs"
+        for name, ratio in serious.items()
+        if ratio > FAR
+    ]
+    value = f"{max(serious.values()):.2g}" if serious else "small"
+    why = "twice the normal difference between maneuvers"
+    return Criterion(name, value, limit, why, "; ".join(clauses))
 
 
 def _consistent(assessments: Sequence[Assessment]) -> Criterion:
@@ -392,19 +383,14 @@ def _consistent(assessments: Sequence[Assessment]) -> Criterion:
     name, last = "runs contradicting others", assessments[-1].stage
     if not isinstance(last.problem.model, DriveModel):
         why = "signs and scales of runs are compared through a drive, which this model is not"
-        return Criterion(name, "-", "0", why, judged=False)
+        return _open(name, "0", why)
     found = contradicting_runs(_fitted_runs(assessments), last.drive.parameters)
-    names = list(dict.fromkeys(str(each.run) for each in found))
-    return Criterion(
-        name,
-        f"{len(names)}",
-        "0",
-        "its data are of another machine, unit or sign, and bias all estimates",
-        "use",
-        f"{listed(names)} contradicts the other runs ({found[0].sentence.rstrip('.')})"
-        if found
-        else "",
-    )
+    names, failure = list(dict.fromkeys(str(each.run) for each in found)), ""
+    if found:
+        said = found[0].sentence.rstrip(".")
+        failure = f"{listed(names)} contradicts the other runs ({said})"
+    why = "its data are of another machine, unit or sign, and bias all estimates"
+    return Criterion(name, f"{len(names)}", "0", why, failure)
 
 
 def _determined(assessments: Sequence[Assessment]) -> Criterion:
@@ -415,15 +401,10 @@ def _determined(assessments: Sequence[Assessment]) -> Criterion:
         found = each.identifiability
         lost += len(shared & {*found.at_bounds, *found.to_fix})
         total += len(shared)
-    words = f"{lost} of {total} parameters are at a bound or not determined"
-    return Criterion(
-        "parameters without a value",
-        f"{lost} of {total}",
-        f"{MOST:.0%}",
-        "a fit that determines few of its parameters has found nothing",
-        "use",
-        words if lost > MOST * total else "",
-    )
+    name, value = "parameters without a value", f"{lost} of {total}"
+    why = "a fit that determines few of its parameters has found nothing"
+    failure = f"{value} parameters are at a bound or not determined" if lost > MOST * total else ""
+    return Criterion(name, value, f"{MOST:.0%}", why, failure)
 
 
 def _bounded_predictions(
@@ -432,65 +413,54 @@ def _bounded_predictions(
     """That what is predicted depends on nothing that the fitted runs leave open."""
     name = "predictions left open"
     if not predicted or not isinstance(assessments[-1].stage.problem.model, DriveModel):
-        why = "no run was held out" if not predicted else "the model is none of a drive"
-        return Criterion(name, "-", "none", why, judged=False)
+        why = "the model is none of a drive" if predicted else "no run was held out"
+        return _open(name, "none", why)
     runs = {each.experiment.name: each.experiment for each in predicted}.values()
-    names = listed(
-        list(dict.fromkeys(n for each in assessments for n in open_unknowns(each, runs)))
-    )
-    return Criterion(
-        name,
-        names or "none",
-        "none",
-        "the prediction is then as uncertain as the parameter",
-        "use",
-        f"predictions depend on {names}, which the fitted runs leave open" if names else "",
-    )
+    found = dict.fromkeys(n for each in assessments for n in open_unknowns(each, runs))
+    names, why = listed(list(found)), "the prediction is then as uncertain as the parameter"
+    failure = f"predictions depend on {names}, which the fitted runs leave open" if names else ""
+    return Criterion(name, names or "none", "none", why, failure)
 
 
-def _misfit_criteria(
-    misfit: LackOfFit, judged: Sequence[RunQuality], assessments: Sequence[Assessment]
-) -> Iterator[Criterion]:
+def _fits(misfit: LackOfFit, side: _Side, assessments: Sequence[Assessment]) -> Iterator[Criterion]:
     """That residuals are no larger than the known measurement error, and follow no fault."""
-    likely = misfit.likely
+    likely, limit = f" (likely: {misfit.likely})" if misfit.likely else "", f"{MISFIT:g}"
     for name, ratio in misfit.ratios.items():
-        shown = [each for each in pooled(judged) if each in (name, f"speed from {name}")]
-        error = max((part_of_range(judged, each) or 0.0 for each in shown), default=0.0)
-        worst = max((e for e in misfit.runs if e.channel == name), key=lambda e: e.ratio)
-        words = (
-            f"residuals of {name} are {ratio:.3g} times their known measurement error, most in "
-            f"{worst.run}{f' (likely: {likely})' if likely else ''}"
-        )
-        fails = ratio > MISFIT
+        error = max(side.parts.get(each) or 0.0 for each in (name, f"speed from {name}"))
+        worst = max((each for each in misfit.runs if each.channel == name), key=lambda e: e.ratio)
+        words = f"residuals of {name} are {ratio:.3g} times their known measurement error, most in "
         yield Criterion(
             f"lack of fit of {name}",
             f"{ratio:.3g}",
-            f"{MISFIT:g}",
+            limit,
             "sound campaigns lie between 0.97 and 1.02",
-            "use" if fails and error > MODEL_ERROR else "values",
-            words if fails else "",
+            f"{words}{worst.run}{likely}" if ratio > MISFIT else "",
+            "use" if ratio > MISFIT and error > MODEL_ERROR else "values",
         )
+    axis = _fitted_runs(assessments)[0].axis
     for name in dict.fromkeys(name for each in assessments for name in each.stage.problem.channels):
         if name not in misfit.ratios:
-            where = f"axes.{_fitted_runs(assessments)[0].axis}.channels.{name}"
-            why = (
-                "its measurement error is not known: state its standard deviation at rest in the "
-                f"campaign file, by a line noise = ... in [{where}]"
-            )
-            yield Criterion(f"lack of fit of {name}", "-", f"{MISFIT:g}", why, judged=False)
+            why = "its measurement error is not known: state its standard deviation at rest in the "
+            why += f"campaign file, by a line noise = ... in [axes.{axis}.channels.{name}]"
+            yield _open(f"lack of fit of {name}", limit, why)
     poor = any(ratio > MISFIT for ratio in misfit.ratios.values())
-    wrong = next((each for each in misfit.faults if _is_wrong(each, poor)), None)
-    for fault in misfit.faults:
-        yield from _fault_criterion(fault, poor, wrong)
+    wrong = [each for each in misfit.faults if _is_wrong(each, poor)]
+    for each in misfit.faults:
+        if each.kind is DRIFT:
+            yield _drift(each)
+        elif each.kind is LOSS:
+            lost = each.significant and each.explains and poor
+            words = "does not follow the largest speeds, which looks like a stop of the machine"
+            channel = each.name.removeprefix(LOSS.words.format(""))
+            why = "a counter that does not follow looks like a stop of the machine"
+            state, failure = ("seen", f"{channel} {words}") if lost else ("not seen", "")
+            yield Criterion(each.name, state, "none", why, failure)
+        elif each.instrumental and each.visible:
+            yield _of_instrument(each, wrong)
     if misfit.clipped:
-        yield Criterion(
-            "clipped channels",
-            f"{len(misfit.clipped)}",
-            "0",
-            "values beyond it were not measured, and bias the fit",
-            "use",
-            misfit.clipped[0].rstrip("."),
-        )
+        why = "values beyond it were not measured, and bias the fit"
+        failure = misfit.clipped[0].rstrip(".")
+        yield Criterion("clipped channels", f"{len(misfit.clipped)}", "0", why, failure)
 
 
 def _is_wrong(fault: Fault, poor: bool) -> bool:
@@ -498,51 +468,36 @@ def _is_wrong(fault: Fault, poor: bool) -> bool:
 
     Where there is lack of fit, only a fault that explains it is told from what else is wrong.
     """
-    told = isfinite(fault.plausible) and fault.visible and fault.significant
-    return told and abs(fault.size) > fault.plausible / 3.0 and (fault.explains or not poor)
+    told = fault.instrumental and fault.visible and fault.significant
+    return told and abs(fault.size) > fault.kind.plausible / 3.0 and (fault.explains or not poor)
 
 
-def _fault_criterion(fault: Fault, poor: bool, wrong: Fault | None) -> Iterator[Criterion]:
-    """That a fault has no size that matters; none of a fault that is no criterion.
+def _drift(fault: Fault) -> Criterion:
+    part, size = abs(fault.size) / 100.0, f"{fault.size:+.2g} {fault.kind.unit}"
+    drifts = part > DRIFTS and fault.significant and fault.explains
+    return Criterion(
+        fault.name.removesuffix(" over the campaign"),
+        size if drifts or part <= DRIFTS else "not seen",
+        percent(DRIFTS),
+        "no single set of parameters describes a machine that changes",
+        f"{fault.name} by {size}" if drifts else "",
+        "use" if part > DRIFTS_AWAY else "values",
+    )
 
-    Of several instruments that seem `wrong` the one that explains most is.
-    """
-    size = f"{fault.size:+.2g} {fault.unit}"
-    explains = fault.significant and fault.explains
-    if fault.name.startswith("drift of "):
-        part = abs(fault.size) / 100.0
-        drifts = part > DRIFTS and explains
-        yield Criterion(
-            fault.name.removesuffix(" over the campaign"),
-            size if drifts or part <= DRIFTS else "not seen",
-            percent(DRIFTS),
-            "no single set of parameters describes a machine that changes",
-            "use" if part > DRIFTS_AWAY else "values",
-            f"{fault.name} by {size}" if drifts else "",
-        )
-    elif fault.lost:
-        seen = explains and poor
-        words = "does not follow the largest speeds, which looks like a stop of the machine"
-        yield Criterion(
-            fault.name,
-            "seen" if seen else "not seen",
-            "none",
-            "a counter that does not follow looks like a stop of the machine",
-            "use",
-            f"{fault.name.removeprefix(LOSS)} {words}" if seen else "",
-        )
-    elif isfinite(fault.plausible) and fault.visible:
-        value = "not seen" if abs(fault.size) > fault.plausible / 3.0 else size
-        if wrong is not None and wrong is not fault and _is_wrong(fault, poor):
-            value = f"see {wrong.name}"
-        yield Criterion(
-            fault.name,
-            size if fault is wrong else value,
-            f"{fault.plausible / 3.0:.2g} {fault.unit}",
-            "a larger error would be visible in these logs",
-            "values",
-            f"{fault.words} off by {size}" if fault is wrong else "",
-        )
+
+def _of_instrument(fault: Fault, wrong: Sequence[Fault]) -> Criterion:
+    """That an instrument's error is small; of several that seem wrong the likeliest one is."""
+    limit, size = fault.kind.plausible / 3.0, f"{fault.size:+.2g} {fault.kind.unit}"
+    first = fault in wrong[:1]
+    value = size if first or abs(fault.size) <= limit else "not seen"
+    return Criterion(
+        fault.name,
+        f"see {wrong[0].name}" if fault in wrong[1:] else value,
+        f"{limit:.2g} {fault.kind.unit}",
+        "a larger error would be visible in these logs",
+        f"{fault.words} off by {size}" if first else "",
+        "values",
+    )
 
 
 def _model_error(qualities: Sequence[RunQuality]) -> Criterion:
@@ -561,15 +516,9 @@ def _model_error(qualities: Sequence[RunQuality]) -> Criterion:
             )
     name, limit = "residuals follow input", f"{FOLLOWS:g}"
     if not tested:
-        return Criterion(name, "-", limit, "the runs are shorter than 8 samples", judged=False)
-    return Criterion(
-        name,
-        f"{strongest:.2f}{'' if clauses else ', but residuals small'}" if strongest else "none",
-        limit,
-        "what the input causes grows with it",
-        "use",
-        "; ".join(clauses),
-    )
+        return _open(name, limit, "the runs are shorter than 8 samples")
+    value = f"{strongest:.2f}{'' if clauses else ', but residuals small'}" if strongest else "none"
+    return Criterion(name, value, limit, "what the input causes grows with it", "; ".join(clauses))
 
 
 # --- words ----------------------------------------------------------------------------------------
@@ -577,18 +526,16 @@ def _model_error(qualities: Sequence[RunQuality]) -> Criterion:
 
 def _remarks(
     assessments: Sequence[Assessment],
-    fitted: Sequence[RunQuality],
-    held: Sequence[RunQuality],
+    fitted: _Side,
+    out: _Side,
     own: Sequence[RunQuality],
     misfit: LackOfFit | None,
 ) -> Iterator[str]:
     """What asks for attention beside the criteria."""
-    for name, found in pooled(fitted or held).items():
+    for name, found in (fitted.measures or out.measures).items():
         if found.nrmse is None:
             yield f"{name}: the measured signal never moves, so nothing can be judged."
-    if assessments and not held:
-        yield "No run was held out: the prediction of other tests was not checked."
-    for name, (ratio, _) in _held_over_fitted(fitted, held).items() if assessments else ():
+    for name, (ratio, _) in _ratios(fitted, out).items():
         if ratio > CARRIES_OVER:
             yield (
                 f"{name}: the RMSE of held-out runs is {ratio:.2f} times that of fitted runs: "
@@ -598,11 +545,8 @@ def _remarks(
         if wide := weak_unknowns(each):
             name = each.stage.stage.name
             yield f"{name}: not determined to within ±{percent(WIDE)}: {listed(wide)}."
-    if misfit is not None:
-        if misfit.likely and any(ratio > MISFIT for ratio in misfit.ratios.values()):
-            yield f"Likely cause of the lack of fit: {misfit.likely}."
-        yield from misfit.clipped
-    for name in pooled(own):
+    yield from misfit.clipped if misfit is not None else ()
+    for name in dict.fromkeys(each.channel for each in own):
         tests, related = following(own, name)
         if related:
             yield (
@@ -614,72 +558,33 @@ def _remarks(
         costs = np.array([each.cost for each in results])
         best = float(costs.min())
         alike = int(np.count_nonzero(costs <= best * (1.0 + SAME)))
-        yield f"{stage}: " + (
-            f"{alike} of {len(results)} starts reached the best cost, {best:.6g}."
-            if np.isfinite(best)
-            else "No start ended with a finite cost."
-        )
+        said = f"{alike} of {len(results)} starts reached the best cost, {best:.6g}."
+        yield f"{stage}: {said if best < inf else 'No start ended with a finite cost.'}"
 
 
-def _headline(
-    is_fit: bool,
-    fitted: Sequence[RunQuality],
-    held: Sequence[RunQuality],
-    failed: Mapping[str, Sequence[Criterion]],
-    experiments: Sequence[Experiment],
-) -> str:
-    unusable, untrusted = ("; ".join(c.failure for c in failed[key]) for key in ("use", "values"))
-    if unusable:
-        return f"Not usable: {unusable}."
-    if not is_fit:
-        runs = len({each.experiment.name for each in held})
-        return f"Predicts {_accuracy(held)} over {runs} run{'s' if runs > 1 else ''}."
-    if untrusted:
-        accuracy = f"{'held-out ' if held else 'fitted '}{_accuracy(held or fitted)}"
-        return (
-            f"Usable for prediction of {_maneuvers(experiments)} ({accuracy}); parameter values "
-            f"not to be trusted because {untrusted}."
-        )
-    if held:
-        return f"Usable: predicts held-out {_accuracy(held)}."
-    return f"Usable as far as tested: follows {_accuracy(fitted)}; no run was held out."
-
-
-def _accuracy(qualities: Sequence[RunQuality]) -> str:
-    """``speed to 1.2 % of its range (worst run 1.6 %) and current to 2.0 % (worst run 2.2 %)``."""
-    parts = list[str]()
-    for name in dict.fromkeys(each.channel for each in qualities):
-        part, alike = part_of_range(qualities, name), [q for q in qualities if q.channel == name]
-        if part is not None:
-            largest = max(each.measures.rmse for each in alike) / range_of(alike)
-            worst = f" (worst run {percent(largest)})" if len(alike) > 1 else ""
-            parts.append(f"{name} to {percent(part)}{'' if parts else ' of its range'}{worst}")
-    return listed(parts) or "channels that never move"
-
-
-def _maneuvers(experiments: Sequence[Experiment]) -> str:
+def _maneuvers(tested: Mapping[str, Experiment]) -> str:
     """``ramps, steps and sines of up to 0.3 Hz from -9 to 9 V``."""
-    kinds, fastest = dict[str, None](), 0.0
-    for each in experiments:
+    runs, fastest = list(tested.values()), 0.0
+    kinds = dict[str, None]()
+    for each in runs:
         word = each.maneuver.split(" ")[0]
         kinds[f"{word}s" if word in ("ramp", "step", "sine", "chirp") else word] = None
-        if each.recognised is not None and each.recognised.frequency:
-            fastest = max(fastest, each.recognised.frequency)
-    low = min(float(each.input.values.min()) for each in experiments)
-    high = max(float(each.input.values.max()) for each in experiments)
+        if each.recognised is not None:
+            fastest = max(fastest, each.recognised.frequency or 0.0)
+    low = min(float(each.input.values.min()) for each in runs)
+    high = max(float(each.input.values.max()) for each in runs)
     words = [f"sines of up to {fastest:.3g} Hz" if k == "sines" and fastest else k for k in kinds]
-    return f"{listed(words)} from {low:.3g} to {high:.3g} {experiments[0].input.unit}"
+    return f"{listed(words)} from {low:.3g} to {high:.3g} {runs[0].input.unit}"
 
 
-def _validity(assessments: Sequence[Assessment], tested: Sequence[Experiment]) -> str:
+def _validity(assessments: Sequence[Assessment], tested: Mapping[str, Experiment]) -> str:
     """What the fit holds for, and what of the drive the fitted runs never reach."""
     said, stage = f"Holds for {_maneuvers(tested)}", assessments[-1].stage
     if not isinstance(stage.problem.model, DriveModel):
         return f"{said}."
-    parameters, reached = stage.drive.parameters, set[str]()
     try:
-        for each in _fitted_runs(assessments):
-            reached |= limits_reached(each, parameters)
+        runs, parameters = _fitted_runs(assessments), stage.drive.parameters
+        reached = {limit for each in runs for limit in limits_reached(each, parameters)}
     except (DomainError, InputError):
         return f"{said}."
     never = [

@@ -387,7 +387,7 @@ def _verdict_section(judged: Verdict, findings: int) -> Section:
         said.append(("Data", "look", (words,)))
     blocks = [Block("terms", said, "verdict")]
     if judged.criteria:
-        made = tables.criteria_table(judged)
+        made = judged.table()
         blocks += [Block("heading", made.title, "h3"), Block("table", made, "criteria")]
     return Section("verdict", "Verdict in detail", blocks)
 

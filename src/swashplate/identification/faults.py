@@ -1,0 +1,319 @@
+"""Faults of machine and instruments: how each would change a reading, and how it is called."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from math import degrees, inf, isfinite, sqrt
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import solve_banded
+
+from swashplate.campaign.experiment import Channel, Experiment
+from swashplate.errors import DomainError
+from swashplate.identification.drive_model import CURRENTS, DriveModel
+from swashplate.identification.model import OFFSET, Model, simulated
+from swashplate.tables import listed
+
+Array = NDArray[np.float64]
+
+
+class Kind(NamedTuple):
+    """A kind of fault: its name, the unit of its size, and what else it may be."""
+
+    words: str
+    factor: float = 100.0
+    """From SI to the unit."""
+    unit: str = "%"
+    plausible: float = inf
+    """Size that occurs without notice; inf for what is no fault of an instrument. [unit]"""
+    also: str = ""
+
+
+SCALE = Kind("scale of {}", plausible=3.0)
+LATE = Kind("time stamps of {}", 1e3, "ms", 10.0, " (or a delay or lag that the model leaves out)")
+SLOW = Kind("lag of {}", 1e3, "ms", also=" (a slow instrument)")
+SLOW_COMMAND = SLOW._replace(also=" (an amplifier or filter that the model leaves out)")
+DRIFT = Kind("drift of {} over the campaign")
+LOSS = Kind("loss at the largest speeds of {}")
+LEAKAGE = Kind("load or leakage, as a loss of {},")
+FRICTION = Kind("friction or hysteresis, as a lag of {},")
+FIXED = Kind("{}")
+"""A fixed parameter that has another value."""
+
+EXPLAINS = 0.2
+"""Part of the residuals' squares from which a fault is named as a likely cause."""
+SIGNIFICANT = 20.0
+"""Standard errors from which a fault's size is taken for one. They are those of one step and of
+independent samples: where fixed parameters are 3 % off, as stated, sizes that would matter reach 13
+of them in sound campaigns, and 35 where an ammeter of slew reads 3 % too much."""
+SAME_DIRECTION = 1e-6
+"""Part of a fault's effect outside the estimates' below which both are the same: derivatives are
+exact to about 1e-9, and a fault of 3 % would then leave 3e-8 of the signal."""
+FAR = 100.0
+"""One-step estimate of a relative error beyond which one step says nothing, tau's apart. [%]"""
+SAME_STAMPS = 0.01
+"""The same of late stamps and a longer delay, compared by whole samples: stamps have jitter. [1]"""
+COMMAND_CHANGE = 1e-3
+"""Relative change of the command by which its effect is found, downwards: 10 V is the limit. [1]"""
+LAG = 0.01
+"""Time constant by which the effect of a slow instrument or amplifier is found. [s]"""
+FASTEST, WINDOW = 0.99, 0.0625
+"""Part of the largest measured speed beyond which a counter is asked whether it follows, and the
+time over which that speed is taken. [s]"""
+DWELLS = 0.1
+"""Time for which a noisy channel stands at its very largest value only if it is clipped. [s]"""
+
+
+@dataclass(frozen=True, eq=False)
+class Fault:
+    """Something wrong with machine or instruments that would change what is measured in one way."""
+
+    kind: Kind
+    name: str
+    """``"scale of counts"``, ``"time stamps of current"``, or a fixed parameter: ``"tau"``."""
+    size: float
+    """One-step estimate from the residuals, all estimates following. [unit of the kind]"""
+    standard_error: float
+    """Of the size, all estimates following; inf where they make up for it. [unit]"""
+    share: float
+    """Part of the residuals' squares that it explains beyond the estimates. [1]"""
+    outside: float
+    """Part of its effect that no change of the estimates makes up for. [1]"""
+    same_as: tuple[str, ...]
+    """Estimates that make up for it, the largest effect first."""
+    with_fixed: float = 0.0
+    """Standard error of the size if each fixed parameter may be off by 10 %. [unit]"""
+    fixed: tuple[str, ...] = ()
+    """Fixed parameters that then make up for it, the largest effect first."""
+
+    @property
+    def instrumental(self) -> bool:
+        """Whether it is one of an instrument, of which a plausible size is known."""
+        return isfinite(self.kind.plausible)
+
+    @property
+    def visible(self) -> bool:
+        """Whether the logs tell one of plausible size from other estimates."""
+        return self.outside > SAME_DIRECTION and 2.0 * self.standard_error < self.kind.plausible
+
+    @property
+    def hidden(self) -> bool:
+        """Whether one of plausible size passes as other estimates, or as other fixed values."""
+        told = self.visible and 2.0 * self.with_fixed < self.kind.plausible
+        return self.instrumental and not told
+
+    @property
+    def explains(self) -> bool:
+        """Whether it explains a large part of the residuals."""
+        return self.share > EXPLAINS
+
+    @property
+    def significant(self) -> bool:
+        """Whether its size is told from none."""
+        return abs(self.size) > SIGNIFICANT * self.standard_error
+
+    @property
+    def near(self) -> bool:
+        """Whether one step says how large it is, or it has no size; no lag is below 0."""
+        if self.kind in (SLOW, SLOW_COMMAND):
+            return self.size > 0.0
+        relative = self.kind.unit == "%" and self.name != "tau" and self.kind is not LOSS
+        return not relative or abs(self.size) <= FAR
+
+    @property
+    def words(self) -> str:
+        """Its name, and the fixed parameters that might be wrong in its place."""
+        either = self.visible and self.hidden and self.fixed
+        return f"{self.name}, or of the fixed {listed(self.fixed)}," if either else self.name
+
+    @property
+    def cause(self) -> str:
+        """It as a likely cause, in words."""
+        size = "" if self.kind is LOSS else f" by {self.size:+.3g} {self.kind.unit}"
+        return f"{self.name}{self.kind.also}{size}"
+
+    @property
+    def assumption(self) -> str:
+        """It as an assumption, in words."""
+        unit = self.kind.unit
+        if self.visible:
+            known = isfinite(self.with_fixed)
+            below = f" below {2.0 * self.with_fixed:.2g} {unit}" if known else ""
+            return f"{self.name}: an error{below} can be one of the fixed {listed(self.fixed)}"
+        if isfinite(self.standard_error):
+            least = f"{2.0 * self.standard_error:.2g} {unit}"
+            return f"{self.name}: an error below {least} is not visible"
+        others = ", ".join(self.same_as)
+        return f"{self.name}: equal to other values of {others} for any measurement of these runs"
+
+
+Effects = dict[str, tuple[Kind, Array]]
+"""(m,) change of a reading per SI unit of a fault's size, by the fault's name."""
+
+
+def measurement_error(channel: Channel) -> float | None:
+    """Known standard deviation of a channel's measurement error, in its unit.
+
+    The stated noise, or that of rounding to whole counts, 1/√12 of one; None where neither is
+    known.
+    """
+    if channel.noise is not None:
+        return channel.noise
+    return None if channel.encoder is None else abs(channel.encoder.angle_per_count) / sqrt(12.0)
+
+
+def fastest(name: str, experiments: Sequence[Experiment]) -> float:
+    """Largest measured rate of a position in any run, over short windows; 0 of others."""
+    rates = [0.0]
+    for channel in (each[name] for each in experiments if name in each.channels):
+        time, values = channel.time[channel.used], channel.values[channel.used]
+        if channel.is_position and time.size > 1:
+            width = max(round(WINDOW / float(np.median(np.diff(time)))), 1)
+            moved = np.abs(values[width:] - values[:-width])
+            rates.append(float((moved / (time[width:] - time[:-width])).max(initial=0.0)))
+    return max(rates)
+
+
+def of_instrument(
+    experiment: Experiment, name: str, output: Array, place: float, largest: float
+) -> Effects:
+    """Effects of faults of a channel's instrument, and of those of the machine that it shows.
+
+    `output` (m,) is what is simulated at the channel's stamps, `place` that of the run in the
+    campaign, from -1/2 to 1/2, `largest` the `fastest` rate of the channel.
+    """
+    channel, time = experiment[name], experiment[name].time
+    slope = np.gradient(output, time) if time.size > 2 else np.zeros_like(output)
+    about = output - output[0] if channel.is_position else output
+    made = [
+        (SCALE, output),
+        (LATE, -slope),
+        (SLOW, (_lagged(time, output) - output) / LAG),
+        (DRIFT, about * place),
+    ]
+    if channel.kind not in CURRENTS:
+        signal = experiment.input.at(time)
+        turned = np.sign(np.diff(signal, prepend=signal[:1]))
+        # the direction of the last change of the command, 0 before the first
+        last = np.maximum.accumulate(np.where(turned != 0.0, np.arange(turned.size), 0))
+        way = turned[last] * (np.abs(slope) > 1e-3 * np.abs(slope).max(initial=0.0))
+        lost, angle = np.ones_like(time), channel.unit.startswith("rad")
+        unit, factor = ("deg", degrees(1.0)) if angle else (channel.unit, 1.0)
+        if channel.is_position:
+            step, unit = np.diff(time, prepend=time[:1]), f"{unit}/s"
+            beyond = np.sign(slope) * np.maximum(np.abs(slope) - FASTEST * largest, 0.0)
+            way, lost = np.cumsum(way * step), time - time[0]
+            made.append((LOSS, -np.cumsum(beyond * step)))
+        made.append((LEAKAGE._replace(factor=factor, unit=unit), -lost))
+        made.append((FRICTION._replace(factor=factor, unit=unit), -way))
+    return {kind.words.format(name): (kind, effect) for kind, effect in made}
+
+
+def of_command(
+    model: Model, values: Mapping[str, float], experiment: Experiment
+) -> dict[str, Effects]:
+    """By channel, the effects of a scale error and of a lag of the command, by differences."""
+    if not isinstance(model, DriveModel) or model.part == "pump":
+        return {}
+    signal = experiment.input
+    plain = {k: v for k, v in values.items() if not k.startswith(OFFSET)}
+    changed = ((1.0 - COMMAND_CHANGE) * signal.values, _lagged(signal.time, signal.values))
+    try:
+        before, less, later = (
+            simulated(model, plain, replace(experiment, input=replace(signal, values=x)))
+            for x in (signal.values, *changed)
+        )
+    except DomainError:
+        return {}
+    scale, lag = (kind.words.format("the command") for kind in (SCALE, SLOW_COMMAND))
+    return {
+        name: {
+            scale: (SCALE, (before[name] - less[name]) / COMMAND_CHANGE),
+            lag: (SLOW_COMMAND, (later[name] - before[name]) / LAG),
+        }
+        for name in before
+    }
+
+
+def late_command(
+    model: Model, targets: Mapping[str, float], tau: float | None, experiment: Experiment
+) -> Fault | None:
+    """Late stamps of the command beside a longer tau that is fixed, both by one sample, if alike.
+
+    `targets` are the values that the fit found for the experiment, by the model's names.
+    """
+    if not isinstance(model, DriveModel) or model.part == "pump" or tau is None or "tau" in targets:
+        return None
+    signal = experiment.input
+    step = float(np.median(np.diff(signal.time)))
+    late = replace(signal, values=np.concatenate([signal.values[:1], signal.values[:-1]]))
+    values = {k: v for k, v in targets.items() if not k.startswith(OFFSET)}
+    first = simulated(model, values, replace(experiment, input=late))
+    longer, plain = ({**values, "tau": tau + step}, values)
+    apart, moved = (
+        sum(float(np.sum((first[k] - other[k]) ** 2)) for k in first)
+        for other in (simulated(model, each, experiment) for each in (longer, plain))
+    )
+    outside = sqrt(apart / moved) if moved > 0.0 else inf
+    if outside > SAME_STAMPS:
+        return None
+    name, same = LATE.words.format("the command"), (f"the fixed tau = {1e3 * tau:.3g} ms",)
+    return Fault(LATE, name, 0.0, inf, 0.0, outside, same)
+
+
+def _lagged(time: Array, values: Array) -> Array:
+    """(m,) values behind a first-order lag of `LAG`, at rest before."""
+    kept = np.exp(-np.diff(time) / LAG)
+    bands = np.vstack([np.ones(time.size), np.append(-kept, 0.0)])
+    made: Array = solve_banded((1, 0), bands, np.append(values[:1], (1.0 - kept) * values[1:]))
+    return made
+
+
+def clipped_channels(experiments: Sequence[Experiment]) -> tuple[str, ...]:
+    """Sentences on channels that stand at an end of their instrument, with the limits to state.
+
+    A channel is clipped where it reads its very largest or smallest value for 0.1 s and longer
+    while the input moves by more than a tenth of its range: no noisy signal does that. Positions
+    are passed over, as they stand still by themselves.
+    """
+    said = []
+    for name in dict.fromkeys(name for each in experiments for name in each.channels):
+        runs = [each for each in experiments if name in each.channels]
+        if runs[0][name].is_position:
+            continue
+        values = np.concatenate([each[name].values for each in runs])
+        low, high = float(values.min()), float(values.max())
+        reach = float(np.ptp(np.concatenate([each.input.values for each in runs])))
+        for end in (low, high):
+            if any(end in (each[name].limits or ()) for each in runs):
+                continue
+            moved = max((_moved_at(end, each, name) for each in runs), default=0.0)
+            if moved <= 0.1 * reach:
+                continue
+            # a rounded reading stands still by itself for as long as a step of it lasts
+            coarse = float(np.diff(np.unique(np.round(values / (high - low), 9))).min())
+            if moved > (0.1 + 2.0 * coarse) * reach:
+                said.append(
+                    f"'{name}' stands at exactly {end:.6g} {runs[0][name].unit} while the input "
+                    f"moves by {moved:.3g} {runs[0].input.unit}: it is clipped there. Set limits = "
+                    f"[{low:.6g}, {high:.6g}] in its channel, and such samples are ignored."
+                )
+    return tuple(said)
+
+
+def _moved_at(end: float, experiment: Experiment, name: str) -> float:
+    """By how much the input moves in any stretch in which a channel stands at an end.
+
+    In its first three quarters: a rounded reading that lags stays where it is when the input has
+    left already.
+    """
+    channel, most = experiment[name], 0.0
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], channel.values == end, [0]])))
+    for first, after in zip(edges[::2], edges[1::2], strict=True):
+        if channel.time[after - 1] - channel.time[first] >= DWELLS:
+            stretch = channel.time[first : after - (after - first) // 4]
+            most = max(most, float(np.ptp(experiment.input.at(stretch))))
+    return most
