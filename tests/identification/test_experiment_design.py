@@ -26,7 +26,8 @@ from swashplate.identification.experiment_design import (
     outlook,
 )
 from swashplate.identification.fitting import fit, smooth
-from swashplate.identification.setup import Forces, Free, GivenPrior, Setup, Stage, load_setup
+from swashplate.identification.setup import Forces, Free, Setup, Stage, load_setup
+from swashplate.identification.unknowns import Prior
 
 AB = unknowns_of("ab", np.ones(2))
 
@@ -209,7 +210,7 @@ def test_the_free_zero_of_an_encoder_costs_what_it_must() -> None:
 
 
 def test_what_is_known_counts_once() -> None:
-    prior = Free(relative=(0.5, 2.0), log=True, prior=GivenPrior(mean=11.4, deviation=0.2))
+    prior = Free(relative=(0.5, 2.0), log=True, prior=Prior(mean=11.4, deviation=0.2))
     plan = Setup(stages=(Stage(name="pump", part="pump", free={"Z10": prior}),))
     known = bench(HOIST.parameters, plan)
     np.testing.assert_allclose(np.abs(known.present), [[5.0]])

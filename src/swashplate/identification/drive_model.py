@@ -31,7 +31,7 @@ from swashplate.identification.setup import (
     deviation,
     load_setup,
 )
-from swashplate.identification.unknowns import Prior, Unknown, Unknowns, bounded
+from swashplate.identification.unknowns import Unknown, Unknowns, bounded
 from swashplate.parameters.definitions import SWITCHES, columns_of, find, is_column
 from swashplate.parameters.parameter_set import ParameterSet
 from swashplate.parameters.rules import FULL_VOLTAGE
@@ -476,7 +476,7 @@ def _of_the_machine(stage: Stage, parameters: ParameterSet) -> list[Unknown]:
     """Unknowns of the drive: free parameters, both directions apart unless tied, then forces."""
     unknowns: list[Unknown] = []
     for name, entry in stage.free.items():
-        definition, prior = find(name), entry.prior
+        definition = find(name)
         columns = definition.columns if name == definition.symbol else (name,)
         unknowns += [
             bounded(
@@ -487,7 +487,7 @@ def _of_the_machine(stage: Stage, parameters: ParameterSet) -> list[Unknown]:
                 least=-np.inf if definition.least is None else definition.least,
                 unit=definition.unit,
                 log=entry.log,
-                prior=None if prior is None else Prior(prior.mean, prior.deviation),
+                prior=entry.prior,
                 sets=group,
             )
             for group in ([columns] if entry.tied else [(each,) for each in columns])

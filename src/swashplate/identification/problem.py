@@ -489,7 +489,7 @@ def linearised_fit(problem: Problem, vector: Array, loss: Loss = "linear") -> Li
         for k, (bounded, _) in zip(mine, parts, strict=True):
             runs[k] = runs[k]._replace(residual=bounded / slope)
     _, prior = problem.unknowns.prior_rows(vector)
-    worths = [each.prior.worth for each in problem.unknowns if each.prior is not None]
+    worths = [each.worth for each in problem.unknowns if each.prior is not None]
     tolerance = TOLERANCE if isinstance(problem.model, Differentiable) else BY_DIFFERENCES
     variables = problem.unknowns.at(vector)
     return LinearisedFit(tuple(runs), variables, prior, tolerance, np.array(worths))

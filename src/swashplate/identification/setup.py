@@ -29,7 +29,7 @@ from swashplate.errors import FileError, InputError, ParameterError
 from swashplate.identification.model import OFFSET, START, OwnModel, simulated
 from swashplate.identification.problem import Problem, noise_scales
 from swashplate.identification.solving import solve
-from swashplate.identification.unknowns import Unknown, Unknowns
+from swashplate.identification.unknowns import Prior, Unknown, Unknowns
 from swashplate.parameters.definitions import find
 from swashplate.parameters.parameter_set import ParameterSet
 from swashplate.results import Result, short
@@ -59,13 +59,6 @@ class Entry(BaseModel):
         return short(self)
 
 
-class GivenPrior(Entry):
-    """What is known beforehand: mean and standard deviation."""
-
-    mean: Finite
-    deviation: PositiveFloat
-
-
 def rising(pair: tuple[float, float]) -> tuple[float, float]:
     """A pair of bounds; refused, in a ValueError, unless the lower one stands first."""
     if not pair[0] < pair[1]:
@@ -88,9 +81,7 @@ class Free(Entry):
     bounds: Bounds | None = Field(None, description="Bounds in SI units.")
     log: bool = Field(False, description="Move the logarithm: for positive numbers.")
     tied: bool = Field(False, description="One value for both directions.")
-    prior: GivenPrior | None = Field(
-        None, description="A normal distribution, of the logarithm if log."
-    )
+    prior: Prior | None = Field(None, description="A normal distribution, of the logarithm if log.")
 
     @model_validator(mode="after")
     def _bounded(self) -> Free:
@@ -435,10 +426,7 @@ class ModelSetup(Result):
         """The set-up as that of a fit in stages, of which it has one."""
         free = {}
         for each in self._unknowns:
-            prior = None
-            if each.prior is not None:
-                prior = GivenPrior(mean=each.prior.mean, deviation=each.prior.deviation)
-            free[each.name] = Free(bounds=(each.low, each.high), log=each.log, prior=prior)
+            free[each.name] = Free(bounds=(each.low, each.high), log=each.log, prior=each.prior)
         return Setup(
             title=self.name,
             stages=(Stage(name=self.name, part="model", free=free),),

@@ -10,7 +10,7 @@ from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import PlainSerializer, PlainValidator
+from pydantic import Field, PlainSerializer, PlainValidator
 
 from swashplate.errors import InputError, ParameterError
 from swashplate.results import Result
@@ -35,13 +35,10 @@ AT_BOUND = 1e-6
 class Prior:
     """What is known of an unknown beforehand: a normal distribution."""
 
-    mean: float
+    mean: Annotated[float, Field(allow_inf_nan=False)]
     """In the unknown's unit."""
-    deviation: float
+    deviation: Annotated[float, Field(gt=0.0)]
     """Standard deviation, positive; of a logarithmic unknown that of its logarithm."""
-    worth: float = 1.0
-    """Squared residuals of the data's cost that stand for one independent one of variance 1: so
-    often the prior counts, see `intervals.weighed`."""
 
 
 @dataclass(frozen=True)
@@ -65,6 +62,9 @@ class Unknown:
     scale: float = field(default=0.0, repr=False)
     """What one unit of the solver's vector means, of an unknown that is not logarithmic; by default
     the size of its nominal value."""
+    worth: float = field(default=1.0, repr=False)
+    """Squared residuals of the data's cost that stand for one independent one of variance 1: so
+    often the prior counts, see `intervals.weighed`."""
 
     def __post_init__(self) -> None:
         if not (isfinite(self.low) and isfinite(self.high) and self.low < self.high):
@@ -295,12 +295,10 @@ class Unknowns(Result):
 
     def with_worths(self, worths: Sequence[float] | None) -> Unknowns:
         """The same with these worths of the priors, in order; without any priors for None."""
-        given, items = iter(worths or ()), []
-        for each in self.items:
-            prior = each.prior
-            if prior is not None:
-                prior = None if worths is None else replace(prior, worth=next(given))
-            items.append(replace(each, prior=prior))
+        if worths is None:
+            return replace(self, items=tuple(replace(each, prior=None) for each in self.items))
+        given = iter(worths)
+        items = (replace(each, worth=next(given)) if each.prior else each for each in self.items)
         return replace(self, items=tuple(items))
 
     def prior_rows(self, vector: Array) -> tuple[Array, Array]:
@@ -309,7 +307,7 @@ class Unknowns(Result):
         residuals, rows = np.zeros(len(known)), np.zeros((len(known), len(self.items)))
         for row, (k, each, prior) in enumerate(known):
             scale, mean = (1.0, np.log(prior.mean)) if each.log else (each.scale, prior.mean)
-            weight = np.sqrt(prior.worth) / prior.deviation
+            weight = np.sqrt(each.worth) / prior.deviation
             residuals[row] = weight * (vector[k] * scale - mean)
             rows[row, k] = weight * scale
         return residuals, rows
