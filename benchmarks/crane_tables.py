@@ -20,18 +20,16 @@ from swashplate.crane import (
     Seaway,
     Setup,
     Spectrum,
-    Start,
     Stick,
-    Study,
     TransferFunctions,
     control,
+    judge,
     load_motion,
-    read_veres,
+    read_ship,
 )
 from swashplate.crane.control import Control
 from swashplate.crane.judgment import mean_of
 from swashplate.crane.stepper import Actuation
-from swashplate.crane.study import NONE, Case
 from swashplate.executors import Threads
 
 PAGE = Path(__file__).parent.parent / "docs" / "crane-checks.md"
@@ -77,37 +75,26 @@ ROLLING = (  # none, ideal, meant at OTHERS, clipped at OTHERS
 )
 
 
-def cases(crane: Crane, factors: tuple[float, ...], alone: bool) -> dict[str, Case]:
-    """Variants by name."""
-    how: Start = {"slew_deg": 90.0, "boom_deg": 45.0, "rope_m": 27.0}
-    made = {
-        NONE: Case((crane,), None, "inverse", how),
-        "ideal drives": Case((crane,), MEANT, "ideal", how),
-    }
-    for name, law in (("meant for ideal", MEANT), ("clipped", CLIPPED)):
-        for factor in factors:
-            larger = crane.with_drive(luff=crane.luff.scale(Z16=factor))
-            made[f"{name}, orifice ×{factor:g}"] = Case((larger,), law, "inverse", how)
-    if alone:
-        made["feedback alone, clip 0.25 m"] = Case((crane,), ALONE, "inverse", how)
-    return made
-
-
 def measured(
-    crane: Crane,
-    sea: Seaway,
-    found: Mapping[str, Case],
-    seeds: range,
+    crane: Crane, sea: Seaway, seeds: range, factors: tuple[float, ...], alone: bool
 ) -> dict[str, np.ndarray]:
     """(n,) root mean square swing of each variant in each seaway. [deg]"""
-    study = Study.of(
-        crane,
-        MEANT,
-        {"sea": sea, "length": LENGTH, "start": START, "executor": Threads(2)},
-        seeds=seeds,
-    )
-    values = np.degrees(study.outcomes(list(found.values()))[..., 0])
-    return {name: values[:, k] for k, name in enumerate(found)}
+    larger = {x: crane.with_drive(luff=crane.luff.scale(Z16=x)) for x in factors}
+    sets: dict[str, tuple[Control, dict[str, str | Crane]]] = {
+        "ideal": (MEANT, {"ideal drives": "ideal"}),
+        "meant": (MEANT, {f"meant for ideal, orifice ×{x:g}": each for x, each in larger.items()}),
+        "clipped": (CLIPPED, {f"clipped, orifice ×{x:g}": each for x, each in larger.items()}),
+    }
+    if alone:
+        sets["alone"] = (ALONE, {"feedback alone, clip 0.25 m": crane})
+    made: dict[str, np.ndarray] = {}
+    for law, drives in sets.values():
+        found = judge(
+            crane, law, sea=sea, seeds=seeds, drives=drives, length=LENGTH, start=START,
+            remedies=False, executor=Threads(2),
+        )  # fmt: skip
+        made |= {name: np.degrees(found.counted(name)) for name in found.names}
+    return made
 
 
 def seaway_rows(
@@ -139,7 +126,7 @@ def seaway_tables(crane: Crane, count: int) -> Iterator[str]:
     random, seeds = np.random.default_rng(0), range(count)
     hulls: dict[str, Hull | TransferFunctions] = {"rolls at 13 s": Seaway().ship}
     if S175.exists():
-        hulls["S175"] = read_veres(S175)
+        hulls["S175"] = read_ship(S175)
     yield from motion_rows(hulls)
     yield from same_rows(crane, hulls)
     yield from none_rows(crane, 5 * count, hulls, random)
@@ -149,7 +136,7 @@ def seaway_tables(crane: Crane, count: int) -> Iterator[str]:
     )
     for (hull, name), others in studied(hulls).items():
         print(hull, name, flush=True)
-        found = measured(crane, Seaway(name, ship=hulls[hull]), variants(crane, hull), seeds)
+        found = measured(crane, Seaway(name, ship=hulls[hull]), seeds, *variants(hull))
         yield f"\n### {hull}, {name}, {count} seaways\n\n{head}"
         yield from seaway_rows(found, others, random)
 
@@ -163,9 +150,9 @@ def studied(
     return {key: each for key, each in made.items() if key[0] in hulls}
 
 
-def variants(crane: Crane, hull: str) -> dict[str, Case]:
-    """What the other crane has run on a hull."""
-    return cases(crane, FACTORS, True) if hull == "S175" else cases(crane, OTHERS, False)
+def variants(hull: str) -> tuple[tuple[float, ...], bool]:
+    """Orifices that the other crane has run on a hull, and whether feedback alone."""
+    return (FACTORS, True) if hull == "S175" else (OTHERS, False)
 
 
 def same_rows(crane: Crane, hulls: Mapping[str, Hull | TransferFunctions]) -> Iterator[str]:
@@ -174,7 +161,7 @@ def same_rows(crane: Crane, hulls: Mapping[str, Hull | TransferFunctions]) -> It
     rows: dict[str, dict[str, str]] = {}
     for (hull, name), others in studied(hulls).items():
         sea = Seaway(peaked(name), ship=hulls[hull])
-        found = measured(crane, sea, variants(crane, hull), range(4))
+        found = measured(crane, sea, range(4), *variants(hull))
         for (variant, values), other in zip(found.items(), others, strict=True):
             rows.setdefault(variant, {})[f"{hull}, {name}"] = f"{values.mean():.2f} / {other:g}"
     heads = [f"{hull}, {name}" for hull, name in studied(hulls)]
@@ -193,10 +180,13 @@ def none_rows(
     yield f"\n### No control, γ = {PEAK}, {count} seaways\n"
     yield "| hull | sea | mean (95 %) | 95 % of means of 4 | other crane, 4 seaways |"
     yield "|---|---|--:|--:|--:|"
-    held = {"no control": cases(crane, (1.0,), False)["no control"]._replace(actuation="ideal")}
     for (hull, name), others in studied(hulls).items():
         sea = Seaway(peaked(name), ship=hulls[hull])
-        values = measured(crane, sea, held, range(count))["no control"]
+        found = judge(
+            crane, {"none": None}, sea=sea, seeds=range(count), drives=["ideal"], length=LENGTH,
+            start=START, executor=Threads(2),
+        )  # fmt: skip
+        values = np.degrees(found.counted("none, ideal"))
         fours = np.sort(values[random.integers(0, values.size, (20_000, 4))].mean(axis=1))
         yield (
             f"| {hull} | {name} | {interval(mean_of(values), '.2f')} | {fours[500]:.2f} to "
@@ -339,7 +329,7 @@ def _left(rope: float, shape: str | None, tuned: float) -> float:
     """Residual swing [rad] of a tip that is moved along a line, shaped for a rope."""
     rate, half = 512.0, np.pi * np.sqrt(tuned / 9.80665)
     time = np.arange(round(90.0 * rate)) / rate
-    impulses = control.IMPULSES[shape] if shape else (1.0,)
+    impulses = control.IMPULSES[shape] if shape else (1.0, 0.0, 0.0)
     tip = np.zeros((time.size, 3))
     for k, share in enumerate(impulses):
         # 0.5 m/s for 3 s with ramps of 0.5 s: small, so that the swing is linear

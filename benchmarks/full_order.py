@@ -73,14 +73,14 @@ def _best(run: Callable[[], object]) -> float:
 
 def validity() -> Iterator[str]:
     """For which maneuvers the one-state model will do."""
-    yield "| axis | maneuver | largest, % | rms, % | step error at 512 Hz, % | within 1 % |"
-    yield "|---|---|--:|--:|--:|---|"
+    yield "| axis | maneuver | largest, % | rms, % | within 1 % |"
+    yield "|---|---|--:|--:|---|"
     found = pl.concat([validity_of(FullOrderDrive.preset(name)).to_polars() for name in AXES])
     for row in found.iter_rows(named=True):
         within = "yes" if row["within_1_percent"] else "no"
         yield (
             f"| {row['axis']} | {row['maneuver']} | {row['largest_percent']:.2f} | "
-            f"{row['rms_percent']:.2f} | {row['step_error_percent']:.2f} | {within} |"
+            f"{row['rms_percent']:.2f} | {within} |"
         )
 
 

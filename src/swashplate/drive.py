@@ -462,8 +462,8 @@ class Drive(Result):
             Steps a second, at least 512. At each frequency the step is shortened a little, so that
             a cycle has a whole number of them and its harmonics are exact. [Hz]
         tolerance : float
-            Relative change of the first harmonic, from one block of cycles to the next, below which
-            the drive repeats itself.
+            Relative change of the first harmonic, from the middle of a simulation to its end, below
+            which the drive repeats itself.
 
         Raises
         ------

@@ -11,7 +11,7 @@ REFUSED = {
     "bode hoist --points 1": "--points is 1, but must be 2 to 2000",
     "bode hoist --from 2 --to 1": "must rise from above 0 Hz, not 2 to 1",
     "bode hoist --amplitude 0.05": "nothing moves about 0 V",
-    "bode hoist --linear-at 0": "so the gain is 0; linearise at +0.2065 V or beyond.",
+    "bode hoist --linear-at 0": "so the gain is 0; linearise at +0.2065 V or beyond, or",
     "compare hoist slew --maneuver hop --out both.csv": "one of the tests of hoist",
     "compensate hoist --speed-deg-s 200": "hoist cannot settle at 200 deg/s",
     "linearize hoist": "give one of --at, --current and --speed-deg-s",

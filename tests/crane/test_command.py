@@ -72,7 +72,7 @@ def test_follow_and_sectors_print_their_tables(tmp_path):
     assert {"ss3"} < set(rows)
     assert "ss4" not in rows
     around = said(
-        "sectors", "tg3637", "--over", "0,90,180,270", "--seeds", "1", "--drives", "identified"
+        "sectors", "tg3637", "--points", "0,90,180,270", "--seeds", "1", "--drives", "identified"
     )
     assert around.exit_code == 0, around.output
     bearings = [each.split()[0] for each in around.stdout.splitlines() if each.strip()][-4:]
@@ -99,10 +99,10 @@ def test_run_writes_its_scene(tmp_path):
         ("judge tg3637 --out judge.pdf", "a verdict is written as"),
         ("judge tg3637 --at slew=3", "--at has no slew; it has slew_deg, boom_deg, rope_m"),
         ("follow tg3637 --sea ss9", "There is no sea 'ss9'"),
-        ("sectors tg3637 --at slew_deg=3", "This study has no slew_deg; it has boom_deg, rope_m"),
-        ("orifices tg3637 --over 1,much", "--over 1,much: 'much' is no number."),
-        ("orifices tg3637 --drives ideal", "This study has no drives; it has slew_deg"),
-        ("operability tg3637 --ship hull.4", "a .4 of WAMIT, and no other file, needs the length"),
+        ("sectors tg3637 --at slew_deg=3", "A sweep over the bearing sets slew_deg itself"),
+        ("sweep tg3637 orifice --points 1,much", "--points 1,much: 'much' is no number."),
+        ("sweep tg3637 wind", "There is no sweep over 'wind'; there are bearing, height, orifice"),
+        ("sweep tg3637 height --ship hull.4", "a .4 of WAMIT, and no other file, needs the length"),
         ("run tg --slew 1", "There is no packaged crane 'tg'; there is tg3637."),
         ("run tg3637 --variant fast", "actuation is 'fast'; it is ideal, volts, inverse."),
         ("run tg3637 --variant ideal:magic", "There is no control 'magic'; there are zv-joint"),

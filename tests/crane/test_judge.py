@@ -15,13 +15,10 @@ from swashplate.crane import (
     control,
     follow,
     judge,
-    operability,
-    orifices,
-    residuals,
-    sectors,
+    sweep,
 )
 from swashplate.crane.judgment import mean_of
-from swashplate.crane.study import PUMPS
+from swashplate.crane.result import PUMPS
 from swashplate.errors import InputError
 from swashplate.executors import Processes, Serial, Threads
 from swashplate.identification.assessment import Judged
@@ -46,13 +43,15 @@ def judged(crane):
 def test_numbers_are_those_of_whole_runs(judged):
     run = judged.run("identified", 3)
     counted = run.swing_deg[round(40.0 * 512) :]
-    assert judged.rms("identified")[3] == pytest.approx(radians(run.rms_deg(40.0)), rel=1e-12)
-    assert judged.largest("identified")[3] == pytest.approx(radians(counted.max()), rel=1e-12)
+    assert judged.counted("identified")[3] == pytest.approx(radians(run.rms_deg(40.0)), rel=1e-12)
+    assert judged.counted("identified", "largest_swing")[3] == pytest.approx(
+        radians(counted.max()), rel=1e-12
+    )
     # limits: against each drive simulated by itself
     for k, axis in enumerate(("hoist", "slew", "luff")):
         for i, limit in enumerate(PUMPS):
             share = run.drive(axis).active(limit)[round(40.0 * 512) :].mean()
-            assert judged.values[3, 2, 2 + 5 * k + i] == pytest.approx(share, abs=1e-12)
+            assert judged.values[3, 2, 3 + 5 * k + i] == pytest.approx(share, abs=1e-12)
 
 
 @pytest.mark.parametrize("executor", [Serial(), Threads(1), Threads(3)], ids=["one", "1", "3"])
@@ -87,7 +86,7 @@ def test_verdict_and_what_would_do(crane, judged):
 def test_differences_are_paired(judged):
     found = judged.difference("identified", "ideal")
     assert found.value == pytest.approx(
-        judged.rms("identified").mean() - judged.rms("ideal").mean(), rel=1e-12
+        judged.counted("identified").mean() - judged.counted("ideal").mean(), rel=1e-12
     )
     assert found.low < found.value < found.high
     rows = {(row.cells[0], row.cells[1]): row.cells[2] for row in judged.tables()[1].rows}
@@ -95,7 +94,7 @@ def test_differences_are_paired(judged):
     frame = judged.to_polars()
     assert frame.height == 18
     assert frame.filter(variant="ideal")["rms_swing"].to_numpy() == pytest.approx(
-        judged.rms("ideal")
+        judged.counted("ideal")
     )
 
 
@@ -113,7 +112,7 @@ def test_a_stopped_run_counts_as_worse(crane):
         crane, {"none": control.Clip()}, seeds=[0], stick=stick, start=5.0, rope_m=47.0,
         remedies=False,
     )  # fmt: skip
-    assert np.isnan(found.rms("no control")).all()
+    assert np.isnan(found.counted("no control")).all()
     assert found.tables()[0].rows[0].cells[-1] == 1
 
 
@@ -132,25 +131,24 @@ def test_axes_follow_what_speed_and_acceleration_allow(crane):
 def test_demand_is_that_of_simulated_motion(crane):
     sea = Seaway("ss3", seed=2)
     motion = sea.motion(2000 * 8 + 1, 8.0)
-    g, pose = crane.geometry, follow(crane, [7.5]).pose
-    reach = g.foot + g.boom * np.cos(pose.boom)
-    along = motion[:, 1] - motion[:, 3] * (g.axis.z + g.boom * np.sin(pose.boom))
-    along = along + motion[:, 5] * (g.axis.x + reach * np.cos(pose.slew))
+    g = crane.geometry  # boom abeam, up by 45 degrees
+    along = motion[:, 1] - motion[:, 3] * (g.axis.z + g.boom * np.sqrt(0.5))
+    along = along + motion[:, 5] * g.axis.x
     asked = follow(crane, [7.5], seas=("ss3",)).seas["ss3"]
     # 270 waves: a standard deviation is good to about 10 %
     assert 2.0 * along.std() == pytest.approx(asked.amplitude[2], rel=0.2)
 
 
 def test_boom_along_the_ship_is_calm_where_the_slew_does_the_work(crane):
-    found = sectors(crane, MEANT, bearings=[0.0, 90.0], seeds=[0], drives=("identified",), **SHORT)
-    mean = found.mean()
+    found = crane.sectors(MEANT, points=[0.0, 90.0], seeds=[0], drives=("identified",), **SHORT)
+    mean = found.mean()[..., 0]
     assert found.names == ("no control", "identified")
     assert mean[0, 1] < 0.2 * mean[0, 0]
     assert mean[1, 1] > mean[0, 1]
 
 
 def test_swing_without_control_is_proportional_to_small_waves(crane):
-    found = operability(crane, MEANT, heights=[0.05, 0.1], seeds=[0, 1], **SHORT)
+    found = sweep(crane, "height", MEANT, points=[0.05, 0.1], seeds=[0, 1], **SHORT)
     swing = found.values[:, :, 0, 0]
     # what is left is of second order in the height: half a per cent here
     np.testing.assert_allclose(swing[:, 1] / swing[:, 0], 2.0, rtol=1e-2)
@@ -158,19 +156,23 @@ def test_swing_without_control_is_proportional_to_small_waves(crane):
 
 
 def test_orifice_is_that_of_another_luff_drive(crane):
-    found = orifices(crane, MEANT, factors=[1.0, 3.0], seeds=[1], **SHORT)
+    found = sweep(crane, "orifice", MEANT, points=[1.0, 3.0], seeds=[1], **SHORT)
     larger = crane.with_drive(luff=crane.luff.scale(Z16=3.0))
     alone = judge(crane, MEANT, seeds=[1], drives={"larger": larger}, remedies=False, **SHORT)
-    assert found.values[0, 1, 2, 0] == alone.rms("larger")[0]
-    assert found.values[0, 0, 0, 0] == found.values[0, 1, 0, 0] == alone.rms("no control")[0]
+    assert found.values[0, 1, 2, 0] == alone.counted("larger")[0]
+    assert found.values[0, 0, 0, 0] == found.values[0, 1, 0, 0] == alone.counted("no control")[0]
 
 
 def test_residuals_over_the_stick_are_those_of_runs(crane):
-    shaper = control.JointShaper("zv")
-    found = residuals(crane, {"volts": ("volts", None), "ZV": ("volts", shaper)}, sticks=[0.5, 1.0])
+    laws = {"none": None, "ZV": control.JointShaper("zv")}
+    found = sweep(crane, "stick", laws, points=[0.5, 1.0], drives=["volts"])
+    assert found.names == ("no control", "none, volts", "ZV, volts")
     # of an independent model: a shaper on the volts is worse than none at full stick
-    np.testing.assert_allclose(np.degrees(found.values), [[10.23, 0.799], [8.95, 11.23]], rtol=0.01)
-    np.testing.assert_allclose(np.degrees(found.reached[1]), [46.11, 62.02], rtol=0.002)
+    wanted = [[10.23, 0.799], [8.95, 11.23]]
+    np.testing.assert_allclose(np.degrees(found.values[0, :, 1:, 1]), wanted, rtol=0.01)
+    np.testing.assert_allclose(np.degrees(found.values[0, 1, 1:, 2]), [46.11, 62.02], rtol=0.002)
+    with pytest.raises(InputError, match="A sweep over the stick sets sea itself"):
+        sweep(crane, "stick", MEANT, sea="ss3")
 
 
 # --- drives of fits -------------------------------------------------------------------------------
@@ -210,8 +212,8 @@ def test_own_logs_lead_to_the_verdict_on_the_own_crane(crane, fitted):
     alone = judge(
         own, MEANT, seeds=[3], drives={"one": drawn[0]}, remedies=False, length=30.0, start=10.0
     )
-    assert found.rms("drawn")[3] == alone.rms("one")[0]
-    assert found.rms("drawn")[1] != alone.rms("one")[0]
+    assert found.counted("drawn")[3] == alone.counted("one")[0]
+    assert found.counted("drawn")[1] != alone.counted("one")[0]
 
 
 def test_cranes_are_drawn_axis_by_axis(crane):
@@ -230,7 +232,7 @@ def test_what_makes_no_study_is_said(crane):
             judge(crane, MEANT, **{"seeds": [0], **how})
 
     refuse("at least one seed", seeds=[])
-    refuse("no drives 'fast'; there are ideal, identified", drives=("fast",))
+    refuse("no drives 'fast'; there are ideal, identified, volts", drives=("fast",))
     refuse("one controller and one set of drives", drives=())
     refuse("empty list of cranes", drives={"drawn": []})
     refuse("counts from 40 s on, but a run is 30 s long", length=30.0)
@@ -238,7 +240,7 @@ def test_what_makes_no_study_is_said(crane):
     refuse("boom of tg3637 stands at 85 deg", boom_deg=85.0)
     with pytest.raises(InputError, match="Periods to follow must be above 0 s"):
         follow(crane, [0.0])
-    with pytest.raises(InputError, match="Heights of waves must be one or more finite"):
-        operability(crane, MEANT, heights=[-1.0])
-    with pytest.raises(InputError, match="This study has no slew_deg; it has boom_deg"):
-        sectors(crane, MEANT, slew_deg=90.0)
+    with pytest.raises(InputError, match="Points of the height must be one or more finite"):
+        sweep(crane, "height", MEANT, points=[-1.0])
+    with pytest.raises(InputError, match="A sweep over the bearing sets slew_deg itself"):
+        sweep(crane, "bearing", MEANT, slew_deg=90.0)

@@ -5,7 +5,7 @@ from math import cos, hypot, pi, radians, sin, sqrt
 import numpy as np
 import pytest
 
-from swashplate.crane import Crane, Pose, Suspension, load_motion
+from swashplate.crane import Crane, Suspension, load_motion
 from swashplate.crane.kinematics import (
     Boom,
     Shafts,
@@ -336,7 +336,7 @@ def test_luff_rope_has_the_lengths_that_were_worked_out_by_hand():
 @pytest.mark.parametrize("slew_deg", [-200.0, -30.0, 0.0, 179.0, 181.0])
 def test_inverse_kinematics_return_to_the_same_shafts(boom_deg, slew_deg):
     crane = Crane.preset("tg3637")
-    g, home = crane.geometry, crane.home(Pose(0.1, radians(45.0), 20.0))
+    g, home = crane.geometry, crane.home(np.degrees(0.1))
     boom = Boom(cos(radians(boom_deg)), sin(radians(boom_deg)))
     rope = luff_rope(boom, g)
     assert boom_of(rope, g) == pytest.approx(boom, abs=1e-14)
@@ -351,8 +351,8 @@ def test_inverse_kinematics_return_to_the_same_shafts(boom_deg, slew_deg):
 @pytest.mark.parametrize(("slew_deg", "boom_deg"), [(0.0, 20.0), (70.0, 45.0), (-130.0, 75.0)])
 def test_torques_of_the_rope_do_the_work_that_lifts_the_load(slew_deg, boom_deg):
     crane = Crane.preset("tg3637")
-    g, pose = crane.geometry, Pose(radians(slew_deg), radians(boom_deg), 20.0)
-    home, n = crane.home(pose), np.array([0.3, -0.2, -0.9])
+    g, home = crane.geometry, crane.home(slew_deg, boom_deg)
+    n = np.array([0.3, -0.2, -0.9])
     n, tension = n / np.linalg.norm(n), 3e5
 
     def loss(hoist, slew, luff):

@@ -20,8 +20,9 @@ def solved(full: FullOrderDrive, run: Simulation, tolerance: float = 1e-8) -> np
     A limit that holds is -1 or 1, one that does not is 0: the spool at its stroke, the relief valve
     open, the plate at a stop. Stops are inelastic.
     """
-    m, options, current = full.plant.machine, full.options(), run.fine("current")
+    m, current = full.plant.machine, run.fine("current")
     instance = full.instance(run.record.step, card=False)
+    options = instance.options[1]
     started = instance.start({"current": float(current[0])}, run.record.step, "rest")
     k, state = started.arguments[1]["k"], np.array(started.states[1].motion)
     time = run.record.step * np.arange(current.size)

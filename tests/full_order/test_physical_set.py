@@ -2,7 +2,6 @@
 
 import pickle
 from math import atan, inf, pi, sqrt
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,7 +10,6 @@ from hypothesis import strategies as st
 
 from swashplate import (
     Drive,
-    FileError,
     FullOrderDrive,
     InputError,
     ParameterError,
@@ -217,37 +215,10 @@ def test_changes() -> None:
         PhysicalSet("mine", "", {})
 
 
-def test_files(tmp_path: Path) -> None:
-    slew = PhysicalSet.preset("slew")
-    slew.to_toml(tmp_path / "slew.toml")
-    again = PhysicalSet.from_toml(tmp_path / "slew.toml")
-    assert again == slew
-    text = (tmp_path / "slew.toml").read_text("utf-8")
-    own = tmp_path / "own.toml"
-    for old, new, sentence in (
-        ("spool_mass =", "spool_mas =", "own.toml: A physical set has no quantity 'spool_mas'"),
-        ('unit = "kg"', 'unit = "Pa"', "own.toml: .* is given in 'Pa', which does not measure"),
-        ("oil_volume = {value = 0.0002", "oil_volume = {value = -1.0", "but must be above 0"),
-        (
-            'status = "assumed"}',
-            'status = "assumed", bounds = [0, 1]}',
-            "spool_arm has bounds; leave them out",
-        ),
-        ("piston_mass =", "spool_frequency =", "chosen only where a set is completed"),
-        ("air_fraction = {value = 0.0", "air_fraction = {value = 1.5", "at least 0 and below 1"),
-    ):
-        assert old in text
-        own.write_text(text.replace(old, new, 1), "utf-8")
-        with pytest.raises(ParameterError, match=sentence):
-            PhysicalSet.from_toml(own)
-    with pytest.raises(FileError, match="There is no file"):
-        PhysicalSet.from_toml(tmp_path / "none.toml")
+def test_an_axis_without_a_set() -> None:
     with pytest.raises(ParameterError, match="no packaged physical set 'winch'; there are hoist"):
         PhysicalSet.preset("winch")
-    own.write_text(
-        'name = "mine"\nlumps = "hoist"\n[physical]\noil_volume = { value = 0.1, unit = "l" }\n',
-        "utf-8",
-    )
-    mine = PhysicalSet.from_toml(own)
-    assert mine.numbers["oil_volume"] == pytest.approx(1e-4)
-    assert mine.to_lumped(0.073926)["Z8"] == pytest.approx(1651400.0, rel=1e-9)
+    with pytest.raises(ParameterError, match="chosen only where a set is completed"):
+        PhysicalSet.preset("hoist").replace(spool_frequency=200.0)
+    with pytest.raises(ParameterError, match="air_fraction .* at least 0 and below 1"):
+        PhysicalSet.preset("hoist").replace(air_fraction=1.5)

@@ -114,7 +114,8 @@ def test_a_machine_of_one_s_own(hold: str) -> None:
     assert model.inputs == ("command", "leak")
     assert model.states[:2] == ("valve.opening", "rod.position")
     assert set(model.states[2:]) == set(model.memory)
-    assert not model.D.any()  # the command comes later than a sample
+    late = round(model.delay / H)  # of the command
+    assert late >= 2
     moved = 1e-6 * np.random.default_rng(1).standard_normal((200, 2))
     moved[0] = 0.0
     records = {"command": at["command"] + moved[:, 0], "leak": at["leak"] + moved[:, 1]}
@@ -127,7 +128,8 @@ def test_a_machine_of_one_s_own(hold: str) -> None:
         (Stored(1, "state", "position"), Stored(0, "signals", "flow")),
     )
     x, y = np.zeros(model.A.shape[0]), np.empty((200, 3))
-    for n, u in enumerate(moved):
+    command = np.concatenate((np.zeros(late), moved[:, 0]))[:200]
+    for n, u in enumerate(np.column_stack((command, moved[:, 1]))):
         y[n] = model.C @ x + model.D @ u
         x = model.A @ x + model.B @ u
     for k in range(2):

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from swashplate import DomainError, Drive, InputError
-from swashplate.linear import DeadZoneError, LinearDrive
+from swashplate.linear import LinearDrive
 
 FRICTION = {"spool_friction": 0.115, "spool_presliding": 5e-5}
 LINE = {"line_stiffness": 1e6, "load_inertia": 5e3, "motor_leakage": 1e-6, "load_torque": 3e4}
@@ -20,14 +20,15 @@ REFINED = {
 }
 VARIANTS = {
     "published": ({}, {}),
-    "leaky": ({"Z7": 0.8}, {}),
     "loaded": ({"Z12": 0.2, "Z11": 0.05}, {}),
     "no delay": ({"tau": 0.0}, {}),
     "short delay": ({"tau": 0.0007}, {}),
     "whole delay": ({"tau": 7.0 / 512.0}, {}),
     "Coulomb": ({"C": 3.0}, {}),
     "split switches": ({}, {"card_switch": "split"}),
-    **{name: (changes, {}) for name, changes in REFINED.items()},
+    # together, so that few forms of the march are compiled; each by itself leads to the continuous
+    # model below
+    **{name: (REFINED[name], {}) for name in ("friction without dither", "leakage", "all")},
 }
 STEP = 1.0 / 512.0
 OUTPUTS = ("shaft_speed", "stroker_pressure", "orifice_opening", "current", "motor_torque")
@@ -193,7 +194,7 @@ def test_the_line_s_resonance(hoist: Drive) -> None:
 def test_where_friction_or_hysteresis_holds(hoist: Drive) -> None:
     lagging = hoist.replace(solenoid_hysteresis=0.008)
     for where in ({"at": 4.0}, {"current": 0.45}):
-        with pytest.raises(DeadZoneError, match="the solenoids' hysteresis of ±0.008 A"):
+        with pytest.raises(DomainError, match="the solenoids' hysteresis of ±0.008 A"):
             lagging.linearize(**where)
     force = lagging.linearize(4.0, input="solenoid_force")
     assert force.gain == hoist.linearize(4.0, input="solenoid_force").gain
@@ -201,9 +202,8 @@ def test_where_friction_or_hysteresis_holds(hoist: Drive) -> None:
         hoist.replace(spool_friction=0.1).linearize(4.0)
 
 
-@pytest.mark.parametrize("name", ["friction", "line", "damping"])
-def test_small_sines_agree_with_the_linear_model(hoist: Drive, name: str) -> None:
-    drive = hoist.replace(**REFINED[name])
+def test_small_sines_of_a_refined_drive_agree_with_the_linear_model(hoist: Drive) -> None:
+    drive = hoist.replace(**REFINED["all"])
     swept = drive.frequency_response([1.0], [1e-3], bias=4.0, tolerance=1e-6)
     exact = drive.linearize(4.0).discrete(1.0 / 512.0).response(1.0)[0]
     assert abs(swept.ratio[0, 0] / exact - 1.0) < 2e-5
@@ -212,7 +212,7 @@ def test_small_sines_agree_with_the_linear_model(hoist: Drive, name: str) -> Non
 # --- what moves beside the command ----------------------------------------------------------------
 
 
-@pytest.mark.parametrize("name", ["leakage", "line", "all"])
+@pytest.mark.parametrize("name", ["leakage", "all"])
 @pytest.mark.parametrize("rate", [100.0, 512.0])
 def test_inputs_beside_the_voltage(hoist: Drive, name: str, rate: float) -> None:
     drive = hoist.replace(**REFINED[name])

@@ -2,17 +2,15 @@
 
 import copy
 import pickle
-from itertools import count
 from math import inf, nan
 from pathlib import Path
 
-import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from swashplate import Drive, FileError, Pair, ParameterError
-from swashplate.parameters import CATALOGUE, preset_names, rules
+from swashplate.parameters import CATALOGUE, preset_names
 
 
 def test_presets() -> None:
@@ -208,16 +206,3 @@ def test_neutral_set_is_a_straight_line_with_one_lag() -> None:
     ideal = 2.0 * (1.0 - np.exp(-t / 0.3))
     speed = neutral.simulate(voltage).shaft_speed
     assert np.abs(speed - ideal).max() < 0.04  # two samples of the current filter
-
-
-def test_first_sets_of_a_process_are_checked_in_plain_python_with_the_same_numbers(
-    axis: Drive,
-) -> None:
-    numbers = {name: np.array([value]) for name, value in axis.parameters.numbers.items()}
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(rules, "_alone", count())
-        plain = rules._static(numbers)
-        patch.setattr(rules, "_alone", count(rules.FIRST))
-        compiled = rules._static(numbers)
-    for one, other in zip(plain, compiled, strict=True):
-        assert (one == other).all()

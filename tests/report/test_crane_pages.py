@@ -14,10 +14,7 @@ from swashplate.crane import (
     control,
     follow,
     judge,
-    operability,
-    orifices,
-    residuals,
-    sectors,
+    sweep,
 )
 from swashplate.errors import InputError
 from swashplate.report import figures
@@ -85,7 +82,7 @@ def test_verdicts_page_says_what_the_judgment_does(tmp_path, judged):
     assert judged.verdict() in text
     assert text.count("<svg") == 3
     assert not re.search(r"(src|href)\s*=\s*[\"']?(https?:)?//", text)
-    rms = np.degrees(judged.rms("identified").mean())
+    rms = np.degrees(judged.counted("identified").mean())
     assert f"{rms:.2f}" in text
     assert "12 of 13 quantities of the crane are assumed" in text
     assert text.count(">assumed<") == 12
@@ -106,31 +103,31 @@ def test_scenes_that_cannot_be_are_refused(tmp_path, crane, runs):
     assert not list(tmp_path.iterdir())
 
 
-@pytest.mark.parametrize("name", ["judgment", "follow", "sectors", "operability", "orifice"])
+SWEEPS = {"bearing": [0, 90, 180, 270], "height": [0.2, 0.5], "orifice": [1.0, 3.0]}
+
+
+@pytest.mark.parametrize("name", ["judgment", "follow", *SWEEPS])
 def test_figures_of_studies_are_legible_and_say_what_is_assumed(
     name, crane, judged, assert_legible
 ):
-    made = {
-        "judgment": lambda: judged,
-        "follow": lambda: follow(crane, [5.0, 8.0, 12.0]),
-        "sectors": lambda: sectors(crane, MEANT, bearings=[0, 90, 180, 270], seeds=[0], **SHORT),
-        "operability": lambda: operability(crane, MEANT, heights=[0.2, 0.5], seeds=[0], **SHORT),
-        "orifice": lambda: orifices(crane, MEANT, factors=[1.0, 3.0], seeds=[0, 1], **SHORT),
-    }[name]()
+    made = judged if name == "judgment" else follow(crane, [5.0, 8.0, 12.0])
+    if name in SWEEPS:
+        made = sweep(crane, name, MEANT, points=SWEEPS[name], seeds=[0, 1], **SHORT)
     figure = made.plot()
     assert_legible(figure)
     words = [each.get_text() for ax in figure.axes for each in ax.texts]
-    assert any("12 of 13 quantities assumed" in each for each in words)
+    assert any("12 of 13 quantities of the crane are assumed" in each for each in words)
     assert "12 of" in made.summary() or made.summary().startswith(repr(made))
 
 
-def test_figure_of_residuals_shows_swing_and_where_the_slew_ends(crane, assert_legible):
-    variants = {"volts": ("volts", None), "ideal": ("ideal", control.TipShaper())}
-    made = residuals(crane, variants, sticks=[0.8, 1.0])
-    figure = figures.plot_residuals(made)
+def test_figure_over_the_stick_shows_swing_and_where_the_slew_ends(crane, assert_legible):
+    drives = ("volts", "ideal")
+    made = sweep(crane, "stick", control.TipShaper(), points=[0.8, 1.0], drives=drives)
+    figure = made.plot()
     assert_legible(figure)
     swing, ends = figure.axes
-    np.testing.assert_allclose(swing.lines[0].get_ydata(), np.degrees(made.values[:, 0]))
+    shown = np.degrees(made.values[0, :, 0, 1])
+    np.testing.assert_allclose(swing.lines[0].get_ydata(), shown)
     assert (swing.get_ylabel(), ends.get_ylabel()) == ("residual swing (deg)", "slew reached (deg)")
 
 

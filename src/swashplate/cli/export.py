@@ -6,9 +6,9 @@ import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Literal
 
-from swashplate.cli.options import AxisName, DriveChoice, argument, option
+from swashplate.cli.options import AxisName, DriveChoice
 from swashplate.cli.terminal import Outputs, check_free, note, working
 from swashplate.cli.words import campaign_of, drive_file, maneuver_of
 from swashplate.errors import InputError
@@ -20,40 +20,29 @@ WASM = Form("WebAssembly", (".wasm",))
 
 def export(
     drive: DriveChoice,
-    fmu: Annotated[
-        Path | None, option("An FMU for co-simulation.", "--fmu", metavar="FILE.fmu")
-    ] = None,
-    c: Annotated[
-        Path | None,
-        option("C source with the drive's numbers, in a folder of its own.", "--c", metavar="DIR"),
-    ] = None,
-    wasm: Annotated[
-        Path | None,
-        option("WebAssembly with the drive's numbers.", "--wasm", metavar="FILE.wasm"),
-    ] = None,
-    fmi: Annotated[
-        Literal["2", "2.0", "3", "3.0"], option("Version of the standard for the FMU.")
-    ] = "2.0",
-    step: Annotated[
-        float | None,
-        option("The drive's own step, at most 1/512 s, whatever the master's is.", metavar="S"),
-    ] = None,
-    platforms: Annotated[
-        str | None,
-        option(
-            "Machines that the FMU is for: linux64, aarch64-linux, win64, darwin64; all by "
-            "default.",
-            metavar="NAME,NAME",
-        ),
-    ] = None,
-    compile: Annotated[
-        bool, option("Compile the C source for this machine, too.", "--compile")
-    ] = False,
+    *,
+    fmu: Path | None = None,
+    c: Path | None = None,
+    wasm: Path | None = None,
+    fmi: Literal["2", "2.0", "3", "3.0"] = "2.0",
+    step: float | None = None,
+    platforms: str | None = None,
+    compile: bool = False,
 ) -> None:
     """Take a drive along: as an FMU, as C source, or as WebAssembly.
 
     An FMU needs neither Python nor a compiler where it runs, and none is
     needed to write it: the package brings its libraries along.
+
+    Options:
+      fmu FILE.fmu: An FMU for co-simulation.
+      c DIR: C source with the drive's numbers, in a folder of its own.
+      wasm FILE.wasm: WebAssembly with the drive's numbers.
+      fmi: Version of the standard for the FMU.
+      step S: The drive's own step, at most 1/512 s, whatever the master's is.
+      platforms NAME,NAME: Machines that the FMU is for: linux64, aarch64-linux, win64, darwin64;
+          all by default.
+      compile: Compile the C source for this machine, too.
 
     For example:
       swashplate export hoist --fmu hoist.fmu
@@ -117,21 +106,22 @@ def said() -> Iterator[None]:
 
 def live(
     drive: DriveChoice,
-    path: Annotated[
-        Path | None,
-        argument("CAMPAIGN.toml", "Tests that are shown beside what the drive makes of them."),
-    ] = None,
+    path: Path | None = None,
+    *,
     axis: AxisName = None,
-    maneuver: Annotated[
-        str | None, option("A maneuver instead of tests, such as step:9.", metavar="NAME")
-    ] = None,
-    out: Annotated[Path, option("The page, .html.", metavar="FILE")] = Path("live.html"),
+    maneuver: str | None = None,
+    out: Path = Path("live.html"),
 ) -> None:
     """Write a page in which the drive runs, with sliders for its parameters.
 
     One file that works offline: open it in a browser, move a slider, and the
     simulated curves, their errors and the limits follow. Changed values stand
     below as lines to put into the drive's file.
+
+    Options:
+      path CAMPAIGN.toml: Tests that are shown beside what the drive makes of them.
+      maneuver NAME: A maneuver instead of tests, such as step:9.
+      out FILE: The page, .html.
 
     For example:
       swashplate live fitted harbour/campaign.toml

@@ -8,7 +8,7 @@ from swashplate.cli.options import (
     Simulating,
     TableFile,
 )
-from swashplate.cli.terminal import Outputs, long_work, note, say, show, working
+from swashplate.cli.terminal import Outputs, note, say, show, working
 from swashplate.cli.words import physical_values, simulated
 from swashplate.errors import InputError
 from swashplate.tables import FIGURE, TABLE
@@ -52,7 +52,6 @@ def full_order(
     given = physical_values(physical or ())
     with working("Completing the physical values"):
         from swashplate.full_order import (
-            TABLE_MANEUVERS,
             FullOrderDrive,
             compare,
             physical_set,
@@ -73,8 +72,8 @@ def full_order(
         from swashplate.equations.marching.record import least_substeps
 
         least_substeps(sampling.rate)  # one out of range is refused before anything is sampled
-        with long_work("", len(TABLE_MANEUVERS)) as begin:
-            found = validity(full, sampling.rate, begin=begin)
+        with working("Simulating"):
+            found = validity(full, sampling.rate)
         files.write(out, "Table", found.write)
         said = f"{len(found.rows)} maneuvers"
         title = drive.title

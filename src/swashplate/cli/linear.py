@@ -8,11 +8,10 @@ from typing import TYPE_CHECKING, Literal
 
 from swashplate.cli.options import DriveChoice, FigureFile, Interpolation, TableFile
 from swashplate.cli.terminal import Outputs, note, show, working
-from swashplate.errors import DomainError, InputError
+from swashplate.errors import InputError
 from swashplate.tables import FIGURE, TABLE
 
 if TYPE_CHECKING:
-    from swashplate.drive import Drive
     from swashplate.linear import LinearDrive
 
 MOST_POINTS = 2000
@@ -57,7 +56,7 @@ def linearize(
       swashplate linearize slew --at 2 --sample-time 0.01 --out slew.toml
       swashplate linearize luff --current 0 --input solenoid_force
     """
-    from swashplate.linear import LINEAR_MODEL, DeadZoneError, model_tables
+    from swashplate.linear import LINEAR_MODEL, model_tables
 
     files = Outputs((out, LINEAR_MODEL))
     if sum(each is not None for each in (at, current, speed_deg_s)) != 1:
@@ -70,13 +69,7 @@ def linearize(
     with working("Linearising"):
         chosen = drive.chosen
         speed = None if speed_deg_s is None else radians(speed_deg_s)
-        try:
-            model = chosen.linearize(at, current=current, speed=speed, input=input)
-        except DeadZoneError as error:
-            raise DomainError(
-                f"{error.where}; {error.instead}, or the pump alone with "
-                "--current 0 --input solenoid_force."
-            ) from None
+        model = chosen.linearize(at, current=current, speed=speed, input=input)
         if sample_time is not None:
             model = model.discrete(sample_time, interpolation)
         gain = None if loop_gain is None else degrees(loop_gain)
@@ -144,7 +137,7 @@ def bode(
     with working("Sweeping"):
         from swashplate.linear import response_table
 
-        linear = None if linear_at is None else _linear(drive.chosen, linear_at)
+        linear = None if linear_at is None else drive.chosen.linearize(linear_at)
         grid = np.union1d(np.geomspace(lowest, highest, points), [frequency])
         response = drive.chosen.frequency_response(grid, amplitudes or AMPLITUDES, bias=bias)
         made = response_table(response, frequency)
@@ -155,12 +148,3 @@ def bode(
     note(f"At {frequency:g} Hz:")
     show(made)
     files.say()
-
-
-def _linear(drive: Drive, voltage: float) -> LinearDrive:
-    from swashplate.linear import DeadZoneError
-
-    try:
-        return drive.linearize(voltage)
-    except DeadZoneError as error:
-        raise DomainError(f"--linear-at: {error.where}; {error.instead}.") from None

@@ -164,7 +164,7 @@ class ShownUnits:
     ] = None
 
 
-_ENTRY = re.compile(r"^  (\w+)((?: --[\w-]+)*) ?([A-Z\[]\S*)?: (.*(?:\n   .*)*)", re.MULTILINE)
+_ENTRY = re.compile(r"^  (\w+)((?: --[\w/-]+)*) ?([A-Z\[]\S*)?: (.*(?:\n   .*)*)", re.MULTILINE)
 """An entry of a docstring's options."""
 WRITTEN = {"out", "plot", "write", "pdf", "fmu", "c", "wasm"}
 """Parameters of commands that write files, and so replace older ones with --force alone."""
@@ -179,18 +179,22 @@ def command(
     """Register a command: its groups spread, --force and units added.
 
     Its docstring ends with "Options:", an entry for each parameter that no shared type here
-    describes: name, flag if it has another, metavar, colon, help. Parameters before the ``*`` are
-    arguments. Examples stand behind them, and are shown below the options.
+    describes: name, flag if it has another, metavar, colon, help; a group's docstring may end so,
+    too. Parameters before the ``*`` are arguments. Examples stand behind them, and are shown below
+    the options.
     """
 
     def register(function: Callable[..., None]) -> Callable[..., None]:
         text = inspect.cleandoc(function.__doc__ or "")
         text, head, shown = text.partition("\n\nFor example:")
         text, _, entries = text.partition("\n\nOptions:\n")
-        said = {found[1]: found for found in _ENTRY.finditer(SHARED + entries)}
         hints = get_type_hints(function, include_extras=True)
         given = inspect.signature(function).parameters.values()
         groups = {each.name: hints[each.name] for each in given if is_dataclass(hints[each.name])}
+        kinds = [kind for group in groups.values() for kind in group.__mro__[::-1]]
+        shared = [inspect.cleandoc(each.__doc__ or "").partition("Options:\n")[2] for each in kinds]
+        found = _ENTRY.finditer("\n".join([SHARED, *shared, entries]))
+        said = {each[1]: each for each in found}
         flat = []
         for each in given:
             if each.name in groups:

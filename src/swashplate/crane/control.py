@@ -2,25 +2,34 @@
 
 Each is a value; `|` combines them: ``TipShaper("zv") | DelayedFeedback(0.2) | Clip()``. In the
 loop they act in one order, whatever order they are written in: joint shaper, path of the tip, tip
-shaper, offsets of the tip (feedback, ship, own), clip, inverse kinematics, position loop.
+shaper, offsets of the tip (feedback, ship, own), clip, inverse kinematics, position loop. The
+linear crane is for controllers that are designed outside the package.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from math import isfinite
-from typing import Any, ClassVar, Literal, NamedTuple, get_args
+from importlib import import_module
+from math import cos, inf, radians, sin
+from typing import TYPE_CHECKING, Any, ClassVar, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from swashplate.crane.kinematics import Boom, boom_rate, reach_rate
+from swashplate.crane.rope import GRAVITY
 from swashplate.equations import Model
 from swashplate.errors import InputError
+from swashplate.results import Result
+
+if TYPE_CHECKING:
+    from swashplate.crane.crane import Crane
 
 Array = NDArray[np.float64]
+Impulses = tuple[float, float, float]
 Shaping = Literal["zv", "zvd", "ei"]
-IMPULSES: dict[str, tuple[float, ...]] = {
-    "zv": (0.5, 0.5),
+IMPULSES: dict[str, Impulses] = {
+    "zv": (0.5, 0.5, 0.0),
     "zvd": (0.25, 0.5, 0.25),
     "ei": (0.2625, 0.475, 0.2625),
 }
@@ -40,6 +49,23 @@ GIVES = ("tip_x", "tip_y")
 """Signals of a law of one's own: what is added to the wanted tip in the ship's frame. [m]"""
 
 
+class Settings(NamedTuple):
+    """Numbers of a controller, as the loop takes them."""
+
+    joint: Impulses = (1.0, 0.0, 0.0)
+    tip: Impulses = (1.0, 0.0, 0.0)
+    path: bool = False
+    """Whether the tip's path is controlled, not only the stick's commands."""
+    gain: float = 0.7
+    """Of the position loop. [1/s]"""
+    feedback: float = 0.0
+    delay: float = 0.25
+    ship: bool = False
+    clip: float = 0.0
+    """[m]; 0: from the limits, by `share`; no clip if that is 0, too."""
+    share: float = 0.0
+
+
 class Control:
     """One stage of control, or several; see the module's text."""
 
@@ -52,6 +78,17 @@ class Control:
 
     def __or__(self, other: Control) -> Chain:
         return Chain((*self.stages, *other.stages))
+
+    def _settings(self) -> dict[str, Any]:
+        """Fields of `Settings` that a stage sets."""
+        return {}
+
+    def _check(self, name: str, most: float = inf) -> None:
+        """Refuse a number of a stage that is not above 0, or too large."""
+        value = getattr(self, name)
+        if not (0.0 < value < inf and value <= most):
+            limit = "" if most == inf else f" and at most {most:g}"
+            raise InputError(f"The {name} of {self.kind} is {value:g}, but must be above 0{limit}.")
 
 
 @dataclass(frozen=True, repr=False)
@@ -85,15 +122,15 @@ class Chain(Control):
 class _Shaper(Control):
     shape: Shaping = "zv"
     kind: ClassVar[str] = "shaper"
+    shaped: ClassVar[str] = "tip"
+    """Field of `Settings`."""
 
     def __post_init__(self) -> None:
-        if self.shape not in get_args(Shaping):
+        if self.shape not in IMPULSES:
             raise InputError(f"A shaper is 'zv', 'zvd' or 'ei', not '{self.shape}'.")
 
-    @property
-    def impulses(self) -> tuple[float, ...]:
-        """Their sizes, half a period apart."""
-        return IMPULSES[self.shape]
+    def _settings(self) -> dict[str, Any]:
+        return {self.shaped: IMPULSES[self.shape]}
 
 
 class JointShaper(_Shaper):
@@ -103,6 +140,8 @@ class JointShaper(_Shaper):
     joints move the tip along a line.
     """
 
+    shaped: ClassVar[str] = "joint"
+
 
 class TipShaper(_Shaper):
     """Shaper of the path that the operator's commands give the tip in the deck's plane.
@@ -110,11 +149,6 @@ class TipShaper(_Shaper):
     Swing is linear in that path, so what cancels in it cancels in the swing, in a turn as well; and
     the path ends where the operator's ends, whatever the rope does.
     """
-
-
-def _positive(name: str, value: float) -> None:
-    if not (isfinite(value) and value > 0.0):
-        raise InputError(f"{name} is {value:g}, but must be above 0.")
 
 
 @dataclass(frozen=True)
@@ -126,20 +160,124 @@ class DelayedFeedback(Control):
     gain : float
         k, part of the load's horizontal distance from the tip that is added to the wanted tip.
     delay : float
-        τ in periods of the present rope. The damping ratio is about k/2 at 0.25.
+        τ in periods of the present rope, at most 1. The damping ratio is about k/2 at 0.25.
     """
 
     gain: float = 0.2
     delay: float = 0.25
-    kind: ClassVar[str] = "feedback"
+    kind: ClassVar[str] = "delayed feedback"
 
     def __post_init__(self) -> None:
-        _positive("The gain of delayed feedback", self.gain)
-        if not 0.0 < self.delay <= 1.0:
+        self._check("gain")
+        self._check("delay", 1.0)
+
+    def _settings(self) -> dict[str, Any]:
+        return {"feedback": self.gain, "delay": self.delay}
+
+
+@dataclass(frozen=True)
+class ShipCompensation(Control):
+    """Compensation of the ship's motion: the wanted tip keeps its place over the sea."""
+
+    kind: ClassVar[str] = "ship compensation"
+
+    def _settings(self) -> dict[str, Any]:
+        return {"ship": True}
+
+
+@dataclass(frozen=True)
+class Clip(Control):
+    """Limit of what control may add to the operator's tip.
+
+    It is static, so that it has no phase: it can take authority from the controller, but never feed
+    the swing.
+
+    Attributes
+    ----------
+    size : float or "auto"
+        Along the boom [m]; by default the largest sine of the load's frequency ω₀ that luff and
+        slew can follow, min(v/ω₀, a/ω₀²) with their limits of speed v and acceleration a, times
+        `share`.
+    share : float
+        Part of it that is used.
+    """
+
+    size: float | Literal["auto"] = "auto"
+    share: float = 0.8
+    kind: ClassVar[str] = "a clip"
+
+    def __post_init__(self) -> None:
+        self._check("share")
+        if self.size != "auto":
+            self._check("size")
+
+    def _settings(self) -> dict[str, Any]:
+        return {"clip": 0.0 if self.size == "auto" else float(self.size), "share": self.share}
+
+
+@dataclass(frozen=True)
+class PositionLoop(Control):
+    """Loop that brings slew and luff back to the wanted path; 0.7 /s without one.
+
+    Attributes
+    ----------
+    gain : float
+        Speed added for each radian of a shaft's error. [1/s]
+    """
+
+    gain: float = 0.7
+    kind: ClassVar[str] = "position loop"
+
+    def __post_init__(self) -> None:
+        self._check("gain")
+
+    def _settings(self) -> dict[str, Any]:
+        return {"gain": self.gain}
+
+
+@dataclass(frozen=True)
+class Law(Control):
+    """A law of one's own: an offset of the wanted tip, as a model of the engine with its own state.
+
+    Attributes
+    ----------
+    model : Model
+        Its inputs are of `SEEN`, its signals or states among others `GIVES`.
+    values : named tuple
+        Of its parameters.
+    """
+
+    model: Model
+    values: Any = ()
+    kind: ClassVar[str] = "law"
+
+    def __post_init__(self) -> None:
+        strange = [each for each in self.model.external if each not in SEEN]
+        if strange:
             raise InputError(
-                f"Delayed feedback waits for {self.delay:g} periods, but more than 0 and at most 1 "
-                "are possible."
+                f"The law {self.model.name} asks for '{strange[0]}', but a crane's controller sees "
+                f"{', '.join(SEEN)}."
             )
+        lacks = [each for each in GIVES if each not in self.model.signal_names]
+        if lacks:
+            raise InputError(
+                f"The law {self.model.name} must have the signals {' and '.join(GIVES)}, what is "
+                f"added to the wanted tip; {lacks[0]} is missing."
+            )
+
+
+def settings_of(control: Control | None) -> tuple[Settings, Law | None]:
+    """Numbers of a controller, and the law in it."""
+    if control is None:
+        return Settings(), None
+    if not isinstance(control, Control):
+        raise InputError(f"{control!r} is no control of a crane; see swashplate.crane.control.")
+    made: dict[str, Any] = {}
+    for each in control.stages:
+        made |= each._settings()
+    path = not all(isinstance(each, JointShaper) for each in control.stages)
+    laws = [each for each in control.stages if isinstance(each, Law)]
+    return Settings(**made, path=path), laws[0] if laws else None
 
 
 def feedback_damping(gain: ArrayLike, delay: ArrayLike) -> Array:
@@ -185,128 +323,61 @@ def feedback_damping(gain: ArrayLike, delay: ArrayLike) -> Array:
     return np.asarray(-first.real / np.abs(first))
 
 
-@dataclass(frozen=True)
-class ShipCompensation(Control):
-    """Compensation of the ship's motion: the wanted tip keeps its place over the sea."""
+# --- the linear crane -----------------------------------------------------------------------------
 
-    kind: ClassVar[str] = "ship compensation"
+INPUTS = ("hoist", "slew", "luff")
+"""Speeds of the shafts. [rad/s]"""
+STATES = ("offset_out", "speed_out", "offset_across", "speed_across", "rope", "slew", "boom")
+"""Load less tip, outwards along the boom and across it to starboard [m]; the load's speed that way
+[m/s]; rope [m]; slew and boom [rad]; the last three from where they are."""
+OUTPUTS = ("swing_out", "swing_across", "rope", "slew", "boom")
+"""Angles of the rope outwards and to starboard [rad]; the rest as the states."""
 
 
-@dataclass(frozen=True)
-class Clip(Control):
-    """Limit of what control may add to the operator's tip.
+@dataclass(frozen=True, eq=False)
+class LinearCrane(Result):
+    """A crane about a load that hangs at rest: ẋ = A x + B u, y = C x. Made by `Crane.linearize`.
 
-    Attributes
-    ----------
-    size : float or "auto"
-        Along the boom [m]; by default the largest sine of the load's frequency ω₀ that luff and
-        slew can follow, min(v/ω₀, a/ω₀²) with their limits of speed v and acceleration a, times
-        `share`.
-    share : float
-        Part of it that is used.
-
-    Notes
-    -----
-    It is static, so that it has no phase: it can take authority from the controller, but never feed
-    the swing.
+    States, inputs and outputs are `STATES`, `INPUTS` and `OUTPUTS` of `swashplate.crane.control`.
+    Both axes of the swing are pendulums, apart from each other: d' = v - p', v' = -g/L d with p'
+    the speed of the tip, -∂ρ/∂θ of the luff and ρ of the slew.
     """
 
-    size: float | Literal["auto"] = "auto"
-    share: float = 0.8
-    kind: ClassVar[str] = "clip"
+    name: str
+    A: Array = field(repr=False)
+    """(7, 7)"""
+    B: Array = field(repr=False)
+    """(7, 3)"""
+    C: Array = field(repr=False)
+    """(5, 7)"""
 
-    def __post_init__(self) -> None:
-        if self.size != "auto":
-            _positive("The size of a clip", self.size)
-        _positive("The share of a clip", self.share)
+    def to_control(self) -> Any:
+        """The model as python-control's StateSpace with named signals.
 
-
-@dataclass(frozen=True)
-class PositionLoop(Control):
-    """Loop that brings slew and luff back to the wanted path; 0.7 /s without one.
-
-    Attributes
-    ----------
-    gain : float
-        Speed added for each radian of a shaft's error. [1/s]
-    """
-
-    gain: float = 0.7
-    kind: ClassVar[str] = "position loop"
-
-    def __post_init__(self) -> None:
-        _positive("The gain of a position loop", self.gain)
-
-
-@dataclass(frozen=True)
-class Law(Control):
-    """A law of one's own: an offset of the wanted tip, as a model of the engine with its own state.
-
-    Attributes
-    ----------
-    model : Model
-        Its inputs are of `SEEN`, its signals or states among others `GIVES`.
-    values : named tuple
-        Of its parameters.
-    """
-
-    model: Model
-    values: Any = field(default=())
-    kind: ClassVar[str] = "law"
-
-    def __post_init__(self) -> None:
-        strange = [each for each in self.model.external if each not in SEEN]
-        if strange:
+        Raises
+        ------
+        InputError
+            If python-control is not installed.
+        """
+        try:
+            control = import_module("control")
+        except ImportError:
             raise InputError(
-                f"The law {self.model.name} asks for '{strange[0]}', but a crane's controller sees "
-                f"{', '.join(SEEN)}."
-            )
-        lacks = [each for each in GIVES if each not in self.model.signal_names]
-        if lacks:
-            raise InputError(
-                f"The law {self.model.name} must have the signals {' and '.join(GIVES)}, what is "
-                f"added to the wanted tip; {lacks[0]} is missing."
-            )
+                "python-control is not installed: pip install swashplate[control]; A, B and C need "
+                "nothing more."
+            ) from None
+        named = {"inputs": list(INPUTS), "outputs": list(OUTPUTS), "name": self.name}
+        return control.ss(self.A, self.B, self.C, np.zeros((5, 3)), states=list(STATES), **named)
 
 
-class Settings(NamedTuple):
-    """Numbers of a controller, as the loop takes them."""
-
-    joint: tuple[float, float, float] = (1.0, 0.0, 0.0)
-    tip: tuple[float, float, float] = (1.0, 0.0, 0.0)
-    path: bool = False
-    """Whether the tip's path is controlled, not only the stick's commands."""
-    gain: float = 0.7
-    feedback: float = 0.0
-    delay: float = 0.25
-    ship: bool = False
-    clip: float = 0.0
-    """[m]; 0: from the limits, by `share`; no clip if that is 0, too."""
-    share: float = 0.0
-
-
-def settings_of(control: Control | None) -> tuple[Settings, Law | None, int]:
-    """Numbers of a controller, its law, and how many half periods its shaper takes."""
-    made, law, halves = Settings(), None, 0
-    for each in control.stages if control is not None else ():
-        if isinstance(each, _Shaper):
-            first, second, *third = each.impulses
-            impulses = (first, second, third[0] if third else 0.0)
-            halves = len(each.impulses) - 1
-            joint = isinstance(each, JointShaper)
-            made = made._replace(joint=impulses) if joint else made._replace(tip=impulses)
-        elif isinstance(each, DelayedFeedback):
-            made = made._replace(feedback=each.gain, delay=each.delay)
-        elif isinstance(each, ShipCompensation):
-            made = made._replace(ship=True)
-        elif isinstance(each, Clip):
-            size = 0.0 if each.size == "auto" else each.size
-            made = made._replace(clip=float(size), share=each.share)
-        elif isinstance(each, PositionLoop):
-            made = made._replace(gain=each.gain)
-        elif isinstance(each, Law):
-            law = each
-        else:
-            raise InputError(f"{each!r} is no stage of a crane's control.")
-        made = made._replace(path=made.path or not isinstance(each, JointShaper))
-    return made, law, halves
+def linearize(crane: Crane, boom_deg: float, rope_m: float) -> LinearCrane:
+    """Linear crane at a boom and rope, see `Crane.linearize`."""
+    crane.home(0.0, boom_deg, rope_m)
+    g, boom = crane.geometry, Boom(cos(radians(boom_deg)), sin(radians(boom_deg)))
+    A, B, C = np.zeros((7, 7)), np.zeros((7, 3)), np.zeros((5, 7))
+    for i in (0, 2):
+        A[i, i + 1], A[i + 1, i], C[i // 2, i] = 1.0, -GRAVITY / rope_m, 1.0 / rope_m
+    B[0, 2], B[2, 1] = reach_rate(boom, g), -(g.foot + g.boom * boom.cos)
+    B[4], B[5, 1], B[6, 2] = (-g.hoist, 0.0, g.coupling * g.luff), 1.0, boom_rate(boom, g)
+    C[2:, 4:] = np.eye(3)
+    return LinearCrane(f"{crane.name}_{boom_deg:g}_{rope_m:g}", A, B, C)

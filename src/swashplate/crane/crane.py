@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from importlib.resources import files
@@ -14,12 +14,11 @@ from numpy.typing import ArrayLike
 from pydantic import BaseModel, ConfigDict, Field, FiniteFloat
 
 from swashplate.analysis.compensation import InverseMap, inverse_map
-from swashplate.crane.control import Control
+from swashplate.crane.control import Control, LinearCrane, linearize
 from swashplate.crane.kinematics import Boom, Geometry, Home, Vector, luff_rope
-from swashplate.crane.linear import LinearCrane, linearize
 from swashplate.crane.result import CraneRun
-from swashplate.crane.sea import Seaway
-from swashplate.crane.stepper import RATE, CraneStepper, Pose, Setup, motion_of
+from swashplate.crane.sea import Seaway, motion_of
+from swashplate.crane.stepper import RATE, CraneStepper, Setup
 from swashplate.crane.stick import AXES, Stick
 from swashplate.documents import parse_toml, read_text, validated
 from swashplate.drive import Drive
@@ -129,45 +128,32 @@ class Crane:
         count = sum(each.status == "assumed" for each in self.quantities.values())
         return f"{count} of {len(self.quantities)} quantities" if count else ""
 
-    def with_drive(
-        self,
-        *,
-        hoist: DriveLike | None = None,
-        slew: DriveLike | None = None,
-        luff: DriveLike | None = None,
-    ) -> Crane:
+    def with_drive(self, **drives: DriveLike) -> Crane:
         """The crane with other drives.
 
         Parameters
         ----------
-        hoist, slew, luff : Drive, Fit, str or path, optional
-            A drive, ``crane.luff.scale(Z16=1.5)``; the result of a fit; or a place: a packaged
-            name, a parameter file, or the folder that a fit wrote.
+        **drives : Drive, Fit, str or path
+            By axis: a drive, ``luff=crane.luff.scale(Z16=1.5)``; the result of a fit; or a place: a
+            packaged name, a parameter file, or the folder that a fit wrote.
 
         Raises
         ------
+        InputError
+            For an axis that there is not.
         FileError, ParameterError
             If there is no such file, or it is no drive's.
         """
-        given = {"hoist": hoist, "slew": slew, "luff": luff}
-        made: dict[str, Any] = {
-            axis: _drive_of(each) for axis, each in given.items() if each is not None
-        }
+        made: dict[str, Any] = {_axis(axis): _drive_of(each) for axis, each in drives.items()}
         return replace(self, **made)
 
-    def drawn(
-        self,
-        *,
-        hoist: Draws | None = None,
-        slew: Draws | None = None,
-        luff: Draws | None = None,
-    ) -> tuple[Crane, ...]:
+    def drawn(self, **draws: Draws) -> tuple[Crane, ...]:
         """Cranes whose drives are drawn from the errors of fits.
 
         Parameters
         ----------
-        hoist, slew, luff : Draws, optional
-            Of `analysis.monte_carlo.drives`; axes without keep their drive.
+        **draws : Draws
+            By axis, of `analysis.monte_carlo.drives`; axes without keep their drive.
 
         Returns
         -------
@@ -177,16 +163,12 @@ class Crane:
         Raises
         ------
         InputError
-            If no draws are given.
+            For an axis that there is not, or if no draws are given.
         """
-        given = {"hoist": hoist, "slew": slew, "luff": luff}
-        found = {axis: each.drives for axis, each in given.items() if each is not None}
-        if not found:
+        if not draws:
             raise InputError("Cranes are drawn from the draws of at least one axis.")
-        sets: Iterator[dict[str, Any]] = (
-            dict(zip(found, each, strict=True)) for each in zip(*found.values(), strict=False)
-        )
-        return tuple(replace(self, **each) for each in sets)
+        sets = zip(*(each.drives for each in draws.values()), strict=False)
+        return tuple(self.with_drive(**dict(zip(draws, each, strict=True))) for each in sets)
 
     def with_geometry(self, **changes: float | tuple[float, ...]) -> Crane:
         """The crane with other quantities, in SI and by name: ``boom_length=38.0``.
@@ -256,38 +238,29 @@ class Crane:
         """Inverse map of the drive of an axis, ``"hoist"``, ``"slew"`` or ``"luff"``."""
         return _inverse(getattr(self, axis))
 
-    def home(self, pose: Pose) -> Home:
-        """A pose as the equations take it.
+    def home(self, slew_deg: float = 0.0, boom_deg: float = 45.0, rope_m: float = 20.0) -> Home:
+        """Where the crane stands at the start of a run, as the equations take it.
 
         Raises
         ------
         InputError
             If boom or rope are beyond the crane's limits.
         """
-        low, high = self.boom_limits
-        if not low <= pose.boom <= high:
+        low, high = map(degrees, self.boom_limits)
+        if not low - 1e-9 <= boom_deg <= high + 1e-9:
             raise InputError(
-                f"The boom of {self.name} stands at {degrees(pose.boom):g} deg, but moves between "
-                f"{degrees(low):g} and {degrees(high):g} deg."
+                f"The boom of {self.name} stands at {boom_deg:g} deg, but moves between {low:g} "
+                f"and {high:g} deg."
             )
         short, long = self.rope_limits
-        if not short <= pose.rope <= long:
+        if not short <= rope_m <= long:
             raise InputError(
-                f"The rope of {self.name} is {pose.rope:g} m, but can be {short:g} to {long:g} m."
+                f"The rope of {self.name} is {rope_m:g} m, but can be {short:g} to {long:g} m."
             )
-        if not isfinite(pose.slew):
+        if not isfinite(slew_deg):
             raise InputError("The slew at the start must be a finite angle.")
-        boom = Boom(cos(pose.boom), sin(pose.boom))
-        return Home(pose.slew, float(luff_rope(boom, self.geometry)), pose.rope)
-
-    def shaft_angle(self, pose: Pose, axis: str, target: float) -> float:
-        """Angle by which a shaft turns from a pose to a target: slew, boom [rad] or rope [m]."""
-        g, home = self.geometry, self.home(pose)
-        if axis == "slew":
-            return target - pose.slew
-        if axis == "hoist":
-            return (pose.rope - target) / g.hoist
-        return (home.luff_rope - float(luff_rope(Boom(cos(target), sin(target)), g))) / g.luff
+        boom = Boom(cos(radians(boom_deg)), sin(radians(boom_deg)))
+        return Home(radians(slew_deg), float(luff_rope(boom, self.geometry)), rope_m)
 
     def simulate(
         self, stick: Stick, *, sea: Seaway | ArrayLike | None = None, **setup: Unpack[Setup]
@@ -313,20 +286,21 @@ class Crane:
             If boom or rope meet a limit, or a drive leaves its domain.
         """
         stepper = CraneStepper(self, setup)
-        commands, end = stick.sample(self, stepper.pose, RATE)
-        ship = motion_of(sea, len(commands))
+        fixed = stepper.fixed
+        commands, end = stick.sample(self, fixed.home, RATE)
+        ship = motion_of(sea, len(commands), RATE)
+        impulses = (*fixed.settings.joint[1:], *fixed.settings.tip[1:])
         return CraneRun(
             crane=self,
             stick=commands,
             ship=ship,
-            out=stepper.take(commands, ship),
-            rate=RATE,
-            pose=stepper.pose,
+            out=stepper.run(commands, ship),
+            home=fixed.home,
             actuation=stepper.actuation,
             stick_end=end,
-            halves=stepper.halves,
-            mass=stepper.mass,
-            rows=stepper.rows,
+            halves=sum(each > 0.0 for each in impulses),
+            mass=fixed.mass,
+            loaded=fixed.loaded,
         )
 
     def stepper(self, **setup: Unpack[Setup]) -> CraneStepper:
@@ -338,14 +312,32 @@ class Crane:
         return CraneStepper(self, setup)
 
     def linearize(self, boom_deg: float = 45.0, rope_m: float = 20.0) -> LinearCrane:
-        """The linear crane at a boom and rope; see `swashplate.crane.linearize`."""
+        """The linear crane at a boom and rope; the slew changes nothing in the boom's own axes.
+
+        Raises
+        ------
+        InputError
+            For a boom or rope beyond the crane's limits.
+        """
         return linearize(self, boom_deg, rope_m)
 
-    def judge(self, control: Control | Mapping[str, Control], **how: Any) -> Judgment:
+    def judge(self, control: Control | Mapping[str, Control | None], **how: Any) -> Judgment:
         """Judgment of control over many seaways; see `swashplate.crane.judge`."""
         from swashplate.crane.judgment import judge
 
         return judge(self, control, **how)
+
+    def sweep(
+        self, over: str, control: Control | Mapping[str, Control | None], **how: Any
+    ) -> Sweep:
+        """Swing over a quantity; see `swashplate.crane.sweep`."""
+        from swashplate.crane.study import sweep
+
+        return sweep(self, over, control, **how)
+
+    def sectors(self, control: Control | Mapping[str, Control | None], **how: Any) -> Sweep:
+        """Swing over the bearing of the boom: `sweep` over ``"bearing"``."""
+        return self.sweep("bearing", control, **how)
 
     def follow(self, periods: ArrayLike = tuple(range(4, 17)), **how: Any) -> Followable:
         """Largest sines of the tip that each axis can follow; see `swashplate.crane.follow`."""
@@ -353,33 +345,10 @@ class Crane:
 
         return follow(self, periods, **how)
 
-    def sectors(self, control: Control | Mapping[str, Control], **how: Any) -> Sweep:
-        """Swing over the bearing of the boom; see `swashplate.crane.sectors`."""
-        from swashplate.crane.study import sectors
-
-        return sectors(self, control, **how)
-
-    def operability(self, control: Control | Mapping[str, Control], **how: Any) -> Sweep:
-        """Swing over the height of the waves; see `swashplate.crane.operability`."""
-        from swashplate.crane.study import operability
-
-        return operability(self, control, **how)
-
-    def orifices(self, control: Control | Mapping[str, Control], **how: Any) -> Sweep:
-        """Swing over the luff drive's orifice; see `swashplate.crane.orifices`."""
-        from swashplate.crane.study import orifices
-
-        return orifices(self, control, **how)
-
     def table(self) -> Table:
         """Geometry with status and source; what is assumed is marked."""
-        columns = (
-            Column("quantity"),
-            Column("value"),
-            Column("unit"),
-            Column("status"),
-            Column("source", wrap=True),
-        )
+        heads = ("quantity", "value", "unit", "status")
+        columns = (*map(Column, heads), Column("source", wrap=True))
         made = Table(self.title or self.name, columns)
         for name, each in self.quantities.items():
             values = each.value if isinstance(each.value, list) else [each.value]
@@ -387,6 +356,12 @@ class Crane:
             look = each.status == "assumed"
             made.add(name.replace("_", " "), text, each.unit, each.status, each.source, look=look)
         return made
+
+
+def _axis(name: str) -> str:
+    if name not in AXES:
+        raise InputError(f"A crane has no drive '{name}': the axes are hoist, slew and luff.")
+    return name
 
 
 def _drive_of(given: DriveLike) -> Drive:

@@ -4,17 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from math import cos, pi, radians, sin, sqrt
+from math import cos, pi, radians, sin
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from swashplate.crane.crane import Crane
-from swashplate.crane.kinematics import Boom, Vector, reach_rate, tip_of
+from swashplate.crane.kinematics import boom_at, reach_rate, tip_of
 from swashplate.crane.loop import half_clip
 from swashplate.crane.sea import BAND, SEA_STATES, Seaway
-from swashplate.crane.stepper import Pose
 from swashplate.crane.stick import AXES
 from swashplate.errors import InputError
 from swashplate.results import Result
@@ -43,18 +42,17 @@ class Followable(Result):
     slew, and along it by the luff. [m]"""
     seas: Mapping[str, Demand]
     crane: Crane = field(repr=False)
-    pose: Pose
+    boom_deg: float
 
     figure = "plot_follow"
 
     def tables(self) -> list[Table]:
         """Amplitudes over the period, and what seas ask for."""
-        heads = [Column(each, ".3f", "m") for each in AXES]
-        made = Table("Largest sine an axis can follow", [Column("period", ".1f", "s"), *heads])
-        for period, amplitudes in zip(self.periods, self.amplitude, strict=True):
-            made.add(float(period), *map(float, amplitudes))
-        columns = (Column("sea"), Column("period", ".1f", "s"), *heads)
-        asked = Table("What seas ask, significant amplitudes", columns)
+        heads = [Column("period", ".1f", "s"), *(Column(each, ".3f", "m") for each in AXES)]
+        made = Table("Largest sine an axis can follow", heads)
+        for period, amplitudes in zip(self.periods.tolist(), self.amplitude.tolist(), strict=True):
+            made.add(period, *amplitudes)
+        asked = Table("What seas ask, significant amplitudes", [Column("sea"), *heads])
         for name, each in self.seas.items():
             asked.add(name, each.period, *each.amplitude)
         return [made, asked]
@@ -92,46 +90,34 @@ def follow(
     times = np.atleast_1d(np.asarray(periods, dtype=np.float64))
     if not (np.isfinite(times).all() and (times > 0.0).all() and times.size):
         raise InputError("Periods to follow must be above 0 s.")
-    pose = Pose(radians(slew_deg), radians(boom_deg), rope_m)
-    crane.home(pose)
-    boom, g = Boom(cos(pose.boom), sin(pose.boom)), crane.geometry
+    g, home = crane.geometry, crane.home(slew_deg, boom_deg, rope_m)
+    boom = boom_at(0.0, g, home)
     rates = (g.hoist, g.foot + g.boom * boom.cos, float(reach_rate(boom, g)))
-    amplitude = np.array(
-        [[_largest(crane, axis, rate, 2.0 * pi / t) for axis, rate in zip(AXES, rates, strict=True)]
-         for t in times]
-    )  # fmt: skip
-    base = seaway or Seaway()
-    asked = {name: demand(crane, pose, replace(base, sea=name)) for name in seas}
-    return Followable(times, amplitude, asked, crane, pose)
+    amplitude = np.zeros((times.size, 3))
+    for i, (axis, rate) in enumerate(zip(AXES, rates, strict=True)):
+        inverse = crane.inverse(axis)
+        low, high = inverse.limits
+        speed, acceleration = rate * min(high, -low), rate * min(inverse.acceleration)
+        for n, omega in enumerate(2.0 * pi / times):
+            amplitude[n, i] = half_clip(0.0, speed, acceleration, 1.0, omega)
+    tip, base = tip_of(home.slew, boom, g), seaway or Seaway()
+    asked = {name: _demand(tip, home.slew, replace(base, sea=name)) for name in seas}
+    return Followable(times, amplitude, asked, crane, boom_deg)
 
 
-def _largest(crane: Crane, axis: str, rate: float, omega: float) -> float:
-    """Amplitude of the tip that an axis can follow at a frequency, by its limits. [m]"""
-    inverse = crane.inverse(axis)
-    low, high = inverse.limits
-    speed, acceleration = rate * min(high, -low), rate * min(inverse.acceleration)
-    return float(half_clip(0.0, speed, acceleration, 1.0, omega))
+def _demand(tip: tuple[float, float, float], slew: float, seaway: Seaway) -> Demand:
+    """What a seaway asks of a tip in the ship's frame [m] that shall stand still over the sea.
 
-
-def demand(crane: Crane, pose: Pose, seaway: Seaway) -> Demand:
-    """What a seaway asks of a tip that shall stand still over the sea, linear in the motions."""
-    g = crane.geometry
-    p: Vector = tip_of(pose.slew, Boom(cos(pose.boom), sin(pose.boom)), g)
+    Linear in the motions.
+    """
     omega = np.linspace(*BAND, 1000)
-    surge, sway, heave, roll, pitch, yaw = seaway.ship.response(
-        omega, np.full(omega.size, radians(seaway.heading_deg)), seaway.speed
-    )
-    x, y, z = (
-        surge + pitch * p.z - yaw * p.y,
-        sway - roll * p.z + yaw * p.x,
-        heave + roll * p.y - pitch * p.x,
-    )
-    c, s = cos(pose.slew), sin(pose.slew)
+    heading = np.full(omega.size, radians(seaway.heading_deg))
+    motion = seaway.ship.response(omega, heading, seaway.speed)
+    forward, port, up = motion[:3] + np.cross(motion[3:], np.array(tip)[:, None], axis=0)
+    c, s = cos(slew), sin(slew)
     density = seaway.spectrum.density(omega)
-    across, along = s * x + c * y, c * x - s * y
-    zeroth = [
-        float(np.trapezoid(density * np.abs(each) ** 2, omega)) for each in (z, across, along)
-    ]
-    second = float(np.trapezoid(density * np.abs(along) ** 2 * omega**2, omega))
-    up, turn, out = (2.0 * sqrt(each) for each in zeroth)
-    return Demand(2.0 * pi * sqrt(zeroth[2] / second), (up, turn, out))
+    spectra = density * np.abs([up, s * forward + c * port, c * forward - s * port]) ** 2
+    zeroth = np.trapezoid(spectra, omega, axis=1)
+    second = np.trapezoid(spectra[2] * omega**2, omega)
+    height, across, along = (2.0 * np.sqrt(zeroth)).tolist()
+    return Demand(2.0 * pi * float(np.sqrt(zeroth[2] / second)), (height, across, along))

@@ -12,14 +12,14 @@ from typing import TYPE_CHECKING, Any, NamedTuple, Unpack
 import numpy as np
 from numpy.typing import NDArray
 
-from swashplate.analysis.whatif import pulled
-from swashplate.crane.control import Clip, Control, PositionLoop
+from swashplate.crane.control import Clip, PositionLoop
 from swashplate.crane.crane import Crane
 from swashplate.crane.following import follow
-from swashplate.crane.result import CraneRun
+from swashplate.crane.result import PUMPS, CraneRun, limit_table
 from swashplate.crane.rope import GRAVITY
+from swashplate.crane.stepper import RATE
 from swashplate.crane.stick import AXES
-from swashplate.crane.study import COUNTED, IDEAL, NONE, PUMPS, Case, Study, StudySetup
+from swashplate.crane.study import COUNTED, NONE, Case, Laws, Study, StudySetup, with_orifice
 from swashplate.errors import InputError
 from swashplate.results import Tabular
 from swashplate.simulation.result import Limit
@@ -34,6 +34,7 @@ FACTORS = (1.25, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0)
 """Factors on the luff's orifice that are tried, the smallest first."""
 SHARES = (0.8, 0.6, 0.4)
 """Shares of what the luff can follow at which control is clipped on trial, the largest first."""
+START = ("slew_deg", "boom_deg", "rope_m")
 BLOCK = 20
 """Seaways of a trial after which it is given up if it has failed already."""
 LEVEL = 0.95
@@ -61,9 +62,7 @@ def mean_of(values: Array) -> Estimate:
     from scipy.special import stdtrit
 
     known = values[np.isfinite(values)]
-    if not known.size:
-        return Estimate(np.nan, np.nan, np.nan)
-    mean = float(known.mean())
+    mean = float(known.mean()) if known.size else np.nan
     if known.size < 2:
         return Estimate(mean, np.nan, np.nan)
     t = float(stdtrit(known.size - 1, 0.5 + 0.5 * LEVEL))
@@ -93,7 +92,7 @@ class Judgment(Tabular):
     cases: Mapping[str, Case]
     """By name, the crane without control first."""
     values: Array
-    """(n, m, 17) of seaways and cases, `study.COUNTED`."""
+    """(n, m, 18) of seaways and cases, `study.COUNTED`."""
     allowed: float
     """Share of seaways in which control may be worse than none."""
     remedies: tuple[Remedy, ...] = ()
@@ -115,37 +114,29 @@ class Judgment(Tabular):
         """The variant that the verdict is on: the last one."""
         return self.names[-1]
 
-    def rms(self, name: str) -> Array:
-        """(n,) root mean square swing of a variant in each seaway, NaN where it was stopped. [rad]
+    def counted(self, name: str, what: str = "rms_swing") -> Array:
+        """(n,) number of a variant in each seaway, of `COUNTED`; NaN where it was stopped.
 
         Raises
         ------
         InputError
             If there is no such variant.
         """
-        return np.asarray(self.values[:, self._place(name), 0])
-
-    def largest(self, name: str) -> Array:
-        """(n,) largest swing of a variant in each seaway. [rad]"""
-        return np.asarray(self.values[:, self._place(name), 1])
-
-    def _place(self, name: str) -> int:
         if name not in self.cases:
             raise InputError(f"There is no variant '{name}'; there are {', '.join(self.names)}.")
-        return self.names.index(name)
+        return np.asarray(self.values[:, self.names.index(name), COUNTED.index(what)])
 
     def difference(self, name: str, other: str = NONE) -> Estimate:
         """Mean paired difference of the root mean square swing to another variant. [rad]"""
-        return mean_of(self.rms(name) - self.rms(other))
+        return mean_of(self.counted(name) - self.counted(other))
 
     def worse(self, name: str) -> float:
         """Share of seaways in which a variant swings more than no control, or was stopped."""
-        return float(_worse(self.rms(name), self.rms(NONE)).mean())
+        return float(_worse(self.counted(name), self.counted(NONE)).mean())
 
     def acting(self, name: str, axis: str, limit: Limit) -> float:
         """Mean share of time for which a limit of a drive acts; NaN if every run was stopped."""
-        column = COUNTED.index(f"{axis}_{str(limit.name).lower()}")
-        return mean_of(self.values[:, self._place(name), column]).value
+        return mean_of(self.counted(name, f"{axis}_{str(limit.name).lower()}")).value
 
     @property
     def passed(self) -> bool:
@@ -154,19 +145,18 @@ class Judgment(Tabular):
 
     def verdict(self) -> str:
         """What the judged variant amounts to, and what would do if it fails."""
-        share, n = self.worse(self.judged), len(self.study.seeds)
-        none, own = (np.degrees(mean_of(self.rms(each)).value) for each in (NONE, self.judged))
+        share, seaways = f"{self.worse(self.judged):.0%}", count(len(self.study.seeds), "seaway")
+        share = share.replace("%", " %")
+        none, own = (np.degrees(mean_of(self.counted(each)).value) for each in (NONE, self.judged))
         if self.passed:
             return (
                 f"With the drives '{self.judged}' the controller brings the swing from {none:.2f} "
-                f"to {own:.2f} deg RMS and makes it worse than none in {_percent(share)} of "
-                f"{count(n, 'seaway')}."
+                f"to {own:.2f} deg RMS and makes it worse than none in {share} of {seaways}."
             )
         said = (
-            f"The controller makes swing worse than none in {_percent(share)} of "
-            f"{count(n, 'seaway')} ({none:.2f} deg RMS without, {own:.2f} with it)"
+            f"The controller makes swing worse than none in {share} of {seaways} ({none:.2f} deg "
+            f"RMS without, {own:.2f} with it){self._cause()}."
         )
-        said += f"{self._cause()}."
         if self.remedies:
             said += f" {' or '.join(each.what for each in self.remedies).capitalize()} would do."
         elif self.tried:
@@ -175,16 +165,14 @@ class Judgment(Tabular):
 
     def _cause(self) -> str:
         """The limit that acts for the longest time."""
-        if self.cases[self.judged].actuation == IDEAL:
+        if self.cases[self.judged].actuation == "ideal":
             return ""
         names = {Limit.ORIFICE: "acceleration limit", Limit.SWASH_STOP: "speed limit"}
-        shares = {
-            (axis, limit): self.acting(self.judged, axis, limit) for axis in AXES for limit in names
-        }
-        (axis, limit), share = max(shares.items(), key=lambda each: np.nan_to_num(each[1]))
+        shares = [(self.acting(self.judged, a, each), a, each) for a in AXES for each in names]
+        share, axis, limit = max(shares, key=lambda each: np.nan_to_num(each[0]))
         if np.isnan(share):
             return ", and was stopped in all of them"
-        return f": {axis} at its {names[limit]} {_percent(share)} of the time"
+        return f": {axis} at its {names[limit]} {100.0 * share:.0f} % of the time"
 
     def run(self, name: str, seed: int) -> CraneRun:
         """The whole run of a variant in one seaway, with all signals.
@@ -196,69 +184,58 @@ class Judgment(Tabular):
         DomainError
             If the run was stopped.
         """
-        if seed not in self.study.seeds:
-            raise InputError(f"There is no seaway {seed} in this judgment.")
-        case = self.cases[self.names[self._place(name)]]
-        crane = case.cranes[self.study.seeds.index(seed) % len(case.cranes)]
-        sea, law = replace(self.study.sea, seed=seed), case.control
-        how: dict[str, Any] = {"actuation": case.actuation, **case.where}
-        return crane.simulate(self.study.stick, sea=sea, control=law, **how)
+        if seed not in self.study.seeds or name not in self.cases or self.study.sea is None:
+            raise InputError(f"There is no seaway {seed} of a variant '{name}' in this judgment.")
+        case = self.cases[name]
+        motion = replace(self.study.sea, seed=seed).motion(round(case.stick.length * RATE) + 1)
+        return case.run(self.study.seeds.index(seed), motion)
 
     @property
     def typical(self) -> int:
         """Seed of the seaway in which the judged variant swings as in half of them."""
-        order = np.argsort(self.rms(self.judged))
+        order = np.argsort(self.counted(self.judged))
         return self.study.seeds[int(order[len(order) // 2])]
 
     def tables(self) -> list[Table]:
         """Swing of each variant, paired differences, limits, and what was tried."""
-        return [self._swings(), self._differences(), self._limits(), *self._remedies()]
-
-    def _swings(self) -> Table:
-        title = f"Swing in {count(len(self.study.seeds), 'seaway')}, means with 95 % intervals"
-        columns = (
-            *(Column("variant"), *_interval(".2f", "rms")),
-            Column("largest", ".2f", "rad", none="–"),
-            *(Column("worse than none", ".0%", none="–"), Column("stopped", "d")),
+        interval = [Column(each, ".2f", "rad", none="–") for each in ("rms", "from", "to")]
+        swings = Table(
+            f"Swing in {count(len(self.study.seeds), 'seaway')}, means with 95 % intervals",
+            (
+                *(Column("variant"), *interval, Column("largest", ".2f", "rad", none="–")),
+                *(Column("worse than none", ".0%", none="–"), Column("stopped", "d")),
+            ),
+            "largest: median over the seaways of the largest swing",
         )
-        made = Table(title, columns, "largest: median over the seaways of the largest swing")
         for name in self.names:
-            rms, largest = self.rms(name), self.largest(name)
+            rms, largest = self.counted(name), self.counted(name, "largest_swing")
             worse = None if name == NONE else self.worse(name)
+            known = largest[np.isfinite(largest)]
+            numbers = *mean_of(rms), float(np.median(known)) if known.size else np.nan, worse
             look = worse is not None and worse > self.allowed
-            middle = float(np.nanmedian(largest)) if np.isfinite(largest).any() else np.nan
-            stopped = int(np.isnan(rms).sum())
-            made.add(name, *mean_of(rms), middle, worse, stopped, look=look)
+            swings.add(name, *numbers, int(np.isnan(rms).sum()), look=look)
+        spec = [Column(each, "+.2f", "rad", none="–") for each in ("difference", "from", "to")]
+        heads = (Column("variant"), Column("less"), *spec)
+        paired = Table("Differences of RMS swing within each seaway", heads)
+        for i, other in enumerate(self.names):
+            for name in self.names[i + 1 :]:
+                paired.add(name, other, *self.difference(name, other))
+        real = [each for each in self.names[1:] if self.cases[each].actuation != "ideal"]
+        acting = [
+            (name, axis, [self.acting(name, axis, each) for each in PUMPS])
+            for name in real
+            for axis in AXES
+        ]
+        made = [swings, paired, limit_table(acting)]
+        if self.remedies:
+            said = (
+                f"tried on the crane's own drives; a clip with a position loop of {LOOP.gain:g} /s"
+            )
+            columns = (Column("remedy"), Column("worse than none", ".0%"), *interval)
+            made.append(Table("What would do", columns, said))
+            for each in self.remedies:
+                made[-1].add(each.what, each.worse, *each.swing)
         return made
-
-    def _differences(self) -> Table:
-        columns = (*(Column("variant"), Column("less"), *_interval("+.2f", "difference")),)
-        made = Table("Differences of RMS swing within each seaway", columns)
-        names = self.names
-        for i, other in enumerate(names):
-            for name in names[i + 1 :]:
-                made.add(name, other, *self.difference(name, other))
-        return made
-
-    def _limits(self) -> Table:
-        heads = [str(each.name).lower().replace("_", " ") for each in PUMPS]
-        shares = (Column(each, ".1%", none="–") for each in heads)
-        columns = (Column("variant"), Column("axis"), *shares)
-        made = Table("Share of time for which limits act", columns)
-        for name in self.names[1:]:
-            for axis in AXES if self.cases[name].actuation != IDEAL else ():
-                made.add(name, axis, *(self.acting(name, axis, each) for each in PUMPS))
-        return made
-
-    def _remedies(self) -> list[Table]:
-        if not self.remedies:
-            return []
-        columns = (*(Column("remedy"), Column("worse than none", ".0%"), *_interval(".2f", "rms")),)
-        said = f"tried on the crane's own drives; a clip with a position loop of {LOOP.gain:g} /s"
-        made = Table("What would do", columns, said)
-        for each in self.remedies:
-            made.add(each.what, each.worse, *each.swing)
-        return [made]
 
     def to_polars(self) -> polars.DataFrame:
         """Numbers of every variant in every seaway, SI, shares of time of limits."""
@@ -276,30 +253,21 @@ class Judgment(Tabular):
         study, assumed = self.study, self.study.crane.assumed
         rests = (
             f"Swing counts from {study.start:g} s to {study.stick.length:g} s of each seaway. "
-            f"Control fails if it is worse than none in more than {_percent(self.allowed)} of them."
+            f"Control fails if it is worse than none in more than {100.0 * self.allowed:.0f} % of "
+            "them."
         )
         crane = (f"{assumed} of the crane are assumed.",) if assumed else ()
         return (self.verdict(), rests, *crane)
 
 
-def _interval(spec: str, name: str) -> tuple[Column, ...]:
-    """Columns of an `Estimate` of swing."""
-    return tuple(Column(each, spec, "rad", none="–") for each in (name, "from", "to"))
-
-
-def _percent(share: float) -> str:
-    return f"{100.0 * share:.0f} %"
-
-
 def _worse(own: Array, none: Array) -> NDArray[np.bool_]:
     """Seaways in which a variant is worse than none."""
-    stopped = np.isnan(own) & np.isfinite(none)
-    return np.asarray((own > none) | stopped)
+    return np.asarray((own > none) | (np.isnan(own) & np.isfinite(none)))
 
 
 def judge(
     crane: Crane,
-    control: Control | Mapping[str, Control],
+    control: Laws,
     *,
     allowed: float = 0.05,
     remedies: bool = True,
@@ -328,59 +296,47 @@ def judge(
     """
     if not 0.0 <= allowed < 1.0:
         raise InputError(f"allowed is {allowed:g}, but is a share of seaways: 0 to below 1.")
-    study = Study.of(crane, control, setup, seeds=range(200))
+    study = Study.of(crane, control, {"seeds": range(200), **setup})
     cases = study.cases()
     made = Judgment(study, cases, study.outcomes(list(cases.values())), allowed)
-    if made.passed or not remedies or cases[made.judged].actuation == IDEAL:
+    case = cases[made.judged]
+    if made.passed or not remedies or case.actuation == "ideal" or case.control is None:
         return made
-    found, tried = _search(made)
-    return replace(made, remedies=found, tried=tried)
-
-
-def _search(judged: Judgment) -> tuple[tuple[Remedy, ...], tuple[str, ...]]:
-    """The smallest factor on the luff's orifice and the largest clip with which control passes."""
-    case = judged.cases[judged.judged]
-    law, where = case.control, case.where
-    assert law is not None
-    if len(case.cranes) == 1:  # factors are of the crane as it is built, whatever was judged
-        case = case._replace(cranes=(judged.study.crane,))
-    stages = [each for each in law.stages if not isinstance(each, Clip | PositionLoop)]
+    # factors are of the crane as it is built, whatever was judged
+    cranes = (crane,) if len(case.cranes) == 1 else case.cranes
+    stages = [each for each in case.control.stages if not isinstance(each, Clip | PositionLoop)]
+    where: dict[str, Any] = {key: dict(study.where)[key] for key in START}
     period = 2.0 * pi * sqrt(where["rope_m"] / GRAVITY)
-    boom, rope = where["boom_deg"], where["rope_m"]
-    reach = follow(case.cranes[0], [period], seas=(), boom_deg=boom, rope_m=rope).amplitude[0, 2]
-
-    def larger(factor: float) -> tuple[str, float, Case]:
-        cranes = tuple(
-            each.with_drive(luff=pulled(each.luff, {"orifice": factor})) for each in case.cranes
-        )
-        return f"luff orifice ×{factor:g}", factor, case._replace(cranes=cranes)
-
-    def clipped(share: float) -> tuple[str, float, Case]:
-        law = reduce(or_, [*stages, Clip(share=share)])
-        what = f"a clip of {share * reach:.2g} m"
-        return what, share * reach, case._replace(control=law | LOOP)
-
+    reach = follow(cranes[0], [period], seas=(), **where).amplitude[0, 2]
+    larger = [
+        (f"luff orifice ×{x:g}", x, case._replace(cranes=tuple(with_orifice(c, x) for c in cranes)))
+        for x in FACTORS
+    ]
+    clipped = []
+    for share in SHARES:
+        law = reduce(or_, [*stages, Clip(share=share), LOOP])
+        named = f"a clip of {share * reach:.2g} m"
+        clipped.append((named, share * reach, case._replace(cranes=cranes, control=law)))
     found: list[Remedy] = []
     tried: list[str] = []
-    for trials in (map(larger, FACTORS), map(clipped, SHARES)):
+    for trials in (larger, clipped):
         for what, size, trial in trials:
-            values = _trial(judged, trial)
-            if values is None:
-                tried.append(what)
-                continue
-            worse = float(_worse(values, judged.rms(NONE)).mean())
-            found.append(Remedy(what, float(size), worse, mean_of(values)))
-            break
-    return tuple(found), tuple(tried)
+            values = _trial(made, trial)
+            if values is not None:
+                worse = float(_worse(values, made.counted(NONE)).mean())
+                found.append(Remedy(what, float(size), worse, mean_of(values)))
+                break
+            tried.append(what)
+    return replace(made, remedies=tuple(found), tried=tuple(tried))
 
 
 def _trial(judged: Judgment, case: Case) -> Array | None:
     """Root mean square swing of a trial in all seaways [rad]; None as soon as it has failed."""
-    none, count = judged.rms(NONE), len(judged.study.seeds)
+    none, seaways = judged.counted(NONE), len(judged.study.seeds)
     made = np.zeros(0)
-    for first in range(0, count, BLOCK):
-        some = range(first, min(first + BLOCK, count))
+    for first in range(0, seaways, BLOCK):
+        some = range(first, min(first + BLOCK, seaways))
         made = np.concatenate([made, judged.study.outcomes([case], some)[:, 0, 0]])
-        if _worse(made, none[: made.size]).sum() > judged.allowed * count:
+        if _worse(made, none[: made.size]).sum() > judged.allowed * seaways:
             return None
     return made

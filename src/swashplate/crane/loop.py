@@ -8,7 +8,8 @@ One sample after the other, at the drives' own rate:
 3. each drive takes its voltage by the engine's compiled step;
 4. shafts move the tip, the ship moves the crane, the tip leads the load.
 
-Open loop is the same kernel without what closes it, a stepper the same kernel over one sample.
+A stepper is the same kernel over one sample. In open loop nothing of a sample acts on the drives:
+they are marched before, and the kernel finds their speeds in its output.
 """
 
 from __future__ import annotations
@@ -20,7 +21,6 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from swashplate.analysis.compensation import InverseMap
 from swashplate.crane.control import Settings
 from swashplate.crane.kinematics import (
     Boom,
@@ -42,7 +42,6 @@ from swashplate.crane.kinematics import (
 )
 from swashplate.crane.rope import (
     GRAVITY,
-    Air,
     Hanging,
     Hung,
     hanging_load,
@@ -56,21 +55,19 @@ from swashplate.parameters.rules import FULL_VOLTAGE
 
 Array = NDArray[np.float64]
 
-IDEAL, VOLTS, INVERSE, DIRECT = range(4)
-"""Actuation: speeds at once; 10 V for full speed; the inverse map's voltage; voltages as given."""
+IDEAL, VOLTS, INVERSE, DIRECT, MARCHED = range(5)
+"""Actuation: speeds at once; 10 V for full speed; the inverse map's voltage; voltages as given;
+voltages, speeds and limits that stand in the output already."""
 ROWS = (
     *("voltage_hoist", "voltage_slew", "voltage_luff"),
     *("speed_hoist", "speed_slew", "speed_luff"),
-    *("shaft_hoist", "shaft_slew", "shaft_luff"),
-    *("tip_x", "tip_y", "tip_z", "load_x", "load_y", "load_z"),
-    *("pull", "rope", "wanted_x", "wanted_y", "boom_cos", "boom_sin"),
     *("limits_hoist", "limits_slew", "limits_luff"),
+    *("shaft_hoist", "shaft_slew", "shaft_luff"),
+    *("tip_x", "tip_y", "tip_z", "load_x", "load_y", "load_z", "hook_x", "hook_y", "hook_z"),
+    *("pull", "rope", "wanted_x", "wanted_y", "boom_cos", "boom_sin"),
+    *("torque_hoist", "torque_slew", "torque_luff"),
 )
-"""What the loop leaves of each sample."""
-TORQUES = ("torque_hoist", "torque_slew", "torque_luff")
-"""What it leaves besides where the load acts back on the drives: torques that they have taken."""
-HOOK = ("hook_x", "hook_y", "hook_z")
-"""What it leaves besides where there is a hook."""
+"""What the loop leaves of each sample, SI; the torques are those that the drives have taken."""
 FINE, TOO_FAST, BOOM_OUT, ROPE_OUT = range(4)
 """How a pass ended."""
 BRAKE_WAITS, BRAKE_TAKES = 0.3, 0.2
@@ -96,7 +93,6 @@ class Fixed(NamedTuple):
 
     geometry: Geometry
     home: Home
-    air: Air
     settings: Settings
     actuation: int
     brake: bool
@@ -111,12 +107,12 @@ class Fixed(NamedTuple):
     hanging: Hanging
     loaded: bool
     """Whether the rope's tension loads the drives."""
+    inverses: tuple[Inverse, Inverse, Inverse]
 
 
 class Plant(NamedTuple):
     """What the loop drives, and what is remembered of it in arrays."""
 
-    inverses: tuple[Inverse, Inverse, Inverse]
     drives: tuple[Machine, Machine, Machine]
     law: Machine
     picks: NDArray[np.int64]
@@ -139,10 +135,6 @@ class State(NamedTuple):
     """Speeds that it wants. [rad/s]"""
     aim: Shafts
     """Where control wants the shafts."""
-    boom: Boom
-    rope: float
-    in_ship: Vector
-    """Tip in the ship's frame."""
     tip: Vector
     hung: Hung
     torques: Shafts
@@ -197,8 +189,11 @@ def on_branch(wanted: float, speed: Array, voltage: Array) -> float:
 
 
 @inlined
-def inverse_voltage(wanted: float, inverse: Inverse) -> float:
-    """Voltage by `InverseMap.voltage` with its rule in the gap, clipped. [V]"""
+def voltage_for(wanted: float, inverse: Inverse, actuation: int) -> float:
+    """Command of a drive for a wanted speed of its shaft, by `InverseMap.voltage`, clipped. [V]"""
+    if actuation == VOLTS:
+        full = inverse.high if wanted > 0.0 else -inverse.low
+        return min(max(FULL_VOLTAGE * wanted / full, -FULL_VOLTAGE), FULL_VOLTAGE)
     lower: float = inverse.minus_speed[inverse.minus_speed.size - 1]
     upper: float = inverse.plus_speed[0]
     if wanted < lower:
@@ -208,19 +203,9 @@ def inverse_voltage(wanted: float, inverse: Inverse) -> float:
     at_rest = abs(wanted - inverse.creep)
     if at_rest <= wanted - lower and at_rest <= upper - wanted:
         return 0.0
-    way = lower if wanted - lower <= upper - wanted else upper
-    minus, plus = inverse.minus_voltage[inverse.minus_voltage.size - 1], inverse.plus_voltage[0]
-    edge: float = minus if way == lower else plus
-    return edge
-
-
-@inlined
-def voltage_for(wanted: float, inverse: Inverse, actuation: int) -> float:
-    """Command of a drive for a wanted speed of its shaft. [V]"""
-    if actuation == VOLTS:
-        full = inverse.high if wanted > 0.0 else -inverse.low
-        return min(max(FULL_VOLTAGE * wanted / full, -FULL_VOLTAGE), FULL_VOLTAGE)
-    return inverse_voltage(wanted, inverse)
+    minus: float = inverse.minus_voltage[inverse.minus_voltage.size - 1]
+    plus: float = inverse.plus_voltage[0]
+    return minus if wanted - lower <= upper - wanted else plus
 
 
 @equation
@@ -234,37 +219,25 @@ def half_clip(size: float, speed: float, acceleration: float, share: float, omeg
 
 
 @inlined
+def reachable(inverse: Inverse, rate: float, size: float, share: float, omega: float) -> float:
+    """Largest offset along an axis whose shaft moves the tip at a rate [m/rad]; see `half_clip`."""
+    speed = rate * min(inverse.high, -inverse.low)
+    return half_clip(size, speed, rate * inverse.acceleration, share, omega)
+
+
+@inlined
 def clipped_offset(
-    offset: tuple[float, float],
-    path: tuple[float, float],
-    boom: Boom,
-    rope: float,
-    fixed: Fixed,
-    inverses: tuple[Inverse, Inverse, Inverse],
+    offset: tuple[float, float], path: tuple[float, float], boom: Boom, rope: float, fixed: Fixed
 ) -> tuple[float, float]:
     """Offset of the tip held, along the boom and across it, within what the drives can follow."""
     omega = sqrt(GRAVITY / rope)
     g, settings = fixed.geometry, fixed.settings
-    _, slew, luff = inverses
-    x, y = offset
     e_x, e_y = path[0] - g.axis.x, path[1] - g.axis.y
     reach = sqrt(e_x * e_x + e_y * e_y)
     e_x, e_y = e_x / reach, e_y / reach
-    rate = reach_rate(boom, g)
-    along = half_clip(
-        settings.clip,
-        rate * min(luff.high, -luff.low),
-        rate * luff.acceleration,
-        settings.share,
-        omega,
-    )
-    across = half_clip(
-        0.0,
-        reach * min(slew.high, -slew.low),
-        reach * slew.acceleration,
-        settings.share,
-        omega,
-    )
+    rate, (_, slew, luff), (x, y) = reach_rate(boom, g), fixed.inverses, offset
+    along = reachable(luff, rate, settings.clip, settings.share, omega)
+    across = reachable(slew, reach, 0.0, settings.share, omega)
     out = min(max(x * e_x + y * e_y, -along), along)
     turn = min(max(y * e_x - x * e_y, -across), across)
     return out * e_x - turn * e_y, out * e_y + turn * e_x
@@ -286,10 +259,13 @@ def limited(u: float, inverse: Inverse) -> float:
     return u * inverse.high if u > 0.0 else -u * inverse.low
 
 
-@inlined
-def within(speed: float, inverse: Inverse) -> float:
-    """A speed within the drive's limits. [rad/s]"""
-    return min(max(speed, inverse.low), inverse.high)
+@kernel
+def open_voltages(stick: Array, inverse: Inverse, actuation: int) -> Array:
+    """Voltages of a drive under the stick alone. [V]"""
+    made = np.empty(stick.size)
+    for m in range(stick.size):
+        made[m] = voltage_for(limited(stick[m], inverse), inverse, actuation)
+    return made
 
 
 # --- the loop -------------------------------------------------------------------------------------
@@ -300,13 +276,8 @@ def _no_law(*_: Any) -> float:
 
 
 @generating
-def loop_of(
-    hoist: Any, slew: Any, luff: Any, law: Any, loaded: bool, hooked: bool
-) -> Callable[..., tuple[State, int]]:
-    """The compiled loop over given steps of three drives and of a law, None for no law.
-
-    `loaded` drives feel the rope; a `hooked` load hangs on slings below a hook.
-    """
+def loop_of(hoist: Any, slew: Any, luff: Any, law: Any) -> Callable[..., tuple[State, int]]:
+    """The compiled loop over given steps of three drives and of a law, None for no law."""
     own = law is not None
     advance_law = law if own else inlined(_no_law)
 
@@ -315,17 +286,18 @@ def loop_of(
         h: float, fixed: Fixed, state: State, plant: Plant, stick: Array, ship: Array, out: Array
     ) -> tuple[State, int]:
         """Take the stick's samples; the state behind the last, and how the pass ended."""
-        inverses, laws, picks = plant.inverses, plant.law, plant.picks
-        memory, margins = plant.memory, plant.margins
-        g, home, settings, actuation = fixed.geometry, fixed.home, fixed.settings, fixed.actuation
+        inverses, settings, actuation = fixed.inverses, fixed.settings, fixed.actuation
+        laws, picks, memory, margins = plant.law, plant.picks, plant.memory, plant.margins
+        g, home, loaded = fixed.geometry, fixed.home, fixed.loaded
         moving = ship.shape[1] > 1
         last = memory.shape[1] - 1
         seen = np.zeros(13)
         sample, shafts, speeds = state.sample, state.shafts, state.speeds
         operator, wish, aim = state.operator, state.wish, state.aim
-        boom, rope, in_ship = state.boom, state.rope, state.in_ship
         tip, hung, torques = state.tip, state.hung, state.torques
         still, brake = state.still, state.brake
+        boom, rope = boom_at(shafts.luff, g, home), rope_length(shafts, g, home)
+        in_ship = tip_of(home.slew + shafts.slew, boom, g)
         volts, omega, limits = np.zeros(3), np.zeros(3), np.zeros(3)
         r = Rotation(1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
         shift = Vector(0.0, 0.0, 0.0)
@@ -336,30 +308,29 @@ def loop_of(
                 shift = Vector(ship[m, 0], ship[m, 1], ship[m, 2])
                 r = rotation(ship[m, 3], ship[m, 4], ship[m, 5])
             # the stick's commands
-            u = stick[m, 0], stick[m, 1], stick[m, 2]
             for i in range(3):
-                memory[i, sample & last] = u[i]
+                memory[i, sample & last] = stick[m, i]
+            u = stick[m, 0], stick[m, 1], stick[m, 2]
             if settings.joint[1] > 0.0:
                 u = (
                     shaped(memory, 0, sample, half, settings.joint),
                     shaped(memory, 1, sample, half, settings.joint),
                     shaped(memory, 2, sample, half, settings.joint),
                 )
-            new = Shafts(
+            wanted = Shafts(
                 limited(u[0], inverses[0]), limited(u[1], inverses[1]), limited(u[2], inverses[2])
             )
-            wanted = new
             path_x, path_y = in_ship.x, in_ship.y
             if settings.path:
                 if sample > 0:
-                    operator = advanced(operator, wish, new, h)
-                wish = new
+                    operator = advanced(operator, wish, wanted, h)
+                wish = wanted
                 lead = tip_of(home.slew + operator.slew, boom_at(operator.luff, g, home), g)
                 memory[3, sample & last] = lead.x
                 memory[4, sample & last] = lead.y
                 path_x = shaped(memory, 3, sample, half, settings.tip)
                 path_y = shaped(memory, 4, sample, half, settings.tip)
-                # what the direction of the rope tells
+                # offsets: the direction of the rope, the ship, a law of one's own
                 swing_x, swing_y = hung.hook.x - tip.x, hung.hook.y - tip.y
                 memory[5, sample & last] = swing_x
                 memory[6, sample & last] = swing_y
@@ -390,48 +361,49 @@ def loop_of(
                     x += laws.outputs[0]
                     y += laws.outputs[1]
                 if settings.clip > 0.0 or settings.share > 0.0:
-                    x, y = clipped_offset((x, y), (path_x, path_y), boom, rope, fixed, inverses)
+                    x, y = clipped_offset((x, y), (path_x, path_y), boom, rope, fixed)
                 path_x += x
                 path_y += y
                 target = shafts_for(path_x, path_y, aim, g, home)
                 if sample == 0:
                     aim = target
-                gain = settings.gain
                 wanted = Shafts(
-                    new.hoist,
-                    (target.slew - aim.slew) / h + gain * (target.slew - shafts.slew),
-                    (target.luff - aim.luff) / h + gain * (target.luff - shafts.luff),
+                    wanted.hoist,
+                    (target.slew - aim.slew) / h + settings.gain * (target.slew - shafts.slew),
+                    (target.luff - aim.luff) / h + settings.gain * (target.luff - shafts.luff),
                 )
                 aim = target
             # actuation
-            if actuation == IDEAL:
-                omega[0] = within(wanted.hoist, inverses[0])
-                omega[1] = within(wanted.slew, inverses[1])
-                omega[2] = within(wanted.luff, inverses[2])
-            elif actuation == DIRECT:
-                volts[0], volts[1], volts[2] = stick[m, 0], stick[m, 1], stick[m, 2]
+            if actuation == MARCHED:
+                for i in range(3):
+                    volts[i], omega[i], limits[i] = out[m, i], out[m, 3 + i], out[m, 6 + i]
+            elif actuation == IDEAL:
+                omega[0] = min(max(wanted.hoist, inverses[0].low), inverses[0].high)
+                omega[1] = min(max(wanted.slew, inverses[1].low), inverses[1].high)
+                omega[2] = min(max(wanted.luff, inverses[2].low), inverses[2].high)
             else:
-                volts[0] = voltage_for(wanted.hoist, inverses[0], actuation)
-                volts[1] = voltage_for(wanted.slew, inverses[1], actuation)
-                volts[2] = voltage_for(wanted.luff, inverses[2], actuation)
-            if actuation != IDEAL:
+                if actuation == DIRECT:
+                    volts[0], volts[1], volts[2] = stick[m, 0], stick[m, 1], stick[m, 2]
+                else:
+                    volts[0] = voltage_for(wanted.hoist, inverses[0], actuation)
+                    volts[1] = voltage_for(wanted.slew, inverses[1], actuation)
+                    volts[2] = voltage_for(wanted.luff, inverses[2], actuation)
                 a, b, c = plant.drives
                 a.inputs[0], b.inputs[0], c.inputs[0] = volts[0], volts[1], volts[2]
                 if loaded:
                     felt = torques.hoist, torques.slew, torques.luff
                     a.inputs[1], b.inputs[1], c.inputs[1] = felt
-                    out[m, 24], out[m, 25], out[m, 26] = felt
                 margins[0] = min(margins[0], hoist(a))
                 margins[1] = min(margins[1], slew(b))
                 margins[2] = min(margins[2], luff(c))
                 omega[0], omega[1], omega[2] = a.outputs[0], b.outputs[0], c.outputs[0]
                 limits[0], limits[1], limits[2] = a.outputs[1], b.outputs[1], c.outputs[1]
-                if fixed.brake:
-                    within_zone = fixed.slowest[0] < volts[0] < fixed.slowest[1]
-                    still = still + h if within_zone else 0.0
-                    falls = h / BRAKE_TAKES if still >= BRAKE_WAITS else -h / BRAKE_TAKES
-                    brake = min(max(brake + falls, 0.0), 1.0)
-                    omega[0] = omega[0] * (1.0 - brake)
+            if fixed.brake and actuation != IDEAL:
+                within_zone = fixed.slowest[0] < volts[0] < fixed.slowest[1]
+                still = still + h if within_zone else 0.0
+                falls = h / BRAKE_TAKES if still >= BRAKE_WAITS else -h / BRAKE_TAKES
+                brake = min(max(brake + falls, 0.0), 1.0)
+                omega[0] = omega[0] * (1.0 - brake)
             # kinematics and rope
             turning = Shafts(omega[0], omega[1], omega[2])
             if sample > 0:
@@ -461,44 +433,32 @@ def loop_of(
                     hung.pull, hung.stretch,
                 )  # fmt: skip
             if sample > 0:
-                hung = rope_step(hung, tip, following, rope, fixed.hanging, fixed.air, h, square)
-            load, pull = hung.load, hung.pull
-            if pull < 0.0:
+                hung = rope_step(hung, tip, following, rope, fixed.hanging, h, square)
+            if hung.pull < 0.0:
                 ended = TOO_FAST
                 break
             tip = following
             for i in range(3):
-                out[m, i], out[m, 3 + i] = volts[i], omega[i]
-            out[m, 6], out[m, 7], out[m, 8] = shafts.hoist, shafts.slew, shafts.luff
-            out[m, 9], out[m, 10], out[m, 11] = tip.x, tip.y, tip.z
-            out[m, 12], out[m, 13], out[m, 14] = load.x, load.y, load.z
-            out[m, 15], out[m, 16] = pull, rope
-            out[m, 17], out[m, 18] = path_x, path_y
-            out[m, 19], out[m, 20] = boom.cos, boom.sin
-            out[m, 21], out[m, 22], out[m, 23] = limits[0], limits[1], limits[2]
-            if hooked:
-                k = out.shape[1] - 3
-                out[m, k], out[m, k + 1], out[m, k + 2] = hung.hook.x, hung.hook.y, hung.hook.z
+                out[m, i], out[m, 3 + i], out[m, 6 + i] = volts[i], omega[i], limits[i]
+            out[m, 9], out[m, 10], out[m, 11] = shafts.hoist, shafts.slew, shafts.luff
+            out[m, 12], out[m, 13], out[m, 14] = tip.x, tip.y, tip.z
+            out[m, 15], out[m, 16], out[m, 17] = hung.load.x, hung.load.y, hung.load.z
+            out[m, 18], out[m, 19], out[m, 20] = hung.hook.x, hung.hook.y, hung.hook.z
+            out[m, 21], out[m, 22] = hung.pull, rope
+            out[m, 23], out[m, 24] = path_x, path_y
+            out[m, 25], out[m, 26] = boom.cos, boom.sin
+            out[m, 27], out[m, 28], out[m, 29] = torques.hoist, torques.slew, torques.luff
             if loaded:
-                tension = fixed.mass * pull
-                rope_along = moved(hung.hook, -1.0, tip)
-                force = moved(Vector(0.0, 0.0, 0.0), tension / size(rope_along), rope_along)
+                tension = fixed.mass * hung.pull
+                along = moved(hung.hook, -1.0, tip)
+                force = moved(Vector(0.0, 0.0, 0.0), tension / size(along), along)
                 if moving:
                     force = to_ship(r, force)
                 torques = shaft_torques(force, home.slew + shafts.slew, boom, tension, g)
             sample += 1
         end = State(
-            sample, shafts, speeds, operator, wish, aim, boom, rope, in_ship, tip, hung, torques,
-            still, brake,
+            sample, shafts, speeds, operator, wish, aim, tip, hung, torques, still, brake
         )  # fmt: skip
         return end, ended
 
     return loop
-
-
-def inverse_of(inverse: InverseMap) -> Inverse:
-    """An inverse map as the loop takes it."""
-    branches = (*inverse.minus, *inverse.plus)
-    a, b, c, d = (np.ascontiguousarray(each, dtype=np.float64) for each in branches)
-    low, high = inverse.limits
-    return Inverse(a, b, c, d, inverse.creep, low, high, min(inverse.acceleration))

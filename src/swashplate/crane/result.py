@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from math import pi, sqrt
@@ -11,8 +11,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from swashplate.crane.loop import HOOK, ROWS, TORQUES
+from swashplate.crane.kinematics import Home
+from swashplate.crane.loop import ROWS
 from swashplate.crane.rope import GRAVITY
+from swashplate.crane.stepper import RATE
 from swashplate.crane.stick import AXES
 from swashplate.errors import InputError
 from swashplate.results import Tabular
@@ -23,7 +25,6 @@ if TYPE_CHECKING:
     import polars
 
     from swashplate.crane.crane import Crane
-    from swashplate.crane.stepper import Pose
 
 Array = NDArray[np.float64]
 
@@ -31,6 +32,8 @@ CALMS, WATCHED = 4.0, 25.0
 """Residual swing counts from so long after the shaper's last impulse, for so long. [s]"""
 SETTLED = 1.0
 """Swing below which a load counts as settled. [deg]"""
+PUMPS = (Limit.DEAD_ZONE, Limit.ORIFICE, Limit.SPOOL, Limit.SWASH_STOP, Limit.RELIEF)
+"""Limits that the loop leaves of each drive, in the order of its bits."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,8 +46,9 @@ class CraneRun(Tabular):
     ship: Array
     """(n, 6) surge, sway, heave [m], roll, pitch, yaw [rad]; (n, 1) zeros for a ship at rest."""
     out: Array = field(repr=False)
-    rate: float
-    pose: Pose
+    """(n, 30) signals by `loop.ROWS`, SI."""
+    home: Home
+    """Where it began."""
     actuation: str
     stick_end: float
     """When the last command has returned to zero. [s]"""
@@ -52,10 +56,14 @@ class CraneRun(Tabular):
     """Half periods of the load that the shaper takes."""
     mass: float
     """Of the load and its hook. [kg]"""
-    rows: tuple[str, ...] = field(default=ROWS, repr=False)
-    """Columns of `out`."""
+    loaded: bool
+    """Whether the drives felt the rope."""
 
     figure = "plot_crane"
+    rows = ROWS
+
+    def __post_init__(self) -> None:
+        self.out.flags.writeable = False
 
     def __repr__(self) -> str:
         return (
@@ -63,75 +71,80 @@ class CraneRun(Tabular):
             f"{self.swing_deg.max():.3g} deg)"
         )
 
-    def _rows(self, *names: str) -> Array:
-        made = self.out[:, [self.rows.index(name) for name in names]]
-        made.flags.writeable = False
-        return made if len(names) > 1 else made[:, 0]
+    def __getitem__(self, signal: str) -> Array:
+        """(n,) signal by its name in `rows`, SI; an `InputError` for another."""
+        if signal not in ROWS:
+            raise InputError(f"A crane's run has no signal '{signal}'; it has {', '.join(ROWS)}.")
+        return self.out[:, ROWS.index(signal)]
+
+    def _three(self, first: str) -> Array:
+        place = ROWS.index(first)
+        return self.out[:, place : place + 3]
 
     @cached_property
     def time(self) -> Array:
         """(n,) [s]"""
-        return np.arange(len(self.out)) / self.rate
+        return np.arange(len(self.out)) / RATE
 
-    @cached_property
+    @property
     def tip(self) -> Array:
         """(n, 3) tip of the boom. [m]"""
-        return self._rows("tip_x", "tip_y", "tip_z")
+        return self._three("tip_x")
 
-    @cached_property
+    @property
     def load(self) -> Array:
         """(n, 3) load. [m]"""
-        return self._rows("load_x", "load_y", "load_z")
+        return self._three("load_x")
 
-    @cached_property
+    @property
+    def hook(self) -> Array:
+        """(n, 3) hook, or the load where there is none. [m]"""
+        return self._three("hook_x")
+
+    @property
+    def voltage(self) -> Array:
+        """(n, 3) commands of the drives, zero with ideal ones. [V]"""
+        return self._three("voltage_hoist")
+
+    @property
+    def shaft_speed(self) -> Array:
+        """(n, 3) speeds of the shafts; the slew's at the turret, the hoist's braked. [rad/s]"""
+        return self._three("speed_hoist")
+
+    @property
+    def load_torque(self) -> Array:
+        """(n, 3) torques of the rope that the drives took, zero unless they are loaded. [N m]"""
+        return self._three("torque_hoist")
+
+    @property
     def rope(self) -> Array:
         """(n,) rope below the tip. [m]"""
-        return self._rows("rope")
+        return self["rope"]
 
     @cached_property
     def slew_deg(self) -> Array:
         """(n,) slew from forward, positive to starboard. [deg]"""
-        return np.degrees(self.pose.slew + self._rows("shaft_slew"))
+        return np.degrees(self.home.slew + self["shaft_slew"])
 
     @cached_property
     def boom_deg(self) -> Array:
         """(n,) elevation of the boom. [deg]"""
-        return np.degrees(np.arctan2(self._rows("boom_sin"), self._rows("boom_cos")))
+        return np.degrees(np.arctan2(self["boom_sin"], self["boom_cos"]))
 
-    @cached_property
-    def voltage(self) -> Array:
-        """(n, 3) commands of the drives, zero with ideal ones. [V]"""
-        return self._rows("voltage_hoist", "voltage_slew", "voltage_luff")
-
-    @cached_property
-    def shaft_speed(self) -> Array:
-        """(n, 3) speeds of the shafts; the slew's at the turret, the hoist's braked. [rad/s]"""
-        return self._rows("speed_hoist", "speed_slew", "speed_luff")
-
-    @cached_property
+    @property
     def tension(self) -> Array:
         """(n,) tension of the rope, 0 where it is slack. [N]"""
-        return self.mass * self._rows("pull")
-
-    @cached_property
-    def load_torque(self) -> Array:
-        """(n, 3) torques of the rope that the drives took, zero unless they are loaded. [N m]"""
-        return self._rows(*TORQUES) if TORQUES[0] in self.rows else np.zeros((len(self.out), 3))
-
-    @cached_property
-    def hook(self) -> Array:
-        """(n, 3) hook, or the load where there is none. [m]"""
-        return self._rows(*HOOK) if HOOK[0] in self.rows else self.load
+        return self.mass * self["pull"]
 
     @property
     def stretch(self) -> Array:
         """(n,) what the tension has added to the rope's length. [m]"""
         return np.asarray(np.linalg.norm(self.hook - self.tip, axis=1) - self.rope)
 
-    @cached_property
+    @property
     def slack(self) -> NDArray[np.bool_]:
         """(n,) whether the rope is slack."""
-        return np.asarray(self.tension <= 0.0)
+        return self["pull"] <= 0.0
 
     @cached_property
     def swing_deg(self) -> Array:
@@ -139,42 +152,59 @@ class CraneRun(Tabular):
         d = self.load - self.tip
         return np.degrees(np.arctan2(np.hypot(d[:, 0], d[:, 1]), -d[:, 2]))
 
-    def _after(self, start: float, lasts: float) -> slice:
-        first = round(start * self.rate)
-        if first >= len(self.out):
-            raise InputError(
-                f"The run is {self.time[-1]:g} s long, but its residual swing counts from "
-                f"{start:.4g} s on: take a longer stick."
-            )
-        return slice(first, first + round(lasts * self.rate))
-
     @property
     def settling_starts(self) -> float:
         """When residual swing counts: the stick's end, the shaper's last impulse, and 4 s. [s]"""
         return self.stick_end + self.halves * pi * sqrt(self.rope[-1] / GRAVITY) + CALMS
 
-    @cached_property
-    def residual_deg(self) -> float:
-        """Largest swing for 25 s from `settling_starts` on. [deg]
+    @property
+    def settling(self) -> slice:
+        """Samples of the 25 s from `settling_starts` on.
 
         Raises
         ------
         InputError
             If the run ends before.
         """
-        return float(self.swing_deg[self._after(self.settling_starts, WATCHED)].max())
+        first = round(self.settling_starts * RATE)
+        if first >= len(self.out):
+            raise InputError(
+                f"The run is {self.time[-1]:g} s long, but its residual swing counts from "
+                f"{self.settling_starts:.4g} s on: take a longer stick."
+            )
+        return slice(first, first + round(WATCHED * RATE))
+
+    @property
+    def residual_deg(self) -> float:
+        """Largest swing for 25 s from `settling_starts` on, refused as `settling`. [deg]"""
+        return float(self.swing_deg[self.settling].max())
 
     def rms_deg(self, start: float = 0.0) -> float:
         """Root mean square of the swing from a time [s] on. [deg]"""
-        return float(
-            np.sqrt(np.mean(self.swing_deg[self._after(start, np.ceil(self.time[-1]))] ** 2))
-        )
+        if not 0.0 <= start <= self.time[-1]:
+            raise InputError(f"The run is {self.time[-1]:g} s long: there is no {start:g} s in it.")
+        return float(np.sqrt(np.mean(self.swing_deg[round(start * RATE) :] ** 2)))
 
-    @cached_property
+    @property
     def settled_at(self) -> float:
         """Last time at which the swing is above 1 degree; 0 if it never is. [s]"""
         above = np.flatnonzero(self.swing_deg > SETTLED)
         return float(self.time[above[-1]]) if above.size else 0.0
+
+    def active(self, axis: str, limit: Limit) -> NDArray[np.bool_]:
+        """(n,) samples at which a limit of `PUMPS` of a drive acts; ideal drives have none.
+
+        Raises
+        ------
+        InputError
+            If there is no such axis.
+        """
+        bits = self.out[:, ROWS.index("limits_hoist") + _place(axis)].astype(np.int64)
+        return (bits >> PUMPS.index(limit)) & 1 > 0
+
+    def limits(self, axis: str) -> dict[str, float]:
+        """Share of time for which each limit of a drive acts, by name, 0 to 1."""
+        return {str(each.name).lower(): float(self.active(axis, each).mean()) for each in PUMPS}
 
     def drive(self, axis: str) -> Simulation:
         """The simulation of one drive under its voltages, with all signals inside it.
@@ -184,30 +214,17 @@ class CraneRun(Tabular):
         InputError
             For ideal drives, which have none.
         """
-        if axis not in AXES:
-            raise InputError(f"There is no axis '{axis}'; there are {', '.join(AXES)}.")
+        place = _place(axis)
         if self.actuation == "ideal":
             raise InputError("Ideal drives have neither voltages nor limits other than of speed.")
-        if axis not in self._drives:
-            found = getattr(self.crane, axis)
-            volts = np.ascontiguousarray(self.voltage[:, AXES.index(axis)])
-            torque = self.load_torque[:, AXES.index(axis)] if TORQUES[0] in self.rows else None
-            self._drives[axis] = found.simulate(volts, self.rate, load_torque=torque)
-        return self._drives[axis]
-
-    @cached_property
-    def _drives(self) -> dict[str, Simulation]:
-        return {}
-
-    def limits(self, axis: str) -> dict[str, float]:
-        """Share of time for which each limit of a drive acts, by name, 0 to 1."""
-        run = self.drive(axis)
-        return {each.name.lower(): float(run.active(each).mean()) for each in Limit if each.name}
+        torque = self.load_torque[:, place] if self.loaded else None
+        drive = getattr(self.crane, axis)
+        made: Simulation = drive.simulate(self.voltage[:, place], RATE, load_torque=torque)
+        return made
 
     def tables(self) -> list[Table]:
         """What the run amounts to, and what limits its drives."""
-        runs = {self.actuation: self}
-        return [run_table(runs), *([] if self.actuation == "ideal" else [limit_table(runs)])]
+        return run_tables({self.actuation: self})
 
     def to_polars(self) -> polars.DataFrame:
         """All signals, a row for each sample, in SI."""
@@ -215,15 +232,21 @@ class CraneRun(Tabular):
 
         columns = {"time": self.time}
         columns |= {f"stick_{axis}": self.stick[:, i] for i, axis in enumerate(AXES)}
-        columns |= {name: self.out[:, i] for i, name in enumerate(self.rows)}
+        columns |= {name: self[name] for name in ROWS}
         columns["swing"] = np.radians(self.swing_deg)
         return pl.DataFrame(columns)
 
 
-def run_table(runs: Mapping[str, CraneRun]) -> Table:
-    """What runs amount to, a row for each by its name: swing, where they end, slack.
+def _place(axis: str) -> int:
+    if axis not in AXES:
+        raise InputError(f"There is no axis '{axis}'; there are {', '.join(AXES)}.")
+    return AXES.index(axis)
 
-    The residual swing is empty where a run is too short for it.
+
+def run_tables(runs: Mapping[str, CraneRun]) -> list[Table]:
+    """Swing and end of runs, a row for each by its name; what limits their drives.
+
+    The residual swing is empty where a run is too short for it; ideal drives have no limits.
     """
     columns = (
         Column("run"),
@@ -238,29 +261,19 @@ def run_table(runs: Mapping[str, CraneRun]) -> Table:
     made = Table("", columns, "Swing, and where slew, boom and rope end")
     for name, run in runs.items():
         late = run.settling_starts > run.time[-1]
-        angles = (
-            np.nan if late else run.residual_deg,
-            run.rms_deg(),
-            run.swing_deg.max(),
-            run.slew_deg[-1],
-            run.boom_deg[-1],
-        )
-        numbers = [float(np.radians(each)) for each in angles]
-        made.add(name, *numbers, float(run.rope[-1]), float(run.slack.mean()))
-    return made
+        swing = (np.nan if late else run.residual_deg, run.rms_deg(), run.swing_deg.max())
+        angles = np.radians([*swing, run.slew_deg[-1], run.boom_deg[-1]])
+        made.add(name, *angles.tolist(), float(run.rope[-1]), float(run.slack.mean()))
+    real = [(name, run) for name, run in runs.items() if run.actuation != "ideal"]
+    shares = [(name, axis, run.limits(axis).values()) for name, run in real for axis in AXES]
+    return [made, limit_table(shares)] if shares else [made]
 
 
-def limit_table(runs: Mapping[str, CraneRun]) -> Table:
-    """Share of time for which limits of the drives act, a row for each run and axis.
-
-    Ideal drives are left out.
-    """
-    shown = (Limit.CURRENT_RATE, Limit.ORIFICE, Limit.SWASH_STOP)
-    heads = ("current rate", "orifice", "swash stop")
-    columns = (Column("run"), Column("axis"), *(Column(each, ".1%") for each in heads))
+def limit_table(rows: Iterable[tuple[str, str, Iterable[float]]]) -> Table:
+    """Share of time for which limits act: of a name and an axis, in the order of `PUMPS`."""
+    heads = [str(each.name).lower().replace("_", " ") for each in PUMPS]
+    columns = (Column("variant"), Column("axis"), *(Column(h, ".1%", none="–") for h in heads))
     made = Table("Share of time for which limits act", columns)
-    for name, run in runs.items():
-        for axis in AXES if run.actuation != "ideal" else ():
-            shares = run.limits(axis)
-            made.add(name, axis, *(shares[str(each.name).lower()] for each in shown))
+    for name, axis, shares in rows:
+        made.add(name, axis, *shares)
     return made

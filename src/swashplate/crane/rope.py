@@ -36,23 +36,6 @@ TOO_FAST = -1.0
 """Pull that says that the tip moves through the rope's length within a step."""
 
 
-class Air(NamedTuple):
-    """What the air does to the load."""
-
-    drag: float
-    """k = ρ C_d A/(2 m): deceleration for each (m/s)² against the air. [1/m]"""
-    wind: Vector
-    """Velocity of the air. [m/s]"""
-
-
-@equation
-def air_drag(vx: float, vy: float, vz: float, air: Air) -> Vector:
-    """Deceleration by the air at a velocity of the load, -k |v - w| (v - w). [m/s²]"""
-    x, y, z = vx - air.wind.x, vy - air.wind.y, vz - air.wind.z
-    share = -air.drag * sqrt(x * x + y * y + z * z)
-    return Vector(share * x, share * y, share * z)
-
-
 @equation
 def dot(a: Vector, b: Vector) -> float:
     """Scalar product."""
@@ -129,23 +112,20 @@ class Suspension(Result):
                 "both 0 for a load on the rope itself."
             )
 
-    def hanging(self, load: float, shortest: float, rate: float) -> Hanging:
-        """Numbers of the suspension with a load.
+    def hanging(
+        self, load: float, shortest: float, rate: float, drag: float, wind: ArrayLike
+    ) -> Hanging:
+        """Numbers of the suspension with a load [kg], on a rope of at least a length [m].
 
-        Parameters
-        ----------
-        load : float
-            Mass. [kg]
-        shortest : float
-            Rope at its shortest, on which the load bounces fastest. [m]
-        rate : float
-            Samples a second. [Hz]
+        `drag` and `wind` are those of `Hanging`.
 
         Raises
         ------
         InputError
-            If the load bounces too fast for the rate.
+            If the load bounces too fast for the rate [Hz].
         """
+        if not (isfinite(load) and load > 0.0):
+            raise InputError(f"The load is {load:g} kg, but must be above 0.")
         mass = load + self.hook
         pulls = 0.0 if self.stiffness == inf else self.stiffness / mass
         ratio = load / self.hook if self.hook > 0.0 else 0.0
@@ -156,7 +136,8 @@ class Suspension(Result):
                 f"bounce at {fastest / (2.0 * pi):.3g} Hz, too fast for {rate:g} samples a second: "
                 "take a rigid rope."
             )
-        return Hanging(pulls, self.damping, self.sling, ratio)
+        along, across, up = map(float, np.asarray(wind))
+        return Hanging(pulls, self.damping, self.sling, ratio, drag, Vector(along, across, up))
 
 
 class Hanging(NamedTuple):
@@ -169,6 +150,10 @@ class Hanging(NamedTuple):
     """[m]; 0 for a load on the rope itself."""
     ratio: float
     """q, mass of the load over that of the hook."""
+    drag: float
+    """k = ρ C_d A/(2 m): deceleration k |v - w| (v - w) by the air. [1/m]"""
+    wind: Vector
+    """w, velocity of the air. [m/s]"""
 
 
 class Hung(NamedTuple):
@@ -251,7 +236,6 @@ def rope_step(
     following: Vector,
     length: float,
     s: Hanging,
-    air: Air,
     h: float,
     square: float,
 ) -> Hung:
@@ -265,7 +249,7 @@ def rope_step(
         Tip at n and n + 1. [m]
     length : float
         Rope at n + 1. [m]
-    s, air :
+    s : Hanging
         Suspension, drag and wind.
     h, square : float
         Step [s], and h², half of it in the first step. [s²]
@@ -275,10 +259,11 @@ def rope_step(
     x = 2 x_n - x_(n-1) + h² a - μ d, with the rope's multiplier μ. An elastic rope pulls by its
     stretch at n, so that the step stays explicit and, undamped, symplectic.
     """
-    weight, still = Vector(0.0, 0.0, -GRAVITY), Vector(0.0, 0.0, 0.0)
-    v = moved(now.load, -1.0, now.before)
-    drag = air_drag(v.x / h, v.y / h, v.z / h, air) if air.drag > 0.0 else still
-    load = coasting(now.load, now.before, square, moved(weight, 1.0, drag))
+    weight = Vector(0.0, 0.0, -GRAVITY)
+    load = coasting(now.load, now.before, square, weight)
+    if s.drag > 0.0:
+        past = moved(moved(now.load, -1.0, now.before), -h, s.wind)
+        load = moved(load, -square * s.drag * size(past) / (h * h), past)
     hooked, elastic = s.sling > 0.0, s.stiffness > 0.0
     hook = coasting(now.hook, now.hook_before, square, weight) if hooked else load
     d, b = moved(now.hook, -1.0, tip), moved(now.load, -1.0, now.hook)
@@ -314,16 +299,14 @@ def hanging_load(tip: Vector, v: Vector, length: float, s: Hanging, h: float) ->
 
 
 @kernel
-def _march(
-    tip: Array, length: Array, start: Hung, s: Hanging, air: Air, h: float, out: Array
-) -> int:
+def _march(tip: Array, length: Array, start: Hung, s: Hanging, h: float, out: Array) -> int:
     """Fill load, hook and pull behind the first sample; the sample that failed, or 0."""
     now, at = start, Vector(tip[0, 0], tip[0, 1], tip[0, 2])
     for n in range(tip.shape[0]):
         if n > 0:
             following = Vector(tip[n, 0], tip[n, 1], tip[n, 2])
             square = 0.5 * h * h if n == 1 else h * h
-            now = rope_step(now, at, following, length[n], s, air, h, square)
+            now = rope_step(now, at, following, length[n], s, h, square)
             at = following
             if now.pull < 0.0:
                 return n
@@ -393,10 +376,8 @@ def load_motion(
     # second-order difference of the first samples
     slope = (4.0 * path[1] - 3.0 * path[0] - path[min(2, len(path) - 1)]) * rate / 2.0
     v = slope if velocity is None else np.asarray(velocity, dtype=np.float64)
-    air = Air(float(drag), Vector(*map(float, np.asarray(wind))))
-    if not (isfinite(mass) and mass > 0.0):
-        raise InputError(f"The load is {mass:g} kg, but must be above 0.")
-    s, h = (suspension or Suspension()).hanging(mass, float(rope.min()), rate), 1.0 / rate
+    h, hangs = 1.0 / rate, suspension or Suspension()
+    s = hangs.hanging(mass, float(rope.min()), rate, float(drag), wind)
     now = hanging_load(Vector(*path[0].tolist()), Vector(*v.tolist()), float(rope[0]), s, h)
     if start is not None:
         load = np.asarray(start, dtype=np.float64)
@@ -413,7 +394,7 @@ def load_motion(
         a, b, c, d = (Vector(*each.tolist()) for each in places)
         now = Hung(a, b, c, d, pull, stretch)
     out = np.empty((len(path), 7))
-    failed = _march(path, rope, now, s, air, h, out)
+    failed = _march(path, rope, now, s, h, out)
     if failed:
         raise InputError(too_fast(float(rope[failed]), failed / rate, rate))
     if not s.stiffness > 0.0:

@@ -263,6 +263,32 @@ def ship_motion(
     return made
 
 
+def motion_of(sea: Seaway | ArrayLike | None, count: int, rate: float) -> Array:
+    """The ship's motion over so many samples, (count, 6); one column if it is at rest.
+
+    Raises
+    ------
+    InputError
+        For a motion of another shape, or a shorter one.
+    """
+    if sea is None:
+        return np.zeros((count, 1))
+    if isinstance(sea, Seaway):
+        return sea.motion(count, rate)
+    made = np.ascontiguousarray(sea, dtype=np.float64)
+    if made.ndim != 2 or made.shape[1] != 6 or not np.isfinite(made).all():
+        raise InputError(
+            "The ship's motion has rows of six finite numbers: surge, sway, heave [m], roll, "
+            "pitch, yaw [rad]."
+        )
+    if len(made) < count:
+        raise InputError(
+            f"The stick is {(count - 1) / rate:g} s long, but the ship's motion only "
+            f"{(len(made) - 1) / rate:g} s at {rate:g} Hz."
+        )
+    return made[:count]
+
+
 def _basis(inner: int) -> Array:
     """Quintic polynomials, (inner, 6): of value, slope and curvature at start and end."""
     t = np.arange(inner) / inner

@@ -1,38 +1,43 @@
-"""Steppers: a crane with its setup, one sample after the other or many at once."""
+"""Steppers: a crane with its setup, one sample after the other or a whole run at once."""
 
 from __future__ import annotations
 
 from functools import lru_cache
-from math import degrees, inf, isfinite, pi, radians, sin, sqrt
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple, TypedDict, get_args
+from math import degrees, inf, isfinite, pi, sin, sqrt
+from typing import TYPE_CHECKING, Any, Literal, TypedDict, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from swashplate.analysis.capability import dead_zone
+from swashplate.analysis.compensation import InverseMap
 from swashplate.crane.control import GIVES, SEEN, Control, settings_of
-from swashplate.crane.kinematics import Shafts, Vector, boom_at, shaft_torques, tip_of
+from swashplate.crane.kinematics import Shafts, Vector, boom_at, rope_length, shaft_torques, tip_of
 from swashplate.crane.loop import (
     DIRECT,
     FINE,
-    HOOK,
+    INVERSE,
+    MARCHED,
     ROPE_OUT,
     ROWS,
     TOO_FAST,
-    TORQUES,
+    VOLTS,
     Fixed,
+    Inverse,
     Plant,
     State,
-    inverse_of,
     loop_of,
+    open_voltages,
 )
-from swashplate.crane.rope import AIR, GRAVITY, Air, Hung, Suspension, too_fast
-from swashplate.crane.sea import Seaway
+from swashplate.crane.rope import AIR, GRAVITY, Hung, Suspension, too_fast
 from swashplate.crane.stick import AXES
 from swashplate.drive import Drive
 from swashplate.equations import compiled_step
+from swashplate.equations.marching.run import marched
+from swashplate.equations.marching.stepping import stored_of
 from swashplate.errors import DomainError, InputError
 from swashplate.parameters.rules import FULL_VOLTAGE
+from swashplate.simulation.instance import instance_of
 
 if TYPE_CHECKING:
     from swashplate.crane.crane import Crane
@@ -43,17 +48,11 @@ Actuation = Literal["ideal", "volts", "inverse"]
 ACTUATIONS = (*get_args(Actuation), "direct")
 RATE = 512.0
 """Samples a second of the loop: the packaged drives' own. [Hz]"""
+OUTPUTS = ("shaft_speed", "limits")
+"""What the loop takes of each drive."""
 QUICKEST = 0.4
 """Largest part of a rope's pull by which a leaking drive may lower it within a sample: at 0.7 they
 would swing against each other from sample to sample."""
-
-
-class Pose(NamedTuple):
-    """Where a run begins: slew and boom in rad, rope below the tip in m."""
-
-    slew: float
-    boom: float
-    rope: float
 
 
 class Start(TypedDict, total=False):
@@ -125,11 +124,6 @@ DEFAULTS: Setup = {
 }
 
 
-def pose_of(where: Start) -> Pose:
-    """The pose of these keywords."""
-    return Pose(radians(where["slew_deg"]), radians(where["boom_deg"]), where["rope_m"])
-
-
 class CraneStepper:
     """A crane that takes commands and gives signals, the same numbers as `Crane.simulate`.
 
@@ -141,17 +135,12 @@ class CraneStepper:
         if strange:
             raise InputError(f"A run has no {strange[0]}; its setup has {', '.join(DEFAULTS)}.")
         how = DEFAULTS | setup
-        self._crane, self.pose = crane, pose_of(how)
-        self.actuation = how["actuation"]
-        settings, law, self.halves = settings_of(how["control"])
-        fixed = _fixed(crane, how, settings)
-        self.mass = fixed.mass
-        self._fixed, self._h = fixed, 1.0 / RATE
+        self._crane, self.actuation = crane, how["actuation"]
+        settings, law = settings_of(how["control"])
+        self.fixed = fixed = _fixed(crane, how, settings)
         given = ("voltage", "load_torque") if fixed.loaded else ("voltage",)
-        self._steps = [
-            getattr(crane, axis).compiled_step(("shaft_speed", "limits"), inputs=given, rate=RATE)
-            for axis in AXES
-        ]
+        drives = [getattr(crane, axis) for axis in AXES]
+        self._steps = [each.compiled_step(OUTPUTS, inputs=given, rate=RATE) for each in drives]
         hoist, slew, luff = (each.machine() for each in self._steps)
         own, picks = hoist, np.zeros(0, dtype=np.int64)
         if law is not None:
@@ -159,26 +148,23 @@ class CraneStepper:
             self._steps.append(compiled_step(law.model, law.values, seen, GIVES, RATE))
             own = self._steps[3].machine()
             picks = np.array([SEEN.index(each) for each in seen], dtype=np.int64)
-        hooked = fixed.hanging.sling > 0.0
+        # in open loop nothing acts back on the drives
+        self._open = how["control"] is None and not fixed.loaded
+        self._open &= fixed.actuation in (VOLTS, INVERSE)
         one, two, three, *last = (each.step for each in self._steps)
-        self._loop = loop_of(one, two, three, last[0] if last else None, fixed.loaded, hooked)
-        self.rows = ROWS + (TORQUES if fixed.loaded else ()) + (HOOK if hooked else ())
+        self._loop = loop_of(one, two, three, last[0] if last else None)
         g, home = fixed.geometry, fixed.home
         zero, boom = Shafts(0.0, 0.0, 0.0), boom_at(0.0, g, home)
-        tip = tip_of(home.slew, boom, g)
-        weight = fixed.mass * GRAVITY
-        torques = shaft_torques(Vector(0.0, 0.0, -weight), home.slew, boom, weight, g)
-        self._state = State(
-            0, zero, zero, zero, zero, zero, boom, home.rope, tip, tip,
-            Hung(tip, tip, tip, tip, 0.0, 0.0), torques, 0.0, 0.0,
-        )  # fmt: skip
+        tip, torques = tip_of(home.slew, boom, g), zero
+        if fixed.loaded:
+            weight = fixed.mass * GRAVITY
+            torques = shaft_torques(Vector(0.0, 0.0, -weight), home.slew, boom, weight, g)
+        hung = Hung(tip, tip, tip, tip, 0.0, 0.0)
+        self._state = State(0, zero, zero, zero, zero, zero, tip, hung, torques, 0.0, 0.0)
         longest = 2.0 * pi * sqrt(fixed.ropes[1] / GRAVITY) * RATE + 4.0
         memory = np.zeros((7, 1 << int(longest).bit_length()))
         memory[3:5] = [[tip.x], [tip.y]]
-        a, b, c = (inverse_of(crane.inverse(axis)) for axis in AXES)
-        self._plant = Plant(
-            (a, b, c), (hoist, slew, luff), own, picks, memory, np.full(4, np.inf)
-        )  # fmt: skip
+        self._plant = Plant((hoist, slew, luff), own, picks, memory, np.full(4, np.inf))
 
     def step(
         self, command: tuple[float, float, float], ship: ArrayLike | None = None
@@ -202,7 +188,7 @@ class CraneStepper:
         InputError, DomainError
             As `Crane.simulate`, and for a command out of range.
         """
-        most = FULL_VOLTAGE if self._fixed.actuation == DIRECT else 1.0
+        most = FULL_VOLTAGE if self.fixed.actuation == DIRECT else 1.0
         commands = np.array([command], dtype=np.float64)
         if commands.shape != (1, 3) or not (np.abs(commands) <= most).all():
             raise InputError(f"A crane takes three commands of at most ±{most:g}.")
@@ -213,7 +199,7 @@ class CraneStepper:
 
     def named(self, row: Array) -> dict[str, float]:
         """Signals of a row that `take` returns, by name."""
-        return dict(zip(self.rows, row.tolist(), strict=True))
+        return dict(zip(ROWS, row.tolist(), strict=True))
 
     def take(self, commands: Array, ship: Array) -> Array:
         """Advance by many samples at once.
@@ -227,7 +213,7 @@ class CraneStepper:
 
         Returns
         -------
-        (n, 24) array
+        (n, 30) array
             Signals, a column for each that `step` returns.
 
         Raises
@@ -235,32 +221,57 @@ class CraneStepper:
         InputError, DomainError
             As `Crane.simulate`.
         """
-        out = np.empty((len(commands), len(self.rows)))
-        plant = self._plant
-        self._state, ended = self._loop(
-            self._h, self._fixed, self._state, plant, commands, ship, out
-        )
+        out = np.empty((len(commands), len(ROWS)))
+        self._pass(self.fixed, commands, ship, out)
         for step, machine, worst in zip(
-            self._steps, (*plant.drives, plant.law), plant.margins.tolist(), strict=False
+            self._steps,
+            (*self._plant.drives, self._plant.law),
+            self._plant.margins.tolist(),
+            strict=False,
         ):
             step.check(machine, worst, "command")
-        if ended != FINE:
-            raise self._stopped(ended)
         return out
 
-    def _stopped(self, ended: int) -> DomainError | InputError:
-        """What has stopped a run."""
-        name, rope, time = self._crane.name, self._state.rope, self._state.sample / RATE
+    def run(self, commands: Array, ship: Array) -> Array:
+        """A whole run from the start, as `take`; the stepper itself is then of no more use."""
+        if not self._open:
+            return self.take(commands, ship)
+        out = np.empty((len(commands), len(ROWS)))
+        for i, axis in enumerate(AXES):
+            instance = instance_of(getattr(self._crane, axis).parameters, by_voltage=True)
+            begun = instance.start({"voltage": 0.0}, 1.0 / RATE, "rest")
+            stick = np.ascontiguousarray(commands[:, i])
+            out[:, i] = open_voltages(stick, self.fixed.inverses[i], self.fixed.actuation)
+            out[:, 3 + i], out[:, 6 + i] = marched(
+                instance,
+                {"voltage": out[:, i]},
+                1.0 / RATE,
+                begun,
+                stored_of(instance.model, OUTPUTS),
+                "command",
+            )
+        self._pass(self.fixed._replace(actuation=MARCHED), commands, ship, out)
+        return out
+
+    def _pass(self, fixed: Fixed, commands: Array, ship: Array, out: Array) -> None:
+        """Run the loop; refuse what stops it."""
+        self._state, ended = self._loop(
+            1.0 / RATE, fixed, self._state, self._plant, commands, ship, out
+        )
+        if ended == FINE:
+            return
+        name, time = self._crane.name, self._state.sample / RATE
+        rope = float(rope_length(self._state.shafts, fixed.geometry, fixed.home))
         if ended == TOO_FAST:
-            return InputError(too_fast(rope, time, RATE))
+            raise InputError(too_fast(rope, time, RATE))
         if ended == ROPE_OUT:
             low, high = self._crane.rope_limits
-            return DomainError(
+            raise DomainError(
                 f"{name}: at {time:.2f} s the rope is {rope:.2f} m long, but can be {low:g} to "
                 f"{high:g} m; hoist or lower less, or start elsewhere."
             )
         low, high = map(degrees, self._crane.boom_limits)
-        return DomainError(
+        raise DomainError(
             f"{name}: at {time:.2f} s the boom meets the limits of its travel, {low:g} to "
             f"{high:g} deg; luff less, or start elsewhere."
         )
@@ -276,26 +287,26 @@ def _fixed(crane: Crane, how: Setup, settings: Any) -> Fixed:
     if not (isfinite(area) and area >= 0.0):
         raise InputError(f"drag_area is {area:g} m², but must be at least 0.")
     load = crane.safe_load if how["load"] is None else how["load"]
-    if not (isfinite(load) and load > 0.0):
-        raise InputError(f"The load is {load:g} kg, but must be above 0.")
+    drag = AIR * area / (2.0 * load) if load > 0.0 else 0.0  # which the suspension refuses
+    wind = (*how["wind"], 0.0)
     if how["loaded"]:
         _check_loaded(crane, actuation, load + suspension.hook, suspension)
-    edges = _edges(crane.hoist)
+    below, above = _edges(crane.hoist)
     low, high = crane.boom_limits
-    forward, port = how["wind"]
+    hoist, slew, luff = (_inverse(crane.inverse(axis)) for axis in AXES)
     return Fixed(
         crane.geometry,
-        crane.home(pose_of(how)),
-        Air(AIR * area / (2.0 * load), Vector(float(forward), float(port), 0.0)),
+        crane.home(how["slew_deg"], how["boom_deg"], how["rope_m"]),
         settings,
         ACTUATIONS.index(actuation),
         bool(how["brake"]),
-        (edges[0] or -FULL_VOLTAGE, edges[1] or FULL_VOLTAGE),
+        (below or -FULL_VOLTAGE, above or FULL_VOLTAGE),
         (sin(low), sin(high)),
         crane.rope_limits,
         load + suspension.hook,
-        suspension.hanging(load, crane.rope_limits[0], RATE),
+        suspension.hanging(load, crane.rope_limits[0], RATE, drag, wind),
         bool(how["loaded"]),
+        (hoist, slew, luff),
     )
 
 
@@ -303,17 +314,16 @@ def _check_loaded(crane: Crane, actuation: str, mass: float, suspension: Suspens
     """Refuse loads on drives that feel none, or that answer them faster than a sample."""
     if actuation == "ideal":
         raise InputError("Ideal drives follow at once, whatever the load: leave out 'loaded'.")
-    drives = [getattr(crane, axis) for axis in AXES]
-    lost = dict(zip(AXES, map(_speed_lost, drives), strict=True))
-    if not any(lost.values()) and not any("line" in each.parameters.options for each in drives):
+    drives = {axis: getattr(crane, axis) for axis in AXES}
+    lost = {axis: _speed_lost(drive) for axis, drive in drives.items()}
+    if not any(lost.values()) and not any("line" in d.parameters.options for d in drives.values()):
         raise InputError(
             f"No drive of {crane.name} feels a load: give one a motor_leakage or a "
             "line_stiffness, as crane.hoist.replace(motor_leakage=1e-6), or leave out 'loaded'."
         )
-    if suspension.stiffness < inf:
-        return
     for axis, arm in (("hoist", crane.geometry.hoist), ("luff", crane.geometry.luff)):
-        if 0.5 * RATE * mass * arm * arm * lost[axis] > QUICKEST:
+        gives = 0.5 * RATE * mass * arm * arm * lost[axis]
+        if suspension.stiffness == inf and gives > QUICKEST:
             raise InputError(
                 f"The {axis} of {crane.name} gives way to {mass:g} kg on a rigid rope within a "
                 f"sample, since its motor_leakage costs {lost[axis]:.3g} rad/s for each N m: "
@@ -330,27 +340,13 @@ def _edges(drive: Drive) -> tuple[float | None, float | None]:
 @lru_cache(maxsize=64)
 def _speed_lost(drive: Drive) -> float:
     """Speed that a drive loses at once for each N m of load. [rad/s/(N m)]"""
-    still, pulled = (
-        float(drive.simulate([0.0], load_torque=torque).shaft_speed[0]) for torque in (0.0, 1e5)
-    )
-    return (still - pulled) / 1e5
+    still, pulled = (drive.simulate([0.0], load_torque=torque) for torque in (0.0, 1e5))
+    return float(still.shaft_speed[0] - pulled.shaft_speed[0]) / 1e5
 
 
-def motion_of(sea: Seaway | ArrayLike | None, count: int) -> Array:
-    """The ship's motion over so many samples; one column if it is at rest."""
-    if sea is None:
-        return np.zeros((count, 1))
-    if isinstance(sea, Seaway):
-        return sea.motion(count, RATE)
-    made = np.ascontiguousarray(sea, dtype=np.float64)
-    if made.ndim != 2 or made.shape[1] != 6 or not np.isfinite(made).all():
-        raise InputError(
-            "The ship's motion has rows of six finite numbers: surge, sway, heave [m], roll, "
-            "pitch, yaw [rad]."
-        )
-    if len(made) < count:
-        raise InputError(
-            f"The stick is {(count - 1) / RATE:g} s long, but the ship's motion only "
-            f"{(len(made) - 1) / RATE:g} s at {RATE:g} Hz."
-        )
-    return made[:count]
+def _inverse(inverse: InverseMap) -> Inverse:
+    """An inverse map as the loop takes it."""
+    branches = (*inverse.minus, *inverse.plus)
+    a, b, c, d = (np.ascontiguousarray(each, dtype=np.float64) for each in branches)
+    low, high = inverse.limits
+    return Inverse(a, b, c, d, inverse.creep, low, high, min(inverse.acceleration))

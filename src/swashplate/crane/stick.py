@@ -4,19 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from math import isfinite, radians
-from types import MappingProxyType
+from math import cos, isfinite, radians, sin
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from swashplate.crane.kinematics import Boom, Home, luff_rope
 from swashplate.errors import InputError
 from swashplate.results import Result
 
 if TYPE_CHECKING:
     from swashplate.crane.crane import Crane
-    from swashplate.crane.stepper import Pose
 
 Array = NDArray[np.float64]
 
@@ -25,30 +24,25 @@ TARGETS = {"hoist": "rope_m", "slew": "slew_deg", "luff": "boom_deg"}
 """Where an axis is led to: rope below the tip, slew, elevation of the boom."""
 
 
-@dataclass(frozen=True)
-class Trapezoid:
-    """One axis from rest to a part of its full speed and back."""
-
-    part: float
-    duration: float | None
-    """From the first to the last moment off zero; None: until the target. [s]"""
-    target: float | None
-
-
 @dataclass(frozen=True, eq=False)
 class Stick(Result):
     """Commands of hoist, slew and luff, each from -1 to 1.
 
-    Positive commands hoist, slew to starboard, lift the boom. Made by `trapezoid` or `record`.
+    Positive commands hoist, slew to starboard, lift the boom. Made by `trapezoid`, `record` or
+    `rest`.
     """
 
     length: float
     """[s]"""
     start: float = 0.0
     ramp: float = 0.0
-    shapes: Mapping[str, Trapezoid] = field(default_factory=dict)
+    parts: Mapping[str, float] = field(default_factory=dict)
+    """Part of the full speed of each axis that moves."""
+    until: Mapping[str, float] = field(default_factory=dict)
+    """Targets by their names; of other axes `duration` counts."""
+    duration: float | None = None
     samples: Array | None = field(default=None, repr=False)
-    """(n, 3) commands at `rate`, in place of shapes."""
+    """(n, 3) commands at `rate`, in place of trapezoids."""
     rate: float = 512.0
 
     @classmethod
@@ -84,34 +78,30 @@ class Stick(Result):
         InputError
             For a command beyond ±1, a target or duration too few or too many.
         """
-        parts = {"hoist": hoist, "slew": slew, "luff": luff}
-        targets = dict(until or {})
-        shapes: dict[str, Trapezoid] = {}
+        parts, targets = {"hoist": hoist, "slew": slew, "luff": luff}, dict(until or {})
+        strange = [each for each in targets if each not in TARGETS.values()]
+        if strange:
+            raise InputError(
+                f"There is no target '{strange[0]}'; there are {', '.join(TARGETS.values())}."
+            )
         for axis, part in parts.items():
-            target = targets.pop(TARGETS[axis], None)
+            target = TARGETS[axis]
             if not -1.0 <= part <= 1.0:
                 raise InputError(f"The stick of the {axis} is {part:g}, but reaches from -1 to 1.")
-            if part == 0.0 and target is not None:
-                raise InputError(f"There is a target {TARGETS[axis]}, but no command {axis}.")
-            if part == 0.0:
-                continue
-            if target is None and duration is None:
+            if part == 0.0 and target in targets:
+                raise InputError(f"There is a target {target}, but no command {axis}.")
+            if part != 0.0 and target not in targets and duration is None:
                 raise InputError(
-                    f"The {axis} needs until={{'{TARGETS[axis]}': ...}} or a duration, so that the "
-                    "stick returns."
+                    f"The {axis} needs until={{'{target}': ...}} or a duration, so that the stick "
+                    "returns."
                 )
-            shapes[axis] = Trapezoid(part, None if target is not None else duration, target)
-        if targets:
-            raise InputError(
-                f"There is no target '{next(iter(targets))}'; there are "
-                f"{', '.join(TARGETS.values())}."
-            )
         if not (start >= 0.0 and ramp > 0.0 and isfinite(length) and length > 0.0):
             raise InputError(
                 f"A stick starts at 0 s or later, with ramps and a length above 0 s, not "
                 f"{start:g}, {ramp:g} and {length:g} s."
             )
-        return cls(length, start, ramp, MappingProxyType(shapes))
+        moving = {axis: part for axis, part in parts.items() if part != 0.0}
+        return cls(length, start, ramp, moving, targets, duration)
 
     @classmethod
     def record(cls, commands: ArrayLike, rate: float = 512.0) -> Stick:
@@ -130,9 +120,9 @@ class Stick(Result):
                 "A recorded stick has two or more rows of hoist, slew and luff, at a rate above "
                 "0 Hz."
             )
-        if not (np.abs(made) <= 1.0).all():
-            n = int(np.argmax(~(np.abs(made) <= 1.0).all(axis=1)))
-            raise InputError(f"Row {n} of the stick is not within -1 to 1 on every axis.")
+        wrong = np.flatnonzero(~(np.abs(made) <= 1.0).all(axis=1))
+        if wrong.size:
+            raise InputError(f"Row {wrong[0]} of the stick is not within -1 to 1 on every axis.")
         made.flags.writeable = False
         return cls((len(made) - 1) / rate, samples=made, rate=float(rate))
 
@@ -141,8 +131,8 @@ class Stick(Result):
         """Nothing, for so long. [s]"""
         return cls.trapezoid(length=length)
 
-    def sample(self, crane: Crane, pose: Pose, rate: float) -> tuple[Array, float]:
-        """Commands at a rate for a crane that starts at a pose, and when the last one ends.
+    def sample(self, crane: Crane, home: Home, rate: float) -> tuple[Array, float]:
+        """Commands at a rate for a crane that starts at its home, and when the last one ends.
 
         Returns
         -------
@@ -162,11 +152,8 @@ class Stick(Result):
             busy = np.flatnonzero(np.any(self.samples != 0.0, axis=1))
             return made, float(grid[busy[-1]]) if busy.size else 0.0
         made, end = np.zeros((time.size, 3)), 0.0
-        for axis, shape in self.shapes.items():
-            lasts = shape.duration
-            if lasts is None:
-                assert shape.target is not None
-                lasts = self._lasts(crane, pose, axis, shape.part, shape.target)
+        for axis, part in self.parts.items():
+            lasts = self._lasts(crane, home, axis, part)
             if lasts < 2.0 * self.ramp:
                 raise InputError(
                     f"The {axis} moves for {lasts:.3g} s, less than its two ramps of "
@@ -178,19 +165,29 @@ class Stick(Result):
                     f"at {self.length:g} s: take a longer record."
                 )
             corners = self.start + np.array([0.0, self.ramp, lasts - self.ramp, lasts])
-            levels = [0.0, shape.part, shape.part, 0.0]
-            made[:, AXES.index(axis)] = np.interp(time, corners, levels)
+            made[:, AXES.index(axis)] = np.interp(time, corners, [0.0, part, part, 0.0])
             end = max(end, self.start + lasts)
         return made, end
 
-    def _lasts(self, crane: Crane, pose: Pose, axis: str, part: float, target: float) -> float:
-        """Time from zero to zero that brings an ideal drive from a pose to a target. [s]"""
-        way = crane.shaft_angle(pose, axis, radians(target) if axis != "hoist" else target)
+    def _lasts(self, crane: Crane, home: Home, axis: str, part: float) -> float:
+        """Time from zero to zero that brings an ideal drive to the target of its axis. [s]"""
+        name = TARGETS[axis]
+        if name not in self.until:
+            assert self.duration is not None
+            return self.duration
+        target, g = self.until[name], crane.geometry
+        if axis == "slew":
+            way = radians(target) - home.slew
+        elif axis == "hoist":
+            way = (home.rope - target) / g.hoist
+        else:
+            boom = Boom(cos(radians(target)), sin(radians(target)))
+            way = (home.luff_rope - float(luff_rope(boom, g))) / g.luff
         low, high = crane.inverse(axis).limits
         speed = part * high if part > 0.0 else -part * low
         if way * speed <= 0.0:
             raise InputError(
-                f"The {axis} leads away from {TARGETS[axis]} = {target:g}, or is there already: "
-                "change the sign of its command or the target."
+                f"The {axis} leads away from {name} = {target:g}, or is there already: change the "
+                "sign of its command or the target."
             )
         return way / speed + self.ramp

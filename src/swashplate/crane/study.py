@@ -1,4 +1,4 @@
-"""Studies of a crane: swing over many seaways, over bearing, wave height, orifice and stick.
+"""Studies of a crane over many seaways, and sweeps of a quantity.
 
 Every variant of control and drives goes through the same seeded seaways, so that differences are
 paired. Of a run only what is counted is kept.
@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from math import atan2, radians, sqrt
+from math import atan2, sqrt
 from typing import Any, NamedTuple, Unpack
 
 import numpy as np
@@ -18,37 +18,40 @@ from swashplate.analysis.whatif import pulled
 from swashplate.crane.control import Control
 from swashplate.crane.crane import Crane
 from swashplate.crane.loop import ROWS
+from swashplate.crane.result import PUMPS, CraneRun
 from swashplate.crane.sea import Seaway, Spectrum
-from swashplate.crane.stepper import RATE, Actuation, Start, pose_of
+from swashplate.crane.stepper import RATE, Actuation, Start
 from swashplate.crane.stick import AXES, Stick
 from swashplate.equations import kernel
 from swashplate.errors import DomainError, InputError
 from swashplate.executors import Executor, Threads
 from swashplate.results import Result
-from swashplate.simulation.result import Limit
 from swashplate.tables import Column, Table
 
 Array = NDArray[np.float64]
+Laws = Control | Mapping[str, Control | None]
+"""A controller, or several by name; None is none."""
 Drives = Sequence[str] | Mapping[str, str | Crane | Sequence[Crane]]
 """Drives of a study, by words or names."""
 
-PUMPS = (Limit.DEAD_ZONE, Limit.ORIFICE, Limit.SPOOL, Limit.SWASH_STOP, Limit.RELIEF)
-"""Limits that the loop leaves of each drive, in the order of its bits."""
 COUNTED = (
-    *("rms_swing", "largest_swing"),
+    *("rms_swing", "largest_swing", "slew"),
     *(f"{axis}_{str(limit.name).lower()}" for axis in AXES for limit in PUMPS),
 )
-"""What is kept of a run: swing [rad], shares of time for which limits act."""
+"""What is kept of a run: swing and slew at the end [rad], shares of time for which limits act."""
 IDEAL, BUILT = "ideal", "identified"
-"""Drives that follow at once, and the crane's own."""
+ACTUATED: Mapping[str, Actuation] = {IDEAL: "ideal", BUILT: "inverse", "volts": "volts"}
+"""Drives that follow at once; the crane's own behind their inverse maps; the same, 10 V for full
+speed."""
 NONE = "no control"
 """The crane as it is built, under the operator's stick alone."""
+
 
 # --- many runs ------------------------------------------------------------------------------------
 
 
 class StudySetup(Start, total=False):
-    """How a study is set up: keywords of `judge`, `sectors`, `operability` and `orifices`.
+    """How a study is set up: keywords of `judge` and `sweep`.
 
     Those of `Start` say where each run begins; by default the load hangs abeam, boom at 45 deg,
     rope 27 m.
@@ -60,9 +63,9 @@ class StudySetup(Start, total=False):
     seeds : sequence of int
         A seaway for each.
     drives : sequence of str, or mapping of str to str, Crane or sequence of Crane
-        ``"ideal"``, which follow at once within their limits of speed, ``"identified"``, the
-        crane's own; by name also other cranes, or several of which each seaway takes the next, see
-        `Crane.drawn`. By default the first two.
+        ``"ideal"``, which follow at once within their limits of speed; ``"identified"``, the
+        crane's own; ``"volts"``, these without their inverse maps; by name also other cranes, or
+        several of which each seaway takes the next, see `Crane.drawn`. By default the first two.
     stick : Stick, optional
         What the operator does; by default nothing, the crane keeps its load in place.
     length : float
@@ -94,33 +97,26 @@ class Case(NamedTuple):
     actuation: Actuation
     where: Start
     """Where it begins, load, brake."""
+    stick: Stick
     height: float = 1.0
     """Factor on the height of the waves."""
 
-    def stepper(self, number: int) -> Any:
-        """The crane of a seaway by its number."""
-        crane = self.cranes[number % len(self.cranes)]
-        return crane.stepper(control=self.control, actuation=self.actuation, **self.where)
-
-
-class _Runs(NamedTuple):
-    """What a worker needs to know of a study."""
-
-    cases: tuple[Case, ...]
-    sea: Seaway
-    commands: Array
-    first: int
-    """Sample from which on swing counts."""
+    def run(self, number: int, motion: Array | None) -> CraneRun:
+        """Its run in a seaway by the seaway's number, in that motion of the ship."""
+        how: dict[str, Any] = {"control": self.control, "actuation": self.actuation, **self.where}
+        sea = motion if motion is None or self.height == 1.0 else self.height * motion
+        return self.cranes[number % len(self.cranes)].simulate(self.stick, sea=sea, **how)
 
 
 @dataclass(frozen=True, eq=False)
-class Study:
+class Study(Result):
     """A study as it is asked for: controllers, drives, seaways, stick, where each run begins."""
 
     crane: Crane
-    laws: Mapping[str, Control]
+    laws: Mapping[str, Control | None]
     drives: Mapping[str, str | Crane | Sequence[Crane]]
-    sea: Seaway
+    sea: Seaway | None
+    """None for a calm sea, in which the residual swing counts."""
     seeds: tuple[int, ...]
     stick: Stick
     start: float
@@ -129,46 +125,35 @@ class Study:
     progress: Callable[[int, int], None] | None
 
     @classmethod
-    def of(
-        cls,
-        crane: Crane,
-        control: Control | Mapping[str, Control],
-        setup: StudySetup,
-        *,
-        seeds: Sequence[int],
-        fixed: tuple[str, ...] = (),
-    ) -> Study:
+    def of(cls, crane: Crane, control: Laws, setup: StudySetup) -> Study:
         """A study from keywords of a user.
-
-        Parameters
-        ----------
-        crane : Crane
-        control : Control or mapping of str to Control
-        setup : StudySetup
-        seeds : sequence of int
-            Taken by default.
-        fixed : tuple of str
-            Keywords that this kind of study does not take.
 
         Raises
         ------
         InputError
             For unknown keywords, seeds, drives or a start that make no study.
         """
-        known = [each for each in StudySetup.__annotations__ if each not in fixed]
-        strange = [each for each in setup if each not in known]
+        strange = [each for each in setup if each not in StudySetup.__annotations__]
         if strange:
-            raise InputError(f"This study has no {strange[0]}; it has {', '.join(known)}.")
-        own: dict[str, Any] = dict(setup)
+            known = ", ".join(StudySetup.__annotations__)
+            raise InputError(f"A study has no {strange[0]}; it has {known}.")
+        own: dict[str, Any] = {"slew_deg": 90.0, "boom_deg": 45.0, "rope_m": 27.0} | dict(setup)
         laws = dict(control) if isinstance(control, Mapping) else {"": control}
         drives = own.pop("drives", (IDEAL, BUILT))
         sets = dict(drives) if isinstance(drives, Mapping) else {each: each for each in drives}
         if not laws or not sets:
             raise InputError("A study needs at least one controller and one set of drives.")
-        chosen = tuple(own.pop("seeds", seeds))
-        if not chosen:
+        for name, given in sets.items():
+            if isinstance(given, str) and given not in ACTUATED:
+                words = ", ".join(ACTUATED)
+                raise InputError(f"There are no drives '{given}'; there are {words}, or cranes.")
+            if not given:
+                raise InputError(f"The drives '{name}' are an empty list of cranes.")
+        seeds = tuple(own.pop("seeds"))
+        if not seeds:
             raise InputError("A study of seaways needs at least one seed.")
         sea = own.pop("sea", "ss3")
+        seaway = sea if isinstance(sea, Seaway) else Seaway(sea)
         length, start = own.pop("length", 120.0), own.pop("start", 40.0)
         stick = own.pop("stick", None) or Stick.rest(length)
         if not 0.0 <= start < stick.length:
@@ -177,44 +162,30 @@ class Study:
                 "earlier or take a longer one."
             )
         executor, progress = own.pop("executor", None) or Threads(), own.pop("progress", None)
-        where: Any = {"slew_deg": 90.0, "boom_deg": 45.0, "rope_m": 27.0} | own
-        seaway = sea if isinstance(sea, Seaway) else Seaway(sea)
-        return cls(
-            crane, laws, sets, seaway, chosen, stick, start, where, executor, progress
-        )  # fmt: skip
+        where: Any = own
+        return cls(crane, laws, sets, seaway, seeds, stick, start, where, executor, progress)
 
-    def cases(self, **moved: Unpack[Start]) -> dict[str, Case]:
-        """Cases by name, with other keywords of where they begin: none, controllers by drives.
-
-        Raises
-        ------
-        InputError
-            For drives that are neither ``"ideal"``, ``"identified"`` nor cranes.
-        """
-        where: Start = {**self.where, **moved}
-        made = {NONE: Case((self.crane,), None, "inverse", where)}
+    def cases(self) -> dict[str, Case]:
+        """Cases by name: no control, then each controller on each set of drives."""
+        made = {NONE: Case((self.crane,), None, "inverse", self.where, self.stick)}
         for law, stages in self.laws.items():
             for name, given in self.drives.items():
                 cranes: tuple[Crane, ...] = (self.crane,)
-                if isinstance(given, str) and given not in (IDEAL, BUILT):
-                    raise InputError(
-                        f"There are no drives '{given}'; there are {IDEAL}, {BUILT}, or cranes by "
-                        "name."
-                    )
-                if not isinstance(given, str):
+                actuation: Actuation = "inverse"
+                if isinstance(given, str):
+                    actuation = ACTUATED[given]
+                else:
                     cranes = (given,) if isinstance(given, Crane) else tuple(given)
-                if not cranes:
-                    raise InputError(f"The drives '{name}' are an empty list of cranes.")
-                actuation: Actuation = "ideal" if given == IDEAL else "inverse"
-                made[f"{law}, {name}" if law else name] = Case(cranes, stages, actuation, where)
+                case = Case(cranes, stages, actuation, self.where, self.stick)
+                made[f"{law}, {name}" if law else name] = case
         return made
 
-    def outcomes(self, cases: Sequence[Case], seeds: range | None = None) -> Array:
+    def outcomes(self, cases: Sequence[Case], numbers: range | None = None) -> Array:
         """Swing and limits of all cases in the seaways, or in some of them by their numbers.
 
         Returns
         -------
-        (n, m, 17) array
+        (n, m, 18) array
             Of seaways and cases, `COUNTED`; NaN where a run met a limit of the crane's travel or
             left the model's domain.
 
@@ -224,44 +195,47 @@ class Study:
             If a case cannot begin as it is asked to.
         """
         for case in cases:  # said here, once, and not by a worker
-            case.stepper(0)
-        pose = pose_of(cases[0].where)
-        commands, _ = self.stick.sample(self.crane, pose, RATE)
-        runs = _Runs(tuple(cases), self.sea, commands, round(self.start * RATE))
-        numbers = range(len(self.seeds)) if seeds is None else seeds
-        made = np.full((len(numbers), len(cases), len(COUNTED)), np.nan)
-        items = [(n, self.seeds[n]) for n in numbers]
-        for done, (k, values) in enumerate(self.executor.run(_of_seaway, runs, items), 1):
+            stepper = case.cranes[0].stepper(control=case.control, **case.where)
+            case.stick.sample(case.cranes[0], stepper.fixed.home, RATE)
+        chosen = range(len(self.seeds)) if numbers is None else numbers
+        made = np.full((len(chosen), len(cases), len(COUNTED)), np.nan)
+        items = [(n, self.seeds[n]) for n in chosen]
+        work = (tuple(cases), self.sea, self.start)
+        for done, (k, values) in enumerate(self.executor.run(_of_seaway, work, items), 1):
             made[k] = values
-            if self.progress is not None and seeds is None:
-                self.progress(done, len(numbers))
+            if self.progress is not None and numbers is None:
+                self.progress(done, len(chosen))
         return made
 
 
-def _of_seaway(runs: _Runs, item: tuple[int, int]) -> Array:
+def _of_seaway(work: tuple[tuple[Case, ...], Seaway | None, float], item: tuple[int, int]) -> Array:
     """Outcomes of all cases in one seaway."""
-    number, seed = item
-    motion = replace(runs.sea, seed=seed).motion(len(runs.commands), RATE)
-    made = np.full((len(runs.cases), len(COUNTED)), np.nan)
-    for row, case in zip(made, runs.cases, strict=True):
-        waves = motion if case.height == 1.0 else case.height * motion
+    (cases, sea, start), (number, seed) = work, item
+    longest = max(case.stick.length for case in cases)
+    motion = None
+    if sea is not None:
+        motion = replace(sea, seed=seed).motion(round(longest * RATE) + 1, RATE)
+    made = np.full((len(cases), len(COUNTED)), np.nan)
+    for row, case in zip(made, cases, strict=True):
         try:
-            out = case.stepper(number).take(runs.commands, waves)
+            run = case.run(number, motion)
         except (DomainError, InputError):  # stopped: by the travel's limits, or the tip too fast
             continue
-        _counted(out, runs.first, row)
+        counts = run.settling if sea is None else slice(round(start * RATE), None)
+        _counted(run.out[counts], row)
+        row[2] += run.home.slew
     return made
 
 
-_TIP, _LOAD, _BITS = ROWS.index("tip_x"), ROWS.index("load_x"), ROWS.index("limits_hoist")
+_TIP, _LOAD, _BITS, _SLEW = map(ROWS.index, ("tip_x", "load_x", "limits_hoist", "shaft_slew"))
 
 
 @kernel
-def _counted(out: Array, first: int, made: Array) -> None:
-    """Root mean square and largest swing [rad], and shares of time of the limits' bits."""
-    count, square, largest = out.shape[0] - first, 0.0, 0.0
-    made[2:] = 0.0
-    for m in range(first, out.shape[0]):
+def _counted(out: Array, made: Array) -> None:
+    """Root mean square and largest swing, angle of the slew [rad]; shares of the limits' bits."""
+    square, largest = 0.0, 0.0
+    made[:] = 0.0
+    for m in range(out.shape[0]):
         x, y, z = (
             out[m, _LOAD] - out[m, _TIP],
             out[m, _LOAD + 1] - out[m, _TIP + 1],
@@ -273,201 +247,161 @@ def _counted(out: Array, first: int, made: Array) -> None:
         for axis in range(3):
             bits = int(out[m, _BITS + axis])
             for bit in range(5):
-                made[2 + 5 * axis + bit] += (bits >> bit) & 1
-    made[0], made[1] = sqrt(square / count), largest
-    made[2:] /= count
+                made[3 + 5 * axis + bit] += (bits >> bit) & 1
+    made /= out.shape[0]
+    made[0], made[1], made[2] = sqrt(square / out.shape[0]), largest, out[-1, _SLEW]
 
 
-# --- over bearing, wave height and the luff's orifice ---------------------------------------------
+# --- sweeps ---------------------------------------------------------------------------------------
 
-SHOWN = {
-    "bearing": ("plot_sectors", ".0f", "rad"),
-    "height": ("plot_operability", ".2f", "m"),
-    "orifice": ("plot_orifice", ".2f", ""),
+
+class Swept(NamedTuple):
+    """A quantity that a sweep goes over."""
+
+    points: tuple[float, ...]
+    setup: StudySetup
+    """Of a study unless the user says otherwise."""
+    unit: str
+    """In which points are given and shown."""
+    fixed: tuple[str, ...] = ()
+    """Keywords of a study that it does not take."""
+
+
+TURN, PERIOD = 45.0, 7.5
+"""Slew of a sweep over the stick [deg]; peak period of a sweep over the waves' height [s]."""
+TENTHS = tuple(k / 10.0 for k in range(1, 11))
+SWEPT: Mapping[str, Swept] = {
+    "bearing": Swept(tuple(range(0, 360, 15)), {"seeds": range(4)}, "deg", ("slew_deg",)),
+    "height": Swept((0.1, 0.2, 0.3, 0.45, 0.6, 0.9, 1.2), {"seeds": range(40)}, "m"),
+    "orifice": Swept((0.5, 0.75, 1.0, 1.25, 1.5, 2.0, 3.0, 5.0), {"seeds": range(20)}, ""),
+    "stick": Swept(
+        TENTHS,
+        {"seeds": (0,), "slew_deg": 0.0, "rope_m": 20.0, "drives": (IDEAL, "volts", BUILT)},
+        "",
+        ("seeds", "sea", "stick", "start", "length"),
+    ),
 }
-"""Figure of each quantity that is swept, and its column."""
+"""Bearing of the boom, from the bow to starboard; significant height of the waves; factor on the
+luff drive's in-line orifice; the operator's stick in a slew by `TURN`, in a calm sea."""
 
 
 @dataclass(frozen=True, eq=False)
 class Sweep(Result):
     """Swing of several variants over a quantity, in the same seaways."""
 
-    what: str
-    """``"bearing"``, ``"height"`` or ``"orifice"``."""
-    grid: Array
-    """(n,) bearing of the boom [rad], significant height of the waves [m], factor on the orifice of
-    the luff drive."""
+    over: str
+    """``"bearing"``, ``"height"``, ``"orifice"`` or ``"stick"``."""
+    points: Array
+    """(n,) [rad], [m], factors, parts of the full speed."""
     names: tuple[str, ...]
     values: Array = field(repr=False)
-    """(seaways, n, variants, 2) root mean square and largest swing [rad]; NaN: stopped."""
+    """(seaways, n, variants, 3) root mean square and largest swing, slew at the end [rad]; NaN:
+    stopped. Over the stick the residual swing, of 25 s."""
     crane: Crane = field(repr=False)
-    sea: Seaway = field(repr=False)
+    sea: Seaway | None = field(repr=False)
 
-    @property
-    def figure(self) -> str:  # type: ignore[override]
-        """The figure that shows it."""
-        return SHOWN[self.what][0]
+    figure = "plot_sweep"
 
     def mean(self) -> Array:
-        """(n, variants) mean over the seaways of the root mean square swing. [rad]"""
-        return np.asarray(np.mean(self.values[..., 0], axis=0))
+        """(n, variants, 3) means over the seaways. [rad]"""
+        return np.asarray(np.mean(self.values, axis=0))
 
     def below(self, limit_deg: float) -> Array:
         """(n, variants) share of seaways whose largest swing is below a limit."""
-        return np.asarray(np.mean(self.values[..., 1] < radians(limit_deg), axis=0))
+        return np.asarray(np.mean(np.degrees(self.values[..., 1]) < limit_deg, axis=0))
 
-    def table(self) -> Table:
-        """Mean of the root mean square swing, a row for each point."""
-        columns = [Column(self.what, *SHOWN[self.what][1:])]
-        columns += [Column(each, ".2f", "rad", none="stopped") for each in self.names]
-        made = Table("Swing, RMS, mean over seaways", columns)
-        for x, row in zip(self.grid, self.mean(), strict=True):
-            made.add(float(x), *map(float, row))
+    def tables(self) -> list[Table]:
+        """Root mean square swing; over the stick the residual swing, and where the slew ends."""
+        shown = {"Swing, RMS, mean over seaways": (0, ".2f")}
+        if self.over == "stick":
+            shown = {"Residual swing": (1, ".3f"), "Slew at the end": (2, ".1f")}
+        made = []
+        unit = SWEPT[self.over].unit.replace("deg", "rad")
+        for title, (kept, spec) in shown.items():
+            columns = [Column(self.over, ".0f" if unit == "rad" else ".2f", unit)]
+            columns += [Column(each, spec, "rad", none="stopped") for each in self.names]
+            made.append(Table(title, columns))
+            for x, row in zip(self.points.tolist(), self.mean()[..., kept].tolist(), strict=True):
+                made[-1].add(x, *row)
         return made
 
 
-def _swept(study: Study, what: str, grid: Array, points: Sequence[Mapping[str, Case]]) -> Sweep:
-    """Swing of the cases of all points, in the same seaways."""
-    cases = [each for point in points for each in point.values()]
-    # what does not depend on the point is simulated once
-    single = {id(each): each for each in cases}
-    found = study.outcomes(list(single.values()))[..., :2]
-    values = found[:, [list(single).index(id(each)) for each in cases]]
-    names = tuple(points[0])
-    shaped = values.reshape(len(values), grid.size, len(names), 2)
-    return Sweep(what, grid, names, shaped, study.crane, study.sea)
-
-
-def sectors(
+def sweep(
     crane: Crane,
-    control: Control | Mapping[str, Control],
+    over: str,
+    control: Laws,
     *,
-    bearings: ArrayLike = tuple(range(0, 360, 15)),
+    points: ArrayLike | None = None,
     **setup: Unpack[StudySetup],
 ) -> Sweep:
-    """Swing over the bearing of the boom [deg], from the bow to starboard, in 4 seaways."""
-    study = Study.of(crane, control, setup, seeds=range(4), fixed=("slew_deg",))
-    grid = _rising("Bearings", bearings)
-    points = [study.cases(slew_deg=float(each)) for each in grid]
-    return _swept(study, "bearing", np.radians(grid), points)
-
-
-def operability(
-    crane: Crane,
-    control: Control | Mapping[str, Control],
-    *,
-    heights: ArrayLike = (0.1, 0.2, 0.3, 0.45, 0.6, 0.9, 1.2),
-    period: float = 7.5,
-    **setup: Unpack[StudySetup],
-) -> Sweep:
-    """Swing over the significant height of waves [m] of one peak period [s], in 40 seaways.
-
-    Of `sea` ship and heading count.
-    """
-    study = Study.of(crane, control, setup, seeds=range(40))
-    grid = _rising("Heights of waves", heights, 0.0)
-    found = study.cases().items()
-    points = [{name: case._replace(height=float(h)) for name, case in found} for h in grid]
-    unit = replace(study, sea=replace(study.sea, sea=Spectrum(1.0, period)))
-    return _swept(unit, "height", grid, points)
-
-
-def orifices(
-    crane: Crane,
-    control: Control | Mapping[str, Control],
-    *,
-    factors: ArrayLike = (0.5, 0.75, 1.0, 1.25, 1.5, 2.0, 3.0, 5.0),
-    **setup: Unpack[StudySetup],
-) -> Sweep:
-    """Swing over factors on the luff drive's in-line orifice, in 20 seaways.
-
-    Beside the crane's own drives there are ideal ones, under the first controller, and no control.
-    """
-    study = Study.of(crane, control, setup, seeds=range(20), fixed=("drives",))
-    grid = _rising("Factors on the orifice", factors, 0.0)
-    laws = {name or "control": law for name, law in study.laws.items()}
-    ideal = Case((crane,), next(iter(laws.values())), "ideal", study.where)
-    common = {NONE: study.cases()[NONE], "ideal drives": ideal}
-    points = []
-    for factor in grid:
-        changed = crane.with_drive(luff=pulled(crane.luff, {"orifice": float(factor)}))
-        own = {name: Case((changed,), law, "inverse", study.where) for name, law in laws.items()}
-        points.append({**common, **own})
-    return _swept(study, "orifice", grid, points)
-
-
-def _rising(what: str, given: ArrayLike, above: float = -np.inf) -> Array:
-    grid = np.atleast_1d(np.asarray(given, dtype=np.float64))
-    if not (np.isfinite(grid).all() and (grid > above).all() and grid.size):
-        limit = f" above {above:g}" if np.isfinite(above) else ""
-        raise InputError(f"{what} must be one or more finite numbers{limit}.")
-    return grid
-
-
-# --- residual swing over the stick ----------------------------------------------------------------
-
-
-@dataclass(frozen=True, eq=False)
-class Residuals(Result):
-    """Residual swing after a maneuver over the stick, for several controllers and actuations."""
-
-    sticks: Array
-    """(n,) part of the full speed."""
-    names: tuple[str, ...]
-    values: Array
-    """(n, m) [rad]"""
-    reached: Array
-    """(n, m) slew at the end. [rad]"""
-    target: float
-    """[rad]"""
-    crane: Crane = field(repr=False)
-
-    figure = "plot_residuals"
-
-    def tables(self) -> list[Table]:
-        """Residual swing, and where the slew ends."""
-        heads = [Column("stick", ".2f"), *(Column(each, ".3f", "rad") for each in self.names)]
-        swing = Table("Residual swing", heads)
-        ends = Table("Slew at the end", [heads[0], *(replace(c, spec=".1f") for c in heads[1:])])
-        for stick, values, reached in zip(self.sticks, self.values, self.reached, strict=True):
-            swing.add(float(stick), *map(float, values))
-            ends.add(float(stick), *map(float, reached))
-        return [swing, ends]
-
-
-def residuals(
-    crane: Crane,
-    variants: Mapping[str, tuple[str, Control | None]],
-    *,
-    sticks: ArrayLike = (0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0),
-    slew_deg: float = 45.0,
-    boom_deg: float = 45.0,
-    rope_m: float = 20.0,
-) -> Residuals:
-    """Residual swing after a slew from forward, over the stick, in a calm sea.
+    """Swing over a quantity, in the same seaways at every point.
 
     Parameters
     ----------
     crane : Crane
-    variants : mapping of str to (str, Control or None)
-        Actuation, as of `Crane.simulate`, and controller by name.
-    sticks : (n,) array_like
-        Parts of the full speed.
-    slew_deg : float
-        Target of the slew.
-    boom_deg, rope_m : float
-        Pose.
+    over : {"bearing", "height", "orifice", "stick"}
+        Bearing of the boom from the bow to starboard [deg], in 4 seaways; significant height of
+        waves [m] with a peak at 7.5 s, in 40, where of `sea` ship and heading count; factor on the
+        luff drive's in-line orifice under control, in 20; the stick, part of the full speed, in a
+        slew of 45 degrees from forward on 20 m of rope in a calm sea, of which the residual swing
+        counts.
+    control : Control or mapping of str to Control or None
+        One controller, or several by name.
+    points : (n,) array_like, optional
+        Of the quantity.
+    **setup
+        Seaways, drives, where each run begins: see `StudySetup`.
+
+    Raises
+    ------
+    InputError
+        For another quantity, points that are none, and keywords that make no study.
     """
-    grid = _rising("Sticks", sticks, 0.0)
-    values, reached = np.zeros((2, grid.size, len(variants)))
-    for i, part in enumerate(grid):
-        full = min(abs(each) for each in crane.inverse("slew").limits)
-        length = np.ceil(radians(slew_deg) / (part * full) + 60.0)
-        stick = Stick.trapezoid(
-            slew=float(part), until={"slew_deg": slew_deg}, length=float(length)
-        )
-        for k, (actuation, law) in enumerate(variants.values()):
-            how: dict[str, Any] = {"actuation": actuation, "control": law}
-            run = crane.simulate(stick, boom_deg=boom_deg, rope_m=rope_m, **how)
-            values[i, k], reached[i, k] = radians(run.residual_deg), radians(run.slew_deg[-1])
-    return Residuals(grid, tuple(variants), values, reached, radians(slew_deg), crane)
+    if over not in SWEPT:
+        raise InputError(f"There is no sweep over '{over}'; there are {', '.join(SWEPT)}.")
+    swept = SWEPT[over]
+    taken = [each for each in setup if each in swept.fixed]
+    if taken:
+        raise InputError(f"A sweep over the {over} sets {taken[0]} itself: leave it out.")
+    grid = np.atleast_1d(np.asarray(swept.points if points is None else points, dtype=np.float64))
+    if not (grid.size and np.isfinite(grid).all() and (over == "bearing" or (grid > 0.0).all())):
+        above = "" if over == "bearing" else " above 0"
+        raise InputError(f"Points of the {over} must be one or more finite numbers{above}.")
+    study = Study.of(crane, control, {**swept.setup, **setup})
+    if over == "stick":
+        study = replace(study, sea=None)
+    elif over == "height" and study.sea is not None:
+        study = replace(study, sea=replace(study.sea, sea=Spectrum(1.0, PERIOD)))
+    found = study.cases()
+    variants = {name: case for name, case in found.items() if name == NONE or case != found[NONE]}
+    cases = [_at(over, float(x), case) for x in grid for case in variants.values()]
+    # what does not depend on the point is simulated once
+    single = [case for k, case in enumerate(cases) if case not in cases[:k]]
+    every = study.outcomes(single)[:, [single.index(each) for each in cases], :3]
+    values = every.reshape(-1, grid.size, len(variants), 3)
+    if over == "bearing":
+        grid = np.radians(grid)
+    return Sweep(over, grid, tuple(variants), values, crane, study.sea)
+
+
+def _at(over: str, x: float, case: Case) -> Case:
+    """A case at a point of a sweep; no control and ideal drives do not know the orifice."""
+    if over == "bearing":
+        return case._replace(where={**case.where, "slew_deg": x})
+    if over == "height":
+        return case._replace(height=x)
+    if over == "orifice":
+        if case.control is None or case.actuation == "ideal":
+            return case
+        return case._replace(cranes=tuple(with_orifice(each, x) for each in case.cranes))
+    full = min(map(abs, case.cranes[0].inverse("slew").limits))
+    length = float(np.ceil(np.radians(TURN) / (x * full) + 60.0))
+    until = {"slew_deg": case.where["slew_deg"] + TURN}
+    return case._replace(stick=Stick.trapezoid(slew=x, until=until, length=length))
+
+
+def with_orifice(crane: Crane, factor: float) -> Crane:
+    """The crane with another in-line orifice of its luff drive; the same one for a factor of 1."""
+    return (
+        crane if factor == 1.0 else crane.with_drive(luff=pulled(crane.luff, {"orifice": factor}))
+    )

@@ -1,4 +1,4 @@
-"""Motion transfer functions of ships: files of VERES, WAMIT and Capytaine, CSV, closed forms.
+"""Motion transfer functions of ships: files of VERES, WAMIT and Capytaine, CSV, a closed form.
 
 All are complex, per metre of wave amplitude and by e^{+iωt}, with the phase to the crest at the
 ship's mean place: surge, sway, heave in m, roll, pitch, yaw in rad; axes as in `kinematics`: x
@@ -9,10 +9,11 @@ heave 1 and roll -ik; in a following sea surge is -i and pitch ik.
 from __future__ import annotations
 
 import csv
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
-from math import isfinite
+from math import isfinite, pi
 from pathlib import Path
-from typing import Any
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,10 +29,13 @@ Complex = NDArray[np.complex128]
 MOTIONS = ("surge", "sway", "heave", "roll", "pitch", "yaw")
 MIRRORED = np.array([1.0, -1.0, 1.0, -1.0, 1.0, -1.0])
 """Signs of the motions where waves come from the other side."""
-OPPOSITE = 0.2
-"""Part of the water's surge or sway that must be seen to say that a ship goes the other way."""
-LONG_WAVE = 0.3
+LONG_WAVES = ((0, 0.0, -1j, 0.2), (1, 90.0, -1j, 0.2), (4, 0.0, 1j, 0.0))
+"""Motions that go with the water in the longest wave of a file: which, heading [deg], the water's
+phase, and what it must exceed to be seen."""
+HEAVES = 0.3
 """Largest distance of heave from 1 in the longest wave of a file, which the wave's crest lifts."""
+LONGEST = 0.4
+"""A file whose lowest frequency is above that has no long wave. [rad/s]"""
 
 
 # --- closed form ----------------------------------------------------------------------------------
@@ -52,6 +56,11 @@ class Hull:
         Natural period. [s]
     roll_damping : float
         Damping ratio.
+
+    Raises
+    ------
+    InputError
+        Unless all are above 0.
     """
 
     length: float
@@ -61,54 +70,31 @@ class Hull:
     roll_damping: float = 0.06
 
     def __post_init__(self) -> None:
-        for name in ("length", "beam", "draught", "roll_period", "roll_damping"):
-            value = getattr(self, name)
+        for name, value in vars(self).items():
             if not (isfinite(value) and value > 0.0):
                 raise InputError(f"The hull's {name} is {value:g}, but must be above 0.")
 
-    def heave_and_pitch(
-        self, omega: Array, met: Array, k: Array, cosine: Array
-    ) -> tuple[Array, Array]:
-        """Amplitudes for each metre of wave, heave [m] and pitch [rad].
-
-        Parameters
-        ----------
-        omega, met : array
-            Frequency of the waves, and that of encounter. [rad/s]
-        k : array
-            Wave number. [1/m]
-        cosine : array
-            Of the heading.
-        """
+    def response(self, omega: Array, heading: Array, speed: float = 0.0) -> Complex:
+        """Complex amplitudes of six motions, (6, n); as `TransferFunctions.response`."""
         L, B, T = self.length, self.beam, self.draught
+        k, c = omega**2 / GRAVITY, np.cos(heading)
+        met = omega - k * speed * c
         alpha = met / omega
-        along = np.maximum(np.abs(k * cosine), 1e-9)
+        along = np.maximum(np.abs(k * c), 1e-9)
         sigma = 0.5 * along * L
         A = 2.0 * np.sin(0.5 * k * B * alpha**2) * np.exp(-k * T * alpha**2)
         f = np.sqrt((1.0 - k * T) ** 2 + (A**2 / (k * B * alpha**3)) ** 2)
-        force = np.exp(-along * T) * f
         resonance = np.sqrt((1.0 - 2.0 * k * T * alpha**2) ** 2 + (A**2 / (k * B * alpha**2)) ** 2)
-        ratio = np.sinc(sigma / np.pi)
+        force, ratio = np.exp(-along * T) * f / resonance, np.sinc(sigma / pi)
         # (sin σ/σ - cos σ)/σ loses its digits where σ is small
-        small = sigma < 1e-3
-        safe = np.where(small, 1.0, sigma)
-        slope = np.where(small, sigma / 3.0, (np.sinc(safe / np.pi) - np.cos(safe)) / safe)
-        return force * ratio / resonance, force * 6.0 / L * slope / resonance
-
-    def response(self, omega: Array, heading: Array, speed: float = 0.0) -> Complex:
-        """Complex amplitudes of six motions, (6, n); as `TransferFunctions.response`."""
-        k = omega**2 / GRAVITY
-        c, s = np.cos(heading), np.sin(heading)
-        met = omega - k * speed * c
-        heave, pitch = self.heave_and_pitch(omega, met, k, c)
-        carried = np.exp(-0.5 * k * self.draught) * np.sinc(
-            0.5 * k * np.abs(c) * self.length / np.pi
-        )
-        own = 2.0 * np.pi / self.roll_period
-        roll = -1j * k * s * carried * own**2
-        roll /= own**2 - met**2 + 2j * self.roll_damping * own * met
-        rows = (-1j * c * carried, -1j * s * carried, heave, roll, 1j * np.sign(c) * pitch, 0.0 * k)
-        return np.stack([np.asarray(each, dtype=np.complex128) for each in rows])
+        slope = np.where(sigma < 1e-3, sigma / 3.0, (ratio - np.cos(sigma)) / sigma)
+        pitch = force * 6.0 / L * slope
+        carried = np.exp(-0.5 * k * T) * np.sinc(0.5 * k * np.abs(c) * L / pi)
+        own = 2.0 * pi / self.roll_period
+        resonant = own**2 / (own**2 - met**2 + 2j * self.roll_damping * own * met)
+        sway = -1j * np.sin(heading) * carried
+        surge, turn = -1j * c * carried, 1j * np.sign(c) * pitch
+        return np.stack([surge, sway, force * ratio + 0j, k * sway * resonant, turn, 0j * k])
 
 
 CRANE_SHIP = Hull(203.8, 23.2, 9.75)
@@ -140,24 +126,22 @@ class TransferFunctions(Result):
     """(v, m, f, 6)"""
 
     def __post_init__(self) -> None:
-        heave = self.values[0, :, 0, 2]
-        if np.abs(heave - 1.0).max() > LONG_WAVE and self.frequencies[0] < 0.4:
+        if self.frequencies[0] >= LONGEST:
+            return
+        longest, wrong = self.values[0, :, 0], "convert the file."
+        heave = longest[:, 2]
+        if np.abs(heave - 1.0).max() > HEAVES:
             raise InputError(
                 f"{self.name}: in the longest wave heave is {complex(heave[0]):.2f} for each "
-                "metre, but must be near 1 + 0i, as with the phase to the crest and z up: convert "
-                "the file."
+                f"metre, but must be near 1 + 0i, as with the phase to the crest and z up: {wrong}"
             )
-        for motion, angle, wanted in ((0, 0.0, -1j), (1, 0.5 * np.pi, -1j), (4, 0.0, 1j)):
-            at = np.abs(self.headings - angle) < 1e-6
-            if self.frequencies[0] < 0.4 and at.any():
-                found = complex(self.values[0, at, 0, motion][0])
-                wrong = (found * np.conj(wanted)).real < 0.0
-                if wrong and abs(found) > (OPPOSITE if motion < 3 else 0.0):
+        for motion, angle, water, seen in LONG_WAVES:
+            for found in longest[np.abs(np.degrees(self.headings) - angle) < 1e-4, motion].tolist():
+                if (found * np.conj(water)).real < 0.0 and abs(found) > seen:
                     raise InputError(
-                        f"{self.name}: in the longest wave of {np.degrees(angle):g} deg "
-                        f"{MOTIONS[motion]} is {found:.3g} for each metre, but must go with the "
-                        f"water, {wanted:g} times what it is: axes, headings or phases are counted "
-                        "otherwise; convert the file."
+                        f"{self.name}: in the longest wave of {angle:g} deg {MOTIONS[motion]} is "
+                        f"{found:.3g} for each metre, but must go with the water, {water:g} times "
+                        f"what it is: axes, headings or phases are counted otherwise; {wrong}"
                     )
 
     def response(self, omega: Array, heading: Array, speed: float = 0.0) -> Complex:
@@ -186,27 +170,39 @@ class TransferFunctions(Result):
                 f"{self.name} has speeds from {low:g} to {high:g} m/s, but {speed:g} m/s is asked "
                 "for."
             )
-        folded = np.arccos(np.clip(np.cos(heading), -1.0, 1.0))
-        side = np.where(np.sin(heading) < 0.0, -1.0, 1.0)
         made = np.zeros((6, omega.size), dtype=np.complex128)
+        folded = np.arccos(np.clip(np.cos(heading), -1.0, 1.0))
         for v, weight_v in _weights(self.speeds, np.array([speed])):
             for m, weight_m in _weights(self.headings, folded):
                 for f, weight_f in _weights(self.frequencies, omega):
-                    made += (self.values[v, m, f].T) * (weight_v * weight_m * weight_f)
-        return made * np.where(side < 0.0, MIRRORED[:, None], 1.0)
+                    made += self.values[v, m, f].T * (weight_v * weight_m * weight_f)
+        return made * np.where(np.sin(heading) < 0.0, MIRRORED[:, None], 1.0)
 
 
-def _weights(grid: Array, at: Array) -> list[tuple[NDArray[np.int64], Array]]:
+def _weights(grid: Array, at: Array) -> Iterator[tuple[NDArray[np.int64], Array]]:
     """Indices and weights of the two neighbours of each value, held at the grid's ends."""
-    if grid.size == 1:
-        return [(np.zeros(at.size, dtype=np.int64), np.ones(at.size))]
-    inside = np.clip(at, grid[0], grid[-1])
-    below = np.clip(np.searchsorted(grid, inside, side="right") - 1, 0, grid.size - 2)
-    share = (inside - grid[below]) / (grid[below + 1] - grid[below])
-    return [(below, 1.0 - share), (below + 1, share)]
+    place = np.interp(at, grid, np.arange(grid.size))
+    below = np.minimum(place.astype(np.int64), max(grid.size - 2, 0))
+    yield below, 1.0 - (place - below)
+    yield np.minimum(below + 1, grid.size - 1), place - below
 
 
 # --- files ----------------------------------------------------------------------------------------
+
+
+class Amplitude(NamedTuple):
+    """One number of a file: a motion for each metre of one wave."""
+
+    speed: float
+    """[m/s]"""
+    heading: float
+    """Where the waves run, from x to y. [deg]"""
+    omega: float
+    """[rad/s]"""
+    motion: int
+    """Place in `MOTIONS`."""
+    value: complex
+    """[m/m] or [rad/m], by e^{+iωt}."""
 
 
 def read_ship(path: str | Path, length: float | None = None) -> TransferFunctions:
@@ -215,15 +211,21 @@ def read_ship(path: str | Path, length: float | None = None) -> TransferFunction
     Parameters
     ----------
     path : path
-        Of VERES, WAMIT, Capytaine, or a table as of `read_csv`.
+        ``.re1`` of VERES; ``.4`` of WAMIT, displacements; ``.nc`` of Capytaine, in netCDF 4: the
+        array ``RAO`` that ``capytaine.post_pro.rao`` gives, stored by ``separate_complex_values``;
+        or ``.csv``, a table in this module's convention with columns ``heading_deg``, ``omega``
+        [rad/s], ``surge_re``, ``surge_im`` and so on [m/m], [rad/m], and where it likes ``speed``
+        [m/s]. Waves from beyond 180 deg, which follow by symmetry, are left out.
     length : float, optional
-        WAMIT's ULEN, without which a ``.4`` cannot be read. [m]
+        WAMIT's ULEN, by which rotations of a ``.4`` are made dimensionless. [m]
 
     Raises
     ------
-    FileError, InputError
-        For another ending, a length that is missing or that no other file takes, and as the
-        reader of each format.
+    FileError
+        If a line is none of such a file, or a motion is missing; the sentence says where.
+    InputError
+        For another ending, a length that is missing or that no other file takes, and another
+        convention of axes, headings or phases.
     """
     kind = Path(path).suffix.lower()
     if (kind == ".4") != (length is not None):
@@ -231,273 +233,163 @@ def read_ship(path: str | Path, length: float | None = None) -> TransferFunction
             f"{path}: a .4 of WAMIT, and no other file, needs the length ULEN of its run."
         )
     if length is not None:
-        return read_wamit(path, length)
-    readers = {".re1": read_veres, ".nc": read_capytaine, ".csv": read_csv}
+        if not (isfinite(length) and length > 0.0):
+            raise InputError(f"WAMIT's length ULEN is {length:g} m, but must be above 0.")
+        return _gathered(path, _wamit(path, length))
+    readers = {".re1": _veres, ".nc": _capytaine, ".csv": _csv}
     if kind not in readers:
         raise InputError(
             f"{path}: transfer functions are read from .re1 of VERES, .4 of WAMIT, .nc of "
             "Capytaine, and .csv."
         )
-    return readers[kind](path)
+    return _gathered(path, readers[kind](path))
 
 
-def read_veres(path: str | Path) -> TransferFunctions:
-    """Motion transfer functions of a VERES file, ``.re1``.
+def _numbers(path: str | Path, line: int, words: Sequence[str | None], wanted: str) -> list[float]:
+    """Finite numbers of a line, as many as are wanted, joined by commas."""
+    names = wanted.split(", ")
+    for name, word in zip(names, [*words, *([None] * len(names))], strict=False):
+        try:
+            fine = isfinite(float(word or ""))
+        except ValueError:
+            fine = False
+        if not fine:
+            raise FileError(
+                f"{path}, line {line}: {name} is {'missing' if word is None else repr(word)}, but "
+                f"must be a number; needed are {wanted}: the file is cut or another one."
+            )
+    return [float(word or "") for word in words[: len(names)]]
 
-    Raises
-    ------
-    FileError
-        If it is no such file, or ends too early; the sentence says where.
-    """
-    words = [line.split() for line in read_text(path).splitlines()]
-    if len(words) < 11 or "VERES" not in " ".join(words[0]):
+
+def _veres(path: str | Path) -> Iterator[Amplitude]:
+    lines = read_text(path).splitlines()
+    if len(lines) < 11 or "VERES" not in lines[0]:
         raise FileError(
             f"{path} is no VERES file of motion transfer functions: its first line differs."
         )
     row = 9
 
-    def numbers(count: int, what: str) -> list[float]:
+    def following(wanted: str) -> list[float]:
         nonlocal row
-        line = words[row] if row < len(words) else []
-        try:
-            found = [float(each) for each in line[:count]]
-        except ValueError:
-            found = []
         row += 1
-        if len(found) < count or not all(map(isfinite, found)):
-            raise FileError(
-                f"{path}, line {row}: {what} is missing, {count} numbers; the file is cut or "
-                "changed."
-            )
-        return found
+        words = lines[row - 1].split() if row <= len(lines) else []
+        return _numbers(path, row, words, wanted)
 
-    sizes = [
-        int(each) for each in numbers(4, "the number of speeds, headings, frequencies, motions")
-    ]
-    if min(sizes) < 1 or sizes[3] != 6:
-        raise FileError(
-            f"{path}, line {row}: needs one or more of each, and six motions, not {sizes}."
-        )
-    speeds, headings, omega = (np.zeros(each) for each in sizes[:3])
-    values = np.zeros((*sizes[:3], 6), dtype=np.complex128)
-    for v in range(sizes[0]):
-        speeds[v] = numbers(5, "a speed")[0]
-        for m in range(sizes[1]):
-            headings[m] = np.radians(numbers(1, "a heading")[0])
-            for f in range(sizes[2]):
-                omega[f] = numbers(1, "a frequency")[0]
-                for _ in range(6):
-                    motion, real, imaginary = numbers(3, "a motion with its two parts")
-                    if not 1 <= int(motion) <= 6:
-                        raise FileError(
-                            f"{path}, line {row}: there is no motion {motion:g}; 1 to 6."
-                        )
-                    values[v, m, f, int(motion) - 1] = complex(real, imaginary)
-    return _ordered(str(path), speeds, headings, omega, values)
+    speeds, headings, frequencies, _ = map(int, following("speeds, headings, frequencies, motions"))
+    for _ in range(speeds):
+        speed = following("speed")[0]
+        for _ in range(headings):
+            (heading,) = following("heading")
+            for _ in range(frequencies):
+                (omega,) = following("frequency")
+                for _ in MOTIONS:
+                    motion, real, imaginary = following("motion, real part, imaginary part")
+                    value = complex(real, imaginary)
+                    yield Amplitude(speed, heading, omega, int(motion) - 1, value)
 
 
-def read_wamit(path: str | Path, length: float) -> TransferFunctions:
-    """Motion transfer functions of a WAMIT file of displacements, ``.4``.
-
-    Each line is period [s], heading [deg], motion 1 to 6, modulus, phase [deg], real and imaginary
-    part, by e^{+iωt} with the phase to the crest at the origin. WAMIT's z points up and its heading
-    is where waves run, from x to y: with x to the bow this module's own. Rotations are for ξ L/A.
-
-    Parameters
-    ----------
-    path : path
-        The file; lines of headings beyond 180 deg, which follow by symmetry, are left out.
-    length : float
-        ULEN of the run, by which rotations are made dimensionless. [m]
-
-    Raises
-    ------
-    FileError
-        If a line does not hold such numbers, or a motion is missing.
-    """
-    if not (isfinite(length) and length > 0.0):
-        raise InputError(f"WAMIT's length ULEN is {length:g} m, but must be above 0.")
-    found: dict[tuple[float, float, int], complex] = {}
+def _wamit(path: str | Path, length: float) -> Iterator[Amplitude]:
+    wanted = "period, heading, motion, modulus, phase, real part, imaginary part"
     for row, line in enumerate(read_text(path).splitlines(), 1):
         words = line.split()
-        try:
-            period, heading, motion, size, _, real, imaginary = map(float, words)
-        except ValueError:
-            if row == 1 and not _is_number(words[:1]):
-                continue  # a line of headings of columns
-            raise FileError(
-                f"{path}, line {row}: needs period, heading, motion, modulus, phase, real and "
-                "imaginary part, seven numbers; the file is cut or another one."
-            ) from None
+        if row == 1 and words and not words[0][-1].isdigit():
+            continue  # names of columns
+        period, heading, motion, size, _, real, imaginary = _numbers(path, row, words, wanted)
         value = complex(real, imaginary)
-        if not abs(abs(value) - size) <= 1e-3 * size + 1e-5 or motion not in range(1, 7):
+        if abs(abs(value) - size) > 1e-3 * size + 1e-5:
             raise FileError(
                 f"{path}, line {row}: the parts {real:g} and {imaginary:g} of motion {motion:g} "
-                f"have not the modulus {size:g}, or it is none of 1 to 6: these are no motions of "
-                "one ship as WAMIT writes them."
+                f"have not the modulus {size:g}: these are no motions of one ship as WAMIT writes "
+                "them."
             )
         if not period > 0.0:
             raise FileError(
                 f"{path}, line {row}: the period is {period:g} s; leave out the limits of zero and "
                 "infinite frequency."
             )
-        heading %= 360.0
-        if heading <= 180.0:
-            found[period, heading, int(motion)] = value / (length if motion > 3 else 1.0)
+        value /= length if motion > 3 else 1.0
+        yield Amplitude(0.0, heading, 2.0 * pi / period, int(motion) - 1, value)
+
+
+def _csv(path: str | Path) -> Iterator[Amplitude]:
+    parts = ", ".join(f"{motion}_{part}" for motion in MOTIONS for part in ("re", "im"))
+    wanted = f"speed, heading_deg, omega, {parts}"
+    for row, cells in enumerate(csv.DictReader(read_text(path).splitlines()), 2):
+        words = [{"speed": "0", **cells}.get(name) for name in wanted.split(", ")]
+        speed, heading, omega, *values = _numbers(path, row, words, wanted)
+        for motion, pair in enumerate(zip(values[::2], values[1::2], strict=True)):
+            yield Amplitude(speed, heading, omega, motion, complex(*pair))
+
+
+def _capytaine(path: str | Path) -> Iterator[Amplitude]:
+    """Capytaine counts by e^{-iωt}."""
+    from h5py import File
+
+    try:
+        with File(path, "r") as file:
+            name = next((each for each in ("RAO", "rao") if each in file), "RAO")
+            if name not in file:
+                raise FileError(f"{path} has no array RAO; it has {', '.join(file) or 'none'}.")
+            scales = [each[0] for each in file[name].dims]
+            dimensions = [each.name.rpartition("/")[2] for each in scales]
+            table = file[name][...]
+            labels = [each.asstr()[...] if each.dtype.kind == "O" else each[...] for each in scales]
+    except (OSError, ValueError, TypeError, IndexError, RuntimeError) as error:
+        raise FileError(
+            f"{path} is no file of netCDF 4 with an array RAO whose dimensions have coordinates: "
+            f"{error}."
+        ) from None
+    wanted = ("complex", "wave_direction", "omega", "radiating_dof")
+    named = ["radiating_dof" if each.endswith("_dof") else each for each in dimensions]
+    if sorted(named) != sorted(wanted):
+        raise FileError(
+            f"{path}: RAO has the dimensions {', '.join(dimensions)}, but needs {', '.join(wanted)}"
+            " with their coordinates."
+        )
+    order = [named.index(each) for each in wanted]
+    parts, directions, omega, freedom = (labels[i] for i in order)
+    names = [str(each).lower() for each in freedom]
+    parts = [str(each) for each in parts]
+    if sorted(parts) != ["im", "re"] or not set(MOTIONS) <= set(names):
+        raise FileError(
+            f"{path}: RAO has the motions {', '.join(names)} and the parts {', '.join(parts)}, but "
+            f"needs {', '.join(MOTIONS)}, re and im."
+        )
+    table = np.transpose(table, order)
+    made = table[parts.index("re")] - 1j * table[parts.index("im")]
+    for (m, f, i), value in np.ndenumerate(made):
+        if names[i] in MOTIONS:
+            heading = float(np.degrees(directions[m]))
+            yield Amplitude(0.0, heading, float(omega[f]), MOTIONS.index(names[i]), complex(value))
+
+
+def _gathered(path: str | Path, amplitudes: Iterable[Amplitude]) -> TransferFunctions:
+    """A table of all amplitudes, each grid rising, headings from 0 to 180 degrees."""
+    found = [
+        each._replace(heading=each.heading % 360.0)
+        for each in amplitudes
+        if each.heading % 360.0 <= 180.0 + 1e-9
+    ]
     if not found:
         raise FileError(f"{path} has no motions in waves from 0 to 180 deg.")
-    periods, headings = (np.array(sorted({key[i] for key in found})) for i in range(2))
-    values = np.empty((1, headings.size, periods.size, 6), dtype=np.complex128)
-    for m, heading in enumerate(headings.tolist()):
-        for f, period in enumerate(periods.tolist()):
-            for motion in range(1, 7):
-                if (period, heading, motion) not in found:
-                    raise FileError(
-                        f"{path}: there is no {MOTIONS[motion - 1]} for {period:g} s and "
-                        f"{heading:g} deg; the file is cut."
-                    )
-                values[0, m, f, motion - 1] = found[period, heading, motion]
-    return _ordered(str(path), np.zeros(1), np.radians(headings), 2.0 * np.pi / periods, values)
-
-
-def _is_number(words: list[str]) -> bool:
-    try:
-        return bool(words) and isfinite(float(words[0]))
-    except ValueError:
-        return False
-
-
-def read_capytaine(path: str | Path) -> TransferFunctions:
-    """Motion transfer functions of a netCDF file of Capytaine.
-
-    The file holds the array ``RAO`` (or ``rao``) that ``capytaine.post_pro.rao`` gives, stored by
-    ``separate_complex_values``, netCDF 4 or 3. Capytaine counts by e^{-iωt}; here it becomes
-    e^{+iωt}. Its headings are where waves run, from x to y.
-
-    Raises
-    ------
-    FileError
-        If the file cannot be read, or lacks that array, a dimension of it or a motion.
-    """
-    arrays, dimensions = _netcdf(path)
-    name = next((each for each in ("RAO", "rao") if each in arrays), None)
-    if name is None:
-        raise FileError(f"{path} has no array RAO; it has {', '.join(sorted(arrays)) or 'none'}.")
-    found = dimensions[name]
-    motion = next((each for each in found if each.endswith("_dof")), "radiating_dof")
-    order = ["complex", "wave_direction", "omega", motion]
-    lacks = [each for each in order if each not in found or each not in arrays]
-    if lacks or len(found) != 4:
-        raise FileError(
-            f"{path}: {name} has the dimensions {', '.join(found)}, but needs {', '.join(order)} "
-            "with their coordinates."
-        )
-    parts, names = arrays["complex"].tolist(), [each.lower() for each in arrays[motion].tolist()]
-    missing = [each for each in MOTIONS if each not in names]
-    if missing or sorted(parts) != ["im", "re"]:
-        raise FileError(
-            f"{path}: {name} has the motions {', '.join(names)} and the parts {', '.join(parts)}, "
-            f"but needs {', '.join(MOTIONS)}, re and im."
-        )
-    table = np.transpose(arrays[name], [found.index(each) for each in order])
-    made = table[parts.index("re")] - 1j * table[parts.index("im")]
-    turned = np.mod(np.asarray(arrays["wave_direction"], dtype=np.float64), 2.0 * np.pi)
-    near = turned <= np.pi + 1e-9
-    values = made[near][None, :, :, [names.index(each) for each in MOTIONS]]
-    if not np.isfinite(values).all():
-        raise FileError(f"{path}: {name} is not finite everywhere.")
-    omega = np.asarray(arrays["omega"], dtype=np.float64)
-    return _ordered(str(path), np.zeros(1), turned[near], omega, values)
-
-
-def _netcdf(path: str | Path) -> tuple[dict[str, Any], dict[str, tuple[str, ...]]]:
-    """Arrays of a netCDF file, words as str, and their dimensions, by name."""
-    arrays: dict[str, Any] = {}
-    dimensions: dict[str, tuple[str, ...]] = {}
-    try:
-        if Path(path).read_bytes()[:3] == b"CDF":
-            from scipy.io import netcdf_file
-
-            with netcdf_file(path, mmap=False) as old:
-                for name, each in old.variables.items():
-                    data, dimensions[name] = each[...], tuple(each.dimensions)
-                    if data.dtype.kind == "S":
-                        words = [b"".join(row.tolist()).decode().strip("\0 ") for row in data]
-                        data, dimensions[name] = np.array(words), dimensions[name][:1]
-                    arrays[name] = np.array(data)
-            return arrays, dimensions
-        from h5py import Dataset, File
-
-        with File(path, "r") as new:
-            for name, each in new.items():
-                if isinstance(each, Dataset):
-                    data = each[...]
-                    if data.dtype.kind in "OS":
-                        data = np.array([word.decode() for word in data.ravel().tolist()])
-                    arrays[name] = data
-                    axes = (
-                        scale[0].name.rpartition("/")[2] if scale else "" for scale in each.dims
-                    )
-                    dimensions[name] = (name,) if each.is_scale else tuple(axes)
-    except (OSError, ValueError, TypeError, AttributeError, UnicodeDecodeError) as error:
-        raise FileError(f"{path} is no netCDF file that can be read: {error}.") from None
-    return arrays, dimensions
-
-
-def read_csv(path: str | Path) -> TransferFunctions:
-    """Motion transfer functions of a CSV table in this module's convention.
-
-    Columns are ``heading_deg``, ``omega`` [rad/s], and for each motion ``surge_re``, ``surge_im``
-    and so on [m/m], [rad/m]; a row for each heading and frequency. A column ``speed`` [m/s] may be
-    there.
-
-    Raises
-    ------
-    FileError
-        If a column or row is missing, or a cell is no number.
-    """
-    rows = list(csv.DictReader(read_text(path).splitlines()))
-    wanted = ["heading_deg", "omega", *(f"{m}_{part}" for m in MOTIONS for part in ("re", "im"))]
-    found: list[list[float]] = []
-    for n, each in enumerate(rows, 2):
-        numbers = []
-        for name in ("speed", *wanted):
-            cell = each.get(name, "0" if name == "speed" else None)
-            try:
-                numbers.append(float(cell or ""))
-            except ValueError:
-                raise FileError(
-                    f"{path}, line {n}: {name} is {cell!r}, but must be a number."
-                ) from None
-        found.append(numbers)
-    if not found:
-        raise FileError(f"{path} has no rows; it needs the columns {', '.join(wanted)}.")
-    table = np.array(found)
+    columns = [np.array(column) for column in zip(*found, strict=True)]
     (speeds, v), (headings, m), (omega, f) = (
-        np.unique(table[:, column], return_inverse=True) for column in range(3)
+        np.unique(column, return_inverse=True) for column in columns[:3]
     )
+    motion, amplitude = columns[3:]
+    if motion.min() < 0 or motion.max() > 5:
+        raise FileError(f"{path} has a motion {motion.max() + 1} of a ship; there are 1 to 6.")
     values = np.full((speeds.size, headings.size, omega.size, 6), np.nan, dtype=np.complex128)
-    values[v, m, f] = table[:, 3::2] + 1j * table[:, 4::2]
-    gap = np.argwhere(np.isnan(values[..., 0]))
-    if gap.size:
-        _, i, j = gap[0]
-        raise FileError(f"{path}: there is no row for {headings[i]:g} deg and {omega[j]:g} rad/s.")
-    return _ordered(str(path), speeds, np.radians(headings), omega, values)
-
-
-def _ordered(
-    name: str, speeds: Array, headings: Array, omega: Array, values: Complex
-) -> TransferFunctions:
-    """A table with rising headings from 0 to 180 degrees and rising frequencies."""
-    by_speed, by_heading, by_omega = np.argsort(speeds), np.argsort(headings), np.argsort(omega)
-    headings, omega = headings[by_heading], omega[by_omega]
-    rising = (np.diff(omega) > 0.0).all() and (np.diff(headings) > 0.0).all()
-    if not (rising and omega[0] > 0.0 and headings[0] >= 0.0 and headings[-1] <= np.pi + 1e-9):
+    values[v, m, f, motion] = amplitude
+    gaps = np.argwhere(~np.isfinite(values))
+    if gaps.size:
+        _, i, j, lacks = gaps[0]
         raise FileError(
-            f"{name}: headings must differ from each other within 0 to 180 deg, and frequencies be "
-            "above 0, each given once."
+            f"{path}: there is no {MOTIONS[lacks]} for {omega[j]:g} rad/s and {headings[i]:g} deg; "
+            "the file is cut."
         )
-    if headings.size > 1 and (headings[0] > 1e-9 or headings[-1] < np.pi - 1e-9):
-        raise FileError(f"{name}: headings must reach from 0 to 180 deg.")
-    values = values[by_speed][:, by_heading][:, :, by_omega]
-    return TransferFunctions(name, speeds[by_speed], headings, omega, values)
+    if len(found) > values.size or omega[0] <= 0.0:
+        raise FileError(f"{path}: frequencies must be above 0, and each wave be there once.")
+    if headings.size > 1 and (headings[0] > 1e-6 or headings[-1] < 180.0 - 1e-6):
+        raise FileError(f"{path}: headings must reach from 0 to 180 deg.")
+    return TransferFunctions(str(path), speeds, np.radians(headings), omega, values)

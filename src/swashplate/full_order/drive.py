@@ -5,7 +5,7 @@ A physical set stands behind the card and solenoids of a drive.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from math import ceil, floor
@@ -16,8 +16,6 @@ from numpy.typing import ArrayLike, NDArray
 
 from swashplate import maneuvers
 from swashplate.drive import Drive
-from swashplate.equations.adjoints import Derived
-from swashplate.equations.code import generating
 from swashplate.equations.derivatives import derive
 from swashplate.equations.equation import interpreted
 from swashplate.equations.marching.jacobian import jacobian
@@ -26,17 +24,16 @@ from swashplate.equations.marching.part import Stored
 from swashplate.equations.marching.record import (
     SOURCE_RATE,
     Interpolation,
-    Record,
     least_substeps,
     record_of,
 )
-from swashplate.equations.marching.run import Instance, Part, Start, check_start, marched
+from swashplate.equations.marching.run import Instance, Part, Start, marched
 from swashplate.errors import DomainError, InputError
 from swashplate.full_order.physical_set import PhysicalSet, from_lumped
 from swashplate.models import full_order as model
 from swashplate.models.displacement_control import Solenoids, solenoid_force
 from swashplate.models.drive import Source
-from swashplate.models.full_order import Motion, PlantConstants, PlantOptions, PlantSignals
+from swashplate.models.full_order import PlantConstants, PlantOptions, PlantSignals
 from swashplate.models.machine import Machine, fastest_rate
 from swashplate.parameters.parameter_set import Change
 from swashplate.results import Result, Tabular
@@ -215,8 +212,7 @@ class FullOrderDrive:
         ParameterError
             For an unknown name, or if lumps contradict each other or a choice.
         """
-        title = drive.parameters.title
-        return cls(drive, from_lumped(drive.parameters, like, title=title, entries=chosen))
+        return cls(drive, from_lumped(drive.parameters, like, **chosen))
 
     def replace(self, **changes: Change) -> FullOrderDrive:
         """With other physical values in SI, e.g. ``replace(load_torque=2e3)``."""
@@ -236,32 +232,20 @@ class FullOrderDrive:
             self.physical.machine, Solenoids(*(numbers[name] for name in Solenoids._fields))
         )
 
-    def options(self, *, held: bool = False) -> model.PlantOptions:
-        """Forms of the equations; with `held` the current keeps its value between samples."""
-        symmetric = self.drive.parameters.pressure_root == "symmetric"
-        return model.PlantOptions(
-            True if symmetric else None, self.physical.air, True if held else None
-        )
-
-    def instance(
-        self, step: float, *, substeps: int | None = None, card: bool = True, held: bool = False
-    ) -> Instance:
+    def instance(self, step: float, *, substeps: int | None = None, card: bool = True) -> Instance:
         """The model with numbers, for the engine: behind a voltage, or without a card a current.
 
-        At a distance of the samples [s]; `substeps` as in `simulate_current`, `held` in `options`.
+        At a distance of the samples [s]; `substeps` as in `follow`.
         """
-        behind = self._machine(self.substeps(step, substeps), held)
-        if not card:
-            return behind
         parameters = self.drive.parameters
-        check_filter_stability(parameters, step)
-        front = Part(card_of(parameters), card_options(parameters))
-        return Instance(model.full_drive, (front, behind.parts[1]), self.physical.name)
-
-    def _machine(self, substeps: int, held: bool = False) -> Instance:
-        given = model.Substeps(float(substeps))
-        plant = Part(self.plant, self.options(held=held), given)
-        return Instance(model.full_machine, (Part(Source()), plant), self.physical.name)
+        symmetric = parameters.pressure_root == "symmetric"
+        options = PlantOptions(symmetric or None, self.physical.air)
+        given = model.Substeps(float(self.substeps(step, substeps)))
+        plant, front, kind = Part(self.plant, options, given), Part(Source()), model.full_machine
+        if card:
+            check_filter_stability(parameters, step)
+            front, kind = Part(card_of(parameters), card_options(parameters)), model.full_drive
+        return Instance(kind, (front, plant), self.physical.name)
 
     def substeps(self, step: float, wanted: int | None = None) -> int:
         """Sub-steps that a step [s] of the record takes.
@@ -307,7 +291,7 @@ class FullOrderDrive:
         """Simulate card and machine over a command [V]; arguments as `Drive.simulate`.
 
         The card's current at its own steps drives the machine, a straight line between them.
-        `substeps` as in `simulate_current`.
+        `substeps` as in `follow`.
         """
         run = self.drive.simulate(
             voltage, rate, time=time, interpolation=interpolation, start=start, clip=clip
@@ -319,30 +303,13 @@ class FullOrderDrive:
     ) -> FullOrderSimulation:
         """Simulate the machine over the current of a run that there is.
 
-        The run is by voltage or by current; its current at the march's own steps counts, a
-        straight line between them. Other arguments as in `simulate_current`.
-        """
-        record = Record(run.fine("current"), run.record.start, run.record.rate, run.record.substeps)
-        return self._integrate(record, False, start, substeps)
-
-    def simulate_current(
-        self,
-        current: ArrayLike,
-        rate: float = SOURCE_RATE,
-        *,
-        time: ArrayLike | None = None,
-        interpolation: Interpolation | None = None,
-        start: Start = "rest",
-        substeps: int | None = None,
-    ) -> FullOrderSimulation:
-        """Simulate the machine over a signed current.
-
         Parameters
         ----------
-        current : (n,) array_like
-            Current, positive towards more speed. [A]
-        rate, time, interpolation, start :
-            As in `Drive.simulate`.
+        run : Simulation
+            By voltage or by current; its current at the march's own steps counts, a straight line
+            between them.
+        start : {"rest", "steady"}
+            Of the machine.
         substeps : int, optional
             Sub-steps of the march a sample, at least 512 samples a second; by default 8, or so
             many that the fastest mode takes six steps a turn.
@@ -350,21 +317,49 @@ class FullOrderDrive:
         Raises
         ------
         InputError
-            For a record or option that cannot be simulated.
+            For an option that cannot be simulated.
         DomainError
             If the machine is too stiff for the march.
         """
-        record = record_of(current, rate, what="current", time=time, interpolation=interpolation)
-        return self._integrate(record, interpolation == "previous", start, substeps)
+        step, record = run.record.step, replace(run.record, values=run.fine("current"))
+        instance = self.instance(step, substeps=substeps, card=False)
+        started = instance.start({"current": float(record.values[0])}, step, start)
+        out = marched(instance, {"current": record.values}, step, started, KEPT, "current")
+        constants = started.arguments[1]["k"]
+        return FullOrderSimulation(self.physical.name, record, self.plant, constants, out)
 
     def modes(self, current: float = 0.0) -> Modes:
-        """Natural modes about the equilibrium under a constant signed current. [A]"""
+        """Natural modes about the equilibrium under a constant signed current, no limit holding.
+
+        The slow pole is the eigenvalue nearest zero. The spool's mode is the one in which position
+        and velocity of the spool take the largest part, by the product of left and right
+        eigenvectors.
+        """
         if not np.isfinite(current):
             raise InputError(f"The current is {current}, but must be a finite number of amperes.")
-        first = {"current": float(current)}
-        state = self._machine(1).start(first, 1.0 / SOURCE_RATE, "steady").states[1]
-        force = float(interpreted(solenoid_force)(float(current), self.plant.solenoids))
-        return _modes(state.motion, force, self.plant.machine, self.options())
+        step = 1.0 / SOURCE_RATE
+        instance = self.instance(step, card=False)
+        motion = instance.start({"current": float(current)}, step, "steady").states[1].motion
+        force = interpreted(solenoid_force)(float(current), self.plant.solenoids)
+        options = instance.options[1]
+        derived = derive(model.free_rates, by="state", options={"options": options})
+        found = derived.python(motion, force, self.plant.machine, options)
+        matrix = np.zeros((5, 5))
+        matrix[0, 1] = matrix[3, 4] = 1.0
+        for (row, column), slope in zip(derived.entries, found[3:], strict=True):
+            matrix[(1, 2, 4)[row], column] = slope
+        values, right = np.linalg.eig(matrix)
+        parts = np.abs(np.linalg.inv(right).T * right)  # (state, mode), free of the states' units
+        slow = int(np.argmin(np.abs(values)))
+        others = [k for k in range(5) if k != slow]
+        by_spool = sorted(others, key=lambda k: -float(parts[:2, k].sum() / parts[:, k].sum()))
+        return Modes(
+            values.astype(np.complex128),
+            complex(values[slow]),
+            _upper(values[by_spool[:2]]),
+            _upper(values[by_spool[2:]]),
+            _upper(np.linalg.eigvals(matrix[3:, 3:])),
+        )
 
     def sensitivities(
         self,
@@ -390,17 +385,6 @@ class FullOrderDrive:
             record, [Observation(signal, record.time, zeros)], "voltage", start
         )
         return jacobian(self.instance(record.step, substeps=substeps), observed, columns).columns
-
-    def _integrate(
-        self, record: Record, held: bool, start: Start, substeps: int | None
-    ) -> FullOrderSimulation:
-        check_start(start)
-        step, records = record.step, {"current": np.ascontiguousarray(record.values)}
-        instance = self._machine(self.substeps(step, substeps), held)
-        started = instance.start({"current": float(record.values[0])}, step, start)
-        out = marched(instance, records, step, started, KEPT, "current")
-        constants = started.arguments[1]["k"]
-        return FullOrderSimulation(self.physical.name, record, self.plant, constants, out)
 
 
 # --- natural modes --------------------------------------------------------------------------------
@@ -446,41 +430,10 @@ class Modes(Result):
         return made
 
 
-@generating
-def _slopes(options: PlantOptions) -> Derived:
-    """Derivatives of the rates by the five states."""
-    return derive(model.free_rates, by="state", options={"options": options})
-
-
-def _modes(at: Motion, force: float, p: Machine, options: PlantOptions) -> Modes:
-    """Modes about a motion, no limit holding.
-
-    The slow pole is the eigenvalue nearest zero. The spool's mode is the one in which position and
-    velocity of the spool take the largest part, by the product of left and right eigenvectors.
-    """
-    matrix, derived = np.zeros((5, 5)), _slopes(options)
-    matrix[0, 1] = matrix[3, 4] = 1.0
-    found = derived.python(at, force, p, options)[len(derived.outputs) :]
-    for (row, column), slope in zip(derived.entries, found, strict=True):
-        matrix[(1, 2, 4)[row], column] = slope
-    values, right = np.linalg.eig(matrix)
-    parts = np.abs(np.linalg.inv(right).T * right)  # (state, mode), free of the states' units
-    slow = int(np.argmin(np.abs(values)))
-    others = [k for k in range(5) if k != slow]
-    by_spool = sorted(others, key=lambda k: -float(parts[:2, k].sum() / parts[:, k].sum()))
-
-    def upper(pair: NDArray[np.number]) -> complex:
-        """The one with positive imaginary part, or the slower of two real ones."""
-        best = np.argmax(pair.imag) if (pair.imag > 0.0).any() else np.argmin(np.abs(pair))
-        return complex(pair[int(best)])
-
-    return Modes(
-        values.astype(np.complex128),
-        complex(values[slow]),
-        upper(values[by_spool[:2]]),
-        upper(values[by_spool[2:]]),
-        upper(np.linalg.eigvals(matrix[3:, 3:])),
-    )
+def _upper(pair: NDArray[np.number]) -> complex:
+    """The one with positive imaginary part, or the slower of two real ones."""
+    best = np.argmax(pair.imag) if (pair.imag > 0.0).any() else np.argmin(np.abs(pair))
+    return complex(pair[int(best)])
 
 
 # --- one state against five -----------------------------------------------------------------------
@@ -517,8 +470,6 @@ class Comparison(Tabular):
     full: FullOrderSimulation
     reduced_speed: Array
     """Shaft speed of the reduced model. [rad/s]"""
-    step_error: float
-    """Largest error of the reduced model's march at its usual step. [rad/s]"""
     voltage: Array | None
     """Command, None where a current was given instead. [V]"""
 
@@ -562,46 +513,33 @@ class Comparison(Tabular):
 def compare(full: FullOrderDrive, run: Simulation, *, start: Start = "rest") -> Comparison:
     """Simulate both models over the current of a run of ``full.drive``.
 
-    The reduced model has the lumps of the full-order one; `start` as in
-    `FullOrderDrive.simulate_current`.
+    The reduced model has the lumps of the full-order one; `start` as in `FullOrderDrive.follow`.
     """
     followed = full.follow(run, start=start)
-    record, reduced = followed.record, full.reduced
+    record = followed.record
     rate = record.rate * record.substeps
-
-    def speed(substeps: int) -> Array:
-        made = reduced.simulate_current(record.values, rate, start=start, substeps=substeps)
-        return np.ascontiguousarray(made.shaft_speed[:: record.substeps])
-
-    least = least_substeps(rate)
     steps = min(ceil(FINE_STEPS * SOURCE_RATE / rate), MOST_STEPS // record.values.size)
-    fine = speed(max(steps, LEAST_FINE_STEPS, least))
-    step_error = float(np.abs(speed(least) - fine).max())
-    return Comparison(followed, read_only(fine), step_error, run.voltage)
+    fine = full.reduced.simulate_current(
+        record.values,
+        rate,
+        start=start,
+        substeps=max(steps, LEAST_FINE_STEPS, least_substeps(rate)),
+    )
+    speed = np.ascontiguousarray(fine.shaft_speed[:: record.substeps])
+    return Comparison(followed, read_only(speed), run.voltage)
 
 
-def validity(
-    full: FullOrderDrive, rate: float = SOURCE_RATE, *, begin: Callable[[str], object] | None = None
-) -> Table:
-    """For which of `TABLE_MANEUVERS` one state is enough, as `validity_table` has it.
-
-    `begin` is called with the name of each maneuver before it is simulated.
-    """
-
-    def compared() -> Iterable[tuple[str, Comparison]]:
-        for name, maneuver in TABLE_MANEUVERS:
-            if begin is not None:
-                begin(name)
-            yield name, compare(full, full.drive.simulate(maneuver.sample(rate), rate))
-
-    return validity_table(full.physical.name, compared())
+def validity(full: FullOrderDrive, rate: float = SOURCE_RATE) -> Table:
+    """For which of `TABLE_MANEUVERS` one state is enough, as `validity_table` has it."""
+    runs = ((name, full.drive.simulate(each.sample(rate), rate)) for name, each in TABLE_MANEUVERS)
+    return validity_table(full.physical.name, ((name, compare(full, run)) for name, run in runs))
 
 
 def validity_table(axis: str, compared: Iterable[tuple[str, Comparison]]) -> Table:
     """Differences in shaft speed under some commands, and whether one state is enough for them.
 
-    A row for each command: top speed, largest and rms difference and step error of the usual march
-    in per cent of it, and whether the largest difference is within 1 %; none without motion.
+    A row for each command: top speed, largest and rms difference in per cent of it, and whether the
+    largest difference is within 1 %; none without motion.
     """
     made = Table(
         "Reduced model less full-order one, in % of the top speed",
@@ -611,18 +549,16 @@ def validity_table(axis: str, compared: Iterable[tuple[str, Comparison]]) -> Tab
             Column("top", ".2f", "rad/s", key="top_speed"),
             Column("largest", ".2f", key="largest_percent"),
             Column("rms", ".2f", key="rms_percent"),
-            Column("step error", ".2f", key="step_error_percent"),
             Column("within 1 %", key="within_1_percent"),
         ),
     )
     for name, each in compared:
-        if not each.moves:
-            made.add(axis, name, each.top_speed, *(None,) * 3, Cell(None, "does not move"))
-            continue
-        enough = each.relative[0] <= ENOUGH
-        parts = (*each.relative, each.step_error / each.top_speed)
-        words = Cell(enough, "yes" if enough else "no")
-        made.add(axis, name, each.top_speed, *(100.0 * part for part in parts), words)
+        if each.moves:
+            enough = each.relative[0] <= ENOUGH
+            cell = Cell(enough, "yes" if enough else "no")
+            made.add(axis, name, each.top_speed, *(100.0 * x for x in each.relative), cell)
+        else:
+            made.add(axis, name, each.top_speed, None, None, Cell(None, "does not move"))
     return made
 
 

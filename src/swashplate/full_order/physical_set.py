@@ -1,7 +1,7 @@
 """Physical sets: arms, springs, masses, areas, oil and load of one machine, always valid.
 
 The quantities are those that `swashplate.models.machine.Machine` declares. A set is given whole, or
-completed from lumped parameters and a few chosen values; TOML files have either.
+completed from lumped parameters and a few chosen values.
 """
 
 from __future__ import annotations
@@ -11,25 +11,23 @@ from dataclasses import dataclass, field, replace
 from difflib import get_close_matches
 from functools import cache
 from importlib.resources import files
-from math import pi, sqrt, tan
-from pathlib import Path
-from types import MappingProxyType
-from typing import Literal
+from math import pi, sqrt
+from typing import Any, Literal
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict
 
-from swashplate.documents import parse_toml, read_text, validated
+from swashplate.documents import parse_toml, validated
 from swashplate.equations.equation import interpreted
 from swashplate.equations.fields import Flag, declared_by
-from swashplate.errors import InputError, ParameterError
+from swashplate.errors import ParameterError
 from swashplate.models import machine as equations
 from swashplate.models.machine import Machine
 from swashplate.parameters.definitions import Definition, definition_of
-from swashplate.parameters.files import AXES, Entry, parameter_of, written
+from swashplate.parameters.files import AXES, Entry, FilePart, parameter_of
 from swashplate.parameters.files import load_preset as load_parameters
 from swashplate.parameters.parameter_set import (
     Change,
+    Entries,
     HasParameters,
     Pair,
     Parameter,
@@ -38,7 +36,7 @@ from swashplate.parameters.parameter_set import (
     set_of,
     value_of,
 )
-from swashplate.parameters.rules import out_of_range, range_sentence
+from swashplate.parameters.rules import Broken, Rule, applied, range_rule, refuse
 from swashplate.tables import Column, Table
 from swashplate.units import chosen_unit, unit_text
 
@@ -46,33 +44,45 @@ QUANTITIES: Mapping[str, Definition] = {
     each.symbol: definition_of(each, "physical") for each in declared_by(Machine)
 }
 """Quantities by name, from the spool to the load."""
-CHOICES: Mapping[str, Definition] = {
-    name: Definition(
-        meaning, unit, 0.0, above=above, stands_for=stands_for, symbol=name, block="physical"
-    )
-    for name, stands_for, meaning, unit, above in (
-        ("spool_frequency", "ω_sp", "natural frequency of the spool", "rad/s", 0.0),
-        ("spool_damping_ratio", "ζ_sp", "damping ratio of the spool", "1", None),
-        (
-            *("swash_frequency", "ω_sw"),
-            *("natural frequency of the swash plate at held pressure", "rad/s", 0.0),
-        ),
-        ("swash_damping_ratio", "ζ_sw", "damping ratio of the swash plate", "1", None),
-    )
-}
-"""What may be chosen in place of inertias and dampings when a set is completed."""
 IN_PLACE_OF: Mapping[str, str] = {
     "feedback_arm_inertia": "spool_frequency",
     "spool_damping": "spool_damping_ratio",
     "swash_inertia": "swash_frequency",
     "piston_damping": "swash_damping_ratio",
 }
-"""Quantities that may be chosen in place of a frequency or a damping ratio."""
+"""Quantities, and what may be chosen in their place when a set is completed."""
+CHOICES: Mapping[str, Definition] = {
+    f"{part}_{what}": Definition(
+        f"{meaning} of the {words}",
+        unit,
+        0.0,
+        above=above,
+        symbol=f"{part}_{what}",
+        block="physical",
+    )
+    for part, words in (("spool", "spool"), ("swash", "swash plate at held pressure"))
+    for what, meaning, unit, above in (
+        ("frequency", "natural frequency", "rad/s", 0.0),
+        ("damping_ratio", "damping ratio", "1", None),
+    )
+}
+"""What these are."""
 AGREES = 1e-9  # Relative difference up to which a given value agrees with the one that follows.
+ARM_TURNS: Rule = (
+    lambda n: ~(n["arm_sine"] < 1.0),
+    "swash_arm/control_arm·tan swash_stop_{side} is {arm_sine:.4g}, but must be below 1: at its "
+    "stop the swash plate would turn the feedback arm past 90°.",
+)
+LOAD_HELD: Rule = (
+    lambda n: ~(np.abs(n["rest"]) < n["ceiling"]),
+    "the load holds a stroking pressure of {rest:.4g} Pa at rest, but it must stay below "
+    "{ceiling:.4g} Pa, the smaller of supply_pressure and relief_pressure; check load_torque, "
+    "pumping_area and pumping_arm.",
+)
 
 
 @dataclass(frozen=True)
-class PhysicalSet(Mapping[str, Parameter]):
+class PhysicalSet(Entries):
     """All physical quantities of a drive, by name; one that has a default may be left out.
 
     Raises
@@ -83,58 +93,29 @@ class PhysicalSet(Mapping[str, Parameter]):
 
     name: str
     title: str
-    entries: Mapping[str, Parameter]
+    parameters: Mapping[str, Parameter]
     numbers: Mapping[str, float] = field(init=False, repr=False, compare=False)
     """Every single value by column, e.g. ``swash_stop_plus``."""
 
     def __post_init__(self) -> None:
-        for name in self.entries:
+        for name in self.parameters:
             quantity_of(name)
-        entries = {
+        found = {
             name: Parameter(each, each.default, status="assumed")
             for name, each in QUANTITIES.items()
             if each.default is not None
-        } | dict(self.entries)
-        missing = [name for name in QUANTITIES if name not in entries]
+        } | dict(self.parameters)
+        missing = [name for name in QUANTITIES if name not in found]
         if missing:
             raise ParameterError(f"{self.name}: no value for {', '.join(missing)}.")
-        ordered = {name: entries[name] for name in QUANTITIES}
-        numbers: dict[str, float] = {}
-        for entry in ordered.values():
-            _check_range(self.name, entry)
-            numbers |= zip(entry.definition.columns, entry.values, strict=True)
-        _check_together(self.name, numbers)
-        object.__setattr__(self, "entries", MappingProxyType(ordered))
-        object.__setattr__(self, "numbers", MappingProxyType(numbers))
+        self._keep({name: found[name] for name in QUANTITIES})
+        refuse(self.name, _broken_rules(self))
 
     @classmethod
     def preset(cls, name: str) -> PhysicalSet:
         """An assumed set of one of Kruse's axes: ``"hoist"``, ``"slew"``, ``"luff"``."""
-        return _set_of(_packaged(name), f"{name}.toml")
-
-    @classmethod
-    def from_toml(cls, path: str | Path) -> PhysicalSet:
-        """A set from a file; a `ParameterError` names file, quantity and rule."""
-        origin = str(path)
-        return _set_of(validated(parse_toml(read_text(path), origin), PhysicalFile, origin), origin)
-
-    def to_toml(self, path: str | Path) -> None:
-        """Store all quantities; `from_toml` gives an equal set back.
-
-        If the file cannot be written (`FileError`), an older one stays as it was.
-        """
-        from tomlkit import comment, document, dumps, table
-
-        from swashplate.tables import write_text
-
-        text, entries = document(), table()
-        text.add(comment("swashplate physical set; SI units; [plus, minus] as magnitudes"))
-        for name, value in (("format", 1), ("name", self.name), ("title", self.title)):
-            text.add(name, value)
-        for name, each in self.items():
-            entries.add(name, written(each))
-        text.add("physical", entries)
-        write_text(dumps(text), path)
+        title, _ = _assumed(name)
+        return replace(from_lumped(load_parameters(name), name), title=title)
 
     @property
     def machine(self) -> Machine:
@@ -144,7 +125,7 @@ class PhysicalSet(Mapping[str, Parameter]):
     @property
     def air(self) -> Flag:
         """Whether there is free air in the oil, as an option of the equations."""
-        return air_in(self.numbers)
+        return _air(self.machine)
 
     def to_lumped(self, Z6: float | None = None) -> dict[str, Change]:
         """Lumped parameters that the set stands for; Kruse eqs. 6.56-6.70 and table 6.1.
@@ -154,63 +135,49 @@ class PhysicalSet(Mapping[str, Parameter]):
         Z6↔Z8: away from the stops only Z7/(1+Z6) and Z8/(1+Z6) count; by default the physical
         A_s²B/(k_r V).
         """
-        n, P0 = self.numbers, rest_pressure(self.numbers)
-        stiffness = rest_modulus(n) / n["oil_volume"]
-        own = n["piston_area"] ** 2 * stiffness / n["return_spring_rate"]
+        m = self.machine
+        rest, stiffness = _rest(m)
+        own = m.piston_area**2 * stiffness / m.return_spring_rate
         gauge = 1.0 if Z6 is None else (1.0 + Z6) / (1.0 + own)
-        spring_moment = n["feedback_spring_rate"] * n["feedback_spring_arm"] ** 2
-        accelerating = n["motor_leakage"] * n["motor_constant"] * n["pump_flow_gain"]
+        accelerating = m.motor_leakage * m.motor_constant * m.pump_flow_gain
         return {
-            "Z1": n["piston_area"] / (n["return_spring_rate"] * n["swash_arm"]),
+            "Z1": m.piston_area / (m.return_spring_rate * m.swash_arm),
             # K_mf C_g A_p d5/(k_r d4²) - Z1 P0, which the definition of P0 makes zero (erratum 20)
             "Z2": 0.0,
-            "Z3": n["swash_arm"] / n["control_arm"],
-            "Z4": spring_moment**2,
-            "Z5": n["spool_arm"],
+            "Z3": m.swash_arm / m.control_arm,
+            "Z4": (m.feedback_spring_rate * m.feedback_spring_arm**2) ** 2,
+            "Z5": m.spool_arm,
             "Z6": own if Z6 is None else Z6,
-            "Z7": n["piston_leakage"] * stiffness * gauge,
-            "Z8": n["valve_flow_gain"] * stiffness * gauge,
-            "Z9": n["supply_pressure"] - P0,
-            "Z10": n["motor_constant"] * n["pump_flow_gain"],
-            "Z11": n["motor_leakage"] * n["load_torque"] + 0.0,  # not -0
-            "Z12": accelerating * n["load_inertia"],
-            "Z13": Pair(n["swash_stop_plus"], n["swash_stop_minus"]),
-            "Z14": n["spool_stroke"],
-            "Z15": n["relief_pressure"],
-            "Z16": Pair(n["orifice_opening_plus"], n["orifice_opening_minus"]),
-            "Z18": n["plussing"],
+            "Z7": m.piston_leakage * stiffness * gauge,
+            "Z8": m.valve_flow_gain * stiffness * gauge,
+            "Z9": m.supply_pressure - rest,
+            "Z10": m.motor_constant * m.pump_flow_gain,
+            "Z11": m.motor_leakage * m.load_torque + 0.0,  # not -0
+            "Z12": accelerating * m.load_inertia,
+            "Z13": Pair(m.swash_stop_plus, m.swash_stop_minus),
+            "Z14": m.spool_stroke,
+            "Z15": m.relief_pressure,
+            "Z16": Pair(m.orifice_opening_plus, m.orifice_opening_minus),
+            "Z18": m.plussing,
         }
+
+    def replace(self, **changes: Change) -> PhysicalSet:
+        """A set with other values in SI, ``replace(load_torque=2e3)``, marked as the user's."""
+        made = {
+            name: Parameter(quantity_of(name), value_of(name, quantity_of(name), change))
+            for name, change in changes.items()
+        }
+        return replace(self, parameters={**self.parameters, **made})
+
+    def __getitem__(self, name: str) -> Parameter:
+        quantity_of(name)
+        return self.parameters[name]
 
     def __repr__(self) -> str:
         return f"PhysicalSet({self.name!r}, {len(self)} quantities)"
 
-    def __getitem__(self, name: str) -> Parameter:
-        quantity_of(name)
-        return self.entries[name]
-
-    def __contains__(self, name: object) -> bool:
-        return name in self.entries
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(self.entries)
-
-    def __len__(self) -> int:
-        return len(self.entries)
-
     def __hash__(self) -> int:
         return hash((self.name, *self.numbers.values()))
-
-    def __reduce__(self) -> tuple[object, ...]:
-        # read-only views cannot be pickled, so a copy in another process is built anew
-        return PhysicalSet, (self.name, self.title, dict(self.entries))
-
-    def replace(self, **changes: Change) -> PhysicalSet:
-        """A set with other values in SI, ``replace(load_torque=2e3)``, marked as the user's."""
-        entries = dict(self.entries)
-        for name, change in changes.items():
-            quantity = quantity_of(name)
-            entries[name] = Parameter(quantity, value_of(name, quantity, change))
-        return replace(self, entries=entries)
 
 
 def quantity_of(name: str) -> Definition:
@@ -227,52 +194,37 @@ def quantity_of(name: str) -> Definition:
     raise ParameterError(f"A physical set has no quantity '{name}'{choice}.")
 
 
-def air_in(numbers: Mapping[str, float]) -> Flag:
-    """Whether there is free air in the oil."""
-    return True if numbers.get("air_fraction", 0.0) > 0.0 else None
+def chosen_quantity(name: str) -> Definition:
+    """What may be chosen by a name: a quantity, or one of `CHOICES`."""
+    return CHOICES[name] if name in CHOICES else quantity_of(name)
 
 
-def rest_pressure(numbers: Mapping[str, float]) -> float:
-    """P0, which holds the load with the plate upright; see `machine.static_pressure`. [Pa]"""
-    return float(interpreted(equations.static_pressure)(_machine_of(numbers)))
+def _air(machine: Machine) -> Flag:
+    return True if machine.air_fraction > 0.0 else None
 
 
-def rest_modulus(numbers: Mapping[str, float]) -> float:
-    """Bulk modulus of the oil at that pressure. [Pa]"""
-    machine, air = _machine_of(numbers), air_in(numbers)
-    return float(interpreted(equations.oil_modulus)(rest_pressure(numbers), machine, air))
+def _rest(machine: Machine) -> tuple[float, float]:
+    """P0, which holds the load with the plate upright [Pa], and the oil's B/V there [Pa/m³]."""
+    pressure = float(interpreted(equations.static_pressure)(machine))
+    modulus = interpreted(equations.oil_modulus)(pressure, machine, _air(machine))
+    return pressure, float(modulus) / machine.oil_volume
 
 
-def _machine_of(numbers: Mapping[str, float]) -> Machine:
-    """A machine of what is known; nothing else may be asked of it."""
-    return Machine(*(numbers.get(name, 0.0) for name in Machine._fields))
-
-
-def _check_range(owner: str, entry: Parameter) -> None:
-    for column, value in zip(entry.definition.columns, entry.values, strict=True):
-        if out_of_range(entry.definition, np.array([value]))[0]:
-            said = range_sentence(column, entry.definition, np.array([value]), 0)
-            raise ParameterError(f"{owner}: {said}")
-
-
-def _check_together(owner: str, numbers: Mapping[str, float]) -> None:
-    """What quantities must satisfy together."""
+def _broken_rules(parameters: Mapping[str, Parameter]) -> Iterator[Broken]:
+    """Rules of single quantities, and those of a whole set."""
+    n: dict[str, Any] = {}
+    for each in parameters.values():
+        for column, value in each.numbers.items():
+            n[column] = np.array([value])
+            yield range_rule(each.definition, column, n[column])
+    if not n.keys() >= set(Machine._fields):
+        return  # not yet completed
     for side in ("plus", "minus"):
-        stop = numbers[f"swash_stop_{side}"]
-        sine = numbers["swash_arm"] / numbers["control_arm"] * tan(stop)
-        if not sine < 1.0:
-            raise ParameterError(
-                f"{owner}: swash_arm/control_arm·tan swash_stop_{side} is {sine:.4g}, but must be "
-                "below 1: at its stop the swash plate would turn the feedback arm past 90°."
-            )
-    pressure = rest_pressure(numbers)
-    ceiling = min(numbers["supply_pressure"], numbers["relief_pressure"])
-    if not abs(pressure) < ceiling:
-        raise ParameterError(
-            f"{owner}: the load holds a stroking pressure of {pressure:.4g} Pa at rest, but it "
-            f"must stay below {ceiling:.4g} Pa, the smaller of supply_pressure and "
-            "relief_pressure; check load_torque, pumping_area and pumping_arm."
-        )
+        arm_sine = n["swash_arm"] / n["control_arm"] * np.tan(n[f"swash_stop_{side}"])
+        yield applied(ARM_TURNS, {"side": side, "arm_sine": arm_sine})
+    rest = interpreted(equations.static_pressure)(Machine(**{k: float(v[0]) for k, v in n.items()}))
+    ceiling = np.minimum(n["supply_pressure"], n["relief_pressure"])
+    yield applied(LOAD_HELD, {"rest": np.array([rest]), "ceiling": ceiling})
 
 
 # --- completed from lumps -------------------------------------------------------------------------
@@ -292,25 +244,15 @@ def chosen_over(
             quantity = chosen_quantity(name)
             change = Parameter(quantity, value_of(name, quantity, change))
         entries[name] = change
-        instead = IN_PLACE_OF.get(name)
-        if instead is not None and instead not in chosen:
+        if (instead := IN_PLACE_OF.get(name)) is not None and instead not in chosen:
             entries.pop(instead, None)
     return entries
-
-
-def chosen_quantity(name: str) -> Definition:
-    """What may be chosen by a name: a quantity, or one of `CHOICES`."""
-    return CHOICES[name] if name in CHOICES else quantity_of(name)
 
 
 def from_lumped(
     lumped: ParameterSet | HasParameters,
     like: str | None = None,
-    *,
-    name: str | None = None,
-    title: str = "",
-    entries: Mapping[str, Change | Parameter] | None = None,
-    **chosen: Change,
+    **chosen: Change | Parameter,
 ) -> PhysicalSet:
     """Complete a physical set from lumped parameters and a few chosen values.
 
@@ -321,19 +263,15 @@ def from_lumped(
     like : str, optional
         Packaged set whose assumed values count where nothing is chosen; by default see
         `nearest_set`.
-    name, title : str, optional
-        Of the set; by default the parameters' name.
-    **chosen : float or (float, float)
+    **chosen : float, (float, float) or Parameter
         Chosen values in SI: those that packaged sets assume, or any other quantity: an inertia or
         damping in place of a frequency or damping ratio, or one that follows from the lumps, which
         must then agree with them.
-    entries : mapping, optional
-        The same, also with source and status.
 
     Returns
     -------
     PhysicalSet
-        Everything but what the user chose is marked as assumed.
+        Of the parameters' name; everything but what the user chose is marked as assumed.
 
     Raises
     ------
@@ -341,32 +279,32 @@ def from_lumped(
         If lumps contradict each other or a chosen value; the sentence names them.
     """
     parameters = set_of(lumped)
-    owner = parameters.name if name is None else name
-    assumed = _entries(_packaged(nearest_set(parameters.name) if like is None else like))
-    given = chosen_over(assumed, {**(entries or {}), **chosen})
+    owner = parameters.name
+    _, assumed = _assumed(nearest_set(parameters.name) if like is None else like)
+    given = chosen_over(assumed, chosen)
     for made_from, choice in IN_PLACE_OF.items():
         if made_from in given and choice in given:
             raise ParameterError(
                 f"{owner}: {made_from} and {choice} are both given, but either follows from the "
                 "other; leave one out."
             )
-    numbers: dict[str, float] = {}
-    for entry in given.values():
-        _check_range(owner, entry)
-        numbers |= zip(entry.definition.columns, entry.values, strict=True)
-    following = _completed(owner, parameters.numbers, numbers, set(given))
-    complete = {}
-    for symbol, (follows, origin) in following.items():
+    refuse(owner, _broken_rules(given))
+    found = {name: each for name, each in given.items() if name in QUANTITIES}
+    known = {k: v for each in given.values() for k, v in each.numbers.items()}
+    for symbol, (follows, origin) in _completed(owner, parameters.numbers, known).items():
         made = Parameter(QUANTITIES[symbol], follows, f"from {origin}", "assumed")
-        if symbol in given:
-            _check_agreement(owner, given[symbol], made)
-        complete[symbol] = given.get(symbol, made)
-    rest = {symbol: entry for symbol, entry in given.items() if symbol in QUANTITIES}
-    return PhysicalSet(owner, title, {**rest, **complete})
+        entry = found.setdefault(symbol, made)
+        for (column, value), expected in zip(entry.numbers.items(), made.values, strict=True):
+            if value != expected and not abs(value - expected) <= AGREES * abs(expected):
+                raise ParameterError(
+                    f"{owner}: {column} is given as {value:.9g} {entry.unit}, but "
+                    f"{expected:.9g} follows {made.source}; leave it out or change one of these."
+                )
+    return PhysicalSet(owner, parameters.title, found)
 
 
 def _completed(
-    owner: str, Z: Mapping[str, float], chosen: dict[str, float], given: set[str]
+    owner: str, Z: Mapping[str, float], n: Mapping[str, float]
 ) -> dict[str, tuple[Value, str]]:
     """Quantities that follow from the lumps and what is chosen, and from which."""
     if Z["Z2"] != 0.0:
@@ -374,16 +312,17 @@ def _completed(
             f"{owner}: Z2 is {Z['Z2']:g}, but a physical set has Z2 = 0, because the pressure is "
             "counted from the one that holds the load (eq. 6.56)."
         )
-    arm, area = chosen["swash_arm"], chosen["piston_area"]
-    supply = Z["Z9"] + rest_pressure(chosen)
-    stiffness = rest_modulus({**chosen, "supply_pressure": supply}) / chosen["oil_volume"]
-    spring_rate = area / (Z["Z1"] * arm)
+    # of what is known; nothing else may be asked of it
+    machine = Machine(*(n.get(name, 0.0) for name in Machine._fields))
+    arm, area, oil = n["swash_arm"], n["piston_area"], "oil_volume and bulk_modulus"
+    supply = Z["Z9"] + _rest(machine)[0]
+    _, stiffness = _rest(machine._replace(supply_pressure=supply))
+    spring_rate, spring_moment = area / (Z["Z1"] * arm), Z["Z4"] ** 0.5
     gauge = (1.0 + area**2 * stiffness / spring_rate) / (1.0 + Z["Z6"]) / stiffness
-    spring_moment, oil = Z["Z4"] ** 0.5, "oil_volume and bulk_modulus"
     made: dict[str, tuple[Value, str]] = {
         "spool_arm": (Z["Z5"], "Z5"),
         "feedback_spring_rate": (
-            spring_moment / chosen["feedback_spring_arm"] ** 2,
+            spring_moment / n["feedback_spring_arm"] ** 2,
             "√Z4 and feedback_spring_arm",
         ),
         "control_arm": (arm / Z["Z3"], "Z3 and swash_arm"),
@@ -396,56 +335,54 @@ def _completed(
         "relief_pressure": (Z["Z15"], "Z15"),
         "return_spring_rate": (spring_rate, "Z1, piston_area and swash_arm"),
         "swash_stop": (Pair(Z["Z13_plus"], Z["Z13_minus"]), "Z13"),
-        "pump_flow_gain": (Z["Z10"] / chosen["motor_constant"], "Z10 and motor_constant"),
+        "pump_flow_gain": (Z["Z10"] / n["motor_constant"], "Z10 and motor_constant"),
         "motor_leakage": (
-            _motor_leakage(owner, Z, chosen),
+            _motor_leakage(owner, Z, n),
             "Z11 and Z12, load_torque and load_inertia",
         ),
     }
     # of both modes: inertia, damping, mass at an arm, stiffness of the spring in the angle
-    for inertia, damping, mass, at, spring, origin in (
+    for inertia, damping, mass, arm_name, at, spring, origin in (
         (
-            *("feedback_arm_inertia", "spool_damping", "spool_mass on spool_arm"),
+            *("feedback_arm_inertia", "spool_damping", "spool_mass", "spool_arm"),
             *(Z["Z5"], spring_moment, "Z4, Z5, spool_frequency and spool_mass"),
         ),
         (
-            *("swash_inertia", "piston_damping", "piston_mass on swash_arm"),
+            *("swash_inertia", "piston_damping", "piston_mass", "swash_arm"),
             *(arm, spring_rate * arm**2),
             "Z1, swash_frequency, piston_area, swash_arm and piston_mass",
         ),
     ):
-        lever = chosen[mass.partition(" ")[0]] * at**2
-        if inertia not in given:
-            frequency = IN_PLACE_OF[inertia]
-            total = spring / chosen[frequency] ** 2
+        lever, turning = n[mass] * at**2, n.get(inertia)
+        if turning is None:
+            total = spring / n[IN_PLACE_OF[inertia]] ** 2
             if lever > total:
                 raise ParameterError(
-                    f"{owner}: {mass} alone has {lever:.4g} kg m², but {frequency} leaves "
-                    f"{total:.4g} kg m² for everything that swings with it; choose a smaller mass "
-                    "or a lower frequency."
+                    f"{owner}: {mass} on {arm_name} alone has {lever:.4g} kg m², but "
+                    f"{IN_PLACE_OF[inertia]} leaves {total:.4g} kg m² for everything that swings "
+                    "with it; choose a smaller mass or a lower frequency."
                 )
-            chosen[inertia] = total - lever
-            made[inertia] = total - lever, origin
-        if damping not in given:
-            swinging = sqrt(spring * (chosen[inertia] + lever))
+            turning = total - lever
+            made[inertia] = turning, origin
+        if damping not in n:
             ratio = IN_PLACE_OF[damping]
-            made[damping] = 2.0 * chosen[ratio] * swinging / at**2, ratio
+            made[damping] = 2.0 * n[ratio] * sqrt(spring * (turning + lever)) / at**2, ratio
     return made
 
 
-def _motor_leakage(owner: str, Z: Mapping[str, float], chosen: Mapping[str, float]) -> float:
+def _motor_leakage(owner: str, Z: Mapping[str, float], n: Mapping[str, float]) -> float:
     """K_mL from Z11 = K_mL C_g and Z12 = K_mL Z10 C_i, which must agree."""
     losses = {
-        "Z11": (Z["Z11"], chosen["load_torque"], "load_torque"),
-        "Z12": (Z["Z12"], Z["Z10"] * chosen["load_inertia"], "load_inertia"),
+        "Z11": (n["load_torque"], "load_torque"),
+        "Z12": (Z["Z10"] * n["load_inertia"], "load_inertia"),
     }
     leakages = []
-    for symbol, (loss, load, cause) in losses.items():
+    for symbol, (load, cause) in losses.items():
         if load != 0.0:
-            leakages.append(loss / load)
-        elif loss != 0.0:
+            leakages.append(Z[symbol] / load)
+        elif Z[symbol] != 0.0:
             raise ParameterError(
-                f"{owner}: {symbol} is {loss:g}, but without {cause} no speed is lost to it; "
+                f"{owner}: {symbol} is {Z[symbol]:g}, but without {cause} no speed is lost to it; "
                 f"choose {cause}, or set {symbol} to 0."
             )
     if len(leakages) == 2 and abs(leakages[0] - leakages[1]) > AGREES * abs(leakages[0]):
@@ -457,63 +394,37 @@ def _motor_leakage(owner: str, Z: Mapping[str, float], chosen: Mapping[str, floa
     return leakages[0] if leakages else 0.0
 
 
-def _check_agreement(owner: str, entry: Parameter, made: Parameter) -> None:
-    columns = entry.definition.columns
-    for column, value, follows in zip(columns, entry.values, made.values, strict=True):
-        if value != follows and not abs(value - follows) <= AGREES * abs(follows):
-            raise ParameterError(
-                f"{owner}: {column} is given as {value:.9g} {entry.unit}, but "
-                f"{follows:.9g} follows {made.source}; leave it out or change one of these."
-            )
+# --- packaged sets --------------------------------------------------------------------------------
 
 
-# --- files ----------------------------------------------------------------------------------------
+class PhysicalFile(FilePart):
+    """What a packaged set assumes; the rest follows from the parameter set of its name."""
 
-
-class PhysicalFile(BaseModel):
-    """A physical set; with `lumps`, what is not given follows from a packaged parameter set."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-    format: Literal[1] = 1
+    format: Literal[1]
     name: str
-    title: str = ""
-    lumps: str | None = None
+    title: str
     physical: dict[str, Entry]
 
 
 @cache
-def _packaged(name: str) -> PhysicalFile:
+def _assumed(name: str) -> tuple[str, Mapping[str, Parameter]]:
+    """Title of a packaged set, and the values that it assumes."""
     if name not in AXES:
         raise ParameterError(
             f"There is no packaged physical set '{name}'; there are {', '.join(AXES)}."
         )
     text = files("swashplate.full_order").joinpath("sets", f"{name}.toml").read_text("utf-8")
-    return validated(parse_toml(text, f"{name}.toml"), PhysicalFile, f"{name}.toml")
+    contents = validated(parse_toml(text, f"{name}.toml"), PhysicalFile, f"{name}.toml")
+    entries = {
+        name: parameter_of(chosen_quantity(name), entry)
+        for name, entry in contents.physical.items()
+    }
+    return contents.title, entries
 
 
 def nearest_set(name: str) -> str:
     """Name of the packaged set that a drive of this name is taken to be like: its own, or hoist."""
     return name if name in AXES else AXES[0]
-
-
-def _set_of(contents: PhysicalFile, origin: str) -> PhysicalSet:
-    try:
-        entries = _entries(contents)
-        if contents.lumps is None:
-            return PhysicalSet(contents.name, contents.title, entries)
-        parameters = load_parameters(contents.lumps)
-        return from_lumped(parameters, name=contents.name, title=contents.title, entries=entries)
-    except (ParameterError, InputError) as error:
-        raise ParameterError(f"{origin}: {error}") from None
-
-
-def _entries(contents: PhysicalFile) -> dict[str, Parameter]:
-    known = quantity_of if contents.lumps is None else chosen_quantity
-    for name, entry in contents.physical.items():
-        if entry.bounds is not None:
-            raise ParameterError(f"{name} has bounds; leave them out, a fit is given its own.")
-    return {name: parameter_of(known(name), entry) for name, entry in contents.physical.items()}
 
 
 # --- for people -----------------------------------------------------------------------------------
@@ -533,7 +444,7 @@ def choices_table(axis: str, given: Mapping[str, Change]) -> Table:
     """What a physical set is completed from: assumed values, and given ones, counted."""
     columns = (Column("Physical value"), Column("", "s"), Column(""), Column(""))
     made = Table("What the drive's parameters do not say", columns)
-    entries = chosen_over(_entries(_packaged(axis)), given)
+    entries = chosen_over(_assumed(axis)[1], given)
     for name, entry in entries.items():
         unit, factor = SHOWN.get(entry.unit, (unit_text(entry.unit), 1.0))
         if chosen_unit(entry.unit).factor != 1.0:

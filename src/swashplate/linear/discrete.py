@@ -2,40 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from functools import lru_cache
-from typing import Any, NamedTuple
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from swashplate.equations.adjoints import Derived
 from swashplate.equations.derivatives import derive
 from swashplate.equations.fields import floats_of, value_at
 from swashplate.equations.marching.part import HOLDS, taps_of
 from swashplate.equations.marching.run import Instance, Started, called, outside
-from swashplate.equations.model import Link, Model, Window, arguments_of
+from swashplate.equations.model import Link, Window, arguments_of, state_paths
 from swashplate.errors import DomainError, InputError
-from swashplate.linear.model import LinearModel
+from swashplate.linear.model import LinearModel, Matrices
 
 Array = NDArray[np.float64]
 Rows = dict[str, Array]
-
-MOVING = ("state", "signals", "inputs")
-"""Arguments of equations that move; the others are constants of a march."""
-
-
-class Recurrence(NamedTuple):
-    """x[n+1] = A x[n] + Σ B_j u_j, y[n] = C x[n] + Σ D_j u_j, u_j an input some samples ago."""
-
-    A: Array
-    B: Array
-    C: Array
-    D: Array
-    states: tuple[str, ...]
-    """Paths of the model's own states, with the part's name before them if there are several."""
-    columns: tuple[tuple[str, int], ...]
-    """Input and whole samples by which it is late, of each column of B and D."""
+"""Derivatives of numbers by all that moves, by the numbers' paths."""
 
 
 def linearize(
@@ -66,7 +49,8 @@ def linearize(
     Returns
     -------
     LinearModel
-        Sampled. Past samples that the model's taps read are states, `memory`.
+        Sampled. Whole samples by which all that is read of the first input is late are its `delay`;
+        other past samples that the model's taps read are states, `memory`.
 
     Raises
     ------
@@ -82,235 +66,156 @@ def linearize(
                 f"{instance.name}: '{name}' is no input at the operating point; there are "
                 f"{', '.join(each for each in instance.model.external if each in at)}."
             )
-    if states is None:
-        # what belongs to the first sample alone has passed
-        known = instance.start(at, h, "steady").arguments
-        steps = (part.step for part in instance.model.parts)
-        states = [called(step, each) for step, each in zip(steps, known, strict=True)]
-    started = instance.start(at, h, "steady", states)
-    wanted = all_outputs(instance.model) if outputs is None else tuple(outputs)
-    found = recurrence(instance, started, h, moving, wanted)
-    return _with_memory(found, moving, wanted, h, instance.name)
-
-
-def all_outputs(model: Model) -> tuple[str, ...]:
-    """Outputs that a model names, or all signals of its last part."""
+    started = standing(instance, at, h) if states is None else instance.start(at, h, chosen=states)
+    model = instance.model
     named = tuple(model.outputs) or tuple(model.parts[-1].outputs)
-    return tuple(each for each in named if each not in model.integrals) or (
-        model.parts[-1].signal_names
-    )
+    named = tuple(each for each in named if each not in model.integrals)
+    wanted = (named or model.parts[-1].signal_names) if outputs is None else tuple(outputs)
+    matrices, names, memory, whole = recurrence(instance, started, h, moving, wanted)
+    return LinearModel(*matrices, names, moving, wanted, whole * h, h, instance.name, memory)
+
+
+def standing(instance: Instance, at: Mapping[str, float], h: float) -> Started:
+    """Model that has stood at its steady state for a sample: what belongs to the first is past."""
+    settled = instance.start(at, h, "steady")
+    steps = (part.step for part in instance.model.parts)
+    states = [called(step, each) for step, each in zip(steps, settled.arguments, strict=True)]
+    return instance.start(at, h, "steady", states)
 
 
 def recurrence(
-    instance: Instance, started: Started, h: float, inputs: Sequence[str], outputs: Sequence[str]
-) -> Recurrence:
-    """Matrices of a model's step at a point, with every sample that its taps read as a column.
+    instance: Instance,
+    started: Started,
+    h: float,
+    inputs: tuple[str, ...],
+    outputs: Sequence[str],
+) -> tuple[Matrices, tuple[str, ...], tuple[str, ...], int]:
+    """Matrices of a model's step at a point, its states, its memory, and the first input's delay.
 
-    The point is given by the states and constant inputs that a march would start with.
+    The point is given by the states and constant inputs that a march would start with. Behind the
+    paths of the model's own states stand the past samples of the inputs that its taps read, the
+    memory. The delay is in whole samples: those by which all that is read of the first input is
+    late.
     """
-    chain = _Chain(instance, started, h, tuple(inputs))
-    n = len(chain.states)
-    following = np.array(chain.following).reshape(n, chain.size)
-    wanted = np.array([chain.output(name) for name in outputs])
-    A, B, C, D = following[:, :n], following[:, n:], wanted[:, :n], wanted[:, n:]
-    return Recurrence(A, B, C, D, tuple(chain.states), tuple(chain.columns))
+    model, places = instance.model, instance.places(inputs, h)
+    states = state_paths(model)
+    taps = {(each.part, each.input): each for each in taps_of(model, inputs)}
+    late = {(name, 0) for name in inputs}
+    for tap in taps.values():
+        whole = int(places.whole[tap.number])
+        late |= {(tap.tap.signal, whole + j) for j in range(tap.tap.samples)}
+    columns = sorted(late, key=lambda each: (inputs.index(each[0]), each[1]))
+    n = len(states)
+    units: dict[Any, Array] = dict(zip([*states, *columns], np.eye(n + len(columns)), strict=True))
+    none = np.zeros(n + len(columns))
+    parts: list[Rows] = []  # of each part: signals and states
 
-
-_taps = lru_cache(maxsize=256)(taps_of)
-
-
-@lru_cache(maxsize=512)
-def _derived(
-    equation: Any, by: tuple[str, ...], options: Any, lengths: tuple[tuple[str, int], ...]
-) -> Derived:
-    decided = {"options": options} if "options" in arguments_of(equation) else {}
-    return derive(equation, by=by, options=decided, lengths=dict(lengths))
-
-
-class _Chain:
-    """Derivatives of all that is known at a sample, by states and samples of the inputs."""
-
-    def __init__(
-        self, instance: Instance, started: Started, h: float, inputs: tuple[str, ...]
-    ) -> None:
-        self.instance, self.model, self.started = instance, instance.model, started
-        parts = self.model.parts
-        several = len(parts) > 1
-        self.states = [
-            f"{part.name}.{path}" if several else path
-            for part in parts
-            for path in floats_of(part.state)
-        ]
-        places = instance.places(inputs, h)
-        self.taps = {(each.part, each.input): each for each in _taps(self.model, inputs)}
-        self.whole, self.fraction = places.whole.tolist(), places.fraction.tolist()
-        late = {(name, 0): None for name in inputs}
-        for tap in self.taps.values():
-            whole = self.whole[tap.number]
-            late |= {(tap.tap.signal, whole + j): None for j in range(tap.tap.samples)}
-        self.columns = sorted(late, key=lambda each: (inputs.index(each[0]), each[1]))
-        self.size = len(self.states) + len(self.columns)
-        self.none = np.zeros(self.size)
-        self.rows: list[Rows] = []
-        self.following: list[Array] = []
-        for i, part in enumerate(parts):
-            self._part(i, part)
-
-    def unit(self, index: int) -> Array:
-        """Row of a state or of a sample of an input."""
-        row = np.zeros(self.size)
-        row[index] = 1.0
-        return row
-
-    def sample(self, name: str, late: int) -> Array:
-        """Row of an input some samples ago, zero if that does not move."""
-        if (name, late) not in self.columns:
-            return self.none
-        return self.unit(len(self.states) + self.columns.index((name, late)))
-
-    def _part(self, i: int, part: Model) -> None:
-        first = sum(len(floats_of(each.state)) for each in self.model.parts[:i])
-        paths = floats_of(part.state)
-        rows = {f"state.{path}": self.unit(first + k) for k, path in enumerate(paths)}
-        for name, kind in part.input_types.items():
-            for path, row in self._input(i, name, kind):
-                rows[path] = rows[f"inputs.{path}"] = row
-        known = self._at(i, part)
-        if part.sample is not None:
-            for path, row in self._through(part, part.sample, known, rows).items():
-                rows[f"signals.{path}"] = row
-        if part.domain is not None:
-            margin = called(part.domain, known)
-            if not margin > 0.0:
-                said = outside(self.model, margin, "operating point")
-                raise DomainError(f"{self.instance.name}: {said}")
-        self.rows.append(rows)
-        found = self._through(part, part.step, known, rows)
-        self.following += [found.get(path, self.none) for path in paths]
-
-    def _at(self, i: int, part: Model) -> dict[str, Any]:
-        """What a part's equations take, its windows read where the taps are."""
-        known = dict(self.started.arguments[i])
-        for name, kind in part.input_types.items():
-            tap = self.taps.get((i, name))
-            if tap is not None and kind is Window:
-                known[name] = known[name]._replace(f=self.fraction[tap.number])
-        if part.inputs is not None:
-            known["inputs"] = part.inputs(*(known[name] for name in part.input_types))
-        return known
-
-    def _input(self, i: int, name: str, kind: Any) -> Iterator[tuple[str, Array]]:
-        link = self.model.link_of(i, name)
-        if link is not None:
-            yield name, self.link(link)
-            return
-        tap = self.taps.get((i, name))
-        signal = self.model.parts[i].tap(name).signal
-        if tap is None:
-            if kind is not Window:
-                yield name, self.sample(signal, 0)
-            return
-        whole, samples = self.whole[tap.number], range(tap.tap.samples)
-        read = [self.sample(signal, whole + j) for j in samples]
-        if kind is Window:
-            for j in samples:
-                yield f"{name}.s.{j}", read[j]
-            return
-        fraction = self.fraction[tap.number]
-        value = self.started.before[signal]
-        hold = HOLDS[tap.tap.hold]
-        # the window of a hold has as many samples as it reads
-        derived = _derived(hold, ("window.s",), None, (("window.s", len(read)),))
-        values = derived.python(Window((value,) * len(read), fraction))
-        rows = {f"window.s.{j}": each for j, each in enumerate(read)}
-        (row,) = self._chained(derived, values, rows).values()
-        yield name, row
-
-    def _through(self, part: Model, equation: Any, known: Mapping[str, Any], rows: Rows) -> Rows:
-        """Rows of an equation's results."""
-        taken = arguments_of(equation)
-        by = tuple(
-            name
-            for name in taken
-            if (name in MOVING or name in part.input_types)
-            and any(path == name or path.startswith(f"{name}.") for path in rows)
-        )
-        if not by:
-            return {}
-        lengths = tuple(
-            (f"{start}.s", part.tap(each).width)
-            for each in part.input_types
-            if part.tap(each).width
-            for start in (each, f"inputs.{each}")
-        )
-        derived = _derived(equation, by, known["options"], lengths)
-        values = derived.python(*(known[name] for name in taken))
-        return self._chained(derived, values, rows)
-
-    def _chained(self, derived: Derived, values: Sequence[float], rows: Rows) -> Rows:
-        slopes = np.zeros((len(derived.outputs), len(derived.inputs)))
-        if derived.entries:
-            slopes[tuple(np.transpose(derived.entries))] = values[len(derived.outputs) :]
-        # the place of a window does not move
-        moving = [k for k, path in enumerate(derived.inputs) if path in rows]
-        into = np.array([rows[derived.inputs[k]] for k in moving]).reshape(-1, self.size)
-        return dict(zip(derived.outputs, slopes[:, moving] @ into, strict=True))
-
-    def link(self, link: Link) -> Array:
-        """Row of a signal between parts."""
+    def link_row(link: Link) -> Array:
         values, rows = [], []
         for part, signal in link.sources:
-            inside = f"signals.{signal}" in self.rows[part]
-            kind = "signals" if inside else "state"
-            rows.append(self.rows[part].get(f"{kind}.{signal}", self.none))
-            values.append(value_at(self.started.arguments[part][kind], signal))
+            kind = "signals" if f"signals.{signal}" in parts[part] else "state"
+            rows.append(parts[part].get(f"{kind}.{signal}", none))
+            values.append(value_at(started.arguments[part][kind], signal))
         if link.equation is None:
             return rows[0]
         names = arguments_of(link.equation)
-        derived = _derived(link.equation, names, None, ())
-        found = self._chained(derived, derived.python(*values), dict(zip(names, rows, strict=True)))
-        return found["value"]
+        known = dict(zip(names, values, strict=True))
+        return _through(link.equation, known, dict(zip(names, rows, strict=True)))["value"]
 
-    def output(self, name: str) -> Array:
-        """Row of a signal of any part, of a state, or of a link."""
-        for part, rows in zip(reversed(self.model.parts), reversed(self.rows), strict=True):
+    def input_rows(i: int, name: str, known: dict[str, Any]) -> Rows:
+        """Rows of what a part takes, its windows read where the taps are."""
+        part, tap = model.parts[i], taps.get((i, name))
+        if (link := model.link_of(i, name)) is not None:
+            return {name: link_row(link)}
+        if tap is None:
+            still = part.input_types[name] is Window
+            return {} if still else {name: units.get((part.tap(name).signal, 0), none)}
+        signal, first = tap.tap.signal, int(places.whole[tap.number])
+        fraction = float(places.fraction[tap.number])
+        read = [units[signal, first + j] for j in range(tap.tap.samples)]
+        if part.input_types[name] is Window:
+            known[name] = known[name]._replace(f=fraction)
+            return {f"{name}.s.{j}": row for j, row in enumerate(read)}
+        window = Window((started.before[signal],) * len(read), fraction)
+        rows = {f"window.s.{j}": row for j, row in enumerate(read)}
+        held = _through(HOLDS[tap.tap.hold], {"window": window}, rows, {"window.s": len(read)})
+        return {name: held["value"]}
+
+    following = []
+    for i, part in enumerate(model.parts):
+        known = dict(started.arguments[i])
+        rows = {
+            f"state.{path}": units[f"{model.prefix(i)}{path}"] for path in floats_of(part.state)
+        }
+        lengths: dict[str, int] = {}
+        for name in part.input_types:
+            taken = input_rows(i, name, known)
+            rows |= taken | {f"inputs.{path}": row for path, row in taken.items()}
+            if part.tap(name).width:
+                lengths |= dict.fromkeys((f"{name}.s", f"inputs.{name}.s"), part.tap(name).width)
+        if part.inputs is not None:
+            known["inputs"] = part.inputs(*(known[name] for name in part.input_types))
+        if part.sample is not None:
+            signals = _through(part.sample, known, rows, lengths)
+            rows |= {f"signals.{path}": row for path, row in signals.items()}
+        if part.domain is not None and not (margin := called(part.domain, known)) > 0.0:
+            raise DomainError(f"{instance.name}: {outside(model, margin, 'operating point')}")
+        parts.append(rows)
+        found = _through(part.step, known, rows, lengths)
+        following += [found.get(path, none) for path in floats_of(part.state)]
+
+    def output_row(name: str) -> Array:
+        for part, rows in zip(reversed(model.parts), reversed(parts), strict=True):
             if name in part.signal_names:
-                return rows.get(f"signals.{name}", rows.get(f"state.{name}", self.none))
-        if name in self.model.links:
-            return self.link(self.model.links[name])
-        if name in self.model.integrals:
+                return rows.get(f"signals.{name}", rows.get(f"state.{name}", none))
+        if name in model.links:
+            return link_row(model.links[name])
+        if name in model.integrals:
             raise InputError(
-                f"{self.instance.name}: '{name}' is an integral of a signal, which a linear model "
-                f"does not have; ask for '{self.model.integrals[name]}'."
+                f"{instance.name}: '{name}' is an integral of a signal, which a linear model does "
+                f"not have; ask for '{model.integrals[name]}'."
             )
-        known = dict.fromkeys(each for part in self.model.parts for each in part.signal_names)
+        there = dict.fromkeys(each for part in model.parts for each in part.signal_names)
         raise InputError(
-            f"{self.instance.name}: there is no signal '{name}'; there are "
-            f"{', '.join((*known, *self.model.links))}."
+            f"{instance.name}: there is no signal '{name}'; there are "
+            f"{', '.join((*there, *model.links))}."
         )
 
+    into, out = np.array(following).reshape(n, none.size), np.array(list(map(output_row, outputs)))
+    read = [(*each, k) for k, each in enumerate(columns, n) if into[:, k].any() or out[:, k].any()]
+    lags = {name: [lag for of, lag, _ in read if of == name] or [0] for name in inputs}
+    first = {name: min(lags[name]) if name == inputs[0] else 0 for name in inputs}
+    past = [(name, lag) for name in inputs for lag in range(first[name] + 1, max(lags[name]) + 1)]
+    # rows: the model's states, then the past samples; columns: these and the present inputs
+    size = n + len(past)
+    at = {each: k for k, each in enumerate((*past, *first.items()), n)}
+    A, C = np.zeros((size, size + len(inputs))), np.zeros((len(out), size + len(inputs)))
+    A[:n, :n], C[:, :n] = into[:, :n], out[:, :n]
+    for name, lag, k in read:
+        A[:n, at[name, lag]], C[:, at[name, lag]] = into[:, k], out[:, k]
+    for name, lag in past:
+        A[at[name, lag], at[name, lag - 1]] = 1.0
+    matrices = A[:, :size], A[:, size:], C[:, :size], C[:, size:]
+    memory = tuple(f"{name}_{lag}" for name, lag in past)
+    return matrices, (*states, *memory), memory, first[inputs[0]]
 
-def _with_memory(
-    found: Recurrence, inputs: tuple[str, ...], outputs: tuple[str, ...], h: float, name: str
-) -> LinearModel:
-    """The recurrence with past samples of its inputs as states."""
-    n = found.A.shape[0]
-    longest = {each: max(late for of, late in found.columns if of == each) for each in inputs}
-    places = [(each, late) for each in inputs for late in range(1, longest[each] + 1)]
-    size = n + len(places)
-    A, B = np.zeros((size, size)), np.zeros((size, len(inputs)))
-    C, D = np.zeros((len(outputs), size)), np.zeros((len(outputs), len(inputs)))
-    A[:n, :n], C[:, :n] = found.A, found.C
-    for k, (of, late) in enumerate(found.columns):
-        if late == 0:
-            B[:n, inputs.index(of)], D[:, inputs.index(of)] = found.B[:, k], found.D[:, k]
-        else:
-            at = n + places.index((of, late))
-            A[:n, at], C[:, at] = found.B[:, k], found.D[:, k]
-    for k, (of, late) in enumerate(places):
-        if late == 1:
-            B[n + k, inputs.index(of)] = 1.0
-        else:
-            A[n + k, n + k - 1] = 1.0
-    memory = tuple(f"{of}_{late}" for of, late in places)
-    return LinearModel(A, B, C, D, (*found.states, *memory), inputs, outputs, 0.0, h, name, memory)
+
+def _through(
+    equation: Any, known: Mapping[str, Any], rows: Rows, lengths: Mapping[str, int] | None = None
+) -> Rows:
+    """Rows of an equation's results, from what is known by its arguments' names and their rows."""
+    taken = arguments_of(equation)
+    moving = {path.partition(".")[0] for path in rows}
+    by = tuple(name for name in taken if name in moving)
+    if not by:
+        return {}
+    options = {"options": known["options"]} if "options" in taken else {}
+    derived = derive(equation, by=by, options=options, lengths=lengths)
+    values = derived.python(*(known[name] for name in taken))
+    slopes = np.zeros((len(derived.outputs), len(derived.inputs)))
+    if derived.entries:
+        slopes[tuple(np.transpose(derived.entries))] = values[len(derived.outputs) :]
+    # constants and the places of windows do not move
+    still = np.zeros(next(iter(rows.values())).size)
+    into = np.array([rows.get(path, still) for path in derived.inputs])
+    return dict(zip(derived.outputs, slopes @ into, strict=True))

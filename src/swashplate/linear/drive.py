@@ -1,32 +1,37 @@
-"""The linear model of a drive: continuous, and at a sample time as the march has it."""
+"""The linear model of a drive: where it is taken, continuous, and at a sample time as the march is.
+
+Small motions leave out the cam ring's ripple, which does not change the mean of a turn, and the
+card's rate limits.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from math import isfinite
-from typing import NamedTuple
+from math import ceil, isfinite, nextafter
+from typing import Any, Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
-from swashplate.equations.marching.record import Interpolation, least_substeps
-from swashplate.equations.marching.run import Instance, Started
-from swashplate.errors import InputError
-from swashplate.linear.discrete import Recurrence, recurrence
-from swashplate.linear.model import UNITS, Coulomb, LinearDrive, Matrices, with_line
-from swashplate.linear.operating_point import (
-    COMMANDS,
-    INPUTS,
-    Input,
+from swashplate.equations.equation import interpreted
+from swashplate.equations.marching.record import SOURCE_RATE, Interpolation, least_substeps
+from swashplate.equations.marching.run import Instance, called
+from swashplate.errors import DomainError, InputError
+from swashplate.linear.discrete import recurrence
+from swashplate.linear.model import (
+    UNITS,
+    Coulomb,
+    LinearDrive,
+    Matrices,
     OperatingPoint,
-    beyond_dead_zone,
-    operating_point,
+    with_line,
 )
 from swashplate.models.card import Card
-from swashplate.models.channel import COULOMB_WIDTH
-from swashplate.models.pump import PumpState
+from swashplate.models.displacement_control import moment_sine, solenoid_force
+from swashplate.models.pump import overpowered
 from swashplate.parameters.parameter_set import ParameterSet
+from swashplate.parameters.rules import FULL_VOLTAGE
 from swashplate.simulation.instance import (
     card_of,
     check_filter_stability,
@@ -34,11 +39,17 @@ from swashplate.simulation.instance import (
     models_of,
     without_ripple,
 )
+from swashplate.simulation.run import steady_states
 from swashplate.tables import UNIT, Cell, Column, Table
 from swashplate.units import display_unit
 
 Array = NDArray[np.float64]
+Input = Literal[
+    "voltage", "current", "solenoid_force", "load_torque", "pump_speed", "supply_pressure"
+]
 
+INPUTS: tuple[Input, ...] = get_args(Input)
+COMMANDS = INPUTS[:3]  # Of which one moves at a time; the others can move beside it.
 OUTPUTS = (
     "shaft_speed",
     "swash_angle",
@@ -51,10 +62,22 @@ OUTPUTS = (
     "motor_pressure_drop",
 )
 """Signals that a linear model can have as outputs."""
+NO_GAIN = {
+    "swash_stop": "the swash plate is at its stop",
+    "relief": "the pressure is at its limit Z15",
+    "orifice": "the leakage takes all that the open orifice lets through",
+    "spool": "the leakage takes all that the open spool lets through",
+}
+"""What holds the speed under limits of the pump, see `swashplate.models.pump.PumpLimits`."""
 FORCE = {"Z17": 0.0, "Z19_plus": 1.0, "Z19_minus": 1.0} | dict.fromkeys(
     ("Z20_plus", "Z20_minus", "Z21_plus", "Z21_minus", "Z22_plus", "Z22_minus"), 0.0
 )
 """Solenoids whose force is the current, for a model whose input is the force."""
+VOLTAGES = 4001  # Among which a speed is looked for, before the place is found exactly.
+DECIMALS = 4
+"""Of the voltage that is proposed; rounded away from 0 V, so that it does have a model."""
+CLOSED = 64.0 * float(np.finfo(float).eps)
+"""By this much tan α_sw stands below a closed spool, on the side of positive opening."""
 
 
 def linearize_drive(
@@ -69,23 +92,7 @@ def linearize_drive(
     """Linear model of small motions about a steady state; see `Drive.linearize`."""
     if input is None:
         input = "voltage" if current is None else "current"
-    inputs = _checked_inputs((input,) if isinstance(input, str) else tuple(input))
-    if coulomb not in ("ignored", "tangent"):
-        raise InputError(f"coulomb is '{coulomb}'; it is 'ignored' or 'tangent'.")
-    if coulomb == "tangent" and parameters.coulomb_sign == "literal":
-        raise InputError(
-            "The literal sign of the card's Coulomb term has no slope; linearise with "
-            "coulomb='ignored'."
-        )
-    point = operating_point(parameters, inputs[0], voltage=voltage, current=current, speed=speed)
-    names = _checked_outputs(outputs, inputs[0])
-    matrices, states, _, _ = _matrices(parameters, point, inputs, names, coulomb)
-    delay = parameters.numbers["tau"] if inputs[0] == "voltage" else 0.0
-    kept = point, coulomb, parameters
-    return LinearDrive(*matrices, states, inputs, names, delay, None, parameters.name, (), *kept)
-
-
-def _checked_inputs(inputs: tuple[str, ...]) -> tuple[str, ...]:
+    inputs: tuple[str, ...] = (input,) if isinstance(input, str) else tuple(input)
     for name in inputs:
         if name not in INPUTS:
             raise InputError(f"The input is '{name}', but must be one of {', '.join(INPUTS)}.")
@@ -94,134 +101,173 @@ def _checked_inputs(inputs: tuple[str, ...]) -> tuple[str, ...]:
             "A linear model needs one input or several different ones, of which the first alone "
             f"may be a command: {', '.join(COMMANDS)}."
         )
-    return inputs
-
-
-def _checked_outputs(outputs: Sequence[str], input: str) -> tuple[str, ...]:
-    """Names of outputs, refused where the input is all there is before them."""
     names = (outputs,) if isinstance(outputs, str) else tuple(outputs)
-    possible = [name for name in OUTPUTS if name != input]
-    if input == "solenoid_force":
-        possible.remove("current")
+    before = {inputs[0], "current"} if inputs[0] == "solenoid_force" else {inputs[0]}
+    possible = [name for name in OUTPUTS if name not in before]
     for name in names:
         if name not in possible:
             raise InputError(
-                f"'{name}' is no output of a model from {input.replace('_', ' ')}; it has "
+                f"'{name}' is no output of a model from {inputs[0].replace('_', ' ')}; it has "
                 f"{', '.join(possible)}."
             )
     if not names or len(set(names)) != len(names):
         raise InputError("A linear model needs one output or several different ones.")
-    return names
+    if coulomb not in ("ignored", "tangent"):
+        raise InputError(f"coulomb is '{coulomb}'; it is 'ignored' or 'tangent'.")
+    if coulomb == "tangent" and parameters.coulomb_sign == "literal":
+        raise InputError(
+            "The literal sign of the card's Coulomb term has no slope; linearise with "
+            "coulomb='ignored'."
+        )
+    point = operating_point(parameters, inputs[0], voltage, current, speed)
+    matrices, states, _, _ = _matrices(parameters, point, inputs, names, coulomb)
+    delay = parameters.numbers["tau"] if inputs[0] == "voltage" else 0.0
+    kept = point, coulomb, parameters
+    return LinearDrive(*matrices, states, inputs, names, delay, None, parameters.name, (), *kept)
 
 
-# --- the pump -------------------------------------------------------------------------------------
+# --- operating point ------------------------------------------------------------------------------
 
 
-class _Known(NamedTuple):
-    """A drive with numbers at its operating point."""
-
-    instance: Instance
-    started: Started
-    records: tuple[str, ...]  # external signals that stand for the inputs
-    step: float  # 0 in continuous time [s]
-
-
-def _known(
+def operating_point(
     parameters: ParameterSet,
-    point: OperatingPoint,
-    inputs: tuple[str, ...],
-    coulomb: Coulomb,
-    step: float,
-) -> _Known:
-    """The equations at the point, with whatever small motions leave out."""
-    by_voltage = inputs[0] == "voltage"
-    instance = without_ripple(instance_of(parameters, by_voltage))
-    front, machine = instance.parts
-    command, at = "current", {"current": point.current}
-    if by_voltage:
-        assert point.voltage is not None
-        if coulomb == "ignored":
-            plus, minus = (each._replace(C=0.0) for each in (front.p.plus, front.p.minus))
-            front = front._replace(p=Card(plus, minus, front.p.tau))
-        command, at = "voltage", {"voltage": beyond_dead_zone(point.voltage, front.p)}
-    elif inputs[0] == "solenoid_force":
-        options = machine.options._replace(hysteresis=None)
-        machine = machine._replace(p=machine.p._replace(**FORCE), options=options)
-        at = {"current": point.solenoid_force}
-    model = instance.model
-    if step == 0.0:
-        models = models_of(parameters.equations)
-        model = models.flowing_drive if by_voltage else models.flowing_pump_drive
-    instance = Instance(model, (front, machine), instance.name)
-    p = machine.p
-    at |= {"load_torque": p.load_torque, "pump_speed": p.pump_speed, "supply_pressure": p.Z9}
-    records = tuple(command if name in COMMANDS else name for name in inputs)
-    return _Known(instance, _standing(instance, at, step, point), records, step)
+    input: str,
+    voltage: float | None = None,
+    current: float | None = None,
+    speed: float | None = None,
+) -> OperatingPoint:
+    """Steady state at which small motions of an input, one of `INPUTS`, have an answer.
 
+    Given by one of voltage [V], current [A] and speed [rad/s].
 
-def _standing(
-    instance: Instance, at: dict[str, float], step: float, point: OperatingPoint
-) -> Started:
-    """A drive that has stood at its operating point for longer than a sample."""
-    card = instance.start(at, step, "steady").states[0]
-    pressure = point.stroker_pressure
-    apart = float(np.spacing(abs(pressure)))
-    while True:
-        state = PumpState(pressure, pressure, point.current)
-        started = instance.start(at, step, "steady", (card, state))
-        signals = started.arguments[1]["signals"]
-        if point.orifice_opening != 0.0 or signals.orifice_opening >= 0.0:
-            break
-        # closed but for rounding: the side of positive opening, in case its root is another one
-        pressure, apart = pressure - apart, 2.0 * apart
-    state = state._replace(
-        spool=signals.spool_free,
-        torque=signals.motor_torque,
-        speed=signals.shaft_speed,
-        flow_speed=signals.flow_speed,
-        load_torque=at["load_torque"],
-        begun=1.0,
-    )
-    return instance.start(at, step, "steady", (card, state))
-
-
-def _pump_states(known: _Known) -> dict[str, str]:
-    """States of the pump that move, and what they are called."""
-    p, options, _ = known.instance.parts[1]
-    sampled = known.step > 0.0
-    found = {"pressure": "stroker_pressure"}
-    if options.damping is not None:
-        found["plate_pressure"] = "plate_pressure"
-    if options.friction is not None and isfinite(p.dither_time):
-        found["deflection"] = "spool_deflection"
-    if options.line is not None:
-        ending = "_before" if sampled else ""
-        found |= {"torque": f"motor_torque{ending}", "speed": f"shaft_speed{ending}"}
-        if sampled:
-            found["flow_speed"] = "flow_speed_before"
-        if sampled and "load_torque" in known.records:
-            found["load_torque"] = "load_torque_before"
-    return {f"pump.{path}": name for path, name in found.items()}
-
-
-def _one_deflection(found: Recurrence, known: _Known) -> Recurrence:
-    """The same with one state of the friction in place of two, place and deflection of the spool.
-
-    The next sample knows them only as d e^(-h/T) - x w/x_s: the deflection that would be left if
-    the spool came back to where it was balanced. In continuous time it is the state itself.
+    Raises
+    ------
+    InputError
+        If not exactly one is given, or it cannot be had.
+    DomainError
+        Where nothing moves: in a dead zone, within the solenoids' hysteresis, at a stop of the
+        swash plate, at the relief pressure, behind a saturated orifice, in the grip of a friction
+        without presliding; or where the solenoid overpowers the feedback spring.
     """
-    p, options, _ = known.instance.parts[1]
-    if known.step == 0.0 or options.friction is None:
-        return found
-    k = known.started.arguments[1]["k"]
-    A, B, C = found.A.copy(), found.B.copy(), found.C.copy()
-    spool, deflection = (found.states.index(f"pump.{name}") for name in ("spool", "deflection"))
-    friction = k.friction_width / p.spool_presliding
-    for matrix in (A, C):
-        matrix[:, deflection] = -matrix[:, spool] / friction
-    for matrix in (A, B):
-        matrix[deflection] = k.dither_factor * matrix[deflection] - friction * matrix[spool]
-    return found._replace(A=A, B=B, C=C)
+    given = {"voltage": voltage, "current": current, "speed": speed}
+    chosen = {name: value for name, value in given.items() if value is not None}
+    if len(chosen) != 1:
+        raise InputError("Linearise at a voltage, a current or a speed; give exactly one of them.")
+    ((kind, value),) = chosen.items()
+    if not isfinite(value):
+        raise InputError(f"The {kind} to linearise at is {value}, but must be a finite number.")
+    if input == "voltage" and current is not None:
+        raise InputError(
+            "A model from the voltage needs a voltage or a speed to linearise at, not a current."
+        )
+    name = parameters.name
+    if speed is not None:
+        voltage = _voltage_of(parameters, speed)
+    if voltage is not None:
+        if abs(voltage) > FULL_VOLTAGE:
+            raise InputError(f"The voltage is {voltage:g} V, but the card takes ±10 V.")
+        current = float(steady_states(parameters, np.array([voltage]))[0][0])
+    assert current is not None
+    instance = without_ripple(instance_of(parameters, False))
+    pump, options, _ = instance.parts[1]
+    sine = interpreted(moment_sine)(interpreted(solenoid_force)(current, pump), pump)
+    if not (margin := 1.0 - sine * sine) > 0.0:
+        raise DomainError(f"{name}: {overpowered(margin, 'current')}")
+
+    sides = []
+    if input == "voltage":
+        assert voltage is not None
+        card = card_of(parameters)
+        channel = card.plus if voltage >= 0.0 else card.minus
+        if channel.V_dz == channel.J == voltage == 0.0:
+            sides.append("card at 0 V: the side of positive voltage")
+        elif abs(voltage) <= channel.V_dz:
+            zone = f"{voltage:g} V lies in the card's dead zone"
+            raise DomainError(f"{name}: {zone}, so the gain is 0; {_beyond(parameters, voltage)}.")
+    if input in ("voltage", "current"):
+        if options.hysteresis is not None:
+            raise DomainError(
+                f"{name}: a current that moves by less than the solenoids' hysteresis of "
+                f"±{pump.solenoid_hysteresis:g} A moves no force, so the gain is 0; linearise the "
+                "drive without it (solenoid_hysteresis=0) for larger motions, or the pump alone "
+                "with input solenoid_force, or sweep sines of a size with frequency_response."
+            )
+        if pump.Z17 == current == 0.0:
+            sides.append("solenoids at 0 A: the side of positive current")
+        elif abs(current) <= pump.Z17:
+            at = "" if voltage is None else f"{voltage:g} V gives "
+            instead = f"linearise beyond ±{pump.Z17:g} A"
+            raise DomainError(
+                f"{name}: {at}{current:.6g} A, which lies in the solenoids' dead zone of Z17 = "
+                f"±{pump.Z17:g} A, so the gain is 0; "
+                f"{instead if voltage is None else _beyond(parameters, voltage)}."
+            )
+    if options.friction is not None and pump.spool_presliding == 0.0:
+        raise DomainError(
+            f"{name}: without spool_presliding the spool_friction of {pump.spool_friction:g} N "
+            "holds the spool fast under small motions, so the gain is 0; give a presliding, or "
+            "sweep sines of a size with frequency_response."
+        )
+    known = instance.start({"current": current}, 1.0 / SOURCE_RATE, "steady").arguments[1]
+    equations: Any = instance.model.parts[1]
+    limits = called(equations.limits, known)
+    for limit, what in NO_GAIN.items():
+        if getattr(limits, limit):
+            raise DomainError(
+                f"{name}: {what}, so the gain is 0; linearise at a smaller command, where the "
+                "speed still follows."
+            )
+    signals = known["signals"]
+    # without leakage the spool is closed, but for rounding
+    opening = 0.0 if options.leaky is None else signals.orifice_opening
+    if options.symmetric is not None and opening == 0.0:
+        sides.append("flow root at a closed spool: the side of positive opening")
+    return OperatingPoint(
+        *(voltage, current, signals.solenoid_force, signals.stroker_pressure, opening),
+        *(signals.swash_angle, signals.shaft_speed, tuple(sides)),
+    )
+
+
+def _beyond(parameters: ParameterSet, voltage: float) -> str:
+    """What to linearise instead of in a dead zone: at the first voltage of the side beyond it."""
+    way, sign, side = (1.0, "+", "plus") if voltage >= 0.0 else (-1.0, "-", "minus")
+    # a zone's end is part of it, so that the first step beyond has a model
+    steps = np.arange(1, ceil(FULL_VOLTAGE * 10**DECIMALS) + 1) / 10**DECIMALS
+    current, _ = steady_states(parameters, way * steps)
+    numbers = parameters.numbers
+    answers = (steps > numbers[f"V_dz_{side}"]) & (np.abs(current) > numbers["Z17"])
+    instead = f"no voltage up to {sign}{FULL_VOLTAGE:g} V leaves it: linearise on the other side"
+    if answers.any():
+        first = steps[int(np.argmax(answers))]
+        instead = f"linearise at {sign}{first:.{DECIMALS}f} V or beyond"
+    return f"{instead}, or the pump alone at current 0 with input solenoid_force"
+
+
+def _voltage_of(parameters: ParameterSet, speed: float) -> float:
+    """The voltage nearest to zero that settles at a speed."""
+    from scipy.optimize import brentq
+
+    def error(volts: float) -> float:
+        return float(steady_states(parameters, np.array([volts]))[1][0] - speed)
+
+    volts = np.linspace(-FULL_VOLTAGE, FULL_VOLTAGE, VOLTAGES)
+    _, speeds = steady_states(parameters, volts)
+    crossing = np.flatnonzero(np.diff(np.signbit(speeds - speed)))
+    size = max(abs(float(speeds[0])), abs(float(speeds[-1])))
+    found = [float(brentq(error, volts[k], volts[k + 1], xtol=1e-14)) for k in crossing]
+    # where the speed jumps, the dead zone's end, brentq finds the jump
+    roots = [each for each in found if abs(error(each)) <= 1e-9 * size]
+    if not roots:
+        lowest, highest = float(np.degrees(speeds.min())), float(np.degrees(speeds.max()))
+        raise InputError(
+            f"{parameters.name}: no constant voltage settles at {float(np.degrees(speed)):.6g} "
+            f"deg/s; speeds lie between {lowest:.6g} and {highest:.6g} deg/s, without what the "
+            "jump at the end of the dead zone leaves out."
+        )
+    return min(roots, key=abs)
+
+
+# --- matrices -------------------------------------------------------------------------------------
 
 
 def _matrices(
@@ -232,66 +278,94 @@ def _matrices(
     coulomb: Coulomb = "ignored",
     step: float = 0.0,
 ) -> tuple[Matrices, tuple[str, ...], tuple[str, ...], int]:
-    """Matrices, states, those of them that are past commands, and whole samples of delay.
+    """Matrices, states, those of them that are past inputs, and whole samples of delay.
 
-    States behind a voltage: the commands since the delay's whole samples (its fraction lies between
-    the last two), what the filter of the channel that is driven remembers, the pump. In continuous
-    time, at a step of 0, the delay stands apart.
+    In continuous time, at a step of 0, the delay stands apart.
     """
-    known = _known(parameters, point, inputs, coulomb, step)
-    found = recurrence(known.instance, known.started, step, known.records, outputs)
-    found = _one_deflection(found, known)
-    names, sign = _pump_states(known), 1.0
-    if inputs[0] == "voltage":
+    by_voltage = inputs[0] == "voltage"
+    instance = without_ripple(instance_of(parameters, by_voltage))
+    front, machine = instance.parts
+    command, side, sign, at = "current", "", 1.0, {"current": point.current}
+    if by_voltage:
         assert point.voltage is not None
         side, sign = ("plus", 1.0) if point.voltage >= 0.0 else ("minus", -1.0)
-        rate = step == 0.0 or known.instance.parts[0].options.exact is not None
-        names = {
-            f"card.{side}.before": "current_rate" if rate else "current_before",
-            f"card.{side}.now": "current",
-            **names,
-        }
-    at = [found.states.index(path) for path in names]
+        if coulomb == "ignored":
+            plus, minus = (each._replace(C=0.0) for each in (front.p.plus, front.p.minus))
+            front = front._replace(p=Card(plus, minus, front.p.tau))
+        # at a dead zone without width, by a hair
+        command = "voltage"
+        at = {command: point.voltage or nextafter(0.0, 1.0)}
+    elif inputs[0] == "solenoid_force":
+        options = machine.options._replace(hysteresis=None)
+        machine = machine._replace(p=machine.p._replace(**FORCE), options=options)
+        at = {"current": point.solenoid_force}
+    p, options, _ = machine
+    at |= {"load_torque": p.load_torque, "pump_speed": p.pump_speed, "supply_pressure": p.Z9}
+    instance = Instance(instance.model, (front, machine), instance.name)
+
+    # a pump that has stood for a sample
+    standing = instance.start(at, step or 1.0 / SOURCE_RATE, "steady").arguments[1]
+    state = called(instance.model.parts[1].step, standing)
+    if options.symmetric is not None and point.orifice_opening == 0.0:
+        lower = CLOSED / p.Z1
+        state = state._replace(
+            pressure=state.pressure - lower, plate_pressure=state.plate_pressure - lower
+        )
+    if step == 0.0:
+        models = models_of(parameters.equations)
+        flowing = models.flowing_drive if by_voltage else models.flowing_pump_drive
+        instance = replace(instance, model=flowing)
+    card = instance.start(at, step, "steady").states[0]
+    started = instance.start(at, step, "steady", (card, state))
+    records = tuple(command if name in COMMANDS else name for name in inputs)
+    (A, B, C, D), states, memory, whole = recurrence(instance, started, step, records, outputs)
+    names = _names(side, step, front.options)
+    if options.friction is not None and step > 0.0:
+        # the next sample knows the spool's place x and its deflection d as d e^(-h/T) - x w/x_s
+        # alone, the deflection that would be left if it came back to where it was balanced
+        k = started.arguments[1]["k"]
+        spool, deflection = (states.index(f"pump.{each}") for each in ("spool", "deflection"))
+        friction = k.friction_width / p.spool_presliding
+        for matrix in (A, C):
+            matrix[:, deflection] = -matrix[:, spool] / friction
+        for matrix in (A, B):
+            matrix[deflection] = k.dither_factor * matrix[deflection] - friction * matrix[spool]
+    if not isfinite(p.dither_time):
+        del names["pump.deflection"]  # without dither nothing is left of it
+    names |= {each: each for each in memory}
+    moving = np.asarray(B.any(axis=1))
+    moving[states.index("pump.pressure")] = True
+    for _ in states:
+        moving |= A[:, moving].any(axis=1)
+    kept = [path for path in names if moving[states.index(path)]]
+    places = [states.index(path) for path in kept]
     # a channel counts in its own direction, the model in that of the speed
-    signs = np.array([sign if path.startswith("card.") else 1.0 for path in names])
-    A, C = found.A[np.ix_(at, at)] * np.outer(signs, signs), found.C[:, at] * signs
-    B, D = found.B[at] * signs[:, np.newaxis], found.D
-    states = tuple(names.values())
-    if inputs[0] != "voltage" or step == 0.0:
-        return (A, B, C, D), states, (), 0
-    whole = int(known.instance.places(known.records, step).whole[0])
-    late = {late: k for k, (of, late) in enumerate(found.columns) if of == "voltage"}
-    others = [k for k, (of, _) in enumerate(found.columns) if of != "voltage"]
-    read = [k for lag, k in late.items() if lag > whole + 1 and (B[:, k].any() or D[:, k].any())]
-    past, now = [late[whole + 1], *read], [late[whole], *others]
-    count = len(past)
-    memory = ("voltage_before", *(f"voltage_before_{j}" for j in range(2, count + 1)))
-    line = np.block([[np.eye(count, k=-1), np.zeros((count, len(at)))], [B[:, past], A]])
-    into = np.hstack((np.eye(count, 1), np.zeros((count, len(others)))))
-    matrices = line, np.vstack((into, B[:, now])), np.hstack((D[:, past], C)), D[:, now]
-    return matrices, (*memory, *states), memory, whole
+    signs = np.array([sign if path.startswith("card.") else 1.0 for path in kept])
+    matrices = (
+        A[np.ix_(places, places)] * np.outer(signs, signs),
+        B[places] * signs[:, np.newaxis],
+        C[:, places] * signs,
+        D,
+    )
+    return matrices, tuple(names[path] for path in kept), memory, whole
 
 
-def slowest_lag(parameters: ParameterSet) -> float:
-    """Time within which a drive at rest forgets most: pump's and card's lags and the delay. [s]"""
-    numbers = parameters.numbers
-    changes = {"Z18": 0.0}
-    if "spool_friction" in numbers and numbers.get("spool_presliding", 0.0) == 0.0:
-        changes["spool_friction"] = 0.0  # it holds the spool fast, for ever
-    rest = OperatingPoint(None, 0.0, 0.0, numbers["Z2"] / numbers["Z1"], 0.0, 0.0, 0.0)
-    (A, *_), *_ = _matrices(
-        parameters.replace(changes), rest, ("solenoid_force",), ("swash_angle",)
-    )
-    poles = np.linalg.eigvals(A)
-    lasting = poles[-poles.real > 1e-6 * np.abs(poles)]
-    lag = 1.0 / float(-lasting.real.max())
-    card = card_of(parameters)
-    # of the filter with the slope that its Coulomb term has at rest
-    cards = (
-        (2.0 * each.zeta * each.omega + each.C / COULOMB_WIDTH) / each.omega**2
-        for each in (card.plus, card.minus)
-    )
-    return numbers["tau"] + lag + max(cards)
+def _names(side: str, step: float, options: Any) -> dict[str, str]:
+    """Paths of the states that small motions can move, and what they are called."""
+    ending = "_before" if step > 0.0 else ""
+    names = {
+        "pump.pressure": "stroker_pressure",
+        "pump.plate_pressure": "plate_pressure",
+        "pump.deflection": "spool_deflection",
+        "pump.torque": f"motor_torque{ending}",
+        "pump.speed": f"shaft_speed{ending}",
+        "pump.flow_speed": f"flow_speed{ending}",
+        "pump.load_torque": f"load_torque{ending}",
+    }
+    if not side:
+        return names
+    before = "current_rate" if step == 0.0 or options.exact is not None else "current_before"
+    return {f"card.{side}.before": before, f"card.{side}.now": "current", **names}
 
 
 # --- at a sample time -----------------------------------------------------------------------------
@@ -316,18 +390,16 @@ def sampled(
     step = sample_time / substeps
     if model.input == "voltage":
         check_filter_stability(model.parameters, step)
-    matrices, states, memory, whole = _matrices(
-        *(model.parameters, model.operating_point, model.inputs, model.outputs, model.coulomb, step)
-    )
+    at = model.parameters, model.operating_point, model.inputs, model.outputs, model.coulomb
+    matrices, states, memory, whole = _matrices(*at, step)
     delay = whole * step
     if substeps > 1:
-        before = len(states)
-        matrices, states = with_line(matrices, states, model.input, whole)
-        line, last = states[: len(states) - before], tuple(f"{name}_last" for name in model.inputs)
+        line = tuple(f"{model.input}_{k}" for k in range(1, whole + 1))
+        last = tuple(f"{name}_last" for name in model.inputs)
         # what is measured beside the command goes straight from sample to sample
         held = [interpolation == "previous", *(False for _ in model.inputs[1:])]
-        matrices = _lifted(*matrices, substeps, held)
-        states, memory, delay = (*states, *last), (*line, *memory, *last), 0.0
+        matrices = _lifted(*with_line(matrices, whole), substeps, held)
+        states, memory, delay = (*line, *states, *last), (*line, *memory, *last), 0.0
     A, B, C, D = matrices
     found = replace(model, A=A, B=B, C=C, D=D, states=states, memory=memory)
     return replace(found, delay=delay, sample_time=sample_time)
@@ -364,55 +436,48 @@ def model_tables(
 ) -> list[Table]:
     """Operating point, small motion and poles of a model, and margins of a loop closed over it.
 
-    Parameters
-    ----------
-    model : LinearDrive
-        From voltage, current or force to the shaft's speed.
-    frequency : float
-        At which gain and phase are given. [Hz]
-    loop_gain : float, optional
-        Of a proportional speed loop. [V, A or N / (rad/s)]
+    Of a model to the shaft's speed. Gain and phase are given at `frequency` [Hz]; `loop_gain` is
+    that of a proportional speed loop [V, A or N / (rad/s)].
     """
-    point, poles = model.operating_point, model.poles
-    made, moving = _key_values("Operating point"), _key_values("Small motion")
+    point, unit = model.operating_point, UNITS[model.input]
+    answer, at = complex(model.response(frequency)[0]), f"at {frequency:g} Hz"
+    made = _key_values("Operating point")
     if point.voltage is not None:
         made.add("voltage", point.voltage, unit="V")
     made.add("current", Cell(point.current, f"{point.current:z.4f}"), unit="A")
     made.add("swash angle", point.swash_angle, unit="rad", spec="z.3f")
     made.add("shaft speed", point.shaft_speed, unit="rad/s", spec="z.3f")
 
-    unit, answer = UNITS[model.input], complex(model.response(frequency)[0])
+    moving = _key_values("Small motion")
     moving.add("steady gain", model.gain, unit=f"rad/s/{unit}", spec="z.5g")
     moving.add("time constant of the pump", model.time_constant, unit="s")
     if model.input == "voltage":
         delay = 1e3 * model.parameters.numbers["tau"]
         moving.add("delay of the card", delay, unit="ms", spec="z.3f")
     moving.add("bandwidth (-3 dB)", _finite(model.bandwidth), unit="Hz", spec=".4g")
-    at = f"at {frequency:g} Hz"
     moving.add(f"gain {at}", abs(answer), unit=f"rad/s/{unit}", spec=".5g")
     moving.add(f"phase {at}", float(np.angle(answer, deg=True)), unit="deg", spec="z.2f")
     largest = _finite(model.largest_gain)
     moving.add("largest proportional gain", largest, unit=f"{unit}/(rad/s)", spec=".4g")
 
     heads = (("real", "z.5g"), ("imaginary", "s"), ("Hz", ".4g"), ("damping", ".3f"))
-    pole_table = Table("", (Column("Poles"), *(Column(*each) for each in heads)))
+    poles = Table("", (Column("Poles"), *(Column(*each) for each in heads)))
     h = model.sample_time
-    for pole in poles[poles.imag >= 0.0]:  # its conjugate stands for both
+    for pole in model.poles[model.poles.imag >= 0.0]:  # its conjugate stands for both
         s = pole if h is None else np.log(pole) / h
         size = float(abs(s))
         imaginary = f"±{pole.imag:.5g}" if pole.imag else ""
         numbers = float(pole.real), imaginary, size / (2.0 * np.pi), float(-s.real) / size
-        pole_table.add("rad/s" if h is None else "z", *numbers)
-    tables = [made, moving, pole_table]
+        poles.add("rad/s" if h is None else "z", *numbers)
     if loop_gain is None:
-        return tables
+        return [made, moving, poles]
     margins, shown = model.margins(loop_gain), display_unit(f"{unit}/(rad/s)")
     loop = _key_values(f"Proportional loop, {shown.factor * loop_gain:g} {shown.name}")
     loop.add("crossover", margins.crossover or Cell(None, "none"), unit="Hz", spec=".4g")
     loop.add("phase margin", _finite(np.degrees(margins.phase_margin)), unit="deg", spec=".1f")
     loop.add("delay margin", _finite(1e3 * margins.delay_margin), unit="ms", spec=".2f")
     loop.add("gain margin", _finite(margins.gain_margin), spec=".3g")
-    return [*tables, loop]
+    return [made, moving, poles, loop]
 
 
 def _key_values(title: str) -> Table:

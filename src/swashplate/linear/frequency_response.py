@@ -6,7 +6,7 @@ The drive is marched over whole cycles of each frequency until it repeats itself
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import ceil
+from math import ceil, sqrt
 from typing import TYPE_CHECKING, Literal, get_args
 
 import numpy as np
@@ -14,9 +14,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from swashplate.equations.marching.march import output_of
 from swashplate.equations.marching.record import FASTEST, SOURCE_RATE
-from swashplate.equations.marching.run import marched
+from swashplate.equations.marching.run import Instance, marched
 from swashplate.errors import DomainError, InputError
-from swashplate.linear.drive import slowest_lag
 from swashplate.models.displacement_control import Pump
 from swashplate.parameters.parameter_set import ParameterSet
 from swashplate.parameters.rules import FULL_VOLTAGE
@@ -46,7 +45,8 @@ SWEPT_OUTPUTS: tuple[SweptOutput, ...] = get_args(SweptOutput)
 SLOWEST_CYCLE = 1e-3  # Lowest frequency. [Hz]
 FEWEST_STEPS, MOST_STEPS = 8, 1_000_000
 """Steps of a cycle, which bound the frequencies from both sides."""
-MOST_BLOCKS = 96  # Blocks of cycles after which an answer that still changes is given up.
+SHORTEST = 1.0  # Half of a march lasts as long at least. [s]
+LONGEST = 64  # Times the first march, after which an answer that still changes is given up.
 STILL = 1e-12  # Answers below this part of the output's size are none.
 
 
@@ -156,25 +156,40 @@ def sweep(
             f"'{output}' is no output of a sweep of the {input}; there are "
             f"{', '.join(name for name in SWEPT_OUTPUTS if name != input)}."
         )
-    largest = abs(bias) + float(a.max())
-    if not np.isfinite(bias) or (input == "voltage" and largest > FULL_VOLTAGE):
-        raise InputError(
-            f"Bias and amplitude reach {largest:g} V, but the card takes ±10 V."
-            if np.isfinite(bias)
-            else f"The bias is {bias}, but must be a finite number."
-        )
-    found = np.zeros((4, a.size, f.size), dtype=np.complex128)
-    block = 3.0 * slowest_lag(parameters)
+    if not np.isfinite(bias):
+        raise InputError(f"The bias is {bias}, but must be a finite number.")
+    if input == "voltage" and (largest := abs(bias) + float(a.max())) > FULL_VOLTAGE:
+        raise InputError(f"Bias and amplitude reach {largest:g} V, but the card takes ±10 V.")
+
+    ratio = np.zeros((a.size, f.size), dtype=np.complex128)
+    distortion, mean, cycles = np.zeros((3, a.size, f.size))
+    instance = without_ripple(instance_of(parameters, input == "voltage"))
+    size = _size(instance.parts[1].p, output)
     for j, frequency in enumerate(f.tolist()):
         steps = ceil(rate / frequency * (1.0 - 1e-12))
+        step = 1.0 / (frequency * steps)
+        if input == "voltage":
+            check_filter_stability(parameters, step)
         wave = np.sin(2.0 * np.pi * np.arange(steps) / steps)
         for i, amplitude in enumerate(a.tolist()):
-            command = bias + amplitude * wave
-            found[:, i, j] = _settled(
-                parameters, command, bias, frequency, block, input, output, tolerance
-            )
-    ratio = found[0] / a[:, np.newaxis]
-    distortion, mean, cycles = found[1:].real
+            cycle = bias + amplitude * wave
+            # twice as long until the middle and the last cycle agree: what lasts is then smaller
+            count = least = 2 * ceil(frequency * SHORTEST)
+            while True:
+                answer = _cycles(instance, input, output, np.tile(cycle, count), step, steps)
+                middle, _, _ = _harmonic(answer[count // 2 - 1], size)
+                last, distortion[i, j], mean[i, j] = _harmonic(answer[-1], size)
+                if abs(last - middle) <= tolerance * abs(last):
+                    break
+                if count >= LONGEST * least:
+                    raise DomainError(
+                        f"{parameters.name}: at {frequency:g} Hz and an amplitude of "
+                        f"{amplitude:g} the answer has not settled to {tolerance:g} within "
+                        f"{count} cycles; allow a larger tolerance, or look at it with a "
+                        "simulation."
+                    )
+                count *= 2
+            ratio[i, j], cycles[i, j] = last / amplitude, count
     if not ratio.any():
         raise DomainError(
             f"{parameters.name}: nothing moves about {bias:g} {'V' if input == 'voltage' else 'A'} "
@@ -187,52 +202,26 @@ def sweep(
     )
 
 
-def _settled(
-    parameters: ParameterSet,
-    command: Array,
-    bias: float,
-    frequency: float,
-    block: float,
-    input: SweptInput,
-    output: SweptOutput,
-    tolerance: float,
-) -> tuple[complex, float, float, int]:
-    """First harmonic as a multiple of the sine, distortion, mean and cycles.
-
-    The cycles come in blocks that last long enough for most of a transient to die out. The last
-    cycles of the last two blocks must agree, or else the march starts again, twice as long.
-    """
-    step, a_block, blocks = 1.0 / (frequency * command.size), max(1, ceil(frequency * block)), 3
-    if input == "voltage":
-        check_filter_stability(parameters, step)
-    instance = without_ripple(instance_of(parameters, input == "voltage"))
+def _cycles(
+    instance: Instance, input: str, output: str, record: Array, step: float, steps: int
+) -> Array:
+    """Answer from the steady state under the first sample, a row for each cycle."""
+    started = instance.start({input: float(record[0])}, step, "steady")
     seen, _ = output_of(instance.model, output)
-    size = _size(instance.parts[1].p, output)
-    while True:
-        count = blocks * a_block
-        records: dict[str, Array] = {input: np.tile(command, count)}
-        started = instance.start({input: float(command[0])}, step, "steady")
-        (signal,) = marched(instance, records, step, started, (seen,), input)
-        # a cycle has a whole number of steps, so that its first harmonic is exact
-        cycles = signal.reshape(count, command.size)
-        earlier, _, _ = _harmonic(cycles[-1 - a_block], size)
-        harmonic, distortion, mean = _harmonic(cycles[-1], size)
-        if abs(harmonic - earlier) <= tolerance * abs(harmonic):
-            return harmonic, distortion, mean, count
-        if blocks >= MOST_BLOCKS:
-            raise DomainError(
-                f"{parameters.name}: at {frequency:g} Hz and an amplitude of "
-                f"{command.max() - bias:g} the answer has not settled to {tolerance:g} within "
-                f"{count} cycles; allow a larger tolerance, or look at it with a simulation."
-            )
-        blocks *= 2
+    (signal,) = marched(instance, {input: record}, step, started, (seen,), input)
+    return np.asarray(signal.reshape(-1, steps))
 
 
-def _size(pump: Pump, output: SweptOutput) -> float:
+def _size(pump: Pump, output: str) -> float:
     """Natural size of a signal, beside which rounding is told from motion."""
-    spool = dict.fromkeys(("spool_position", "orifice_opening"), pump.Z5)
-    sizes = {"shaft_speed": pump.Z10, "stroker_pressure": 1.0 / pump.Z1, **spool}
-    return sizes.get(output, pump.Z4**0.5 / pump.Z5 if output == "solenoid_force" else 1.0)
+    sizes = {
+        "shaft_speed": pump.Z10,
+        "stroker_pressure": 1.0 / pump.Z1,
+        "spool_position": pump.Z5,
+        "orifice_opening": pump.Z5,
+        "solenoid_force": sqrt(pump.Z4) / pump.Z5,
+    }
+    return sizes.get(output, 1.0)
 
 
 def _harmonic(signal: Array, size: float) -> tuple[complex, float, float]:

@@ -1,21 +1,19 @@
-"""Linear models: state space with a delay before its input, what follows from it, other forms."""
+"""Linear models: state space with a delay before its input, its margins in a loop, other forms."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from functools import cached_property
-from math import log
+from math import copysign, inf, log, pi
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from swashplate.equations.marching.record import Interpolation
 from swashplate.errors import DomainError, InputError
-from swashplate.linear.margins import LoopMargins, bandwidth, largest_gain, loop_margins
-from swashplate.linear.operating_point import OperatingPoint
 from swashplate.parameters.parameter_set import ParameterSet
 from swashplate.tables import Form, ending, write_text
 
@@ -25,8 +23,8 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
 Matrices = tuple[Array, Array, Array, Array]
+Response = Callable[[Array], ComplexArray]
 Coulomb = Literal["ignored", "tangent"]
-Controller = float | Callable[[Array], ComplexArray]
 
 PLATE_STATES = ("stroker_pressure", "plate_pressure", "spool_deflection")
 """States between current and swash angle."""
@@ -67,7 +65,7 @@ class LinearModel:
     D: Array  # (m, k)
     states: tuple[str, ...]
     inputs: tuple[str, ...]
-    """The first is the one that loops, gains and responses are about unless told otherwise."""
+    """The first is the one that loops, gains and responses are about unless stated otherwise."""
     outputs: tuple[str, ...]
     delay: float
     """What stands exactly before the first input; of a sampled model whole samples. [s]"""
@@ -77,16 +75,16 @@ class LinearModel:
 
     def __repr__(self) -> str:
         time = "continuous" if self.sample_time is None else f"sampled at {self.sample_time:g} s"
-        kind, said = type(self).__name__, ", ".join(self.inputs)
-        return f"{kind}({self.name!r}, {said} to {', '.join(self.outputs)}, {time})"
+        kind, inputs = type(self).__name__, ", ".join(self.inputs)
+        return f"{kind}({self.name!r}, {inputs} to {', '.join(self.outputs)}, {time})"
 
     @property
     def input(self) -> str:
         """The first input."""
         return self.inputs[0]
 
-    def _poles(self, states: Iterable[str]) -> ComplexArray:
-        """Poles of some of the states, the slowest first."""
+    def poles_of(self, *states: str) -> ComplexArray:
+        """Poles of some of the states by themselves, the slowest first."""
         kept = [k for k, name in enumerate(self.states) if name in states]
         poles = np.linalg.eigvals(self.A[np.ix_(kept, kept)])
         slowness = poles.real if self.sample_time is None else np.abs(poles)
@@ -98,7 +96,7 @@ class LinearModel:
 
         Of a continuous model in the s-plane [rad/s], of a sampled one in the z-plane [1].
         """
-        return self._poles([name for name in self.states if name not in self.memory])
+        return self.poles_of(*(name for name in self.states if name not in self.memory))
 
     @property
     def is_stable(self) -> bool:
@@ -113,9 +111,7 @@ class LinearModel:
 
         Those of the other inputs are the `response` to them at 0 Hz.
         """
-        n = self.A.shape[0]
-        rest = -self.A if self.sample_time is None else np.eye(n) - self.A
-        return np.asarray((self.C @ np.linalg.solve(rest, self.B) + self.D)[:, 0])
+        return np.asarray(self.response([0.0])[:, 0].real)
 
     @property
     def gain(self) -> float:
@@ -130,14 +126,18 @@ class LinearModel:
         """
         f = np.atleast_1d(np.asarray(frequency, dtype=np.float64))
         h = self.sample_time
-        highest = np.inf if h is None else 0.5 / h
+        highest = inf if h is None else 0.5 / h
         # half the rate may have been computed in another way
         if f.ndim != 1 or not (np.isfinite(f) & (f >= 0.0) & (f <= highest * (1.0 + 1e-12))).all():
             raise InputError(
                 "Frequencies must be one row of finite numbers from 0 on"
                 + ("." if h is None else f" to 1/(2 h) = {highest:g} Hz.")
             )
-        at = self.index_of_input(input)
+        if input is not None and input not in self.inputs:
+            raise InputError(
+                f"The model of {self.name} has no input '{input}'; it has {', '.join(self.inputs)}."
+            )
+        at = 0 if input is None else self.inputs.index(input)
         s = 2j * np.pi * f
         point = s if h is None else np.exp(s * h)
         n = self.A.shape[0]
@@ -148,29 +148,28 @@ class LinearModel:
             found = found * np.exp(-s * self.delay)
         return np.asarray(found[:, 0] if np.ndim(frequency) == 0 else found, dtype=np.complex128)
 
-    def index_of_input(self, input: str | None) -> int:
-        """Number of an input, of the first if None."""
-        if input is not None and input not in self.inputs:
-            raise InputError(
-                f"The model of {self.name} has no input '{input}'; it has {', '.join(self.inputs)}."
-            )
-        return 0 if input is None else self.inputs.index(input)
-
-    def _first(self, frequency: Array) -> ComplexArray:
-        return np.asarray(self.response(frequency)[0])
+    # --- loops ------------------------------------------------------------------------------------
 
     def _fastest(self) -> float:
         """Frequency far beyond all poles, or half the rate of a sampled model. [Hz]"""
-        if self.sample_time is not None:
-            return 0.5 / self.sample_time
-        return 1e3 * float(np.abs(self.poles).max())
-
-    def _check_stable(self) -> None:
         if not self.is_stable:
             raise DomainError(
                 f"{self.name}: the linear model is unstable (poles {self.poles}), so that a "
                 "bandwidth or margin means nothing."
             )
+        if self.sample_time is not None:
+            return 0.5 / self.sample_time
+        return 1e3 * float(np.abs(self.poles).max())
+
+    def _size(self, grid: Array) -> float:
+        """Magnitude of the steady gain, of an output that follows a steady input."""
+        size = abs(self.gain)
+        if size <= 1e-9 * float(np.abs(self.response(grid)[0]).max()):
+            raise DomainError(
+                "The output does not follow a steady input (its gain is 0), so it has neither a "
+                "bandwidth nor a largest gain; ask for another output."
+            )
+        return size
 
     @property
     def bandwidth(self) -> float:
@@ -178,8 +177,10 @@ class LinearModel:
 
         Infinite where it never does, below half the rate of a sampled model.
         """
-        self._check_stable()
-        return bandwidth(self._first, self.gain, self._fastest())
+        grid = _grid(self._fastest())
+        level = self._size(grid) / np.sqrt(2.0)
+        falls = _roots(lambda f: np.abs(self.response(f)[0]) - level, grid)
+        return falls[0] if falls else inf
 
     @property
     def largest_gain(self) -> float:
@@ -187,10 +188,10 @@ class LinearModel:
 
         In the input's unit by the output's, positive; infinite where none does.
         """
-        self._check_stable()
-        return largest_gain(self._first, self.delay, self._fastest(), self.gain)
+        small = 1e-6 / self._size(_grid(self._fastest()))
+        return small * self.margins(copysign(small, self.gain)).gain_margin
 
-    def margins(self, controller: Controller) -> LoopMargins:
+    def margins(self, controller: float | Response) -> LoopMargins:
         """Margins of the loop u = K (r - y) closed over the first output.
 
         The controller is a proportional gain K, e.g. in V/(rad/s), or its frequency response: a
@@ -202,13 +203,14 @@ class LinearModel:
         DomainError
             If the closed loop is unstable; it then has no margin.
         """
-        self._check_stable()
 
         def loop(frequency: Array) -> ComplexArray:
             factor = controller(frequency) if callable(controller) else controller
-            return np.asarray(factor * self._first(frequency))
+            return np.asarray(factor * self.response(frequency)[0])
 
         return loop_margins(loop, self.delay, self._fastest(), self.name)
+
+    # --- other forms ------------------------------------------------------------------------------
 
     def to_scipy(self, *, without_delay: bool = False) -> StateSpace:
         """The model as `scipy.signal.StateSpace`, continuous or sampled.
@@ -222,8 +224,7 @@ class LinearModel:
         matrices = self.A, self.B, self.C, self.D
         if self.sample_time is not None:
             late = round(self.delay / self.sample_time)
-            matrices, _ = with_line(matrices, self.states, self.input, late)
-            return StateSpace(*matrices, dt=self.sample_time)
+            return StateSpace(*with_line(matrices, late), dt=self.sample_time)
         if self.delay != 0.0 and not without_delay:
             raise InputError(
                 f"The model has a delay of {self.delay:g} s, which no state space holds exactly; "
@@ -263,6 +264,28 @@ class LinearModel:
             write_text(dump_toml(self.content()), path)
 
 
+@dataclass(frozen=True)
+class OperatingPoint:
+    """A steady state; signs as everywhere: positive goes with more speed."""
+
+    voltage: float | None
+    """None where a current was given. [V]"""
+    current: float
+    """Signed. [A]"""
+    solenoid_force: float
+    """[N]"""
+    stroker_pressure: float
+    """δP. [Pa]"""
+    orifice_opening: float
+    """x_eff: zero, unless the stroking piston leaks. [m]"""
+    swash_angle: float
+    """[rad]"""
+    shaft_speed: float
+    """The mean of a turn. [rad/s]"""
+    one_sided: tuple[str, ...] = ()
+    """Switches that the point lies on, and the side whose slope is taken."""
+
+
 @dataclass(frozen=True, eq=False)
 class LinearDrive(LinearModel):
     """Small motions of a drive about an operating point."""
@@ -291,7 +314,7 @@ class LinearDrive(LinearModel):
         shorter than its step is refused in a `DomainError`. Where friction or damping give it more
         poles than one, that of the slowest.
         """
-        slowest = self._poles(PLATE_STATES)[0]
+        slowest = self.poles_of(*PLATE_STATES)[0]
         if self.sample_time is None:
             return -1.0 / float(slowest.real)
         pole = float(abs(slowest) if slowest.imag else slowest.real)
@@ -314,20 +337,99 @@ class LinearDrive(LinearModel):
         return sampled(self, sample_time, interpolation)
 
 
-# --- delays ---------------------------------------------------------------------------------------
-
-
-def with_line(
-    matrices: Matrices, states: tuple[str, ...], input: str, whole: int
-) -> tuple[Matrices, tuple[str, ...]]:
-    """Matrices and names of the states with whole samples of delay before the first input."""
+def with_line(matrices: Matrices, whole: int) -> Matrices:
+    """Matrices with whole samples of delay before the first input as states, the newest first."""
     if whole == 0:
-        return matrices, states
+        return matrices
     A, B, C, D = matrices
     n, others = A.shape[0], np.zeros((whole, B.shape[1] - 1))
     line, last, first = np.eye(whole, k=-1), np.eye(1, whole, whole - 1), np.eye(whole, 1)
     longer = np.block([[line, np.zeros((whole, n))], [B[:, :1] @ last, A]])
     into = np.block([[first, others], [np.zeros((n, 1)), B[:, 1:]]])
     out = np.hstack((D[:, :1] @ last, C)), np.hstack((np.zeros_like(D[:, :1]), D[:, 1:]))
-    names = tuple(f"{input}_{k}" for k in range(1, whole + 1))
-    return (longer, into, *out), (*names, *states)
+    return longer, into, *out
+
+
+# --- margins --------------------------------------------------------------------------------------
+
+POINTS, DECADES = 4000, 9  # Of the search, which ends at the fastest frequency.
+MOST_TURN = 100.0
+"""Phase of the delay beyond which a loop of size 1 or more cannot be stable. [rad]
+
+Up to there it turns by half a radian at most from one point of the search to the next.
+"""
+
+
+class LoopMargins(NamedTuple):
+    """Margins of a stable loop."""
+
+    crossover: float
+    """Frequency at which |L| = 1 that leaves the smallest delay margin, 0 where none. [Hz]"""
+    phase_margin: float  # Phase of L above -180° there, infinite where there is no crossover. [rad]
+    delay_margin: float  # Further delay that makes the loop swing. [s]
+    gain_margin: float  # Factor on L that makes the loop swing. [1]
+
+
+def loop_margins(loop: Response, delay: float, fastest: float, name: str) -> LoopMargins:
+    """Margins of the loop 1 + L = 0.
+
+    Parameters
+    ----------
+    loop : callable
+        L of frequencies [Hz], of parts that are stable or integrate.
+    delay, fastest : float
+        The delay within L [s], and the highest frequency to look at [Hz].
+    name : str
+        Whose loop, for the sentence.
+
+    Raises
+    ------
+    DomainError
+        If the closed loop is unstable: by Nyquist's criterion, the argument of 1 + L does not come
+        from where it must to zero.
+    """
+    grid = _grid(fastest)
+    values = loop(grid)
+    if not np.isfinite(values).all():
+        raise InputError(f"{name}: the controller's frequency response is not finite.")
+    argument = np.unwrap(np.angle(1.0 + values))
+    # a loop that integrates begins at -90° or, twice, at -180°; another one on the positive axis
+    integrates = abs(values[0]) > 2.0 * abs(loop(10.0 * grid[:1])[0])
+    begins_well = (-pi if integrates else -0.5 * pi) <= argument[0] <= 0.25 * pi
+    turned = 2.0 * pi * delay * grid > MOST_TURN
+    if abs(argument[-1]) > 0.5 * pi or not begins_well or (np.abs(values[turned]) >= 1.0).any():
+        raise DomainError(
+            f"{name}: the closed loop is unstable, so it has no margins; lower the controller's "
+            "gain."
+        )
+    margins = [(inf, 0.0, inf)]
+    for frequency in _roots(lambda f: np.log(np.maximum(np.abs(loop(f)), 1e-300)), grid):
+        phase = (float(np.angle(loop(np.array([frequency]))[0])) + pi) % (2.0 * pi)
+        margins.append((phase / (2.0 * pi * frequency), frequency, phase))
+    delay_margin, crossover, phase = min(margins)
+    # where L crosses the negative real axis farthest out
+    turns = _roots(lambda f: loop(f).imag, grid, values.real < 0.0)
+    sizes = [abs(loop(np.array([frequency]))[0]) for frequency in turns]
+    if values[-1].real < 0.0 and abs(values[-1].imag) <= 1e-9 * abs(values[-1]):
+        sizes.append(abs(values[-1]))  # half the rate of a sampled model
+    gain_margin = float(1.0 / max(sizes)) if sizes else inf
+    return LoopMargins(crossover, phase, delay_margin, gain_margin)
+
+
+def _grid(fastest: float) -> Array:
+    return np.asarray(np.geomspace(fastest * 10.0**-DECADES, fastest, POINTS))
+
+
+def _roots(
+    function: Callable[[Array], Array], grid: Array, within: NDArray[np.bool_] | None = None
+) -> list[float]:
+    """Frequencies at which a function changes its sign, between points of the grid within."""
+    from scipy.optimize import brentq
+
+    turns = np.diff(np.signbit(function(grid)))
+    if within is not None:
+        turns &= within[:-1] & within[1:]
+    return [
+        float(brentq(lambda f: float(function(np.array([f]))[0]), grid[k], grid[k + 1]))
+        for k in np.flatnonzero(turns)
+    ]

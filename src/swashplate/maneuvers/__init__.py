@@ -15,9 +15,7 @@ command ends with. Where the cubic would then leave the amplitude, as after a fa
 with the steepest slope of that sign with which it stays within, at the amplitude itself with none.
 """
 
-from swashplate.maneuvers.pieces import Curve as Curve
 from swashplate.maneuvers.pieces import Maneuver as Maneuver
-from swashplate.maneuvers.pieces import Piece as Piece
 from swashplate.maneuvers.pieces import sampled as sampled
 from swashplate.maneuvers.pieces import superpose as superpose
 from swashplate.maneuvers.shapes import chirp as chirp

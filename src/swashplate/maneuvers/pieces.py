@@ -1,13 +1,11 @@
 """Maneuvers as objects: curves one after another, to be sampled, scaled, joined and added."""
-# ruff: noqa: D102 - what the two methods of every curve return is said once, by Curve
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import reduce
-from typing import Protocol
+from functools import partial
 
 import numpy as np
 import numpy.typing as npt
@@ -15,10 +13,12 @@ import numpy.typing as npt
 from swashplate.errors import InputError
 from swashplate.results import Result
 
-# --- curves ---------------------------------------------------------------------------------------
-
-
 Array = npt.NDArray[np.float64]
+Curve = Callable[[Array], tuple[Array, Array]]
+"""What a piece follows: voltage [V] and exact slope [V/s], at a kink of what follows it, over the
+time since its start [s]."""
+Piece = tuple[float, Curve]
+"""Start of a curve, from the beginning of the maneuver [s], which holds until the next starts."""
 
 NEAR = 1e-9
 """An instant this little before a jump, or after the end, counts as being there. [s]
@@ -27,6 +27,58 @@ Decimal durations do not add up exactly (0.1 + 0.2 > 0.3), and a step must not m
 for it.
 """
 HALVINGS = 60  # Of the slope of a return until it is found, to the last bits.
+LONGEST = 100_000_000
+"""Samples that a maneuver may have; more is a mistake and would not fit into memory."""
+
+# --- curves ---------------------------------------------------------------------------------------
+
+
+def line(time: Array, level: float = 0.0, rise: float = 0.0) -> tuple[Array, Array]:
+    """Straight line from `level` [V] on, which rises by `rise` [V/s]."""
+    return level + rise * time, np.full_like(time, rise)
+
+
+def tone(
+    time: Array, amplitude: float, frequency: float, growth: float = 0.0, phase: float = 0.0
+) -> tuple[Array, Array]:
+    """Sine of `amplitude` [V] and `phase` [rad]; its `frequency` [Hz] grows by `growth` [Hz/s]."""
+    angle = 2.0 * np.pi * (frequency + 0.5 * growth * time) * time + phase
+    speed = 2.0 * np.pi * (frequency + growth * time)
+    return amplitude * np.sin(angle), amplitude * speed * np.cos(angle)
+
+
+def homeward(time: Array, level: float, rise: float, duration: float) -> tuple[Array, Array]:
+    """Cubic from voltage `level` [V] and slope `rise` [V/s] to (0, 0) at `duration` [s]."""
+    done = time / duration
+    # written with the time left as a factor, it ends at exactly zero
+    return (
+        (1.0 - done) ** 2 * (level * (1.0 + 2.0 * done) + rise * time),
+        (1.0 - done) * (rise * (1.0 - 3.0 * done) - 6.0 * (level / duration) * done),
+    )
+
+
+def joined(time: Array, times: Array, volts: Array) -> tuple[Array, Array]:
+    """Rows of a log joined by straight lines."""
+    # at the last row there is no line that follows: keep to the one before
+    slopes = np.diff(volts) / np.diff(times)
+    return np.interp(time, times, volts), slopes[interval(times[:-1], time)]
+
+
+def kept(time: Array, times: Array, volts: Array) -> tuple[Array, Array]:
+    """Rows of a log, each until the next."""
+    return volts[interval(times, time)], np.zeros_like(time)
+
+
+def scaled(time: Array, factor: float, curve: Curve) -> tuple[Array, Array]:
+    """Another curve times `factor` [1]."""
+    voltage, slope = curve(time)
+    return factor * voltage, factor * slope
+
+
+def summed(time: Array, curves: Sequence[Curve]) -> tuple[Array, Array]:
+    """Sum of one or more curves."""
+    voltages, slopes = zip(*(curve(time) for curve in curves), strict=True)
+    return sum(voltages[1:], voltages[0]), sum(slopes[1:], slopes[0])
 
 
 def interval(starts: npt.ArrayLike, time: Array) -> npt.NDArray[np.intp]:
@@ -34,125 +86,28 @@ def interval(starts: npt.ArrayLike, time: Array) -> npt.NDArray[np.intp]:
     return np.searchsorted(starts, time + NEAR, side="right") - 1
 
 
-class Curve(Protocol):
-    """What a piece of a maneuver follows; both methods take an array of times [s]."""
-
-    def __call__(self, time: Array, /) -> Array:
-        """Voltage [V], in an array of the same shape."""
-
-    def slope(self, time: Array, /) -> Array:
-        """Exact dV/dt [V/s], in an array of the same shape; at a kink, of what follows it."""
-
-
-@dataclass(frozen=True)
-class Line:
-    """Straight line from `level` [V] on, which rises by `rise` [V/s]."""
-
-    level: float = 0.0
-    rise: float = 0.0
-
-    def __call__(self, time: Array) -> Array:
-        return self.level + self.rise * time
-
-    def slope(self, time: Array) -> Array:
-        return np.full_like(time, self.rise)
-
-
-@dataclass(frozen=True)
-class Hermite:
-    """Cubic from voltage `level` [V] and slope `rise` [V/s] to (0, 0) at `duration` [s]."""
-
-    level: float
-    rise: float
-    duration: float
-
-    def __call__(self, time: Array) -> Array:
-        # Written with the time left as a factor, it ends at exactly zero.
-        done = time / self.duration
-        return (1.0 - done) ** 2 * (self.level * (1.0 + 2.0 * done) + self.rise * time)
-
-    def slope(self, time: Array) -> Array:
-        done = time / self.duration
-        mean = self.level / self.duration
-        return (1.0 - done) * (self.rise * (1.0 - 3.0 * done) - 6.0 * mean * done)
-
-    @property
-    def peak(self) -> float:
-        """Largest magnitude. [V]"""
-        change = self.rise * self.duration
-        turn = 3.0 * (2.0 * self.level + change)
-        # where its one extremum beside the end lies, as a part of the duration
-        part = change / turn if turn else 0.0
-        if not 0.0 < part < 1.0:
-            return abs(self.level)
-        return max(abs(self.level), (1.0 - part) ** 2 * abs(self.level + change / 3.0))
-
-
-def return_within(amplitude: float, level: float, rise: float, duration: float) -> Hermite:
+def return_within(amplitude: float, level: float, rise: float, duration: float) -> Curve:
     """Return from `level` [V] to rest that stays within ±`amplitude` [V], not below ±`level`.
 
     It starts with the slope `rise` [V/s] where the cubic then stays within, else with the steepest
     slope of that sign with which it does, which is 0 at the amplitude itself.
     """
-    whole = Hermite(level, rise, duration)
     bound = max(amplitude, abs(level))
-    if whole.peak <= bound:
-        return whole
+
+    def stays(part: float) -> bool:
+        change = part * rise * duration
+        turn = 3.0 * (2.0 * level + change)
+        # where its one extremum beside the end lies, as a part of the duration
+        at = change / turn if turn else 0.0
+        return not 0.0 < at < 1.0 or (1.0 - at) ** 2 * abs(level + change / 3.0) <= bound
+
     low, high = 0.0, 1.0 if abs(level) < bound else 0.0
+    if stays(1.0):
+        low = high = 1.0
     for _ in range(HALVINGS):
         middle = 0.5 * (low + high)
-        if Hermite(level, middle * rise, duration).peak <= bound:
-            low = middle
-        else:
-            high = middle
-    return Hermite(level, low * rise, duration)
-
-
-@dataclass(frozen=True)
-class Tone:
-    """Sine of `amplitude` [V] and `phase` [rad]; its `frequency` [Hz] grows by `growth` [Hz/s]."""
-
-    amplitude: float
-    frequency: float
-    growth: float = 0.0
-    phase: float = 0.0
-
-    def __call__(self, time: Array) -> Array:
-        return self.amplitude * np.sin(self._angle(time))
-
-    def slope(self, time: Array) -> Array:
-        speed = 2.0 * np.pi * (self.frequency + self.growth * time)
-        return self.amplitude * speed * np.cos(self._angle(time))
-
-    def _angle(self, time: Array) -> Array:
-        return 2.0 * np.pi * (self.frequency + 0.5 * self.growth * time) * time + self.phase
-
-
-@dataclass(frozen=True)
-class Scaled:
-    """Another curve times `factor` [1]."""
-
-    factor: float
-    curve: Curve
-
-    def __call__(self, time: Array) -> Array:
-        return self.factor * self.curve(time)
-
-    def slope(self, time: Array) -> Array:
-        return self.factor * self.curve.slope(time)
-
-
-@dataclass(frozen=True)
-class Sum:
-    """Sum of one or more curves."""
-
-    curves: tuple[Curve, ...]
-
-    def __call__(self, time: Array) -> Array:
-        return reduce(np.add, (curve(time) for curve in self.curves))
-
-    def slope(self, time: Array) -> Array:
-        return reduce(np.add, (curve.slope(time) for curve in self.curves))
+        low, high = (middle, high) if stays(middle) else (low, middle)
+    return partial(homeward, level=level, rise=low * rise, duration=duration)
 
 
 # --- checks ---------------------------------------------------------------------------------------
@@ -200,49 +155,7 @@ def row(name: str, values: npt.ArrayLike) -> Array:
     return numbers
 
 
-def window(start: float, settle: float | None, length: float) -> tuple[float, float, float]:
-    """Start and end of the command between rest and return, and the whole length.
-
-    Parameters
-    ----------
-    start, settle, length : float
-        Rest before the command, return after it (None for none) and the whole. [s]
-
-    Raises
-    ------
-    InputError
-        If one is negative or not finite, or nothing is left for the command.
-    """
-    start, length = finite("start", start, 0.0), finite("length", length, 0.0)
-    settle = finite("settle", settle or 0.0, 0.0)
-    if start + settle >= length:
-        raise InputError(
-            f"start {start:g} s and settle {settle:g} s leave nothing of a length of {length:g} s."
-        )
-    return start, length - settle, length
-
-
-# --- pieces ---------------------------------------------------------------------------------------
-
-
-LONGEST = 100_000_000
-"""Samples that a maneuver may have; more is a mistake and would not fit into memory."""
-
-
-@dataclass(frozen=True, eq=False)
-class Piece:
-    """A voltage from `start` on, until the next piece starts or the maneuver ends.
-
-    Attributes
-    ----------
-    start : float
-        From the beginning of the maneuver. [s]
-    curve : Curve
-        Voltage [V] and its slope [V/s] over the time since `start` [s].
-    """
-
-    start: float
-    curve: Curve
+# --- maneuvers ------------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True, eq=False)
@@ -255,8 +168,8 @@ class Maneuver(Result):
         For people, such as "step 9 V"; `dataclasses.replace(m, name=...)` gives another.
     length : float
         Duration. [s]
-    pieces : tuple of Piece
-        In the order of their starts, the first at 0. At a jump the later piece holds.
+    pieces : tuple of (float, callable)
+        Starts [s], the first at 0, and curves in their order. At a jump the later piece holds.
     amplitude : float
         What the maneuver states and its voltage never exceeds, inf where it states none. [V]
     """
@@ -268,13 +181,11 @@ class Maneuver(Result):
 
     def __call__(self, time: npt.ArrayLike) -> Array:
         """Voltage [V] at `time` [s] of any shape, zero outside [0, length]."""
-        values = self._gather(time, (piece.curve for piece in self.pieces))
-        # the curves stay within the amplitude, rounding errors apart
-        return np.clip(values, 0.0 - self.amplitude, self.amplitude)
+        return self._at(time)[0]
 
     def slope(self, time: npt.ArrayLike) -> Array:
         """Exact dV/dt [V/s] at `time` [s] of any shape, at a jump or kink of what follows it."""
-        return self._gather(time, (piece.curve.slope for piece in self.pieces))
+        return self._at(time)[1]
 
     def time(self, rate: float = 512.0) -> Array:
         """Instants n/rate [s] of the samples, shape (rate·length + 1,).
@@ -306,14 +217,14 @@ class Maneuver(Result):
     def __add__(self, after: Maneuver) -> Maneuver:
         if not isinstance(after, Maneuver):
             return NotImplemented
-        moved = (replace(piece, start=self.length + piece.start) for piece in after.pieces)
+        moved = ((self.length + start, curve) for start, curve in after.pieces)
         name, length = f"{self.name} + {after.name}", self.length + after.length
         amplitude = max(self.amplitude, after.amplitude)
         return Maneuver(name, length, (*self.pieces, *moved), amplitude)
 
     def __mul__(self, factor: float) -> Maneuver:
         factor = finite("factor", factor)
-        pieces = (replace(piece, curve=Scaled(factor, piece.curve)) for piece in self.pieces)
+        pieces = ((start, partial(scaled, factor=factor, curve=c)) for start, c in self.pieces)
         amplitude = abs(factor) * self.amplitude if factor else 0.0
         return Maneuver(f"{factor:g} * ({self.name})", self.length, tuple(pieces), amplitude)
 
@@ -322,20 +233,19 @@ class Maneuver(Result):
     def __neg__(self) -> Maneuver:
         return replace(-1.0 * self, name=f"-({self.name})")
 
-    def _gather(self, time: npt.ArrayLike, functions: Iterable[Callable[[Array], Array]]) -> Array:
-        """Let each piece's function say what it is at the times at which that piece holds."""
+    def _at(self, time: npt.ArrayLike) -> tuple[Array, Array]:
+        """Voltage and slope: of each time by the piece that holds there."""
         stamps = np.asarray(time, dtype=float)
-        values = np.where(np.isnan(stamps), np.nan, 0.0)
+        nothing = np.where(np.isnan(stamps), np.nan, 0.0)
+        voltage, slope = nothing, nothing.copy()
         inside = (stamps >= 0.0) & (stamps <= self.length + NEAR)
         stamps = np.minimum(stamps, self.length)
-        holding = np.where(inside, interval([piece.start for piece in self.pieces], stamps), -1)
-        for index, (piece, function) in enumerate(zip(self.pieces, functions, strict=True)):
+        holding = np.where(inside, interval([start for start, _ in self.pieces], stamps), -1)
+        for index, (start, curve) in enumerate(self.pieces):
             here = holding == index
-            values[here] = function(np.maximum(stamps[here] - piece.start, 0.0))
-        return values[()]  # a number for a number
-
-
-# --- composition ----------------------------------------------------------------------------------
+            voltage[here], slope[here] = curve(np.maximum(stamps[here] - start, 0.0))
+        # the curves stay within the amplitude, rounding errors apart; a number for a number
+        return np.clip(voltage, 0.0 - self.amplitude, self.amplitude)[()], slope[()]
 
 
 def superpose(*maneuvers: Maneuver) -> Maneuver:
@@ -349,35 +259,27 @@ def superpose(*maneuvers: Maneuver) -> Maneuver:
     if not maneuvers:
         raise InputError("superpose needs at least one maneuver.")
     length = max(each.length for each in maneuvers)
-    name = " with ".join(each.name for each in maneuvers)
-    together = Sum(tuple(_padded(each, length) for each in maneuvers))
+    # a shorter one rests from its end on, the end included, as after any jump
+    longer = (each if each.length == length else returned(each, length) for each in maneuvers)
+    together = partial(summed, curves=[each._at for each in longer])
     amplitude = sum(each.amplitude for each in maneuvers)
-    return Maneuver(name, length, (Piece(0.0, together),), amplitude)
+    return Maneuver(" with ".join(m.name for m in maneuvers), length, ((0.0, together),), amplitude)
 
 
-def _padded(short: Maneuver, length: float) -> Maneuver:
-    """Let it rest from its end on, the end included, as after any jump."""
-    if short.length == length:
-        return short
-    return replace(short, length=length, pieces=(*short.pieces, Piece(short.length, Line())))
-
-
-def returned(before: Maneuver, name: str, length: float) -> Maneuver:
-    """Add to a maneuver the return that ends at `length` [s], to the last bit."""
-    level, slope = float(before(before.length)), float(before.slope(before.length))
-    within = before.amplitude if math.isfinite(before.amplitude) else 0.0
-    curve = return_within(within, level, slope, length - before.length)
-    return replace(
-        before, name=name, length=length, pieces=(*before.pieces, Piece(before.length, curve))
-    )
+def returned(before: Maneuver, length: float, curve: Curve = line) -> Maneuver:
+    """A maneuver with a curve from its end on until `length` [s], to the last bit."""
+    return replace(before, length=length, pieces=(*before.pieces, (before.length, curve)))
 
 
 def settled(
     name: str, amplitude: float, pieces: Sequence[Piece], end: float, length: float
 ) -> Maneuver:
     """Rest, the pieces until `end` [s], and the return if there is time left until `length` [s]."""
-    command = Maneuver(name, end, (Piece(0.0, Line()), *pieces), abs(amplitude))
-    return returned(command, name, length) if end < length else command
+    command = Maneuver(name, end, ((0.0, line), *pieces), abs(amplitude))
+    if not end < length:
+        return command
+    level, slope = float(command(end)), float(command.slope(end))
+    return returned(command, length, return_within(abs(amplitude), level, slope, length - end))
 
 
 def sampled(command: npt.ArrayLike | Maneuver, rate: float) -> npt.ArrayLike:

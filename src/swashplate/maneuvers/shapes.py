@@ -3,7 +3,8 @@
 import inspect
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from functools import partial
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -12,19 +13,19 @@ import numpy.typing as npt
 from swashplate.errors import InputError
 from swashplate.maneuvers.pieces import (
     Array,
-    Line,
     Maneuver,
     Piece,
-    Scaled,
-    Sum,
-    Tone,
     finite,
-    interval,
+    joined,
+    kept,
+    line,
     positive,
     row,
+    scaled,
     settled,
+    summed,
+    tone,
     whole,
-    window,
 )
 
 # --- shapes ---------------------------------------------------------------------------------------
@@ -33,7 +34,7 @@ from swashplate.maneuvers.pieces import (
 def rest(duration: float) -> Maneuver:
     """Nothing, 0 V, for `duration` [s]; it raises InputError if that is negative."""
     duration = finite("duration", duration, 0.0)
-    return Maneuver(f"rest {duration:g} s", duration, (Piece(0.0, Line()),), 0.0)
+    return Maneuver(f"rest {duration:g} s", duration, ((0.0, line),), 0.0)
 
 
 def step(
@@ -52,7 +53,7 @@ def step(
         raise InputError(
             f"a step needs 0 <= start < stop <= length, not {start:g}, {stop:g}, {length:g} s."
         )
-    pieces = [Piece(start, Line(amplitude)), Piece(stop, Line())]
+    pieces: list[Piece] = [(start, partial(line, level=amplitude)), (stop, line)]
     return settled(f"step {amplitude:g} V", amplitude, pieces, length, length)
 
 
@@ -72,17 +73,13 @@ def ramp(
         Negative for a ramp downwards. [V/s]
     limit : float
         Largest magnitude, positive. [V]
-
-    Raises
-    ------
-    InputError
-        If `limit` is not positive, or `start` and `settle` leave nothing of `length`.
     """
     slope, limit = finite("slope", slope), positive("limit", limit)
-    start, end, length = window(start, settle, length)
-    pieces = [Piece(start, Line(rise=slope))]
+    start, end, length = _window(start, settle, length)
+    pieces = [(start, partial(line, rise=slope))]
     if abs(slope) * (end - start) > limit:
-        pieces.append(Piece(start + limit / abs(slope), Line(math.copysign(limit, slope))))
+        top = partial(line, level=math.copysign(limit, slope))
+        pieces.append((start + limit / abs(slope), top))
     return settled(f"ramp {slope:g} V/s", limit, pieces, end, length)
 
 
@@ -97,15 +94,10 @@ def stairs(
         At least one. [V]
     dwell : float
         How long each is held, positive. [s]
-
-    Raises
-    ------
-    InputError
-        If there is no level, or a time is out of its range.
     """
     volts, dwell = row("levels", levels).tolist(), positive("dwell", dwell)
     start, settle = finite("start", start, 0.0), finite("settle", settle or 0.0, 0.0)
-    pieces = [Piece(start + dwell * index, Line(level)) for index, level in enumerate(volts)]
+    pieces = [(start + dwell * k, partial(line, level=level)) for k, level in enumerate(volts)]
     end = start + dwell * len(pieces)
     name = f"stairs {'/'.join(f'{level:g}' for level in volts)} V"
     amplitude = max(abs(level) for level in volts)
@@ -135,16 +127,12 @@ def sine(
         Peak. [V]
     frequency : float
         Positive. [Hz]
-
-    Raises
-    ------
-    InputError
-        If `frequency` is not positive, or `start` and `settle` leave nothing of `length`.
     """
     amplitude, frequency = finite("amplitude", amplitude), positive("frequency", frequency)
-    start, end, length = window(start, settle, length)
+    start, end, length = _window(start, settle, length)
     name = f"sine {amplitude:g} V {frequency:g} Hz"
-    return settled(name, amplitude, [Piece(start, Tone(amplitude, frequency))], end, length)
+    curve = partial(tone, amplitude=amplitude, frequency=frequency)
+    return settled(name, amplitude, [(start, curve)], end, length)
 
 
 def chirp(
@@ -164,18 +152,14 @@ def chirp(
         Peak. [V]
     first, last : float
         Frequencies in either order, not negative. [Hz]
-
-    Raises
-    ------
-    InputError
-        If a frequency is negative, or `start` and `settle` leave nothing of `length`.
     """
     amplitude = finite("amplitude", amplitude)
     first, last = finite("first", first, 0.0), finite("last", last, 0.0)
-    start, end, length = window(start, settle, length)
-    curve = Tone(amplitude, first, growth=(last - first) / (end - start))
+    start, end, length = _window(start, settle, length)
+    growth = (last - first) / (end - start)
+    curve = partial(tone, amplitude=amplitude, frequency=first, growth=growth)
     name = f"chirp {amplitude:g} V {first:g} to {last:g} Hz"
-    return settled(name, amplitude, [Piece(start, curve)], end, length)
+    return settled(name, amplitude, [(start, curve)], end, length)
 
 
 def multisine(
@@ -207,20 +191,24 @@ def multisine(
         they leave is too short to tell the frequencies of a band apart.
     """
     amplitude, seed = finite("amplitude", amplitude), whole("seed", seed)
-    start, end, length = window(start, settle, length)
+    start, end, length = _window(start, settle, length)
     band = isinstance(frequencies, tuple)
     lines = _band(frequencies, end - start) if band else row("frequencies", frequencies)
     low, high = positive("the lowest frequency", lines.min()), lines.max()
     phases = np.random.default_rng(seed).uniform(0.0, 2.0 * np.pi, lines.size)
-    pairs = zip(lines.tolist(), phases.tolist(), strict=True)
-    together = Sum(tuple(Tone(1.0, line, phase=phase) for line, phase in pairs))
+    tones = [
+        partial(tone, amplitude=1.0, frequency=frequency, phase=phase)
+        for frequency, phase in zip(lines.tolist(), phases.tolist(), strict=True)
+    ]
+    together = partial(summed, curves=tones)
     points = math.ceil(_POINTS_PER_PERIOD * high * (end - start)) + 1
     time, spacing = np.linspace(0.0, end - start, points, retstep=True)
     # between two points it rises above the peak found by half its curvature at most
     curvature = float(((2.0 * np.pi * lines) ** 2).sum())
-    peak = float(np.abs(together(time)).max()) + 0.5 * curvature * (0.5 * float(spacing)) ** 2
+    peak = float(np.abs(together(time)[0]).max()) + 0.5 * curvature * (0.5 * float(spacing)) ** 2
     name = f"multisine {amplitude:g} V {low:.3g} to {high:.3g} Hz seed {seed}"
-    return settled(name, amplitude, [Piece(start, Scaled(amplitude / peak, together))], end, length)
+    curve = partial(scaled, factor=amplitude / peak, curve=together)
+    return settled(name, amplitude, [(start, curve)], end, length)
 
 
 def _band(band: Sequence[float], period: float) -> Array:
@@ -240,28 +228,18 @@ def _band(band: Sequence[float], period: float) -> Array:
     return np.asarray(periods / period)
 
 
+def _window(start: float, settle: float | None, length: float) -> tuple[float, float, float]:
+    """Start and end of the command between rest and return, and the whole length. [s]"""
+    start, length = finite("start", start, 0.0), finite("length", length, 0.0)
+    settle = finite("settle", settle or 0.0, 0.0)
+    if start + settle >= length:
+        raise InputError(
+            f"start {start:g} s and settle {settle:g} s leave nothing of a length of {length:g} s."
+        )
+    return start, length - settle, length
+
+
 # --- recordings -----------------------------------------------------------------------------------
-
-
-@dataclass(frozen=True, eq=False)
-class _Rows:
-    """`volts` [V] at `times` [s]: `joined` by straight lines, or each until the next."""
-
-    times: Array
-    volts: Array
-    joined: bool
-
-    def __call__(self, time: Array) -> Array:
-        if self.joined:
-            return np.interp(time, self.times, self.volts)
-        return self.volts[interval(self.times, time)]
-
-    def slope(self, time: Array) -> Array:
-        if not self.joined:
-            return np.zeros_like(time)
-        # at the last row there is no line that follows: keep to the one before
-        slopes: Array = np.diff(self.volts) / np.diff(self.times)
-        return slopes[interval(self.times[:-1], time)]
 
 
 def recorded(
@@ -303,11 +281,9 @@ def recorded(
         raise InputError(
             f"time must increase, but row {late[0]} (first is 0) has {after} s after {before} s."
         )
-    curve = _Rows(times, volts, interpolation == "linear")
+    curve = partial(joined if interpolation == "linear" else kept, times=times, volts=volts)
     end = float(times[-1]) if length is None else positive("length", length)
-    return Maneuver(
-        f"recorded {times.size} rows", end, (Piece(0.0, curve),), float(np.abs(volts).max())
-    )
+    return Maneuver(f"recorded {times.size} rows", end, ((0.0, curve),), float(np.abs(volts).max()))
 
 
 # --- source ---------------------------------------------------------------------------------------

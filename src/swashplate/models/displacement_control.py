@@ -28,9 +28,7 @@ DRIVEN = "a current beyond Z17"
 
 # What no measurement of speed determines apart, by the symmetries' names; the weights stand on the
 # parameters. Two are not powers: 1 + Z6 goes with "motion", Z2 moves by Z1 Z9 along "zero".
-PRESSURE, ZERO, TRAVEL, FORCE = "pressure", "zero", "travel", "force"
-MOTION, TILT, ANGLE = "motion", "tilt", "angle"
-OF_FORCE = {FORCE: 1.0, TILT: 1.0}
+PRESSURE, ZERO, TRAVEL, FORCE, MOTION = "pressure", "zero", "travel", "force", "motion"
 
 
 class Pump(NamedTuple):
@@ -38,11 +36,10 @@ class Pump(NamedTuple):
 
     # fmt: off
     Z1: Annotated[float, Definition("pressure to swash plate tangent", "1/Pa", above=0.0,
-        source="6.55", stands_for="A_s/(k_r d4)", symmetry={PRESSURE: -1.0, ANGLE: 1.0})]
-    Z2: Annotated[float, Definition("offset of the swash plate tangent", "1", source="6.55",
-        symmetry={ANGLE: 1.0})]
+        source="6.55", stands_for="A_s/(k_r d4)", symmetry={PRESSURE: -1.0})]
+    Z2: Annotated[float, Definition("offset of the swash plate tangent", "1", source="6.55")]
     Z3: Annotated[float, Definition("arm ratio of the feedback", "1", above=0.0, source="6.59",
-        stands_for="d4/d3", symmetry={TILT: 1.0, ANGLE: -1.0})]
+        stands_for="d4/d3")]
     Z4: Annotated[float, Definition("squared moment of the feedback spring", "N^2 m^2", above=0.0,
         source="6.57", stands_for="k_f² d3⁴", symmetry={TRAVEL: 2.0, FORCE: 2.0})]
     Z5: Annotated[float, Definition("arm of the spool", "m", above=0.0, source="6.57",
@@ -53,41 +50,41 @@ class Pump(NamedTuple):
         source="6.64", stands_for="K_L B/V", switch="leaky")]
     Z8: Annotated[float, Definition("flow gain of the valve", "sqrt(Pa)/(m s)", above=0.0,
         source="6.67", stands_for="C_o B/V",
-        symmetry={PRESSURE: 0.5, TRAVEL: -1.0, MOTION: 1.0, TILT: -1.0})]
+        symmetry={PRESSURE: 0.5, TRAVEL: -1.0, MOTION: 1.0})]
     Z9: Annotated[float, Definition("supply pressure less static pressure", "Pa", above=0.0,
         source="6.67", stands_for="ΔP − P0", symmetry={PRESSURE: 1.0, ZERO: 1.0})]
     Z10: Annotated[float, Definition("swash plate angle to shaft speed", "1/s", above=0.0,
-        source="6.69", stands_for="K_mf C_q", symmetry={ANGLE: -1.0})]
+        source="6.69", stands_for="K_mf C_q")]
     Z11: Annotated[float, Definition("speed lost to static load", "rad/s", source="6.69",
         stands_for="K_mL C_g")]
     Z12: Annotated[float, Definition("speed lost to accelerating load", "1", source="6.69",
         stands_for="K_mL K_mf C_i C_q", switch="loaded")]
     Z13_plus: Annotated[float, Definition("stop of the swash plate", "rad", above=0.0, upper=pi / 2,
-        source="8.9", symmetry={ANGLE: 1.0}, needs="the swash plate at its stop")]
+        source="8.9", needs="the swash plate at its stop")]
     Z13_minus: Annotated[float, MINUS]
     Z14: Annotated[float, Definition("stroke of the spool", "m", above=0.0, can_be_off=True,
         source="6.36", symmetry={TRAVEL: 1.0}, needs="the spool at its stop")]
     Z15: Annotated[float, Definition("largest stroking pressure", "Pa", above=0.0, can_be_off=True,
         source="6.2.5", symmetry={PRESSURE: 1.0}, needs="the relief valve open")]
     Z16_plus: Annotated[float, Definition("opening at which the orifice limits the flow", "m",
-        above=0.0, can_be_off=True, source="6.71", symmetry={TRAVEL: 1.0, TILT: 1.0},
+        above=0.0, can_be_off=True, source="6.71", symmetry={TRAVEL: 1.0},
         needs="an orifice limiting the flow")]
     Z16_minus: Annotated[float, MINUS]
     Z17: Annotated[float, Definition("dead zone of the solenoids", "A", lower=0.0, source="6.61",
         needs=DRIVEN)]
     Z18: Annotated[float, Definition("neutral offset of the spool", "m", source="6.57",
-        symmetry={TRAVEL: 1.0, TILT: 1.0})]
+        symmetry={TRAVEL: 1.0})]
     Z19_plus: Annotated[float, Definition("solenoid force, linear", "N/A", source="6.61",
-        symmetry=OF_FORCE, needs=DRIVEN)]
+        symmetry={FORCE: 1.0}, needs=DRIVEN)]
     Z19_minus: Annotated[float, MINUS]
     Z20_plus: Annotated[float, Definition("solenoid force, quadratic", "N/A^2", source="6.61",
-        symmetry=OF_FORCE, needs=DRIVEN)]
+        symmetry={FORCE: 1.0}, needs=DRIVEN)]
     Z20_minus: Annotated[float, MINUS]
     Z21_plus: Annotated[float, Definition("solenoid force, cubic", "N/A^3", source="6.61",
-        symmetry=OF_FORCE, needs=DRIVEN)]
+        symmetry={FORCE: 1.0}, needs=DRIVEN)]
     Z21_minus: Annotated[float, MINUS]
     Z22_plus: Annotated[float, Definition("solenoid force, quartic", "N/A^4", source="6.61",
-        symmetry=OF_FORCE, needs=DRIVEN)]
+        symmetry={FORCE: 1.0}, needs=DRIVEN)]
     Z22_minus: Annotated[float, MINUS]
     spool_friction: Annotated[float, Definition("friction of spool and solenoid", "N", lower=0.0,
         stands_for="F_s", default=0.0, switch="friction", least=1e-07)] = 0.0

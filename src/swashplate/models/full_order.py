@@ -63,7 +63,6 @@ class PlantOptions(NamedTuple):
 
     symmetric: Flag = OFF  # √((ΔP - sgn(x)P)/2) in place of the published root (erratum 13).
     air: Flag = OFF  # The oil has free air in it, see `mixture_modulus`.
-    held: Flag = OFF  # The current keeps its value between samples, in place of a straight line.
 
 
 class Substeps(NamedTuple):
@@ -257,9 +256,7 @@ def plant_sample(
     one sample old; the first sample has no time before it.
     """
     count = given.substeps
-    rise = 0.0
-    if options.held is None:
-        rise = (inputs.current - state.current) / count
+    rise = (inputs.current - state.current) / count
     span = Span(state.begun * h / count, state.current, rise)
     motion = repeated(substep, count, state.motion, span, p, k, options)
     return plant_signals(motion, inputs.current, p, k, options)

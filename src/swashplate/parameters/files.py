@@ -4,12 +4,12 @@ from collections.abc import Mapping
 from functools import cache
 from importlib.resources import files
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, PositiveFloat
 
 from swashplate.documents import parse_toml, read_text, validated
-from swashplate.equations.replacement import Replacement, found_at
+from swashplate.equations.replacement import found_at
 from swashplate.errors import InputError, ParameterError
 from swashplate.parameters.definitions import Block, Definition, declare, find, options_of
 from swashplate.parameters.parameter_set import (
@@ -30,10 +30,14 @@ from swashplate.units import to_si
 TwoNumbers = Annotated[list[float], Field(min_length=2, max_length=2)]
 
 
-class Entry(BaseModel):
-    """One parameter: ``Z16 = { value = [1.2e-4, 1.5e-4], unit = "m", source = "table 7.2" }``."""
+class FilePart(BaseModel):
+    """What a file may have, and nothing else."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class Entry(FilePart):
+    """One parameter: ``Z16 = { value = [1.2e-4, 1.5e-4], unit = "m", source = "table 7.2" }``."""
 
     value: float | TwoNumbers
     unit: str
@@ -42,10 +46,8 @@ class Entry(BaseModel):
     bounds: TwoNumbers | None = None
 
 
-class ModelOptions(BaseModel):
+class ModelOptions(FilePart):
     """Variants of the equations; the defaults are those the published values belong to."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
 
     pressure_root: PressureRoot = "published"
     coulomb_sign: CoulombSign = "smooth"
@@ -60,10 +62,8 @@ class ModelOptions(BaseModel):
     motion: Motion = "shaft"
 
 
-class CardFile(BaseModel):
+class CardFile(FilePart):
     """A control card by itself, so that several sets can use it."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
 
     format: Literal[1] = 1
     name: str
@@ -73,10 +73,8 @@ class CardFile(BaseModel):
     control_card: dict[str, Entry]
 
 
-class SetFile(BaseModel):
+class SetFile(FilePart):
     """A whole drive; `control_card` is the name of a packaged card or the card's own table."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
 
     format: Literal[1] = 1
     name: str
@@ -90,14 +88,15 @@ class SetFile(BaseModel):
     """What goes beyond Kruse's equations; all of it is off where it is not given."""
 
 
-# --- reading and writing --------------------------------------------------------------------------
+# --- reading --------------------------------------------------------------------------------------
 
 AXES = ("hoist", "slew", "luff")  # Kruse's three axes.
+SETS = files("swashplate.parameters").joinpath("sets")
 
 
 def preset_names() -> tuple[str, ...]:
     """Names of the packaged sets, Kruse's axes first."""
-    names = {path.name.removesuffix(".toml") for path in _folder("").iterdir() if path.is_file()}
+    names = {each.name.removesuffix(".toml") for each in SETS.iterdir() if each.is_file()}
     return (*AXES, *sorted(names - set(AXES) - {"__init__.py"}))
 
 
@@ -108,7 +107,7 @@ def load_preset(name: str) -> ParameterSet:
         raise ParameterError(
             f"There is no packaged parameter set '{name}'; there are {', '.join(preset_names())}."
         )
-    return read_set((_folder("") / f"{name}.toml").read_text("utf-8"), f"{name}.toml")
+    return read_set(SETS.joinpath(f"{name}.toml").read_text("utf-8"), f"{name}.toml")
 
 
 def load_set(path: str | Path) -> ParameterSet:
@@ -119,135 +118,109 @@ def load_set(path: str | Path) -> ParameterSet:
 def read_set(text: str, origin: str) -> ParameterSet:
     """A parameter set from TOML text; `origin` names it in errors."""
     contents = validated(parse_toml(text, origin), SetFile, origin)
+    model, rate = contents.model, contents.model.rate
     if isinstance(contents.control_card, str):
-        card = _load_card(contents.control_card, origin)
-        card_name, entries, rate = card.name, card.control_card, card.rate
+        card = _packaged_card(contents.control_card, origin)
+        card_name, entries, rate = card.name, card.control_card, rate or card.rate
     else:
-        rate = None
         card_name, entries = contents.card or f"{contents.name} card", contents.control_card
-    own = _equations(contents.model, origin)
-    parameters = {
-        **_parameters(entries, "control_card", origin),
-        **_parameters(contents.pump_motor, "pump_motor", origin),
-        **_parameters(contents.refinements, "refinements", origin),
+    equations = []
+    for places in model.equations:
+        # a file runs no code, so that the equation's module must be imported already
+        try:
+            equations.append(found_at(places))
+        except (ImportError, InputError, TypeError) as error:
+            raise ParameterError(f"{origin}: [model] equations: {error}") from None
+        if equations[-1].parameters is not None:
+            declare(equations[-1].parameters)
+    blocks: dict[Block, Mapping[str, Entry]] = {
+        "control_card": entries,
+        "pump_motor": contents.pump_motor,
+        "refinements": contents.refinements,
     }
-    model = contents.model
+    parameters: dict[str, Parameter] = {}
+    try:
+        for block, table in blocks.items():
+            for symbol, entry in table.items():
+                definition = find(symbol)
+                if symbol != definition.symbol or definition.block != block:
+                    raise ParameterError(f"[{block}] has no parameter '{symbol}'.")
+                parameters[symbol] = parameter_of(definition, entry)
+    except ParameterError as error:
+        raise ParameterError(f"{origin}: {error}") from None
     values = {symbol: each.values[0] for symbol, each in parameters.items()}
     return ParameterSet(
         *(contents.name, contents.title, card_name, parameters),
-        *(model.pressure_root, model.coulomb_sign, model.card_switch, model.rate or rate),
+        *(model.pressure_root, model.coulomb_sign, model.card_switch, rate),
         options_of(values) if model.options is None else frozenset(model.options),
-        *(own, model.motion),
+        *(tuple(equations), model.motion),
     )
 
 
-def _equations(model: ModelOptions, origin: str) -> tuple[Replacement, ...]:
-    """One's own equations; a file runs no code, so their module must be imported already."""
-    found = []
-    for places in model.equations:
-        try:
-            found.append(found_at(places))
-        except (ImportError, InputError, TypeError) as error:
-            raise ParameterError(f"{origin}: [model] equations: {error}") from None
-        if found[-1].parameters is not None:
-            declare(found[-1].parameters)
-    return tuple(found)
-
-
-def dump_set(parameters: ParameterSet) -> str:
-    """A parameter set as TOML text that `read_set` turns back into an equal set."""
-    from tomlkit import comment, document, dumps, table
-
-    text = document()
-    text.add(comment("swashplate parameter set; SI units; [plus, minus] as magnitudes"))
-    text.add("format", 1)
-    text.add("name", parameters.name)
-    text.add("title", parameters.title)
-    text.add("card", parameters.card)
-    options = table()
-    for name in ("pressure_root", "coulomb_sign", "card_switch"):
-        options.add(name, getattr(parameters, name))
-    if parameters.rate is not None:
-        options.add("rate", parameters.rate)
-    if parameters.options != options_of(parameters.numbers):
-        options.add("options", sorted(parameters.options))
-    if parameters.equations:
-        options.add("equations", [each.places for each in parameters.equations])
-    if parameters.motion != "shaft":
-        options.add("motion", parameters.motion)
-    text.add("model", options)
-    for block in ("control_card", "pump_motor", "refinements"):
-        entries = table()
-        for symbol, parameter in parameters.items():
-            if parameter.definition.block == block:
-                entries.add(symbol, written(parameter))
-        if entries:
-            text.add(block, entries)
-    return dumps(text)
-
-
-def written(parameter: Parameter) -> Mapping[str, object]:
-    """A parameter as an entry of a file."""
-    from tomlkit import inline_table
-
-    entry = inline_table()
-    pair = isinstance(parameter.value, Pair)
-    entry.append("value", list(parameter.values) if pair else parameter.value)
-    entry.append("unit", parameter.unit)
-    if parameter.source:
-        entry.append("source", parameter.source)
-    entry.append("status", parameter.status)
-    if parameter.own_bounds is not None:
-        entry.append("bounds", list(parameter.own_bounds))
-    return entry
-
-
-def parameter_of(definition: Definition, entry: Entry) -> Parameter:
-    """A parameter from its entry, in SI; what does not fit the definition is a `ParameterError`."""
-    what = f"{definition.symbol} ({definition.name})"
-
-    def si(numbers: list[float]) -> tuple[float, ...]:
-        try:
-            return tuple(to_si(each, entry.unit, definition.unit, what) for each in numbers)
-        except InputError as error:
-            raise ParameterError(str(error)) from None
-
-    if not isinstance(entry.value, list):
-        (number,) = si([entry.value])
-        value = value_of(definition.symbol, definition, number)
-    elif definition.directional:
-        value = Pair(*si(entry.value))
-    else:
-        raise ParameterError(f"{what} has one value, not a plus and a minus one.")
-    bounds = None if entry.bounds is None else si(entry.bounds)
-    return Parameter(definition, value, entry.source, entry.status, bounds)  # type: ignore[arg-type]
-
-
-def _folder(name: str) -> Any:
-    folder = files("swashplate.parameters").joinpath("sets")
-    return folder.joinpath(name) if name else folder
-
-
-def _load_card(name: str, origin: str) -> CardFile:
-    cards = _folder("cards")
-    names = sorted(path.name.removesuffix(".toml") for path in cards.iterdir())
+def _packaged_card(name: str, origin: str) -> CardFile:
+    cards = SETS.joinpath("cards")
+    names = sorted(each.name.removesuffix(".toml") for each in cards.iterdir())
     if name not in names:
         raise ParameterError(
             f"{origin}: there is no packaged control card '{name}'; there are "
             f"{', '.join(names)}, or give the card's own [control_card] table."
         )
-    text = (cards / f"{name}.toml").read_text("utf-8")
+    text = cards.joinpath(f"{name}.toml").read_text("utf-8")
     return validated(parse_toml(text, f"{name}.toml"), CardFile, f"{name}.toml")
 
 
-def _parameters(entries: Mapping[str, Entry], block: Block, origin: str) -> dict[str, Parameter]:
-    made = {}
-    for symbol, entry in entries.items():
-        try:
-            definition = find(symbol)
-            if symbol != definition.symbol or definition.block != block:
-                raise ParameterError(f"[{block}] has no parameter '{symbol}'.")
-            made[symbol] = parameter_of(definition, entry)
-        except ParameterError as error:
-            raise ParameterError(f"{origin}: {error}") from None
-    return made
+def parameter_of(definition: Definition, entry: Entry) -> Parameter:
+    """A parameter from its entry, in SI; what does not fit the definition is a `ParameterError`."""
+    what = f"{definition.symbol} ({definition.name})"
+    given = entry.value if isinstance(entry.value, list) else [entry.value]
+    try:
+        numbers, bounds = (
+            tuple(to_si(each, entry.unit, definition.unit, what) for each in values)
+            for values in (given, entry.bounds or ())
+        )
+    except InputError as error:
+        raise ParameterError(str(error)) from None
+    if len(numbers) == 2 and not definition.directional:
+        raise ParameterError(f"{what} has one value, not a plus and a minus one.")
+    change = numbers if len(numbers) == 2 else numbers[0]
+    value = value_of(definition.symbol, definition, change)
+    return Parameter(definition, value, entry.source, entry.status, bounds or None)  # type: ignore[arg-type]
+
+
+# --- writing --------------------------------------------------------------------------------------
+
+
+def dump_set(parameters: ParameterSet) -> str:
+    """A parameter set as TOML text that `read_set` turns back into an equal set."""
+    from tomlkit import comment, document, dumps, inline_table
+
+    options: dict[str, object] = {
+        name: getattr(parameters, name) for name in ("pressure_root", "coulomb_sign", "card_switch")
+    }
+    if parameters.rate is not None:
+        options["rate"] = parameters.rate
+    if parameters.options != options_of(parameters.numbers):
+        options["options"] = sorted(parameters.options)
+    if parameters.equations:
+        options["equations"] = [each.places for each in parameters.equations]
+    if parameters.motion != "shaft":
+        options["motion"] = parameters.motion
+    blocks: dict[str, dict[str, object]] = {"model": options}
+    for symbol, each in parameters.items():
+        entry = inline_table()
+        entry.append("value", list(each.values) if isinstance(each.value, Pair) else each.value)
+        entry.append("unit", each.unit)
+        if each.source:
+            entry.append("source", each.source)
+        entry.append("status", each.status)
+        if each.own_bounds is not None:
+            entry.append("bounds", list(each.own_bounds))
+        blocks.setdefault(each.definition.block, {})[symbol] = entry
+    text = document()
+    text.add(comment("swashplate parameter set; SI units; [plus, minus] as magnitudes"))
+    text.add("format", 1)
+    for name in ("name", "title", "card"):
+        text.add(name, getattr(parameters, name))
+    for block, entries in blocks.items():
+        text.add(block, entries)
+    return dumps(text)

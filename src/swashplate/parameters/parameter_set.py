@@ -4,7 +4,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, fields, replace
 from itertools import groupby
 from types import MappingProxyType
-from typing import Literal, NamedTuple, Protocol
+from typing import Any, Literal, NamedTuple, Protocol, Self
 
 from swashplate.equations.replacement import Replacement
 from swashplate.errors import ParameterError
@@ -55,9 +55,7 @@ class Parameter(Result):
     @property
     def bounds(self) -> tuple[float, float]:
         """Lowest and highest value: the set's own bounds, or else the catalogue's range."""
-        if self.own_bounds is not None:
-            return self.own_bounds
-        return self.definition.lower, self.definition.upper
+        return self.own_bounds or (self.definition.lower, self.definition.upper)
 
     @property
     def symbol(self) -> str:
@@ -79,9 +77,47 @@ class Parameter(Result):
         """Its one or two numbers, in the order of ``definition.columns``."""
         return tuple(self.value) if isinstance(self.value, Pair) else (self.value,)
 
+    @property
+    def numbers(self) -> dict[str, float]:
+        """The same by column."""
+        return dict(zip(self.definition.columns, self.values, strict=True))
+
+
+class Entries(Mapping[str, Parameter]):
+    """Parameters by symbol, read-only, of a frozen dataclass that has them as `parameters`."""
+
+    parameters: Mapping[str, Parameter]
+    numbers: Mapping[str, float]
+
+    def _keep(self, parameters: Mapping[str, Parameter]) -> None:
+        """Keep parameters as they are from now on, and all their numbers by column."""
+        numbers = {k: v for each in parameters.values() for k, v in each.numbers.items()}
+        object.__setattr__(self, "parameters", MappingProxyType(parameters))
+        object.__setattr__(self, "numbers", MappingProxyType(numbers))
+
+    def __getitem__(self, symbol: str) -> Parameter:
+        return self.parameters[symbol]
+
+    def __contains__(self, symbol: object) -> bool:
+        return symbol in self.parameters
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.parameters)
+
+    def __len__(self) -> int:
+        return len(self.parameters)
+
+    def __reduce__(self) -> tuple[object, ...]:
+        # read-only views cannot be pickled, so a copy in another process is built anew
+        own: Any = self
+        given = (getattr(self, each.name) for each in fields(own) if each.init)
+        return type(self), tuple(
+            dict(each) if isinstance(each, MappingProxyType) else each for each in given
+        )
+
 
 @dataclass(frozen=True)
-class ParameterSet(Mapping[str, Parameter]):
+class ParameterSet(Entries):
     """All parameters of a drive, by symbol; of the refinements those that are given.
 
     A refinement that is not given can be asked for by its symbol all the same, and is off.
@@ -114,10 +150,11 @@ class ParameterSet(Mapping[str, Parameter]):
     """Every single value by column, e.g. ``Z16_plus``."""
 
     def __post_init__(self) -> None:
-        kinds = [each.parameters for each in self.equations if each.parameters is not None]
-        for kind in kinds:
-            declare(kind)
-        own = {name for kind in kinds for name in kind._fields}
+        own: set[str] = set()
+        for kind in (each.parameters for each in self.equations):
+            if kind is not None:
+                declare(kind)
+                own.update(kind._fields)
         strange = [name for name in self.parameters if name in OWN and name not in own]
         if strange:
             raise ParameterError(
@@ -127,25 +164,18 @@ class ParameterSet(Mapping[str, Parameter]):
         missing = [symbol for symbol in CATALOGUE if symbol not in self.parameters]
         if missing:
             raise ParameterError(f"{self.name}: no value for {', '.join(missing)}.")
-        ordered = {symbol: self.parameters[symbol] for symbol in CATALOGUE}
-        more = [each for each in (*REFINEMENTS, *OWN) if each in self.parameters]
-        ordered |= {each: self.parameters[each] for each in more}
-        numbers = {}
-        for parameter in ordered.values():
-            for column, value in zip(parameter.definition.columns, parameter.values, strict=True):
-                numbers[column] = value
-                if parameter.own_bounds is None:
-                    continue
-                low, high = parameter.own_bounds
-                if not low <= value <= high:
+        known = (*CATALOGUE, *REFINEMENTS, *OWN)
+        self._keep({name: self.parameters[name] for name in known if name in self.parameters})
+        for each in self.values():
+            for column, value in each.numbers.items():
+                if each.own_bounds and not each.own_bounds[0] <= value <= each.own_bounds[1]:
+                    low, high = each.own_bounds
                     raise ParameterError(
-                        f"{self.name}: {column} ({parameter.name}) is {value:g} {parameter.unit}, "
-                        f"outside its bounds {low:g} to {high:g}."
+                        f"{self.name}: {column} ({each.name}) is {value:g} {each.unit}, outside "
+                        f"its bounds {low:g} to {high:g}."
                     )
-        check_rules(self.name, numbers)
-        check_options(self.name, self.options, numbers)
-        object.__setattr__(self, "parameters", MappingProxyType(ordered))
-        object.__setattr__(self, "numbers", MappingProxyType(numbers))
+        check_rules(self.name, self.numbers)
+        check_options(self.name, self.options, self.numbers)
 
     def __repr__(self) -> str:
         return f"ParameterSet({self.name!r}, {len(self)} parameters)"
@@ -158,24 +188,8 @@ class ParameterSet(Mapping[str, Parameter]):
             raise unknown_parameter(symbol)
         return Parameter(definition, definition.default, status="inactive")
 
-    def __contains__(self, symbol: object) -> bool:
-        return symbol in self.parameters
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(self.parameters)
-
-    def __len__(self) -> int:
-        return len(self.parameters)
-
     def __hash__(self) -> int:
         return hash((self.name, self.options, self.equations, *self.numbers.values()))
-
-    def __reduce__(self) -> tuple[object, ...]:
-        # read-only views cannot be pickled, so a copy in another process is built anew
-        given = (getattr(self, each.name) for each in fields(self) if each.init)
-        return ParameterSet, tuple(
-            dict(each) if isinstance(each, MappingProxyType) else each for each in given
-        )
 
     @property
     def refinements(self) -> tuple[str, ...]:
@@ -187,7 +201,7 @@ class ParameterSet(Mapping[str, Parameter]):
         )
 
     @property
-    def plain(self) -> "ParameterSet":
+    def plain(self) -> Self:
         """The set without refinements, itself if it has none."""
         if REFINEMENTS.keys().isdisjoint(self.parameters) and not self.equations:
             return self
@@ -222,9 +236,7 @@ class ParameterSet(Mapping[str, Parameter]):
             made += [table] if members else []
         return made
 
-    def replace(
-        self, changes: Mapping[str, Change], options: frozenset[str] | None = None
-    ) -> "ParameterSet":
+    def replace(self, changes: Mapping[str, Change], options: frozenset[str] | None = None) -> Self:
         """Copy with other values, marked as the user's.
 
         Parameters
@@ -244,16 +256,15 @@ class ParameterSet(Mapping[str, Parameter]):
         for name, change in changes.items():
             definition = find(name)
             old = parameters.get(definition.symbol, self[definition.symbol])
-            parameters[definition.symbol] = replace(
-                old, value=value_of(name, definition, change, old), source="", status="user"
-            )
+            value = value_of(name, definition, change, old)
+            parameters[definition.symbol] = replace(old, value=value, source="", status="user")
         if options is None:
             numbers = {symbol: parameters[symbol].values[0] for symbol in parameters}
             touched = {SWITCHES[name] for name in changes if name in SWITCHES}
             options = (self.options - touched) | (options_of(numbers) & touched)
         return replace(self, parameters=parameters, options=options)
 
-    def scale(self, factors: Mapping[str, Change]) -> "ParameterSet":
+    def scale(self, factors: Mapping[str, Change]) -> Self:
         """Copy with values multiplied by factors; names as in `replace`."""
         changes: dict[str, Change] = {}
         for name, factor in factors.items():
@@ -264,8 +275,7 @@ class ParameterSet(Mapping[str, Parameter]):
             elif isinstance(factor, tuple):
                 raise ParameterError(f"{name} has one value, so it takes one factor, not two.")
             else:
-                value = self.numbers[name] if name in self.numbers else old.values[0]
-                changes[name] = value * factor
+                changes[name] = old.numbers[name] * factor
         return self.replace(changes)
 
 
@@ -283,17 +293,12 @@ def value_of(
         raise ParameterError(
             f"{name} must be a number in {definition.unit}, or a pair of them, not {change!r}."
         ) from None
-    if len(numbers) == 2:
-        return Pair(*numbers)
-    (number,) = numbers
     if not definition.directional:
-        return number
+        return numbers[0]
     if name == definition.symbol:
-        return Pair(number, number)
+        return Pair(numbers[0], numbers[-1])
     assert old is not None
-    assert isinstance(old.value, Pair)
-    side = name.removeprefix(definition.symbol + "_")
-    return old.value._replace(**{side: number})
+    return Pair(*(old.numbers | {name: numbers[0]}).values())
 
 
 class HasParameters(Protocol):

@@ -1,13 +1,11 @@
-"""What values must satisfy, each alone and together; every rule is a sentence when broken.
+"""What values must satisfy, each alone and together: conditions with the sentence when broken.
 
 The rules work on arrays, one element a parameter set, so that a thousand sets are checked at once
 by the same lines as a single one.
 """
 
 from collections.abc import Callable, Iterator, Mapping
-from functools import partial
-from itertools import count
-from math import isfinite, isinf, isnan
+from math import inf, isfinite
 from typing import Any
 
 import numpy as np
@@ -24,37 +22,71 @@ from swashplate.models.displacement_control import (
     solenoid_force,
     solenoids_of,
 )
-from swashplate.parameters.definitions import (
-    DEFAULTS,
-    OPTIONS,
-    REFINEMENTS,
-    SWITCHES,
-    Definition,
-    find,
-)
+from swashplate.parameters.definitions import DEFAULTS, OPTIONS, SWITCHES, Definition, find
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
+Values = dict[str, Any]
+"""Arrays by column, one element a set, and what follows from them; or words."""
+Rule = tuple[Callable[[Values], Mask], str]
+"""Which sets break it, and the sentence for one of them, by the names of the values."""
 Broken = tuple[Mask, Callable[[int], str]]
 """Sets that break a rule, and the sentence for one of them."""
 
 FULL_VOLTAGE = 10.0  # Largest command, either way. [V]
 VOLTAGES = np.linspace(0.0, FULL_VOLTAGE, 101)
 """Commands at which the static rules are checked. [V]"""
-FIRST = 3
-"""Single sets that a process checks in plain Python: commands that read one or two and simulate
-nothing need not wait for machine code to be loaded."""
-_alone = count()
-SIDES = ("plus", "minus")
 N_CHANNEL, N_PUMP = len(Channel._fields), len(Pump._fields)
 
-
-def _plain_tuple(values: Array, length: int) -> tuple[float, ...]:
-    return tuple(float(each) for each in values)
-
-
-# compiled code needs to know the length; Numba's function for it does not run uncompiled
-tuple_of: Any = _plain_tuple if JIT_OFF else to_fixed_tuple
+OF_REFINEMENTS: tuple[Rule, ...] = (
+    (
+        lambda n: (
+            (n["spool_friction"] > 0.0)
+            & np.isfinite(n["dither_time"])
+            & (n["spool_presliding"] == 0.0)
+        ),
+        "dither_time is {dither_time:g} s, but spool_presliding is 0: dither frees a spool that "
+        "friction lets give a little; give that travel, of the order of 5e-5 m.",
+    ),
+    (
+        lambda n: (n["line_stiffness"] > 0.0) & (n["load_inertia"] == 0.0),
+        "line_stiffness is {line_stiffness:g} N m/rad, but load_inertia is 0: give the inertia "
+        "that the line has to turn, in kg m^2 at the shaft.",
+    ),
+    (
+        lambda n: n["depth"] >= 1.0,
+        "cam_ripple + cam_ripple_per_torque·|load_torque| is {depth:.4g}, but must be below 1: a "
+        "motor whose displacement vanishes somewhere would run away.",
+    ),
+)
+AT_REST: Rule = (
+    lambda n: np.abs(n["rest"]) >= n["ceiling"],
+    "the pressure at rest Z2/Z1 is {rest:g} Pa, but must stay below {ceiling:g} Pa, the smaller of "
+    "Z9 and Z15.",
+)
+OF_A_SIDE: tuple[Rule, ...] = (
+    (
+        lambda n: n["I_t2"] >= n["I_t1"],
+        "I_t2_{side} is {I_t2:g} A, but must be below I_t1_{side} = {I_t1:g} A: the decay begins "
+        "at a lower current than the rate limit.",
+    ),
+    (
+        lambda n: n["arm_sine"] >= 1.0,
+        "Z3·tan Z13_{side} is {arm_sine:.4g}, but must be below 1: at its stop of {Z13:g} rad the "
+        "swash plate would turn the feedback arm past 90°.",
+    ),
+    (
+        lambda n: n["lowest"] < 0.0,
+        f"the steady current of the {{side}} channel falls to {{lowest:.3g}} A within "
+        f"{FULL_VOLTAGE:g} V, but a current is a magnitude; check G1_{{side}}, G2_{{side}} and "
+        "G3_{side}.",
+    ),
+    (
+        lambda n: ~(n["moment"] < 1.0),
+        f"Z5·F/√Z4 reaches {{moment:.4g}} within {FULL_VOLTAGE:g} V ({{side}}), but must be below "
+        "1: the solenoid would overpower the feedback spring; check Z19 to Z22, Z4 and Z5.",
+    ),
+)
 
 
 def check_rules(owner: str, numbers: Mapping[str, float]) -> None:
@@ -72,8 +104,12 @@ def check_rules(owner: str, numbers: Mapping[str, float]) -> None:
     ParameterError
         For the first broken rule, naming parameter, value and rule.
     """
-    columns = {column: np.array([value]) for column, value in numbers.items()}
-    for mask, sentence in broken_rules(columns):
+    refuse(owner, broken_rules({name: np.array([value]) for name, value in numbers.items()}))
+
+
+def refuse(owner: str, rules: Iterator[Broken]) -> None:
+    """Raise the sentence of the first rule that the first set breaks, as a `ParameterError`."""
+    for mask, sentence in rules:
         if mask[0]:
             raise ParameterError(f"{owner}: {sentence(0)}")
 
@@ -110,138 +146,76 @@ def broken_rules(numbers: Mapping[str, Array]) -> Iterator[Broken]:
         Every value by column, one element a set.
     """
     for column, values in numbers.items():
-        definition = find(column)
-        yield (
-            out_of_range(definition, values),
-            partial(range_sentence, column, definition, values),
-        )
-    if not REFINEMENTS.keys().isdisjoint(numbers):
-        yield from _of_refinements(numbers)
-    pressure, ceiling = numbers["Z2"] / numbers["Z1"], np.minimum(numbers["Z9"], numbers["Z15"])
-    yield (
-        np.abs(pressure) >= ceiling,
-        lambda i: (
-            f"the pressure at rest Z2/Z1 is {pressure[i]:g} Pa, but must stay below "
-            f"{ceiling[i]:g} Pa, the smaller of Z9 and Z15."
-        ),
-    )
-    lowest, moment = _static(numbers)
-    for k, side in enumerate(SIDES):
-        yield from _of_side(numbers, side, lowest[:, k], moment[:, k])
+        yield range_rule(find(column), column, values)
+    n: Values = dict(numbers)
+    n["rest"], n["ceiling"] = n["Z2"] / n["Z1"], np.minimum(n["Z9"], n["Z15"])
+    size = n["rest"].size
+    # a refinement that is not given is what it is without
+    n |= {name: np.full(size, value) for name, value in DEFAULTS.items() if name not in numbers}
+    n["depth"] = n["cam_ripple"] + n["cam_ripple_per_torque"] * np.abs(n["load_torque"])
+    for rule in (*OF_REFINEMENTS, AT_REST):
+        yield applied(rule, n)
+    lowest, moment = _static(n, size)
+    for k, side in enumerate(("plus", "minus")):
+        own = {name: n[f"{name}_{side}"] for name in ("I_t1", "I_t2", "Z13")}
+        own |= {"side": side, "lowest": lowest[:, k], "moment": moment[:, k]}
+        own["arm_sine"] = n["Z3"] * np.tan(own["Z13"])
+        for rule in OF_A_SIDE:
+            yield applied(rule, own)
 
 
-def out_of_range(definition: Definition, values: Array) -> Mask:
-    """Which values lie outside a definition's range."""
+def applied(rule: Rule, n: Values) -> Broken:
+    """A rule with the sets that break it."""
+    breaks, words = rule
+
+    def sentence(i: int) -> str:
+        return words.format_map({k: v if isinstance(v, str) else float(v[i]) for k, v in n.items()})
+
+    return breaks(n), sentence
+
+
+def range_rule(definition: Definition, column: str, values: Array) -> Broken:
+    """Which values lie outside a definition's range, and what is wrong with one of them."""
     # what is no number passes no comparison
     strict = definition.above is not None or not isfinite(definition.lower)
     allowed = values > definition.lower if strict else values >= definition.lower
     if isfinite(definition.upper) or not definition.can_be_off:
         allowed &= values < definition.upper
-    return np.logical_not(allowed)
+
+    def sentence(i: int) -> str:
+        value, hint = float(values[i]), ""
+        if value < 0.0 and definition.directional and isfinite(value):
+            hint = "; minus values are stored as magnitudes"
+        unit = "" if definition.unit == "1" else f" {definition.unit}"
+        what = f"{column} ({definition.name}) is {value:g}{unit}"
+        return f"{what}, but must be {definition.range}{hint}."
+
+    return np.logical_not(allowed), sentence
 
 
-def range_sentence(column: str, definition: Definition, values: Array, i: int) -> str:
-    """What is wrong with one of the values."""
-    value, hint = float(values[i]), ""
-    if value < 0.0 and definition.directional and not (isnan(value) or isinf(value)):
-        hint = "; minus values are stored as magnitudes"
-    unit = "" if definition.unit == "1" else f" {definition.unit}"
-    return f"{column} ({definition.name}) is {value:g}{unit}, but must be {definition.range}{hint}."
+# --- static rules ---------------------------------------------------------------------------------
 
 
-def _of_refinements(numbers: Mapping[str, Array]) -> Iterator[Broken]:
-    """Rules of refinements together; one that is not given is what it is without."""
-    size = next(iter(numbers.values())).size
-    n = {name: numbers.get(name, np.full(size, default)) for name, default in DEFAULTS.items()}
-    time, stiffness = n["dither_time"], n["line_stiffness"]
-    depth = n["cam_ripple"] + n["cam_ripple_per_torque"] * np.abs(n["load_torque"])
-    yield (
-        (n["spool_friction"] > 0.0) & np.isfinite(time) & (n["spool_presliding"] == 0.0),
-        lambda i: (
-            f"dither_time is {time[i]:g} s, but spool_presliding is 0: dither frees a spool that "
-            "friction lets give a little; give that travel, of the order of 5e-5 m."
-        ),
-    )
-    yield (
-        (stiffness > 0.0) & (n["load_inertia"] == 0.0),
-        lambda i: (
-            f"line_stiffness is {stiffness[i]:g} N m/rad, but load_inertia is 0: give the inertia "
-            "that the line has to turn, in kg m^2 at the shaft."
-        ),
-    )
-    yield (
-        depth >= 1.0,
-        lambda i: (
-            f"cam_ripple + cam_ripple_per_torque·|load_torque| is {depth[i]:.4g}, but must be "
-            "below 1: a motor whose displacement vanishes somewhere would run away."
-        ),
-    )
-
-
-def _of_side(
-    numbers: Mapping[str, Array], side: str, lowest: Array, moment: Array
-) -> Iterator[Broken]:
-    """Rules of one direction, with its lowest steady current [A] and largest sin φ."""
-    upper, lower = numbers[f"I_t1_{side}"], numbers[f"I_t2_{side}"]
-    yield (
-        lower >= upper,
-        lambda i: (
-            f"I_t2_{side} is {lower[i]:g} A, but must be below I_t1_{side} = {upper[i]:g} A: the "
-            "decay begins at a lower current than the rate limit."
-        ),
-    )
-    stop = numbers[f"Z13_{side}"]
-    sine = numbers["Z3"] * np.tan(stop)
-    yield (
-        sine >= 1.0,
-        lambda i: (
-            f"Z3·tan Z13_{side} is {sine[i]:.4g}, but must be below 1: at its stop of "
-            f"{stop[i]:g} rad the swash plate would turn the feedback arm past 90°."
-        ),
-    )
-    yield (
-        lowest < 0.0,
-        lambda i: (
-            f"the steady current of the {side} channel falls to {lowest[i]:.3g} A within "
-            f"{FULL_VOLTAGE:g} V, but a current is a magnitude; check G1_{side}, G2_{side} and "
-            f"G3_{side}."
-        ),
-    )
-    yield (
-        ~(moment < 1.0),
-        lambda i: (
-            f"Z5·F/√Z4 reaches {moment[i]:.4g} within {FULL_VOLTAGE:g} V ({side}), but must be "
-            "below 1: the solenoid would overpower the feedback spring; check Z19 to Z22, Z4 and "
-            "Z5."
-        ),
-    )
-
-
-def _static(numbers: Mapping[str, Array]) -> tuple[Array, Array]:
+def _static(n: Values, size: int) -> tuple[Array, Array]:
     """Lowest steady current [A] and largest sin φ of every set (rows) and side (columns)."""
-    size = next(iter(numbers.values())).size
-    channels = np.stack(
-        [
-            np.stack([numbers[f"{name}_{side}"] for name in Channel._fields], axis=1)
-            for side in SIDES
-        ],
-        axis=1,
-    )
-    pumps = np.stack(
-        [
-            numbers[name] if name in numbers else np.full(size, Pump._field_defaults[name])
-            for name in Pump._fields
-        ],
-        axis=1,
+    sides = [[n[f"{name}_{side}"] for name in Channel._fields] for side in ("plus", "minus")]
+    channels = np.moveaxis(np.array(sides), -1, 0)
+    pumps = np.column_stack(
+        [n.get(name, np.full(size, Pump._field_defaults.get(name))) for name in Pump._fields]
     )
     lowest, moment = np.empty((size, 2)), np.empty((size, 2))
-    if size == 1 and next(_alone) < FIRST:
-        pump, extremes = Pump(*pumps[0].tolist()), interpreted(_extremes)
-        for side in range(2):
-            channel = Channel(*channels[0, side].tolist())
-            lowest[0, side], moment[0, side] = extremes(channel, pump, side, VOLTAGES.tolist())
+    if size == 1:
+        # commands that read a set and simulate nothing need not wait for machine code
+        pump, volts = Pump(*pumps[0].tolist()), VOLTAGES.tolist()
+        for k in range(2):
+            channel = Channel(*channels[0, k].tolist())
+            lowest[0, k], moment[0, k] = interpreted(_extremes)(channel, pump, k, volts)
     else:
         static_extremes(channels, pumps, VOLTAGES, lowest, moment)
+    return lowest, moment
+
+    lowest, moment = np.empty((size, 2)), np.empty((size, 2))
+    static_extremes(channels, pumps, VOLTAGES, lowest, moment)
     return lowest, moment
 
 
@@ -249,7 +223,7 @@ def _static(numbers: Mapping[str, Array]) -> tuple[Array, Array]:
 def _extremes(channel: Channel, pump: Pump, side: int, voltages: Array) -> tuple[float, float]:
     """Lowest steady current [A] and largest |sin φ| of one side within some voltages."""
     solenoids = solenoids_of(pump)
-    least, most = np.inf, 0.0
+    least, most = inf, 0.0
     for voltage in voltages:
         current = channel_level(voltage, channel)
         force = solenoid_force(-current if side == 1 else current, solenoids)
@@ -260,22 +234,22 @@ def _extremes(channel: Channel, pump: Pump, side: int, voltages: Array) -> tuple
     return least, most
 
 
+def _plain_tuple(values: Array, length: int) -> tuple[float, ...]:
+    return tuple(float(each) for each in values)
+
+
+# compiled code needs to know the length; Numba's function for it does not run uncompiled
+tuple_of: Any = _plain_tuple if JIT_OFF else to_fixed_tuple
+
+
 @kernel
 def static_extremes(
     channels: Array, pumps: Array, voltages: Array, lowest: Array, moment: Array
 ) -> None:
-    """Lowest steady current and largest sin φ within some voltages, of many sets.
+    """Lowest steady current [A] and largest |sin φ| of both sides of many sets, (m, 2) outputs.
 
-    Parameters
-    ----------
-    channels : (m, 2, 13) array
-        Fields of `Channel` of every set, plus and minus.
-    pumps : (m, 43) array
-        Fields of `Pump`.
-    voltages : (n,) array
-        Constant commands towards each side. [V]
-    lowest, moment : (m, 2) arrays
-        Outputs: current [A] and |sin φ| of both sides; not a number where any is none.
+    `channels` are the fields of `Channel` of every set and side, (m, 2, 13), `pumps` those of
+    `Pump`, (m, 43); not a number where any of what is computed is none.
     """
     for i in range(pumps.shape[0]):
         pump = Pump(*tuple_of(pumps[i], N_PUMP))

@@ -8,12 +8,9 @@ from .analysis import plot_whatif as plot_whatif
 from .campaign import plot_campaign as plot_campaign
 from .campaign import plot_channel as plot_channel
 from .crane import plot_crane as plot_crane
-from .crane_studies import plot_follow as plot_follow
-from .crane_studies import plot_judgment as plot_judgment
-from .crane_studies import plot_operability as plot_operability
-from .crane_studies import plot_orifice as plot_orifice
-from .crane_studies import plot_residuals as plot_residuals
-from .crane_studies import plot_sectors as plot_sectors
+from .crane import plot_follow as plot_follow
+from .crane import plot_judgment as plot_judgment
+from .crane import plot_sweep as plot_sweep
 from .linear import plot_bode as plot_bode
 from .simulation import plot_comparison as plot_comparison
 from .simulation import plot_full_order as plot_full_order

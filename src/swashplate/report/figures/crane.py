@@ -1,31 +1,48 @@
-"""Figures of cranes: how runs swing, where they lead, and what limits their drives."""
+"""Figures of cranes: runs and what limits their drives; judgment, sweeps, what axes can follow."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
+from numpy.typing import NDArray
 
-from swashplate.crane import CraneRun
+from swashplate.crane import Crane, CraneRun, Followable, Judgment, Seaway, Sweep
+from swashplate.crane.judgment import mean_of
 from swashplate.errors import InputError
 from swashplate.report.lines import SHADES, draw, fit_time, shade_handle, stretches
 from swashplate.report.style import (
+    BLUE,
     FAINT,
+    FOOT,
     GREY,
+    GRID,
+    HEAD,
     INK,
     NORMAL,
+    ROW,
     SMALL,
+    VERMILION,
+    WIDTH,
     Stroke,
     dress,
     handle,
     label_below,
+    legend_rows,
+    new_figure,
     put_legend,
     sheet,
     strokes,
+    write,
+    write_title,
 )
 from swashplate.simulation.result import Limit
+
+Array = NDArray[np.float64]
 
 MOST_RUNS = 6
 """More lines than that nobody can follow."""
@@ -33,6 +50,53 @@ MOVED = 2.0
 """Travel of slew and boom that gets a panel of its own. [deg]"""
 ACTING = (Limit.ORIFICE, Limit.SWASH_STOP)
 """Limits that a crane's drives are judged by: of acceleration and of speed."""
+LEAST = 0.01
+"""Least swing on a logarithmic scale. [deg]"""
+
+
+def assumed(crane: Crane) -> str:
+    """How much of a crane's geometry is assumed, as a remark."""
+    return f"{crane.assumed} of the crane are assumed" if crane.assumed else ""
+
+
+def seaway_words(sea: Seaway | None, height: bool = True) -> str:
+    """A seaway in a few words, with the height of its waves or without."""
+    if sea is None:
+        return "calm sea"
+    what = str(sea.sea)
+    if not isinstance(sea.sea, str):
+        what = f"{sea.sea.height:g} m, " * height + f"peak at {sea.sea.period:g} s"
+    return f"{what}, waves at {sea.heading_deg:g}°"
+
+
+def remark(ax: Axes, *said: str, rows: int = 0, right: bool = False) -> None:
+    """Write grey words above a panel, over so many rows of a legend."""
+    words, side = "; ".join(filter(None, said)), 1.0 if right else 0.0
+    how = {"fontsize": SMALL, "color": GREY, "ha": "right" if right else "left"}
+    place = {"xycoords": "axes fraction", "textcoords": "offset points"}
+    ax.annotate(words, (side, 1.0), xytext=(0.0, 5.0 + 13.0 * rows), **place, **how)  # type: ignore[arg-type]
+
+
+def _panels(
+    heights: list[float], title: str, looks: Mapping[str, Stroke], *said: str
+) -> tuple[Figure, list[Axes]]:
+    """Panels with a legend of lines, where there are several, and a remark."""
+    legend = [handle(name, *look) for name, look in looks.items()] if len(looks) > 1 else []
+    figure, axes = sheet(heights, title, legend=legend, lines=1)
+    remark(axes[0], *said, rows=legend_rows(legend) if legend else 0)
+    return figure, axes
+
+
+def _logarithmic(ax: Axes, low: float, high: float) -> None:
+    """A logarithmic ordinate with plain numbers."""
+    ax.set_yscale("log")
+    ax.set_ylim(low, high)
+    ax.yaxis.set_major_locator(LogLocator(subs=(1.0, 3.0)))
+    ax.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    ax.yaxis.set_minor_locator(NullLocator())
+
+
+# --- runs -----------------------------------------------------------------------------------------
 
 
 def plot_crane(
@@ -60,72 +124,218 @@ def plot_crane(
     named = {runs.actuation: runs} if isinstance(runs, CraneRun) else dict(runs)
     if not 0 < len(named) <= MOST_RUNS:
         raise InputError(f"A figure shows 1 to {MOST_RUNS} runs of a crane, not {len(named)}.")
-    first = next(iter(named.values()))
-    looks = strokes(named)
+    first, looks = next(iter(named.values())), strokes(named)
     driven = {name: run for name, run in named.items() if run.actuation != "ideal"}
-    heads = {"swing_deg": "swing (deg)", "slew_deg": "slew (deg)", "boom_deg": "boom (deg)"}
-    for signal in ("slew_deg", "boom_deg"):
-        if all(np.ptp(getattr(run, signal)) <= MOVED for run in named.values()):
-            del heads[signal]
-    legend = [handle(name, *look) for name, look in looks.items()] if len(named) > 1 else []
-    sizes = {"swing_deg": 2.1, "slew_deg": 1.5, "boom_deg": 1.2}
-    heights = [sizes[each] for each in heads] + ([1.5] if sea else [])
+    shown = [("swing_deg", "swing (deg)", 2.1, named)]
+    for signal, label, height in (("slew_deg", "slew (deg)", 1.5), ("boom_deg", "boom (deg)", 1.2)):
+        if any(np.ptp(getattr(run, signal)) > MOVED for run in named.values()):
+            shown.append((signal, label, height, named))
+    shown += [("swing_deg", "in sea (deg)", 1.5, dict(sea))] if sea else []
+    heights = [height for _, _, height, _ in shown]
     heights += [0.17 * 2 * len(driven) + 0.25] if driven else []
-    figure, axes = sheet(heights, title or first.crane.title, legend=legend, lines=1)
-    for ax, (signal, label) in zip(axes, heads.items(), strict=False):
-        _lines(ax, named, looks, signal, label)
-    axes[0].set_ylim(bottom=0.0)
-    if sea:
-        _lines(axes[len(heads)], sea, looks, "swing_deg", "in sea (deg)")
-        axes[len(heads)].set_ylim(bottom=0.0)
+    back = "grey line: the stick is back at zero" if first.stick_end > 0.0 else ""
+    figure, axes = _panels(heights, title or first.crane.title, looks, back, assumed(first.crane))
+    for ax, (signal, label, _, lines) in zip(axes, shown, strict=False):
+        dress(ax, label)
+        for name, run in lines.items():
+            draw(ax, run.time, getattr(run, signal), looks[name].color, dashes=looks[name].dashes)
+        if signal == "swing_deg":
+            ax.set_ylim(bottom=0.0)
     if driven:
         _acting(axes[-1], driven, looks)
     for ax in axes:
         fit_time(ax, first.time)
         if first.stick_end > 0.0:
             ax.axvline(first.stick_end, color=FAINT, linewidth=0.8, zorder=1.0)
-    says = ["grey line: the stick is back at zero"] if first.stick_end > 0.0 else []
-    says += [f"{first.crane.assumed} of the crane are assumed"] if first.crane.assumed else []
-    axes[0].annotate(
-        "; ".join(says),
-        (0.0, 1.0),
-        xytext=(0.0, 18.0 if legend else 4.0),
-        xycoords="axes fraction",
-        textcoords="offset points",
-        fontsize=SMALL,
-        color=GREY,
-    )
     label_below(axes[-1], "time (s)")
     return figure
-
-
-def _lines(
-    ax: Axes, runs: Mapping[str, CraneRun], looks: Mapping[str, Stroke], signal: str, label: str
-) -> None:
-    """A signal of all runs."""
-    dress(ax, label)
-    for name, run in runs.items():
-        look = looks[name]
-        draw(ax, run.time, getattr(run, signal), look.color, dashes=look.dashes)
 
 
 def _acting(ax: Axes, runs: Mapping[str, CraneRun], looks: Mapping[str, Stroke]) -> None:
     """Bars where limits of slew and luff act, a row for each run and axis."""
     rows = [(name, axis) for name in runs for axis in ("slew", "luff")]
     ax.set_ylim(len(rows) - 0.4, -0.6)
-    labels = []
     for row, (name, axis) in enumerate(rows):
-        run = runs[name].drive(axis)
+        run = runs[name]
         for limit in ACTING:
-            spans = stretches(run.time, run.active(limit))
+            spans = stretches(run.time, run.active(axis, limit))
             bars = [(start, end - start) for start, end in spans]
             color = SHADES[limit].color
             ax.broken_barh(bars, (row - 0.36, 0.72), facecolors=color, edgecolor="none")
-        labels.append(axis)
     dress(ax)
     ax.grid(False, axis="y")
-    ax.set_yticks(range(len(rows)), labels, fontsize=SMALL)
+    ax.set_yticks(range(len(rows)), [axis for _, axis in rows], fontsize=SMALL)
     for (name, _), text in zip(rows, ax.get_yticklabels(), strict=True):
         text.set_color(looks[name].color if len(runs) > 1 else INK)
     ax.set_ylabel("limits", fontsize=NORMAL, color=INK)
     put_legend(ax, [shade_handle(SHADES[limit]) for limit in ACTING])
+
+
+# --- studies --------------------------------------------------------------------------------------
+
+
+class Look(NamedTuple):
+    """How a sweep over a quantity looks."""
+
+    title: str
+    below: str
+    label: str
+    remark: str
+    """Of the number of seaways."""
+
+
+LOOKS = {
+    "bearing": Look("Swing over the bearing of the boom", "", "", "RMS, mean of {} seaways"),
+    "height": Look(
+        "Seaways in which the load swings less than {:g}°",
+        "significant height of the waves (m)",
+        "share of seaways (%)",
+        "{} seaways a height",
+    ),
+    "orifice": Look(
+        "Swing over the size of the luff drive's orifice",
+        "orifice of the luff drive, to the identified one",
+        "swing, RMS (deg)",
+        "mean of {} seaways with its 95 % interval",
+    ),
+    "stick": Look(
+        "Residual swing after a slew",
+        "stick, part of the full speed",
+        "residual swing (deg)",
+        "",
+    ),
+}
+
+
+def plot_sweep(result: Sweep, *, limit_deg: float = 3.0, title: str = "") -> Figure:
+    """Figure of the swing over a quantity, for several variants.
+
+    Over the bearing of the boom it is polar, with a logarithmic radius; over the waves' height it
+    shows the share of seaways in which the largest swing stays below a limit; over the stick the
+    residual swing, and where the slew ends.
+    """
+    look, looks, points = LOOKS[result.over], strokes(result.names), result.points
+    words = title or look.title.format(limit_deg)
+    sea = seaway_words(result.sea, result.over != "height")
+    said = (sea, look.remark.format(len(result.values)), assumed(result.crane))
+    if result.over == "bearing":
+        return _polar(result, words, looks, *said)
+    stick = result.over == "stick"
+    figure, (ax, *ends) = _panels([2.7, 1.4] if stick else [3.0], words, looks, *said)
+    values, shares = np.degrees(result.values), 100.0 * result.below(limit_deg)
+    for k, (color, dashes) in enumerate(looks.values()):
+        how: dict[str, Any] = {"color": color, "linestyle": dashes, "linewidth": 1.4}
+        if result.over == "height":
+            ax.plot(points, shares[:, k], marker="o", ms=3.5, clip_on=False, **how)
+        elif stick:
+            ax.plot(points, np.maximum(values[0, :, k, 1], LEAST), marker="o", ms=3.0, **how)
+            ends[0].plot(points, values[0, :, k, 2], marker="o", ms=3.0, **how)
+        else:
+            found = np.array([mean_of(values[:, n, k, 0]) for n in range(points.size)])
+            middle, low, high = np.maximum(found, LEAST).T
+            ax.fill_between(points, low, high, color=color, alpha=0.15, linewidth=0.0)
+            ax.plot(points, middle, **how)
+    dress(ax, look.label)
+    if result.over == "height":
+        ax.set_ylim(0.0, 100.0)
+        ax.set_xlim(left=0.0)
+    elif stick:
+        _logarithmic(ax, LEAST, 1.3 * float(np.nanmax(values[..., 1])))
+        dress(ends[0], "slew reached (deg)")
+    else:
+        mean = values[..., 0].mean(axis=0)
+        low = max(LEAST, 0.5 * float(np.nanmin(mean)))
+        _logarithmic(ax, low, 1.6 * float(np.nanmax(mean)))
+        ax.axvline(1.0, color=FAINT, linewidth=0.8, zorder=1.0)
+        write(ax, "as built", (1.0, low), (4.0, 4.0), coords="data", color=GREY)
+        ax.set_xlim(points[0], points[-1])
+    label_below(ends[0] if ends else ax, look.below)
+    return figure
+
+
+def _polar(result: Sweep, title: str, looks: dict[str, Stroke], *said: str) -> Figure:
+    """Swing over the bearing around the ship."""
+    legend = [handle(name, *look) for name, look in looks.items()]
+    rows = legend_rows(legend)
+    figure = new_figure(WIDTH, HEAD + ROW * (rows + 1) + 5.4 + FOOT, layout="none")
+    write_title(figure, title)
+    top = 1.0 - (HEAD + ROW * (rows + 1) + 0.05) / float(figure.get_figheight())
+    ax: Any = figure.add_axes((0.16, 0.06, 0.68, top - 0.11), projection="polar")
+    ax.set_theta_zero_location("N")
+    ax.set_theta_direction(-1)
+    mean, floor = np.degrees(result.mean()[..., 0]), np.log10(0.05)
+    around = np.append(result.points, result.points[0] + 2.0 * np.pi)
+    for values, (color, dashes) in zip(mean.T, looks.values(), strict=True):
+        radius = np.log10(np.maximum(np.append(values, values[0]), 0.05)) - floor
+        ax.plot(around, radius, color=color, linestyle=dashes, linewidth=1.4)
+    shown = [each for each in (0.1, 0.3, 1.0, 3.0, 10.0, 30.0) if each <= 1.3 * np.nanmax(mean)]
+    ax.set_ylim(0.0, np.log10(1.3 * np.nanmax(mean)) - floor)
+    ax.set_yticks(np.log10(shown) - floor, [f"{each:g}°" for each in shown])
+    ax.set_rlabel_position(22.5)
+    names = {0: "bow", 90: "starboard", 180: "stern", 270: "port"}
+    angles = range(0, 360, 30)
+    ax.set_xticks(np.radians(angles), [names.get(each, f"{each}°") for each in angles])
+    ax.tick_params(labelsize=SMALL, labelcolor=INK)
+    ax.tick_params(axis="x", pad=8.0)
+    for angle, text in zip(angles, ax.get_xticklabels(), strict=True):
+        side: Literal["left", "right"] = "left" if angle < 180 else "right"
+        text.set_horizontalalignment("center" if angle % 180 == 0 else side)
+    ax.grid(True, color=GRID, linewidth=0.6)
+    ax.spines["polar"].set_color(FAINT)
+    above = figure.add_axes((0.012, top + 0.01, 0.9, 0.001))
+    above.set_axis_off()
+    put_legend(above, legend)
+    remark(above, *said, rows=rows)
+    return figure
+
+
+def plot_follow(result: Followable, *, title: str = "") -> Figure:
+    """Figure of the amplitude that each axis can follow over the period, with seas as points."""
+    looks = strokes(("hoist, up", "slew, across the boom", "luff, along the boom"))
+    said = f"boom at {result.boom_deg:.0f}°; points: what holding the tip asks of the luff"
+    words = title or "What the axes can follow"
+    figure, (ax,) = _panels([3.3], words, looks, said, assumed(result.crane))
+    for (color, dashes), values in zip(looks.values(), result.amplitude.T, strict=True):
+        ax.plot(result.periods, values, color=color, linestyle=dashes, linewidth=1.4)
+    asked = {name: (each.period, each.amplitude[2]) for name, each in result.seas.items()}
+    for name, place in asked.items():
+        ax.plot(*place, "D", color=INK, ms=4.5)
+        box = {"facecolor": "white", "edgecolor": "none", "pad": 0.6}
+        write(ax, name, place, (6.0, -3.0), coords="data", bbox=box)
+    dress(ax, "amplitude (m)")
+    every = [*result.amplitude.ravel(), *(amplitude for _, amplitude in asked.values())]
+    _logarithmic(ax, 0.8 * min(every), 1.25 * max(every))
+    ax.set_xlim(result.periods[0], result.periods[-1])
+    label_below(ax, "period (s)")
+    return figure
+
+
+def plot_judgment(result: Judgment, *, title: str = "") -> Figure:
+    """Figure of a judgment: swing of every variant in every seaway, and what limits its drives."""
+    names, study = list(reversed(result.names)), result.study
+    words = title or f"Swing in {len(study.seeds)} seaways"
+    figure, (ax,) = sheet([0.42 * len(names) + 0.3], words, lines=1)
+    said = "bars: mean with its 95 % interval"
+    remark(ax, seaway_words(study.sea), said, assumed(study.crane), right=True)
+    random = np.random.default_rng(0)
+    labels, edge = [], 0.0
+    for row, name in enumerate(names):
+        values = np.degrees(result.counted(name))
+        known = values[np.isfinite(values)]
+        edge = max(edge, float(known.max(initial=0.0)))
+        share = result.worse(name) if name in result.names[1:] else 0.0
+        color = VERMILION if share > result.allowed else BLUE
+        spread = row + random.uniform(-0.25, 0.25, known.size)
+        ax.plot(known, spread, "o", color=color, ms=2.6, alpha=0.35, mew=0.0)
+        mean = mean_of(known)
+        ax.plot([mean.low, mean.high], [row, row], color=INK, linewidth=3.0, solid_capstyle="butt")
+        ax.plot([mean.value] * 2, [row - 0.3, row + 0.3], color=INK, linewidth=1.6)
+        worse = f"\nworse than none: {100.0 * share:.0f} %" if name in result.names[1:] else ""
+        labels.append(name + worse)
+    dress(ax)
+    ax.grid(False, axis="y")
+    ax.set_yticks(range(len(names)), labels, fontsize=NORMAL)
+    ax.set_ylim(-0.6, len(names) - 0.4)
+    ax.set_xlim(0.0, 1.05 * edge)
+    label_below(ax, "swing, RMS of a seaway (deg)")
+    return figure

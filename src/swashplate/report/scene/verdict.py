@@ -12,10 +12,9 @@ from matplotlib import rc_context
 from matplotlib.figure import Figure
 
 from swashplate.crane import Judgment
-from swashplate.crane.study import IDEAL, NONE
+from swashplate.crane.study import NONE
 from swashplate.errors import DomainError
-from swashplate.report.figures.crane import plot_crane
-from swashplate.report.figures.crane_studies import plot_follow, plot_judgment, seaway_words
+from swashplate.report.figures.crane import plot_crane, plot_follow, plot_judgment, seaway_words
 from swashplate.report.fit_report.page import Block, Section, listed_block, page, text
 from swashplate.report.fit_report.summary import Light, light
 from swashplate.tables import Table, count, listed, write_text
@@ -30,6 +29,11 @@ LIMITS_IN_WORDS = (
     "accelerate faster. Swash stop: the pump is at full stroke, so that it cannot turn faster. A "
     "controller that counts on more comes late, and late it feeds the swing."
 )
+FOLLOWED = (
+    "Largest sine of the tip that each axis can follow, and what seas ask of the luff: a point "
+    "above the luff's line is more than it has"
+)
+ASSUMED = "Shaded rows of the geometry are assumed: measure them before you rely on a number."
 
 
 def write_judgment(judgment: Judgment, path: str | Path) -> None:
@@ -46,14 +50,47 @@ def write_judgment(judgment: Judgment, path: str | Path) -> None:
     FileError
         If the file cannot be written.
     """
-    crane, study = judgment.study.crane, judgment.study
+    study, judged = judgment.study, judgment.judged
+    crane, where = study.crane, judgment.cases[NONE].where
+    pose = {key: value for key, value in where.items() if key in ("slew_deg", "boom_deg", "rope_m")}
     swings, differences, limits, *remedies = judgment.tables()
+    verdict, *rests = judgment.sentences()
+    look: Light = "good" if judgment.passed else "bad"
+    summary = [
+        Block("verdict", (light(look, "works" if judgment.passed else "fails"), verdict), look),
+        _drawn(plot_judgment(judgment), "Swing of each variant in each seaway"),
+        *_tables(*remedies),
+    ]
+    if judgment.tried and judgment.remedies:  # else the verdict says so
+        summary.append(text(f"Tried, and not enough: {listed(judgment.tried)}.", "remark"))
+    limiting, example, basis = [], [], []
+    if limits.rows:
+        periods = np.linspace(4.0, 14.0, 21)
+        followable = plot_follow(crane.follow(periods, seaway=study.sea, **pose))
+        limiting = [text(LIMITS_IN_WORDS), _drawn(followable, FOLLOWED), *_tables(limits)]
+    try:
+        runs = {name: judgment.run(name, judgment.typical) for name in (NONE, judged)}
+        caption = f"Seaway {judgment.typical}, in which '{judged}' swings as in half of all seaways"
+        example = [_drawn(plot_crane(runs, title=""), caption)]
+    except DomainError:  # a run that was stopped has no signals
+        pass
+    basis.append(
+        f"Boom at {pose['slew_deg']:g}° from the bow to starboard and {pose['boom_deg']:g}° up, "
+        f"rope {pose['rope_m']:g} m."
+    )
+    for name, case in judgment.cases.items():
+        if name != NONE:
+            ideal = case.actuation == "ideal"
+            drives = "ideal drives" if ideal else count(len(case.cranes), "crane")
+            basis.append(f"{name}: {case.control!r}, {drives}.")
+    basis += [f"{axis}: {getattr(crane, axis).parameters.title}." for axis in ("slew", "luff")]
+    geometry = Block("details", [Block("table", crane.table())], "Geometry, with its sources")
     sections = [
-        _summary(judgment, remedies),
+        Section("summary", "Summary", [*summary, *listed_block(rests)]),
         Section("swing", "Swing", [text(IN_WORDS), *_tables(swings, differences)]),
-        _limits(judgment, limits),
-        _example(judgment),
-        _basis(judgment),
+        Section("limits", "Limits of the drives", limiting),
+        Section("example", "One of the seaways", example),
+        Section("basis", "What it rests on", [*listed_block(basis), geometry, text(ASSUMED)]),
     ]
     content = {
         "what": "Crane",
@@ -67,17 +104,15 @@ def write_judgment(judgment: Judgment, path: str | Path) -> None:
     write_text(page([each for each in sections if each.blocks], content), path)
 
 
-def svg(figure: Figure) -> Markup:
-    """A figure as SVG within a page, as wide as there is room."""
+def _drawn(figure: Figure, caption: str) -> Block:
+    """A figure as SVG within the page, as wide as there is room."""
     written = StringIO()
     with rc_context({"svg.hashsalt": "swashplate"}):
         figure.savefig(written, format="svg", metadata={"Date": None})
     drawn = written.getvalue()
-    return Markup(
-        drawn[drawn.index("<svg") :].replace(
-            "<svg", '<svg class="chart" style="min-width: 600px"', 1
-        )
-    )
+    drawn = drawn[drawn.index("<svg") :]
+    look = '<svg class="chart" style="min-width: 600px"'
+    return Block("figure", Markup(drawn.replace("<svg", look, 1)), caption)
 
 
 def _tables(*tables: Table) -> list[Block]:
@@ -86,70 +121,3 @@ def _tables(*tables: Table) -> list[Block]:
         made += [Block("heading", each.title, "h3"), Block("table", each)]
         made += [text(each.caption, "remark")] if each.caption else []
     return made
-
-
-def _summary(judgment: Judgment, remedies: list[Table]) -> Section:
-    """The first screen: verdict, swing in every seaway, what would do."""
-    look: Light = "good" if judgment.passed else "bad"
-    verdict, *rests = judgment.sentences()
-    words = "works" if judgment.passed else "fails"
-    shown = [
-        Block("verdict", (light(look, words), verdict), look),
-        Block("figure", svg(plot_judgment(judgment)), "Swing of each variant in each seaway"),
-        *_tables(*remedies),
-    ]
-    if judgment.tried and judgment.remedies:  # else the verdict says so
-        shown.append(text(f"Tried, and not enough: {listed(judgment.tried)}.", "remark"))
-    return Section("summary", "Summary", [*shown, *listed_block(rests)])
-
-
-def _limits(judgment: Judgment, limits: Table) -> Section:
-    """What limits the drives, and what they can follow."""
-    if not limits.rows:
-        return Section("limits", "Limits of the drives", [])
-    how = judgment.cases[judgment.judged].where
-    pose = {key: how[key] for key in ("slew_deg", "boom_deg", "rope_m")}
-    study, periods = judgment.study, np.linspace(4.0, 14.0, 21)
-    followable = study.crane.follow(periods, seaway=study.sea, **pose)
-    caption = (
-        "Largest sine of the tip that each axis can follow, and what seas ask of the luff: a point "
-        "above the luff's line is more than it has"
-    )
-    figure = Block("figure", svg(plot_follow(followable)), caption)
-    return Section(
-        "limits", "Limits of the drives", [text(LIMITS_IN_WORDS), figure, *_tables(limits)]
-    )
-
-
-def _example(judgment: Judgment) -> Section:
-    """One seaway over time."""
-    seed, names = judgment.typical, [NONE, judgment.judged]
-    try:
-        runs = {name: judgment.run(name, seed) for name in names}
-    except DomainError:  # a run that was stopped has no signals
-        return Section("example", "One of the seaways", [])
-    caption = f"Seaway {seed}, in which '{judgment.judged}' swings as in half of all seaways"
-    drawn = svg(plot_crane(runs, title=""))
-    return Section("example", "One of the seaways", [Block("figure", drawn, caption)])
-
-
-def _basis(judgment: Judgment) -> Section:
-    """Crane, pose, controllers."""
-    crane, said = judgment.study.crane, []
-    for name, case in judgment.cases.items():
-        if name != NONE:
-            drives = "ideal drives" if case.actuation == IDEAL else count(len(case.cranes), "crane")
-            said.append(f"{name}: {case.control!r}, {drives}.")
-    how = judgment.cases[NONE].where
-    pose = (
-        f"Boom at {how['slew_deg']:g}° from the bow to starboard and {how['boom_deg']:g}° up, rope "
-        f"{how['rope_m']:g} m."
-    )
-    sets = [f"{axis}: {getattr(crane, axis).parameters.title}." for axis in ("slew", "luff")]
-    geometry = Block("details", [Block("table", crane.table())], "Geometry, with its sources")
-    assumed = "Shaded rows of the geometry are assumed: measure them before you rely on a number."
-    return Section(
-        "basis",
-        "What it rests on",
-        [*listed_block([pose, *said, *sets]), geometry, text(assumed)],
-    )
