@@ -15,7 +15,7 @@ from swashplate.equations.marching.observation import Observation, ObservedRecor
 from swashplate.equations.marching.record import record_of
 from swashplate.maneuvers import source_tests
 from swashplate.parameters.definitions import columns_of
-from swashplate.simulation.residuals import ALL_COLUMNS, PUMP_COLUMNS, jacobian, residuals, triangle
+from swashplate.simulation.residuals import ALL_COLUMNS, PUMP_COLUMNS, made_ready
 
 Array = NDArray[np.float64]
 
@@ -60,17 +60,17 @@ class HoistTests:
     def residuals(self, tests: list[ObservedRecord]) -> None:
         """Residuals of all tests."""
         for each in tests:
-            residuals(self.drive.parameters, each)
+            made_ready(self.drive.parameters, each).residuals(each)
 
     def jacobian(self) -> None:
         """Residuals and derivatives of all tests, into memory from before."""
         for each, kept in zip(self.pump, self.kept, strict=True):
-            jacobian(self.drive.parameters, each, PUMP, out=kept)
+            made_ready(self.drive.parameters, each, PUMP).jacobian(each, kept)
 
     def triangle(self, tests: list[ObservedRecord], columns: tuple[str, ...]) -> None:
         """Triangular factors of all tests."""
         for each in tests:
-            triangle(self.drive.parameters, each, columns)
+            made_ready(self.drive.parameters, each, columns).triangle(each)
 
 
 def fit_rows() -> Iterator[Row]:

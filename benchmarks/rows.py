@@ -18,7 +18,7 @@ from swashplate.equations.marching.pieces import addresses, run_once
 from swashplate.equations.marching.record import record_of
 from swashplate.equations.marching.run import arrays_of, march_of
 from swashplate.simulation.instance import instance_of
-from swashplate.simulation.residuals import PUMP_COLUMNS, jacobian
+from swashplate.simulation.residuals import PUMP_COLUMNS, made_ready
 
 Array = NDArray[np.float64]
 
@@ -84,7 +84,8 @@ class Marches:
 
     def jacobian_call(self) -> None:
         """Speed and all its derivatives, into memory from before."""
-        jacobian(self.drive.parameters, self.observed, PUMP_COLUMNS, out=self.rows)
+        ready = made_ready(self.drive.parameters, self.observed, PUMP_COLUMNS)
+        ready.jacobian(self.observed, self.rows)
 
     def pump_call(self) -> Array:
         """Pump and motor as a user calls them."""

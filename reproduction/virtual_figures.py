@@ -13,7 +13,7 @@ from reproduction.curves import MULTIPLIED, filtered_speed_deg_s
 from swashplate.campaign import interpolate_counts
 from swashplate.drive import Drive
 from swashplate.identification.drive_model import measured_current
-from swashplate.simulation.run import simulate_pump
+from swashplate.simulation.run import simulate_drive
 
 WINDOW = (1.55, 1.75)
 """Part of the ramp that figure 7.2 looks at: the winch is slow, a count lasts some samples. [s]"""
@@ -53,7 +53,7 @@ def measured_current_figure(shown: Shown, bench: Bench) -> Figure:
     experiment = bench.run(shown.axis, test)
     record = measured_current(experiment, ON_CURRENT)
     start: Literal["rest"] = "rest"
-    run = simulate_pump(Drive.preset(shown.axis).parameters, record, start)
+    run = simulate_drive(Drive.preset(shown.axis).parameters, {"current": record}, start)
     volts = MULTIPLIED.factor * experiment.input.at(run.time)
     return Figure(
         shown.number,

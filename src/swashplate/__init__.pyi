@@ -4,6 +4,7 @@ from .campaign.campaign import Campaign as Campaign
 from .campaign.experiment import Channel as Channel
 from .campaign.experiment import Experiment as Experiment
 from .drive import Drive as Drive
+from .equations.marching.use import Stepper as Stepper
 from .errors import DomainError as DomainError
 from .errors import FileError as FileError
 from .errors import InputError as InputError
@@ -27,5 +28,4 @@ from .simulation.batch import simulate_many as simulate_many
 from .simulation.residuals import Sensitivities as Sensitivities
 from .simulation.result import Limit as Limit
 from .simulation.result import Simulation as Simulation
-from .simulation.stepper import Sample as Sample
-from .simulation.stepper import Stepper as Stepper
+from .simulation.run import Sample as Sample

@@ -10,13 +10,14 @@ from typing import TYPE_CHECKING, NamedTuple, TypedDict, Unpack, overload
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from swashplate.equations.marching.record import SOURCE_RATE, Interpolation, Record, record_of
+from swashplate.equations.marching.record import SOURCE_RATE, Interpolation
 from swashplate.equations.marching.run import Start
 from swashplate.equations.marching.stepping import CompiledStep, stored_of
+from swashplate.equations.marching.use import Stepper
 from swashplate.equations.model import Equation
 from swashplate.equations.replacement import Replacement
 from swashplate.errors import InputError
-from swashplate.maneuvers import Maneuver, sampled
+from swashplate.maneuvers import Maneuver
 from swashplate.parameters.files import dump_set, load_preset, load_set
 from swashplate.parameters.parameter_set import Change, Parameter, ParameterSet
 from swashplate.parameters.rules import FULL_VOLTAGE
@@ -28,8 +29,13 @@ from swashplate.simulation.instance import (
     with_equation,
 )
 from swashplate.simulation.result import Simulation
-from swashplate.simulation.run import check_voltage, measured_records, simulate_drive, steady_states
-from swashplate.simulation.stepper import Stepper
+from swashplate.simulation.run import (
+    Sample,
+    drive_records,
+    drive_stepper,
+    simulate_drive,
+    steady_states,
+)
 
 if TYPE_CHECKING:
     from swashplate.executors import Executor
@@ -49,11 +55,15 @@ Array = NDArray[np.float64]
 
 
 class Given(TypedDict, total=False):
-    """How a record is given, see `Drive.simulate`."""
+    """How inputs are given, and what was measured beside the command; see `Drive.simulate`."""
 
+    clip: bool
     time: ArrayLike | None
     interpolation: Interpolation | None
     substeps: int | None
+    load_torque: ArrayLike | None
+    pump_speed: ArrayLike | None
+    supply_pressure: ArrayLike | None
 
 
 @dataclass(frozen=True)
@@ -177,14 +187,8 @@ class Drive(Result):
         voltage: ArrayLike | Maneuver,
         rate: float = SOURCE_RATE,
         *,
-        time: ArrayLike | None = None,
-        interpolation: Interpolation | None = None,
         start: Start = "rest",
-        clip: bool = False,
-        substeps: int | None = None,
-        load_torque: ArrayLike | None = None,
-        pump_speed: ArrayLike | None = None,
-        supply_pressure: ArrayLike | None = None,
+        **given: Unpack[Given],
     ) -> Simulation:
         """Simulate the whole drive over a command.
 
@@ -194,21 +198,21 @@ class Drive(Result):
             Command; a maneuver is sampled at `rate`. [V]
         rate : float
             Samples a second, 10 Hz to 100 kHz; with `time`, rate of the result's grid. [Hz]
+        start : {"rest", "steady"}
+            From rest at 0 V, or settled at the first command.
         time : (n,) array_like, optional
             Increasing time stamps in any distances; `interpolation` must then be given. [s]
         interpolation : {"linear", "previous"}, optional
             What the command is between samples: a straight line (default) or held.
-        start : {"rest", "steady"}
-            From rest at 0 V, or settled at the first command.
         clip : bool
             Clip a command beyond ±10 V instead of refusing it.
         substeps : int, optional
             Steps of the march a sample; by default so many that h ≤ 1/512 s.
         load_torque, pump_speed, supply_pressure : (n,) array_like or float, optional
-            What was measured beside the command: torque of the load at the shaft, positive against
-            positive speed [N m]; speed of the prime mover over that which Z10 belongs to [1];
-            supply pressure less static pressure, in place of Z9 [Pa]. By default the parameters
-            count.
+            What was measured beside the command, at its stamps: torque of the load at the shaft,
+            positive against positive speed [N m]; speed of the prime mover over that which Z10
+            belongs to [1]; supply pressure less static pressure, in place of Z9 [Pa]. By default
+            the parameters count.
 
         Returns
         -------
@@ -222,11 +226,8 @@ class Drive(Result):
         DomainError
             If the solenoid overpowers the feedback spring.
         """
-        record = _record(
-            voltage, rate, time=time, interpolation=interpolation, clip=clip, substeps=substeps
-        )
-        measured = measured_records(record, load_torque, pump_speed, supply_pressure)
-        return simulate_drive(self.parameters, record, start, measured=measured)
+        records = drive_records("voltage", voltage, rate, **given)
+        return simulate_drive(self.parameters, records, start)
 
     def simulate_current(
         self,
@@ -234,15 +235,11 @@ class Drive(Result):
         rate: float = SOURCE_RATE,
         *,
         start: Start = "rest",
-        load_torque: ArrayLike | None = None,
-        pump_speed: ArrayLike | None = None,
-        supply_pressure: ArrayLike | None = None,
-        **options: Unpack[Given],
+        **given: Unpack[Given],
     ) -> Simulation:
         """Simulate pump and motor alone over a signed current [A]; arguments as `simulate`."""
-        record = record_of(current, rate, what="current", **options)
-        measured = measured_records(record, load_torque, pump_speed, supply_pressure)
-        return simulate_drive(self.parameters, record, start, measured=measured, driver="current")
+        records = drive_records("current", current, rate, **given)
+        return simulate_drive(self.parameters, records, start)
 
     def sensitivities(
         self,
@@ -251,23 +248,22 @@ class Drive(Result):
         *,
         parameters: Sequence[str] | None = None,
         start: Start = "rest",
-        clip: bool = False,
-        **options: Unpack[Given],
+        **given: Unpack[Given],
     ) -> Sensitivities:
-        """Simulate with exact derivatives of currents, speed and position.
+        """Simulate with exact derivatives of any signal.
 
         Parameters
         ----------
         parameters : sequence of str, optional
             Symbols (``"Z16"`` stands for both directions) or columns (``"Z16_plus"``) to
             differentiate by; by default all of card, pump and motor.
-        voltage, rate, start, clip, **options :
-            As in `simulate`; `time`, `interpolation`, `substeps`.
+        voltage, rate, start, **given :
+            As in `simulate`.
         """
         from swashplate.simulation.residuals import sensitivities
 
-        record = _record(voltage, rate, clip=clip, **options)
-        return sensitivities(self.parameters, record, "voltage", start, parameters)
+        records = drive_records("voltage", voltage, rate, **given)
+        return sensitivities(self.parameters, records, start, parameters)
 
     def sensitivities_current(
         self,
@@ -276,13 +272,13 @@ class Drive(Result):
         *,
         parameters: Sequence[str] | None = None,
         start: Start = "rest",
-        **options: Unpack[Given],
+        **given: Unpack[Given],
     ) -> Sensitivities:
         """The same for pump and motor alone over a signed current. [A]"""
         from swashplate.simulation.residuals import sensitivities
 
-        record = record_of(current, rate, what="current", **options)
-        return sensitivities(self.parameters, record, "current", start, parameters)
+        records = drive_records("current", current, rate, **given)
+        return sensitivities(self.parameters, records, start, parameters)
 
     def simulate_many(
         self,
@@ -291,11 +287,11 @@ class Drive(Result):
         voltage: ArrayLike | Maneuver | None = None,
         current: ArrayLike | None = None,
         rate: float = SOURCE_RATE,
-        interpolation: Interpolation | None = None,
         cost: SquaredError | None = None,
         output: str = "shaft_speed",
         to: str | Path | None = None,
         executor: Executor | None = None,
+        **given: Unpack[Given],
     ) -> Batch:
         """Simulate many parameter sets over one record, from rest, on all cores.
 
@@ -305,14 +301,11 @@ class Drive(Result):
             Symbol or column to (m,) values, one for each set; other parameters are this drive's.
         voltage, current : (n,) array_like
             The record, one of the two. [V or A]
-        rate, interpolation :
+        rate, **given :
             As in `simulate`.
-        cost : SquaredError, optional
-            Reduce each set to one number on the fly, so that memory does not grow with the record.
         output : str
-            Without `cost`: the signal to return, ``"shaft_speed"``, ``"shaft_position"`` or
-            ``"current"``.
-        to, executor :
+            Without `cost`: the signal to return, such as ``"shaft_speed"`` or ``"current"``.
+        cost, to, executor :
             As in `swashplate.simulate_many`.
 
         Raises
@@ -322,17 +315,12 @@ class Drive(Result):
         """
         from swashplate.simulation.batch import simulate_drives
 
-        if (voltage is None) == (current is None):
+        commands = {"voltage": voltage, "current": current}
+        chosen = [(driver, each) for driver, each in commands.items() if each is not None]
+        if len(chosen) != 1:
             raise InputError("A batch needs either a voltage or a current.")
-        if current is None:
-            assert voltage is not None
-            record = _record(voltage, rate, interpolation=interpolation)
-        else:
-            record = record_of(current, rate, what="current", interpolation=interpolation)
-        by_voltage = current is None
-        return simulate_drives(
-            self.parameters, changes, record, by_voltage, cost, output, to, executor
-        )
+        records = drive_records(*chosen[0], rate, **given)
+        return simulate_drives(self.parameters, changes, records, output, cost, to, executor)
 
     def stepper(
         self,
@@ -340,12 +328,12 @@ class Drive(Result):
         *,
         interpolation: Interpolation = "linear",
         start: Start = "rest",
-    ) -> Stepper:
+    ) -> Stepper[Sample]:
         """The drive one sample at a time: command in, sample out, numbers as in `simulate`.
 
         `h` is the interval between samples [s]; other arguments as in `simulate`.
         """
-        return Stepper(self.parameters, h, interpolation, start)
+        return drive_stepper(self.parameters, h, interpolation, start)
 
     def compiled_step(
         self,
@@ -388,11 +376,10 @@ class Drive(Result):
     ) -> LinearDrive:
         """Linear model of small motions about a steady state, from the exact partial derivatives.
 
-        Refinements count as their equations say of motions that are small enough. Friction is that
-        of presliding, whose memory is a state, ``"spool_deflection"``; damping and the line add
-        their states. The cam ring's ripple counts with the mean of a turn: not at all. Within the
-        solenoids' hysteresis a current moves nothing: only the force, or what is measured beside
-        the command, has a model there.
+        Refinements count: friction as presliding, with the state ``"spool_deflection"``; damping
+        and the line with their states; the cam ring's ripple with its mean over a turn, zero.
+        Within the solenoids' hysteresis a current moves nothing: only the force, or what is
+        measured beside the command, has a model there.
 
         Parameters
         ----------
@@ -504,11 +491,3 @@ class Drive(Result):
         if np.ndim(voltage) == 0:
             return float(current[0]), float(speed[0])
         return current.reshape(volts.shape), speed.reshape(volts.shape)
-
-
-def _record(
-    voltage: ArrayLike | Maneuver, rate: float, *, clip: bool = False, **options: Unpack[Given]
-) -> Record:
-    """A command on the march's grid."""
-    command = sampled(voltage, rate)
-    return check_voltage(record_of(command, rate, what="voltage", **options), clip)

@@ -7,16 +7,16 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
 from itertools import islice
-from typing import TYPE_CHECKING, Any, Protocol, TypeVar
+from typing import TYPE_CHECKING, Any, Protocol
 
 from swashplate.errors import InputError
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor as Pool
 
-Item = TypeVar("Item")
-Result = TypeVar("Result")
-Shared = TypeVar("Shared")
+Work = Callable[[Any, Any], Any]
+Done = Iterator[tuple[int, Any]]
+"""Position of an item and what the work gave for it, as each is done."""
 
 LOOK = 2.0
 """How often a client looks whether its cluster is still there, while nothing ends. [s]"""
@@ -25,9 +25,7 @@ LOOK = 2.0
 class Executor(Protocol):
     """Runs one function over many items; all give the same results, in any order."""
 
-    def run(
-        self, function: Callable[[Shared, Item], Result], shared: Shared, items: Sequence[Item]
-    ) -> Iterator[tuple[int, Result]]:
+    def run(self, function: Work, shared: Any, items: Sequence[Any]) -> Done:
         """Yield (position of the item, result) as each is done.
 
         Parameters
@@ -38,6 +36,11 @@ class Executor(Protocol):
             Its first argument, the same for all items; sent once to each worker.
         items : sequence
             Its second argument.
+
+        Raises
+        ------
+        InputError
+            If workers or a cluster cannot be reached or are lost, or cannot import the model.
         """
         ...
 
@@ -45,9 +48,7 @@ class Executor(Protocol):
 class Serial:
     """One after another, in this process."""
 
-    def run(
-        self, function: Callable[[Shared, Item], Result], shared: Shared, items: Sequence[Item]
-    ) -> Iterator[tuple[int, Result]]:
+    def run(self, function: Work, shared: Any, items: Sequence[Any]) -> Done:
         """See `Executor.run`."""
         for position, item in enumerate(items):
             yield position, function(shared, item)
@@ -60,9 +61,7 @@ class Threads:
     workers: int | None = None
     """How many; by default one for each core that this process may use."""
 
-    def run(
-        self, function: Callable[[Shared, Item], Result], shared: Shared, items: Sequence[Item]
-    ) -> Iterator[tuple[int, Result]]:
+    def run(self, function: Work, shared: Any, items: Sequence[Any]) -> Done:
         """See `Executor.run`."""
         from concurrent.futures import ThreadPoolExecutor
 
@@ -80,23 +79,22 @@ def _receive(shared: Any) -> None:
     A parent that is killed cannot end its workers, and what they hold of its pipes would keep
     whoever reads them waiting.
     """
+    from multiprocessing import parent_process
     from threading import Thread
 
     global _shared
     _shared = shared
-    Thread(target=_end_with_parent, daemon=True).start()
-
-
-def _end_with_parent() -> None:
-    from multiprocessing import parent_process
-
     parent = parent_process()
-    if parent is not None:
-        parent.join()
-        os._exit(1)
+
+    def end_with_parent() -> None:
+        if parent is not None:
+            parent.join()
+            os._exit(1)
+
+    Thread(target=end_with_parent, daemon=True).start()
 
 
-def _apply(function: Callable[[Any, Any], Any], item: Any) -> Any:
+def _apply(function: Work, item: Any) -> Any:
     return function(_shared, item)
 
 
@@ -107,16 +105,8 @@ class Processes:
     workers: int | None = None
     """How many; by default one for each core that this process may use."""
 
-    def run(
-        self, function: Callable[[Shared, Item], Result], shared: Shared, items: Sequence[Item]
-    ) -> Iterator[tuple[int, Result]]:
-        """See `Executor.run`.
-
-        Raises
-        ------
-        InputError
-            If a worker dies or cannot import the model.
-        """
+    def run(self, function: Work, shared: Any, items: Sequence[Any]) -> Done:
+        """See `Executor.run`."""
         from concurrent.futures import ProcessPoolExecutor
         from concurrent.futures.process import BrokenProcessPool
         from multiprocessing import active_children, get_context
@@ -144,13 +134,13 @@ class Processes:
 
 
 def _completed(
-    pool: Pool, function: Callable[[Item], Result], items: Sequence[Item], workers: int
-) -> Iterator[tuple[int, Result]]:
+    pool: Pool, function: Callable[[Any], Any], items: Sequence[Any], workers: int
+) -> Done:
     """Results as they come; no more are waiting than it takes to keep all workers busy."""
     from concurrent.futures import FIRST_COMPLETED, Future, wait
 
     waiting = iter(enumerate(items))
-    running: dict[Future[Result], int] = {}
+    running: dict[Future[Any], int] = {}
     try:
         while True:
             for k, item in islice(waiting, 2 * workers - len(running)):
@@ -173,16 +163,8 @@ class Dask:
     retries: int = 3
     """How often an item is done again after its worker was lost."""
 
-    def run(
-        self, function: Callable[[Shared, Item], Result], shared: Shared, items: Sequence[Item]
-    ) -> Iterator[tuple[int, Result]]:
-        """See `Executor.run`.
-
-        Raises
-        ------
-        InputError
-            If Dask is not installed, no scheduler answers, or it is lost.
-        """
+    def run(self, function: Work, shared: Any, items: Sequence[Any]) -> Done:
+        """See `Executor.run`."""
         from importlib.util import find_spec
 
         if find_spec("distributed") is None:

@@ -11,6 +11,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence, Set
 from dataclasses import fields, is_dataclass
 from pathlib import Path
+from textwrap import shorten
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from swashplate.errors import InputError
@@ -32,13 +33,9 @@ def short(value: object) -> str:
     else:  # a model of pydantic's, or a named tuple
         kind: Any = type(value)
         names = list(getattr(kind, "model_fields", ()) or getattr(kind, "_fields", ()))
-    said, room = [], LONGEST - len(type(value).__name__) - 8
-    for name in names:
-        said.append(f"{name}={_brief(getattr(value, name))}")
-        if sum(map(len, said)) + 2 * len(said) > room:
-            said[-1] = "..."
-            break
-    return f"{type(value).__name__}({', '.join(said)})"
+    said = ", ".join(f"{name}={_brief(getattr(value, name))}" for name in names)
+    kind = type(value).__name__
+    return f"{kind}({shorten(said, LONGEST - len(kind) - 2, placeholder=' ...')})"
 
 
 def _brief(value: Any) -> str:
@@ -59,16 +56,13 @@ def _brief(value: Any) -> str:
         keys = ", ".join(map(str, value))
         return f"{{{keys if len(keys) <= 60 else f'{len(value)} entries'}}}"
     if isinstance(value, Sequence | Set):
-        return _items(list(value))
+        items = list(value)
+        plain = all(isinstance(each, str | int | float) for each in items)
+        if plain and len(items) <= SPELT_OUT:
+            return f"[{', '.join(map(_brief, items))}]"
+        return f"<{len(items)} {type(items[0]).__name__}>"
     text = object.__repr__(value) if callable(value) else repr(value)
     return text if len(text) <= 60 and not callable(value) else f"<{type(value).__name__}>"
-
-
-def _items(items: list[Any]) -> str:
-    plain = all(isinstance(each, str | int | float) for each in items)
-    if plain and len(items) <= SPELT_OUT:
-        return f"[{', '.join(map(_brief, items))}]"
-    return f"<{len(items)} {type(items[0]).__name__}>" if items else "[]"
 
 
 class Result:

@@ -6,8 +6,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from swashplate import Campaign, FileError, InputError
+from swashplate import Campaign, Drive, FileError, InputError
 from swashplate.campaign import campaign_findings, draft_campaign, examine, unsigned_currents
+from swashplate.identification.data_checks import beside_the_drives
 
 RATE = 200.0
 TIME = np.arange(int(8.0 * RATE)) / RATE
@@ -118,6 +119,29 @@ def test_a_nameplates_turns(tmp_path: Path, header: str, factor: float) -> None:
     assert ('unit = "rpm"' in tests.path.read_text("utf-8")) == (header == "rpm")
 
 
+# --- what the input is between samples ------------------------------------------------------------
+
+
+@pytest.mark.parametrize("true", ["previous", "linear"])
+def test_the_interpolation_that_fits_better_is_named(tmp_path: Path, true: str) -> None:
+    """A driver's command, sampled 20 times a second; the drive is known."""
+    random, fine = np.random.default_rng(3), np.arange(0.0, 30.0, 1.0 / 512.0)
+    time = np.arange(0.0, 29.99, 0.05)
+    levels = np.concatenate([[0.0, 0.0], random.uniform(-7.0, 7.0, 30)])
+    command = np.interp(time, np.arange(32.0), levels)
+    held = np.searchsorted(time, fine, side="right") - 1
+    moved = command[held] if true == "previous" else np.interp(fine, time, command)
+    speed = np.interp(time, fine, Drive.preset("hoist").simulate(moved).shaft_speed)
+    log = write(tmp_path, "log.csv", time=time, voltage=command, speed=speed)
+    tests = drafted(tmp_path, log, drive="hoist")
+    other = "linear" if true == "previous" else "previous"
+    wrong = tests if true == "linear" else edit(tests, 'n = "previous"', 'n = "linear"')
+    (said,) = beside_the_drives(wrong)
+    assert f"the input of the axis 'hoist' seems to be '{true}' between samples" in said
+    assert f'try interpolation = "{true}" in [axes.hoist.input]' in said
+    assert beside_the_drives(edit(wrong, f'n = "{other}"', f'n = "{true}"')) == []
+
+
 # --- M4, M5: spikes, and what is ignored ----------------------------------------------------------
 
 
@@ -137,6 +161,26 @@ def test_a_spike_is_found_with_the_line_that_leaves_it_out(tmp_path: Path) -> No
     assert np.flatnonzero(~channel.used).tolist() == [700, 701]
     (_, quality) = examine(mended["log"])
     assert quality.high < 1.0
+
+
+def test_a_spike_of_the_command_is_found_and_left_out(tmp_path: Path) -> None:
+    command = SINE + np.random.default_rng(4).normal(0.0, 0.002, TIME.size)
+    command[900] = -9.0
+    log = write(tmp_path, "log.csv", time=TIME, voltage=command, speed=lagged(SINE))
+    tests = drafted(tmp_path, log)
+    (said,) = findings(tests)
+    assert said.startswith("1 spike, up to -9 V: leave out with axes.drive.input.ignore = ")
+    line = said.removeprefix("1 spike, up to -9 V: leave out with ").removesuffix(" in this run")
+    tests.path.write_text(tests.path.read_text("utf-8") + line + "\n", "utf-8")
+    mended = Campaign.from_toml(tests.path)
+    assert findings(mended) == []
+    assert mended["log"].input.at(TIME[900:901]) == pytest.approx(command[899:900])
+
+
+def test_a_tap_of_the_command_is_no_spike(tmp_path: Path) -> None:
+    command = 5.0 * ((TIME > 1.0) & (TIME < 1.019)) - 3.0 * (TIME > 4.0)
+    log = write(tmp_path, "log.csv", time=TIME, voltage=command, speed=lagged(command))
+    assert findings(drafted(tmp_path, log)) == []
 
 
 def test_a_drop_out_while_the_command_stands_still_is_a_spike(tmp_path: Path) -> None:

@@ -1,6 +1,7 @@
 """A model of one's own, marched and differentiated like the package's drives."""
 
 import pickle
+from dataclasses import replace
 from math import cos, exp, log, sin
 from typing import Any, NamedTuple
 
@@ -17,6 +18,7 @@ from swashplate.equations import (
     report,
     sensitivities,
     simulate,
+    stepper,
 )
 from swashplate.equations.marching.jacobian import residuals
 from swashplate.equations.marching.observation import Observation, ObservedRecord
@@ -95,7 +97,92 @@ def by_hand(p: Valve) -> np.ndarray:
 def test_simulation_is_the_loop_by_hand() -> None:
     run = simulate(valve, P, {"command": COMMAND}, RATE, given=STROKE)
     assert run["position"] == pytest.approx(by_hand(P), abs=1e-9)
-    assert run.names == ("command", "opening", "position")
+    assert run.names == ("time", "command", "opening", "position")
+
+
+class Stops(NamedTuple):
+    low: bool
+    high: bool
+
+
+@equation
+def at_stops(state: Rod, given: Stroke) -> Stops:
+    return Stops(state.position <= given.low, state.position >= given.high)
+
+
+stopped = replace(valve, limits=at_stops, parts=(), integrals={"travel": "position"})
+SHORT = Stroke(-0.05, 0.2)
+TIMES = np.cumsum(0.02 + 0.015 * np.sin(np.arange(300))) - 0.3
+WAYS = {
+    "sub-steps": {"rate": 25.0, "substeps": 4},
+    "sub-steps, held": {"rate": 25.0, "substeps": 4, "interpolation": "previous"},
+    "stamps": {"rate": 40.0, "time": TIMES, "interpolation": "linear"},
+    "stamps, held": {"rate": 40.0, "time": TIMES, "interpolation": "previous", "substeps": 3},
+}
+
+
+def gridded(rate, time=None, interpolation="linear", substeps=1) -> np.ndarray:
+    """The command on the march's grid."""
+    stamps = np.arange(COMMAND.size) / rate if time is None else time
+    count = round((stamps[-1] - stamps[0]) * rate - 0.4999) * substeps
+    fine = stamps[0] + np.arange(count + 1) / (rate * substeps)
+    if interpolation == "linear":
+        return np.interp(fine, stamps, COMMAND)
+    return COMMAND[np.searchsorted(stamps, fine + 1e-9, side="right") - 1]
+
+
+@pytest.mark.parametrize("way", WAYS.values(), ids=WAYS)
+def test_stamps_and_sub_steps_are_a_finer_grid(way) -> None:
+    """Of signals, limits, integrals, many sets and derivatives: those of the gridded command."""
+    substeps, inputs = way.get("substeps", 1), {"command": COMMAND}
+    fine, rate = {"command": gridded(**way)}, way["rate"] * substeps
+    expected = simulate(stopped, P, fine, rate, given=SHORT)
+    run = simulate(stopped, P, inputs, given=SHORT, **way)
+    assert run.time == pytest.approx(expected.time[::substeps] + way.get("time", [0.0])[0])
+    assert run.names == ("time", "command", "opening", "position", "travel")
+    for name in ("position", "travel"):
+        assert run[name] == pytest.approx(expected[name][::substeps], abs=1e-12)
+    assert (run.active("high") == (run["position"] == SHORT.high)).all()
+    assert run.active("high").any()
+    assert (run.active("low") == (run["position"] == SHORT.low)).all()
+    many = simulate_many(
+        stopped, P, {"gain": [0.3, 0.4]}, inputs, output="travel", given=SHORT, **way
+    )
+    assert (many.output[1] == run["travel"]).all()
+    by = sensitivities(stopped, P, inputs, output="position", given=SHORT, **way)
+    finely = sensitivities(stopped, P, fine, rate, output="position", given=SHORT)
+    assert by == pytest.approx(finely[::substeps], abs=1e-9)
+
+
+@pytest.mark.parametrize("way", ["sub-steps", "sub-steps, held"])
+def test_a_stepper_gives_the_bits_of_the_run(way: str) -> None:
+    run = simulate(stopped, P, {"command": COMMAND}, given=SHORT, **WAYS[way])
+    made = stepper(stopped, P, ["command"], given=SHORT, **WAYS[way])
+    samples = [made.step(u) for u in COMMAND[:200]]
+    kept = made.state
+    later = [made.step(u) for u in COMMAND[200:]]
+    made.state = kept
+    assert [made.step(u) for u in COMMAND[200:]] == later
+    for name in ("command", "position", "travel"):
+        assert [each[name] for each in samples + later] == run[name].tolist()
+    for limit in Stops._fields:
+        assert [each[limit] for each in samples + later] == run.active(limit).tolist()
+    with pytest.raises(InputError, match="The command is nan, but must be a finite number"):
+        made.step(np.nan)
+
+
+def test_a_number_stands_for_a_constant_input() -> None:
+    both = Model("both", Valve, Rod, pushed)
+    levels = {"command": COMMAND, "push": np.full(COMMAND.size, 0.2)}
+    expected = simulate(both, P, levels, RATE)["position"]
+    assert (simulate(both, P, {**levels, "push": 0.2}, RATE)["position"] == expected).all()
+    with pytest.raises(InputError, match="same number of samples: none is a record"):
+        simulate(both, P, {"command": 1.0, "push": 0.2}, RATE)
+
+
+@equation
+def pushed(state: Rod, command: float, push: float, p: Valve, h: float) -> Rod:
+    return Rod(command, state.position + h * p.gain * (state.opening + push))
 
 
 @pytest.mark.parametrize("name", Valve._fields)

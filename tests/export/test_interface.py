@@ -14,7 +14,7 @@ import pytest
 from swashplate import Drive, InputError
 from swashplate.equations.c_source import feedthrough
 from swashplate.export import content_of, drive_sources, libraries, values_of
-from swashplate.simulation.stepper import Sample
+from swashplate.simulation.run import Sample
 
 OK, BAD_VALUE, UNSTABLE, BAD_DELAY, DOMAIN = range(5)
 H = 1.0 / 512.0

@@ -17,7 +17,7 @@ from tests.export.webassembly import Page
 from swashplate import Drive
 from swashplate.export import content_of, drive_sources, values_of, wasm
 from swashplate.models.displacement_control import PumpOptions
-from swashplate.simulation.stepper import Sample
+from swashplate.simulation.run import Sample
 
 H = 1.0 / 512.0
 NAMES = (*Sample._fields[1:], "motor_torque", "motor_pressure_drop")
@@ -144,7 +144,7 @@ def compared(
         assert (wanted == values).all(), (name, np.abs(wanted - values).max())
     for bit, name in enumerate(LIMITS):
         acts = ((flags >> bit) & 1).astype(bool)
-        wanted = run.rate_limited() if name == "current_rate" else run.active(name)
+        wanted = run.active(name, fine=name == "current_rate")
         assert (wanted == acts).all(), name
 
 

@@ -89,7 +89,7 @@ def test_every_axis_at_both_stops(name: str, frequency: float) -> None:
     assert run.swash_angle.min() >= -n["swash_stop_minus"]
     # each stop is taken hold of and let go once a turn
     assert np.count_nonzero(np.diff(run.plate_hold)) <= 4 * np.ceil(7.0 * frequency)
-    assert np.isfinite(run.marched).all()
+    assert all(np.isfinite(run[name]).all() for name in run.names)
 
 
 def test_oil_and_energy_are_kept(hoist: FullOrderDrive) -> None:

@@ -9,7 +9,7 @@ import pytest
 
 from swashplate import FileError
 from swashplate.logs import apart, open_log
-from swashplate.logs.binary import OPENERS
+from swashplate.logs.binary import look
 
 
 def test_what_is_no_file(tmp_path):
@@ -47,7 +47,7 @@ def test_an_extra_that_is_not_installed(tmp_path, monkeypatch, content, library,
     for name in ("nptdms", "asammdf"):
         monkeypatch.setitem(sys.modules, name, None)
     with pytest.raises(FileError, match=rf"needs the library {library}.*'swashplate\[{extra}\]'"):
-        OPENERS[extra.upper()](path)
+        look(extra.upper(), path)
 
 
 @pytest.fixture

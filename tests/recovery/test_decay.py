@@ -9,9 +9,8 @@ from scipy.optimize import least_squares
 from swashplate import Drive
 from swashplate.equations.marching.observation import Observation, ObservedRecord
 from swashplate.equations.marching.record import record_of
-from swashplate.equations.marching.triangle import combine
 from swashplate.maneuvers import source_tests
-from swashplate.simulation.residuals import ALL_COLUMNS, PUMP_COLUMNS, triangle
+from swashplate.simulation.residuals import ALL_COLUMNS, PUMP_COLUMNS, made_ready
 
 CARD = tuple(name for name in ALL_COLUMNS if name not in PUMP_COLUMNS and not name.startswith("C_"))
 
@@ -29,7 +28,7 @@ def test_all_of_the_card_is_found_if_its_decay_may_begin_within_a_step(seed: int
 
     def rows(multiples: np.ndarray) -> np.ndarray:
         at = truth.replace(dict(zip(CARD, (multiples * size).tolist(), strict=True)))
-        return combine(triangle(at, each, CARD).factor for each in tests)
+        return np.vstack([made_ready(at, each, CARD).triangle(each).factor for each in tests])
 
     # I_t2 has a mirror image about lim2/a, 14 % away: the start must not lie beyond
     rng = np.random.default_rng(seed)

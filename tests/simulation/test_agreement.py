@@ -8,11 +8,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from tests.simulation.experiments import jacobian, residuals
 
 from swashplate import Drive, Simulation, maneuvers
 from swashplate.equations.marching.observation import Observation, ObservedRecord
 from swashplate.equations.marching.record import record_of
-from swashplate.simulation.residuals import jacobian, residuals
 
 SIGNALS = (
     "current_positive",
@@ -63,6 +63,8 @@ CASES = {
     "no line, physical root": ({**RIPPLE, **LOAD, "swash_damping": 0.02}, "physical root"),
 }
 """Every option of card, pump and refinements, alone or together, and without the line."""
+RICHEST = ("all terms, other forms", "everything", "no line, physical root")
+"""Those that have all options between them; plain drives' residuals are in test_residuals."""
 
 
 @pytest.fixture(params=CASES.values(), ids=CASES.keys())
@@ -105,6 +107,7 @@ def test_side_by_side_gives_the_same_bits(drive: Drive) -> None:
         assert np.array_equal(batch.output[i], one.simulate(voltage).shaft_position)
 
 
+@pytest.mark.parametrize("drive", [CASES[name] for name in RICHEST], ids=RICHEST, indirect=True)
 def test_residuals_carry_the_same_bits(drive: Drive) -> None:
     voltage, seen = command()[:900], ("shaft_speed", "shaft_position", "current")
     time, run = np.arange(900) / 512.0, drive.simulate(voltage)
@@ -124,6 +127,24 @@ def test_a_batch_by_current_gives_the_same_bits(hoist: Drive) -> None:
     pumps = hoist.simulate_many({"Z16_plus": [1.44e-4, 1e-4]}, current=current).output
     alone = hoist.replace(Z16_plus=1.44e-4).simulate_current(current)
     assert np.array_equal(pumps[0], alone.shaft_speed)
+
+
+def test_stamps_and_a_measured_load_count_everywhere(hoist: Drive) -> None:
+    """In a batch and in derivatives as in a simulation, at the command's stamps."""
+    drive = hoist.replace(**LOAD)
+    given = {"time": np.cumsum(0.003 + 0.001 * np.sin(np.arange(500)))}
+    given |= {"interpolation": "linear", "load_torque": 3e4 * np.sin(np.arange(500) / 60.0)}
+    voltage = 6.0 * np.sin(np.arange(500) / 80.0)
+    ends = [1.02 * drive["Z8"].value, 0.98 * drive["Z8"].value]
+    runs = [drive.replace(Z8=each).simulate(voltage, 256.0, **given) for each in ends]
+    batch = drive.simulate_many({"Z8": ends}, voltage=voltage, rate=256.0, **given)
+    for row, run in zip(batch.output, runs, strict=True):
+        assert np.array_equal(row, run.shaft_speed)
+    still = drive.simulate(voltage, 256.0, **{**given, "load_torque": 0.0})
+    assert np.abs(still.shaft_speed - runs[0].shaft_speed).max() > 0.01
+    by = drive.sensitivities(voltage, 256.0, parameters=["Z8"], **given)["swash_angle"][:, 0]
+    slope = (runs[0].swash_angle - runs[1].swash_angle) / (ends[0] - ends[1])
+    assert np.abs(by - slope).max() < 0.01 * np.abs(by).max()
 
 
 @pytest.mark.parametrize("interpolation", ["linear", "previous"])

@@ -15,11 +15,13 @@ pytestmark = pytest.mark.slow
 SCRIPT = """
 import numpy as np
 from swashplate import Drive
+from swashplate.equations.marching.march import output_of
 from swashplate.equations.marching.run import march_of
 from swashplate.simulation.result import KEPT
 run = Drive.preset("hoist").simulate_current(np.full(60, 0.5))
 print(run.shaft_speed[-1])
-march = march_of(run.instance.model, (run.driven_by,), run.instance.options, KEPT)()
+kept = tuple(output_of(run.instance.model, name)[0] for name in KEPT)
+march = march_of(run.instance.model, (run.driven_by,), run.instance.options, kept)()
 print(march.cache_hits)
 """
 

@@ -111,11 +111,9 @@ def test_an_unstable_filter_is_refused_with_the_least_substeps_that_do(zeta: flo
             drive.simulate(voltage, substeps=least - 1)
 
 
-@pytest.mark.parametrize(
-    ("zeta", "words"), [(1e300, "much damping .* lower"), (1e-5, "little damping .* raise")]
-)
-def test_a_filter_that_no_step_would_do_for_is_refused(zeta: float, words: str) -> None:
-    with pytest.raises(InputError, match=words):
+@pytest.mark.parametrize("zeta", [1e300, 1e-5])
+def test_a_filter_that_no_step_would_do_for_is_refused(zeta: float) -> None:
+    with pytest.raises(InputError, match="simulate with a zeta nearer to 1"):
         recursive(zeta).simulate(np.ones(10))
 
 
@@ -127,7 +125,7 @@ def test_the_differential_equation_bears_half_a_swing_in_a_step() -> None:
     slower = drive.replace(omega=2e3)
     for settled in (drive.simulate(voltage, substeps=2), slower.simulate(voltage)):
         assert settled.current[-1] == pytest.approx(0.015 * 5.0, rel=1e-9)
-    with pytest.raises(InputError, match="swings so fast .* lower omega"):
+    with pytest.raises(InputError, match="swings too fast .* lower omega"):
         drive.replace(omega=1e9).simulate(voltage)
     batch = drive.simulate_many({"omega": [2e3, 2012.0]}, voltage=voltage)
     assert list(batch.failures) == [1]

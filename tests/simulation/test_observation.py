@@ -2,12 +2,11 @@
 
 import numpy as np
 import pytest
+from tests.simulation.experiments import residuals
 
 from swashplate import Drive, InputError, maneuvers
 from swashplate.equations.marching.observation import Observation, ObservedRecord, Own
 from swashplate.equations.marching.record import Record, record_of
-from swashplate.simulation.residuals import Own as DriveOwn
-from swashplate.simulation.residuals import residuals
 
 pytestmark = pytest.mark.traced
 
@@ -31,11 +30,6 @@ def speed(**changes) -> Observation:
         ({"values": [1.0, np.nan, 2.0]}, "not finite, or the weight negative, at sample 1"),
         ({"weight": [1.0, 1.0, -1.0]}, "the weight negative, at sample 2"),
         ({"weight": [1.0, 2.0]}, "one number or 3 of them, not of shape"),
-        ({"poles": (62.8, 0.0)}, "poles are in rad/s, above 0 and finite"),
-        ({"poles": (np.inf,)}, "poles are in rad/s, above 0 and finite"),
-        ({"delay": np.nan}, "the delay must be a finite time"),
-        ({"unknown": ("gain",)}, "can be 'offset', 'clock_offset' or both, not"),
-        ({"unknown": ("offset", "offset")}, "can be 'offset', 'clock_offset' or both, not"),
     ],
 )
 def test_refusals(changes: dict, sentence: str) -> None:
@@ -48,7 +42,7 @@ def test_samples_without_weight_may_be_anything() -> None:
         record_of(np.zeros(2000), 512.0, what="voltage"),
         [speed(values=[1.0, np.nan, np.inf], weight=[2.0, 0.0, 0.0])],
     )
-    assert observed.plan(Own(), 0).measured.tolist() == [1.0, 0.0, 0.0]
+    assert observed.plan((), 0).measured.tolist() == [1.0, 0.0, 0.0]
 
 
 def record(samples: int = 11, rate: float = 100.0, substeps: int = 6) -> Record:
@@ -61,37 +55,26 @@ def test_residuals_at_any_stamps(hoist: Drive) -> None:
     run = hoist.simulate(command, 100.0)
     fine = hoist.simulate_current(run.fine("current"), 600.0)
     time = np.array([-1.0, 0.0, 0.07, 0.07 + 0.25 / 600.0, 0.5, 0.5, 5.0])
-    both = ("clock_offset", "offset")
     observed = ObservedRecord(
         record_of(command, 100.0, what="voltage"),
         [
-            speed(time=time, values=np.arange(7.0), weight=2.0, delay=0.003, unknown=both),
-            speed(time=time, values=np.zeros(7), unknown=("offset",)),
+            speed(time=time, values=np.arange(7.0), weight=2.0, free_offset=True),
+            speed(time=time, values=np.zeros(7), free_offset=True),
         ],
     )
-    assert observed.own_columns == (
-        "offset of shaft_speed [0]",
-        "clock_offset of shaft_speed [0]",
-        "offset of shaft_speed [1]",
-    )
+    assert observed.own_columns == ("offset of shaft_speed [0]", "offset of shaft_speed [1]")
     assert observed.rows_of(1) == slice(7, 14)
-    found = residuals(hoist.parameters, observed, DriveOwn(None, (0.5, 0.0), (0.0, 0.25)))
-    late = np.interp(time - 0.003, fine.time, fine.shaft_speed) + 0.5 - np.arange(7.0)
-    ahead = np.interp(time + 0.25, fine.time, fine.shaft_speed)
-    np.testing.assert_allclose(found[:7], 2.0 * late, rtol=0.0, atol=1e-12)
-    np.testing.assert_allclose(found[7:], ahead, rtol=0.0, atol=1e-12)
+    found = residuals(hoist.parameters, observed, Own({}, (0.5, 0.0)))
+    seen = np.interp(time, fine.time, fine.shaft_speed)
+    expected = 2.0 * (seen + 0.5 - np.arange(7.0))
+    np.testing.assert_allclose(found[:7], expected, rtol=0.0, atol=1e-12)
+    np.testing.assert_allclose(found[7:], seen, rtol=0.0, atol=1e-12)
 
 
-@pytest.mark.parametrize(
-    ("own", "sentence"),
-    [
-        (Own(offsets=(1.0, 2.0)), "There are 1 observations, which need as many finite offsets"),
-        (Own(clock_offsets=(np.nan,)), "need as many finite clock offsets"),
-    ],
-)
-def test_own_unknowns_must_fit(own: Own, sentence: str) -> None:
-    with pytest.raises(InputError, match=sentence):
-        ObservedRecord(record(), [speed()]).plan(own, 0)
+def test_offsets_must_fit() -> None:
+    for offsets in ((1.0, 2.0), (np.nan,)):
+        with pytest.raises(InputError, match="1 observations, which need as many finite offsets"):
+            ObservedRecord(record(), [speed()]).plan(offsets, 0)
 
 
 def test_refused_records() -> None:

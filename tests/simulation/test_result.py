@@ -80,10 +80,3 @@ def test_a_failing_writer_leaves_the_old_file(tmp_path) -> None:
         write_whole(path, write)
     assert path.read_text() == "old"
     assert [p.name for p in tmp_path.iterdir()] == ["run.csv"]
-
-
-def test_signals_at_other_stamps(hoist: Drive) -> None:
-    run = hoist.simulate(maneuvers.step(4.0).sample(512.0))
-    there = run.at([2.0, 2.0 + 0.5 / 512.0], "shaft_speed")
-    assert there[0] == run.shaft_speed[1024]
-    assert there[1] == pytest.approx(run.shaft_speed[1024:1026].mean(), rel=1e-12)

@@ -1,15 +1,59 @@
 """The triangular factor against NumPy's, also where columns are missing, equal or empty."""
 
+from typing import NamedTuple
+
 import numpy as np
 import pytest
+from tests.simulation.experiments import triangle
 
-from swashplate import DomainError, Drive, InputError
+from swashplate import DomainError, Drive
+from swashplate.equations import Model, equation, instance_of
+from swashplate.equations.marching import jacobian as engine
 from swashplate.equations.marching.observation import Observation, ObservedRecord
-from swashplate.equations.marching.record import record_of
-from swashplate.equations.marching.triangle import ROWS, combine
-from swashplate.simulation.residuals import triangle
+from swashplate.equations.marching.record import Record, record_of
 
 pytestmark = pytest.mark.traced
+
+
+class Gains(NamedTuple):
+    a: float = 0.0
+    b: float = 0.0
+    c: float = 0.0
+    d: float = 0.0
+    e: float = 0.0
+    f: float = 0.0
+
+
+class Still(NamedTuple):
+    nothing: float
+
+
+class Seen(NamedTuple):
+    total: float
+
+
+@equation
+def sample(u: float, v: float, w: float, x: float, y: float, z: float, p: Gains) -> Seen:
+    return Seen(p.a * u + p.b * v + p.c * w + p.d * x + p.e * y + p.f * z)
+
+
+@equation
+def step(state: Still) -> Still:
+    return state
+
+
+weighted = Model("weighted", parameters=Gains, state=Still, step=step, sample=sample)
+
+
+def factor_of(matrix: np.ndarray) -> np.ndarray:
+    """Triangle of rows whose first columns are the model's inputs, and whose last one is left."""
+    inputs = {name: np.zeros(len(matrix)) for name in "uvwxyz"}
+    inputs |= dict(zip("uvwxyz", matrix.T[:-1].copy(), strict=False))
+    record = Record(inputs.pop("u"), 0.0, 1.0, 1)
+    seen = Observation("total", record.time, -matrix[:, -1])
+    observed = ObservedRecord(record, [seen], driven_by="u", others=inputs)
+    columns = "abcdef"[: matrix.shape[1] - 1]
+    return engine.triangle(instance_of(weighted, Gains()), observed, columns).factor
 
 
 def numbers(rows: int, columns: int, seed: int = 0) -> np.ndarray:
@@ -22,11 +66,11 @@ def upright(factor: np.ndarray) -> np.ndarray:
     return np.where(np.diag(factor) < 0.0, -1.0, 1.0)[:, None] * factor
 
 
-@pytest.mark.parametrize("rows", [7, ROWS, ROWS + 1, 5 * ROWS + 3])
+@pytest.mark.parametrize("rows", [7, 512, 513, 2563])
 def test_factor_is_numpys(rows: int) -> None:
     matrix = numbers(rows, 7)
     scale = np.linalg.norm(matrix, axis=0)
-    found, expected = combine([matrix]), upright(np.linalg.qr(matrix, mode="r"))
+    found, expected = factor_of(matrix), upright(np.linalg.qr(matrix, mode="r"))
     assert np.array_equal(found, np.triu(found))
     np.testing.assert_allclose(found / scale, expected / scale, rtol=0.0, atol=1e-13)
 
@@ -36,7 +80,7 @@ def test_empty_and_equal_columns_keep_the_singular_values() -> None:
     matrix[:, 0] = 0.0
     matrix[:, 3] = 0.0
     matrix[:, 4] = 2.0 * matrix[:, 1]
-    factor = combine([matrix])
+    factor = factor_of(matrix)
     found = np.linalg.svd(factor, compute_uv=False)
     expected = np.linalg.svd(matrix, compute_uv=False)
     np.testing.assert_allclose(found, expected, rtol=0.0, atol=1e-13 * expected[0])
@@ -48,17 +92,10 @@ def test_a_nearly_singular_problem_is_solved_as_well_as_by_numpy() -> None:
     matrix = rng.normal(size=(2000, 4))
     matrix[:, 3] = matrix[:, 0] + 1e-9 * matrix[:, 3]  # squared, its condition would be lost
     solution = np.array([1.0, -2.0, 3.0, 0.5])
-    factor = combine([np.column_stack([matrix, matrix @ solution])])
+    factor = factor_of(np.column_stack([matrix, matrix @ solution]))
     found = np.linalg.solve(factor[:4, :4], factor[:4, 4])
     np.testing.assert_allclose(found, solution, atol=1e-5)
     assert abs(factor[4, 4]) < 1e-12 * np.linalg.norm(matrix @ solution)
-
-
-def test_nothing_to_combine() -> None:
-    with pytest.raises(InputError, match="but there are none"):
-        combine([])
-    with pytest.raises(InputError, match="but they have 2 and 3"):
-        combine([np.eye(2), np.eye(3)])
 
 
 @pytest.mark.parametrize("size", [1e-150, 1e-158, 1e-162, 1e-200, 1e150])
@@ -66,7 +103,7 @@ def test_columns_of_any_size_leave_numbers(size: float) -> None:
     """A column that is next to nothing leaves the others' products as they are."""
     matrix = np.random.default_rng(3).normal(size=(900, 4))
     matrix[:, 1] *= size
-    factor = combine([matrix])
+    factor = factor_of(matrix)
     assert np.isfinite(factor).all()
     others = [0, 2, 3]
     products = (factor.T @ factor)[np.ix_(others, others)]

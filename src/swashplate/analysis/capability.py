@@ -17,7 +17,7 @@ from swashplate.models.pump import PumpState
 from swashplate.parameters.rules import FULL_VOLTAGE
 from swashplate.results import Result, Tabular, short
 from swashplate.simulation.instance import instance_of
-from swashplate.simulation.run import pressure_limits, pump_arguments, settled_state
+from swashplate.simulation.run import pump_arguments
 from swashplate.tables import UNIT, Cell, Column, Table
 
 if TYPE_CHECKING:
@@ -116,14 +116,15 @@ def acceleration_curve(drive: Drive, voltage: float, points: int = 201) -> Accel
         The ends lie a hair's breadth inside, where the plate still moves.
     """
     instance, ends = instance_of(drive.parameters, False), (-FULL_VOLTAGE, FULL_VOLTAGE)
-    low, high = (settled_state(instance, drive.steady_current(each)).pressure for each in ends)
+    at = ({"current": drive.steady_current(each)} for each in ends)
+    low, high = (instance.start(each, 1.0, "steady").states[1].pressure for each in at)
     inside = INSIDE * (high - low)
     return _curve(drive, voltage, np.linspace(low + inside, high - inside, points))
 
 
 def speed_limits(drive: Drive) -> tuple[float, float]:
     """Lowest and highest speed that the swash plate's stops, or Z15, allow at all. [rad/s]"""
-    k = pressure_limits(instance_of(drive.parameters, False))
+    k = pump_arguments(instance_of(drive.parameters, False), 0.0)["k"]
     low, high = _curve(drive, 0.0, np.array([k.lower, k.upper])).speed
     return float(low), float(high)
 

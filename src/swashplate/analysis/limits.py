@@ -254,7 +254,7 @@ def limit_shares(
         if isinstance(other, str):
             return None, other
         try:
-            again = simulate_drive(other.parameters, run.record, start)
+            again = simulate_drive(other.parameters, run.records, start)
         except SwashplateError as refusal:
             return None, str(refusal)
         return rms_difference(again.shaft_speed, asked), ""
@@ -292,7 +292,7 @@ def _changed(drive: Drive, changes: Mapping[str, Change]) -> Drive | str:
 
 def _free_speed(unlimited: Drive, run: Simulation, start: Start) -> Array:
     try:
-        return simulate_drive(unlimited.parameters, run.record, start).shaft_speed
+        return simulate_drive(unlimited.parameters, run.records, start).shaft_speed
     except SwashplateError as refusal:
         raise DomainError(
             f"Without its limits the drive cannot be simulated, so that there is no speed to "

@@ -19,10 +19,10 @@ from .quality import examine as examine
 from .quality import quality_table as quality_table
 from .quality import spiked as spiked
 from .quality import spikes as spikes
+from .quality import turned as turned
 from .quality import unsigned_currents as unsigned_currents
 from .recognition import Recognised as Recognised
 from .recognition import recognise as recognise
-from .recognition import roundest as roundest
 from .samples import ambiguous_gaps as ambiguous_gaps
 from .samples import find_lost_counts as find_lost_counts
 from .samples import increasing as increasing

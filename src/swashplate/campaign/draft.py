@@ -7,23 +7,20 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
-from itertools import chain
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import NamedTuple, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
-from swashplate.campaign.campaign import read_run
 from swashplate.campaign.quality import has_sign
+from swashplate.campaign.reading import read_run
 from swashplate.campaign.recognition import recognise
 from swashplate.campaign.samples import rolls_over_at
 from swashplate.campaign.schema import (
+    CHANNEL_KINDS,
     KINDS,
     CampaignFile,
-    ChannelKind,
-    InputKind,
     axis_lines,
     conversion,
     run_lines,
@@ -34,6 +31,7 @@ from swashplate.logs import Column, Log, open_log
 from swashplate.units import speed_unit, to_si
 
 Array = NDArray[np.float64]
+Values = Mapping[str, Array]
 
 HEADER = """\
 # A draft, made from the headers of the logs: check each line that says "guessed", and fill in each
@@ -47,42 +45,41 @@ FIXME = "FIXME"
 """What the lines hold that say what the draft leaves out or open."""
 
 TIME = r"time|zeit|uhrzeit|stamp|timestamp|time stamp|datetime|date time|clock|t|seconds?|exp time"
-VOLTAGE = r"volts?|voltage|joystick voltage|u|spannung"
 COMMAND = r"cmd|command|duty|setpoint|valve|stick|joystick|stellgröße|stellgroesse|sollwert"
+VOLTAGE = r"volts?|voltage|joystick voltage|u|spannung"
 ROD = r"ms|displacement|stroke|cylinder|rod|extension|hub|weg"
-CHANNELS: tuple[tuple[ChannelKind, str], ...] = (
-    ("encoder_counts", r"counts?|encoder|enc|ticks|pulses"),
-    ("current_plus", r"current (?:plus|positive|a|up)|(?:i|strom) (?:plus|a)"),
-    ("current_minus", r"current (?:minus|negative|b|down)|(?:i|strom) (?:minus|b)"),
-    ("rectified_current", r"currents?|amps?|ammeter|strom|i"),
-    ("stroker_pressure", r"stroker pressure|delta p|dp|servo pressure"),
-    ("swash_angle", r"swash angle|swash|alpha"),
-    ("spool_position", r"spool position|spool"),
-    ("shaft_speed", r"speed|rpm|omega|velocity|drehzahl|n|n \w+"),
-    ("position", r"position|pos|angle|pos fb"),
-    ("position", ROD),
-)
-UNITS: Mapping[str, ChannelKind] = {
+WORDS = {
+    "encoder_counts": r"counts?|encoder|enc|ticks|pulses",
+    "current_plus": r"current (?:plus|positive|a|up)|(?:i|strom) (?:plus|a)",
+    "current_minus": r"current (?:minus|negative|b|down)|(?:i|strom) (?:minus|b)",
+    "rectified_current": r"currents?|amps?|ammeter|strom|i",
+    "stroker_pressure": r"stroker pressure|delta p|dp|servo pressure",
+    "swash_angle": r"swash angle|swash|alpha",
+    "spool_position": r"spool position|spool",
+    "shaft_speed": r"speed|rpm|omega|velocity|drehzahl|n|n \w+",
+    "position": rf"position|pos|angle|pos fb|{ROD}",
+}
+"""Last words of the names of columns by kinds of channel, the first that fits; and their units."""
+UNITS = {
     **dict.fromkeys(("A", "mA"), "rectified_current"),
     **dict.fromkeys(("counts", "count"), "encoder_counts"),
     **dict.fromkeys(("rad/s", "deg/s", "rpm", "m/s", "mm/s"), "shaft_speed"),
 }
-GIVEN = ("time", "voltage", "current")
-"""What one column alone can be said to be."""
 MANY = 4
 """Runs from which on one is held back for validation."""
 
 
-class ColumnGuess(NamedTuple):
+@dataclass(frozen=True)
+class ColumnGuess:
     """What a column may be."""
 
     column: Column
-    role: str
+    role: str = "unknown"
     """``"time"``, ``"input"``, ``"channel"`` or ``"unknown"``."""
-    kind: InputKind | ChannelKind | None = None
+    kind: str | None = None
     axis: str = ""
     """What stands before the word in its name, such as the "boom" of "Boom Cmd", or empty."""
-    linear: bool = False
+    rod: bool = False
     """Whether its name is that of a rod's displacement and not of a shaft's angle."""
     unit: str | None = None
     """From the header, or from the end of its name as in ``time_ms``."""
@@ -97,22 +94,22 @@ def guess(column: Column) -> ColumnGuess:
     name = re.sub(r"[\[(].*[\])]", "", column.name).strip()
     stem, _, ending = name.rpartition("_")
     if column.unit is None and stem:
-        found = _by_name(column, stem)._replace(unit=ending)
+        found = _by_name(column, stem)
         try:
             if found.role == "time":
                 to_si(1.0, ending, "s", "")
-                return found
-            if found.kind is not None:
+            elif found.kind is not None:
                 conversion(found.kind, ending, "")
-                return found
+            if found.role != "unknown":
+                return replace(found, unit=ending)
         except InputError:
             pass
-    found = _by_name(column, name)._replace(unit=column.unit)
+    found = replace(_by_name(column, name), unit=column.unit)
     unit = found.unit or ("rpm" if re.search(r"rpm|drehzahl", name.lower()) else None)
     if found.kind == "shaft_speed":
-        return found._replace(unit=unit)
+        return replace(found, unit=unit)
     if found.role == "unknown" and unit is not None and speed_unit(unit) in UNITS:
-        return found._replace(role="channel", kind=UNITS[speed_unit(unit)])
+        return replace(found, role="channel", kind=UNITS[speed_unit(unit)])
     return found
 
 
@@ -127,23 +124,12 @@ def _by_name(column: Column, name: str) -> ColumnGuess:
         return ColumnGuess(column, "time")
     if column.unit in ("V", "mV") or before(VOLTAGE) is not None:
         return ColumnGuess(column, "input", "voltage", before(f"{VOLTAGE}|{COMMAND}") or "")
-    axis = before(COMMAND)
-    if axis is not None:
+    if (axis := before(COMMAND)) is not None:
         return ColumnGuess(column, "input", "other", axis)
-    for kind, words in CHANNELS:
-        axis = before(words)
-        if axis is not None:
-            return ColumnGuess(column, "channel", kind, axis, words == ROD)
-    return ColumnGuess(column, "unknown")
-
-
-class _Look(NamedTuple):
-    """What a log shows at first sight."""
-
-    log: Log
-    guesses: list[ColumnGuess]
-    values: dict[str, Array]
-    time: ColumnGuess | None
+    for kind, words in WORDS.items():
+        if (axis := before(words)) is not None:
+            return ColumnGuess(column, "channel", kind, axis, before(ROD) is not None)
+    return ColumnGuess(column)
 
 
 def draft_campaign(
@@ -188,55 +174,42 @@ def draft_campaign(
     InputError
         If there is no log, or none has a column that is named.
     """
-    if not logs:
-        raise InputError("A draft needs at least one log.")
-    given = dict(columns or {})
+    given, units = dict(columns or {}), dict(units or {})
+    opened = [open_log(path) for path in logs]
+    met = {column.name: column for log in reversed(opened) for column in reversed(log.columns)}
+    unmet = sorted({*given, *units} - {*met})
+    why = "" if logs else "A draft needs at least one log"
     for name, what in given.items():
         if what != "time" and what not in KINDS:
-            raise InputError(f"'{name}' cannot be a '{what}': it is time, {', '.join(KINDS)}.")
-    looks = [_look(open_log(path), given, dict(units or {})) for path in logs]
-    met = {column.name for look in looks for column in look.log.columns}
-    unmet = sorted({*given, *(units or {})} - met)
-    if unmet:
-        raise InputError(f"No log has a column '{unmet[0]}'; there are {', '.join(sorted(met))}.")
-    axes = _by_axis(_refined(looks, counts_per_turn, given))
-    plain = Path(drive).stem if drive is not None else "drive"
-    named = {prefix or plain: guesses for prefix, guesses in axes.items()}
+            why = why or f"'{name}' cannot be a '{what}': it is time, {', '.join(KINDS)}"
+    if unmet and not why:
+        why = f"No log has a column '{unmet[0]}'; there are {', '.join(sorted(met))}"
+    if why:
+        raise InputError(f"{why}.")
+    values = [_numbers(log, [column.name for column in log.columns]) for log in opened]
+    ordered = {name: met[name] for log in opened for name in (each.name for each in log.columns)}
+    guesses = _refined(ordered, values, counts_per_turn, given, units)
+    axes = _by_axis(guesses.values(), Path(drive).stem if drive is not None else "drive")
     lines = [HEADER, f"title = {toml_string(Path(folder).resolve().name)}", ""]
-    for name, guesses in named.items():
-        lines += _axis(name, guesses, looks[0], drive, counts_per_turn)
-    used = [each for guesses in named.values() for each in guesses]
-    taken = {each.column.name for each in used}
-    others = [each for each in looks[0].guesses if each.role != "time"]
-    left = ", ".join(each.column.name for each in others if each.column.name not in taken)
+    for name, ours in axes.items():
+        lines += _axis(name, ours, guesses, opened[0], values[0], drive, counts_per_turn)
+    used = [each for ours in axes.values() for each in ours]
+    others = (guesses[each.name] for each in opened[0].columns)
+    left = ", ".join(e.column.name for e in others if e.role != "time" and e not in used)
     if left:
         lines += [f"{UNUSED}: {left}", ""]
     if counts_per_turn is not None and all(each.kind != "encoder_counts" for each in used):
         among = f" among {left}" if left else ""
         lines += [f"{NO_ENCODER}{among}; counts_per_turn = {counts_per_turn:.12g} is left out", ""]
-    runs = [_run(look, named, Path(folder)) for look in looks]
-    _mark_unreadable(lines, runs, looks)
+    text = "\n".join(lines)
+    runs = [
+        _run(log, numbers, guesses, axes, Path(folder), text)
+        for log, numbers in zip(opened, values, strict=True)
+    ]
     _hold_back(runs)
     for each in runs:
         lines += run_lines(each.file, each.role, each.more, seen=each.seen, why=each.why)
     return "\n".join(lines).rstrip() + "\n"
-
-
-def _look(log: Log, given: Mapping[str, str], units: Mapping[str, str]) -> _Look:
-    # a column that is said to be time or input takes the place of those that were guessed
-    said = {"time" if what == "time" else "input" for what in given.values() if what in GIVEN}
-    guesses = []
-    for column in log.columns:
-        guessed, what = guess(column), given.get(column.name)
-        if what is not None:
-            role = "time" if what == "time" else "input" if what in (*GIVEN, "other") else "channel"
-            kind = None if what == "time" else cast("InputKind | ChannelKind", what)
-            guessed = guessed._replace(role=role, kind=kind)
-        elif guessed.role in said:
-            guessed = guessed._replace(role="unknown", kind=None)
-        guesses.append(guessed._replace(unit=units.get(column.name, guessed.unit)))
-    time = next((each for each in guesses if each.role == "time"), None)
-    return _Look(log, guesses, _numbers(log, [each.column.name for each in guesses]), time)
 
 
 def _numbers(log: Log, names: list[str]) -> dict[str, Array]:
@@ -251,51 +224,63 @@ def _numbers(log: Log, names: list[str]) -> dict[str, Array]:
 
 
 def _refined(
-    looks: Sequence[_Look], counts_per_turn: float | None, given: Mapping[str, str]
-) -> list[ColumnGuess]:
-    """Guesses of all logs' columns with what their numbers say, each column once.
+    columns: Mapping[str, Column],
+    logs: Sequence[Values],
+    counts_per_turn: float | None,
+    given: Mapping[str, str],
+    units: Mapping[str, str],
+) -> dict[str, ColumnGuess]:
+    """Guesses by names and units, and by what the numbers of all logs say.
 
-    A current has a sign if it goes to minus its peak in any log; two of them are plus and minus;
-    whole numbers that begin anew at their end are an encoder's, whatever their name.
+    A column that is said to be time or input takes the place of those that were guessed. A current
+    has a sign if it goes to minus its peak in any log; two of them are plus and minus; whole
+    numbers that begin anew at their end are an encoder's, whatever their name.
     """
+    roles = {what: "time" if what == "time" else "channel" for what in ("time", *CHANNEL_KINDS)}
+    roles |= dict.fromkeys(("voltage", "current", "other"), "input")
+    taken = {roles[what] for what in given.values() if what != "other"} - {"channel"}
     met: dict[str, ColumnGuess] = {}
-    for each in chain.from_iterable(look.guesses for look in looks):
-        met.setdefault(each.column.name, each)
-    for name, each in met.items():
-        values = [look.values[name] for look in looks if look.values.get(name, np.zeros(0)).size]
+    for name, column in columns.items():
+        each = guess(column)
+        if name in given:
+            kind = None if given[name] == "time" else given[name]
+            each = replace(each, role=roles[given[name]], kind=kind)
+        elif each.role in taken:
+            each = replace(each, role="unknown", kind=None)
+        values = [log[name] for log in logs if log.get(name, np.zeros(0)).size]
         empty = sum(int(np.count_nonzero(~np.isfinite(part))) for part in values)
-        met[name] = each = each._replace(empty=empty)
+        each = replace(each, unit=units.get(name, each.unit), empty=empty)
         if each.kind == "encoder_counts" or (each.role == "unknown" and each.unit is None):
             sizes = [rolls_over_at(part, counts_per_turn) or 0 for part in values]
             if size := max(sizes, default=0):
-                met[name] = each._replace(role="channel", kind="encoder_counts", rolls_over_at=size)
-        if each.kind == "rectified_current" and values and name not in given and has_sign(values):
-            met[name] = each._replace(kind="signed_current")
+                each = replace(each, role="channel", kind="encoder_counts", rolls_over_at=size)
+        if each.kind == "rectified_current" and name not in given and has_sign(values):
+            each = replace(each, kind="signed_current")
+        met[name] = each
     for name, each in met.items():
         twin = met.get(name[:-1] + {"A": "B", "a": "b", "1": "2"}.get(name[-1:], "?"))
         if name[-2:-1] == "_" and twin is not None and "current" in str(each.kind):
-            met[name] = each._replace(kind="current_plus")
-            met[twin.column.name] = twin._replace(
-                role="channel", kind="current_minus", axis=each.axis, unit=each.unit
+            met[name] = replace(each, kind="current_plus")
+            met[twin.column.name] = replace(
+                twin, role="channel", kind="current_minus", axis=each.axis, unit=each.unit
             )
     if not {"current_plus", "current_minus"} <= {each.kind for each in met.values()}:
         for name, each in met.items():
             if each.kind in ("current_plus", "current_minus") and name not in given:
-                met[name] = each._replace(kind="rectified_current", axis="")
-    return list(met.values())
+                met[name] = replace(each, kind="rectified_current", axis="")
+    return met
 
 
-def _by_axis(guesses: Iterable[ColumnGuess]) -> dict[str, list[ColumnGuess]]:
+def _by_axis(guesses: Iterable[ColumnGuess], plain: str) -> dict[str, list[ColumnGuess]]:
     """Inputs and channels under the axis that their names begin with.
 
     An axis needs an input and a channel; columns without a prefix belong to the only axis.
     """
     useful = [each for each in guesses if each.role in ("input", "channel")]
-    prefixes = dict.fromkeys(each.axis for each in useful if each.role == "input")
-    named = [p for p in prefixes if p and any(c.axis == p and c.role == "channel" for c in useful)]
-    if len(named) > 1:
-        return {axis: [each for each in useful if each.axis == axis] for axis in named}
-    return {"": useful}
+    axes = dict.fromkeys(each.axis for each in useful if each.role == "input")
+    named = {axis: [each for each in useful if each.axis == axis] for axis in axes if axis}
+    named = {axis: ours for axis, ours in named.items() if any(e.role == "channel" for e in ours)}
+    return named if len(named) > 1 else {plain: useful}
 
 
 # --- axes -----------------------------------------------------------------------------------------
@@ -303,8 +288,10 @@ def _by_axis(guesses: Iterable[ColumnGuess]) -> dict[str, list[ColumnGuess]]:
 
 def _axis(
     name: str,
-    guesses: list[ColumnGuess],
-    look: _Look,
+    ours: list[ColumnGuess],
+    guesses: Mapping[str, ColumnGuess],
+    log: Log,
+    values: Values,
     drive: str | None,
     counts_per_turn: float | None,
 ) -> list[str]:
@@ -313,73 +300,75 @@ def _axis(
     own = ['# drive = "hoist"    # a packaged drive or a parameter file, to be fitted']
     if drive is not None:
         own = [f"drive = {toml_string(name if name in preset_names() else drive)}"]
-    column = None if look.time is None else look.time.column
+    time = _time(log, guesses)
     clock = f"{{ rate = 512 }}    # {FIXME}: no column of time found; samples a second"
-    if look.time is not None and column is not None:
-        unit = f', unit = "{look.time.unit or "s"}"' if column.unit is None else ""
-        clock = f"{{ column = {toml_string(column.name)}{unit} }}"
+    if time is not None:
+        unit = f', unit = "{time.unit or "s"}"' if time.column.unit is None else ""
+        clock = f"{{ column = {toml_string(time.column.name)}{unit} }}"
     own += [f"time = {clock}", 'start = "rest"    # at the first sample: rest, steady or estimated']
-    names = ", ".join(repr(each.name) for each in look.log.columns)
+    names = ", ".join(repr(each.name) for each in log.columns)
     left_open = f'column = "{FIXME}"    # which of {names}'
-    drives = _inputs(guesses)
+    drives = [each for each in ours if each.role == "input"]
     given = [f'kind = "voltage"    # {FIXME}: or current, or other', f"{left_open} commands?"]
-    given = _signal(drives[0], look, None) if drives else given
+    given = _signal(drives[0], values, None) if drives else given
     given.append('interpolation = "previous"    # guessed: held between samples; or "linear"')
     given += [f"# another input? '{each.column.name}'" for each in drives[1:]]
     kind = f'kind = "shaft_speed"    # {FIXME}: or position, encoder_counts ...'
     channels = {
-        channel: _signal(each, look, counts_per_turn)
-        for channel, each in _channels(guesses).items()
+        channel: _signal(each, values, counts_per_turn) for channel, each in _channels(ours).items()
     } or {"measured": [kind, f"{left_open} was measured?"]}
     return axis_lines(name, own, given, channels)
 
 
-def _channels(guesses: Iterable[ColumnGuess]) -> dict[str, ColumnGuess]:
+def _time(log: Log, guesses: Mapping[str, ColumnGuess]) -> ColumnGuess | None:
+    """The column of a log's time stamps."""
+    found = (guesses[column.name] for column in log.columns)
+    return next((each for each in found if each.role == "time"), None)
+
+
+def _channels(ours: Iterable[ColumnGuess]) -> dict[str, ColumnGuess]:
     """An axis's channels by their names in the file: the kind, and a number from the second on."""
     named: dict[str, ColumnGuess] = {}
-    for each in guesses:
+    for each in ours:
         if each.role == "channel":
             number = 1 + sum(each.kind == other.kind for other in named.values())
             named[str(each.kind) if number == 1 else f"{each.kind}_{number}"] = each
     return named
 
 
-def _signal(guessed: ColumnGuess, look: _Look, counts_per_turn: float | None) -> list[str]:
-    column, kind = guessed.column, str(guessed.kind)
+def _signal(guessed: ColumnGuess, values: Values, counts_per_turn: float | None) -> list[str]:
+    """Entries of an input or a channel."""
+    column, kind, scale = guessed.column, str(guessed.kind), 1.0
     percent = kind == "other" and guessed.unit == "%"
     kind = "voltage" if percent else kind
     lines = [
         f'kind = "{kind}"    # guessed: {KINDS[kind].meaning}',
         f"column = {toml_string(column.name)}",
     ]
-    scale = 1.0
     if percent:
         scale = 0.1
         lines += ['unit = "V"', "scale = 0.1    # guessed: 100 % stand for the 10 V of a card"]
     elif kind == "encoder_counts":
-        given = "" if counts_per_turn is None else f"{counts_per_turn:.12g}"
+        left_open = f"# counts_per_turn = 1000    # {FIXME}: for one turn, quadrature included"
+        known = f"counts_per_turn = {counts_per_turn or 0:.12g}"
         lines += [
-            f"counts_per_turn = {given}"
-            if given
-            else f"# counts_per_turn = 1000    # {FIXME}: for one turn, quadrature included",
+            left_open if counts_per_turn is None else known,
             "gear_ratio = 1.0    # turns of the encoder for one turn of the shaft",
         ]
-        if guessed.rolls_over_at is not None:
-            size = guessed.rolls_over_at
+        if size := guessed.rolls_over_at:
             lines.append(f"rolls_over_at = {size}    # guessed: begins anew after {size} counts")
     elif column.unit is None:
-        unit = "mm" if guessed.linear else next(iter(KINDS[kind].units), "1")
+        unit = "mm" if guessed.rod else next(iter(KINDS[kind].units), "1")
         why = "from its name" if guessed.unit else "guessed: the header gives none"
         lines.append(f"unit = {toml_string(guessed.unit or unit)}    # {why}")
     if guessed.empty:
         lines.append(f'missing = "drop"    # guessed: {guessed.empty} cells are empty')
-    if guessed.role == "input" and str(guessed.kind) == "other":
-        values = look.values.get(column.name, np.zeros(0))
-        neutral = float(values[np.isfinite(values)][0]) if np.isfinite(values).any() else 0.0
+    if guessed.role == "input" and guessed.kind == "other":
+        known_values = values.get(column.name, np.zeros(0))
+        neutral = next(iter(known_values[np.isfinite(known_values)].tolist()), 0.0)
         if neutral:
-            lines.append(
-                f"offset = {-scale * neutral:.9g}    # guessed: the first sample is neutral"
-            )
+            why = "guessed: the first sample is neutral"
+            lines.append(f"offset = {-scale * neutral:.9g}    # {why}")
     return lines
 
 
@@ -391,21 +380,29 @@ class _Draft:
     """A run's entries, and kind and direction, and the size, of its maneuver."""
 
     file: str
-    seen: str
     more: list[str]
+    role: str
+    why: str
+    seen: str
     stratum: str
     peak: float
-    role: str
-    why: str = ""
 
 
-def _run(look: _Look, axes: Mapping[str, list[ColumnGuess]], folder: Path) -> _Draft:
-    path, root = look.log.path.resolve(), folder.resolve()
-    file = path.relative_to(root) if path.is_relative_to(root) else path
-    names = {column.name for column in look.log.columns}
-    tested, without = list[str](), list[str]()
-    for axis, guesses in axes.items():
-        drives, channels = _inputs(guesses)[:1], _channels(guesses)
+def _run(
+    log: Log,
+    values: Values,
+    guesses: Mapping[str, ColumnGuess],
+    axes: Mapping[str, list[ColumnGuess]],
+    folder: Path,
+    text: str,
+) -> _Draft:
+    """A run; ignored if the file, whose other lines are the text, could not be read with it."""
+    path, root = log.path.resolve(), folder.resolve()
+    file = (path.relative_to(root) if path.is_relative_to(root) else path).as_posix()
+    names = {column.name for column in log.columns}
+    tested, more = list[str](), list[str]()
+    for axis, ours in axes.items():
+        drives, channels = [each for each in ours if each.role == "input"][:1], _channels(ours)
         missing = [
             f"axes.{toml_key(axis)}.channels.{key} = false    # no column "
             f"{toml_string(each.column.name)}"
@@ -414,65 +411,52 @@ def _run(look: _Look, axes: Mapping[str, list[ColumnGuess]], folder: Path) -> _D
         ]
         if all(d.column.name in names for d in drives) and len(missing) < max(len(channels), 1):
             tested.append(axis)
-            without += missing
+            more += missing
     if tested and len(tested) < len(axes):
-        without.insert(0, f"only = [{', '.join(toml_string(axis) for axis in tested)}]")
+        more.insert(0, f"only = [{', '.join(toml_string(axis) for axis in tested)}]")
     role, why = ("fit", "") if tested else ("ignore", "it has no input")
-    seen, stratum, peak = _seen(look, axes)
-    return _Draft(file.as_posix(), seen, without, stratum, peak, role, why)
+    if tested and f'column = "{FIXME}"' not in text:
+        one = text.replace("# counts_per_turn = 1000", "counts_per_turn = 1000")
+        one = "\n".join([one, *run_lines(file, role, more)])
+        try:
+            read = validated(parse_toml(one, "the draft"), CampaignFile, "the draft")
+            list(read_run("the draft", "run", read.runs[0], read.axes, log))
+        except (FileError, InputError) as error:
+            role, why = "ignore", f"{FIXME}: {error}"
+    return _Draft(file, more, role, why, *_seen(values, _time(log, guesses), axes))
 
 
-def _inputs(guesses: Iterable[ColumnGuess]) -> list[ColumnGuess]:
-    return [each for each in guesses if each.role == "input"]
-
-
-def _seen(look: _Look, axes: Mapping[str, list[ColumnGuess]]) -> tuple[str, str, float]:
+def _seen(
+    values: Values, clock: ColumnGuess | None, axes: Mapping[str, list[ColumnGuess]]
+) -> tuple[str, str, float]:
     """Length, rate and maneuvers of a run for a comment; their kind, direction and size."""
-    time = None if look.time is None else look.values.get(look.time.column.name)
-    if look.time is None or time is None or time.size < 2:
-        return f"{len(next(iter(look.values.values()), []))} samples", "", 0.0
-    seen = [f"{time.size} samples"]
+    time = values.get(clock.column.name) if clock is not None else None
+    if clock is None or time is None or time.size < 2:
+        return f"{len(next(iter(values.values()), []))} samples", "", 0.0
+    seen, strata, peak = [f"{time.size} samples"], list[str](), 0.0
     try:
-        time = to_si(1.0, look.time.unit or "s", "s", "") * (time - time[0])
+        time = to_si(1.0, clock.unit or "s", "s", "") * (time - time[0])
     except InputError:
         return seen[0], "", 0.0
     if not np.all(np.diff(time) > 0.0):
         return seen[0], "", 0.0
     seen.append(f"{np.ptp(time):.4g} s at {1.0 / np.median(np.diff(time)):.4g} Hz")
-    strata, peak = [], 0.0
-    for guesses in axes.values():
-        for drive in _inputs(guesses)[:1]:
-            values = look.values.get(drive.column.name)
-            if values is None or not np.isfinite(values).all():
-                continue
-            unit, size = drive.unit or "V", 1.0
-            if drive.kind == "voltage":
-                unit, size, _ = conversion("voltage", unit, drive.column.name)
-            found = recognise(time, size * values, unit=unit)
-            if drive.kind == "voltage":
-                seen.append(found.name)
-            away = values - values[0]
-            low, high = -float(away.min()), float(away.max())
-            both = min(low, high) > 0.25 * max(low, high)
-            strata.append(f"{found.kind} {'both' if both else 'up' if high > low else 'down'}")
-            peak = max(peak, low, high)
-    return ", ".join(seen), ", ".join(strata), peak
-
-
-def _mark_unreadable(lines: list[str], runs: list[_Draft], looks: Sequence[_Look]) -> None:
-    """Give the role "ignore" to runs that the file, as it stands, could not be read with."""
-    text = "\n".join(lines).replace("# counts_per_turn = 1000", "counts_per_turn = 1000")
-    if f'column = "{FIXME}"' in text:
-        return
-    for each, look in zip(runs, looks, strict=True):
-        if each.role == "ignore":
+    for ours in axes.values():
+        drive = next((each for each in ours if each.role == "input"), None)
+        command = None if drive is None else values.get(drive.column.name)
+        if drive is None or command is None or not np.isfinite(command).all():
             continue
-        one = "\n".join([text, *run_lines(each.file, each.role, each.more)])
-        try:
-            file = validated(parse_toml(one, "the draft"), CampaignFile, "the draft")
-            list(read_run("the draft", "run", file.runs[0], file.axes, look.log))
-        except (FileError, InputError) as error:
-            each.role, each.why = "ignore", f"{FIXME}: {error}"
+        unit, size = drive.unit or "V", 1.0
+        if drive.kind == "voltage":
+            unit, size, _ = conversion("voltage", unit, drive.column.name)
+        found = recognise(time, size * command, unit=unit)
+        seen += [found.name] * (drive.kind == "voltage")
+        away = command - command[0]
+        low, high = -float(away.min()), float(away.max())
+        both = min(low, high) > 0.25 * max(low, high)
+        strata.append(f"{found.kind} {'both' if both else 'up' if high > low else 'down'}")
+        peak = max(peak, low, high)
+    return ", ".join(seen), ", ".join(strata), peak
 
 
 def _hold_back(runs: list[_Draft]) -> None:

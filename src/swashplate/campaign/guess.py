@@ -8,7 +8,7 @@ about them. Both are where a fit begins, not its result.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from itertools import product
 from math import inf, isfinite, log, sqrt
@@ -118,6 +118,16 @@ class _Run(NamedTuple):
     speeds: Array
     """(m,)"""
 
+    def errors(self, numbers: Array) -> Array:
+        """Simulated less measured mean speeds; numbers (10,) end with lag and delay [s]."""
+        position = np.empty(self.time.size)
+        position[0] = self.start
+        share = float(1.0 - np.exp(-STEP / max(numbers[8], 1e-4)))
+        command = np.interp(self.time - numbers[9], self.time, self.command)
+        march_guess(command, STEP, numbers, share, position)
+        there, back = (np.interp(each, self.time, position) for each in (self.ends, self.begins))
+        return np.asarray((there - back) / (self.ends - self.begins) - self.speeds)
+
 
 def guess_drive(experiments: Sequence[Experiment]) -> Guess:
     """First guess from the runs of one axis, by their commands and their speeds or positions.
@@ -134,9 +144,12 @@ def guess_drive(experiments: Sequence[Experiment]) -> Guess:
         If no run has such a channel, the input is no voltage, the speed goes against the command,
         a channel has gross spikes, or too little moves.
     """
-    runs, unit, spoilt = [], "", spiked(experiments)
+    runs, unit, spoilt = list[_Run](), "", spiked(experiments)
+    kinds: tuple[ChannelKind, ...] = ("shaft_speed", "encoder_counts", "position")
     for each in experiments:
-        channel = _moving(each)
+        # the channel that tells how it moves: a speed before a position
+        channels = (channel for kind in kinds for channel in each.of_kind(kind))
+        channel = next((one for one in channels if np.count_nonzero(one.used) > 8), None)
         if channel is None:
             continue
         if each.input.kind != "voltage":
@@ -150,7 +163,8 @@ def guess_drive(experiments: Sequence[Experiment]) -> Guess:
             raise InputError(f"{sentence}.")
         unit = f"{channel.unit}/s" if channel.is_position else channel.unit
         runs.append(_run(each, channel))
-    if sum(run.speeds.size for run in runs) < FEWEST:
+    speeds = np.concatenate([np.zeros(0), *(run.speeds for run in runs)])
+    if speeds.size < FEWEST:
         raise InputError(
             "No run measures a motion that a guess could be read off: it needs a channel of the "
             "kind shaft_speed, position or encoder_counts that is not ignored."
@@ -158,12 +172,11 @@ def guess_drive(experiments: Sequence[Experiment]) -> Guess:
     commands = np.concatenate([run.command for run in runs])
     size = np.array([max(float(commands.max()), 0.0), max(-float(commands.min()), 0.0)])
     size[size < ONE_WAY * size.max()] = 0.0
-    speeds = np.concatenate([run.speeds for run in runs])
     scale = float(np.quantile(np.abs(speeds), 0.99))
     if not size.max() > 0.0 or scale == 0.0:
         raise InputError("The command or the speed never leaves rest: there is nothing to guess.")
-    found = _searched(runs, size, scale)
-    errors = np.concatenate([_errors(run, found) for run in runs])
+    found = _searched(runs, speeds, size, scale)
+    errors = np.concatenate([run.errors(found) for run in runs])
     # numbers of a way that was not tried are the other's
     pairs = found[:8].reshape(4, 2)
     pairs[:, size == 0.0] = pairs[:, size > 0.0][:, :1]
@@ -178,16 +191,6 @@ def guess_drive(experiments: Sequence[Experiment]) -> Guess:
     )
 
 
-def _moving(experiment: Experiment) -> Channel | None:
-    """The channel that tells how it moves: a speed before a position."""
-    kinds: tuple[ChannelKind, ...] = ("shaft_speed", "encoder_counts", "position")
-    for kind in kinds:
-        for channel in experiment.of_kind(kind):
-            if np.count_nonzero(channel.used) > 8:
-                return channel
-    return None
-
-
 def _run(experiment: Experiment, channel: Channel) -> _Run:
     drive, used = experiment.input, channel.used
     time, values = channel.time[used], channel.values[used]
@@ -197,29 +200,15 @@ def _run(experiment: Experiment, channel: Channel) -> _Run:
         travelled = np.concatenate([[0.0], np.cumsum(steps)])
     interval = float(np.median(np.diff(time)))
     width = max(WINDOW, 2.0 * interval)
-    begin, end = max(time[0], drive.time[0]), min(time[-1], drive.time[-1])
-    edges = np.arange(begin, end, width)
-    at = np.interp(edges, time, travelled)
+    edges = np.arange(max(time[0], drive.time[0]), min(time[-1], drive.time[-1]), width)
     # a window across ignored samples or a gap tells of no speed
-    gaps = np.flatnonzero(np.diff(time) > 3.0 * interval)
-    broken = np.zeros(max(edges.size - 1, 0), dtype=np.bool_)
-    for gap in gaps:
-        broken |= (edges[:-1] < time[gap + 1]) & (edges[1:] > time[gap])
-    speeds = np.diff(at)[~broken] / width
+    whole = np.ones(max(edges.size - 1, 0), dtype=np.bool_)
+    for gap in np.flatnonzero(np.diff(time) > 3.0 * interval):
+        whole &= (edges[:-1] >= time[gap + 1]) | (edges[1:] <= time[gap])
+    speeds = np.diff(np.interp(edges, time, travelled))[whole] / width
     grid = np.arange(drive.time[0], drive.time[-1] + STEP, STEP)
     start = 0.0 if experiment.start == "rest" or not speeds.size else float(speeds[0])
-    return _Run(grid, drive.at(grid), start, edges[:-1][~broken], edges[1:][~broken], speeds)
-
-
-def _errors(run: _Run, numbers: Array) -> Array:
-    """Simulated less measured mean speeds of a run; numbers (10,) end with lag and delay [s]."""
-    position = np.empty(run.time.size)
-    position[0] = run.start
-    share = float(1.0 - np.exp(-STEP / max(numbers[8], 1e-4)))
-    command = np.interp(run.time - numbers[9], run.time, run.command)
-    march_guess(command, STEP, numbers, share, position)
-    there, back = (np.interp(each, run.time, position) for each in (run.ends, run.begins))
-    return np.asarray((there - back) / (run.ends - run.begins) - run.speeds)
+    return _Run(grid, drive.at(grid), start, edges[:-1][whole], edges[1:][whole], speeds)
 
 
 LOWEST = np.array([0.0, 0.0, -5.0, -5.0, log(0.002), 0.0, -1.5, -1.5, -2.0, -2.0])
@@ -229,15 +218,14 @@ TYPICAL = np.array([0.05, 0.05, 0.2, 0.2, 0.3, 0.02, 0.1, 0.1, 0.5, 0.5])
 the delay [s], and logarithms of top speeds and accelerations over the greatest speed."""
 
 
-def _searched(runs: Sequence[_Run], size: Array, scale: float) -> Array:
+def _searched(runs: Sequence[_Run], speeds: Array, size: Array, scale: float) -> Array:
     """Numbers (10,) of least squares: a grid first, on which gains are linear, then all at once."""
     from scipy.optimize import least_squares
 
     tried, steepness = size > 0.0, scale / size.max()
-    speeds = np.concatenate([run.speeds for run in runs])
 
     def errors(numbers: Array) -> Array:
-        return np.concatenate([_errors(run, numbers) for run in runs])
+        return np.concatenate([run.errors(numbers) for run in runs])
 
     def numbers_of(vector: Array) -> Array:
         """From what is searched for, with or without limits."""
@@ -246,49 +234,50 @@ def _searched(runs: Sequence[_Run], size: Array, scale: float) -> Array:
         gain = np.exp(vector[2:4]) * steepness
         return np.concatenate([vector[:2] * size, gain, limits, [np.exp(vector[4]), vector[5]]])
 
-    def residuals(vector: Array) -> Array:
-        return errors(numbers_of(vector)) / scale
+    def best(starts: Iterable[Array]) -> tuple[float, Array]:
+        found = []
+        for start in starts:
+            low, high, typical = (each[: start.size] for each in (LOWEST, HIGHEST, TYPICAL))
+            found.append(
+                least_squares(
+                    lambda vector: errors(numbers_of(vector)) / scale,
+                    np.clip(start, low + 1e-6, high - 1e-6),
+                    bounds=(low, high),
+                    loss="soft_l1",
+                    f_scale=0.05,
+                    x_scale=typical,
+                    diff_step=1e-3,
+                    max_nfev=60,
+                )
+            )
+        chosen = min(found, key=lambda each: float(each.cost))
+        return float(chosen.cost), chosen.x
 
-    def solved(vector: Array) -> tuple[float, Array]:
-        n = vector.size
-        found = least_squares(
-            residuals,
-            np.clip(vector, LOWEST[:n] + 1e-6, HIGHEST[:n] - 1e-6),
-            bounds=(LOWEST[:n], HIGHEST[:n]),
-            loss="soft_l1",
-            f_scale=0.05,
-            x_scale=TYPICAL[:n],
-            diff_step=1e-3,
-            max_nfev=60,
-        )
-        return float(found.cost), found.x
-
-    candidates: list[tuple[float, Array]] = []
+    candidates: list[tuple[float, Array, Array]] = []
     for lag, delay, share in product(LAGS, DELAYS, DEAD_ZONES):
         numbers = np.array([*(share * size), 0.0, 0.0, inf, inf, inf, inf, lag, delay])
         at_rest = errors(numbers)
-        ways = [errors(numbers + np.eye(10)[2 + way]) - at_rest for way in np.flatnonzero(tried)]
-        design, gain = np.transpose(ways), np.zeros(2)
-        gain[tried] = np.linalg.lstsq(design, speeds, rcond=None)[0]
-        cost = float(np.sum((design @ gain[tried] - speeds) ** 2))
+        design = [errors(numbers + np.eye(10)[2 + way]) - at_rest for way in np.flatnonzero(tried)]
+        gain, left = np.zeros(2), np.transpose(design)
+        gain[tried] = np.linalg.lstsq(left, speeds, rcond=None)[0]
+        cost = float(np.sum((left @ gain[tried] - speeds) ** 2))
         steep = np.log(np.maximum(gain, 1e-3 * steepness) / steepness)
         dead = np.where(tried, share, 0.1)
-        candidates.append((cost, np.array([*dead, *steep, log(lag), delay, *gain])))
+        candidates.append((cost, np.array([*dead, *steep, log(lag), delay]), gain))
     candidates.sort(key=lambda each: each[0])
-    if (candidates[0][1][6:][tried] <= 0.0).any():
+    if (candidates[0][2][tried] <= 0.0).any():
         raise InputError(
             "The speed goes against the command: reverse it with sign = -1 in its channel."
         )
-    _, plain = min((solved(each[:6]) for _, each in candidates[:3]), key=lambda each: each[0])
-    steep = log(0.7) - plain[4]
-    tries = [plain, plain + np.array([0.0, 0.0, 0.7, 0.7, -0.7, 0.0])]
-    limited = (solved(np.array([*each, 0.0, 0.0, steep, steep])) for each in tries)
-    cost, whole = min(limited, key=lambda each: each[0])
+    _, plain = best(start for _, start, _ in candidates[:3])
+    steeper = plain + np.array([0.0, 0.0, 0.7, 0.7, -0.7, 0.0])
+    pull = log(0.7) - plain[4]
+    cost, whole = best(np.array([*each, 0.0, 0.0, pull, pull]) for each in (plain, steeper))
     # a limit that makes no difference was not reached
     for index in range(6, 10):
         without = whole.copy()
         without[index] = NONE
-        rough = residuals(without) / 0.05
+        rough = errors(numbers_of(without)) / (0.05 * scale)
         loss = 0.05**2 * float(np.sum(np.sqrt(1.0 + rough**2) - 1.0))
         if loss < SEEN * cost + NEXT_TO_NOTHING * float(np.sum((speeds / scale) ** 2)):
             whole = without
@@ -321,27 +310,24 @@ def guessed_set(guess: Guess, source: str) -> ParameterSet:
     speed_of_flow = 1.0 / (lag * flow * n["Z3"] * n["Z5"])
     stops = [min(top / per_angle, FAR_STOP) for top in guess.top_speed]
     orifices = [pull / (per_angle * flow * speed_of_flow) for pull in guess.acceleration]
-    made = base.replace(
-        {
-            "V_dz": guess.dead_zone,
-            "G1": (guess.gain[0] / per_ampere, guess.gain[1] / per_ampere),
-            "tau": guess.delay,
-            "Z8": speed_of_flow,
-            "Z10": per_angle,
-            "Z13": (stops[0], stops[1]),
-            "Z16": (orifices[0], orifices[1]),
-        }
-    )
-    changed = {"V_dz", "G1", "tau", "Z8", "Z10", "Z13", "Z16"}
+    changed: dict[str, float | tuple[float, float]] = {
+        "V_dz": guess.dead_zone,
+        "G1": (guess.gain[0] / per_ampere, guess.gain[1] / per_ampere),
+        "tau": guess.delay,
+        "Z8": speed_of_flow,
+        "Z10": per_angle,
+        "Z13": (stops[0], stops[1]),
+        "Z16": (orifices[0], orifices[1]),
+    }
+    made = base.replace(changed)
     said = {
         symbol: replace(each, source=source, status="approximate")
         if symbol in changed
         else replace(each, source="assumed: no speed determines it")
         for symbol, each in made.parameters.items()
     }
-    return replace(
-        made, name=guess.axis, title=f"{guess.axis}: guessed from {source}", parameters=said
-    )
+    title = f"{guess.axis}: guessed from {source}"
+    return replace(made, name=guess.axis, title=title, parameters=said)
 
 
 def fit_configuration(guess: Guess, start: ParameterSet | Drive) -> str:

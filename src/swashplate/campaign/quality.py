@@ -29,7 +29,6 @@ from swashplate.tables import Column, Table
 from swashplate.units import display_unit
 
 Array = NDArray[np.float64]
-Flags = NDArray[np.bool_]
 
 LONG_GAP = 5.0
 """An interval of more than this many usual ones is worth a look; single lost rows are not."""
@@ -37,6 +36,8 @@ LOST_SHARE = 0.01
 """Nor are they worth one until they are more than this share."""
 AT_REST = 0.25
 """An input within this share of its largest excursion may be at rest, or in a dead zone."""
+AGAINST = 0.5
+"""Correlation below minus which one signal goes against another."""
 NEGATIVE = 0.05
 """Share of its peak below zero that is noise of a rectified current; a signed one goes to about
 minus its peak."""
@@ -48,6 +49,8 @@ SPIKE_SHARE = 0.1
 """A spike is farther than this share of what lasts from it as well, in range or beyond."""
 NEIGHBOURS = 11
 """Samples of the running median: up to five in a row may be a spike."""
+TAPS = 2
+"""Samples in a row that may be a spike of a command; more may be meant."""
 GROSS = 2.0
 """Distance from the median, over all that a channel moves, from which a spike is gross. [1]"""
 QUIET = 0.3
@@ -94,39 +97,47 @@ def examine(experiment: Experiment, unsigned: Collection[str] = ()) -> tuple[Qua
     drive, found = experiment.input, list[Quality]()
     signals: dict[str, InputSignal | Channel] = {"input": drive, **experiment.channels}
     for name, signal in signals.items():
-        stamps, lost = stamp_statistics(signal.time), None
-        used = np.ones(signal.time.size, np.bool_)
+        stamps, lost, limits = stamp_statistics(signal.time), None, signal.limits
+        used, findings = np.ones(signal.time.size, np.bool_), list[str]()
+        # the input's stamps are reported once, with the input
+        if signal is drive or not np.array_equal(signal.time, drive.time):
+            findings += _of_stamps(stamps)
         if isinstance(signal, Channel):
             used = signal.used
-            limits, findings = signal.limits, _of_channel(experiment, signal, name not in unsigned)
+            if signal.dropped:
+                many = _counted(signal.dropped, "missing sample is", "missing samples are")
+                findings.append(f"{many} left out")
+        elif limits is None and drive.kind == "voltage":
+            limits = (-FULL_VOLTAGE, FULL_VOLTAGE)
+        values = signal.values[used] if used.any() else signal.values
+        low, high, clipped = float(values.min()), float(values.max()), float("nan")
+        if limits is not None and used.any():
+            clipped = float(np.mean((values <= limits[0]) | (values >= limits[1])))
+        if isinstance(signal, Channel):
+            if clipped > 0.0:
+                findings.append(
+                    f"{100.0 * clipped:.2g} % of the samples are at the end of its range"
+                )
             if signal.counts is not None:
-                lost = 0 if used.sum() < 8 else _lost(signal)
+                rows = signal.time[used], signal.counts[used]
+                lost = int(find_lost_counts(*rows).size) if used.sum() >= 8 else 0
+            findings += _of_channel(experiment, signal, name not in unsigned)
             if lost:
                 times = "once" if lost == 1 else f"{lost} times"
                 findings.append(f"jumps {times} as no motion does: lost or doubled counts")
         else:
-            full = (-FULL_VOLTAGE, FULL_VOLTAGE) if drive.kind == "voltage" else None
-            limits = drive.limits or full
-            findings = _of_input(drive, limits)
-        values = signal.values[used]
-        clipped = float("nan")
-        if limits is not None and values.size:
-            clipped = float(np.mean((values <= limits[0]) | (values >= limits[1])))
-        if clipped > 0.0 and signal is not drive:
-            findings.insert(
-                0, f"{100.0 * clipped:.2g} % of the samples are at the end of its range"
-            )
-        if signal.dropped and signal is not drive:
-            many = _counted(signal.dropped, "missing sample is", "missing samples are")
-            findings.insert(0, f"{many} left out")
-        # the input's stamps are told of once, with the input
-        if signal is drive or not np.array_equal(signal.time, drive.time):
-            findings = [*_stamp_findings(stamps), *findings]
-        shown = values if values.size else signal.values
-        ends = float(shown.min()), float(shown.max())
+            if low == high:
+                findings.append("the input never changes: nothing can be identified from this run")
+            if limits is not None and (low < limits[0] or high > limits[1]):
+                findings.append(
+                    f"goes from {low:g} to {high:g} {drive.unit}, beyond its range of "
+                    f"{limits[0]:g} to {limits[1]:g}: check unit, scale and offset"
+                )
+            findings += _of_spikes(experiment, drive)
         found.append(
             Quality(
-                *(experiment.name, name, signal.kind, signal.unit, stamps, *ends, clipped, lost),
+                *(experiment.name, name, signal.kind, signal.unit, stamps, low, high, clipped),
+                lost_counts=lost,
                 dropped=signal.dropped,
                 ignored=float(np.mean(~used)),
                 findings=tuple(findings),
@@ -135,47 +146,11 @@ def examine(experiment: Experiment, unsigned: Collection[str] = ()) -> tuple[Qua
     return tuple(found)
 
 
-def _of_input(drive: InputSignal, limits: tuple[float, float] | None) -> list[str]:
-    low, high, findings = drive.values.min(), drive.values.max(), []
-    if low == high:
-        findings.append("the input never changes: nothing can be identified from this run")
-    if limits is not None and (low < limits[0] or high > limits[1]):
-        findings.append(
-            f"goes from {low:g} to {high:g} {drive.unit}, beyond its range of {limits[0]:g} to "
-            f"{limits[1]:g}: check unit, scale and offset"
-        )
-    return findings
-
-
-def _of_channel(experiment: Experiment, channel: Channel, signed: bool) -> list[str]:
-    drive, used, findings = experiment.input, channel.used, list[str]()
-    time, values = channel.time[used], channel.values[used]
-    if time.size < 2:
-        return []
-    if np.ptp(values) == 0.0 and np.ptp(drive.values) > 0.0:
-        findings.append("never changes although the input does: is it connected?")
-    findings += _spike_findings(experiment, channel)
-    if channel.kind == "rectified_current" and has_sign([values], NEGATIVE):
-        findings.append("turns negative, so it is not rectified: should it be signed_current?")
-    if signed and _moves_against(drive, channel):
-        findings.append("moves against the input: should its sign be -1?")
-    outside = int(np.count_nonzero((time < drive.time[0]) | (time > drive.time[-1])))
-    if outside:
-        lie = _counted(outside, "sample lies", "samples lie")
-        findings.append(f"{lie} before or after the input's record")
-    return findings
-
-
-def _lost(channel: Channel) -> int:
-    assert channel.counts is not None
-    return int(find_lost_counts(channel.time[channel.used], channel.counts[channel.used]).size)
-
-
 def _counted(number: int, one: str, several: str) -> str:
     return f"{number} {one if number == 1 else several}"
 
 
-def _stamp_findings(stamps: StampStatistics) -> Iterator[str]:
+def _of_stamps(stamps: StampStatistics) -> Iterator[str]:
     if stamps.longest > LONG_GAP * stamps.period or stamps.missing > LOST_SHARE * stamps.rows:
         yield (
             f"{_counted(stamps.gaps.size, 'gap', 'gaps')}, the longest {stamps.longest:.3g} s; "
@@ -188,31 +163,38 @@ def _stamp_findings(stamps: StampStatistics) -> Iterator[str]:
         )
 
 
-def _moves_against(drive: InputSignal, channel: Channel) -> bool:
-    """Whether a signed signal goes down where the input goes up."""
-    time, values = channel.time[channel.used], channel.values[channel.used]
+def _of_channel(experiment: Experiment, channel: Channel, signed: bool) -> Iterator[str]:
+    drive, time, values = experiment.input, channel.time[channel.used], channel.values[channel.used]
+    if time.size < 2:
+        return
+    if np.ptp(values) == 0.0 and np.ptp(drive.values) > 0.0:
+        yield "never changes although the input does: is it connected?"
+    yield from _of_spikes(experiment, channel)
+    if channel.kind == "rectified_current" and has_sign([values], NEGATIVE):
+        yield "turns negative, so it is not rectified: should it be signed_current?"
+    motion, at = values, time
     if channel.is_position:
-        middle = 0.5 * (time[1:] + time[:-1])
-        motion = np.diff(values) / np.diff(time)
-    elif channel.kind in ("signed_current", "shaft_speed", "swash_angle", "spool_position"):
-        middle, motion = time, values
-    else:
-        return False
-    return turned(drive.at(middle) - drive.values[0], motion)
+        motion, at = np.diff(values) / np.diff(time), 0.5 * (time[1:] + time[:-1])
+    directed = ("signed_current", "shaft_speed", "swash_angle", "spool_position")
+    driven = drive.at(at) - drive.values[0]
+    directional = signed and (channel.is_position or channel.kind in directed)
+    if directional and turned(driven, motion):
+        yield "moves against the input: should its sign be -1?"
+    if outside := int(np.count_nonzero((time < drive.time[0]) | (time > drive.time[-1]))):
+        lie = _counted(outside, "sample lies", "samples lie")
+        yield f"{lie} before or after the input's record"
 
 
 def turned(driven: Array, motion: Array) -> bool:
-    """Whether a motion (n,) goes against what it should be (n,), both about zero: clearly so."""
+    """Whether a motion (n,) goes against what it should be (n,), in any units, both about zero.
+
+    Their correlation is below -0.5.
+    """
     size = float(np.linalg.norm(driven) * np.linalg.norm(motion))
-    return float(driven @ motion) < -0.5 * size
+    return float(driven @ motion) < -AGAINST * size
 
 
 # --- currents with and without a sign -------------------------------------------------------------
-
-
-def _noise(values: Array) -> float:
-    """Standard deviation from sample to sample."""
-    return float(np.median(np.abs(np.diff(values)))) / (0.6745 * 2.0**0.5) if values.size > 1 else 0
 
 
 def has_sign(currents: Sequence[Array], share: float = 0.25) -> bool:
@@ -222,7 +204,8 @@ def has_sign(currents: Sequence[Array], share: float = 0.25) -> bool:
     """
     finite = [each[np.isfinite(each)] for each in currents if np.isfinite(each).any()]
     ends = np.array([[*np.quantile(each, (0.002, 0.998))] for each in finite] or [[0.0, 0.0]])
-    noise = max((_noise(each) for each in finite), default=0.0)
+    steps = [np.median(np.abs(np.diff(each))) for each in finite if each.size > 1]
+    noise = float(max(steps, default=0.0)) / (0.6745 * 2.0**0.5)
     return bool(-ends[:, 0].min() > max(share * ends[:, 1].max(), SURE * noise))
 
 
@@ -262,38 +245,48 @@ def unsigned_currents(experiments: Iterable[Experiment]) -> dict[tuple[str, str]
 # --- spikes ---------------------------------------------------------------------------------------
 
 
-def spikes(channel: Channel, drive: InputSignal) -> list[tuple[float, float, float]]:
+def spikes(signal: Channel | InputSignal, drive: InputSignal) -> list[tuple[float, float, float]]:
     """Single samples, up to five in a row, that no motion explains; an encoder's are lost counts.
+
+    Parameters
+    ----------
+    signal : Channel or InputSignal
+        Where they are looked for: a channel, or the input itself, of which one or two samples in a
+        row may be a spike.
+    drive : InputSignal
+        The run's input.
 
     Returns
     -------
     list of (float, float, float)
         Instants before and after each spike, half an interval off [s], and its value farthest from
-        what lasts [unit of the channel].
+        what lasts [unit of the signal].
 
     Notes
     -----
     A sample is one where it lies more than 8 median absolute deviations from the running median of
-    11 samples, and beyond all values of that median by a tenth of their range; or, while the input
-    stands still, by a quarter of the range from the median within it.
+    11 samples, and beyond all values of that median by a tenth of their range; or, of a channel
+    while the input stands still, by a quarter of the range from the median within it.
     """
     from scipy.ndimage import median_filter
 
-    used = np.flatnonzero(channel.used)
-    time, values = channel.time[used], channel.values[used]
-    if channel.kind in ("encoder_counts", "other") or time.size < 4 * NEIGHBOURS:
+    used = signal.used if isinstance(signal, Channel) else np.ones(signal.time.size, np.bool_)
+    time, values = signal.time[used], signal.values[used]
+    if signal.kind in ("encoder_counts", "other") or time.size < 4 * NEIGHBOURS:
         return []
     lasting = median_filter(values, size=NEIGHBOURS, mode="nearest")
     low, high = float(lasting.min()), float(lasting.max())
     off = np.abs(values - lasting)
     least = SPIKE * float(np.median(off))
-    room = max(SPIKE_SHARE * (high - low), least)
+    room, most = max(SPIKE_SHARE * (high - low), least), TAPS
     found = (values > high + room) | (values < low - room)
-    if (off > max(0.25 * (high - low), least)).any():
-        grid = np.linspace(-QUIET, 0.0, 7)[:, None] + time
-        commands = drive.at(grid.ravel()).reshape(grid.shape)
-        quiet = np.ptp(commands, axis=0) <= 0.02 * np.ptp(drive.values)
-        found |= quiet & (off > max(0.25 * (high - low), least))
+    if signal is not drive:
+        most = NEIGHBOURS // 2
+        within = off > max(0.25 * (high - low), least)
+        if within.any():
+            grid = np.linspace(-QUIET, 0.0, 7)[:, None] + time
+            commands = drive.at(grid.ravel()).reshape(grid.shape)
+            found |= within & (np.ptp(commands, axis=0) <= 0.02 * np.ptp(drive.values))
     rows = np.flatnonzero(found & (off > least))
     half = 0.5 * float(np.median(np.diff(time)))
     groups = np.split(rows, np.flatnonzero(np.diff(rows) > NEIGHBOURS // 2) + 1)
@@ -304,7 +297,7 @@ def spikes(channel: Channel, drive: InputSignal) -> list[tuple[float, float, flo
             float(values[group[np.argmax(off[group])]]),
         )
         for group in groups
-        if group.size and group[-1] - group[0] < NEIGHBOURS // 2
+        if group.size and group[-1] - group[0] < most
     ]
 
 
@@ -314,26 +307,30 @@ def spiked(experiments: Sequence[Experiment]) -> dict[tuple[str, str], tuple[str
     Beside the sentence, whether a spike is gross: farther beyond all that lasts than the channel
     moves in any run, so that squared errors would be the spike's.
     """
-    said, moves = dict[tuple[str, str], str](), dict[str, float]()
+    said, moves = dict[tuple[str, str], tuple[str, float]](), dict[str, float]()
     for each in experiments:
         for name, channel in each.channels.items():
-            kept = channel.used
-            for begin, end, _ in spikes(channel, each.input):
+            kept, found = channel.used, spikes(channel, each.input)
+            values = channel.values[kept]
+            for begin, end, _ in found:
                 kept &= (channel.time < begin) | (channel.time > end)
             if kept.any():
                 moves[name] = max(moves.get(name, 0.0), float(np.ptp(channel.values[kept])))
-            for sentence in _spike_findings(each, channel):
-                said[each.name, name] = f"{each.name}: '{name}' has {sentence}"
-    runs, found = {each.name: each for each in experiments}, {}
-    for (run, name), sentence in said.items():
-        values = runs[run][name].values[runs[run][name].used]
-        far = float(np.abs(values - np.median(values)).max())
-        found[run, name] = sentence, far > GROSS * moves.get(name, 0.0)
-    return found
+            for sentence in _of_spikes(each, channel, found):
+                far = float(np.abs(values - np.median(values)).max())
+                said[each.name, name] = f"{each.name}: '{name}' has {sentence}", far
+    return {
+        (run, name): (sentence, far > GROSS * moves.get(name, 0.0))
+        for (run, name), (sentence, far) in said.items()
+    }
 
 
-def _spike_findings(experiment: Experiment, channel: Channel) -> Iterator[str]:
-    found = spikes(channel, experiment.input)
+def _of_spikes(
+    experiment: Experiment,
+    signal: Channel | InputSignal,
+    found: Sequence[tuple[float, float, float]] | None = None,
+) -> Iterator[str]:
+    found = spikes(signal, experiment.input) if found is None else found
     if not found:
         return
     windows = ", ".join(
@@ -342,10 +339,10 @@ def _spike_findings(experiment: Experiment, channel: Channel) -> Iterator[str]:
     )
     more = "" if len(found) <= NAMED else f" and {len(found) - NAMED} more like these"
     largest = max((value for _, _, value in found), key=abs)
+    place = f"channels.{signal.name}" if isinstance(signal, Channel) else "input"
     yield (
-        f"{_counted(len(found), 'spike', 'spikes')}, up to {largest:.4g} {channel.unit}{more}: "
-        f"leave out with axes.{experiment.axis}.channels.{channel.name}.ignore = "
-        f"[{windows}] in this run"
+        f"{_counted(len(found), 'spike', 'spikes')}, up to {largest:.4g} {signal.unit}{more}: "
+        f"leave out with axes.{experiment.axis}.{place}.ignore = [{windows}] in this run"
     )
 
 
@@ -360,19 +357,28 @@ def campaign_findings(campaign: Campaign) -> tuple[str, ...]:
     FileError, ParameterError
         If the file, which is read once more, has changed meanwhile and cannot be read.
     """
-    moving = dict.fromkeys((each.axis for each in campaign), False)
-    for each in campaign:
-        moving[each.axis] |= bool(each.of_kind("shaft_speed", "position", "encoder_counts"))
-    return (
-        *_unused_windows(campaign),
-        *(
-            f"axis '{axis}': no channel measures its motion; a fit of the pump needs one of the "
-            "kind shaft_speed, position or encoder_counts"
-            for axis, seen in moving.items()
-            if not seen
-        ),
-        *unsigned_currents(campaign).values(),
-    )
+    found, file = list[str](), read_campaign_file(campaign.path)
+    for name, axis in file.axes.items():
+        runs, where = campaign.select(axis=name), f"axes.{name}"
+        found += _unused(f"{where}.ignore", axis.ignore, runs)
+        for key, channel in axis.channels.items():
+            of = f"{where}.channels.{key}"
+            found += _unused(f"{of}.ignore", channel.ignore, runs, key)
+            found += _unused(f"{of}.weights", channel.weights, runs, key)
+    for number, run in enumerate(file.runs, 1):
+        if run.role != "ignore":
+            ours = [each for each in campaign if each.run == (run.name or Path(run.file).stem)]
+            for key in ("ignore", "weights"):
+                found += _unused(f"run {number} ({run.file}): {key}", getattr(run, key), ours)
+    axes = dict.fromkeys(each.axis for each in campaign)
+    moving = {e.axis for e in campaign if e.of_kind("shaft_speed", "position", "encoder_counts")}
+    found += [
+        f"axis '{axis}': no channel measures its motion; a fit of the pump needs one of the kind "
+        "shaft_speed, position or encoder_counts"
+        for axis in axes
+        if axis not in moving
+    ]
+    return (*found, *unsigned_currents(campaign).values())
 
 
 def beyond_the_card(experiment: Experiment) -> tuple[str, ...]:
@@ -389,32 +395,17 @@ def beyond_the_card(experiment: Experiment) -> tuple[str, ...]:
     )
 
 
-def _unused_windows(campaign: Campaign) -> Iterator[str]:
-    """Windows that leave out or weigh no sample of any run: a misspelt maneuver, another clock."""
-    file = read_campaign_file(campaign.path)
-    for name, axis in file.axes.items():
-        runs = campaign.select(axis=name)
-        yield from _unused(f"axes.{name}.ignore", axis.ignore, runs)
-        for key, channel in axis.channels.items():
-            where = f"axes.{name}.channels.{key}"
-            yield from _unused(f"{where}.ignore", channel.ignore, runs, key)
-            yield from _unused(f"{where}.weights", channel.weights, runs, key)
-    for number, run in enumerate(file.runs, 1):
-        if run.role != "ignore":
-            ours = [each for each in campaign if each.run == (run.name or Path(run.file).stem)]
-            where = f"run {number} ({run.file})"
-            yield from _unused(f"{where}: ignore", run.ignore, ours)
-            yield from _unused(f"{where}: weights", run.weights, ours)
-
-
 def _unused(
     where: str,
     windows: Iterable[schema.Window],
     runs: Sequence[Experiment],
     channel: str | None = None,
 ) -> Iterator[str]:
+    """Windows that leave out or weigh no sample of any run: a misspelt maneuver, another clock."""
     for window in windows:
         held = [each for each in runs if applying((window,), each.maneuver)]
+        signals = (each.channels.items() for each in held)
+        times = [one.time for of in signals for name, one in of if channel in (None, name)]
         if not held:
             names = list(dict.fromkeys(f"'{each.maneuver}'" for each in runs))
             more = [f"{len(names) - NAMED} others"] if len(names) > NAMED else []
@@ -422,12 +413,7 @@ def _unused(
                 f"{where}: no run has the maneuver '{window.maneuver}', so that its window does "
                 f"nothing; there are {', '.join([*names[:NAMED], *more])}"
             )
-        elif not any(
-            inside(window, signal.time).any()
-            for each in held
-            for name, signal in each.channels.items()
-            if channel in (None, name)
-        ):
+        elif not any(inside(window, time).any() for time in times):
             first, last = (
                 "its end" if each is None else f"{each:g} s" for each in (window.start, window.stop)
             )

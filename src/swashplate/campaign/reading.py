@@ -1,22 +1,30 @@
-"""Signals of a log on their clocks, in SI; of a log too long to hold, its windows with motion."""
+"""Experiments from a log and the entries of a campaign file; of a long log, windows with motion.
+
+A signal is read on its clock, in SI; a run is split where a counter may have gone round unseen.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
-from typing import NamedTuple
+from itertools import pairwise
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from swashplate.campaign import schema
-from swashplate.campaign.experiment import Channel, Encoder, InputSignal, Source
-from swashplate.campaign.schema import conversion, inside
+from swashplate.campaign.experiment import Channel, Encoder, Experiment, InputSignal, Source
+from swashplate.campaign.recognition import recognise
+from swashplate.campaign.samples import ambiguous_gaps, unwrap_counts
+from swashplate.campaign.schema import applying, conversion, ends, inside
+from swashplate.documents import validated
 from swashplate.errors import FileError, InputError
 from swashplate.logs import LONG, Column, Log, check_duration, check_stamps, in_parts, unit_of
 from swashplate.units import to_si
 
 Array = NDArray[np.float64]
+AnySignal = TypeVar("AnySignal", InputSignal, Channel)
 
 SINCE_1970 = 1e8
 """Stamps that begin beyond this are seconds of a calendar and are counted from the first. [s]"""
@@ -24,179 +32,299 @@ LARGEST = 1e30
 """No signal of a machine has so much of any SI unit."""
 
 
-class Columns:
-    """The wanted columns of one log, read together."""
+def read_run(
+    place: str, name: str, run: schema.Run, axes: Mapping[str, schema.Axis], log: Log
+) -> Iterator[Experiment]:
+    """Experiments of a run: one for each axis that it tests, window of a long log, and split.
 
-    def __init__(self, log: Log, wanted: list[tuple[str, str]]) -> None:
-        self.log = log
-        self.found = self.find(log, wanted)
-        self.values = log.read(list(self.found))
-        self.stamps: dict[tuple[schema.Clock, int], Array] = {}
-        """Stamps by their clock and number, so that signals share them."""
-        self.begins = {name: values[:1] for name, values in self.values.items()}
-        if log.first:
-            self.begins = log.between(0, 1).read(list(self.found))
+    Parameters
+    ----------
+    place : str
+        The run, for sentences about the campaign file.
+    name : str
+        Its own.
 
-    @staticmethod
-    def find(log: Log, wanted: Iterable[tuple[str, str]]) -> dict[str, Column]:
-        """Columns by the names that are wanted, each with what for.
-
-        Raises
-        ------
-        InputError
-            If there is none; the sentence says what for.
-        """
-        found = {}
-        for name, what in wanted:
-            try:
-                found[name] = log.find(name)
-            except InputError as error:
-                raise InputError(f"For {what}: {error}") from None
-        return found
-
-
-def wanted_columns(axis: schema.Axis) -> Iterator[tuple[str, str]]:
-    """Columns that an axis needs, and what for."""
-    signals: dict[str, schema.Signal] = {"the input": axis.input}
-    signals |= {f"channel '{name}'": channel for name, channel in axis.channels.items()}
-    for what, signal in signals.items():
-        yield signal.column, what
-        for clock in (signal.time, axis.time):
-            if clock is not None and clock.column is not None:
-                yield clock.column, f"the time of {what}"
-
-
-class _Samples(NamedTuple):
-    """Samples of a signal that can be used, in SI, and what a signal says of them."""
-
-    unit: str
-    time: Array
-    values: Array
-    source: Source
-    factor: float
-    """Size of one of the signal's units in SI."""
-    limits: tuple[float, float] | None
-    dropped: int
-
-
-def read_input(axis: schema.Axis, columns: Columns, span: schema.Window | None) -> InputSignal:
-    """The input of an axis as the campaign file says."""
-    read = _samples("the input", axis.input, axis, columns, span)
-    assert read is not None  # an input without samples is refused
-    held = axis.input.interpolation
-    return InputSignal(
-        axis.input.kind,
-        *read[:3],
-        held,
-        source=read.source,
-        limits=read.limits,
-        dropped=read.dropped,
-    )
-
-
-def read_channel(
-    name: str, axis: schema.Axis, columns: Columns, span: schema.Window | None
-) -> Channel | None:
-    """A channel as the campaign file says, all samples alike; None where all of them are missing.
-
-    Of an encoder the counts are as they were read, roll-overs and all.
+    Raises
+    ------
+    FileError, InputError, ParameterError
+        For the first thing that is wrong; the sentence names file, column and row.
     """
-    entry, encoder = axis.channels[name], None
-    read = _samples(f"channel '{name}'", entry, axis, columns, span)
-    if read is None:
-        return None
-    if entry.counts_per_turn is not None:
-        encoder = Encoder(entry.counts_per_turn, entry.gear_ratio, entry.sign, entry.rolls_over_at)
-    return Channel(
-        *(name, entry.kind, *read[:3], np.ones(read.time.size), read.source),
-        None if entry.noise is None else read.factor * entry.noise,
-        read.limits,
-        read.dropped,
-        encoder,
-        None if encoder is None else read.values,
-    )
+    tested = _axes_of(place, run, axes)
+    for part in _windows(tested, log, run.span):
+        columns = _Columns(part, tested)
+        for key, axis in tested.items():
+            full = f"{name} {key}" if len(axes) > 1 else name
+            yield from _experiments(full, name, key, run, axis, columns)
 
 
-def _samples(
-    what: str,
-    signal: schema.Input | schema.Channel,
-    axis: schema.Axis,
-    columns: Columns,
-    span: schema.Window | None,
-) -> _Samples | None:
-    """Samples of a signal; None for a channel all of whose samples are missing."""
-    column, numbers = columns.found[signal.column], columns.values[signal.column]
-    said = f"{columns.log.path}: column '{column.name}' ({what})"
-    time = stamps_in(signal.time or axis.time, axis.time, columns, numbers.size)
-    if time.size != numbers.size:
-        raise FileError(f"{said} has {numbers.size} samples, but its time {time.size}.")
-    kept = np.ones(numbers.size, dtype=np.bool_) if span is None else inside(span, time)
-    missing = kept & ~np.isfinite(numbers)
-    if missing.any() and signal.missing == "refuse":
-        rows = np.flatnonzero(missing) + 1 + columns.log.first
-        others = f" and {rows.size - 1} others" if rows.size > 1 else ""
-        raise FileError(
-            f"{said} has no finite number in data row {rows[0]}{others}; mend the log, or say "
-            "missing = 'drop' to leave such samples out."
+def _axes_of(
+    place: str, run: schema.Run, axes: Mapping[str, schema.Axis]
+) -> dict[str, schema.Axis]:
+    """The axes that a run tests, with what differs in it."""
+    for name in (*run.only, *run.axes):
+        if name not in axes:
+            raise InputError(
+                f"{place} names the axis '{name}', but the axes are {', '.join(axes)}."
+            )
+    tested = {}
+    for name in run.only or axes:
+        axis, origin = axes[name], f"{place}: axes.{name}"
+        changes = dict(run.axes.get(name, {}))
+        given = changes.get("channels")
+        for key, change in given.items() if isinstance(given, Mapping) else ():
+            if key not in axis.channels and not (isinstance(change, Mapping) and "kind" in change):
+                raise InputError(
+                    f"{origin} changes the channel '{key}', but the axis has "
+                    f"{', '.join(axis.channels)}; a new channel needs its kind and column."
+                )
+        if changes:
+            content = _merged(axis.model_dump(by_alias=True, exclude_unset=True), changes)
+            if not content["channels"]:
+                raise InputError(f'{origin} has no channel left; say role = "ignore" instead.')
+            axis = validated(content, schema.Axis, origin)
+        tested[name] = axis
+    return tested
+
+
+def _merged(content: dict[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:
+    """A table with some entries replaced, tables within it merged in turn.
+
+    Ignored windows are added to those that there are; false takes a channel out.
+    """
+    merged = dict(content)
+    for key, value in changes.items():
+        old = merged.get(key)
+        if isinstance(old, dict) and isinstance(value, Mapping):
+            merged[key] = _merged(old, value)
+        elif isinstance(old, dict) and value is False:
+            del merged[key]
+        elif key == "ignore" and isinstance(old, (list, tuple)) and isinstance(value, list):
+            merged[key] = [*old, *value]
+        else:
+            merged[key] = value
+    return merged
+
+
+# --- signals in SI --------------------------------------------------------------------------------
+
+
+class _Columns:
+    """The columns of a log that some axes need, read together, or those of one signal."""
+
+    def __init__(
+        self, log: Log, axes: Mapping[str, schema.Axis], only: schema.Signal | None = None
+    ) -> None:
+        self.log, self.found = log, _found(log, axes, only)
+        self.values = log.read(list(self.found))
+        first = log.between(0, 1).read(list(self.found)) if log.first else self.values
+        self._begins = {name: values[:1] for name, values in first.items()}
+        self._stamps: dict[tuple[schema.Clock, int], Array] = {}
+
+    def stamps(self, signal: schema.Signal, axis: schema.Axis) -> Array:
+        """Increasing stamps of a signal; those of a calendar from the axis's first one on. [s]"""
+        clock, main, size = signal.time or axis.time, axis.time, self.values[signal.column].size
+        # signals share an array: whoever compares stamps sees at once that they are the same
+        if (clock, size) in self._stamps:
+            return self._stamps[clock, size]
+        with np.errstate(over="ignore"):
+            if clock.column is None:
+                rate = clock.rate or 1.0
+                time = clock.offset + (self.log.first + np.arange(size)) / rate
+                source = "the rate"
+            else:
+                numbers, factor = self.values[clock.column], self._second(clock)
+                source = f"column '{self.found[clock.column].name}'"
+                check_stamps(self.log, self.found[clock.column].name, numbers)
+                of_main = main if main.column is not None else clock
+                begin = self._second(of_main) * float(self._begins[of_main.column or ""][0])
+                # the difference first: a float64 keeps a microsecond of a calendar's stamp
+                since = numbers if begin < SINCE_1970 else numbers - begin / factor
+                time = factor * since + clock.offset
+            time = self._stamps[clock, size] = check_duration(self.log, source, time)
+        return time
+
+    def _second(self, clock: schema.Clock) -> float:
+        """Size of the unit of a column of stamps [s]."""
+        column = self.found[clock.column or ""]
+        unit = clock.unit or unit_of(column, clock.column or "", "s")
+        return to_si(1.0, unit, "s", f"{self.log.path}: column '{column.name}' (the time)")
+
+    def samples(
+        self, what: str, signal: schema.Input | schema.Channel, axis: schema.Axis, run: schema.Run
+    ) -> tuple[dict[str, Any], float]:
+        """What a signal is made of, in SI, and the size of its unit; empty where all is missing."""
+        log, column, numbers = self.log, self.found[signal.column], self.values[signal.column]
+        said = f"{log.path}: column '{column.name}' ({what})"
+        time = self.stamps(signal, axis)
+        if time.size != numbers.size:
+            raise FileError(f"{said} has {numbers.size} samples, but its time {time.size}.")
+        kept = np.ones(numbers.size, np.bool_) if run.span is None else inside(run.span, time)
+        for window in signal.ignore if isinstance(signal, schema.Input) else ():
+            kept &= ~inside(window, time)
+        missing = kept & ~np.isfinite(numbers)
+        if missing.any() and signal.missing == "refuse":
+            rows = np.flatnonzero(missing) + 1 + log.first
+            others = f" and {rows.size - 1} others" if rows.size > 1 else ""
+            raise FileError(
+                f"{said} has no finite number in data row {rows[0]}{others}; mend the log, or say "
+                "missing = 'drop' to leave such samples out."
+            )
+        if isinstance(signal, schema.Channel) and missing.any() and missing.sum() == kept.sum():
+            return {}, 1.0
+        kept &= ~missing
+        if (left := np.count_nonzero(kept)) < 2:
+            raise FileError(f"{said} has {left} samples that can be used, but needs two at least.")
+        first = schema.KINDS[signal.kind].units[:1] or ("1",)
+        unit = signal.unit or unit_of(column, signal.column, first[0])
+        si, factor, zero = conversion(signal.kind, unit, said)
+        # an encoder's sign belongs to the scale of its counts, see `Encoder`
+        sign = 1 if signal.kind == "encoder_counts" else signal.sign
+        with np.errstate(over="ignore"):
+            values = factor * sign * (signal.scale * numbers[kept] + signal.offset) + zero
+            largest = float(np.max(np.abs(values)))
+        if not largest < LARGEST:
+            raise InputError(
+                f"{said} reaches {largest:.3g} {si}; check its unit, scale and offset."
+            )
+        low, high = signal.limits or (0.0, 0.0)
+        return {
+            "kind": signal.kind,
+            "unit": si,
+            "time": time if kept.all() else np.ascontiguousarray(time[kept]),
+            "values": values,
+            "source": Source(log.path, column.name),
+            "limits": signal.limits and (factor * low + zero, factor * high + zero),
+            "dropped": int(np.count_nonzero(missing)),
+        }, factor
+
+
+def _found(
+    log: Log, axes: Mapping[str, schema.Axis], only: schema.Signal | None = None
+) -> dict[str, Column]:
+    """Columns that some axes need, or one of their signals, by the names they are wanted by."""
+    found = dict[str, Column]()
+    for axis in axes.values():
+        signals: dict[str, schema.Signal] = {"the input": axis.input}
+        signals |= {f"channel '{name}'": channel for name, channel in axis.channels.items()}
+        for what, signal in signals.items():
+            if only is not None and signal is not only:
+                continue
+            clocks = [clock for clock in (signal.time, axis.time) if clock is not None]
+            stamps = ((clock.column, f"the time of {what}") for clock in clocks)
+            for name, why in ((signal.column, what), *stamps):
+                try:
+                    found |= {name: log.find(name)} if name is not None else {}
+                except InputError as error:
+                    raise InputError(f"For {why}: {error}") from None
+    return found
+
+
+# --- experiments ----------------------------------------------------------------------------------
+
+
+def _experiments(
+    name: str, run_name: str, key: str, run: schema.Run, axis: schema.Axis, columns: _Columns
+) -> Iterator[Experiment]:
+    """One experiment, or several where a counter's position across a gap is not known."""
+    log, signals, cuts = columns.log, dict[str, Channel](), dict[float, str]()
+    parts, _ = columns.samples("the input", axis.input, axis, run)
+    drive = InputSignal(**parts, interpolation=axis.input.interpolation)
+    notes = [log.cut] if log.cut else []
+    for channel, entry in axis.channels.items():
+        parts, factor = columns.samples(f"channel '{channel}'", entry, axis, run)
+        if not parts:
+            notes.append(f"'{channel}' has no sample here and is left out of this run")
+            continue
+        time, values, size = parts["time"], parts["values"], entry.rolls_over_at
+        noise = None if entry.noise is None else factor * entry.noise
+        counts = encoder = None
+        if entry.counts_per_turn is not None:
+            encoder = Encoder(entry.counts_per_turn, entry.gear_ratio, entry.sign, size)
+            counts = values
+        weight = np.ones(time.size)
+        signals[channel] = Channel(
+            channel, **parts, weight=weight, noise=noise, encoder=encoder, counts=counts
         )
-    if isinstance(signal, schema.Channel) and missing.any() and missing.sum() == kept.sum():
-        return None
-    kept &= ~missing
-    if np.count_nonzero(kept) < 2:
-        raise FileError(
-            f"{said} has {np.count_nonzero(kept)} samples that can be used, but needs two at least."
+        for row in ambiguous_gaps(time, values, size) if size is not None else ():
+            cuts[float(time[row])] = (
+                f"within the gap of {time[row] - time[row - 1]:.3g} s the counter '{channel}', "
+                f"which begins anew after {size}, may have gone round once more or less"
+            )
+    if not signals:
+        raise InputError(
+            f"{log.path}: its channels have 0 samples that can be used; leave the run out "
+            'with role = "ignore".'
         )
-    first = schema.KINDS[signal.kind].units[:1] or ("1",)
-    unit = signal.unit or unit_of(column, signal.column, first[0])
-    si, factor, zero = conversion(signal.kind, unit, said)
-    # an encoder's sign belongs to the scale of its counts, see `Encoder`
-    sign = 1 if signal.kind == "encoder_counts" else signal.sign
-    with np.errstate(over="ignore"):
-        values = factor * sign * (signal.scale * numbers[kept] + signal.offset) + zero
-        largest = float(np.max(np.abs(values)))
-    if not largest < LARGEST:
-        raise InputError(f"{said} reaches {largest:.3g} {si}; check its unit, scale and offset.")
-    limits = signal.limits
-    return _Samples(
-        si,
-        time if kept.all() else np.ascontiguousarray(time[kept]),
-        values,
-        Source(columns.log.path, column.name),
-        factor,
-        None if limits is None else (factor * limits[0] + zero, factor * limits[1] + zero),
-        int(np.count_nonzero(missing)),
-    )
+    unit = {"voltage": "V", "current": "A"}.get(drive.kind, drive.unit)
+    for part, (begin, end) in enumerate(pairwise([-np.inf, *sorted(cuts), np.inf])):
+        given = _within(drive, begin, end)
+        kept = {each: _within(read, begin, end) for each, read in signals.items()}
+        kept = {each: read for each, read in kept.items() if read.time.size > 1}
+        if given.time.size < 2 or not kept:
+            continue
+        said = list(notes) if part == 0 else []
+        if np.isfinite(end):
+            said.append(f"split at {end:.4g} s, from where it is a run of its own: {cuts[end]}")
+        split = part > 0 or log.resumes
+        recognised = recognise(given.time, given.values, unit=unit)
+        maneuver = run.maneuver or recognised.name
+        ignored = applying((*axis.ignore, *run.ignore), maneuver)
+        yield Experiment(
+            f"{name} from {given.time[0]:.6g} s" if part or log.cut else name,
+            key,
+            run_name,
+            run.role,
+            "estimated" if split else run.start or axis.start,
+            None if split else run.start_pressure,
+            given,
+            {
+                each: _finished(axis.channels[each], read, given, maneuver, ignored, run)
+                for each, read in kept.items()
+            },
+            run.maneuver,
+            recognised,
+            tuple((*ends(each), each.why) for each in ignored),
+            tuple(said),
+        )
 
 
-def stamps_in(clock: schema.Clock, main: schema.Clock, columns: Columns, size: int) -> Array:
-    """Increasing time stamps of a signal; those of a calendar from the axis's first one on. [s]"""
-    if (clock, size) not in columns.stamps:
-        columns.stamps[clock, size] = _stamps(clock, main, columns, size)
-    return columns.stamps[clock, size]
+def _within(signal: AnySignal, begin: float, end: float) -> AnySignal:
+    """The part of a signal from one instant to before another [s]."""
+    kept = (signal.time >= begin) & (signal.time < end)
+    if kept.all():
+        return signal
+    arrays: dict[str, Any] = {
+        key: each[kept] for key, each in vars(signal).items() if isinstance(each, np.ndarray)
+    }
+    return replace(signal, **arrays)
 
 
-def _stamps(clock: schema.Clock, main: schema.Clock, columns: Columns, size: int) -> Array:
-    with np.errstate(over="ignore"):
-        if clock.rate is not None:
-            time = clock.offset + (columns.log.first + np.arange(size)) / clock.rate
-            return check_duration(columns.log, "the rate", time)
-        numbers, factor = _clock(clock, columns)
-        name = columns.found[clock.column or ""].name
-        check_stamps(columns.log, name, numbers)
-        of_main = _clock(main, columns)[1] if main.column is not None else factor
-        begin = of_main * float(columns.begins[main.column or clock.column or ""][0])
-        # the difference first: a float64 keeps a thousandth of a millisecond of a calendar's stamp
-        since = numbers if begin < SINCE_1970 else numbers - begin / factor
-        return check_duration(columns.log, f"column '{name}'", factor * since + clock.offset)
-
-
-def _clock(clock: schema.Clock, columns: Columns) -> tuple[Array, float]:
-    """Numbers of a column of time, and the size of their unit [s]."""
-    assert clock.column is not None  # the schema sees to a column or a rate
-    column, numbers = columns.found[clock.column], columns.values[clock.column]
-    unit = clock.unit or unit_of(column, clock.column, "s")
-    factor = to_si(1.0, unit, "s", f"{columns.log.path}: column '{column.name}' (the time)")
-    return numbers, factor
+def _finished(
+    entry: schema.Channel,
+    read: Channel,
+    drive: InputSignal,
+    maneuver: str,
+    ignored: Sequence[schema.Window],
+    run: schema.Run,
+) -> Channel:
+    """A channel whose counts are unwrapped, with the product of all factors that apply."""
+    encoder, counts, values = read.encoder, read.counts, read.values
+    if encoder is not None and counts is not None:
+        if encoder.rolls_over_at is not None:
+            try:
+                counts = unwrap_counts(counts, encoder.rolls_over_at)
+            except InputError as error:
+                raise InputError(f"{read.source}: {error}") from None
+        values = counts * encoder.angle_per_count
+    weight = np.full(read.time.shape, run.weight * entry.weight)
+    if entry.weight_by_input:
+        levels, factors = np.transpose(entry.weight_by_input)
+        weight *= np.interp(np.abs(drive.at(read.time)), levels, factors)
+    for each in applying((*entry.weights, *run.weights), maneuver):
+        weight[inside(each, read.time)] *= each.factor
+    for window in (*ignored, *applying(entry.ignore, maneuver)):
+        weight[inside(window, read.time)] = 0.0
+    return replace(read, counts=counts, values=values, weight=weight)
 
 
 # --- long logs ------------------------------------------------------------------------------------
@@ -216,91 +344,74 @@ PIECE = 60_000
 """A longer motion is cut into pieces of so many rows, of which the later ones begin in motion."""
 
 
-def windows(axes: Iterable[schema.Axis], log: Log, span: schema.Window | None) -> list[Log]:
+def _windows(axes: Mapping[str, schema.Axis], log: Log, span: schema.Window | None) -> list[Log]:
     """The log itself or, of one of more rows than `LONG`, its windows in which an input moves.
 
     Within the span of the run, if it has one. The log is looked through once, block after block,
     its stamps checked. A window takes in 2 s of rest before and 5 s after the motion; if all
     together have more rows than `HELD`, one in several is taken, evenly over the log.
-
-    Raises
-    ------
-    FileError, InputError
-        As `read_signal`; or if no input ever moves.
     """
-    tested = list(axes)
-    wanted = [each for axis in tested for each in wanted_columns(axis)]
-    found = list(Columns.find(log, wanted))
-    log = in_parts(log, found)
-    rows = log.rows_of(found)
+    names = list(_found(log, axes))
+    log = in_parts(log, names)
+    rows = log.rows_of(names)
     if rows is None or rows <= LONG:
         return [log]
-    moving = np.zeros(-(-rows // GRAIN), dtype=np.bool_)
-    period = np.inf
-    for axis in tested:
-        inputs = [each for each in wanted_columns(axis) if each[1] == "the input"]
-        inputs += [each for each in wanted_columns(axis) if each[1] == "the time of the input"]
-        ends = np.empty((moving.size, 2))
-        for begin in range(0, rows, BLOCK // GRAIN * GRAIN):
-            last = min(begin + BLOCK // GRAIN * GRAIN, rows)
+    moving, period = np.zeros(-(-rows // GRAIN), dtype=np.bool_), np.inf
+    for key, axis in axes.items():
+        extremes, step = np.empty((moving.size, 2)), BLOCK // GRAIN * GRAIN
+        for begin in range(0, rows, step):
             # with the row before, so that stamps are compared across blocks
-            block = Columns(log.between(max(begin - 1, 0), last), inputs)
-            values = block.values[axis.input.column]
-            time = stamps_in(axis.input.time or axis.time, axis.time, block, values.size)
+            part = log.between(max(begin - 1, 0), min(begin + step, rows))
+            block = _Columns(part, {key: axis}, axis.input)
+            time, values = block.stamps(axis.input, axis), block.values[axis.input.column]
             period = min(period, float(np.median(np.diff(time[:BLOCK]))))
-            values = values[1:] if begin else values
+            time, values = (each[int(begin > 0) :] for each in (time, values))
             edges = np.arange(0, values.size, GRAIN)
-            part = slice(begin // GRAIN, begin // GRAIN + edges.size)
-            ends[part, 0] = np.fmin.reduceat(values, edges)
-            ends[part, 1] = np.fmax.reduceat(values, edges)
+            here = slice(begin // GRAIN, begin // GRAIN + edges.size)
+            extremes[here, 0] = np.fmin.reduceat(values, edges)
+            extremes[here, 1] = np.fmax.reduceat(values, edges)
             if span is not None:
-                ends[part][~inside(span, time[-values.size :][edges])] = np.nan
-        moving |= _moves(ends)
+                extremes[here][~inside(span, time[edges])] = np.nan
+        moving |= _moves(extremes)
     if not moving.any():
         raise InputError(
             f"{log.path} has {rows} rows, in none of which the input moves: leave the run out with "
             'role = "ignore".'
         )
-    return _cut(log, rows, moving, period)
+    changes = np.flatnonzero(np.diff(np.concatenate([[False], moving, [False]])))
+    first = np.maximum(changes[::2] * GRAIN - round(BEFORE / period), 0)
+    last = np.minimum(changes[1::2] * GRAIN + round(AFTER / period), rows)
+    apart = np.flatnonzero(first[1:] > last[:-1])
+    pieces = [
+        (place, min(place + PIECE, end), place > begin)
+        for begin, end in zip(
+            first[[0, *(apart + 1)]].tolist(), last[[*apart, last.size - 1]].tolist(), strict=True
+        )
+        for place in range(begin, end, PIECE)
+    ]
+    every = 1
+    while sum(end - begin for begin, end, _ in pieces[::every]) > HELD and every < len(pieces):
+        every += 1
+    said = f"; the log has {len(pieces)} windows with motion"
+    said += f", of which 1 in {every} is taken" * (every > 1)
+    if log.table is not None:
+        said += f"; its {rows} rows are read from {log.table.name}, written beside it"
+    found, taken = list[Log](), pieces[::every]
+    for number, (begin, end, within) in enumerate(taken, 1):
+        part = log.between(begin, end)
+        cut = f"window {number} of {len(taken)}: {part.cut}{said * (number == 1)}"
+        found.append(replace(part, cut=cut, resumes=within))
+    return found
 
 
-def _moves(ends: Array) -> NDArray[np.bool_]:
+def _moves(extremes: Array) -> NDArray[np.bool_]:
     """Whether an input leaves its rest, where it is most often, by its extremes in each grain."""
-    middle = 0.5 * (ends[:, 0] + ends[:, 1])
+    middle = extremes.mean(axis=1)
     known = middle[np.isfinite(middle)]
     if not known.size or known.min() == known.max():
         return np.zeros(middle.size, dtype=np.bool_)
     counts, edges = np.histogram(known, 64)
     most = int(counts.argmax())
     rest = np.median(known[(known >= edges[most]) & (known <= edges[most + 1])])
-    away = np.max(np.abs(ends - rest), axis=1)
-    moves: NDArray[np.bool_] = np.nan_to_num(away) > MOVES * np.nanmax(away)
-    return moves
-
-
-def _cut(log: Log, rows: int, moving: NDArray[np.bool_], period: float) -> list[Log]:
-    """Parts of a log about its motion, so many that all can be held."""
-    changes = np.flatnonzero(np.diff(np.concatenate([[False], moving, [False]])))
-    first = np.maximum(changes[::2] * GRAIN - round(BEFORE / period), 0)
-    last = np.minimum(changes[1::2] * GRAIN + round(AFTER / period), rows)
-    apart = np.flatnonzero(first[1:] > last[:-1])
-    begins, ends = first[[0, *(apart + 1)]], last[[*apart, last.size - 1]]
-    pieces = [
-        (int(place), int(min(place + PIECE, end)), place > begin)
-        for begin, end in zip(begins, ends, strict=True)
-        for place in range(begin, end, PIECE)
-    ]
-    every = 1
-    while sum(end - begin for begin, end, _ in pieces[::every]) > HELD and every < len(pieces):
-        every += 1
-    taken = pieces[::every]
-    said = f"the log has {len(pieces)} windows with motion"
-    said += f", of which 1 in {every} is taken" * (every > 1)
-    if log.table is not None:
-        said += f"; its {rows} rows are read from {log.table.name}, written beside it"
-    found = []
-    for number, (begin, end, within) in enumerate(taken, 1):
-        part = log.between(begin, end)
-        cut = f"window {number} of {len(taken)}: {part.cut}"
-        found.append(replace(part, cut=f"{cut}; {said}" if number == 1 else cut, resumes=within))
-    return found
+    away = np.max(np.abs(extremes - rest), axis=1)
+    return np.asarray(np.nan_to_num(away) > MOVES * np.nanmax(away))

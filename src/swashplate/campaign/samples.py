@@ -161,36 +161,39 @@ def unwrap_counts(counts: ArrayLike, modulus: int) -> Array:
         If a reading is no whole number or outside the counter, or a step is exactly half the
         modulus, so that neither way round is the shorter.
     """
-    readings = row("counts", counts)
+    readings, size = row("counts", counts), whole("modulus", modulus)
+    if not 2 <= size <= WIDEST:
+        raise InputError(f"A counter must have from 2 to 2^53 readings, not {size}.")
+    signed = readings.min() < 0.0
+    low, high = (-(size // 2), (size - 1) // 2) if signed else (0, size - 1)
+    short = _shortest(np.diff(readings), size)
     broken = np.flatnonzero(np.floor(readings) != readings)
+    outside = np.flatnonzero((readings < low) | (readings > high))
+    ambiguous = np.flatnonzero(short == -0.5 * size) + 1
     if broken.size:
         raise InputError(
             f"counts must be whole numbers, but row {broken[0]} (the first is 0) is "
             f"{readings[broken[0]]}."
         )
-    size = whole("modulus", modulus)
-    if not 2 <= size <= WIDEST:
-        raise InputError(f"A counter must have from 2 to 2^53 readings, not {size}.")
-    signed = readings.min() < 0.0
-    low, high = (-(size // 2), (size - 1) // 2) if signed else (0, size - 1)
-    outside = np.flatnonzero((readings < low) | (readings > high))
     if outside.size:
         raise InputError(
             f"counts hold {readings[outside[0]]:.0f} in row {outside[0]} (the first is 0), outside "
             f"the {low} to {high} of a {'signed ' if signed else ''}counter of {size} readings: "
             "give its own size, in a campaign file rolls_over_at."
         )
-    steps = np.diff(readings)
-    short = steps - size * np.floor(steps / size + 0.5)
-    ambiguous = np.flatnonzero(short == -0.5 * size)
     if ambiguous.size:
-        at = int(ambiguous[0]) + 1
+        at = int(ambiguous[0])
         raise InputError(
             f"counts go from {readings[at - 1]:.0f} to {readings[at]:.0f} at row {at} (the first "
             f"is 0), half the range of a counter of {size}, which may be up or down; cut the "
             "record there."
         )
     return np.asarray(readings[0] + np.concatenate([[0.0], np.cumsum(short)]))
+
+
+def _shortest(steps: Array, modulus: int) -> Array:
+    """Steps of a counter by the shorter way round, down where both are as long. [count]"""
+    return np.asarray(steps - modulus * np.floor(steps / modulus + 0.5))
 
 
 def ambiguous_gaps(time: Array, readings: Array, modulus: int) -> Rows:
@@ -203,11 +206,9 @@ def ambiguous_gaps(time: Array, readings: Array, modulus: int) -> Rows:
     gaps = np.flatnonzero(intervals > GAP * np.median(intervals))
     if not gaps.size or readings.size < 2 * SUSTAINED or np.any(readings != np.floor(readings)):
         return np.zeros(0, dtype=np.intp)
-    steps = np.diff(readings)
-    short = steps - modulus * np.floor(steps / modulus + 0.5)
-    usual = np.delete(np.arange(steps.size), gaps)
     # across a gap the shortest way round says nothing of the speed
-    fastest = MARGIN * _lasting(short[usual], intervals[usual])
+    usual = np.delete(np.arange(intervals.size), gaps)
+    fastest = MARGIN * _lasting(_shortest(np.diff(readings), modulus)[usual], intervals[usual])
     return gaps[fastest * intervals[gaps] >= 0.5 * modulus] + 1
 
 
@@ -270,30 +271,23 @@ def rolls_over_at(values: Array, counts_per_turn: float | None = None) -> int | 
     """
     if values.size < 2 or not np.isfinite(values).all() or np.any(values != np.floor(values)):
         return None
-    if np.unique(values).size < FEWEST:
-        return None
-    low, high = float(values.min()), float(values.max())
+    low, high, steps = float(values.min()), float(values.max()), np.diff(values)
     span = high + 1.0 if low >= 0.0 else 2.0 * max(-low, high + 1.0)
-    steps = np.diff(values)
     over = np.abs(steps) > 0.5 * span
-    if not over.any() or over.all():
+    if np.unique(values).size < FEWEST or not over.any() or over.all():
         return None
-    ordinary = float(np.quantile(np.abs(steps[~over]), ORDINARY))
+    usual, turn = steps[~over], float(counts_per_turn or 0.0)
+    ordinary = float(np.quantile(np.abs(usual), ORDINARY))
     # the steps beside a roll-over are as large as the one across it, taken the other way round
-    beside = np.interp(np.flatnonzero(over), np.flatnonzero(~over), steps[~over])
-    turn = 0.0 if counts_per_turn is None else float(counts_per_turn)
+    beside = np.interp(np.flatnonzero(over), np.flatnonzero(~over), usual)
     sizes = {1 << ceil(log2(span)), 100 * ceil(span / 100.0)}
     if turn.is_integer() and span <= turn <= NEAR * span:
         sizes = {int(turn)}
-    best, error = 0, np.inf
-    for size in sorted(sizes):
-        short = steps[over] - size * np.round(steps[over] / size)
-        off = float(np.median(np.abs(short - beside)))
-        if off < error:
-            best, error, across = size, off, short
+    across = {size: steps[over] - size * np.round(steps[over] / size) for size in sorted(sizes)}
+    best = min(across, key=lambda size: float(np.median(np.abs(across[size] - beside))))
     # across a gap any step may be; the counter's size is known to what the largest reading leaves
-    small = np.mean(np.abs(across) <= 2.0 * ordinary + (best - span)) >= 0.5
-    level = np.ptp(np.concatenate([steps[~over], across])) == 0.0
+    small = np.mean(np.abs(across[best]) <= 2.0 * ordinary + (best - span)) >= 0.5
+    level = np.ptp(np.concatenate([usual, across[best]])) == 0.0
     return None if level or not small or ordinary >= 0.25 * best else best
 
 
@@ -301,7 +295,7 @@ def rolls_over_at(values: Array, counts_per_turn: float | None = None) -> int | 
 
 
 def signed_by_command(rectified: ArrayLike, command: ArrayLike, *, level: float = 0.0) -> Array:
-    """Give a rectified current the sign of the command.
+    """Rectified current with the sign of the command.
 
     Parameters
     ----------
@@ -337,6 +331,6 @@ def signed_by_command(rectified: ArrayLike, command: ArrayLike, *, level: float 
             f"rectified must not be negative, but row {negative[0]} (the first is 0) is "
             f"{readings[negative[0]]} A."
         )
-    signs = np.where(np.abs(numbers) > level, np.sign(numbers), 0.0)
-    last = np.maximum.accumulate(np.where(signs != 0.0, np.arange(signs.size), 0))
-    return np.where(signs[last] < 0.0, -readings, readings)
+    signed = np.abs(numbers) > level
+    last = np.maximum.accumulate(np.where(signed, np.arange(numbers.size), 0))
+    return np.where(signed[last] & (numbers[last] < 0.0), -readings, readings)

@@ -227,6 +227,15 @@ class Input(Signal):
     interpolation: Literal["previous", "linear"] = Field(
         "previous", description="Between two samples: hold the earlier one, or a straight line."
     )
+    ignore: tuple[Window, ...] = Field(
+        (), description="Windows whose samples are left out: the input goes on across them."
+    )
+
+    @model_validator(mode="after")
+    def _of_all_maneuvers(self) -> Input:
+        if any(each.maneuver is not None for each in self.ignore):
+            raise ValueError("a window of the input holds in every maneuver: leave it out there")
+        return self
 
 
 class Channel(Signal):

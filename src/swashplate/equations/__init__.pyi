@@ -15,13 +15,15 @@ from .loops import interpolate as interpolate
 from .loops import repeated as repeated
 from .loops import root as root
 from .marching.lanes import report as report
+from .marching.run import instance_of as instance_of
 from .marching.stepping import CompiledStep as CompiledStep
 from .marching.stepping import Machine as Machine
 from .marching.stepping import compiled_step as compiled_step
 from .marching.use import Run as Run
-from .marching.use import instance_of as instance_of
+from .marching.use import Stepper as Stepper
 from .marching.use import sensitivities as sensitivities
 from .marching.use import simulate as simulate
+from .marching.use import stepper as stepper
 from .model import Model as Model
 from .model import Tap as Tap
 from .model import Window as Window

@@ -18,7 +18,7 @@ from swashplate.equations.c_source.model import Writer
 from swashplate.equations.fields import declared_by, numbers_of
 from swashplate.equations.marching.record import SOURCE_RATE
 from swashplate.equations.marching.run import Instance, called
-from swashplate.equations.marching.use import instance_of as instance_of_model
+from swashplate.equations.marching.run import instance_of as instance_of_model
 from swashplate.equations.model import Model
 from swashplate.errors import FileError, InputError
 from swashplate.export.variables import DRIVE, DRIVE_WORDS, OWN, References, Words, words_of
@@ -30,7 +30,7 @@ from swashplate.simulation.instance import (
     instance_of,
     models_of,
 )
-from swashplate.simulation.stepper import Sample
+from swashplate.simulation.run import Sample
 from swashplate.tables import write_text
 
 Array = NDArray[np.float64]

@@ -20,14 +20,14 @@ from swashplate.equations.derivatives import derive
 from swashplate.equations.equation import interpreted
 from swashplate.equations.marching.jacobian import jacobian
 from swashplate.equations.marching.observation import Observation, ObservedRecord
-from swashplate.equations.marching.part import Stored
 from swashplate.equations.marching.record import (
     SOURCE_RATE,
     Interpolation,
     least_substeps,
     record_of,
 )
-from swashplate.equations.marching.run import Instance, Part, Start, marched
+from swashplate.equations.marching.run import Instance, Part, Start
+from swashplate.equations.marching.use import Run, read_only
 from swashplate.errors import DomainError, InputError
 from swashplate.full_order.physical_set import PhysicalSet, from_lumped
 from swashplate.models import full_order as model
@@ -38,7 +38,7 @@ from swashplate.models.machine import Machine, fastest_rate
 from swashplate.parameters.parameter_set import Change
 from swashplate.results import Result, Tabular
 from swashplate.simulation.instance import PATHS, card_of, card_options, check_filter_stability
-from swashplate.simulation.result import Named, Signals, read_only, signal
+from swashplate.simulation.result import Named
 from swashplate.tables import Cell, Column, Table
 
 if TYPE_CHECKING:
@@ -56,9 +56,6 @@ LEAST_SUBSTEPS = 8  # Sub-steps a sample that kinks of the flow, at the orifices
 MOST_SUBSTEPS = 20_000  # Sub-steps a sample, beyond which the machine is too stiff for the march.
 
 
-KEPT = tuple(Stored(1, "signals", name) for name in PlantSignals._fields)
-
-
 def path_of(name: str) -> str:
     """Path in the model of a quantity, or of a parameter of card or solenoids, by its column."""
     if name in Machine._fields:
@@ -73,64 +70,57 @@ def path_of(name: str) -> str:
     )
 
 
-@dataclass(frozen=True, eq=False)
-class FullOrderSimulation(Signals):
+class FullOrderSimulation(Run, Tabular):
     """Signals of one record, read-only arrays of the record's length, all SI.
 
     Signs are those of `swashplate.Simulation`. The record is the signed current. The motor's
     pressure drop is positive where the load resists positive speed.
     """
 
-    plant: model.Plant
-    """The machine and its solenoids."""
-    constants: PlantConstants
-    """What follows from these alone."""
-    marched: Array
-    """(k, n) signals of `swashplate.models.full_order.PlantSignals` on the march's grid."""
+    kept = PlantSignals._fields
+
+    @property
+    def plant(self) -> model.Plant:
+        """The machine and its solenoids."""
+        found: model.Plant = self.instance.parts[1].p
+        return found
+
+    @property
+    def constants(self) -> PlantConstants:
+        """What follows from these alone."""
+        found: PlantConstants = self.started.arguments[1]["k"]
+        return found
 
     @property
     def names(self) -> tuple[str, ...]:
         """The signals that it has: ``"time"`` and `SIGNALS`."""
         return ("time", *SIGNALS)
 
-    def __repr__(self) -> str:
-        return f"FullOrderSimulation({self.name!r}, {self.time.size} samples)"
-
-    @cached_property
-    def _fine(self) -> dict[str, Array]:
-        """All signals on the grid that was marched."""
-        found = zip(PlantSignals._fields, self.marched, strict=True)
-        return {"current": self.record.values, **dict(found)}
-
-    def fine(self, signal: str) -> Array:
-        """A signal on the march's grid: one of `SIGNALS`, or the ``"piston_pressure"``."""
-        return self.turned() if signal == "shaft_position" else self._fine[signal]
-
-    current = Named(signal)
+    current = Named()
     """Signed current. [A]"""
-    solenoid_force = Named(signal)
+    solenoid_force = Named()
     """Net force of both solenoids on the spool. [N]"""
-    spool_position = Named(signal)
+    spool_position = Named()
     """Displacement of the spool. [m]"""
-    spool_velocity = Named(signal)
+    spool_velocity = Named()
     """Velocity of the spool. [m/s]"""
-    orifice_opening = Named(signal)
+    orifice_opening = Named()
     """Effective opening, what the orifices leave of the spool's displacement. [m]"""
-    valve_flow = Named(signal)
+    valve_flow = Named()
     """Flow through the valve towards the stroking piston. [m³/s]"""
-    stroker_pressure = Named(signal)
+    stroker_pressure = Named()
     """Stroking pressure δP about the one that holds the load at rest. [Pa]"""
-    swash_angle = Named(signal)
+    swash_angle = Named()
     """Angle of the swash plate. [rad]"""
-    swash_rate = Named(signal)
+    swash_rate = Named()
     """Rate of the swash plate. [rad/s]"""
-    shaft_speed = Named(signal)
+    shaft_speed = Named()
     """Speed of the shaft, of the turret for slew. [rad/s]"""
-    shaft_position = Named(signal)
+    shaft_position = Named()
     """Angle of the shaft, zero at the start: the trapezoidal integral of its speed. [rad]"""
-    motor_pressure_drop = Named(signal)
+    motor_pressure_drop = Named()
     """Pressure drop across the motor, P_hi - P_lo, under load inertia and gravity. [Pa]"""
-    pump_flow = Named(signal)
+    pump_flow = Named()
     """Flow of the pump to the motor. [m³/s]"""
 
     @property
@@ -321,12 +311,9 @@ class FullOrderDrive:
         DomainError
             If the machine is too stiff for the march.
         """
-        step, record = run.record.step, replace(run.record, values=run.fine("current"))
-        instance = self.instance(step, substeps=substeps, card=False)
-        started = instance.start({"current": float(record.values[0])}, step, start)
-        out = marched(instance, {"current": record.values}, step, started, KEPT, "current")
-        constants = started.arguments[1]["k"]
-        return FullOrderSimulation(self.physical.name, record, self.plant, constants, out)
+        record = replace(run.record, values=run.fine("current"))
+        instance = self.instance(record.step, substeps=substeps, card=False)
+        return FullOrderSimulation(instance, {"current": record}, start).marched("current")
 
     def modes(self, current: float = 0.0) -> Modes:
         """Natural modes about the equilibrium under a constant signed current, no limit holding.

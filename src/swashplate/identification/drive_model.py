@@ -16,7 +16,7 @@ from swashplate.campaign.experiment import Channel, Experiment, InputSignal
 from swashplate.campaign.samples import signed_by_command
 from swashplate.campaign.schema import SIGNALS as SIGNALS
 from swashplate.drive import Drive
-from swashplate.equations.marching.observation import ObservedRecord
+from swashplate.equations.marching.observation import ObservedRecord, Own
 from swashplate.equations.marching.record import SLOWEST, SOURCE_RATE, Record, even_rate, record_of
 from swashplate.errors import DomainError, InputError, ParameterError
 from swashplate.executors import available_cores
@@ -37,9 +37,9 @@ from swashplate.parameters.parameter_set import ParameterSet
 from swashplate.parameters.rules import FULL_VOLTAGE
 from swashplate.results import Result
 from swashplate.simulation.instance import START_PRESSURE, at_every_rate
-from swashplate.simulation.residuals import Own, Ready, made_ready
+from swashplate.simulation.residuals import Ready, made_ready
 from swashplate.simulation.result import Limit, Simulation
-from swashplate.simulation.run import check_voltage, simulate_drive, simulate_pump
+from swashplate.simulation.run import check_voltage, simulate_drive
 
 Array = NDArray[np.float64]
 
@@ -74,8 +74,8 @@ def simulated_current(experiment: Experiment, parameters: ParameterSet) -> Recor
     """The signed current that a card makes of an experiment's command."""
     record = voltage_record(experiment)
     # refinements begin behind the card
-    run = simulate_drive(parameters.plain, record, experiment.begins)
-    return Record(run.fine("current"), record.start, record.rate, record.substeps)
+    run = simulate_drive(parameters.plain, {"voltage": record}, experiment.begins)
+    return replace(record, values=run.fine("current"))
 
 
 def simulated_run(experiment: Experiment, parameters: ParameterSet) -> Simulation:
@@ -88,15 +88,12 @@ def simulated_run(experiment: Experiment, parameters: ParameterSet) -> Simulatio
     DomainError
         If the model does not hold under it.
     """
-    begins = experiment.begins
     try:
         if experiment.input.kind == "current":
-            return simulate_pump(
-                parameters, current_record(experiment), begins, experiment.start_pressure
-            )
-        return simulate_drive(
-            parameters, voltage_record(experiment), begins, experiment.start_pressure
-        )
+            records = {"current": current_record(experiment)}
+        else:
+            records = {"voltage": voltage_record(experiment)}
+        return simulate_drive(parameters, records, experiment.begins, experiment.start_pressure)
     except InputError as error:
         raise InputError(f"{experiment.input.source}: {error}") from None
 
@@ -270,7 +267,9 @@ class DriveModel(Result, EquationModel):
             if name in values
             for path in self._start_paths(name)
         }
-        own = Own(values.get(START_PRESSURE), offsets, states=states)
+        if START_PRESSURE in values:
+            states[START_PRESSURE] = values[START_PRESSURE]
+        own = Own(states, offsets)
         try:
             return made_ready(self.parameters_at(values), observed, columns, own)
         except InputError as error:  # a filter that is unstable at this step

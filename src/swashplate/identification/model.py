@@ -303,7 +303,7 @@ class EquationModel(ABC):
         own = [
             f"{OFFSET}{channel}"
             for channel, each in zip(channels, observed.observations, strict=True)
-            if each.unknown
+            if each.free_offset
         ]
         asked = list(dict.fromkeys(c for each in moved for c in each if not c.startswith(OFFSET)))
         chain = np.array([[each.get(row, 0.0) for each in moved] for row in (*asked, *own)])
@@ -330,7 +330,7 @@ class EquationModel(ABC):
                     if weight is None
                     else experiment[name].values,
                     1.0 if weight is None else weight,
-                    unknown=("offset",) if f"{OFFSET}{name}" in own else (),
+                    free_offset=f"{OFFSET}{name}" in own,
                 )
                 for name, weight in weights.items()
             ]

@@ -12,7 +12,6 @@ from swashplate.logs.log import Column as Column
 from swashplate.logs.log import Log as Log
 from swashplate.logs.log import Series as Series
 from swashplate.logs.log import check_duration as check_duration
-from swashplate.logs.log import check_finite as check_finite
 from swashplate.logs.log import check_stamps as check_stamps
 from swashplate.logs.log import open_log as open_log
 from swashplate.logs.log import read_series as read_series

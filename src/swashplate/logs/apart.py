@@ -41,20 +41,23 @@ _START = "import sys; sys.path[:] = {path!r}; from swashplate.logs.apart import 
 
 
 def open_apart(reader: str, path: Path) -> Log:
-    """Look into a file of a format of `swashplate.logs.binary.OPENERS`, in the other process.
+    """Look into a file by `swashplate.logs.binary.look`, in the other process.
 
     Raises
     ------
     FileError
         As the reader does; or if the file ended the process, or took too long.
     """
-    told = _Other.ask(reader, path)[0]
+
+    def ask(*what: Any) -> tuple[dict[str, Any], list[Array]]:
+        return _Other.ask(path, [reader, str(path.absolute()), str(path), *what])
 
     def load(positions: Sequence[int], first: int = 0, last: int | None = None) -> list[Array]:
-        return _Other.ask(reader, path, positions, (first, last))[1]
+        return ask([*positions], first, last)[1]
 
-    columns = tuple(Column(*column) for column in told["columns"])
-    return Log(path, told["format"], columns, load, told["left_out"], tuple(told["lengths"]))
+    found = ask(None, 0, None)[0]
+    columns = tuple(Column(*column) for column in found["columns"])
+    return Log(path, found["format"], columns, load, found["left_out"], tuple(found["lengths"]))
 
 
 class _Other:
@@ -83,16 +86,8 @@ class _Other:
         self._end = finalize(self, _ended, self._process, self._errors)
 
     @classmethod
-    def ask(
-        cls,
-        reader: str,
-        path: Path,
-        positions: Sequence[int] | None = None,
-        rows: tuple[int, int | None] = (0, None),
-    ) -> tuple[dict[str, Any], list[Array]]:
-        """What the other process has to say of a file, and these columns of it."""
-        question: dict[str, Any] = {"reader": reader, "path": str(path.absolute()), "rows": rows}
-        question |= {"said": str(path), "positions": positions and list(positions)}
+    def ask(cls, path: Path, question: Sequence[Any]) -> tuple[dict[str, Any], list[Array]]:
+        """What the other process has to say of a file, and the columns asked for."""
         with cls.lock:
             try:
                 cls.running = other = cls.running or cls()
@@ -112,45 +107,36 @@ class _Other:
             raise (InputError if answer["kind"] == "InputError" else FileError)(answer["error"])
         return answer, arrays
 
-    def _answer(self, path: Path, question: dict[str, Any]) -> tuple[dict[str, Any], list[Array]]:
+    def _answer(self, path: Path, question: Sequence[Any]) -> tuple[dict[str, Any], list[Array]]:
         source = cast(io.BufferedReader, self._process.stdout)
         sink = cast(io.BufferedWriter, self._process.stdin)
-        try:
-            sink.write(json.dumps(question).encode() + b"\n")
-            sink.flush()
-        except BrokenPipeError:
-            raise FileError(self._what_ended(path)) from None
         seconds = _PATIENCE + _PATIENCE_PER_MEGABYTE * path.stat().st_size / 1e6
         # a clock that ends the process, since not every system can wait for a pipe
         clock = threading.Timer(seconds, self._process.kill)
         clock.start()
-        try:
+        line = b""
+        with suppress(BrokenPipeError):
+            sink.write(json.dumps(question).encode() + b"\n")
+            sink.flush()
             line = source.readline()
-        finally:
-            out_of_time = not clock.is_alive()
-            clock.cancel()
-        if out_of_time:
+        in_time = clock.is_alive()
+        clock.cancel()
+        if not in_time:
             raise FileError(
                 f"{path} could not be read within {seconds:.0f} s; it is damaged or too large."
             )
-        if not line.endswith(b"\n"):
-            raise FileError(self._what_ended(path))
-        answer = json.loads(line)
-        arrays = []
-        for count in answer.get("counts", []):
-            array = np.empty(count)
-            if source.readinto(array.view(np.uint8).data) < array.nbytes:
-                raise FileError(self._what_ended(path))
-            arrays.append(array)
+        answer = json.loads(line) if line.endswith(b"\n") else {}
+        arrays = [np.empty(size) for size in answer.get("sizes", [])]
+        read = [source.readinto(each.view(np.uint8).data) == each.nbytes for each in arrays]
+        if not answer or not all(read):
+            self._process.wait()
+            self._errors.seek(0)
+            lines = self._errors.read()[-2000:].decode("utf-8", "replace").split("\n")
+            last = next((line for line in reversed(lines) if line[:1].isalpha()), "")
+            reason = printable(last).strip().rstrip(".")[:200]
+            why = f": {reason}" if reason else ""
+            raise FileError(f"{path} is damaged so that reading it breaks off{why}.")
         return answer, arrays
-
-    def _what_ended(self, path: Path) -> str:
-        self._process.wait()
-        self._errors.seek(0)
-        lines = self._errors.read()[-2000:].decode("utf-8", "replace").split("\n")
-        told = next((line for line in reversed(lines) if line[:1].isalpha()), "")
-        reason = printable(told).strip().rstrip(".")[:200]
-        return f"{path} is damaged so that reading it breaks off{': ' if reason else ''}{reason}."
 
 
 def _ended(process: subprocess.Popen[bytes], errors: IO[bytes]) -> None:
@@ -192,31 +178,25 @@ def in_parts(log: Log, names: Sequence[str]) -> Log:
     FileError
         If a cell holds no number, or the table cannot be written.
     """
+    import polars as pl
+
     if log.stream is None or max(log.lengths, default=0) <= LONG:
         return log
     table = log.path.with_name(f"{log.path.name}.parquet")
-    columns = list(dict.fromkeys(log.columns.index(log.find(name)) for name in names))
+    columns = {log.columns.index(log.find(name)) for name in names}
     stat = log.path.stat()
-    stamp = [stat.st_size, stat.st_mtime_ns, log.format]
-    *made_of, stored = _stamp_of(table) or [None, []]
-    if made_of != stamp or not {*columns} <= {*stored}:
-        stored = sorted({*columns, *(stored if made_of == stamp else [])})
+    stamp, made_of = [stat.st_size, stat.st_mtime_ns, log.format], []
+    with suppress(pl.exceptions.PolarsError, ValueError, OSError):
+        # size, time and format of the log that a table was made of, and places of its columns
+        made_of = json.loads(pl.read_parquet_metadata(table).get(_KEY, "null"))
+    if made_of is None:
+        raise FileError(f"{table} stands where the table of a long log belongs; rename it.")
+    stored: list[int] = made_of[-1] if made_of[:-1] == stamp else []
+    if not columns <= {*stored}:
+        stored = sorted(columns.union(stored))
         _convert(log, stored, table, json.dumps([*stamp, stored]))
     kept = tuple(log.columns[position] for position in stored)
     return replace(open_apart("Parquet", table), path=log.path, columns=kept, table=table)
-
-
-def _stamp_of(table: Path) -> list[Any] | None:
-    """Size, time and format of the log that a table was made of, and positions of its columns."""
-    import polars as pl
-
-    try:
-        stamp = json.loads(pl.read_parquet_metadata(table).get(_KEY, "null"))
-    except (pl.exceptions.PolarsError, ValueError, OSError):
-        return None
-    if stamp is None:
-        raise FileError(f"{table} stands where the table of a long log belongs; rename it.")
-    return list(stamp)
 
 
 def _convert(log: Log, columns: Sequence[int], table: Path, stamp: str) -> None:
@@ -226,14 +206,12 @@ def _convert(log: Log, columns: Sequence[int], table: Path, stamp: str) -> None:
     stream, names = log.stream, [str(position) for position in columns]
     failed: list[FileError] = []
 
-    def pieces(
-        wanted: list[str] | None, predicate: object, count: object, size: object
-    ) -> Iterator[polars.DataFrame]:
+    def pieces(*_: object) -> Iterator[polars.DataFrame]:
         assert stream is not None
         try:
             for arrays in stream(columns):
                 yield pl.DataFrame(dict(zip(names, arrays, strict=True)))
-        except FileError as error:  # Polars would tell of it in words of its own
+        except FileError as error:  # Polars would report it in words of its own
             failed.append(error)
             raise
 
@@ -243,13 +221,11 @@ def _convert(log: Log, columns: Sequence[int], table: Path, stamp: str) -> None:
         source.sink_parquet(partial, row_group_size=_GROUP, metadata={_KEY: stamp})
         partial.replace(table)
     except (pl.exceptions.PolarsError, OSError) as error:
-        raise (
-            failed[0]
-            if failed
-            else FileError(
-                f"{log.path} has about {max(log.lengths)} rows, more than are held at once, and "
-                f"its table {table.name} cannot be written beside it: {said(error)}."
-            )
+        if failed:
+            raise failed[0] from None
+        raise FileError(
+            f"{log.path} has about {max(log.lengths)} rows, more than are held at once, and its "
+            f"table {table.name} cannot be written beside it: {said(error)}."
         ) from None
     finally:
         partial.unlink(missing_ok=True)
@@ -266,28 +242,26 @@ _USED = Path("/proc/self/statm")
 
 def serve() -> None:
     """Answer questions: a line of JSON each, answered by a line and the arrays asked for."""
-    from swashplate.logs.binary import OPENERS
+    from swashplate.logs.binary import look
 
     answers = os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)  # what libraries print must not get between the answers
     warnings.simplefilter("ignore")
     last: tuple[object, Log] | None = None
     for line in sys.stdin.buffer:
-        asked = json.loads(line)
-        path, reader = Path(asked["path"]), asked["reader"]
-        arrays: Sequence[Array] = []
-        answer: dict[str, Any]
+        reader, name, shown, positions, *rows = json.loads(line)
+        path, arrays, answer = Path(name), list[Array](), dict[str, Any]()
         try:
             _limit_memory(path)
             known = (reader, path, path.stat().st_mtime_ns, path.stat().st_size)
             if last is None or last[0] != known:
                 last = None
-                last = known, OPENERS[reader](path)
+                last = known, look(reader, path)
             log = last[1]
-            if asked["positions"] is not None:
-                arrays = log.load(asked["positions"], *asked["rows"])
-            answer = {key: getattr(log, key) for key in ("format", "columns", "lengths")}
-            answer["left_out"] = dict(log.left_out)
+            arrays = [*log.load(positions, *rows)] if positions is not None else []
+            answer = {
+                key: getattr(log, key) for key in ("format", "columns", "left_out", "lengths")
+            }
         except (KeyboardInterrupt, SystemExit):
             raise
         except BaseException as error:
@@ -298,9 +272,9 @@ def serve() -> None:
                     f"{path} cannot be read as {reader}, it is damaged or of another kind: "
                     f"{said(error)}."
                 )
-            kind = "InputError" if isinstance(error, InputError) else "FileError"
-            answer, arrays = {"error": what.replace(str(path), asked["said"]), "kind": kind}, []
-        answer["counts"] = [array.size for array in arrays]
+            answer = {"error": what.replace(name, shown), "kind": type(error).__name__}
+            arrays = []
+        answer["sizes"] = [array.size for array in arrays]
         answers.write(json.dumps(answer).encode() + b"\n")
         for array in arrays:
             answers.write(np.ascontiguousarray(array).view(np.uint8).data)

@@ -1,19 +1,18 @@
 """Logs in binary formats: thin layers over Polars, SciPy, h5py, npTDMS and asammdf.
 
-They are opened in a process of their own, see `swashplate.logs.apart`. What a library reads from a
-damaged file without a word is refused here: variables, blocks and channels that were cut off.
+A format is a row of `FORMATS`: how a file is opened, what it holds, how a column is read. What a
+library reads from a damaged file without a word is refused here: variables, blocks and channels
+that were cut off. All of it runs in a process of its own, see `swashplate.logs.apart`.
 """
 
 from __future__ import annotations
 
 import logging
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
-from functools import partial
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from math import ceil, prod
 from pathlib import Path
-from types import MappingProxyType
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -26,49 +25,91 @@ class _Item(NamedTuple):
     """Something that a file holds: a column of a log, or the reason why it is none."""
 
     name: str
+    reason: str = ""
     unit: str | None = None
     rows: int = 0
     key: Any = None
     """Where it is in the file."""
-    reason: str = ""
 
 
-def _log(
-    path: Path,
-    form: str,
-    items: Iterable[_Item],
-    read: Callable[[Sequence[Any], int, int | None], Sequence[Array]],
-    what: str = "columns",
-) -> Log:
-    """The log of a file's items; `read` gives those of some keys, `what` is what they are called.
+class _Format(NamedTuple):
+    """How files of a format are read."""
+
+    opened: Callable[[Path], AbstractContextManager[Any]]
+    items: Callable[[Any], Iterator[_Item]]
+    """What an opened file holds."""
+    column: Callable[[Any, Any, int, int | None], Any]
+    """Numbers of an opened file by a key, from a row to before a last one (None: to the end)."""
+    what: str = "columns"
+
+
+def look(reader: str, path: Path) -> Log:
+    """Look into a file as one of the formats of `swashplate.logs.log.ENDINGS` but text.
 
     Raises
     ------
     FileError
-        If none of them is a column of numbers.
+        If it is of another kind, has no columns of numbers, or needs a library that is not
+        installed. Of a damaged file whatever its library raises.
     """
-    items = list(items)
+    form = _form_of(reader, path)
+    opened, items_of, column, what = FORMATS[form]
+    with opened(path) as file:
+        items = list(items_of(file))
     kept = [each for each in items if not each.reason]
     left_out = {each.name: each.reason for each in items if each.reason}
     if not kept:
         why = "".join(f"; '{each}': {reason}" for each, reason in left_out.items())[:300]
         raise FileError(f"{path} has no {what} of numbers{printable(why)}.")
 
-    def load(positions: Sequence[int], first: int = 0, last: int | None = None) -> Sequence[Array]:
-        return read([kept[position].key for position in positions], first, last)
+    def load(positions: Sequence[int], first: int = 0, last: int | None = None) -> list[Array]:
+        arrays = []
+        with opened(path) as file:
+            for item in (kept[position] for position in positions):
+                numbers = np.asarray(column(file, item.key, first, last), np.float64).ravel()
+                claimed = len(range(item.rows)[first:last])
+                if numbers.size != claimed:
+                    raise FileError(
+                        f"{path}: '{item.name}' has {numbers.size} numbers where it claims "
+                        f"{claimed}; the file was cut off or is damaged."
+                    )
+                arrays.append(numbers)
+        return arrays
 
     columns = tuple(Column(each.name, each.unit) for each in kept)
     return Log(path, form, columns, load, left_out, tuple(each.rows for each in kept))
 
 
-def _whole(path: Path, called: str, numbers: Array, claimed: int) -> Array:
-    """Refuse a column with fewer numbers than it claims."""
-    if numbers.size != claimed:
+_LARGEST = 256 << 20
+"""A file of MATLAB 4 or 5 is read as a whole; a larger one is refused. [byte]"""
+
+
+def _form_of(reader: str, path: Path) -> str:
+    """The row of `FORMATS` by the first bytes of a file; another kind of file is refused."""
+    check_kind(path, reader, *["HDF5"] * (reader == "MATLAB"))
+    with path.open("rb") as file:
+        head, size = file.read(2056), file.seek(0, 2)
+    if reader == "MDF":
+        version = head[8:16].decode("latin-1").strip(" \0")
+        why = "" if version.startswith("4") else f"is MDF {version!r}; convert it to MDF 4"
+        if not head.startswith(b"MDF     ") or len(head) < 64:
+            why = "is no MDF file"
+        if head.startswith(b"UnFinMF "):
+            why = "was not finished by its logger; let its program finalise it"
+        if why:
+            raise FileError(f"{path} {why}.")
+        return "MDF 4"
+    if reader != "MATLAB":
+        return reader
+    # HDF5 begins at 0 or, behind MATLAB's own header, at a power of two
+    if any(head[place:].startswith(b"\x89HDF\r\n\x1a\n") for place in (0, 512, 1024, 2048)):
+        return "MATLAB 7.3"
+    if size > _LARGEST:
         raise FileError(
-            f"{path}: '{called}' has {numbers.size} numbers where it claims {claimed}; the file "
-            "was cut off or is damaged."
+            f"{path} has {size >> 20} MB, and MATLAB files up to version 7 are read as a whole, up "
+            f"to {_LARGEST >> 20} MB: save it with -v7.3, or as CSV."
         )
-    return numbers
+    return "MATLAB 5" if head[126:128] in (b"IM", b"MI") else "MATLAB 4"
 
 
 def _missing(path: Path, library: str, extra: str) -> FileError:
@@ -82,34 +123,28 @@ def _missing(path: Path, library: str, extra: str) -> FileError:
 # --- Parquet --------------------------------------------------------------------------------------
 
 
-def open_parquet(path: Path) -> Log:
-    """Look into a Parquet file: its columns of numbers, dates and durations.
-
-    Dates and times become seconds since the first of the column, durations seconds.
-    """
+def _parquet(path: Path) -> AbstractContextManager[Any]:
     import polars as pl
 
-    check_kind(path, "Parquet")
-    rows = int(pl.scan_parquet(path).select(pl.len()).collect().item())
-
-    def item(name: str, kind: pl.DataType) -> _Item:
-        if not (kind.is_numeric() or kind.is_temporal() or kind == pl.Boolean):
-            return _Item(name, reason=f"it is of the type {kind}")
-        return _Item(name, "s" if kind.is_temporal() else split_unit(name)[1], rows, name)
-
-    def read(names: Sequence[str], first: int, last: int | None) -> list[Array]:
-        # one column after the other: none that is done waits in the form that Polars reads it in
-        return [_parquet_column(path, name, first, last) for name in names]
-
-    items = (item(*each) for each in pl.read_parquet_schema(path).items())
-    return _log(path, "Parquet", items, read)
+    return nullcontext(pl.scan_parquet(path))
 
 
-def _parquet_column(path: Path, column: str, first: int, last: int | None) -> Array:
+def _parquet_items(stored: Any) -> Iterator[_Item]:
     import polars as pl
 
-    stored = pl.scan_parquet(path).select(column)
-    cells = stored.slice(first, None if last is None else last - first).collect()[column]
+    rows = int(stored.select(pl.len()).collect().item())
+    for name, kind in stored.collect_schema().items():
+        unit = "s" if kind.is_temporal() else split_unit(name)[1]
+        numbers = kind.is_numeric() or kind.is_temporal() or kind == pl.Boolean
+        yield _Item(name, "" if numbers else f"it is of the type {kind}", unit, rows, name)
+
+
+def _parquet_column(stored: Any, name: str, first: int, last: int | None) -> Any:
+    """Numbers; dates and times as seconds since the first of the column, durations as seconds."""
+    import polars as pl
+
+    stored = stored.select(name)
+    cells = stored.slice(first, None if last is None else last - first).collect()[name]
     if not cells.dtype.is_temporal():
         return cells.cast(pl.Float64).to_numpy()
     zero = 0
@@ -119,43 +154,29 @@ def _parquet_column(path: Path, column: str, first: int, last: int | None) -> Ar
         ticks = cells.cast(pl.Int64)
     else:
         ticks = cells.cast(pl.Datetime("ns")).dt.epoch("ns")
-        begin = stored.drop_nulls().head(1).collect()[column].cast(pl.Datetime("ns"))
+        begin = stored.drop_nulls().head(1).collect()[name].cast(pl.Datetime("ns"))
         zero = next(iter(begin.dt.epoch("ns")), 0)
     # subtracted as integers: a double of nanoseconds since 1970 would be 256 ns coarse
-    return np.asarray(((ticks - zero).cast(pl.Float64) / 1e9).to_numpy(), np.float64)
+    return ((ticks - zero).cast(pl.Float64) / 1e9).to_numpy()
 
 
 # --- arrays: MATLAB and HDF5 ----------------------------------------------------------------------
 
 _MOST = 4096  # signals in one matrix; one with more of both rows and columns is a picture or a map
 _KINDS = {"c": "it holds complex numbers", "S": "it holds text", "U": "it holds text"}
-_OTHER = "it is no array of numbers"
-_LARGEST = 256 << 20
-"""A file of MATLAB 4 or 5 is read as a whole; a larger one is refused. [byte]"""
-_HDF5 = b"\x89HDF\r\n\x1a\n"
 _UNITS = ("unit", "units", "Unit", "Units", "UNIT", "UNITS")
 _OBJECTS = 100_000  # in one file
 
 
-class _Place(NamedTuple):
-    """A vector, or a row or a column of a matrix."""
-
-    array: str
-    axis: int | None
-    """Dimension along which it is chosen, None for a vector."""
-    number: int
-    """Position along that dimension, from 0."""
-    rows: int
-
-
 def _signals(
-    name: str, array: str, shape: tuple[int, ...], kind: str, units: Sequence[str], *, matlab: bool
-) -> list[_Item]:
-    """Vectors of an array of a shape in its own language's order; `array` is its place.
+    name: str, array: str, shape: tuple[int, ...], kind: str, units: Sequence[str], form: str
+) -> Iterator[_Item]:
+    """Vectors of an array of a shape in its own language's order; the longer dimension is time.
 
-    The longer dimension is taken for the time.
+    Their keys are the array's place, the dimension along which a vector is chosen, None of an array
+    that is one, and its number along it. `form` is ``"({})"`` of MATLAB, ``"[{}]"`` of HDF5.
     """
-    reason = "" if kind in tuple("iufb") else _KINDS.get(kind, _OTHER)
+    reason = "" if kind in "iufb" else _KINDS.get(kind, "it is no array of numbers")
     reason = reason or ("it is empty" if 0 in shape else "")
     if not reason and len(shape) > 2:
         reason = f"it has {len(shape)} dimensions"
@@ -165,53 +186,17 @@ def _signals(
         if count > _MOST and not reason:
             reason = f"it is a matrix of {shape[0]} by {shape[1]}"
     if reason:
-        return [_Item(name, reason=reason)]
+        yield _Item(name, reason)
+        return
     given = list(units) if len(units) == count else [*units[:1], split_unit(name)[1]][:1] * count
-    if axis is None:
-        return [_Item(name, given[0], prod(shape), _Place(array, None, 0, prod(shape)))]
-    form = (("({},:)", "(:,{})") if matlab else ("[{},:]", "[:,{}]"))[axis]
-    rows = max(shape)
-    return [
-        _Item(name + form.format(i + matlab), given[i], rows, _Place(array, axis, i, rows))
-        for i in range(count)
-    ]
+    first = int(form[0] == "(")  # MATLAB counts from 1
+    for i in range(count):
+        place = "" if axis is None else form.format(("{},:", ":,{}")[axis].format(i + first))
+        yield _Item(name + place, "", given[i], max(shape, default=1), (array, axis, i))
 
 
-def open_matlab(path: Path) -> Log:
-    """Look into a MATLAB file: vectors, matrices and the fields of structures.
-
-    Columns are called as MATLAB writes them: ``x``, ``s.t``, ``x(1,:)``, ``x(:,1)``; of a matrix,
-    the longer dimension is taken for the time. Whatever else there is, is left out.
-    """
-    check_kind(path, "MATLAB", "HDF5")
-    with path.open("rb") as file:
-        head, size = file.read(2056), file.seek(0, 2)
-    # HDF5 begins at 0 or, behind MATLAB's own header, at a power of two
-    if any(head[place : place + 8] == _HDF5 for place in (0, 512, 1024, 2048)):
-        return _open_h5(path, "MATLAB 7.3", _matlab_name, matlab=True)
-    five = head[126:128] in (b"IM", b"MI")
-    if size > _LARGEST:
-        raise FileError(
-            f"{path} has {size >> 20} MB, and MATLAB files up to version 7 are read as a whole, up "
-            f"to {_LARGEST >> 20} MB: save it with -v7.3, or as CSV."
-        )
-
-    def read(places: Sequence[Any], first: int, last: int | None) -> list[Array]:
-        values, arrays = _matlab_values(path), []
-        for name, axis, number, _ in places:
-            vector = values[name] if axis is None else np.take(values[name], number, axis=axis)
-            arrays.append(np.asarray(vector, np.float64).ravel()[first:last])
-        return arrays
-
-    items = (
-        item
-        for name, value in _matlab_values(path).items()
-        for item in _signals(name, name, value.shape, value.dtype.kind, (), matlab=True)
-    )
-    return _log(path, "MATLAB 5" if five else "MATLAB 4", items, read, "vectors")
-
-
-def _matlab_values(path: Path) -> dict[str, Any]:
+@contextmanager
+def _matlab(path: Path) -> Iterator[Any]:
     """Arrays by the names of the variables and, of structures, of their fields."""
     from scipy.io import loadmat
 
@@ -223,154 +208,119 @@ def _matlab_values(path: Path) -> dict[str, Any]:
             yield called, np.asarray(value)
 
     variables = loadmat(path, appendmat=False, simplify_cells=True).items()
-    return {
-        called: value
-        for name, content in variables
-        if not name.startswith("__")
-        for called, value in of(printable(name), content)
-    }
+    named = (each for each in variables if not each[0].startswith("__"))
+    yield dict(pair for name, content in named for pair in of(printable(name), content))
 
 
-def _matlab_name(dataset: Any) -> tuple[str, str]:
-    """What a dataset of version 7.3 is called, and why it cannot be read."""
-    kind = _text(dataset.attrs.get("MATLAB_class", "double"))
-    numbers = kind in ("single", "logical", "double") or kind.lstrip("u").startswith("int")
-    reason = "it is empty" if dataset.attrs.get("MATLAB_empty", 0) else ""
-    if "MATLAB_object_decode" in dataset.attrs or not numbers:
-        reason = f"it is a MATLAB {kind}"
-    return dataset.name.strip("/").replace("/", "."), reason
+def _matlab_items(arrays: Mapping[str, Any]) -> Iterator[_Item]:
+    for name, value in arrays.items():
+        yield from _signals(name, name, value.shape, value.dtype.kind, (), "({})")
 
 
-def open_hdf5(path: Path) -> Log:
-    """Look into an HDF5 file: every dataset of numbers, of one or two dimensions.
-
-    Columns are called ``/group/data``, those of a matrix ``/group/data[:,0]`` or
-    ``/group/data[0,:]``, along its longer dimension. Units are from attributes. Links to other
-    files are not followed.
-    """
-    check_kind(path, "HDF5")
-    return _open_h5(path, "HDF5", lambda each: (f"/{each.name.lstrip('/')}", ""), matlab=False)
+def _matlab_column(arrays: Mapping[str, Any], key: Any, first: int, last: int | None) -> Any:
+    name, axis, number = key
+    vector = arrays[name] if axis is None else np.take(arrays[name], number, axis=axis)
+    return np.ravel(vector)[first:last]
 
 
-def _open_h5(
-    path: Path, form: str, naming: Callable[[Any], tuple[str, str]], *, matlab: bool
-) -> Log:
-    """A log of the datasets that `naming` gives a name and no reason why they cannot be read."""
+@contextmanager
+def _hdf5(path: Path) -> Iterator[Any]:
     import h5py
 
-    items: list[_Item] = []
     with h5py.File(path, "r", locking=False) as file:
-        names: list[str] = []
-        # visits neither soft nor external links, and an object of several names once
-        file.visit(names.append)
-        if len(names) > _OBJECTS:
-            raise FileError(
-                f"{path} has {len(names)} objects, more than the {_OBJECTS} that are read."
-            )
-        # MATLAB keeps what cells and objects refer to below a name with a #
-        for dataset in (file.get(name) for name in names if not (matlab and name[:1] == "#")):
-            if not isinstance(dataset, h5py.Dataset):
-                continue
-            called, reason = naming(dataset)
-            try:
-                if not dataset.shape:
-                    reason = reason or "it is a single value"
-                elif dataset.is_virtual or dataset.external:
-                    reason = reason or "its numbers are in other files"
-                found = [_Item(called, reason=reason)] if reason else None
-                items += found or _h5_signals(called, dataset, matlab)
-            except (TypeError, ValueError) as error:  # a type that NumPy does not have
-                items.append(_Item(called, reason=said(error)))
-
-    def read(places: Sequence[Any], first: int, last: int | None) -> list[Array]:
-        with h5py.File(path, "r", locking=False) as file:
-            return [_h5_vector(path, file, each, first, last, matlab) for each in places]
-
-    return _log(path, form, items, read)
+        yield file
 
 
-def _h5_signals(called: str, dataset: Any, matlab: bool) -> list[_Item]:
-    given: Any = next((dataset.attrs[key] for key in _UNITS if key in dataset.attrs), [])
-    units = [_text(each) for each in np.ravel(given).tolist()]
-    shape = dataset.shape[::-1] if matlab else dataset.shape
-    return _signals(called, dataset.name, shape, dataset.dtype.kind, units, matlab=matlab)
+def _datasets(file: Any) -> Iterator[Any]:
+    """All datasets, each once; neither soft nor external links are followed."""
+    import h5py
+
+    names: list[str] = []
+    file.visit(names.append)
+    if len(names) > _OBJECTS:
+        raise ValueError(f"it has {len(names)} objects, more than the {_OBJECTS} that are read")
+    found = map(file.get, names)
+    yield from (each for each in found if isinstance(each, h5py.Dataset))
+
+
+def _hdf5_signals(name: str, dataset: Any, form: str) -> Iterator[_Item]:
+    reason = "" if dataset.shape else "it is a single value"
+    try:
+        if dataset.is_virtual or dataset.external:
+            reason = reason or "its numbers are in other files"
+        given: Any = next((dataset.attrs[key] for key in _UNITS if key in dataset.attrs), [])
+        units = [_text(each) for each in np.ravel(given).tolist()]
+        shape = dataset.shape[::-1] if form == "({})" else dataset.shape
+        found = list(_signals(name, dataset.name, shape, dataset.dtype.kind, units, form))
+        yield from [_Item(name, reason)] if reason else found
+    except (TypeError, ValueError) as error:  # a type that NumPy does not have
+        yield _Item(name, said(error))
+
+
+def _hdf5_items(file: Any) -> Iterator[_Item]:
+    for dataset in _datasets(file):
+        yield from _hdf5_signals(f"/{dataset.name.lstrip('/')}", dataset, "[{}]")
+
+
+def _matlab73_items(file: Any) -> Iterator[_Item]:
+    """Of MATLAB 7.3, whose dimensions are stored the other way round."""
+    for dataset in _datasets(file):
+        name = dataset.name.strip("/").replace("/", ".")
+        kind = _text(dataset.attrs.get("MATLAB_class", "double"))
+        numbers = kind in ("single", "logical", "double") or kind.lstrip("u").startswith("int")
+        if name.startswith("#"):
+            continue  # what cells and objects refer to
+        if "MATLAB_object_decode" in dataset.attrs or not numbers:
+            yield _Item(name, f"it is a MATLAB {kind}")
+        elif dataset.attrs.get("MATLAB_empty", 0):
+            yield _Item(name, "it is empty")
+        else:
+            for each in _hdf5_signals(name, dataset, "({})"):
+                if each.key and each.key[1] is not None:
+                    array, axis, number = each.key
+                    each = each._replace(key=(array, 1 - axis, number))
+                yield each
 
 
 def _text(value: object) -> str:
     return value.decode("utf-8", "replace") if isinstance(value, bytes) else str(value)
 
 
-def _h5_vector(
-    path: Path, file: Any, place: _Place, first: int, last: int | None, matlab: bool
-) -> Array:
-    dataset, rows = file[place.array], slice(first, last)
-    _check_stored(path, dataset)
-    if place.axis is not None:
-        # MATLAB's dimensions are stored the other way round
-        by_column = (place.axis == 1) is not matlab
-        where: Any = (rows, place.number) if by_column else (place.number, rows)
-    else:
-        # a vector of n by 1 or 1 by n
-        where = tuple(rows if size == place.rows else 0 for size in dataset.shape)
-        where = where if dataset.ndim == 1 or place.rows > 1 else ...
-    return np.asarray(dataset[where], np.float64).ravel()
-
-
-def _check_stored(path: Path, dataset: Any) -> None:
-    """Refuse numbers that are claimed but were never stored: HDF5 would give zeros for them."""
-    what = f"'{dataset.name}'"
+def _hdf5_column(file: Any, key: Any, first: int, last: int | None) -> Any:
+    array, axis, number = key
+    dataset, rows = file[array], slice(first, last)
+    # HDF5 would give zeros for numbers that are claimed but were never stored
     if dataset.id.get_storage_size() == 0:
-        raise FileError(f"{path}: {what} claims {prod(dataset.shape)} numbers, but none is stored.")
+        raise ValueError(
+            f"'{dataset.name}' claims {prod(dataset.shape)} numbers, but none is stored"
+        )
     if dataset.chunks is not None:
         sides = zip(dataset.shape, dataset.chunks, strict=True)
-        expected = prod(ceil(length / chunk) for length, chunk in sides)
-        count = dataset.id.get_num_chunks()
+        expected, count = (
+            prod(ceil(size / side) for size, side in sides),
+            dataset.id.get_num_chunks(),
+        )
         if count != expected:
-            raise FileError(
-                f"{path}: {what} has only {count} of its {expected} blocks; the others were never "
-                "written."
+            raise ValueError(
+                f"'{dataset.name}' has only {count} of its {expected} blocks, the others were "
+                "never written"
             )
+    if axis is not None:
+        return dataset[(rows, number) if axis else (number, rows)]
+    # a vector of n by 1 or 1 by n
+    return dataset[
+        tuple(rows if size > 1 else 0 for size in dataset.shape) if dataset.size > 1 else ...
+    ]
 
 
 # --- TDMS -----------------------------------------------------------------------------------------
 
 
-def open_tdms(path: Path) -> Log:
-    """Look into a TDMS file: the channels of numbers and of times, in all groups.
+class _Refusal(logging.Handler):
+    """Refuses what npTDMS merely warns of: data that are cut off, and read as far as they go."""
 
-    In a file of several groups, a column is called ``group/channel``. The clock of a waveform, an
-    increment among its properties, becomes a column ``time``. Times are seconds since the first.
-    """
-    check_kind(path, "TDMS")
-    items: list[_Item] = []
-    with _tdms(path) as file:
-        for group in file.groups():
-            prefix = f"{group.name}/" if len(file.groups()) > 1 else ""
-            clocks: dict[tuple[float, float, int], str] = {}
-            for channel in group.channels():
-                called, kind, rows = prefix + channel.name, channel.dtype.kind, len(channel)
-                if rows == 0 or kind not in "iufbM":
-                    held = "it holds complex numbers" if kind == "c" else "it holds text"
-                    items.append(_Item(called, reason=held if rows else "it is empty"))
-                    continue
-                unit = channel.properties.get("unit_string") or split_unit(channel.name)[1]
-                unit = "s" if kind == "M" else unit
-                key = group.name, channel.name, rows, None
-                items.append(_Item(called, str(unit) if unit else None, rows, key))
-                step = channel.properties.get("wf_increment")
-                begin = channel.properties.get("wf_start_offset", 0.0)
-                if isinstance(step, float) and step > 0.0 and isinstance(begin, float):
-                    clocks.setdefault((begin, step, rows), channel.name)
-            for clock, name in clocks.items():
-                called = f"{prefix}time" if len(clocks) == 1 else f"{prefix}{name} time"
-                if called not in {each.name for each in items}:
-                    items.append(_Item(called, "s", clock[2], (group.name, name, clock[2], clock)))
-
-    def read(keys: Sequence[Any], first: int, last: int | None) -> list[Array]:
-        with _tdms(path) as file:
-            return [_tdms_channel(path, file, key, first, last) for key in keys]
-
-    return _log(path, "TDMS", items, read, "channels")
+    def emit(self, record: logging.LogRecord) -> None:
+        raise ValueError(record.getMessage().partition(", will")[0])
 
 
 @contextmanager
@@ -391,24 +341,44 @@ def _tdms(path: Path) -> Iterator[Any]:
         logger.removeHandler(refusal)
 
 
-class _Refusal(logging.Handler):
-    """Refuses what npTDMS merely warns of: data that are cut off, and read as far as they go."""
+def _tdms_items(file: Any) -> Iterator[_Item]:
+    """Channels and, of waveforms, whose properties hold an increment, a column ``time``.
 
-    def emit(self, record: logging.LogRecord) -> None:
-        raise ValueError(record.getMessage().partition(", will")[0])
+    In a file of several groups, a column is called ``group/channel``.
+    """
+    for group in file.groups():
+        prefix = f"{group.name}/" if len(file.groups()) > 1 else ""
+        clocks, names = dict[tuple[float, float, int], str](), set[str]()
+        for channel in group.channels():
+            kind, rows, given = channel.dtype.kind, len(channel), channel.properties
+            names.add(channel.name)
+            if rows == 0 or kind not in "iufbM":
+                yield _Item(
+                    prefix + channel.name, _KINDS.get(kind, _KINDS["S"]) if rows else "it is empty"
+                )
+                continue
+            unit = "s" if kind == "M" else given.get("unit_string") or split_unit(channel.name)[1]
+            key = group.name, channel.name, None
+            yield _Item(prefix + channel.name, "", str(unit) if unit else None, rows, key)
+            step, begin = given.get("wf_increment"), given.get("wf_start_offset", 0.0)
+            if isinstance(step, float) and step > 0.0 and isinstance(begin, float):
+                clocks.setdefault((begin, step, rows), channel.name)
+        for clock, name in clocks.items():
+            called = "time" if len(clocks) == 1 else f"{name} time"
+            if called not in names:
+                yield _Item(prefix + called, "", "s", clock[2], (group.name, name, clock))
 
 
-def _tdms_channel(path: Path, file: Any, key: Any, first: int, last: int | None) -> Array:
-    group, name, rows, clock = key
-    last = rows if last is None else min(last, rows)
-    if clock is not None:
-        offset, increment, _ = clock
-        return np.asarray(offset + increment * np.arange(first, last, dtype=np.float64))
+def _tdms_column(file: Any, key: Any, first: int, last: int | None) -> Any:
+    group, name, clock = key
     channel = file[group][name]
-    numbers = np.asarray(channel.read_data(first, last - first))
-    if numbers.dtype.kind == "M":
+    rows = range(len(channel))[first:last]
+    if clock is not None:
+        return clock[0] + clock[1] * np.arange(rows.start, rows.stop, dtype=np.float64)
+    numbers = np.asarray(channel.read_data(first, len(rows)))
+    if numbers.dtype.kind == "M":  # seconds since the first
         numbers = (numbers - channel.read_data(0, 1)[0]) / np.timedelta64(1, "s")
-    return _whole(path, name, numbers.astype(np.float64, copy=False), last - first)
+    return numbers
 
 
 # --- MDF ------------------------------------------------------------------------------------------
@@ -419,83 +389,64 @@ _VARIABLE = (1, 5)  # channels whose samples differ in length
 _LEFT_OUT = "it holds text or bytes"
 
 
-def open_mdf(path: Path) -> Log:
-    """Look into an MDF 4 file: the channels of numbers of all groups, and the clock of each group.
-
-    In a file of several groups a column is called ``group/channel``, by the group's acquisition
-    name or ``group 0``, ``group 1`` and so on. Samples that the file marks as invalid are NaN.
-    """
-    check_kind(path, "MDF")
-    with path.open("rb") as file:
-        head = file.read(64)
-    if head.startswith(b"UnFinMF "):
-        raise FileError(f"{path} was not finished by its logger; let its program finalise it.")
-    version = head[8:16].decode("latin-1").strip(" \0")
-    if not head.startswith(b"MDF     ") or len(head) < 64:
-        raise FileError(f"{path} is no MDF file.")
-    if not version.startswith("4"):
-        raise FileError(f"{path} is MDF {version!r}; convert it to MDF 4.")
+def _mdf(path: Path) -> AbstractContextManager[Any]:
     try:
         import asammdf
     except ImportError:
         raise _missing(path, "asammdf", "mdf") from None
-    items: list[_Item] = []
-    opened: Callable[[], Any] = partial(asammdf.MDF, path)
-    with opened() as mdf:
-        named = [group.channel_group.acq_name or "" for group in mdf.groups]
-        counts = Counter(named)
-        for number, group in enumerate(mdf.groups):
-            called = named[number]
-            prefix = f"{called}/" if called and counts[called] == 1 else f"group {number}/"
-            prefix = "" if len(named) == 1 else prefix
-            rows = group.channel_group.cycles_nr
-            for place, channel in enumerate(group.channels):
-                name, conversion = prefix + channel.name, channel.conversion
-                texts = conversion is not None and conversion.conversion_type in _TEXTS
-                numeric = channel.data_type in _NUMBERS and channel.channel_type not in _VARIABLE
-                if texts or not numeric or rows == 0:
-                    empty = numeric and not texts
-                    items.append(_Item(name, reason="it is empty" if empty else _LEFT_OUT))
-                    continue
-                unit = channel.unit or getattr(conversion, "unit", "") or None
-                unit = unit or split_unit(channel.name)[1]
-                items.append(_Item(name, unit, rows, (name, number, place, rows)))
-
-    def read(keys: Sequence[Any], first: int, last: int | None) -> list[Array]:
-        with opened() as mdf:
-            return [_mdf_samples(path, mdf, key, first, last) for key in keys]
-
-    return _log(path, "MDF 4", items, read, "channels")
+    opened: AbstractContextManager[Any] = asammdf.MDF(path)
+    return opened
 
 
-def _mdf_samples(path: Path, mdf: Any, key: Any, first: int, last: int | None) -> Array:
-    called, group, place, rows = key
-    count = (rows if last is None else min(last, rows)) - first
-    # "ignore" leaves invalid samples where they are; they would be cut out otherwise
+def _mdf_items(mdf: Any) -> Iterator[_Item]:
+    """Channels of all groups, and the clock of each.
+
+    In a file of several groups a column is called ``group/channel``, by the group's acquisition
+    name or ``group 0``, ``group 1`` and so on.
+    """
+    named = [group.channel_group.acq_name or "" for group in mdf.groups]
+    counts = Counter(named)
+    for number, group in enumerate(mdf.groups):
+        called, rows = named[number], group.channel_group.cycles_nr
+        prefix = f"{called}/" if called and counts[called] == 1 else f"group {number}/"
+        prefix = "" if len(named) == 1 else prefix
+        for place, channel in enumerate(group.channels):
+            conversion = channel.conversion
+            texts = conversion is not None and conversion.conversion_type in _TEXTS
+            numeric = channel.data_type in _NUMBERS and channel.channel_type not in _VARIABLE
+            reason = _LEFT_OUT if texts or not numeric else "" if rows else "it is empty"
+            unit = channel.unit or getattr(conversion, "unit", "") or split_unit(channel.name)[1]
+            yield _Item(prefix + channel.name, reason, unit or None, rows, (number, place))
+
+
+def _mdf_column(mdf: Any, key: Any, first: int, last: int | None) -> Any:
+    """Numbers; samples that the file marks as invalid are NaN."""
+    group, place = key
+    rows = range(mdf.groups[group].channel_group.cycles_nr)[first:last]
+    # invalid samples would be cut out otherwise
     samples, invalid = mdf.get(
         group=group,
         index=place,
         samples_only=True,
         ignore_invalidation_bits=True,
         record_offset=first,
-        record_count=count,
+        record_count=len(rows),
     )
     if samples.dtype.kind not in "iufb" or samples.ndim != 1:
-        raise FileError(f"{path}: '{called}' cannot be read as numbers: {_LEFT_OUT}.")
-    numbers = _whole(path, called, np.array(samples, np.float64), count)
+        raise ValueError(f"a channel cannot be read as numbers: {_LEFT_OUT}")
+    numbers = np.array(samples, np.float64)
     if invalid is not None:
         numbers[np.asarray(invalid, bool)] = np.nan
     return numbers
 
 
-OPENERS: Mapping[str, Callable[[Path], Log]] = MappingProxyType(
-    {
-        "Parquet": open_parquet,
-        "MATLAB": open_matlab,
-        "HDF5": open_hdf5,
-        "TDMS": open_tdms,
-        "MDF": open_mdf,
-    }
-)
-"""What opens a file of each format. All raise a FileError for a file that is damaged, of another
-kind, without columns of numbers, or whose library is not installed."""
+FORMATS: Mapping[str, _Format] = {
+    "Parquet": _Format(_parquet, _parquet_items, _parquet_column),
+    "MATLAB 4": _Format(_matlab, _matlab_items, _matlab_column, "vectors"),
+    "MATLAB 5": _Format(_matlab, _matlab_items, _matlab_column, "vectors"),
+    "MATLAB 7.3": _Format(_hdf5, _matlab73_items, _hdf5_column),
+    "HDF5": _Format(_hdf5, _hdf5_items, _hdf5_column),
+    "TDMS": _Format(_tdms, _tdms_items, _tdms_column, "channels"),
+    "MDF 4": _Format(_mdf, _mdf_items, _mdf_column, "channels"),
+}
+"""How files of each format are read."""

@@ -6,17 +6,17 @@ import codecs
 import csv
 import re
 from collections import Counter
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Sequence
+from contextlib import suppress
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, ClassVar, Literal, NamedTuple
 
 from swashplate.errors import FileError, InputError
 from swashplate.logs.log import Column, check_kind, printable, split_unit
 
-_NAMED = {"comma": ",", "semicolon": ";", "tab": "\t", "space": " ", "spaces": " ", "bar": "|"}
-COMMENTS = ("#", "%", "//")
-"""What comment lines begin with where the user does not say."""
+_DELIMITERS = {"comma": ",", "semicolon": ";", "tab": "\t", "space": " ", "bar": "|"}
+_COMMENTS = ("#", "%", "//")
 
 
 @dataclass(frozen=True)
@@ -56,38 +56,27 @@ class TextOptions:
 
     def __post_init__(self) -> None:
         """Check them."""
-        mark = self.delimiter
-        if mark is not None and mark not in _NAMED:
-            if len(mark) != 1 or not mark.isascii() or mark in '\r\n"\0':
-                raise InputError(
-                    f"delimiter must be one character, 'tab' or 'space', not {mark!r}."
-                )
-            if mark.isalnum() or mark in "+-.":
-                raise InputError(f"delimiter {mark!r} is a part of numbers; name another.")
-        if self.decimal not in (None, ".", ","):
-            raise InputError(f"decimal must be '.' or ',', not {self.decimal!r}.")
-        if self.header_row is not None and self.header_row < 0:
-            raise InputError(
-                f"header_row must be the line of the header, or 0, not {self.header_row!r}."
-            )
+        mark = _DELIMITERS.get(self.delimiter or "comma", self.delimiter) or ""
+        wrong = ""
+        if len(mark) != 1 or not mark.isascii() or mark in '\r\n"\0':
+            wrong = f"delimiter must be one character, 'tab' or 'space', not {mark!r}"
+        elif mark.isalnum() or mark in "+-.":
+            wrong = f"delimiter {mark!r} is a part of numbers; name another"
+        elif self.decimal not in (None, ".", ","):
+            wrong = f"decimal must be '.' or ',', not {self.decimal!r}"
+        elif (self.header_row or 0) < 0:
+            wrong = f"header_row must be the line of the header, or 0, not {self.header_row!r}"
         try:
             "".encode(self.encoding or "utf-8")  # zlib and the like are codecs, but not of text
         except (LookupError, UnicodeError, ValueError):
-            raise InputError(
-                f"encoding {self.encoding!r} is unknown; take 'utf-8', 'latin-1' or 'utf-16'."
-            ) from None
-
-    @property
-    def delimiters(self) -> tuple[str, ...]:
-        """Delimiters that may be: the one given, or all that are looked for."""
-        if self.delimiter is None:
-            return (",", ";", "\t", " ", "|")
-        return (_NAMED.get(self.delimiter, self.delimiter),)
+            wrong = f"encoding {self.encoding!r} is unknown; take 'utf-8', 'latin-1' or 'utf-16'"
+        if wrong:
+            raise InputError(f"{wrong}.")
 
     @property
     def marks(self) -> tuple[str, ...]:
         """What comment lines begin with."""
-        return COMMENTS if self.comment is None else tuple(filter(None, [self.comment]))
+        return _COMMENTS if self.comment is None else tuple(filter(None, [self.comment]))
 
 
 # --- encoding -------------------------------------------------------------------------------------
@@ -101,39 +90,37 @@ _CONTROL = re.compile(r"[\x00-\x08\x0e-\x19\x1b-\x1f\x7f]")
 
 
 def encoding_of(path: Path, given: str | None) -> tuple[str, int]:
-    """Canonical name of a text file's encoding, and the bytes of its byte-order mark.
+    """Name of a text file's encoding, and the bytes of its byte-order mark.
 
-    What is not given is told by a byte-order mark, or is UTF-8, or else Latin-1.
-
-    Raises
-    ------
-    FileError
-        If the file is no text.
+    By default it is what a byte-order mark says, or UTF-8, or else Latin-1.
     """
     with path.open("rb") as file:
         head = file.read(1 << 16)
-    marks = ((len(mark), name) for mark, name in _BYTE_ORDER.items() if head.startswith(mark))
-    mark, marked = next(marks, (0, None))
-    names = [marked] if marked else ["utf-8", "iso8859-1"]
+    mark = next((mark for mark in _BYTE_ORDER if head.startswith(mark)), b"")
+    names = [_BYTE_ORDER[mark]] if mark else ["utf-8", "iso8859-1"]
     if given is not None:
         name = codecs.lookup(given).name.removesuffix("-sig")
-        names = [(marked or "utf-16-le") if name == "utf-16" else name]
+        names = [_BYTE_ORDER.get(mark, "utf-16-le") if name == "utf-16" else name]
     for name in names:
         try:
-            text = codecs.getincrementaldecoder(name)("strict").decode(head[mark:])
+            text = codecs.getincrementaldecoder(name)("strict").decode(head[len(mark) :])
             break
         except UnicodeError as error:
-            why = error
+            why = f"is no text in {name}: {error}"
     else:
         check_kind(path)
-        raise FileError(f"{path} is no text in {name}: {why}.")
-    control = _CONTROL.search(text)
-    if control:
+        raise FileError(f"{path} {why}.")
+    if control := _CONTROL.search(text):
         check_kind(path)
         line = len(re.findall(r"\r\n|\n|\r", text[: control.start()])) + 1
         what = "a NUL byte" if control[0] == "\0" else f"the byte {ord(control[0]):#04x}"
         raise FileError(f"{path} has {what} in line {line}; it is damaged or no text file.")
-    return name, mark
+    return name, len(mark)
+
+
+def is_comment(line: str, marks: tuple[str, ...]) -> bool:
+    """Whether a line begins with one of the marks."""
+    return bool(marks) and line.lstrip().startswith(marks)
 
 
 # --- cells ----------------------------------------------------------------------------------------
@@ -194,43 +181,40 @@ def shown(cell: str) -> str:
 
 # --- delimiter and decimal sign -------------------------------------------------------------------
 
-_SAID = {",": "commas", ";": "semicolons", "\t": "tabs", " ": "spaces", "|": "bars"}
+_NAMES = {",": "commas", ";": "semicolons", "\t": "tabs", " ": "spaces", "|": "bars"}
 _THREE = re.compile(r"[+-]?[1-9]\d{0,2},\d{3}")
 
 
-@dataclass(frozen=True)
-class Layout:
+class Layout(NamedTuple):
     """How the rows of a text file are to be taken apart."""
 
     delimiter: str
     """One character; a space stands for any number of spaces and tabs."""
     decimal: str
-    width: int
+    width: int = 0
     """Fields in a row."""
-    numeric: tuple[bool, ...]
+    numeric: tuple[bool, ...] = ()
     """Which of them are numbers, as far as a sample of rows shows."""
-    rows: int = 0
-    """Rows of the sample that fit."""
-    score: float = 0.0
-    """Their share times the share of their characters in numbers; more with a header."""
 
-    def split(self, line: str) -> list[str]:
+    def __str__(self) -> str:
+        point = "comma" if self.decimal == "," else "point"
+        return f"{_NAMES.get(self.delimiter, repr(self.delimiter))}, decimal {point}"
+
+    def cells(self, line: str) -> list[str]:
         """Cells of a line, stripped."""
         if self.delimiter == " ":
             line = line.replace("\t", " ").strip()
-        if '"' in line:
-            try:
-                cells = next(csv.reader([line], delimiter=self.delimiter, skipinitialspace=True))
-                return [cell.strip() for cell in cells]
-            except (csv.Error, StopIteration):
-                pass
         parts = line.split() if self.delimiter == " " else line.split(self.delimiter)
+        if '"' in line:
+            with suppress(csv.Error, StopIteration):
+                parts = next(csv.reader([line], delimiter=self.delimiter, skipinitialspace=True))
         return [cell.strip() for cell in parts]
 
-    def is_blank(self, line: str) -> bool:
-        """Whether a line is no row; one of nothing but delimiters is a row of empty cells."""
-        empty = self.delimiter == "\t" and len(self.split(line)) == self.width
-        return not empty and not line.strip()
+    def names(self, line: str) -> list[str]:
+        """Cells of a header; where spaces delimit, the one before a unit does not."""
+        if self.delimiter == " ":
+            line = re.sub(r"[ \t]+([\[(])", "\0\\1", line)
+        return [cell.replace("\0", " ") for cell in self.cells(line)]
 
     def numbers_in(self, cells: Sequence[str]) -> list[bool]:
         """Of the cells in columns of numbers that are not empty, which are numbers."""
@@ -242,16 +226,11 @@ class Layout:
         found = self.numbers_in(cells)
         return len(cells) == self.width and bool(found) and all(found)
 
-    def names(self, text: str) -> list[str]:
-        """Cells of a header; where spaces delimit, the one before a unit does not."""
-        if self.delimiter == " ":
-            text = re.sub(r"[ \t]+([\[(])", "\0\\1", text)
-        return [cell.replace("\0", " ") for cell in self.split(text)]
-
-    def __str__(self) -> str:
-        """What it is, for people."""
-        point = "comma" if self.decimal == "," else "point"
-        return f"CSV, {_SAID.get(self.delimiter, repr(self.delimiter))}, decimal {point}"
+    def is_blank(self, line: str) -> bool:
+        """Whether a line is no row; one of nothing but tabs is a row of empty cells."""
+        if line.strip():
+            return False
+        return self.delimiter != "\t" or len(self.cells(line)) != self.width
 
 
 def find_layout(lines: Sequence[str], options: TextOptions, path: Path) -> Layout:
@@ -265,36 +244,37 @@ def find_layout(lines: Sequence[str], options: TextOptions, path: Path) -> Layou
         If there are no rows of numbers, or if two readings are as good as each other.
     """
     quoted = any('"' in line for line in lines)
-    tried = (
-        _tried(lines, Layout(delimiter, decimal, 0, ()))
-        for delimiter in options.delimiters
-        for decimal in ((options.decimal,) if options.decimal else (".", ","))
-        if delimiter != decimal or quoted or None not in (options.delimiter, options.decimal)
-    )
-    trials = [trial for trial in tried if trial is not None]
+    given = {key: getattr(options, key) for key in ("delimiter", "decimal")}
+    mark = options.delimiter and _DELIMITERS.get(options.delimiter, options.delimiter)
+    trials = [
+        trial
+        for delimiter in ([mark] if mark else [",", ";", "\t", " ", "|"])
+        for decimal in ([options.decimal] if options.decimal else [".", ","])
+        if delimiter != decimal or quoted or None not in given.values()
+        for trial in _tried(lines, Layout(delimiter, decimal))
+    ]
     if not trials:
-        given = [f"{key} {getattr(options, key)!r}" for key in ("delimiter", "decimal")]
-        given = [each for each in given if not each.endswith("None")]
-        with_them = f" with {' and '.join(given)}" if given else ""
+        said = " and ".join(f"{key} {value!r}" for key, value in given.items() if value)
         count = f"{len(lines)} line" + "s" * (len(lines) > 1)
         raise FileError(
-            f"{path} has no rows of two or more numbers{with_them}, only {count} of text."
+            f"{path} has no rows of two or more numbers{said and f' with {said}'}, only {count} of "
+            "text."
         )
-    tabbed = max((trial.rows for trial in trials if trial.delimiter == "\t"), default=0)
     # a tab between numbers delimits them, whatever spaces there are in names
-    trials = [each for each in trials if each.delimiter != " " or each.rows > tabbed]
-    best = max(trial.score for trial in trials)
-    equal = [trial for trial in trials if trial.score > best - 1e-9]
+    tabbed = max((rows for _, rows, trial in trials if trial.delimiter == "\t"), default=0)
+    trials = [each for each in trials if each[2].delimiter != " " or each[1] > tabbed]
+    best = max(score for score, _, _ in trials)
+    equal = [trial for score, _, trial in trials if score > best - 1e-9]
     if len({trial.delimiter for trial in equal}) > 1:
         row = next((line for line in lines if "," in line), lines[0])
-        readings = " or as ".join(str(trial).removeprefix("CSV, ") for trial in equal)
+        readings = " or as ".join(map(str, equal))
         raise FileError(
             f"{path} can be read in more than one way, '{shown(row)}' as {readings}; "
             "give 'delimiter' or 'decimal' as an option."
         )
     chosen = equal[0]  # with a point: where both signs are alike, there are whole numbers alone
     if options.decimal is None and chosen.delimiter != "," and chosen.decimal == ",":
-        rows = (zip(chosen.split(line), chosen.numeric, strict=False) for line in lines)
+        rows = (zip(chosen.cells(line), chosen.numeric, strict=False) for line in lines)
         cells = [cell for row in rows for cell, one in row if one and "," in cell]
         cells = [cell for cell in cells if is_number(cell, ",")]
         if cells and all(_THREE.fullmatch(cell) for cell in cells):
@@ -305,119 +285,110 @@ def find_layout(lines: Sequence[str], options: TextOptions, path: Path) -> Layou
     return chosen
 
 
-def _tried(lines: Sequence[str], layout: Layout) -> Layout | None:
-    """A layout with width, columns of numbers and score by a sample of lines."""
-    rows = [layout.split(line) for line in lines]
-    marks = [[cell != "" and is_number(cell, layout.decimal) for cell in row] for row in rows]
+def _tried(lines: Sequence[str], layout: Layout) -> Iterator[tuple[float, int, Layout]]:
+    """A layout with its width and columns of numbers, behind its score and its number of rows.
+
+    The score is the share of rows that fit times the share of their characters in numbers; a header
+    of as many fields adds a half. A log of one column has no time and gives nothing.
+    """
+    rows = [layout.cells(line) for line in lines]
+    marks = [[is_number(cell, layout.decimal) for cell in row] for row in rows]
     counts = Counter(len(row) for row, mark in zip(rows, marks, strict=True) if any(mark))
     texts = {len(row) for row, mark in zip(rows, marks, strict=True) if not any(mark)}
     # as many fields as most rows have; among equals, as many as a header has, then as the first
     width = max(counts, key=lambda each: (counts[each], each in texts), default=0)
-    if width < 2:  # a log of one column has no time
-        return None
-    fitting = [
-        (row, mark)
+    kept = [
+        list(zip(row, mark, strict=True))
         for row, mark in zip(rows, marks, strict=True)
-        if len(row) == width and any(mark)
+        if len(row) == width > 1 and any(mark)
     ]
-    filled = [sum(row[i] != "" for row, _ in fitting) for i in range(width)]
-    numbers = [sum(mark[i] for _, mark in fitting) for i in range(width)]
-    numeric = tuple(0 < filled[i] <= 2 * numbers[i] for i in range(width))
-    layout = replace(layout, width=width, numeric=numeric, rows=len(fitting))
+    columns = zip(*kept, strict=True)
+    numeric = [
+        2 * sum(one for _, one in each) >= sum(cell != "" for cell, _ in each)
+        and any(one for _, one in each)
+        for each in columns
+    ]
+    layout = layout._replace(width=width, numeric=tuple(numeric))
     begin = next((place for place, row in enumerate(rows) if layout.fits(row)), None)
     if begin is None:
-        return None
-    cells = [pair for row, mark in fitting for pair in zip(row, mark, strict=True)]
-    share = sum(len(cell) for cell, one in cells if one) / sum(len(cell) for cell, _ in cells)
-    score = len(fitting) / (len(rows) - begin) * share
+        return
+    letters = sum(len(cell) for row in kept for cell, _ in row)
+    share = sum(len(cell) for row in kept for cell, one in row if one) / letters
+    score = len(kept) / (len(rows) - begin) * share
     # the line of text above the rows, the header, should have as many fields as they
     header = next((len(rows[i]) for i in reversed(range(begin)) if not any(marks[i])), 0)
     if header > 1:
         score += 0.5 if header == width else 0.25
-    return replace(layout, score=score)
+    yield score, len(kept), layout
 
 
-# --- what stands above the rows -------------------------------------------------------------------
+# --- names and units, above the rows --------------------------------------------------------------
 
-Units = tuple[str | None, ...]
-
-
-class Line(NamedTuple):
-    """A line of the file."""
-
-    number: int
-    """The first is 1."""
-    text: str
-
-
-class Heading(NamedTuple):
-    """What the first lines of a file say."""
-
-    columns: tuple[Column, ...]
-    first: int
-    """Line of the first row of data; the first line of the file is 1."""
+_Units = list[str | None]
 
 
 def read_heading(
-    lines: Sequence[Line], layout: Layout, options: TextOptions, path: Path
-) -> Heading:
-    """Find the names, the units and the first row of data in the first lines of a file.
+    head: Sequence[str], layout: Layout, options: TextOptions, path: Path
+) -> tuple[tuple[Column, ...], int]:
+    """Columns by the first lines of a file, and the line of the first row; the first line is 1.
 
     Raises
     ------
     FileError
         If there is no row of numbers, or the header has another number of fields than the rows.
     """
-    marks, number = options.marks, options.header_row
-    filled = [line for line in lines if not layout.is_blank(line.text)]
-    comments = [line for line in filled if marks and line.text.lstrip().startswith(marks)]
-    plain = sorted({*filled}.difference(comments))
+    numbered = [each for each in enumerate(head, 1) if not layout.is_blank(each[1])]
+    marks = "|".join(map(re.escape, options.marks))
     # comments without their marks, as NumPy writes names into one
-    bare = {
-        line.number: re.sub(rf"^\s*(?:{'|'.join(map(re.escape, marks))})?", "", line.text)
-        for line in comments
+    comments = {
+        number: re.sub(rf"^\s*(?:{marks})", "", line)
+        for number, line in numbered
+        if is_comment(line, options.marks)
     }
+    plain = [each for each in numbered if each[0] not in comments]
     names: list[str] = []
-    units: Units | None = None
-    if number:
-        header = [bare.get(line.number, line.text) for line in filled if line.number == number]
-        plain = [line for line in plain if line.number > number]
-        if not header or not plain:
+    units: _Units | None = None
+    if options.header_row:
+        number = options.header_row
+        plain = [each for each in plain if each[0] > number]
+        header = comments.get(number, head[number - 1] if number <= len(head) else "")
+        if layout.is_blank(header) or not plain:
             raise FileError(f"{path} has no header in line {number}, or no rows below it.")
-        names, _ = _names_and_units(header, layout)
+        names, _ = _names_and_units([header], layout)
         if not names:
-            _refuse_names(Line(number, header[0]), layout, path)
-        units = units_of(layout.split(plain[0].text))
+            raise _wrong_header(number, header, layout, path)
+        units = _units_of(layout.cells(plain[0][1]))
         first = 0 if units is None else 1
+        if first == len(plain):
+            raise FileError(f"{path} has no rows below line {number}.")
     else:
-        rows = [layout.split(line.text) for line in plain]
+        rows = [layout.cells(line) for _, line in plain]
         first = next((place for place, row in enumerate(rows) if layout.fits(row)), len(rows))
         if first == len(rows):
             raise FileError(f"{path} has no rows of numbers in its first {len(plain)} lines.")
         # a damaged row is a row all the same: it must be refused, not taken for the names
         while first > 1 and any(layout.numbers_in(rows[first - 1])):
-            if units_of(rows[first - 1]) or len(layout.names(plain[first - 2].text)) < len(rows[0]):
+            above = layout.names(plain[first - 2][1])
+            if _units_of(rows[first - 1]) or len(above) < len(rows[0]):
                 break
             first -= 1
-    if number is None:
-        above = [line for line in plain[:first] if any(layout.split(line.text))]
-        names, units = _names_and_units([line.text for line in above], layout)
-        if above and not names:
-            title = above[-1].text.rstrip()
+    if options.header_row is None:
+        filled = [each for each in plain[:first] if any(layout.cells(each[1]))]
+        names, units = _names_and_units([line for _, line in filled], layout)
+        if filled and not names:
+            title = filled[-1][1].rstrip()
             if len(layout.names(title)) > 1 and not title.endswith((":", ".")):
-                _refuse_names(above[-1], layout, path)
+                raise _wrong_header(*filled[-1], layout, path)
         if not names:
-            said = [text for line, text in bare.items() if line < plain[first].number]
+            said = [line for number, line in comments.items() if number < plain[first][0]]
             names, units = _names_and_units(said, layout)
             if units is None and (not all(names) or any(layout.numbers_in(names))):
                 names = []
-    if first == len(plain):
-        raise FileError(f"{path} has no rows below line {number}.")
-    cells = layout.split(plain[first].text)
-    return Heading(tuple(_columns(names, units, layout, cells)), plain[first].number)
+    begin, row = plain[first]
+    return tuple(_columns(names, units, layout, layout.cells(row))), begin
 
 
-def _names_and_units(above: Sequence[str], layout: Layout) -> tuple[list[str], Units | None]:
+def _names_and_units(above: Sequence[str], layout: Layout) -> tuple[list[str], _Units | None]:
     """Names and units in the last one or two of some lines; no names where these are none."""
     if not above:
         return [], None
@@ -428,40 +399,36 @@ def _names_and_units(above: Sequence[str], layout: Layout) -> tuple[list[str], U
         names.append("")  # a delimiter at the end of each row
     if len(names) != layout.width:
         return [], None
-    units = units_of(names)
+    units = _units_of(names)
     before = layout.names(above[-2]) if units is not None and len(above) > 1 else []
     return (before, units) if len(before) == layout.width else (names, None)
 
 
-def _refuse_names(line: Line, layout: Layout, path: Path) -> None:
-    """Refuse a header of another width than the rows."""
-    count = len(layout.names(line.text))
-    hint = ""
+def _wrong_header(number: int, line: str, layout: Layout, path: Path) -> FileError:
+    count, hint = len(layout.names(line)), ""
     if layout.delimiter == "," and layout.width >= 2 * count - 1:
         hint = " Do decimal commas stand between commas? Export it with semicolons."
-    raise FileError(
-        f"{path} has {count} names in line {line.number}, but {layout.width} fields in the rows "
+    return FileError(
+        f"{path} has {count} names in line {number}, but {layout.width} fields in the rows "
         f"below.{hint}"
     )
 
 
 def _columns(
-    names: Sequence[str], units: Units | None, layout: Layout, cells: Sequence[str]
-) -> list[Column]:
+    names: Sequence[str], units: _Units | None, layout: Layout, cells: Sequence[str]
+) -> Iterator[Column]:
     """Columns by names, each its own, and units; a first cell that is a date makes it seconds."""
-    called = [name or f"column {place}" for place, name in enumerate(names, 1)] or [
-        f"column {place}" for place in range(1, layout.width + 1)
-    ]
+    named = [*names] or [""] * layout.width
     if names and not names[-1] and not layout.numeric[-1] and not cells[-1]:
-        called.pop()  # a delimiter at the end of each line
-    columns, counts, seen = [], Counter(called), Counter[str]()
+        named.pop()  # a delimiter at the end of each line
+    called = [name or f"column {place}" for place, name in enumerate(named, 1)]
+    counts, seen = Counter(called), Counter[str]()
     for place, name in enumerate(called):
         seen[name] += 1
-        unique = printable(f"{name} #{seen[name]}" if counts[name] > 1 else name)
         unit = split_unit(name)[1] or (units[place] if units else None)
-        dated = place < len(cells) and date_form(cells[place])
-        columns.append(Column(unique, "s" if dated else unit))
-    return columns
+        if place < len(cells) and date_form(cells[place]):
+            unit = "s"
+        yield Column(printable(f"{name} #{seen[name]}" if counts[name] > 1 else name), unit)
 
 
 _KNOWN = frozenset(
@@ -482,16 +449,14 @@ _PARTS = re.compile(r"[\s*/·.()^²³0-9-]+")
 _BRACKETS = re.compile(r"\[.*\]|\(.*\)")
 
 
-def units_of(cells: Sequence[str]) -> Units | None:
+def _units_of(cells: Sequence[str]) -> _Units | None:
     """Units of a row of them, None where a cell is empty; or None if it is no such row."""
     filled = [cell for cell in cells if cell]
     # a short word of another language may stand among units, such as Imp for pulses
     others = [cell for cell in filled if not _is_unit(cell)]
     if 2 * len(others) >= len(filled) or any(len(cell) > _SHORT for cell in others):
         return None
-    return tuple(
-        cell[1:-1].strip() if _BRACKETS.fullmatch(cell) else cell or None for cell in cells
-    )
+    return [cell[1:-1].strip() if _BRACKETS.fullmatch(cell) else cell or None for cell in cells]
 
 
 def _is_unit(cell: str) -> bool:

@@ -133,24 +133,26 @@ class Log:
 
     def _position(self, wanted: str) -> int:
         names = [column.name for column in self.columns]
-        suffixed = re.compile(rf"{re.escape(wanted)}_\w+")
         bare = [_without_unit(column) for column in self.columns]
-        for matches in (
-            [name == wanted for name in names],
-            [name == wanted for name in bare],
-            [bool(suffixed.fullmatch(name)) for name in names],
+        suffixed = re.compile(rf"{re.escape(wanted)}_\w+")
+        matches: list[str] = []
+        for found in (
+            [name for name in names if name == wanted],
+            [name for name, other in zip(names, bare, strict=True) if other == wanted],
+            [name for name in names if suffixed.fullmatch(name)],
             [
-                wanted in (_last(name), _last(other))
+                name
                 for name, other in zip(names, bare, strict=True)
+                if wanted in (_last(name), _last(other))
             ],
         ):
-            if matches.count(True) > 1:
-                several = _listed([name for name, each in zip(names, matches, strict=True) if each])
-                raise InputError(
-                    f"{self.path} has more than one '{wanted}': {several}; name the one."
-                )
-            if True in matches:
-                return matches.index(True)
+            matches = matches or found
+        if len(matches) > 1:
+            raise InputError(
+                f"{self.path} has more than one '{wanted}': {_listed(matches)}; name the one."
+            )
+        if matches:
+            return names.index(matches[0])
         for name, reason in self.left_out.items():
             if wanted in (name, _last(name)):
                 raise FileError(f"{self.path}: '{name}' cannot be read as numbers: {reason}.")
@@ -179,32 +181,6 @@ def said(error: BaseException) -> str:
     first = printable(lines[0]) if lines else ""
     sentence = re.split(r"[.!?;](?:\s|$)", first, maxsplit=1)[0].strip()[:200]
     return sentence or type(error).__name__
-
-
-def check_file(path: Path) -> int:
-    """Size in bytes of a file that can be read.
-
-    Raises
-    ------
-    FileError
-        If it is missing, a folder, not readable or empty.
-    """
-    try:
-        if path.is_dir():
-            reason = "is a folder, not a log"
-        elif path.exists() and not path.is_file():
-            reason = "is no ordinary file"
-        else:
-            with path.open("rb") as file:
-                size = file.seek(0, 2)
-            reason = "" if size else "is empty"
-    except FileNotFoundError:
-        raise FileError(f"There is no file {path}.") from None
-    except (OSError, ValueError) as error:
-        reason = f"cannot be read: {getattr(error, 'strerror', None) or said(error)}"
-    if reason:
-        raise FileError(f"{path} {reason}.")
-    return size
 
 
 _KINDS = {
@@ -278,13 +254,24 @@ def open_log(path: str | Path, *, options: TextOptions | None = None) -> Log:
     source = Path(path)
     suffix = source.suffix.lower()
     name = next((name for name, suffixes in ENDINGS.items() if suffix in suffixes), None)
-    if name is None:
+    why = ""
+    try:
         if source.is_dir():
-            raise FileError(f"{source} is a folder, not a log.")
-        instead = ": save a spreadsheet as CSV" if suffix.startswith(".xls") else ""
-        known = ", ".join(SUFFIXES)
-        raise FileError(f"{source} ends in '{source.suffix}'; a log is read from {known}{instead}.")
-    check_file(source)
+            why = "is a folder, not a log"
+        elif name is None:
+            why = f"ends in '{source.suffix}'; a log is read from {', '.join(SUFFIXES)}"
+            why += ": save a spreadsheet as CSV" if suffix.startswith(".xls") else ""
+        elif source.exists() and not source.is_file():
+            why = "is no ordinary file"
+        else:
+            with source.open("rb") as file:
+                why = "" if file.read(1) else "is empty"
+    except FileNotFoundError:
+        raise FileError(f"There is no file {source}.") from None
+    except (OSError, ValueError) as error:
+        why = f"cannot be read: {getattr(error, 'strerror', None) or said(error)}"
+    if why or name is None:
+        raise FileError(f"{source} {why}.")
     if name == "CSV":
         from swashplate.logs.text import open_text
 

@@ -34,6 +34,7 @@ Broken = tuple[Mask, Callable[[int], str]]
 """Sets that break a rule, and the sentence for one of them."""
 
 FULL_VOLTAGE = 10.0  # Largest command, either way. [V]
+SIDES = ("plus", "minus")  # Endings of what has two directions.
 VOLTAGES = np.linspace(0.0, FULL_VOLTAGE, 101)
 """Commands at which the static rules are checked. [V]"""
 N_CHANNEL, N_PUMP = len(Channel._fields), len(Pump._fields)
@@ -156,7 +157,7 @@ def broken_rules(numbers: Mapping[str, Array]) -> Iterator[Broken]:
     for rule in (*OF_REFINEMENTS, AT_REST):
         yield applied(rule, n)
     lowest, moment = _static(n, size)
-    for k, side in enumerate(("plus", "minus")):
+    for k, side in enumerate(SIDES):
         own = {name: n[f"{name}_{side}"] for name in ("I_t1", "I_t2", "Z13")}
         own |= {"side": side, "lowest": lowest[:, k], "moment": moment[:, k]}
         own["arm_sine"] = n["Z3"] * np.tan(own["Z13"])
@@ -198,7 +199,7 @@ def range_rule(definition: Definition, column: str, values: Array) -> Broken:
 
 def _static(n: Values, size: int) -> tuple[Array, Array]:
     """Lowest steady current [A] and largest sin φ of every set (rows) and side (columns)."""
-    sides = [[n[f"{name}_{side}"] for name in Channel._fields] for side in ("plus", "minus")]
+    sides = [[n[f"{name}_{side}"] for name in Channel._fields] for side in SIDES]
     channels = np.moveaxis(np.array(sides), -1, 0)
     pumps = np.column_stack(
         [n.get(name, np.full(size, Pump._field_defaults.get(name))) for name in Pump._fields]

@@ -6,10 +6,10 @@ Of each set its output, in memory or streamed to files, or only its cost.
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Unpack
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -19,9 +19,9 @@ from swashplate.equations.library import TAN_22_5
 from swashplate.equations.marching.lanes import LANES, lanes_of
 from swashplate.equations.marching.march import output_of
 from swashplate.equations.marching.observation import Observation
-from swashplate.equations.marching.record import Record
+from swashplate.equations.marching.record import Record, Sampling
 from swashplate.equations.marching.run import outside
-from swashplate.equations.marching.use import records_of
+from swashplate.equations.marching.use import inputs_of
 from swashplate.errors import FileError, InputError
 from swashplate.executors import Executor, Threads
 from swashplate.parameters.definitions import SWITCHES, columns_of
@@ -29,24 +29,18 @@ from swashplate.parameters.parameter_set import ParameterSet
 from swashplate.parameters.rules import broken_rules
 from swashplate.results import Result
 from swashplate.simulation.instance import (
-    PATHS,
-    SIDES,
     card_options,
     models_of,
+    path_of,
     pump_options,
-    step_limit,
+    unstable_filters,
 )
 from swashplate.simulation.result import check_output
-from swashplate.tables import write_whole
+from swashplate.tables import write_table
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
 
-OVERPOWERED = "Z5·F/√Z4 reaches 1 under this input: the solenoid overpowers the feedback spring."
-OVERFLOW = (
-    "the numbers grow beyond all bounds under this input: a parameter is far larger or smaller "
-    "than any real drive's; compare the set with a packaged one."
-)
 SAMPLES_A_FILE = 2**23
 """Samples of all sets of a file, 64 MB, unless a single block of sets has more."""
 
@@ -82,169 +76,6 @@ class Batch(Result):
     marched, called by its number."""
 
 
-Block = tuple[Indices, tuple[Any, ...]]
-"""Up to LANES sets, and the options that they share: kernels are compiled for those."""
-
-
-@dataclass(frozen=True, eq=False)
-class _Sets:
-    """Sets over one record, and what of them is wanted."""
-
-    model: Model
-    numbers: Mapping[str, Array]  # (m,) each, by path; see `Lanes`
-    record: Record
-    records: Mapping[str, Array]  # external signals on the record's grid
-    output: str
-    cost: SquaredError | None
-    to: Path | None
-    place: Array | None = field(default=None, repr=False)  # (m, n), within this process
-
-    def __getstate__(self) -> dict[str, Any]:
-        """Without what other processes have no use for."""
-        return {**self.__dict__, "place": None}
-
-    def compared(self) -> tuple[Array, Array]:
-        """Measured values and weights on the march's grid, zero weight between the samples."""
-        # zeros that nobody writes to take no memory
-        measured, weight = np.zeros(self.record.values.size), np.zeros(self.record.values.size)
-        if self.cost is not None:
-            time, every = self.record.time, slice(None, None, self.record.substeps)
-            seen = Observation(self.cost.output, time, self.cost.measured, self.cost.weight)
-            weight[every] = seen.weight
-            measured[every] = np.where(weight[every] > 0.0, seen.values, 0.0)
-        return measured, weight
-
-
-def _march(
-    shared: _Sets, blocks: Sequence[Block]
-) -> list[tuple[Indices, Array | None, list[tuple[int, float]]]]:
-    """March blocks of sets; their outputs go into one file if into any.
-
-    Of each block the sets, their costs or outputs unless these are in their place already, and
-    those that failed with their worst margin.
-    """
-    made, record, keep = [], shared.record, shared.cost is None
-    measured, weight = shared.compared()
-    table: dict[str, Array] = {}
-    for sets, options in blocks:
-        padded, size = np.resize(sets, LANES), sets.size
-        lanes = lanes_of(shared.model, tuple(shared.records), options, shared.output)
-        found = lanes(
-            {path: values[padded] for path, values in shared.numbers.items()},
-            shared.records,
-            record.step,
-            measured=measured,
-            weight=weight,
-            keep=keep,
-        )
-        worst = found.worst[:size]
-        bad = ~(np.isfinite(found.end[:size]) & (worst > 0.0))
-        values: Array | None = np.where(bad, np.inf, found.cost[:size])
-        if keep:
-            values = found.outputs[:size, :: record.substeps]
-            values[bad] = np.nan
-            if shared.to is not None:
-                table |= {str(number): row for number, row in zip(sets, values, strict=True)}
-                values = None
-            elif shared.place is not None:
-                shared.place[sets] = values
-                values = None
-        made.append((sets, values, list(zip(sets[bad].tolist(), worst[bad].tolist(), strict=True))))
-    if shared.to is not None:
-        _write(_file(shared.to, blocks), {"time": record.time, **table})
-    return made
-
-
-def _file(folder: Path, blocks: Sequence[Block]) -> Path:
-    return folder / f"{blocks[0][0][0]:08d}.parquet"
-
-
-def _write(path: Path, columns: Mapping[str, Array]) -> None:
-    """Write a table beside its place, have it on the disk, and rename it."""
-    import polars as pl
-
-    def write(beside: Path) -> None:
-        pl.DataFrame(dict(columns)).write_parquet(beside)
-        with beside.open("rb+") as file:
-            os.fsync(file.fileno())
-
-    write_whole(path, write)
-
-
-def _run(
-    shared: _Sets,
-    blocks: Sequence[Block],
-    count: int,
-    failures: dict[int, str],
-    why: Callable[[float], str],
-    executor: Executor | None,
-) -> Batch:
-    """March all blocks wherever the executor runs them."""
-    samples, several, keep = shared.record.time.size, 1, shared.cost is None
-    values = None if keep else np.full(count, np.inf)
-    if shared.to is not None:
-        if not keep:
-            raise InputError(
-                "Outputs are written to files, costs are not: leave out one of to and cost."
-            )
-        _make_folder(shared.to)
-        several = max(SAMPLES_A_FILE // (samples * LANES), 1)
-    elif keep:
-        values = _outputs(count, samples)
-        shared = replace(shared, place=values)
-    items = [blocks[k : k + several] for k in range(0, len(blocks), several)]
-    # each block writes its own sets' places, so the result does not depend on who is first
-    for _, made in (executor or Threads()).run(_march, shared, items):
-        for sets, found, failed in made:
-            failures |= {number: why(margin) for number, margin in failed}
-            if found is not None:
-                assert values is not None
-                values[sets] = found
-    files = tuple(_file(shared.to, each) for each in items) if shared.to else ()
-    kept, costs = (values, None) if keep else (None, values)
-    return Batch(costs, kept, dict(sorted(failures.items())), files)
-
-
-def _outputs(count: int, samples: int) -> Array:
-    """Room for outputs in memory.
-
-    Raises
-    ------
-    InputError
-        If the machine has less.
-    """
-    size = 8.0 * count * samples
-    try:
-        memory = float(os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES"))
-    except (AttributeError, ValueError, OSError):  # not on Windows
-        memory = np.inf
-    try:
-        if size < memory:
-            return np.full((count, samples), np.nan)
-    except MemoryError:
-        pass
-    raise InputError(
-        f"The outputs of {count} sets, {samples} samples each, take {size / 2**30:.3g} GiB, more "
-        "than this machine's memory: ask for a cost, or have them written to files with to=FOLDER."
-    )
-
-
-def _make_folder(folder: Path) -> None:
-    """A folder without outputs of an earlier batch."""
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        there = next(folder.glob("*.parquet"), None)
-    except OSError as error:
-        raise FileError(f"{folder} cannot be made: {error.strerror or error}.") from None
-    if there is not None:
-        raise FileError(
-            f"{folder} holds {there.name} already; name an empty folder for the outputs."
-        )
-
-
-# --- models of one's own --------------------------------------------------------------------------
-
-
 def simulate_many(
     model: Model,
     p: Any,
@@ -258,13 +89,14 @@ def simulate_many(
     options: Any = None,
     given: Any = None,
     executor: Executor | None = None,
+    **sampling: Unpack[Sampling],
 ) -> Batch:
     """Simulate many parameter sets of a model over one record, from rest or states of one's own.
 
     Parameters
     ----------
-    model, p, inputs, rate, options, given :
-        As in `swashplate.equations.simulate`.
+    model, p, inputs, rate, options, given, **sampling :
+        As in `swashplate.equations.simulate`; `time`, `interpolation`, `substeps`.
     changes : mapping of str to (m,) array_like
         Values of parameters by path, one for each set; the others are those of `p`. With
         ``start.`` before its path, a number of the state at the first sample, as `begin` of
@@ -289,95 +121,113 @@ def simulate_many(
         If files cannot be written.
     """
     instance = instance_of(model, p, options=options, given=given)
-    records = records_of(instance, inputs, rate)
+    records = inputs_of(instance, inputs, rate, **sampling)
     paths = parameter_paths(model)
     values, count = _given_sets(changes)
-    starts = [f"start.{path}" for path in state_paths(model)]
+    known = (*paths, *(f"start.{path}" for path in state_paths(model)))
     for path in values:
-        if path not in (*paths, *starts):
-            raise InputError(
-                f"{model.name} has no parameter '{path}'; it has {', '.join((*paths, *starts))}."
-            )
-    observed = cost.output if cost is not None else output
-    if not observed:
+        if path not in known:
+            raise InputError(f"{model.name} has no parameter '{path}'; it has {', '.join(known)}.")
+    if cost is None and not output:
         raise InputError(f"{model.name}: say which output of the sets is wanted, or give a cost.")
-    output_of(model, observed)
     taps = [(i, tap) for i, part in enumerate(model.parts) for tap in part.taps.values()]
     delays = {f"{model.prefix(i)}{tap.delay}" for i, tap in taps if tap.delay}
     givens = [f"given {model.prefix(i)}{path}" for i, path in model.places("given")]
-    held = dict(zip((*paths, *givens), (*instance.params, *instance.given), strict=True))
-    numbers = {**{path: np.full(count, number) for path, number in held.items()}, **values}
+    numbers = dict(zip((*paths, *givens), (*instance.params, *instance.given), strict=True))
     failures: dict[int, str] = {}
     for path, column in values.items():
         late = path in delays
         rule = "a finite number, at least 0" if late else "a finite number"
         for i in np.flatnonzero(~np.isfinite(column) | (late & (column < 0.0))):
             failures[int(i)] = f"{model.name}: {path} is {column[i]:g}, but must be {rule}."
+    columns = {path: np.full(count, number) for path, number in numbers.items()} | values
     good = np.setdiff1d(np.arange(count), list(failures))
-    record = Record(next(iter(records.values())), 0.0, float(rate), 1)
-    shared = _Sets(model, numbers, record, records, observed, cost, Path(to) if to else None)
-
-    def why(worst: float) -> str:
-        if worst > 0.0:
-            return f"{model.name}: the numbers grow beyond all bounds under this input."
-        return f"{model.name}: {outside(model, worst, 'input')}"
-
     blocks = [(good[k : k + LANES], instance.options) for k in range(0, good.size, LANES)]
-    return _run(shared, blocks, count, failures, why, executor)
-
-
-# --- drives ---------------------------------------------------------------------------------------
+    sets = _Sets(
+        model, columns, records, cost.output if cost else output, cost, Path(to) if to else None
+    )
+    return _run(sets, blocks, count, failures, (model.name, "input"), executor)
 
 
 def simulate_drives(
     parameters: ParameterSet,
     changes: Mapping[str, ArrayLike],
-    record: Record,
-    by_voltage: bool,
-    cost: SquaredError | None,
+    records: Mapping[str, Record],
     output: str,
+    cost: SquaredError | None,
     to: str | Path | None,
     executor: Executor | None,
 ) -> Batch:
     """March many sets over one record; see `Drive.simulate_many`."""
     given, count = _given_sets(changes)
-    columns = [(column, each) for name, each in given.items() for column in columns_of([name])]
-    twice = [column for k, (column, _) in enumerate(columns) if column in dict(columns[:k])]
-    if twice:
-        raise InputError(f"{twice[0]} is given twice.")
-    held = {name: np.full(count, value) for name, value in parameters.numbers.items()}
-    numbers = {**held, **dict(columns)}
-    failures = _failures(parameters, numbers, record.step, by_voltage)
-    observed = cost.output if cost is not None else output
-    by_path = {PATHS[column]: values for column, values in numbers.items()}
-    records = {"voltage" if by_voltage else "current": record.values}
-    models = models_of(parameters.equations)
-    model = models.drive if by_voltage else models.pump_drive
-    check_output(observed)
-    shared = _Sets(model, by_path, record, records, observed, cost, Path(to) if to else None)
-
-    def why(worst: float) -> str:
-        return f"{parameters.name}: {OVERFLOW if worst > 0.0 else OVERPOWERED}"
-
-    blocks = _blocks(parameters, numbers, failures, given, by_voltage)
-    return _run(shared, blocks, count, failures, why, executor)
-
-
-def _failures(
-    parameters: ParameterSet, numbers: Mapping[str, Array], step: float, by_voltage: bool
-) -> dict[int, str]:
-    """Sets that cannot be marched at all."""
+    numbers = {name: np.full(count, value) for name, value in parameters.numbers.items()}
+    changed = [(column, each) for name, each in given.items() for column in columns_of([name])]
+    for k, (column, values) in enumerate(changed):
+        if column in dict(changed[:k]):
+            raise InputError(f"{column} is given twice.")
+        numbers[column] = values
+    driver, record = next(iter(records.items()))
+    by_voltage, models = driver == "voltage", models_of(parameters.equations)
+    output = cost.output if cost else output
+    check_output(output)
     name, failures, exact = parameters.name, dict[int, str](), parameters.rate is None
-    for mask, sentence in broken_rules(numbers):
+    unstable = unstable_filters(numbers, record.step, exact) if by_voltage else ()
+    for mask, sentence in (*broken_rules(numbers), *unstable):
         for i in np.flatnonzero(mask):
             failures.setdefault(int(i), f"{name}: {sentence(int(i))}")
-    why = "swings too fast for" if exact else "is unstable at"
-    for side in SIDES if by_voltage else ():
-        limit = step_limit(numbers[f"zeta_{side}"], exact)
-        said = f"{name}: the current filter of the {side} channel {why} this step."
-        for i in np.flatnonzero(~(numbers[f"omega_{side}"] * step < limit)):
-            failures.setdefault(int(i), said)
-    return failures
+    sets = _Sets(
+        models.drive if by_voltage else models.pump_drive,
+        {path_of(column): values for column, values in numbers.items()},
+        records,
+        output,
+        cost,
+        to,
+    )
+    blocks = _blocks(parameters, numbers, failures, given, by_voltage)
+    return _run(sets, blocks, count, failures, (name, driver), executor)
+
+
+# --- blocks of sets -------------------------------------------------------------------------------
+
+Block = tuple[Indices, tuple[Any, ...]]
+"""Up to LANES sets, and the options that they share: kernels are compiled for those."""
+
+
+@dataclass(frozen=True, eq=False)
+class _Sets:
+    """Sets over one record, and what of them is wanted."""
+
+    model: Model
+    numbers: Mapping[str, Array]  # (m,) each, by path; see `Lanes`
+    records: Mapping[str, Record]  # external signals on the grid
+    output: str
+    cost: SquaredError | None
+    to: str | Path | None
+    place: Array | None = field(default=None, repr=False)  # (m, n), within this process
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Without what other processes have no use for."""
+        return {**self.__dict__, "place": None}
+
+    @property
+    def record(self) -> Record:
+        """The first input."""
+        return next(iter(self.records.values()))
+
+    def file(self, blocks: Sequence[Block]) -> Path:
+        """Where outputs of some blocks go."""
+        return Path(self.to or "") / f"{blocks[0][0][0]:08d}.parquet"
+
+    def compared(self) -> tuple[Array, Array]:
+        """Measured values and weights on the march's grid, zero weight between the samples."""
+        # zeros that nobody writes to take no memory
+        measured, weight = np.zeros(self.record.values.size), np.zeros(self.record.values.size)
+        if self.cost is not None:
+            time, every = self.record.time, slice(None, None, self.record.substeps)
+            seen = Observation(self.cost.output, time, self.cost.measured, self.cost.weight)
+            weight[every] = seen.weight
+            measured[every] = np.where(weight[every] > 0.0, seen.values, 0.0)
+        return measured, weight
 
 
 def _blocks(
@@ -387,7 +237,7 @@ def _blocks(
     changed: Iterable[str],
     by_voltage: bool,
 ) -> list[Block]:
-    """Blocks of sets that share the options which the kernels are compiled for."""
+    """Blocks of a drive's sets that share the options which the kernels are compiled for."""
     stops = np.tan(np.maximum(numbers["Z13_plus"], numbers["Z13_minus"]))
     masks: dict[str, NDArray[np.bool_]] = {"steep": stops >= TAN_22_5}
     for option in {SWITCHES[column] for column in changed if column in SWITCHES}:
@@ -405,7 +255,106 @@ def _blocks(
     return found
 
 
-# --- what both have in common ---------------------------------------------------------------------
+def _march(shared: _Sets, blocks: Sequence[Block]) -> list[tuple[dict[int, float], Indices, Array]]:
+    """March blocks of sets; their outputs go into one file if into any.
+
+    Of each block the worst margins of the sets that failed, and of those that have them, costs or
+    outputs: none where these are in their place already.
+    """
+    made, record, keep = [], shared.record, shared.cost is None
+    measured, weight = shared.compared()
+    inputs = {name: each.values for name, each in shared.records.items()}
+    table = {"time": record.time}
+    for sets, options in blocks:
+        padded, size = np.resize(sets, LANES), sets.size
+        lanes = lanes_of(shared.model, tuple(inputs), options, shared.output)
+        own = {path: values[padded] for path, values in shared.numbers.items()}
+        found = lanes(own, inputs, record.step, measured=measured, weight=weight, keep=keep)
+        worst, values = found.worst[:size], found.cost[:size]
+        good = np.isfinite(found.end[:size]) & (worst > 0.0)
+        if keep:
+            values = found.outputs[:size, :: record.substeps]
+        values[~good] = np.nan if keep else np.inf
+        if keep and shared.to is not None:
+            table |= {str(number): row for number, row in zip(sets, values, strict=True)}
+            values = values[:0]
+        elif shared.place is not None:
+            shared.place[sets] = values
+            values = values[:0]
+        failed = dict(zip(sets[~good].tolist(), worst[~good].tolist(), strict=True))
+        made.append((failed, sets[: len(values)], values))
+    if shared.to is not None:
+        import polars as pl
+
+        write_table(pl.DataFrame(table), shared.file(blocks))
+    return made
+
+
+def _run(
+    shared: _Sets,
+    blocks: Sequence[Block],
+    count: int,
+    failures: dict[int, str],
+    names: tuple[str, str],
+    executor: Executor | None,
+) -> Batch:
+    """March all blocks wherever the executor runs them; `names` of the model and its driver."""
+    output_of(shared.model, shared.output)
+    samples, several, keep = shared.record.time.size, 1, shared.cost is None
+    values = None if keep else np.full(count, np.inf)
+    if shared.to is not None:
+        if not keep:
+            raise InputError(
+                "Outputs are written to files, costs are not: leave out one of to and cost."
+            )
+        _make_folder(Path(shared.to))
+        several = max(SAMPLES_A_FILE // (samples * LANES), 1)
+    elif keep:
+        values = _outputs(count, samples)
+        shared = replace(shared, place=values)
+    items = [blocks[k : k + several] for k in range(0, len(blocks), several)]
+    # each block writes its own sets' places, so the result does not depend on who is first
+    for _, made in (executor or Threads()).run(_march, shared, items):
+        for failed, sets, found in made:
+            for number, worst in failed.items():
+                why = f"the numbers grow beyond all bounds under this {names[1]}."
+                if not worst > 0.0:
+                    why = outside(shared.model, worst, names[1])
+                failures[number] = f"{names[0]}: {why}"
+            if values is not None:
+                values[sets] = found
+    files = tuple(map(shared.file, items)) if shared.to else ()
+    kept, costs = (values, None) if keep else (None, values)
+    return Batch(costs, kept, dict(sorted(failures.items())), files)
+
+
+def _outputs(count: int, samples: int) -> Array:
+    """Room for outputs in memory, refused if the machine has less."""
+    size = 8.0 * count * samples
+    try:
+        if size < float(os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")):
+            return np.full((count, samples), np.nan)
+    except (AttributeError, ValueError, OSError):  # not on Windows, which says so by a MemoryError
+        return np.full((count, samples), np.nan)
+    except MemoryError:
+        pass
+    raise InputError(
+        f"The outputs of {count} sets, {samples} samples each, take {size / 2**30:.3g} GiB, more "
+        "than this machine's memory: ask for a cost, or have them written to files with to=FOLDER."
+    )
+
+
+def _make_folder(folder: Path) -> None:
+    """A folder without outputs of an earlier batch."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        there = next(folder.glob("*.parquet"), None)
+    except OSError as error:
+        raise FileError(f"{folder} cannot be made: {error.strerror or error}.") from None
+    if there is not None:
+        raise FileError(
+            f"{folder} holds {there.name} already; name an empty folder for the outputs."
+        )
 
 
 def _given_sets(changes: Mapping[str, ArrayLike]) -> tuple[dict[str, Array], int]:

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from cmath import log, sqrt
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from functools import lru_cache
 from math import floor
-from typing import Any, Final, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -32,28 +33,19 @@ from swashplate.models.drive import (
 )
 from swashplate.parameters.definitions import OWN
 from swashplate.parameters.parameter_set import ParameterSet
+from swashplate.parameters.rules import SIDES, Broken
 
-SIDES: Final = ("plus", "minus")
+Array = NDArray[np.float64]
+
 MOST_SUBSTEPS = 1000
 """Steps a sample that anyone would wait for."""
 
 
-class _Paths(dict[str, str]):
-    """Paths of columns, those of users' own equations among them."""
-
-    def __missing__(self, column: str) -> str:
-        if column not in OWN:
-            raise KeyError(column)
-        return f"pump.{column}"
-
-
-PATHS = _Paths(
-    {
-        **{path: f"pump.{path}" for path in floats_of(Pump)},
-        **{f"{name}_{side}": f"card.{side}.{name}" for side in SIDES for name in Channel._fields},
-        "tau": "card.tau",
-    }
-)
+PATHS = {
+    **{path: f"pump.{path}" for path in floats_of(Pump)},
+    **{f"{name}_{side}": f"card.{side}.{name}" for side in SIDES for name in Channel._fields},
+    "tau": "card.tau",
+}
 """Path in the model of every column such as ``Z16_plus``."""
 START_PRESSURE = "start_pressure"
 """Column of δP at the first sample, where it is an unknown of the experiment."""
@@ -63,6 +55,8 @@ def path_of(column: str) -> str:
     """Path in the model of a column, of the pressure at the start, or of a state at the start."""
     if column.startswith("start."):
         return column
+    if column in OWN:  # of an equation of one's own
+        return f"pump.{column}"
     return "start.pump.pressure" if column == START_PRESSURE else PATHS[column]
 
 
@@ -164,12 +158,32 @@ def without_ripple(instance: Instance) -> Instance:
     return Instance(instance.model, (card, smooth), instance.name)
 
 
-def step_limit(zeta: ArrayLike, exact: bool) -> NDArray[np.float64]:
+def step_limit(zeta: ArrayLike, exact: bool) -> Array:
     """Largest ωh that the card's filter bears, for each ζ; see the equation of that name."""
     damping = np.asarray(zeta, dtype=np.float64)
     limit = interpreted(filter_limit)
     found = [limit(each, True if exact else None) for each in damping.reshape(-1).tolist()]
     return np.array(found).reshape(damping.shape)
+
+
+def unstable_filters(numbers: Mapping[str, Array], step: float, exact: bool) -> Iterator[Broken]:
+    """Sets at whose step the filter would settle on wrong values without a word, as rules are."""
+    for side in SIDES:
+        zeta, omega = numbers[f"zeta_{side}"], numbers[f"omega_{side}"]
+        steps = omega * step / step_limit(zeta, exact)
+
+        def sentence(i: int, side: str = side, steps: Array = steps) -> str:
+            zeta, omega = numbers[f"zeta_{side}"][i], numbers[f"omega_{side}"][i]
+            change = "a zeta nearer to 1 or a lower omega"
+            if steps[i] < MOST_SUBSTEPS:
+                change = f"substeps={floor(steps[i]) + 1} or more, a higher rate or a lower omega"
+            return (
+                f"the current filter of the {side} channel (zeta = {zeta:g}, omega = {omega:g} "
+                f"rad/s) {'swings too fast for' if exact else 'is unstable at'} a step of "
+                f"1/{1.0 / step:g} s; simulate with {change}."
+            )
+
+        yield ~(steps < 1.0), sentence
 
 
 @lru_cache(maxsize=256)
@@ -181,28 +195,11 @@ def check_filter_stability(parameters: ParameterSet, step: float) -> None:
     InputError
         Unless ωh is below `step_limit`; the sentence says how many steps a sample would do.
     """
-    numbers, exact = parameters.numbers, parameters.rate is None
-    for side in SIDES:
-        zeta, omega = numbers[f"zeta_{side}"], numbers[f"omega_{side}"]
-        steps = omega * step / float(step_limit(zeta, exact))
-        if steps < 1.0:
-            continue
-        channel = f"{parameters.name}: the current filter of the {side} channel (zeta = {zeta:g}"
-        if not steps < MOST_SUBSTEPS:
-            has, change = "has so little damping", "raise zeta"
-            if zeta >= 1.0:
-                has, change = "has so much damping", "lower zeta"
-            if exact:
-                has, change = f"swings so fast with omega = {omega:g} rad/s", "lower omega"
-            raise InputError(
-                f"{channel}) {has} that {MOST_SUBSTEPS} steps a sample would not do; {change}."
-            )
-        raise InputError(
-            f"{channel}, omega = {omega:g} rad/s) "
-            f"{'swings too fast for' if exact else 'is unstable at'} a step of 1/{1.0 / step:g} s; "
-            f"simulate with substeps={floor(steps) + 1} or more or at a higher rate, or lower "
-            "omega."
-        )
+    names = [f"{name}_{side}" for name in ("zeta", "omega") for side in SIDES]
+    numbers = {name: np.array([parameters.numbers[name]]) for name in names}
+    for broken, sentence in unstable_filters(numbers, step, parameters.rate is None):
+        if broken[0]:
+            raise InputError(f"{parameters.name}: {sentence(0)}")
 
 
 def at_every_rate(parameters: ParameterSet) -> ParameterSet:

@@ -1,21 +1,20 @@
-"""Simulation of a drive: from a parameter set and a record to a result, and its steady states."""
+"""A drive run: over records, one sample at a time, and where it settles."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
-from functools import partial
-from typing import Any, Literal
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from swashplate.equations.marching.part import Stored
-from swashplate.equations.marching.record import Record, column
-from swashplate.equations.marching.run import Instance, Start, Started, called, marched
+from swashplate.equations.marching.record import Interpolation, Record, least_substeps, on_grid
+from swashplate.equations.marching.run import Instance, Start, Started, marched
+from swashplate.equations.marching.use import Stepper
 from swashplate.errors import DomainError, InputError
-from swashplate.models.displacement_control import PumpConstants
-from swashplate.models.pump import PumpInputs, PumpState
+from swashplate.maneuvers import Maneuver, sampled
 from swashplate.parameters.parameter_set import ParameterSet
 from swashplate.parameters.rules import FULL_VOLTAGE
 from swashplate.simulation.instance import (
@@ -24,10 +23,35 @@ from swashplate.simulation.instance import (
     models_of,
     without_ripple,
 )
-from swashplate.simulation.result import KEPT, Simulation
+from swashplate.simulation.result import Simulation
 
 Array = NDArray[np.float64]
-Driver = Literal["voltage", "current"]
+
+
+def drive_records(
+    driver: str,
+    command: ArrayLike | Maneuver,
+    rate: float,
+    *,
+    clip: bool = False,
+    time: ArrayLike | None = None,
+    interpolation: Interpolation | None = None,
+    substeps: int | None = None,
+    **measured: ArrayLike | None,
+) -> dict[str, Record]:
+    """A drive's command and what was measured beside it on the march's grid, checked.
+
+    What was measured is a straight line between samples, whatever the command is.
+    """
+    beside = {name: values for name, values in measured.items() if values is not None}
+    between: dict[str, Interpolation | None] = {driver: interpolation}
+    between |= dict.fromkeys(beside, "linear")
+    steps = least_substeps(rate, substeps)
+    inputs = {driver: sampled(command, rate), **beside}
+    found = on_grid(inputs, rate, time=time, interpolation=between, substeps=steps)
+    if driver == "voltage":
+        found["voltage"] = check_voltage(found["voltage"], clip)
+    return found
 
 
 def check_voltage(record: Record, clip: bool) -> Record:
@@ -36,8 +60,7 @@ def check_voltage(record: Record, clip: bool) -> Record:
     if low >= -FULL_VOLTAGE and high <= FULL_VOLTAGE:
         return record
     if clip:
-        clipped = np.clip(record.values, -FULL_VOLTAGE, FULL_VOLTAGE)
-        return Record(clipped, record.start, record.rate, record.substeps)
+        return replace(record, values=np.clip(record.values, -FULL_VOLTAGE, FULL_VOLTAGE))
     first = int(np.argmax(np.abs(record.values) > FULL_VOLTAGE))
     raise InputError(
         f"The voltage is {record.values[first]:g} V at {record.start + first * record.step:g} s, "
@@ -47,49 +70,25 @@ def check_voltage(record: Record, clip: bool) -> Record:
 
 def simulate_drive(
     parameters: ParameterSet,
-    record: Record,
+    records: Mapping[str, Record],
     start: Start,
     start_pressure: float | None = None,
-    measured: Mapping[str, Array] | None = None,
-    *,
-    driver: Driver = "voltage",
 ) -> Simulation:
-    """March card and pump over a voltage record; see `Drive.simulate`.
+    """March card and pump over a voltage, or the pump alone over a current; see `Drive.simulate`.
 
     With `start_pressure` the pump begins there [Pa] and only the card's state is that of `start`.
     """
+    driver, record = next(iter(records.items()))
     if driver == "voltage":
         check_filter_stability(parameters, record.step)
-    instance = instance_of(parameters, driver == "voltage")
-    others = measured or {}
-    records = {driver: record.values, **others}
-    started = started_at(instance, records, record.step, start, start_pressure)
-    out = marched(instance, records, record.step, started, KEPT, driver)
-    return Simulation(parameters.name, record, instance, driver, started, out, others)
-
-
-simulate_pump = partial(simulate_drive, driver="current")
-"""March the pump alone over a signed current; see `Drive.simulate_current`."""
-
-
-def started_at(
-    instance: Instance,
-    records: Mapping[str, Array],
-    step: float,
-    start: Start,
-    start_pressure: float | None = None,
-) -> Started:
-    """Where a record begins, with the pump at a pressure of its own if one is given. [Pa]"""
-    started = instance.start({name: float(v[0]) for name, v in records.items()}, step, start)
-    if start_pressure is None:
-        return started
-    card, pump = started.states
-    pump = pump._replace(**start_states(instance, start_pressure, started))
-    return started._replace(states=(card, pump))
+    run = Simulation(instance_of(parameters, driver == "voltage"), records, start)
+    if start_pressure is not None:
+        run = replace(run, begin=start_states(run.instance, start_pressure, run.started))
+    return run.marched(driver)
 
 
 def start_states(instance: Instance, pressure: float, started: Started) -> dict[str, float]:
-    """Numbers of the pump's state that a pressure at the start sets. [Pa]
+    """Numbers of the pump's state that a pressure at the start sets, by path. [Pa]
 
     Raises
     ------
@@ -106,35 +105,48 @@ def start_states(instance: Instance, pressure: float, started: Started) -> dict[
             f"{instance.name}: the pressure at the start is {pressure:.6g} Pa, but the stops of "
             f"the swash plate and Z15 keep it between {k.lower:.6g} and {k.upper:.6g} Pa."
         )
-    return dict.fromkeys(instance.model.parts[1].free_start["pressure"], float(pressure))
+    paths = instance.model.parts[1].free_start["pressure"]
+    return {f"pump.{path}": float(pressure) for path in paths}
 
 
-def measured_records(
-    record: Record,
-    load_torque: ArrayLike | None,
-    pump_speed: ArrayLike | None,
-    supply_pressure: ArrayLike | None,
-) -> dict[str, Array]:
-    """Inputs beside the command, on the march's grid.
+class Sample(NamedTuple):
+    """Signals at one sample, named and signed as in `Simulation`, SI."""
 
-    Each is None, a number, or as many finite samples as the command has.
-    """
-    given = {
-        "load_torque": load_torque,
-        "pump_speed": pump_speed,
-        "supply_pressure": supply_pressure,
-    }
-    found: dict[str, Array] = {}
-    fine = np.arange(record.values.size)
-    grid = fine[:: record.substeps]
-    for name, values in given.items():
-        if values is None:
-            continue
-        samples = column(np.full(grid.size, values) if np.ndim(values) == 0 else values, name)
-        if samples.size != grid.size:
-            raise InputError(f"{name} has {samples.size} samples, but the command has {grid.size}.")
-        found[name] = np.interp(fine, grid, samples)
-    return found
+    voltage: float
+    current_positive: float
+    current_negative: float
+    current: float
+    solenoid_force: float
+    spool_position: float
+    orifice_opening: float
+    stroker_pressure: float
+    swash_angle: float
+    shaft_speed: float
+    shaft_position: float
+
+
+def drive_stepper(
+    parameters: ParameterSet, h: float, interpolation: Interpolation, start: Start
+) -> Stepper[Sample]:
+    """The drive one sample at a time; see `Drive.stepper`."""
+    if not h > 0.0:
+        raise InputError(f"The sample interval is {h:g} s, but must be above 0.")
+    rate = 1.0 / h
+    if abs(rate - round(rate)) < 1e-9 * rate:
+        rate = float(round(rate))  # 1/(1/49) is not 49, but the user means 49 Hz
+    substeps = least_substeps(rate)
+    check_filter_stability(parameters, 1.0 / (rate * substeps))
+    return Stepper(
+        instance_of(parameters, True),
+        ("voltage",),
+        Sample._fields[1:],
+        rate,
+        Sample,
+        start,
+        interpolation=interpolation,
+        substeps=substeps,
+        bound=FULL_VOLTAGE,
+    )
 
 
 # --- steady states --------------------------------------------------------------------------------
@@ -150,24 +162,6 @@ def steady_states(parameters: ParameterSet, voltage: Array) -> tuple[Array, Arra
     return current, speed
 
 
-def pump_arguments(instance: Instance, current: float, step: float = 1.0) -> dict[str, Any]:
+def pump_arguments(instance: Instance, current: float) -> dict[str, Any]:
     """What the pump's equations take under a constant current, by the arguments' names."""
-    p, options, _ = instance.parts[1]
-    known: dict[str, Any] = {"p": p, "options": options, "h": step}
-    pump: Any = instance.model.parts[1]
-    known["k"] = called(pump.constants, known)
-    known["inputs"] = PumpInputs(current, p.pump_speed, p.load_torque, p.Z9)
-    return known
-
-
-def settled_state(instance: Instance, current: float) -> PumpState:
-    """State of the pump that a constant signed current settles at."""
-    pump: Any = instance.model.parts[1]
-    made: PumpState = called(pump.settled, pump_arguments(instance, current))
-    return made
-
-
-def pressure_limits(instance: Instance) -> PumpConstants:
-    """Pressures at which stops and relief valve act, with the other constants. [Pa]"""
-    made: PumpConstants = pump_arguments(instance, 0.0)["k"]
-    return made
+    return {**instance.start({"current": current}, 1.0).arguments[1]}

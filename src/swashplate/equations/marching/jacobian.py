@@ -10,29 +10,29 @@ from numpy.typing import ArrayLike, NDArray
 
 from swashplate.equations.code import generating
 from swashplate.equations.fields import value_at
-from swashplate.equations.marching.graph import Graph, Known, graph_of
+from swashplate.equations.marching.graph import Graph, Moved, graph_of
 from swashplate.equations.marching.layout import Layout, layout_of, started_by
 from swashplate.equations.marching.observation import ObservedRecord, Own
 from swashplate.equations.marching.pieces import addresses
-from swashplate.equations.marching.rows import Program, Sink, march_observed, room_for, rooms
+from swashplate.equations.marching.rows import STRIDE, Program, Sink, march_observed
 from swashplate.equations.marching.run import Instance, Start, arrays_of, begun, check_domain
-from swashplate.equations.marching.triangle import ROWS, aligned, upright
+from swashplate.equations.marching.triangle import EIGHTH, ROWS, aligned, upright
 from swashplate.errors import DomainError, InputError
 
 Array = NDArray[np.float64]
 
 
-def starting_slopes(
+def _slopes(
     graph: Graph, instance: Instance, first: Mapping[str, float], h: float, start: Start
-) -> dict[tuple[Known, str], float]:
+) -> dict[Moved, float]:
     """Derivatives of constants and of states at the start by all parameters that move them."""
     starting = graph.starting(start)
     values = []
-    for kind, part, path in starting.arguments:
+    for part, kind, path in starting.arguments:
         if kind in ("p", "given"):
             own = instance.parts[part]
             values.append(value_at(own.p if kind == "p" else own.given, path))
-        elif kind == "signal":
+        elif kind == "input":
             values.append(first.get(path, 0.0) if start == "steady" else 0.0)
         else:
             values.append(h if kind == "h" else 0.0)
@@ -40,7 +40,7 @@ def starting_slopes(
     return dict(zip(starting.moves, found[len(found) - len(starting.moves) :], strict=True))
 
 
-def begun_columns(
+def _begun(
     layout: Layout,
     instance: Instance,
     first: Mapping[str, float],
@@ -52,23 +52,20 @@ def begun_columns(
 
     `own` are paths of states that the run starts from as its own unknowns: nothing else moves them.
     """
-    model, slopes = layout.model, dict[tuple[Known, str], float]()
+    graph, slopes = layout.graph, dict[Moved, float]()
     if layout.columns:
-        slopes = starting_slopes(layout.graph, instance, first, h, start)
+        slopes = _slopes(graph, instance, first, h, start)
     tangent = np.zeros(layout.tangents)
-    for (part, path), found in layout.places.items():
-        free = f"{model.prefix(part)}{path}" in own
-        for c, at in found.items():
-            if free:
-                tangent[at] = path in started_by(model, part, layout.columns[c])
-            else:
-                tangent[at] = slopes.get((("state", part, path), layout.columns[c]), 0.0)
-    places = instance.places(layout.graph.sampler.signals, h)
-    terms = layout.program.terms
-    scale = terms.scale.copy()
+    for (state, column), at in layout.places.items():
+        if f"{graph.model.prefix(state.part)}{state.path}" in own:
+            tangent[at] = state.path in started_by(graph.model, state.part, column)
+        else:
+            tangent[at] = slopes.get((state, column), 0.0)
+    places, scale = instance.places(graph.sampler.signals, h), layout.program.scale.copy()
     for at, slot in layout.slots:
-        scale[at] *= places.slope[slot] if isinstance(slot, int) else slopes[slot]
-    return layout.program._replace(terms=terms._replace(scale=scale)), tangent
+        is_tap = slot[0].kind == "fraction"
+        scale[at] *= places.slope[int(slot[0].path)] if is_tap else slopes[slot]
+    return layout.program._replace(scale=scale), tangent
 
 
 @generating
@@ -76,7 +73,7 @@ def _at_rest(
     layout: Layout, instance: Instance, h: float, own: tuple[str, ...]
 ) -> tuple[Program, Array]:
     """Those of a start at rest, which depends on no record."""
-    return begun_columns(layout, instance, {}, h, "rest", own)
+    return _begun(layout, instance, {}, h, "rest", own)
 
 
 # --- what a fit asks for --------------------------------------------------------------------------
@@ -86,11 +83,9 @@ class Jacobian(NamedTuple):
     """Weighted residuals and their derivatives."""
 
     names: tuple[str, ...]
-    """Columns: those asked for, then the observations' own unknowns."""
+    """Columns: those asked for, then the observations' free offsets."""
     rows: Array
     """(k + 1, m): the columns one after the other, each over all m samples, residuals last."""
-    squares: Array
-    """Sum of squared residuals of each observation."""
 
     @property
     def columns(self) -> Array:
@@ -99,7 +94,7 @@ class Jacobian(NamedTuple):
 
     @property
     def residuals(self) -> Array:
-        """(m,) weight · (simulated - measured), a view."""
+        """(m,) weight · (simulated + offset - measured), a view."""
         return np.asarray(self.rows[-1])
 
 
@@ -111,8 +106,6 @@ class Triangle(NamedTuple):
     factor: Array
     """(k + 1, k + 1) upper triangle R of [J r], with RᵀR = [J r]ᵀ[J r]; no diagonal element is
     negative."""
-    squares: Array
-    """Sum of squared residuals of each observation."""
 
 
 NOTHING_OWN = Own()
@@ -121,8 +114,8 @@ NOTHING_OWN = Own()
 def residuals(instance: Instance, observed: ObservedRecord, own: Own = NOTHING_OWN) -> Array:
     """(m,) weighted residuals of all observations, one after the other, 0 where the weight is.
 
-    Of each weight · (simulated - measured) in its signal's SI unit; `own` are values of the
-    experiment's own unknowns.
+    Of each weight · (simulated + offset - measured) in its signal's SI unit; `own` are values of
+    the experiment's own unknowns.
 
     Raises
     ------
@@ -132,7 +125,7 @@ def residuals(instance: Instance, observed: ObservedRecord, own: Own = NOTHING_O
         If the own unknowns do not fit.
     """
     rows = np.empty((1, observed.rows))
-    _march(instance, observed, own, (), _sink(rows, (), (0, 0), observed))
+    _march(instance, observed, own, (), (), rows, 0)
     return np.asarray(rows[0])
 
 
@@ -159,18 +152,17 @@ def jacobian(
         Where to write; the `rows` of an earlier call, for example. New memory takes longer to get
         than the whole march.
     """
-    count = len(columns)
-    to = np.flatnonzero(np.ones(count) if moved is None else moved)
-    shape = (count + len(observed.own_columns) + 1, observed.rows)
+    to = np.flatnonzero(np.ones(len(columns)) if moved is None else moved)
+    names = (*columns, *observed.own_columns)
+    shape = (len(names) + 1, observed.rows)
     if out is None:
         out = np.empty(shape)
     elif out.shape != shape or out.dtype != np.float64 or not out.flags.carray:
         raise InputError(f"out must be a plain array of floats of shape {shape}.")
-    if to.size < count:
-        out[:count][~np.isin(np.arange(count), to)] = 0.0
-    sink = _sink(out, to, (count, 0), observed)
-    _march(instance, observed, own, tuple(columns[c] for c in to.tolist()), sink)
-    return Jacobian((*columns, *observed.own_columns), out, sink.squares)
+    for c in set(range(len(columns))).difference(to):
+        out[c] = 0.0
+    _march(instance, observed, own, [columns[c] for c in to.tolist()], to, out, len(columns))
+    return Jacobian(names, out)
 
 
 def triangle(
@@ -190,13 +182,14 @@ def triangle(
     DomainError
         Also if a derivative is so large that its square overflows.
     """
-    count, names = len(columns), (*columns, *observed.own_columns)
-    to = np.flatnonzero(np.ones(count) if moved is None else moved)
-    places = np.concatenate([to, np.arange(count, len(names) + 1)])
-    sink = _sink(aligned(places.size, ROWS), np.arange(to.size), (to.size, places.size), observed)
-    _march(instance, observed, own, tuple(columns[c] for c in to.tolist()), sink)
+    to = np.flatnonzero(np.ones(len(columns)) if moved is None else moved)
+    names = (*columns, *observed.own_columns)
+    places = np.concatenate([to, np.arange(len(columns), len(names) + 1)])
+    rows, some = aligned(places.size, ROWS), np.zeros((places.size, places.size))
+    asked = [columns[c] for c in to.tolist()]
+    _march(instance, observed, own, asked, range(to.size), rows, to.size, some)
     factor = np.zeros((len(names) + 1, len(names) + 1))
-    factor[np.ix_(places, places)] = sink.factor
+    factor[np.ix_(places, places)] = upright(some)
     if not np.isfinite(factor).all():
         overflown = np.asarray(~np.isfinite(factor)).any(axis=0)
         bad = [*names, "the residuals"][int(np.argmax(overflown))]
@@ -204,45 +197,48 @@ def triangle(
             f"{instance.name}: {bad}: the derivatives are too large for a least-squares problem; "
             "check the size of the parameters and weights."
         )
-    return Triangle(names, upright(factor), sink.squares)
+    return Triangle(names, factor)
 
 
-def _sink(rows: Array, to: ArrayLike, sizes: tuple[int, int], observed: ObservedRecord) -> Sink:
-    """A sink; `sizes` are the columns before the observations' own, and those of a triangle."""
-    return Sink(
-        rows=rows,
-        to=np.asarray(to, dtype=np.int64),
-        own=np.arange(sizes[0], rows.shape[0] - 1),
-        factor=np.zeros((sizes[1], sizes[1])),
-        squares=np.zeros(len(observed.observations)),
-    )
+NO_FACTOR = np.zeros((0, 0))
 
 
 def _march(
-    instance: Instance, observed: ObservedRecord, own: Own, columns: tuple[str, ...], sink: Sink
+    instance: Instance,
+    observed: ObservedRecord,
+    own: Own,
+    columns: Sequence[str],
+    to: ArrayLike,
+    rows: Array,
+    before: int,
+    factor: Array = NO_FACTOR,
 ) -> None:
-    """March, and fill the sink."""
+    """March, and fill rows, or fold them into a `factor`.
+
+    `to` are the places of the columns' rows; those of free offsets are behind the first `before`.
+    """
     records, h, start = observed.records, observed.record.step, observed.start
     signals, seen = tuple(records), tuple(dict.fromkeys(o.signal for o in observed.observations))
     missing = [c for c in columns if c.startswith("start.") and c[6:] not in own.start]
     if missing:
         raise InputError(f"{missing[0]} is a column, so Own needs a value of it.")
     graph = graph_of(instance.model, signals, instance.options, seen)
-    plan = observed.plan(own, int(sink.own[0]) if sink.own.size else 0)
+    plan = observed.plan(own.offsets, before)
     numbers = tuple(seen.index(each.signal) for each in observed.observations)
-    layout = layout_of(graph, columns, numbers, start)
+    layout = layout_of(graph, tuple(columns), numbers, start)
     first = {name: float(values[0]) for name, values in records.items()}
     started = instance.start(first, h, start)
     states, places = begun(instance, started, own.start), instance.places(signals, h)
     if start == "rest":
         program, tangent = _at_rest(layout, instance, h, tuple(own.start))
     else:
-        program, tangent = begun_columns(layout, instance, first, h, start, own.start)
-    values, met = tuple(records.values()), np.array([np.inf])
-    spare = rooms(layout, plan.kept.shape)
-    room = room_for(spare, layout, plan)
-    arrays = arrays_of(instance, values, started, places, states, met, room.flat)
+        program, tangent = _begun(layout, instance, first, h, start, own.start)
+    sink = Sink(rows, np.array(to, dtype=np.int64), np.arange(before, len(rows) - 1), factor)
+    values, met, block = tuple(records.values()), np.array([np.inf]), layout.taken()
+    arrays = arrays_of(instance, values, started, places, states, met, block)
     pieces = addresses(graph.pieces, layout.pieces)
+    integrals = np.zeros((program.integrals, 3))
+    room = block, aligned(STRIDE), aligned(EIGHTH), integrals, plan.first[:-1].copy()
     march_observed(pieces, arrays, (values[0].size, h), tangent.copy(), program, plan, sink, room)
+    layout.give_back(block)
     check_domain(instance, states, float(met[0]), observed.driven_by)
-    spare.append(room)

@@ -24,11 +24,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swashplate.equations import expressions as ex
-from swashplate.equations.code import Call, Choice, Code, Item, Let, Rule, generating, leaves
+from swashplate.equations.code import Choice, Code, Item, Let, Rule, generating, leaves
 from swashplate.equations.equation import JIT_OFF
 from swashplate.equations.expressions import Node, text
 from swashplate.equations.marching.march import Sampler, lower, output_of
-from swashplate.equations.marching.part import Stored, choose, rest_of
+from swashplate.equations.marching.part import Stored, choose
 from swashplate.equations.marching.run import module
 from swashplate.equations.marching.triangle import aligned
 from swashplate.equations.model import Model
@@ -38,9 +38,6 @@ Array = NDArray[np.float64]
 
 LANES = 16
 """Sets marched side by side: two vectors of eight where the processor has them, else four of 4."""
-
-
-# --- without branches -----------------------------------------------------------------------------
 
 
 CALLED: dict[str, Any] = {"choose": choose}
@@ -53,6 +50,9 @@ SHORT = 16
 """Statements that are not worth a loop of their own."""
 VECTOR = {*ex.CHEAP, "choose", "/", "sqrt", "**"}
 """Operations that processors have for many numbers at once."""
+CALLS = re.compile(r"([A-Za-z_]\w*)\(")
+CALLED_ONCE = re.compile(r"_[0-9a-f]{8}$")
+"""What a generated function's name ends in."""
 
 
 def is_vector(node: Node) -> bool:
@@ -68,11 +68,6 @@ def is_flat(item: Item) -> bool:
     return isinstance(item, Let) and is_vector(item.node)
 
 
-def made_by(item: Choice | Call) -> tuple[str, ...]:
-    """Names that an item gives their values."""
-    return tuple(name for name, _, _ in item.merged) if isinstance(item, Choice) else item.results
-
-
 class Statement(NamedTuple):
     """Lines that give some names their values."""
 
@@ -83,16 +78,25 @@ class Statement(NamedTuple):
 
 
 class Straight:
-    """Code of a sample without branches, and what can be computed ahead of the march.
+    """A sample without branches in loops over lanes, and what can be computed ahead of the march.
 
-    Names in `still` do not change over the march: what follows nothing but them is `ahead`, the
-    rest stands in `loops` over lanes. `fresh` gives a name that is not taken.
+    What follows nothing but parameters, givens, constants and places of taps is `ahead`. Every
+    number that one loop leaves to another has a row of a block: row r of lane l is ``flat[r * LANES
+    + l]``. With all of it in one array at known distances the compiler need not prove at run time
+    that rows do not overlap.
     """
 
-    def __init__(self, still: Iterable[str], fresh: Callable[[str], str]) -> None:
-        self.still, self.fresh = {"h", *still}, fresh
+    def __init__(self, sampler: Sampler) -> None:
+        parts = sampler.used
+        self.known = {
+            node.value for part in parts for _, node in (*leaves(part.p), *leaves(part.given))
+        }
+        self.known |= {part.fraction(tap) for part in parts for tap in part.taps}
+        constants = {name for part in parts for name in sampler.constants(part)}
+        self.still, self.fresh = {"h", *self.known, *constants}, parts[0].code.fresh
         self.ahead: list[Statement] = []
         self.loops: list[list[Statement]] = [[]]
+        self.number: dict[str, int] = {}  # Rows, given out on demand.
         self._moved: dict[Node, Node] = {}
 
     def add(self, code: Code, items: Iterable[Item]) -> None:
@@ -106,7 +110,10 @@ class Straight:
                     self.let(name, ex.make("if", item.test, one, two))
             else:
                 assert not isinstance(item, Rule)
-                names = made_by(item)
+                if isinstance(item, Choice):
+                    names = tuple(name for name, _, _ in item.merged)
+                else:
+                    names = item.results
                 alone = Code(code.taken)
                 alone.items = [item]
                 made = [*map(ex.name, names)]
@@ -116,8 +123,13 @@ class Straight:
 
     def let(self, name: str, node: Node) -> None:
         """Append a name and what it stands for."""
-        made = node if node.reads <= self.still else self.node(node)
+        made = node if node.reads <= self.still else self._branchless(node)
         self._append(Statement((name,), [f"{name} = {text(made)}"], made.reads, is_vector(made)))
+
+    def become(self, name: str, node: Node) -> None:
+        """Append what becomes of a row at the end of a sample."""
+        made = self._branchless(node)
+        self._append(Statement((), [f"{self.row(name)} = {text(made)}"], made.reads, True))
 
     def _append(self, statement: Statement) -> None:
         if statement.names and statement.reads <= self.still:
@@ -136,12 +148,7 @@ class Straight:
         if len(self.loops[-1]) > SHORT:
             self.loops.append([])
 
-    def become(self, row: str, node: Node) -> None:
-        """Append what becomes of a row."""
-        made = self.node(node)
-        self._append(Statement((), [f"{row} = {text(made)}"], made.reads, True))
-
-    def node(self, node: Node) -> Node:
+    def _branchless(self, node: Node) -> Node:
         """An expression without branches, and without what can be computed ahead of the march."""
         if node.op in ex.LEAVES:
             return node
@@ -151,7 +158,7 @@ class Straight:
                 self.let(name, node)
                 self._moved[node] = ex.name(name, node.kind)
             return self._moved[node]
-        args = [self.node(each) for each in node.args]
+        args = [self._branchless(each) for each in node.args]
         if node.op == "if" and node.kind != "int":
             return ex.make("choose", *args, kind=node.kind)
         if node.op == "and":
@@ -160,43 +167,25 @@ class Straight:
             return reduce(lambda a, b: ex.make("choose", a, ex.number(True), b, kind="bool"), args)
         return ex.make(node.op, *args, value=node.value)
 
-
-# --- the march ------------------------------------------------------------------------------------
-
-CALLS = re.compile(r"([A-Za-z_]\w*)\(")
-CALLED_ONCE = re.compile(r"_[0-9a-f]{8}$")
-"""What a generated function's name ends in."""
-
-
-class Rows:
-    """Rows of a block of lanes, given out on demand.
-
-    A block is one flat array: row r of lane l is ``flat[r * LANES + l]``. With everything in one
-    array at known distances the compiler need not prove at run time that rows do not overlap.
-    """
-
-    def __init__(self) -> None:
-        self.number: dict[str, int] = {}
-
-    def text(self, name: str) -> str:
+    def row(self, name: str) -> str:
         """Text of a lane's number in the row of a name."""
         return f"flat[{self.number.setdefault(name, len(self.number))} * LANES + lane]"
 
     def loads(self, names: Iterable[str]) -> list[str]:
         """Lines that take numbers out of their rows."""
-        return [f"{name} = {self.text(name)}" for name in sorted(names)]
+        return [f"{name} = {self.row(name)}" for name in sorted(names)]
 
     def saves(self, names: Iterable[str]) -> list[str]:
         """Lines that put numbers into their rows."""
-        return [f"{self.text(name)} = {name}" for name in sorted(names)]
+        return [f"{self.row(name)} = {name}" for name in sorted(names)]
 
-    def loops(self, loops: Sequence[Sequence[Statement]], shared: set[str]) -> list[str]:
-        """Text of loops over lanes; the names in `shared` are the same for all lanes."""
+    def lines(self, shared: set[str]) -> list[str]:
+        """Text of the loops over lanes; the names in `shared` are the same for all lanes."""
         lines: list[str] = []
-        for k, loop in enumerate(loops):
+        for k, loop in enumerate(self.loops):
             made = {name for each in loop for name in each.names}
             read = {name for each in loop for name in each.reads}
-            later = {name for after in loops[k + 1 :] for each in after for name in each.reads}
+            later = {name for after in self.loops[k + 1 :] for each in after for name in each.reads}
             body = [line for each in loop for line in each.lines]
             loads, saves = self.loads(read - made - shared), self.saves(made & later)
             lines += over_lanes([*loads, *body, *saves])
@@ -206,15 +195,6 @@ class Rows:
 def over_lanes(lines: Sequence[str]) -> list[str]:
     """A loop over lanes."""
     return ["for lane in range(LANES):", *indented(lines)] if lines else []
-
-
-def straight_of(sampler: Sampler) -> tuple[Straight, set[str]]:
-    """Room for a sample without branches, and the names of numbers that are known ahead of it."""
-    parts = sampler.used()
-    known = {node.value for part in parts for _, node in (*leaves(part.p), *leaves(part.given))}
-    known |= {part.fraction(tap) for part in parts for tap in part.taps}
-    constants = {name for part in parts for name in sampler.constants(part)}
-    return Straight(known | constants, parts[0].code.fresh), known
 
 
 def report(model: Model, output: str | None = None, *, options: Any = None) -> str:
@@ -235,32 +215,22 @@ def report(model: Model, output: str | None = None, *, options: Any = None) -> s
         A line for each operation that is done set by set, with the equation that it stands in; or
         that there is none. `simulate_many` works either way, and slower in the first.
     """
-    signals = [
-        part.tap(name).signal
-        for i, part in enumerate(model.parts)
-        for name in part.input_types
-        if model.link_of(i, name) is None and name not in part.defaults
-    ]
-    several = len(model.parts) > 1
-    chosen = [getattr(options, part.name, None) if several else options for part in model.parts]
-    chosen = [
-        part.options() if made is None and part.options is not None else made
-        for made, part in zip(chosen, model.parts, strict=True)
-    ]
+    signals, chosen, found = list[str](), list[Any](), dict[str, None]()
+    for i, part in enumerate(model.parts):
+        outside = [name for name in part.input_types if model.link_of(i, name) is None]
+        signals += [part.tap(name).signal for name in outside if name not in part.defaults]
+        own = options if len(model.parts) == 1 else getattr(options, part.name, None)
+        chosen.append(part.options() if own is None and part.options is not None else own)
     names = (*model.outputs, *model.parts[-1].outputs) or model.parts[-1].signal_names
-    place, _ = output_of(model, output or names[-1])
-    sampler = Sampler(model, signals, chosen, [place])
-    found: dict[str, None] = {}
-    straight, _ = straight_of(sampler)
-    for part in sampler.used():
-        before = len(straight.loops)
-        straight.add(part.code, part.code.kept(sampler.ends[part.part]))
-        for statement in [each for loop in straight.loops[before - 1 :] for each in loop]:
-            if not statement.vector:
-                where = part.code.origins.get(statement.names[0], part.own.name)
-                called = {word for line in statement.lines for word in CALLS.findall(line)}
-                slow = sorted(CALLED_ONCE.sub("", word) for word in called - {*VECTOR, *CALLED})
-                found[f"{where} calls {', '.join(slow)}"] = None
+    sampler = Sampler(model, signals, chosen, [output_of(model, output or names[-1])[0]])
+    for each in sampler.used:
+        straight = Straight(sampler)
+        straight.add(each.code, each.code.kept(sampler.ends[each.part]))
+        for statement in [made for loop in straight.loops for made in loop if not made.vector]:
+            where = each.code.origins.get(statement.names[0], each.own.name)
+            called = {word for line in statement.lines for word in CALLS.findall(line)}
+            slow = sorted(CALLED_ONCE.sub("", word) for word in called - {*VECTOR, *CALLED})
+            found[f"{where} calls {', '.join(slow)}"] = None
     if not found:
         return f"Nothing keeps {model.name} from vector instructions."
     return "\n".join([f"{model.name} is not all vector instructions:", *found])
@@ -291,23 +261,21 @@ class Lanes:
         self, model: Model, signals: Sequence[str], options: Sequence[Any], output: str
     ) -> None:
         place, is_rate = output_of(model, output)
-        self._sampler, self._rows = Sampler(model, signals, options, [place]), Rows()
-        self._straight, self._known = straight_of(self._sampler)
+        self._sampler = Sampler(model, signals, options, [place])
+        self._straight = Straight(self._sampler)
         text = "\n\n".join(self._texts(place, is_rate))
-        made = module(
-            f"{model.name}_lanes", text, {**self._sampler.names, **CALLED, "LANES": LANES}
-        )
+        names = {**self._sampler.names, **CALLED, "LANES": LANES}
+        made = module(f"{model.name}_lanes", text, names)
         self.prepare: Callable[..., None] = made["prepare"]
         self.march: Callable[..., None] = made["march"]
 
     def _texts(self, place: Stored, is_rate: bool) -> list[str]:
         """Texts of both kernels."""
-        sampler, rows, straight = self._sampler, self._rows, self._straight
-        parts, model = sampler.used(), sampler.model
+        sampler, straight, model = self._sampler, self._straight, self._sampler.model
         # what rows become at the end of a sample
         following: dict[str, Node] = {}
         shown = ex.name("value")
-        for part in parts:
+        for part in sampler.used:
             straight.cut()
             straight.add(part.code, part.code.kept(sampler.ends[part.part]))
             for source, node in sampler.sources.items():
@@ -330,22 +298,20 @@ class Lanes:
         straight.let("error", ex.make("-", shown, ex.name("target")))
         square = ex.make("*", ex.make("*", ex.name("counts"), ex.name("error")), ex.name("error"))
         following |= {"cost": ex.make("+", ex.name("cost"), square), "shown": shown}
-
         # what a lane sees of a record at a place of its own is fetched a sample ahead of its use: a
         # row that was just written number by number cannot be read as a whole at once
         first: list[str] = []
         fetched: list[str] = []
-        for tap in (tap for part in parts for tap in part.taps):
-            part = sampler.parts[tap.part]
-            samples, record = part.tap_samples(tap), sampler.signals.index(tap.tap.signal)
-            queue = [f"{part.fraction(tap)}_coming", *samples]
-            for lines, name, n in ((first, queue[1], "0"), (fetched, queue[0], "coming")):
-                index = f"{n} - whole[{tap.number}, lane]"
-                lines.append(f"{rows.text(name)} = sample_at(records[{record}], {index}, 0.0)")
-            following |= {older: ex.name(newer) for newer, older in pairwise(queue)}
+        for part in sampler.used:
+            for tap in part.taps:
+                record = f"records[{sampler.signals.index(tap.tap.signal)}]"
+                queue = [f"{part.fraction(tap)}_coming", *part.tap_samples(tap)]
+                for lines, name, n in ((first, queue[1], "0"), (fetched, queue[0], "coming")):
+                    index = f"{n} - whole[{tap.number}, lane]"
+                    lines.append(f"{straight.row(name)} = sample_at({record}, {index}, 0.0)")
+                following |= {older: ex.name(newer) for newer, older in pairwise(queue)}
         for name, node in following.items():
-            straight.become(rows.text(name), node)
-
+            straight.become(name, node)
         read = {name for loop in straight.loops for each in loop for name in each.reads}
         shared = {"target": "measured[n]", "counts": "weight[n]"}
         shared["half"] = "0.5 * h if n > 0 else 0.0"
@@ -353,8 +319,8 @@ class Lanes:
         inner = [f"{name} = {value}" for name, value in shared.items() if name in read]
         if fetched:
             inner += ["coming = min(n + 1, last)", *over_lanes(fetched)]
-        inner += rows.loops(straight.loops, {"h", *shared})
-        kept = over_lanes([f"outputs[lane, n] = {rows.text('shown')}"])
+        inner += straight.lines({"h", *shared})
+        kept = over_lanes([f"outputs[lane, n] = {straight.row('shown')}"])
         inner += ["if outputs.size > 0:", *indented(kept)]
         lines = ["last = measured.size - 1", *over_lanes(first)]
         lines += ["for n in range(measured.size):", *indented(inner)]
@@ -373,21 +339,21 @@ class Lanes:
 
     def _prepared(self, read: set[str]) -> list[str]:
         """Lines of a lane ahead of the march, from what is known to what is read in it."""
-        sampler, rows, straight = self._sampler, self._rows, self._straight
+        sampler, straight = self._sampler, self._straight
         lines = [line for each in straight.ahead for line in each.lines]
-        lines += rows.saves(read & straight.still - self._known - {"h"})
+        lines += straight.saves(read & straight.still - straight.known - {"h"})
         used = {name for each in straight.ahead for name in each.reads}
-        for part in sampler.used():
-            rest = rest_of(part)
-            state, nodes = dict(leaves(part.state)), dict(leaves(rest.value))
+        for part in sampler.used:
+            code, value = part.begun()
+            state, nodes = dict(leaves(part.state)), dict(leaves(value))
             at_rest = {state[path].value: nodes[path] for path in sampler.carried[part.part]}
-            lines += lines_of(rest.code, at_rest.values())
-            lines += [f"{rows.text(name)} = {text(node)}" for name, node in at_rest.items()]
-            reads = {*sampler.constants(part), *rest.code.reads(at_rest.values())}
+            lines += lines_of(code, at_rest.values())
+            lines += [f"{straight.row(name)} = {text(node)}" for name, node in at_rest.items()]
+            reads = {*sampler.constants(part), *code.reads(at_rest.values())}
             needed = [ex.name(name) for name in reads]
             lines[:0] = lines_of(part.prologue, needed)
             used |= part.prologue.reads(needed)
-        return [*rows.loads(used & self._known), *lines]
+        return [*straight.loads(used & straight.known), *lines]
 
     def __call__(
         self,
@@ -406,21 +372,21 @@ class Lanes:
         sample, ``"start."`` before their paths, where they are not those at rest. The output is
         compared with (n,) `measured` values under the `weight` of each squared error.
         """
-        rows, model, parts = self._rows.number, self._sampler.model, self._sampler.used()
+        rows, model, parts = self._straight.number, self._sampler.model, self._sampler.used
         block = aligned(len(rows), LANES)
         taps = [tap for part in parts for tap in part.taps]
         whole = np.zeros((max((tap.number for tap in taps), default=0) + 1, LANES), dtype=np.int64)
         starts: dict[str, int] = {}
         for part in parts:
             prefix, states = model.prefix(part.part), dict(leaves(part.state))
-            for name, path in part.parameters.items():
-                if name in rows:
-                    default = part.own.parameters._field_defaults.get(path)
-                    value = numbers.get(f"{prefix}{path}", default)
-                    block[rows[name]] = numbers[f"{prefix}{path}"] if value is None else value
-            for path, node in leaves(part.given):
-                if node.value in rows:
-                    block[rows[node.value]] = numbers[f"given {prefix}{path}"]
+            known = {name: f"{prefix}{path}" for name, path in part.parameters.items()}
+            known |= {node.value: f"given {prefix}{path}" for path, node in leaves(part.given)}
+            for name, path in known.items():
+                if name in rows and path in numbers:
+                    block[rows[name]] = numbers[path]
+                elif name in rows:
+                    default = part.own.parameters._field_defaults
+                    block[rows[name]] = default[part.parameters[name]]
             for tap in part.taps:
                 late = numbers[f"{prefix}{tap.tap.delay}"] / h if tap.tap.delay else np.zeros(LANES)
                 end = np.maximum(late, tap.tap.ahead) - tap.tap.ahead

@@ -2,48 +2,31 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from typing import NamedTuple
+from collections import deque
+from contextlib import suppress
 
 import numpy as np
+from numpy.typing import NDArray
 
 from swashplate.equations.code import generating
-from swashplate.equations.marching.graph import PAIR, By, Entry, Graph, Group, Known, PartGraph
+from swashplate.equations.marching.graph import PAIR, Graph, Group, Moved, PartGraph, Term
+from swashplate.equations.marching.part import Stored
 from swashplate.equations.marching.rows import (
     ABREAST,
     CALL,
-    CARRIED,
     CHAIN,
     COMBINE,
+    INTEGRATE,
     RECUR,
     STRIDE,
     Program,
-    Terms,
 )
+from swashplate.equations.marching.triangle import aligned_room
 from swashplate.equations.model import Model
 
-Slot = tuple[Known, str] | int
-"""A factor known only with the parameters: a constant by a column, a tap's place by its delay."""
-
-
-class Term(NamedTuple):
-    """A product of one or two rows and a number."""
-
-    a: int
-    b: int
-    scale: float
-    slot: Slot | None = None
-
-
-class Reference(NamedTuple):
-    """A row that holds a derivative, but for a factor."""
-
-    row: int
-    scale: float
-
-
-Node = tuple[str, int, str]
-"""A signal or state of a part: kind, number of the part, path."""
+Array = NDArray[np.float64]
+Todo = tuple[int, int, int, int]
+"""A row of `Program.todo`."""
 
 
 class Layout:
@@ -52,225 +35,192 @@ class Layout:
     Attributes
     ----------
     program : Program
-    pieces : frozenset of int
+    pieces : set of int
         Numbers of the pieces that are called.
-    slots : list of (int, Slot)
+    slots : list of (int, Moved)
         Terms with a factor of this kind.
-    rows : int
-    constant : dict of float to int
-        Rows that hold just one value.
     tangents : int
         Numbers in the vector of tangents; the first belongs to idle columns.
-    places : dict of (int, str) to dict of int to int
-        Place of a tangent by part and state, and by the number of the column.
+    places : dict of Moved to int
+        Place of the tangent of a state by a column.
     """
 
     def __init__(
         self, graph: Graph, columns: tuple[str, ...], observed: tuple[int, ...], start: str
     ) -> None:
-        self.graph, self.model, self.columns = graph, graph.model, columns
-        derived = graph.starting(start).moves if columns else ()
-        self._starts = {(*known[1:], by) for known, by in derived if known[0] == "state"}
-        self._moved = {each for each in derived if each[0][0] == "k"}
-        self.rows, self.tangents = graph.rows, 1
-        self.constant: dict[float, int] = {}
-        self._idle = self._row()
-        self.places: dict[tuple[int, str], dict[int, int]] = {}
-        self._references: dict[Node, dict[int, Reference]] = {}
-        self._made: list[tuple[int, list[Term]]] = []  # Rows that are sums of terms.
-        self._todo: list[tuple[int, int, int, int]] = [(CALL, 0, 0, 0)]
-        self._numbers: list[int] = []
-        for part in graph.parts:
-            self._part(part)
-        seen, width = len(self._made), len(columns) + 2
-        self._made += [
-            (r * width + c, self._observed(number, c))
-            for r, number in enumerate(observed)
-            for c in range(len(columns))
-        ]
-        terms = [term for _, made in self._made for term in made]
-        targets = np.array([target for target, _ in self._made], dtype=np.int64) * STRIDE
-        targets[seen:] += CARRIED
+        self.graph, self.columns = graph, columns
+        self._size, self.tangents = graph.size, 1
+        self._constant: dict[float, int] = {}  # Rows that hold just one value.
+        self._spare: deque[Array] = deque(maxlen=8)
+        self.places: dict[Moved, int] = {}
+        self._by: dict[Stored, dict[int, Term]] = {}
+        """Derivatives of what is known, by the number of each column that moves it."""
+        self._begun: set[Moved] = set()  # States that a column moves at the first sample.
+        self._sums: list[tuple[int, list[Term]]] = []  # Rows that are made, and of what.
+        self._lanes: list[int] = []
+        self._seed(start)
+        done = [(part, self._part(part)) for part in graph.parts]
+        integrals: list[Todo] = []
+        values, seen = zip(*(self._observed(each, integrals) for each in observed), strict=True)
+        made, todo = len(self._sums), [(CALL, 0, 0, 0)]
+        self._sums += [(0, terms) for each in seen for terms in each]
+        read = {row for _, terms in self._sums for term in terms for row in term.rows}
+        for part, own in done:
+            if part.fill is not None and (own or any(row in part.rows for row in read)):
+                todo.append((CALL, part.fill, 0, 0))
+            todo += own
+        todo += integrals
+        terms = [term for _, each in self._sums for term in each]
+        ones = self._value(1.0)
+        pairs = [(*term.rows, *(ones, -1)[len(term.rows) :]) for term in terms]
         self.program = Program(
-            len(columns),
-            np.array(self._todo, dtype=np.int64),
-            Terms(
-                targets,
-                np.cumsum([0, *(len(made) for _, made in self._made)]).astype(np.int64),
-                np.array([term.a for term in terms], dtype=np.int64) * STRIDE,
-                np.array([term.b for term in terms], dtype=np.int64) * STRIDE,
-                np.array([term.scale for term in terms], dtype=np.float64),
-            ),
-            seen,
-            np.array(self._numbers, dtype=np.int64),
-            np.array([self._value_row(number) for number in observed], dtype=np.int64),
-            np.array([graph.observed[number][1] for number in observed], dtype=np.bool_),
+            todo=np.array(todo, dtype=np.int64),
+            target=np.array([row for row, _ in self._sums], dtype=np.int64),
+            first=np.cumsum([0, *(len(each) for _, each in self._sums)]).astype(np.int64),
+            a=np.array([pair[0] for pair in pairs], dtype=np.int64),
+            b=np.array([pair[1] for pair in pairs], dtype=np.int64),
+            scale=np.array([term.scale for term in terms], dtype=np.float64),
+            lanes=np.array(self._lanes, dtype=np.int64),
+            seen=made,
+            value=np.array(values, dtype=np.int64),
+            integrals=sum(what == INTEGRATE for what, *_ in todo),
         )
-        self.pieces = frozenset(todo[1] for todo in self._todo if todo[0] in (CALL, CHAIN))
+        self.pieces = {piece for what, piece, *_ in todo if what in (CALL, CHAIN)}
         self.slots = [(k, term.slot) for k, term in enumerate(terms) if term.slot is not None]
 
+    def taken(self) -> Array:
+        """Memory for a block, of an earlier march if it can be: new memory takes longer to get."""
+        with suppress(IndexError):  # another thread may be faster
+            return self._spare.pop()
+        block = aligned_room(self._size)
+        for value, row in self._constant.items():
+            block[row : row + STRIDE] = value
+        return block
+
+    def give_back(self, block: Array) -> None:
+        """Keep the memory of a march that has ended."""
+        self._spare.append(block)
+
     def _row(self) -> int:
-        self.rows += 1
-        return self.rows - 1
+        self._size += STRIDE
+        return self._size - STRIDE
 
-    def _constant(self, value: float) -> int:
+    def _value(self, value: float) -> int:
         """Row that holds just this value."""
-        if value not in self.constant:
-            self.constant[value] = self._row()
-        return self.constant[value]
+        if value not in self._constant:
+            self._constant[value] = self._row()
+        return self._constant[value]
 
-    def _combine(self, since: int) -> None:
-        """Have the rows made that are new since then."""
-        if len(self._made) > since:
-            self._todo.append((COMBINE, since, len(self._made), 0))
+    def _seed(self, start: str) -> None:
+        """What the columns move at once: parameters, constants, places of taps, starts."""
+        graph, number = self.graph, {column: c for c, column in enumerate(self.columns)}
+        for known, column in graph.starting(start).moves if self.columns else ():
+            if known.kind == "state":
+                self._begun.add((known, column))
+            elif column in number:
+                by = self._by.setdefault(known, {})
+                by[number[column]] = Term(slot=(known, column))
+        for part in graph.sampler.used:
+            i, prefix = part.part, graph.model.prefix(part.part)
+            for path in part.parameters.values():
+                if f"{prefix}{path}" in number:
+                    self._by[Stored(i, "p", path)] = {number[f"{prefix}{path}"]: Term()}
+            for tap in part.taps:
+                column, known = f"{prefix}{tap.tap.delay}", Stored(i, "fraction", str(tap.number))
+                if tap.tap.delay and column in number:
+                    self._by[known] = {number[column]: Term(slot=(known, column))}
+            for column in self.columns:
+                for path in started_by(graph.model, i, column):
+                    self._begun.add((Stored(i, "state", path), column))
 
-    def _part(self, part: PartGraph) -> None:
-        """What is done for a part: its pieces, its recurrences, and the signals others need."""
-        at = len(self._todo)
-        moves = [self._group(part, group) for group in part.groups]
-        signals = bool(self.columns) and any(each.startswith("signals.") for each in part.entries)
-        piece = part.fill if any(moves) or signals else part.signals
-        if piece >= 0:
-            self._todo.insert(at, (CALL, piece, 0, 0))
-        if self.columns:
-            self._signals(part)
+    def _terms(self, result: Stored, c: int) -> list[Term]:
+        """What a derivative by a column is the sum of."""
+        if result in self._by:
+            return [self._by[result][c]] if c in self._by[result] else []
+        return [
+            partial.times(self._by[by][c])
+            for by, partial in self.graph.partials.get(result, {}).items()
+            if c in self._by.get(by, ())
+        ]
 
-    def _terms(
-        self, part: PartGraph, result: str, c: int, within: Sequence[str] = ()
-    ) -> Iterator[Term]:
-        """What moves a result with a column, apart from the states of its own group."""
-        i, column = part.code.part, self.columns[c]
-        prefix = self.model.prefix(i)
-        for by, entry in part.entries.get(result, {}).items():
-            row, scale = entry.row, 1.0
-            if row < 0:
-                row, scale = self._constant(1.0), entry.value
-            if by.kind == "p":
-                if column == f"{prefix}{by.path}":
-                    yield Term(row, -1, scale)
-            elif by.kind == "k":
-                slot = ("k", i, by.path), column
-                if slot in self._moved:
-                    yield Term(row, -1, scale, slot)
-            elif by.kind == "tap":
-                tap = next(each for each in part.code.taps if each.number == int(by.path))
-                if column == f"{prefix}{tap.tap.delay}":
-                    yield Term(row, -1, scale, tap.number)
-            elif by.kind == "signal":
-                yield from self._through(entry, ("signal", by.part, by.path), c)
-            elif by.path not in within:
-                yield from self._through(entry, ("state", i, by.path), c)
+    def _sum(self, terms: list[Term], whole: bool = False) -> Term:
+        """A sum of terms as one that needs no slot: there already, or of a row that is made.
 
-    def _through(self, entry: Entry, node: Node, c: int) -> Iterator[Term]:
-        """A known derivative, multiplied by a partial one."""
-        found = self._references.get(node, {}).get(c)
-        if found is not None and entry.row < 0:
-            yield Term(found.row, -1, entry.value * found.scale)
-        elif found is not None:
-            yield Term(entry.row, found.row, found.scale)
-
-    def _sum(self, terms: list[Term], whole: bool = False) -> Reference | None:
-        """Row that holds a sum of terms: one that is there already, or a new one.
-
-        With `whole` the row needs no factor any more.
+        With `whole` it is a row without a factor.
         """
-        if not terms:
-            return None
-        only = terms[0]
-        alone = len(terms) == 1 and only.b < 0 and only.slot is None
-        if alone and (not whole or only.scale == 1.0):
-            return Reference(only.a, only.scale)
+        if len(terms) == 1 and terms[0].slot is None:
+            rows, scale, _ = only = terms[0]
+            if len(rows) < 2 and (not whole or (rows and scale == 1.0)):
+                return only
+        if not terms or terms == [Term((), terms[0].scale)]:
+            return Term((self._value(terms[0].scale if terms else 0.0),))
+        return Term((self._make(terms),))
+
+    def _make(self, terms: list[Term]) -> int:
+        """A new row that is a sum of terms."""
         row = self._row()
-        self._made.append((row, terms))
-        return Reference(row, 1.0)
+        self._sums.append((row, terms))
+        return row
 
-    def _group(self, part: PartGraph, group: Group) -> bool:
-        """Columns of a recurrence, and rows that they need; whether there are any."""
-        since, i = len(self._made), part.code.part
+    def _part(self, part: PartGraph) -> list[Todo]:
+        """What is done for a part: its recurrences, and the signals that others need."""
+        todo: list[Todo] = []
+        for group in part.groups:
+            todo += self._group(group)
+        for signal, state in part.behind.items():
+            by = self._by[state].items()
+            self._by[signal] = {c: Term((term.rows[0] + 1,)) for c, term in by}
+        since = len(self._sums)
+        for signal in part.needed:
+            found = {c: self._terms(signal, c) for c in range(len(self.columns))}
+            self._by[signal] = {c: self._sum(terms) for c, terms in found.items() if terms}
+        return todo + self._made(since)
+
+    def _made(self, since: int) -> list[Todo]:
+        """Have the rows made that are new since then."""
+        return [(COMBINE, since, len(self._sums), 0)] if len(self._sums) > since else []
+
+    def _group(self, group: Group) -> list[Todo]:
+        """Columns of a recurrence, and rows that they need, if there are any."""
+        since, begin, first = len(self._sums), len(self._lanes), group.states[0]
         found: list[list[tuple[int, int, int]]] = []
+        made: dict[Stored, dict[int, Term]] = {state: {} for state in group.states}
         for c, column in enumerate(self.columns):
-            results = [f"state.{path}" for path in group.states]
-            terms = [list(self._terms(part, result, c, group.states)) for result in results]
-            starts = {*started_by(self.model, i, column)}
-            starts |= {path for path in group.states if (i, path, column) in self._starts}
-            if not any(terms) and starts.isdisjoint(group.states):
-                continue
-            each = []
-            for path, stored, moving in zip(group.states, group.stored, terms, strict=True):
-                result = self._row() if stored else self._idle
-                made, place = self._sum(moving, whole=True), self.tangents
-                self.tangents += 1
-                self.places.setdefault((i, path), {})[c] = place
-                each.append((made.row if made else self._constant(0.0), result, place))
-                if stored:
-                    rows = self._references.setdefault(("state", i, path), {})
-                    rows[c] = Reference(result, 1.0)
-            found.append(each)
+            terms = [self._terms(state, c) for state in group.states]
+            if any(terms) or any((state, column) in self._begun for state in group.states):
+                found.append([])
+                for state, each in zip(group.states, terms, strict=True):
+                    row, taken = self._sum(each, whole=True).rows[0], self._row()
+                    self.places[state, column] = self.tangents
+                    found[-1].append((row, taken, self.tangents))
+                    made[state][c] = Term((taken,))
+                    self.tangents += 1
+        own = self.graph.partials[first].get(first, Term((), 0.0))
+        self._by |= made
         if not found:
-            return False
-        generated, numbers = group.piece >= 0, list[int]()
-        abreast = PAIR if generated else ABREAST
-        idle = [(self._constant(0.0), self._idle, 0)] * len(group.states)
-        found += [idle] * (-len(found) % abreast)
-        if generated:
-            numbers.append(len(found))
+            return []
+        idle = [(self._value(0.0), 0, 0)] * len(group.states)
+        found += [idle] * (-len(found) % (ABREAST if group.piece is None else PAIR))
+        for lanes in zip(*found, strict=True):
+            self._lanes += [place for each in zip(*lanes, strict=True) for place in each]
+        if group.piece is None:
+            run = (RECUR, own.rows[0] if own.rows else self._value(own.scale))
         else:
-            own = By("state", group.states[0])
-            entry = part.entries[f"state.{group.states[0]}"].get(own, Entry(-1))
-            row = entry.row if entry.row >= 0 else self._constant(entry.value)
-            numbers.append(row * STRIDE)
-        for k, after in enumerate(group.after):
-            numbers += [each[k][0] * STRIDE for each in found]
-            numbers += [each[k][1] * STRIDE for each in found]
-            numbers += [each[k][2] for each in found]
-            numbers += [] if generated else [int(after) for _ in found]
-        self._combine(since)
-        begin = len(self._numbers)
-        self._numbers += numbers
-        what, piece = (CHAIN, group.piece) if generated else (RECUR, 0)
-        self._todo.append((what, piece, begin, len(self._numbers)))
-        return True
+            run = (CHAIN, group.piece)
+        return [*self._made(since), (*run, begin, len(self._lanes))]
 
-    def _signals(self, part: PartGraph) -> None:
-        """Derivatives of the signals of a part that others need."""
-        since, i = len(self._made), part.code.part
-        for signal, path in part.aliases.items():
-            self._references["signal", i, signal] = self._references.get(("state", i, path), {})
-        for source in self.graph.sampler.sources:
-            node = ("signal", i, source.signal)
-            if source.part != i or node in self._references:
-                continue
-            result = f"signals.{source.signal}"
-            if result not in part.entries:
-                state = ("state", i, source.signal)
-                self._references[node] = self._references.get(state, {})
-                continue
-            sums = (self._sum(list(self._terms(part, result, c))) for c in range(len(self.columns)))
-            self._references[node] = {c: made for c, made in enumerate(sums) if made is not None}
-        self._combine(since)
-
-    def _observed(self, number: int, c: int) -> list[Term]:
-        """What an observed signal's derivative by a column is."""
-        place, _ = self.graph.observed[number]
-        if place.kind == "link":
-            terms = []
-            for source in self.model.links[place.path].sources:
-                known = self._references.get(("signal", *source), {}).get(c)
-                factor = self.graph.links[place.path].get(source.signal, 0.0)
-                if known is not None and factor != 0.0:
-                    terms.append(Term(known.row, -1, factor * known.scale))
-            return terms
-        node = ("state" if place.kind == "state" else "signal", place.part, place.path)
-        if node in self._references:
-            known = self._references[node].get(c)
-            return [] if known is None else [Term(known.row, -1, known.scale)]
-        part = next(each for each in self.graph.parts if each.code.part == place.part)
-        return list(self._terms(part, f"signals.{place.path}", c))
-
-    def _value_row(self, number: int) -> int:
-        place, _ = self.graph.observed[number]
-        stored = self.graph.stored.get(place)
-        return self.graph.values[place.part, place.path] if stored is None else stored
+    def _observed(self, number: int, integrals: list[Todo]) -> tuple[int, list[list[Term]]]:
+        """Row of an observed signal, and what its derivatives are."""
+        place, integral = self.graph.observed[number]
+        value = self.graph.row_of[place]
+        seen = [self._terms(place, c) for c in range(len(self.columns))]
+        if not integral:
+            return value, seen
+        since, begun = len(self._sums), sum(what == INTEGRATE for what, *_ in integrals)
+        rows = [self._make(terms) if terms else 0 for terms in ([Term((value,))], *seen)]
+        integrals += self._made(since)
+        integrals += [(INTEGRATE, row, begun + k, 0) for k, row in enumerate(filter(None, rows))]
+        return rows[0], [[Term((row,))] if row else [] for row in rows[1:]]
 
 
 @generating

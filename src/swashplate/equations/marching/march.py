@@ -1,10 +1,10 @@
 """Marches: one model over its inputs, a sample after the other, for one set or many at once.
 
 Every march is generated as readable source in which the model's equations stand as straight code
-over scalars (`scalars`). `PartCode` has one sample of a part, and the functions below wrap it as
+over scalars (`code`). `PartCode` has one sample of a part, and the functions below wrap it as
 
 - `march_source`: the march, over whole records or a block of them for the Jacobian,
-- `advance_source`: one sample, for steppers and for kernels that close loops.
+- `step_source`: one sample, for steppers and for kernels that close loops.
 
 Many sets side by side are in `lanes`.
 
@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from itertools import chain
 from typing import Any
 
@@ -32,13 +32,17 @@ from swashplate.equations.writing import function_source, indented, lines_of
 from swashplate.errors import InputError
 
 _OWN = """
-n m j c lane first last worst h half value error total count span used progress values lines
+n m j c lane first last worst h half value error total count size used progress values lines
 whole fraction params given constants states out flags records before measured weight outputs flat
-table kept tangent columns program plan sink room block met machine volts current speed voltage
-target counts coming cost rate integral shown choose
+inputs table kept tangent lanes columns program plan sink room block met machine volts current speed
+voltage target counts coming cost rate integral shown choose width
 """
 RESERVED = {*_OWN.split(), *(name for name in vars(math) if not name.startswith("_"))}
 """Names that the kernels use themselves."""
+MACHINE = (
+    "inputs lines whole fraction params given h constants states outputs".split()  # noqa: SIM905
+)
+"""What a step takes from a `Machine`."""
 
 
 @inlined
@@ -51,6 +55,15 @@ class Sampler:
     """One sample of a whole model: the code of its parts, and what of it is needed.
 
     `wanted` are numbers that are kept at every sample; parts that none of them needs are left out.
+
+    Attributes
+    ----------
+    parts, used : list of PartCode
+        All parts, and those that are needed.
+    ends, carried : list
+        Of each part the results that are needed, and the paths of the states.
+    sources : dict of Source to Node
+        Signals that other parts or links need.
     """
 
     def __init__(
@@ -65,59 +78,44 @@ class Sampler:
         self.model, self.signals = model, tuple(signals)
         taken = {*RESERVED, *self.signals, *(f"{each}_before" for each in self.signals)}
         self.parts = [
-            PartCode(model, i, signals, options[i], taken, ruled=ruled)
-            for i in range(len(model.parts))
+            PartCode(model, i, signals, each, taken, ruled=ruled) for i, each in enumerate(options)
         ]
-        self.wanted = tuple(wanted)
         self.ends: list[list[Node]] = [[] for _ in self.parts]
-        """Results of each part that are needed."""
         self.carried: list[list[str]] = [[] for _ in self.parts]
-        """Paths of the states that are needed."""
         self.sources: dict[Source, Node] = {}
-        self._settle()
-
-    def _settle(self) -> None:
-        """Find out what is needed: what is kept, what it follows from, and their margins."""
-        for part in self.parts:
-            for each in self.wanted:
-                if each.part == part.part and each.kind not in ("link", "limits"):
-                    self.ends[part.part].append(part.node(each))
-                if each.part == part.part and each.kind == "limits":
-                    self.ends[part.part] += part.limits
-        for each in self.wanted:
+        for each in wanted:
             if each.kind == "link":
-                self._need(self.model.links[each.path].sources)
-        for i in range(len(self.parts) - 1, -1, -1):
-            part = self.parts[i]
-            if not self.ends[i]:
-                continue
-            if part.margin is not None:
-                self.ends[i].append(part.margin)
-            state, following = dict(leaves(part.state)), dict(leaves(part.following))
-            name_of = {node.value: path for path, node in state.items()}
-            while True:
-                read = part.code.reads(self.ends[i])
-                new = [
-                    path
-                    for name, path in name_of.items()
-                    if name in read and path not in self.carried[i]
-                ]
-                if not new:
-                    break
-                self.carried[i] += new
-                self.ends[i] += [following[path] for path in new]
-            self.carried[i] = [path for path in state if path in self.carried[i]]
-            for name in part.own.input_types:
-                link = self.model.link_of(i, name)
-                if link is not None and any(part.source(s) in read for s in link.sources):
-                    self._need(link.sources)
+                self._need(model.links[each.path].sources)
+            else:
+                part = self.parts[each.part]
+                self.ends[each.part] += part.limits if each.kind == "limits" else [part.node(each)]
+        for part in reversed(self.parts):
+            if self.ends[part.part]:
+                self._settle(part)
+        self.used = [part for part in self.parts if self.ends[part.part]]
 
-    def _need(self, sources: Iterable[Source]) -> None:
-        for source in sources:
-            if source not in self.sources:
-                node = self.parts[source.part].signal(source.signal)
-                self.sources[source] = node
-                self.ends[source.part].append(node)
+    def _settle(self, part: PartCode) -> None:
+        """Find out what a part's results follow from: its states, and signals of other parts."""
+        ends, carried = self.ends[part.part], set[str]()
+        ends += [] if part.margin is None else [part.margin]
+        state, following = dict(leaves(part.state)), dict(leaves(part.following))
+        while True:
+            read = part.code.reads(ends)
+            new = {path for path, node in state.items() if node.value in read} - carried
+            if not new:
+                break
+            carried |= new
+            ends += [following[path] for path in state if path in new]
+        self.carried[part.part] = [path for path in state if path in carried]
+        for name in part.own.input_types:
+            link = self.model.link_of(part.part, name)
+            if link is not None and any(part.source(each) in read for each in link.sources):
+                self._need(link.sources)
+
+    def _need(self, sources: Sequence[Source]) -> None:
+        for source in (each for each in sources if each not in self.sources):
+            node = self.sources[source] = self.parts[source.part].signal(source.signal)
+            self.ends[source.part].append(node)
 
     @property
     def names(self) -> dict[str, Any]:
@@ -127,24 +125,15 @@ class Sampler:
             found |= part.code.names | part.prologue.names
         return found
 
-    def used(self) -> list[PartCode]:
-        """Parts that are needed."""
-        return [part for part in self.parts if self.ends[part.part]]
-
     def read(self, part: PartCode) -> set[str]:
         """Names from outside that a part needs."""
         return part.code.reads(self.ends[part.part])
 
-    def ahead(self, parts: Iterable[PartCode] | None = None) -> list[str]:
-        """Lines ahead of a loop: parameters, givens and constants that are needed."""
-        lines = []
-        for part in parts if parts is not None else self.used():
-            read = self.read(part)
-            constants = [node for _, node in leaves(part.known["k"])] if "k" in part.known else []
-            wanted = [node for node in constants if node.reads & read]
-            lines += self.given(part, read | part.prologue.reads(wanted))
-            lines += lines_of(part.prologue, wanted)
-        return lines
+    def ahead(self, part: PartCode, read: set[str]) -> list[str]:
+        """Lines ahead of a loop: a part's parameters, givens and constants that are read in it."""
+        wanted = [node for node in part.constants if node.reads & read]
+        lines = lines_of(part.prologue, wanted)
+        return [*self.given(part, read | part.prologue.reads(wanted)), *lines]
 
     def given(self, part: PartCode, read: set[str]) -> list[str]:
         """Lines that take a part's parameters and givens, as far as they are read, from arrays."""
@@ -160,68 +149,48 @@ class Sampler:
 
     def constants(self, part: PartCode) -> list[str]:
         """Names of a part's constants that its sample reads."""
-        if "k" not in part.known:
-            return []
-        read = self.read(part)
-        found: dict[str, None] = {}
-        for _, node in leaves(part.known["k"]):
-            found |= dict.fromkeys(sorted(node.reads & read))
-        own = {node.value for _, node in leaves(part.p)}
-        return [name for name in found if name not in own]
+        found = dict.fromkeys(name for node in part.constants for name in sorted(node.reads))
+        read = self.read(part) - part.parameters.keys()
+        return [name for name in found if name in read]
 
-    def places(self) -> list[str]:
-        """Lines that unpack records and the taps' places."""
-        lines = []
-        for k, signal in enumerate(self.signals):
-            lines += [f"{signal} = records[{k}]", f"{signal}_before = before[{k}]"]
-        for part in self.used():
-            for tap in part.taps:
-                lines.append(f"{part.whole(tap)} = whole[{tap.number}]")
-                lines.append(f"{part.fraction(tap)} = fraction[{tap.number}]")
-        return lines
+    def places(self, part: PartCode) -> list[str]:
+        """Lines that take the places of a part's taps from arrays."""
+        return [
+            f"{name} = {array}[{tap.number}]"
+            for tap in part.taps
+            for name, array in ((part.whole(tap), "whole"), (part.fraction(tap), "fraction"))
+        ]
 
-    def fetched(self, part: PartCode) -> list[str]:
-        """Lines that read a part's inputs from the records at sample n."""
+    def fetched(
+        self, part: PartCode, past: Callable[[str, str], str], now: Callable[[str], str]
+    ) -> list[str]:
+        """Lines that read a part's inputs: what a signal was some samples ago, and what it is."""
         lines, read = [], self.read(part)
         for tap in part.taps:
             for j, name in enumerate(part.tap_samples(tap)):
                 if name in read:
-                    back = f" - {j}" if j else ""
-                    lines.append(
-                        f"{name} = sample_at({tap.tap.signal}, n - {part.whole(tap)}{back}, "
-                        f"{tap.tap.signal}_before)"
-                    )
-        for name in part.own.input_types:
-            signal = part.own.tap(name).signal
-            if f"x_{signal}" in read and signal in self.signals:
-                lines.append(f"x_{signal} = {signal}[n]")
-        return lines
+                    back = f"{part.whole(tap)} + {j}" if j else part.whole(tap)
+                    lines.append(f"{name} = {past(tap.tap.signal, back)}")
+        inputs = [part.own.tap(name).signal for name in part.own.input_types]
+        known = [each for each in dict.fromkeys(inputs) if each in self.signals]
+        return lines + [f"x_{each} = {now(each)}" for each in known if f"x_{each}" in read]
 
-    def body(self, part: PartCode) -> list[str]:
-        """Lines of a part's sample, and of the signals that other parts need of it."""
+    def body(self, part: PartCode, places: Mapping[Stored, str]) -> list[str]:
+        """Lines of a part's sample, of signals that other parts need, and of what is kept.
+
+        `places` are the texts of where numbers are kept; limits are one, a bit for each.
+        """
         lines = lines_of(part.code, self.ends[part.part])
         for source, node in self.sources.items():
             if source.part == part.part:
                 lines.append(f"{part.source(source)} = {text(node)}")
-        return lines
-
-    def stored(
-        self, part: PartCode, stored: Sequence[Stored], into: Callable[[int], str]
-    ) -> list[str]:
-        """Lines that write what is kept of a part; `into` says where, by the place in `stored`.
-
-        Limits are one number, a bit for each.
-        """
-        lines = []
-        for row, each in enumerate(stored):
-            if each.part != part.part:
-                continue
+        for each in (each for each in places if each.part == part.part):
             if each.kind == "limits":
                 bits = (f"({1 << k} if {text(n)} else 0)" for k, n in enumerate(part.limits))
-                lines.append(f"{into(row)} = {' | '.join(bits)}")
+                lines.append(f"{places[each]} = {' | '.join(bits)}")
             else:
                 code, made = self.observed(part, each)
-                lines += [*lines_of(code, [made]), f"{into(row)} = {text(made)}"]
+                lines += [*lines_of(code, [made]), f"{places[each]} = {text(made)}"]
         return lines
 
     def observed(self, part: PartCode, stored: Stored) -> tuple[Code, Node]:
@@ -236,28 +205,16 @@ class Sampler:
         assert isinstance(made, Node)
         return code, made
 
-    def _flat(self, part: PartCode) -> list[tuple[str, str]]:
-        """Names of a part's states, each with its place in a flat array."""
-        names, places = dict(leaves(part.state)), self.model.places("state")
-        carried = self.carried[part.part]
-        return [(names[p].value, f"states[{places.index((part.part, p))}]") for p in carried]
-
-    def load(self, part: PartCode) -> list[str]:
-        """Lines that take a part's state out of the flat array."""
-        return [f"{name} = {place}" for name, place in self._flat(part)]
-
-    def save(self, part: PartCode) -> list[str]:
-        """Lines that put it back."""
-        return [f"{place} = {name}" for name, place in self._flat(part)]
-
-    def step(self, part: PartCode) -> list[str]:
-        """Lines that take a part's state to the next sample, all of it at once."""
+    def states(self, part: PartCode) -> tuple[list[str], list[str], list[str]]:
+        """Lines that take a part's state out of a flat array, to the next sample, and back."""
+        carried, places = self.carried[part.part], self.model.places("state")
         names, following = dict(leaves(part.state)), dict(leaves(part.following))
-        if not self.carried[part.part]:
-            return []
-        left = ", ".join(names[path].value for path in self.carried[part.part])
-        right = ", ".join(text(following[path]) for path in self.carried[part.part])
-        return [f"{left} = {right}"]
+        own = [names[path].value for path in carried]
+        flat = [f"states[{places.index((part.part, path))}]" for path in carried]
+        step = f"{', '.join(own)} = {', '.join(text(following[path]) for path in carried)}"
+        pairs = [*zip(own, flat, strict=True)]
+        load, save = [f"{a} = {b}" for a, b in pairs], [f"{b} = {a}" for a, b in pairs]
+        return load, [step] if carried else [], save
 
 
 def lower(one: Node, two: Node) -> Node:
@@ -267,28 +224,34 @@ def lower(one: Node, two: Node) -> Node:
 
 
 def march_source(
-    model: Model, signals: Sequence[str], options: Sequence[Any], rows: Mapping[Stored, str]
+    model: Model, signals: Sequence[str], options: Sequence[Any], places: Mapping[Stored, str]
 ) -> tuple[str, dict[str, Any]]:
     """Text of the march over samples as a `piece`, and what its names mean.
 
     Parameters
     ----------
-    rows : mapping of Stored to str
-        What is kept, and where it goes at sample ``n - first``.
+    places : mapping of Stored to str
+        What is kept, and where it goes at sample ``n``.
     """
-    stored, places = tuple(rows), tuple(rows.values())
-    sampler = Sampler(model, signals, options, stored)
-    parts = sampler.used()
-    lines = ["last = first + count", *sampler.places(), *sampler.ahead()]
-    samples: list[list[str]] = []
+    sampler = Sampler(model, signals, options, [*places])
+    parts = sampler.used
+    lines, saved, samples = ["last = first + count"], list[str](), list[list[str]]()
+    for k, signal in enumerate(sampler.signals):
+        lines += [f"{signal} = records[{k}]", f"{signal}_before = before[{k}]"]
     for part in parts:
-        lines += sampler.load(part)
-        inner = [*sampler.fetched(part), *sampler.body(part)]
-        inner += sampler.stored(part, stored, lambda row: places[row])
+        load, step, save = sampler.states(part)
+        lines += [*sampler.places(part), *sampler.ahead(part, sampler.read(part)), *load]
+        saved += save
+        fetched = sampler.fetched(
+            part,
+            lambda signal, back: f"sample_at({signal}, n - ({back}), {signal}_before)",
+            lambda signal: f"{signal}[n]",
+        )
+        inner = [*fetched, *sampler.body(part, places)]
         if part.margin is not None:
             margin = text(part.margin)
             inner += [f"worst = {margin} if {margin} < worst else worst", f"total += {margin}"]
-        samples.append([*inner, *sampler.step(part)])
+        samples.append([*inner, *step])
     margins = any(part.margin is not None for part in parts)
     lines += ["worst, total = inf, 0.0"] if margins else []
     passed = [parts[-1].source(each) for each in sampler.sources if each.part != parts[-1].part]
@@ -302,8 +265,7 @@ def march_source(
         lines += indented(["if m > first:", "    n = m - 1", *indented(following)])
     else:
         lines += ["for n in range(first, last):", *indented(chain(*samples))]
-    for part in parts:
-        lines += sampler.save(part)
+    lines += saved
     if margins:
         # a sum is no number once a margin was none
         lines += [
@@ -314,68 +276,56 @@ def march_source(
     return function_source(f"march({PIECE})", says, lines, "@piece"), sampler.names
 
 
-def advance_source(
+def step_source(
     model: Model, signals: Sequence[str], options: Sequence[Any], stored: Sequence[Stored]
-) -> tuple[str, dict[str, Any]]:
-    """Text of one sample, for steppers and for kernels that close loops, and what its names mean.
+) -> tuple[str, dict[str, Any], int]:
+    """Text of one sample, for steppers and for kernels that close loops.
 
-    ``prepare(params, given, h, constants)`` computes constants once and returns how many there are.
-    ``advance(values, lines, whole, fraction, params, given, h, constants, states, out)`` shifts the
-    newest values into the delay lines (a row for each signal, newest first), fills ``out`` with the
-    numbers of this sample in the order of `stored`, takes ``states`` to the next one, and returns
-    the margin of the domain.
+    ``prepare(params, given, h, constants)`` computes constants once. ``step(machine)`` shifts the
+    newest inputs into the delay lines (a row for each signal, newest first), fills the outputs with
+    the numbers of this sample in the order of `stored`, takes the states to the next one, and
+    returns the margin of the domain.
+
+    Returns
+    -------
+    text : str
+    names : dict
+        What the text refers to.
+    count : int
+        Constants.
     """
     sampler = Sampler(model, signals, options, stored)
-    parts = sampler.used()
-    tapped = {tap.tap.signal for part in parts for tap in part.taps}
-    lines, shifted = [], []
-    for k, signal in enumerate(sampler.signals):
-        if signal in tapped:
-            shifted.append(f"lines[{k}, j] = lines[{k}, j - 1]")
-            lines.append(f"lines[{k}, 0] = values[{k}]")
-    if shifted:
-        lines = ["for j in range(lines.shape[1] - 1, 0, -1):", *indented(shifted), *lines]
-    prepare: list[str] = []
-    count = 0
-    for part in parts:
-        read = sampler.read(part)
-        prepare += sampler.ahead([part])
+    row = sampler.signals.index
+    tapped = sorted({row(tap.tap.signal) for part in sampler.used for tap in part.taps})
+    lines = [f"{each} = machine.{each}" for each in MACHINE]
+    prepare, ends, count = list[str](), ["worst = inf"], 0
+    if tapped:
+        lines += ["for j in range(lines.shape[1] - 1, 0, -1):"]
+        lines += [f"    lines[{k}, j] = lines[{k}, j - 1]" for k in tapped]
+        lines += [f"lines[{k}, 0] = inputs[{k}]" for k in tapped]
+    places = {each: f"outputs[{k}]" for k, each in enumerate(stored)}
+    for part in sampler.used:
+        read, (load, step, save) = sampler.read(part), sampler.states(part)
+        prepare += sampler.ahead(part, read)
         for name in sampler.constants(part):
             prepare.append(f"constants[{count}] = {name}")
             lines.append(f"{name} = constants[{count}]")
             count += 1
-        lines += [*sampler.given(part, read), *sampler.load(part)]
-        for tap in part.taps:
-            lines.append(f"{part.fraction(tap)} = fraction[{tap.number}]")
-            row = sampler.signals.index(tap.tap.signal)
-            for j, name in enumerate(part.tap_samples(tap)):
-                if name in read:
-                    lines.append(f"{name} = lines[{row}, whole[{tap.number}] + {j}]")
-        for k, signal in enumerate(sampler.signals):
-            if f"x_{signal}" in read:
-                lines.append(f"x_{signal} = values[{k}]")
-        lines += sampler.body(part)
-        lines += sampler.stored(part, stored, lambda row: f"out[{row}]")
-    lines.append("worst = inf")
-    for part in parts:
+        lines += [*sampler.places(part), *sampler.given(part, read), *load]
+        lines += sampler.fetched(
+            part,
+            lambda signal, back: f"lines[{row(signal)}, {back}]",
+            lambda signal: f"inputs[{row(signal)}]",
+        )
+        lines += sampler.body(part, places)
         if part.margin is not None:
-            lines.append(f"worst = {text(lower(ex.name('worst'), part.margin))}")
-        lines += [*sampler.step(part), *sampler.save(part)]
-    lines.append("return worst")
-    texts = [
-        function_source(
-            "prepare(params, given, h, constants)",
-            f"Constants of {model.name}.",
-            [*prepare, f"return {count}"],
-        ),
-        function_source(
-            "advance(values, lines, whole, fraction, params, given, h, constants, states, out)",
-            f"One sample of {model.name}.",
-            lines,
-            "@inlined",
-        ),
-    ]
-    return "\n\n".join(texts), sampler.names
+            ends.append(f"worst = {text(lower(ex.name('worst'), part.margin))}")
+        ends += [*step, *save]
+    head, says = "prepare(params, given, h, constants)", f"Constants of {model.name}."
+    prepared = function_source(head, says, [*prepare, "return"])
+    says, lines = f"One sample of {model.name}.", [*lines, *ends, "return worst"]
+    stepped = function_source("step(machine)", says, lines, "@inlined")
+    return f"{prepared}\n\n{stepped}", sampler.names, count
 
 
 def output_of(model: Model, output: str) -> tuple[Stored, bool]:

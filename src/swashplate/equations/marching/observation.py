@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
 from types import MappingProxyType
-from typing import Literal, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -15,7 +15,7 @@ from swashplate.equations.marching.run import Start, check_start
 from swashplate.errors import InputError
 
 Array = NDArray[np.float64]
-Unknown = Literal["offset", "clock_offset"]
+Indices = NDArray[np.int64]
 
 ON_GRID = 1e-7
 """Samples by which a stamp may miss a grid point and still means it: rounding of its seconds."""
@@ -26,8 +26,8 @@ class Observation:
     """Measured samples of one signal, compared with the simulated signal at their stamps.
 
     The residual of sample i is ``weight[i] · (simulated(time[i]) + offset - values[i])``, where
-    simulated(t) is the signal behind the low passes at ``t + clock_offset - delay``, linearly
-    interpolated between the samples of the march's grid, and held outside the record.
+    simulated(t) is linearly interpolated between the samples of the march's grid, and held outside
+    the record.
     """
 
     signal: str
@@ -39,14 +39,8 @@ class Observation:
     weight: ArrayLike = 1.0
     """(m,) or one number, not negative, which multiplies the residual. Samples of weight 0 do not
     count, whatever their values are."""
-    poles: Sequence[float] = ()
-    """Poles of the first-order low passes that the measured signal went through, which the
-    simulated one goes through as well. They are discretised exactly for an input that is held over
-    a step, y[n+1] = e⁻ᵖʰ y[n] + (1 - e⁻ᵖʰ) u[n], and begin with y = u. [rad/s]"""
-    delay: float = 0.0
-    """By how much what was measured lags behind, apart from the poles; negative if it leads. [s]"""
-    unknown: Sequence[Unknown] = ()
-    """Of the offset and the clock offset, those to be found."""
+    free_offset: bool = False
+    """Whether the offset is to be found."""
 
     def __post_init__(self) -> None:
         what = f"The observation of {self.signal}"
@@ -74,20 +68,8 @@ class Observation:
                 f"{what}: value or weight is not finite, or the weight negative, at sample "
                 f"{int(np.argmax(bad))}; give weight 0 to samples that are not to count."
             )
-        poles = tuple(float(pole) for pole in self.poles)
-        if not all(0.0 < pole < np.inf for pole in poles):
-            raise InputError(f"{what}: poles are in rad/s, above 0 and finite, not {poles}.")
-        if not np.isfinite(self.delay):
-            raise InputError(f"{what}: the delay must be a finite time, not {self.delay}.")
-        strange = [each for each in self.unknown if each not in ("offset", "clock_offset")]
-        if strange or len(set(self.unknown)) != len(tuple(self.unknown)):
-            raise InputError(
-                f"{what}: unknown can be 'offset', 'clock_offset' or both, not {self.unknown!r}."
-            )
         for name, value in (("time", time), ("values", values), ("weight", weight)):
             object.__setattr__(self, name, value)
-        object.__setattr__(self, "poles", poles)
-        object.__setattr__(self, "unknown", tuple(self.unknown))
 
     def __repr__(self) -> str:
         return f"Observation({self.signal!r}, {np.size(self.time)} samples)"
@@ -100,8 +82,6 @@ class Own(NamedTuple):
     """Parts of the state at the first sample, by path; others are those of the start."""
     offsets: Sequence[float] = ()
     """Offset of each observation, in its signal's unit; none given means none."""
-    clock_offsets: Sequence[float] = ()
-    """By how much the record's clock is ahead of each observation's; none given means none. [s]"""
 
 
 @dataclass(frozen=True, eq=False)
@@ -136,16 +116,12 @@ class ObservedRecord:
 
     @property
     def own_columns(self) -> tuple[str, ...]:
-        """Labels of the observations' own unknowns, in the order of their columns."""
-        return tuple(
-            f"{name} of {each.signal} [{r}]"
-            for r, each in enumerate(self.observations)
-            for name in ("offset", "clock_offset")
-            if name in each.unknown
-        )
+        """Labels of the observations' free offsets, in the order of their columns."""
+        seen = enumerate(self.observations)
+        return tuple(f"offset of {each.signal} [{r}]" for r, each in seen if each.free_offset)
 
     @cached_property
-    def _first(self) -> NDArray[np.int64]:
+    def _first(self) -> Indices:
         sizes = [np.size(each.time) for each in self.observations]
         return np.concatenate([[0], np.cumsum(sizes)]).astype(np.int64)
 
@@ -163,66 +139,43 @@ class ObservedRecord:
         """Lowest and highest value of the record. [V or A]"""
         return float(self.record.values.min()), float(self.record.values.max())
 
-    def plan(self, own: Own, first_own: int) -> Plan:
-        """What the march needs to know of the observations, at values of their own unknowns.
+    def plan(self, offsets: Sequence[float], first_own: int) -> Plan:
+        """What the march needs to know of the observations, at values of their offsets.
 
-        `first_own` is the column of the first of these; an `InputError` says if there are not as
+        `first_own` is the column of the first free one; an `InputError` says if there are not as
         many offsets as observations.
         """
-        offsets = _one_each(own.offsets, self, "offset")
-        clocks = _one_each(own.clock_offsets, self, "clock offset")
-        plan = self._placed(clocks) if any(clocks) else self._unmoved
+        count = len(self.observations)
+        if len(offsets) not in (0, count) or not np.isfinite(offsets).all():
+            raise InputError(
+                f"There are {count} observations, which need as many finite offsets, not "
+                f"{tuple(offsets)}."
+            )
+        plan = self._plan
         if any(offsets):
             shifts = np.repeat(np.array(offsets), np.diff(plan.first))
             plan = plan._replace(measured=plan.measured - shifts)
-        at = first_own
-        columns = np.full((2, len(self.observations)), -1, dtype=np.int64)
-        for r, each in enumerate(self.observations):
-            for k, name in enumerate(("offset", "clock_offset")):
-                if name in each.unknown:
-                    columns[k, r] = at
-                    at += 1
-        return plan._replace(offset_column=columns[0], clock_column=columns[1])
+        free = np.array([each.free_offset for each in self.observations])
+        return plan._replace(offset_column=np.where(free, first_own + np.cumsum(free) - 1, -1))
 
     @cached_property
-    def _unmoved(self) -> Plan:
-        """The plan without offsets of any kind."""
-        return self._placed((0.0,) * len(self.observations))
-
-    def _placed(self, clocks: Sequence[float]) -> Plan:
-        cells, fractions, slopes = [], [], []
-        moving = any("clock_offset" in each.unknown for each in self.observations)
-        for each, clock in zip(self.observations, clocks, strict=True):
-            time = np.asarray(each.time) + (clock - each.delay)
-            cell, fraction, slope = _cells(self.record, time, moving)
-            cells.append(cell)
-            fractions.append(fraction)
-            slopes.append(slope)
-        back, ahead = np.concatenate(slopes, axis=1)
-        weight = np.concatenate([np.asarray(each.weight) for each in self.observations])
+    def _plan(self) -> Plan:
+        """The plan without offsets."""
+        places = [_cells(self.record, np.asarray(each.time)) for each in self.observations]
+        weights = [np.asarray(each.weight) for each in self.observations]
         measured = np.concatenate([np.asarray(each.values) for each in self.observations])
-        poles = max(len(each.poles) for each in self.observations)
-        kept = np.zeros((len(self.observations), poles))
-        for r, each in enumerate(self.observations):
-            kept[r, : len(each.poles)] = np.exp(-self.record.step * np.array(each.poles))
-        none = np.zeros(0, dtype=np.int64)
+        weight = np.concatenate(weights)
         return Plan(
             first=self._first,
-            cell=np.concatenate(cells),
-            fraction=np.concatenate(fractions),
-            back=np.ascontiguousarray(back),
-            ahead=np.ascontiguousarray(ahead),
+            cell=np.concatenate([cell for cell, _ in places]),
+            fraction=np.concatenate([fraction for _, fraction in places]),
             measured=np.where(weight > 0.0, measured, 0.0),
             weight=weight,
+            even=np.array([bool((each == 1.0).all()) for each in weights]),
             regular=np.array(
-                [
-                    bool((fraction == 0.0).all() and (np.diff(cell) == 1).all())
-                    for cell, fraction in zip(cells, fractions, strict=True)
-                ]
+                [bool((at == 0.0).all() and (np.diff(cell) == 1).all()) for cell, at in places]
             ),
-            kept=kept,
-            offset_column=none,
-            clock_column=none,
+            offset_column=np.zeros(0, dtype=np.int64),
         )
 
 
@@ -237,7 +190,7 @@ def every_sample(
     size = record.values.size
     seen, plan = _every_sample(signal, record.start, record.rate, record.substeps, size)
     observed = ObservedRecord(record, (seen,), driven_by, start, others)
-    observed.__dict__["_unmoved"] = plan
+    observed.__dict__["_plan"] = plan
     return observed
 
 
@@ -247,41 +200,14 @@ def _every_sample(
 ) -> tuple[Observation, Plan]:
     record = Record(np.zeros(size), start, rate, substeps)
     seen = Observation(signal, record.time, np.zeros(record.time.size))
-    return seen, ObservedRecord(record, (seen,))._unmoved
+    return seen, ObservedRecord(record, (seen,))._plan
 
 
-def _cells(record: Record, time: Array, moving: bool) -> tuple[NDArray[np.int64], Array, Array]:
-    """Where stamps lie on the grid: (m,) point at or before each, how far behind it, in steps.
-
-    And (2, m) weights of the slopes before and behind that point in the derivative by time, on a
-    grid point the mean of both sides, as a central difference has it; (2, 0) unless `moving`. [1/s]
-    """
-    last = record.values.size - 1
+def _cells(record: Record, time: Array) -> tuple[Indices, Array]:
+    """Where stamps lie on the grid: (m,) point at or before each, how far behind it, in steps."""
     at = (time - record.start) * (record.rate * record.substeps)
     nearest = np.rint(at)
-    if (np.abs(at - nearest) < ON_GRID).all():
-        at = nearest
-    else:
-        at = np.where(np.abs(at - nearest) < ON_GRID, nearest, at)
-    held = (at < 0.0) | (at > last)
-    at = np.clip(at, 0.0, last)
+    at = np.where(np.abs(at - nearest) < ON_GRID, nearest, at)
+    at = np.clip(at, 0.0, record.values.size - 1)
     cell = at.astype(np.int64)
-    fraction = at - cell
-    if not moving:
-        return cell, fraction, np.zeros((2, 0))
-    on_grid = fraction == 0.0
-    ahead = np.where(held | (cell == last), 0.0, np.where(on_grid, 0.5, 1.0))
-    back = np.where(held | (cell == 0) | ~on_grid, 0.0, 0.5)
-    return cell, fraction, np.stack([back, ahead]) / record.step
-
-
-def _one_each(values: Sequence[float], observed: ObservedRecord, what: str) -> tuple[float, ...]:
-    count = len(observed.observations)
-    if len(values) == 0:
-        return (0.0,) * count
-    if len(values) != count or not np.isfinite(values).all():
-        raise InputError(
-            f"There are {count} observations, which need as many finite {what}s, not "
-            f"{tuple(values)}."
-        )
-    return tuple(float(value) for value in values)
+    return cell, at - cell

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Sequence
 from functools import cached_property, lru_cache
 from typing import Any, NamedTuple, get_type_hints
 
@@ -10,15 +10,7 @@ from numba import types
 from numba.extending import intrinsic
 
 from swashplate.equations import expressions as ex
-from swashplate.equations.code import (
-    Code,
-    Flag,
-    Tuple,
-    Value,
-    fixed,
-    leaves,
-    rebuilt,
-)
+from swashplate.equations.code import Code, Flag, Tuple, Value, fixed, leaves, rebuilt
 from swashplate.equations.equation import JIT_OFF
 from swashplate.equations.expressions import Node
 from swashplate.equations.fields import floats_of
@@ -35,7 +27,7 @@ from swashplate.equations.model import (
     previous,
 )
 from swashplate.equations.reading import read
-from swashplate.equations.syntax import plain
+from swashplate.equations.syntax import is_named_tuple, plain
 from swashplate.errors import InputError
 
 HOLDS: dict[str, Equation] = {
@@ -46,13 +38,15 @@ HOLDS: dict[str, Equation] = {
 
 
 class Stored(NamedTuple):
-    """A number of a part that is kept."""
+    """A number of a part: what a march can keep, and what that is derived by."""
 
     part: int
     kind: str
-    """``signals``, ``state``, ``limits``, ``input``, ``link``, or ``tap`` for a tap's sample."""
+    """``signals``, ``state``, ``limits``, ``input``, ``link``, ``tap`` for a tap's sample; ``p``,
+    ``k``, ``given`` and ``fraction`` for a parameter, constant, given and the place of a tap."""
     path: str = ""
-    """Of the number; name of the input or link; input and number of a tap's sample, ``at.0``."""
+    """Of the number; name of the input, constant or link; input and number of a tap's sample,
+    ``at.0``; number of the tap."""
 
 
 class TapOf(NamedTuple):
@@ -103,57 +97,39 @@ class PartCode:
         self.taps = [each for each in taps_of(model, self.records) if each.part == part]
         for tap in self.taps:
             self.code.taken |= {*self.tap_samples(tap), self.fraction(tap), self.whole(tap)}
-        self.p = self._names(self.own.parameters, "p")
-        self.given = self._names(self.own.given, "given") if self.own.given else Tuple(None, ())
-        self.state = self._names(self.own.state, "s")
+        own = self.own
+        self.p = _named(own.parameters, self._fresh("p"))
+        self.given = _named(own.given, self._fresh("given")) if own.given else Tuple(None, ())
+        self.state = _named(own.state, self._fresh("s"))
+        self.parameters = {node.value: path for path, node in leaves(self.p)}
+        """Path of each parameter by the name that stands for it."""
         self.known: dict[str, Value] = {"p": self.p, "h": ex.name("h"), "given": self.given}
         self.known["state"] = self.state
-        if self.own.constants is not None:
-            self.known["k"] = self._call(self.prologue, self.own.constants)
-        self.inputs: dict[str, Value] = {}
-        for name in self.own.input_types:
-            self.inputs[name] = self._input(name)
+        if own.constants is not None:
+            self.known["k"] = self._call(self.prologue, own.constants)
+        self.inputs = {name: self._input(name) for name in own.input_types}
         self.known |= self.inputs
         self.entry = list(self.code.items)  # Items that make the inputs; a start needs them, too.
-        if self.own.inputs is not None:
-            self.known["inputs"] = Tuple(self.own.inputs, tuple(self.inputs.values()))
-        if self.own.sample is not None:
-            self.known["signals"] = self._call(self.code, self.own.sample)
-        self.following = self._call(self.code, self.own.step)
-        self._check_type(self.own.step, self.following, self.own.state)
-
-    def _check_type(self, equation: Equation, made: Value, kind: type[Any]) -> None:
-        """Refuse what an equation returns unless it is of a type, and all of it numbers."""
-        cls = made.cls if isinstance(made, Tuple) else None
-        numbers = tuple(path for path, node in leaves(made) if node.kind in ("float", "int"))
-        if cls is not kind or numbers != floats_of(kind):
+        if own.inputs is not None:
+            self.known["inputs"] = Tuple(own.inputs, tuple(self.inputs.values()))
+        if own.sample is not None:
+            self.known["signals"] = self._call(self.code, own.sample)
+        self.following = self._call(self.code, own.step)
+        cls = self.following.cls if isinstance(self.following, Tuple) else None
+        made = tuple(path for path, n in leaves(self.following) if n.kind in ("float", "int"))
+        if cls is not own.state or made != floats_of(own.state):
             raise InputError(
-                f"Model {self.own.name}: {plain(equation).__name__} must return a {kind.__name__} "
-                "of numbers on every way."
+                f"Model {own.name}: {plain(own.step).__name__} must return a "
+                f"{own.state.__name__} of numbers on every way."
             )
 
-    def _names(self, kind: Any, letter: str) -> Value:
-        hints = get_type_hints(kind)
-
-        def made(kind: Any, hints: Mapping[str, Any], path: str) -> Value:
-            items: list[Value] = []
-            for name in kind._fields:
-                inner = hints[name]
-                below = f"{path}{name}"
-                if isinstance(inner, type) and hasattr(inner, "_fields"):
-                    items.append(made(inner, get_type_hints(inner), f"{below}_"))
-                else:
-                    taken = self.code.fresh(f"{letter}_{self.prefix}{below}")
-                    items.append(ex.name(taken))
-            return Tuple(kind, tuple(items))
-
-        return made(kind, hints, "")
+    def _fresh(self, letter: str) -> Callable[[str], str]:
+        """What gives the numbers of a named tuple their names."""
+        return lambda path: self.code.fresh(f"{letter}_{self.prefix}{path}")
 
     def _call(self, code: Code, equation: Equation, **more: Value) -> Value:
-        return self.call(code, equation, {**self.known, **more})
-
-    def call(self, code: Code, equation: Equation, known: Mapping[str, Value]) -> Value:
         """Append a call of one of the part's equations, of what is known by argument."""
+        known = {**self.known, **more}
         given = {name: known[name] for name in arguments_of(equation) if name in known}
         if "options" in arguments_of(equation):
             given["options"] = fixed(self.options) or Flag("unknown", "options")
@@ -167,7 +143,7 @@ class PartCode:
         """An input as a name, a window of names, or what a hold makes of one."""
         link = self.model.link_of(self.part, name)
         if link is not None:
-            return self.linked(link)
+            return self._linked(link)
         tap = self.own.tap(name)
         found = next((each for each in self.taps if each.input == name), None)
         if found is None:
@@ -177,14 +153,11 @@ class PartCode:
                 # refused where the model is given its numbers; a constant keeps the code whole
                 return ex.ZERO
             return dict(leaves(self.p))[self.own.defaults[name]]
-        samples = [ex.name(each) for each in self.tap_samples(found)]
-        fraction = ex.name(self.fraction(found))
-        window = Tuple(Window, (Tuple(None, tuple(samples)), fraction))
-        if tap.width:
-            return window
-        return self._call(self.code, HOLDS[tap.hold], window=window)
+        samples = tuple(map(ex.name, self.tap_samples(found)))
+        window = Tuple(Window, (Tuple(None, samples), ex.name(self.fraction(found))))
+        return window if tap.width else self._call(self.code, HOLDS[tap.hold], window=window)
 
-    def linked(self, link: Link) -> Node:
+    def _linked(self, link: Link) -> Node:
         """A signal between parts, from the names of its sources."""
         sources = {each.signal: ex.name(self.source(each)) for each in link.sources}
         if link.equation is None:
@@ -229,6 +202,23 @@ class PartCode:
             return []
         return [node for _, node in leaves(self._call(self.code, self.own.limits))]
 
+    @cached_property
+    def constants(self) -> list[Node]:
+        """What the part's equation of constants makes, as known in its sample."""
+        return [node for _, node in leaves(self.known["k"])] if "k" in self.known else []
+
+    @cached_property
+    def outside(self) -> dict[str, Stored]:
+        """Names of what is read of records: samples of taps, and inputs as they come."""
+        found = {}
+        for tap in self.taps:
+            for j, name in enumerate(self.tap_samples(tap)):
+                found[name] = Stored(self.part, "tap", f"{tap.input}.{j}")
+        for name, node in self.inputs.items():
+            if node == ex.name(f"x_{self.own.tap(name).signal}"):
+                found[node.value] = Stored(self.part, "input", name)
+        return found
+
     def signal(self, path: str) -> Node:
         """A signal, or a number of the state, by its path."""
         signals = self.known.get("signals", Tuple(None, ()))
@@ -236,64 +226,50 @@ class PartCode:
 
     def node(self, stored: Stored) -> Node:
         """A number that is kept."""
-        if stored.kind == "tap":
-            name, number = stored.path.split(".")
-            tap = next(each for each in self.taps if each.input == name)
-            return ex.name(self.tap_samples(tap)[int(number)])
-        if stored.kind == "input":
-            made = self.inputs[stored.path]
-            assert isinstance(made, Node)
-            return made
+        if stored.kind in ("tap", "input"):
+            return next(ex.name(n) for n, each in self.outside.items() if each == stored)
         if stored.kind == "state":
             return dict(leaves(self.state))[stored.path]
         return self.signal(stored.path)
 
-    @cached_property
-    def parameters(self) -> dict[str, str]:
-        """Path of each parameter by the name that stands for it."""
-        return {node.value: path for path, node in leaves(self.p)}
+    def begun(self, start: str = "rest") -> tuple[Code, Value]:
+        """State at the start, and the code that leads to it.
+
+        At rest every signal is zero, or what its default parameter is; ``steady`` is the steady
+        state under the inputs as they come. A part without an equation for that has no state.
+        """
+        code, own = Code(self.code.taken, ruled=self.code.ruled), self.own
+        if start == "steady" and own.settled is not None:
+            code.items = list(self.entry)
+            return code, self._call(code, own.settled)
+        if own.rest is None:
+            defaults = own.state._field_defaults
+            first = [defaults.get(path.split(".")[0], 0.0) for path, _ in leaves(self.state)]
+            return code, rebuilt(self.state, (ex.number(float(each)) for each in first))
+        inputs: dict[str, Value] = {}
+        for name in own.input_types:
+            if name in own.defaults:
+                inputs[name] = dict(leaves(self.p))[own.defaults[name]]
+            elif own.tap(name).width:
+                zeros = (ex.ZERO,) * own.tap(name).width
+                inputs[name] = Tuple(Window, (Tuple(None, zeros), ex.ZERO))
+            else:
+                inputs[name] = ex.ZERO
+        if own.inputs is not None:
+            inputs["inputs"] = Tuple(own.inputs, tuple(inputs.values()))
+        return code, self._call(code, own.rest, **inputs)
 
 
-class Start(NamedTuple):
-    """A part's state at the start as straight code."""
-
-    code: Code
-    value: Value
-
-
-def rest_of(part: PartCode) -> Start:
-    """State at rest: every signal is zero, or what its default parameter is."""
-    code = Code(part.code.taken, ruled=part.code.ruled)
-    own = part.own
-    if own.rest is None:
-        defaults = own.state._field_defaults
-        nodes = [
-            ex.number(float(defaults.get(path.split(".")[0], 0.0)))
-            for path, _ in leaves(part.state)
-        ]
-        return Start(code, rebuilt(part.state, iter(nodes)))
-    inputs: dict[str, Value] = {}
-    for name in own.input_types:
-        if name in own.defaults:
-            inputs[name] = dict(leaves(part.p))[own.defaults[name]]
-        elif own.tap(name).width:
-            zeros = (ex.ZERO,) * own.tap(name).width
-            inputs[name] = Tuple(Window, (Tuple(None, zeros), ex.ZERO))
+def _named(kind: Any, name_of: Callable[[str], str], path: str = "") -> Value:
+    """A named tuple of names; `name_of` gives one for the words of a path."""
+    hints = get_type_hints(kind)
+    items: list[Value] = []
+    for name in kind._fields:
+        if is_named_tuple(hints[name]):
+            items.append(_named(hints[name], name_of, f"{path}{name}_"))
         else:
-            inputs[name] = ex.ZERO
-    known = {**part.known, **inputs}
-    if own.inputs is not None:
-        known["inputs"] = Tuple(own.inputs, tuple(inputs.values()))
-    return Start(code, part.call(code, own.rest, known))
-
-
-def settled_of(part: PartCode) -> Start | None:
-    """Steady state under the inputs as they come, None where the part has no equation for it."""
-    if part.own.settled is None:
-        return None
-    code = Code(part.code.taken, ruled=part.code.ruled)
-    code.items = list(part.entry)
-    return Start(code, part.call(code, part.own.settled, part.known))
+            items.append(ex.name(name_of(f"{path}{name}")))
+    return Tuple(kind, tuple(items))
 
 
 # --- without branches -----------------------------------------------------------------------------

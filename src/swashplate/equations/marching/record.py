@@ -1,23 +1,36 @@
 """Input records on the march's grid: uniform or with time stamps, any rate, sub-stepped."""
 
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from math import ceil
-from typing import Literal
+from typing import Literal, TypedDict
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from swashplate.equations.fields import is_real
 from swashplate.errors import InputError
 
 Array = NDArray[np.float64]
 Interpolation = Literal["linear", "previous"]
+Between = Interpolation | Mapping[str, Interpolation | None] | None
+"""What inputs, or each of them by its name, are between two samples; None is linear."""
+
+
+class Sampling(TypedDict, total=False):
+    """How inputs are given; see `on_grid`."""
+
+    time: ArrayLike | None
+    interpolation: Between
+    substeps: int | None
+
 
 SOURCE_RATE = 512.0
-"""Rate of Kruse's logs; no step is longer than one of its samples. [Hz]"""
+"""Rate of Kruse's logs; a drive's step is no longer than one of its samples. [Hz]"""
 LONGEST = 100_000_000
 """Steps that a record may take: 54 hours at 512 Hz. More is a mistake, in a unit perhaps."""
 SLOWEST, FASTEST = 10.0, 100_000.0
-"""Range of record rates. [Hz]"""
+"""Range of a drive's record rates. [Hz]"""
 
 
 @dataclass(frozen=True)
@@ -45,6 +58,59 @@ class Record:
         return self.start + np.arange(samples) / self.rate
 
 
+def on_grid(
+    inputs: Mapping[str, ArrayLike],
+    rate: float,
+    *,
+    time: ArrayLike | None = None,
+    interpolation: Between = None,
+    substeps: int | None = None,
+) -> dict[str, Record]:
+    """Inputs by name as records on one grid; arguments as of `swashplate.equations.simulate`.
+
+    Raises
+    ------
+    InputError
+        For an empty, non-finite or unsorted record, naming the sample, for more points than anyone
+        means, and for options that there are not.
+    """
+    between, substeps = checked_sampling(inputs, rate, interpolation, substeps)
+    data = {name: column(v, f"The {name}") for name, v in inputs.items() if not is_real(v)}
+    sizes = {name: samples.size for name, samples in data.items()}
+    if len(set(sizes.values())) != 1:
+        listed = ", ".join(f"{name} {size}" for name, size in sizes.items()) or "none is a record"
+        raise InputError(f"All inputs need the same number of samples: {listed}.")
+    what, size = next(iter(sizes.items()))
+    columns = {
+        name: data[name] if name in data else column(np.full(size, value), f"The {name}")
+        for name, value in inputs.items()
+    }
+    if time is None:
+        _check_length(size * substeps, f"{size} samples at {rate:g} Hz")
+        return {
+            name: Record(_refined(each, between[name], substeps), 0.0, float(rate), substeps)
+            for name, each in columns.items()
+        }
+    stamps = column(time, "The time")
+    if stamps.size != size:
+        raise InputError(f"There are {stamps.size} time stamps for {size} samples of {what}.")
+    late = np.flatnonzero(np.diff(stamps) <= 0.0)
+    if late.size:
+        raise InputError(
+            f"The time must increase, but goes from {stamps[late[0]]:g} s at sample {late[0]} to "
+            f"{stamps[late[0] + 1]:g} s at sample {late[0] + 1}."
+        )
+    if None in between.values():
+        raise InputError(
+            "A record with time stamps needs interpolation='previous' (held between stamps) or "
+            "'linear' (a straight line between them)."
+        )
+    return {
+        name: gridded(each, stamps, rate, between[name] or "linear", substeps)
+        for name, each in columns.items()
+    }
+
+
 def record_of(
     values: ArrayLike,
     rate: float,
@@ -54,75 +120,58 @@ def record_of(
     interpolation: Interpolation | None = None,
     substeps: int | None = None,
 ) -> Record:
-    """Put an input record on the march's grid.
+    """A drive's input, `what` by name, on the march's grid: see `on_grid` and `least_substeps`."""
+    steps = least_substeps(rate, substeps)
+    made = on_grid({what: values}, rate, time=time, interpolation=interpolation, substeps=steps)
+    return made[what]
 
-    Parameters
-    ----------
-    values : (n,) array_like
-        Input samples.
-    rate : float
-        Rate of the samples or, with `time`, of the grid that they are put on. [Hz]
-    what : str
-        Name of the input, for errors: ``"voltage"`` or ``"current"``.
-    time : (n,) array_like, optional
-        Time stamps, increasing, in any distances. [s]
-    interpolation : {"linear", "previous"}, optional
-        What the input is between two samples: a straight line or held. Must be chosen with
-        `time`; otherwise ``"linear"``.
-    substeps : int, optional
-        Steps of the march a sample; by default as many as keep h at or below 1/512 s.
+
+def least_substeps(rate: float, wanted: int | None = None) -> int:
+    """Steps a sample that keep a drive's h at or below 1/512 s, or those that are wanted.
 
     Raises
     ------
     InputError
-        For an empty, non-finite or unsorted record or a rate out of range, naming the sample.
-    """
-    data = column(values, f"The {what}")
-    least = least_substeps(rate)
-    if substeps is None:
-        substeps = least
-    elif substeps < least:
-        raise InputError(
-            f"substeps is {substeps}, but at {rate:g} Hz at least {least} are needed to keep the "
-            "step at or below 1/512 s."
-        )
-    if interpolation not in (None, "linear", "previous"):
-        raise InputError(f"interpolation is '{interpolation}'; it is 'linear' or 'previous'.")
-    if time is not None:
-        if interpolation is None:
-            raise InputError(
-                "A record with time stamps needs interpolation='previous' (held between stamps) "
-                "or 'linear' (a straight line between them)."
-            )
-        stamps = _checked_stamps(time, data.size, what)
-        return gridded(data, stamps, rate, interpolation, substeps)
-    _check_length(data.size * substeps, f"{data.size} samples at {rate:g} Hz")
-    return Record(_refined(data, interpolation, substeps), 0.0, float(rate), substeps)
-
-
-def least_substeps(rate: float) -> int:
-    """Steps a sample that keep h at or below 1/512 s.
-
-    Raises
-    ------
-    InputError
-        For a rate out of range.
+        For a rate out of range, or too few steps.
     """
     if not SLOWEST <= rate <= FASTEST:
         raise InputError(
             f"The rate is {rate:g} Hz, but must be between {SLOWEST:g} and {FASTEST:g} Hz."
         )
-    return max(ceil(SOURCE_RATE / rate - 1e-9), 1)
+    least = max(ceil(SOURCE_RATE / rate - 1e-9), 1)
+    if wanted is not None and wanted < least:
+        raise InputError(
+            f"substeps is {wanted}, but at {rate:g} Hz at least {least} are needed to keep the "
+            "step at or below 1/512 s."
+        )
+    return least if wanted is None else wanted
+
+
+def check_rate(rate: float) -> None:
+    """Refuse a rate that is no number above 0. [Hz]"""
+    if not is_real(rate) or not 0.0 < rate < np.inf:
+        raise InputError(f"The rate is {rate!r} Hz, but must be a number above 0.")
+
+
+def checked_sampling(
+    names: Iterable[str], rate: float, interpolation: Between, substeps: int | None
+) -> tuple[dict[str, Interpolation | None], int]:
+    """What each input is between two samples, and the steps a sample, one where none are said."""
+    check_rate(rate)
+    if substeps is not None and (substeps < 1 or substeps != int(substeps)):
+        raise InputError(f"substeps is {substeps!r}, but must be a whole number, at least 1.")
+    if isinstance(interpolation, Mapping):
+        found = {name: interpolation.get(name) for name in names}
+    else:
+        found = dict.fromkeys(names, interpolation)
+    for way in found.values():
+        if way not in (None, "linear", "previous"):
+            raise InputError(f"interpolation is '{way}'; it is 'linear' or 'previous'.")
+    return found, int(substeps or 1)
 
 
 def column(values: ArrayLike, what: str, *, finite: bool = True) -> Array:
-    """A copy of one column of real numbers, so that nothing changes with the user's array.
-
-    Raises
-    ------
-    InputError
-        For anything else, no number at all or one that is not finite; `what` names it.
-    """
+    """A copy of one column of real numbers; an `InputError` names by `what` anything else."""
     try:
         given = np.asarray(values)
     except ValueError:  # rows of different lengths
@@ -133,7 +182,7 @@ def column(values: ArrayLike, what: str, *, finite: bool = True) -> Array:
         raise InputError(f"{what} must be one column, not {given.ndim}-dimensional.")
     if given.size == 0:
         raise InputError(f"{what} is empty.")
-    data = np.array(given, dtype=np.float64, order="C")
+    data = np.array(given, dtype=np.float64, order="C")  # not changed with the user's array
     # one pass: a sum is finite if and only if no sample is NaN or infinite, overflow apart
     if finite and not np.isfinite(data.sum()):
         bad = np.flatnonzero(~np.isfinite(data))
@@ -145,18 +194,31 @@ def column(values: ArrayLike, what: str, *, finite: bool = True) -> Array:
     return data
 
 
-def _checked_stamps(time: ArrayLike, size: int, what: str) -> Array:
-    stamps = column(time, "The time")
-    if stamps.size != size:
-        raise InputError(f"There are {stamps.size} time stamps for {size} samples of {what}.")
-    steps = np.diff(stamps)
-    if np.any(steps <= 0.0):
-        first = int(np.argmax(steps <= 0.0))
-        raise InputError(
-            f"The time must increase, but goes from {stamps[first]:g} s at sample {first} to "
-            f"{stamps[first + 1]:g} s at sample {first + 1}."
-        )
-    return stamps
+def even_rate(stamps: Array) -> float | None:
+    """Rate of stamps that lie evenly, within 2 % of a step; None if they do not. [Hz]"""
+    if stamps.size < 2:
+        return None
+    rate = float((stamps.size - 1) / (stamps[-1] - stamps[0]))
+    even = stamps[0] + np.arange(stamps.size) / rate
+    if np.abs(stamps - even).max() >= 0.02 / rate:
+        return None
+    return float(round(rate)) if abs(rate - round(rate)) < 1e-6 * rate else rate
+
+
+def gridded(
+    data: Array, stamps: Array, rate: float, interpolation: Interpolation, substeps: int = 1
+) -> Record:
+    """Samples with stamps, on a grid that starts at the first one."""
+    start = float(stamps[0])
+    span = float(stamps[-1]) - start
+    _check_length(span * rate * substeps, f"stamps from {start:g} s to {stamps[-1]:g} s")
+    samples = int(span * rate + 1e-9) + 1
+    fine = start + np.arange((samples - 1) * substeps + 1) / (rate * substeps)
+    if interpolation == "linear":
+        return Record(np.interp(fine, stamps, data), start, float(rate), substeps)
+    # a stamp counts from the grid point that it falls on, rounding errors apart
+    seen = np.searchsorted(stamps, fine + 1e-9 / rate, side="right") - 1
+    return Record(data[seen], start, float(rate), substeps)
 
 
 def _refined(data: Array, interpolation: Interpolation | None, substeps: int) -> Array:
@@ -178,36 +240,3 @@ def _check_length(steps: float, what: str) -> None:
             f"The record with {what} takes {steps:.3g} steps, more than the {LONGEST:.0e} that are "
             "simulated at once; check the unit of the time."
         )
-
-
-def even_rate(stamps: Array) -> float | None:
-    """Rate of stamps that lie evenly, within 2 % of a step; None if they do not. [Hz]"""
-    if stamps.size < 2:
-        return None
-    rate = float((stamps.size - 1) / (stamps[-1] - stamps[0]))
-    even = stamps[0] + np.arange(stamps.size) / rate
-    if np.abs(stamps - even).max() >= 0.02 / rate:
-        return None
-    return float(round(rate)) if abs(rate - round(rate)) < 1e-6 * rate else rate
-
-
-def gridded(
-    data: Array, stamps: Array, rate: float, interpolation: Interpolation, substeps: int = 1
-) -> Record:
-    """Samples with stamps, on a grid that starts at the first one.
-
-    Raises
-    ------
-    InputError
-        If the grid has more points than anyone means.
-    """
-    start = float(stamps[0])
-    span = float(stamps[-1]) - start
-    _check_length(span * rate * substeps, f"stamps from {start:g} s to {stamps[-1]:g} s")
-    samples = int((stamps[-1] - start) * rate + 1e-9) + 1
-    fine = start + np.arange((samples - 1) * substeps + 1) / (rate * substeps)
-    if interpolation == "linear":
-        return Record(np.interp(fine, stamps, data), start, float(rate), substeps)
-    # a stamp counts from the grid point that it falls on, rounding errors apart
-    held = np.searchsorted(stamps, fine + 1e-9 / rate, side="right") - 1
-    return Record(data[held], start, float(rate), substeps)

@@ -1,4 +1,4 @@
-"""A model with numbers: its start, its march, and what lies inside."""
+"""A model with numbers: its start and its march."""
 
 from __future__ import annotations
 
@@ -19,23 +19,21 @@ from swashplate.equations.fields import floats_of, is_real, made, numbers_of, va
 from swashplate.equations.marching.march import march_source
 from swashplate.equations.marching.part import Stored, taps_of
 from swashplate.equations.marching.pieces import Planned, addresses, piece, pointers, run_once
-from swashplate.equations.model import Link, Model, Place, Window, arguments_of, place, state_paths
+from swashplate.equations.model import Link, Model, Window, arguments_of, place, state_paths
 from swashplate.equations.syntax import plain
 from swashplate.errors import DomainError, InputError
 
 Array = NDArray[np.float64]
-Indices = NDArray[np.int64]
 Start = Literal["rest", "steady"]
-
-K = TypeVar("K")
 T = TypeVar("T")
 
-STARTS = ("rest", "steady")
+NO_NUMBER = (ValueError, ZeroDivisionError, OverflowError)
+"""What an equation raises where it gives no number."""
 
 
 def check_start(start: str) -> None:
     """Refuse a start that is neither ``"rest"`` nor ``"steady"``."""
-    if start not in STARTS:
+    if start not in ("rest", "steady"):
         raise InputError(f"start is '{start}'; it is 'rest' or 'steady'.")
 
 
@@ -64,7 +62,7 @@ class Started(NamedTuple):
 class Places(NamedTuple):
     """Where the taps read, all of them."""
 
-    whole: Indices
+    whole: NDArray[np.int64]
     fraction: Array
     slope: Array
 
@@ -93,24 +91,34 @@ class Instance:
         found = [part.given for part in self.parts if part.given is not None]
         return np.array([number for each in found for number in numbers_of(each)])
 
+    @cached_property
+    def _lately(self) -> dict[Any, Any]:
+        """What was found lately: a fit asks for the same with every set."""
+        return {}
+
+    def _kept(self, key: tuple[Any, ...], find: Callable[[], T]) -> T:
+        if key not in self._lately:
+            if len(self._lately) > 128:
+                self._lately.clear()
+            self._lately[key] = find()
+        found: T = self._lately[key]
+        return found
+
     def places(self, signals: Sequence[str], h: float) -> Places:
         """Where every tap reads at a step of `h`."""
-        key = (tuple(signals), h)
-        if key in self._places:
-            return self._places[key]
-        found: list[Place] = []
-        for each in taps_of(self.model, tuple(signals)):
-            name, p = each.tap.delay, self.parts[each.part].p
-            delay = float(value_at(p, name)) if name else 0.0
+        return self._kept(("places", *signals, h), lambda: self._places(tuple(signals), h))
+
+    def _places(self, signals: tuple[str, ...], h: float) -> Places:
+        found = []
+        for each in taps_of(self.model, signals):
+            name = each.tap.delay
+            delay = float(value_at(self.parts[each.part].p, name)) if name else 0.0
             if not 0.0 <= delay < math.inf:
                 raise InputError(f"{self.name}: {name} is {delay:g} s, but a delay is at least 0.")
             found.append(place(each.tap, delay, h))
-        places = Places(
-            np.array([each.whole for each in found], dtype=np.int64),
-            np.array([each.fraction for each in found]),
-            np.array([each.slope for each in found]),
-        )
-        return _remembered(self._places, key, places)
+        whole = np.array([each.whole for each in found], dtype=np.int64)
+        rest = [[each.fraction, each.slope] for each in found]
+        return Places(whole, *np.array(rest).reshape(-1, 2).T.copy())
 
     def check_inputs(self, signals: Collection[str]) -> None:
         """Refuse external signals that the model does not know, and the lack of those it needs."""
@@ -153,9 +161,13 @@ class Instance:
         DomainError
             If constants or the state cannot be computed for these numbers.
         """
-        key = (tuple(first.items()), h, start)
-        if chosen is None and key in self._starts:
-            return self._starts[key]
+        if chosen is not None:
+            return self._start(first, h, start, chosen)
+        return self._kept((*first.items(), h, start), lambda: self._start(first, h, start, None))
+
+    def _start(
+        self, first: Mapping[str, float], h: float, start: Start, chosen: Sequence[Any] | None
+    ) -> Started:
         check_start(start)
         self.check_inputs(first)
         before = {name: value if start == "steady" else 0.0 for name, value in first.items()}
@@ -167,25 +179,28 @@ class Instance:
             if part.constants is not None:
                 known["k"] = self._called(part.constants, known)
             for name in part.input_types:
-                known[name] = self._input(i, name, first, before, states, found)
+                tap, link = part.tap(name), self.model.link_of(i, name)
+                if link is not None:
+                    known[name] = linked(link, states, found)
+                    continue
+                if tap.signal in first:
+                    value = (before if part.looked_at(name) else first)[tap.signal]
+                else:
+                    value = float(value_at(own.p, part.defaults[name]))
+                known[name] = Window((value,) * tap.width, 0.0) if tap.width else value
             if part.inputs is not None:
                 known["inputs"] = part.inputs(*(known[name] for name in part.input_types))
             known["state"] = self._state(part, known, start) if chosen is None else chosen[i]
             states.append(known["state"])
             if part.sample is not None:
-                known["signals"] = _sampled(part, known)
+                try:
+                    known["signals"] = called(part.sample, known)
+                except NO_NUMBER:
+                    # outside the domain; the march, which asks for its margin, says what is wrong
+                    none = dict.fromkeys(floats_of(part.signals or tuple), math.nan)
+                    known["signals"] = made(part.signals or tuple, none)
             found.append(known)
-        made_now = Started(tuple(states), before, tuple(found))
-        return made_now if chosen is not None else _remembered(self._starts, key, made_now)
-
-    # what was found lately: a fit asks for the same with every set
-    @cached_property
-    def _places(self) -> dict[tuple[tuple[str, ...], float], Places]:
-        return {}
-
-    @cached_property
-    def _starts(self) -> dict[tuple[tuple[tuple[str, float], ...], float, Start], Started]:
-        return {}
+        return Started(tuple(states), before, tuple(found))
 
     def _state(self, part: Model, known: Mapping[str, Any], start: Start) -> Any:
         equation = part.rest if start == "rest" else part.settled
@@ -209,57 +224,16 @@ class Instance:
     def _called(self, equation: Callable[..., Any], known: Mapping[str, Any]) -> Any:
         try:
             return called(equation, known)
-        except (ValueError, ZeroDivisionError, OverflowError) as error:
+        except NO_NUMBER as error:
             raise DomainError(
                 f"{self.name}: {plain(equation).__name__} cannot be computed for these numbers "
                 f"({error})."
             ) from None
 
-    def _input(
-        self,
-        part: int,
-        name: str,
-        first: Mapping[str, float],
-        before: Mapping[str, float],
-        states: Sequence[Any],
-        found: Sequence[Mapping[str, Any]],
-    ) -> Any:
-        own = self.model.parts[part]
-        link = self.model.link_of(part, name)
-        if link is not None:
-            return linked(link, states, found)
-        tap = own.tap(name)
-        if tap.signal in first:
-            value = before[tap.signal] if own.looked_at(name) else first[tap.signal]
-        else:
-            value = float(value_at(self.parts[part].p, own.defaults[name]))
-        return Window((value,) * tap.width, 0.0) if tap.width else value
-
 
 def called(equation: Callable[..., Any], known: Mapping[str, Any]) -> Any:
     """What an equation gives for what is known by the names of its arguments."""
     return interpreted(equation)(*(known[name] for name in arguments_of(equation)))
-
-
-def _remembered(known: dict[K, T], key: K, value: T) -> T:
-    """Keep a value, of few at a time."""
-    if len(known) > 64:
-        known.clear()
-    known[key] = value
-    return value
-
-
-def _sampled(part: Model, known: Mapping[str, Any]) -> Any:
-    """Signals of a part at its start; none of them a number outside the part's domain.
-
-    The march, which computes them again and asks for the domain's margin, says what is wrong.
-    """
-    assert part.sample is not None
-    assert part.signals is not None
-    try:
-        return called(part.sample, known)
-    except (ValueError, ZeroDivisionError, OverflowError):
-        return made(part.signals, dict.fromkeys(floats_of(part.signals), math.nan))
 
 
 def linked(link: Link, states: Sequence[Any], found: Sequence[Mapping[str, Any]]) -> float:
@@ -274,7 +248,51 @@ def linked(link: Link, states: Sequence[Any], found: Sequence[Mapping[str, Any]]
     return float(interpreted(link.equation)(*values))
 
 
-# --- kernels --------------------------------------------------------------------------------------
+def instance_of(
+    model: Model, p: Any, *, options: Any = None, given: Any = None, name: str | None = None
+) -> Instance:
+    """A model with its numbers.
+
+    Parameters
+    ----------
+    model : Model
+        A single model, or a joined one.
+    p, options, given : named tuple
+        Of a joined model each has a field for every part that has any.
+    name : str, optional
+        For messages; by default the model's.
+
+    Raises
+    ------
+    InputError
+        If a tuple has not the type that the model declares.
+    """
+    parts = []
+    for part in model.parts:
+        own = Part(p, options, given)
+        if len(model.parts) > 1:
+            own = Part(*(getattr(each, part.name, None) for each in own))
+        if own.options is None and part.options is not None:
+            own = own._replace(options=part.options())
+        kinds = {"parameters": part.parameters, "options": part.options, "given": part.given}
+        for (what, kind), number in zip(kinds.items(), own, strict=True):
+            if kind is None:
+                continue
+            if not isinstance(number, kind):
+                raise InputError(
+                    f"Model {part.name}: its {what} must be a {kind.__name__}, not {number!r}."
+                )
+            for path in () if what == "options" else floats_of(kind):
+                value = value_at(number, path)
+                if not is_real(value):
+                    raise InputError(
+                        f"Model {part.name}: {path} is {value!r}, but must be a real number."
+                    )
+        parts.append(own)
+    return Instance(model, tuple(parts), name or model.name)
+
+
+# --- marching -------------------------------------------------------------------------------------
 
 
 def module(name: str, text: str, names: Mapping[str, Any]) -> dict[str, Any]:
@@ -353,17 +371,9 @@ def arrays_of(
     flat: Array,
 ) -> tuple[Any, ...]:
     """What pieces take from ``records`` on (see `pieces.PIECE`); `values` must be kept as well."""
-    return (
-        pointers(values),
-        np.array([*started.before.values()]),
-        places.whole,
-        places.fraction,
-        instance.params,
-        instance.given,
-        states,
-        met,
-        flat,
-    )
+    before = np.array([*started.before.values()])
+    numbers = instance.params, instance.given
+    return (pointers(values), before, places.whole, places.fraction, *numbers, states, met, flat)
 
 
 def check_domain(instance: Instance, states: Array, worst: float, cause: str) -> None:
@@ -376,16 +386,14 @@ def check_domain(instance: Instance, states: Array, worst: float, cause: str) ->
     """
     if not worst > 0.0:
         raise DomainError(f"{instance.name}: {outside(instance.model, worst, cause)}")
-    if np.isfinite(states).all():
-        return
-    names = [
-        f"{part.name}'s {path}" for part in instance.model.parts for path in floats_of(part.state)
-    ]
-    bad = int(np.argmax(~np.isfinite(states)))
-    raise DomainError(
-        f"{instance.name}: {names[bad]} is {states[bad]} at the end of the record: the numbers "
-        f"overflow under this {cause}; check the size of the parameters."
-    )
+    bad = np.flatnonzero(~np.isfinite(states))
+    if bad.size:
+        part, path = instance.model.places("state")[bad[0]]
+        raise DomainError(
+            f"{instance.name}: {instance.model.parts[part].name}'s {path} is {states[bad[0]]} at "
+            f"the end of the record: the numbers overflow under this {cause}; check the size of "
+            "the parameters."
+        )
 
 
 def outside(model: Model, worst: float, cause: str) -> str:

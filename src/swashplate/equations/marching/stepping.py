@@ -25,27 +25,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swashplate.equations.code import generating
-from swashplate.equations.fields import is_real
-from swashplate.equations.marching.march import advance_source, output_of
+from swashplate.equations.marching.march import output_of, step_source
 from swashplate.equations.marching.part import Stored
-from swashplate.equations.marching.run import Instance, Start, check_domain, module
-from swashplate.equations.marching.use import instance_of
+from swashplate.equations.marching.record import check_rate
+from swashplate.equations.marching.run import Instance, Start, check_domain, instance_of, module
 from swashplate.equations.model import Model
 from swashplate.errors import InputError
 
 Array = NDArray[np.float64]
-
-STEP = '''
-
-
-@inlined
-def step(machine):
-    """Take the inputs, give the outputs, go on to the next sample; the domain's margin."""
-    return advance(
-        machine.inputs, machine.lines, machine.whole, machine.fraction, machine.parameters,
-        machine.given, machine.h, machine.constants, machine.states, machine.outputs,
-    )
-'''
 
 
 class Machine(NamedTuple):
@@ -60,7 +47,7 @@ class Machine(NamedTuple):
     """Inputs of late, newest first: what delays look at."""
     whole: NDArray[np.int64]
     fraction: Array
-    parameters: Array
+    params: Array
     given: Array
     constants: Array
     h: float
@@ -68,22 +55,20 @@ class Machine(NamedTuple):
 
     def copied(self) -> Machine:
         """The machine with a memory of its own: both go on from here apart."""
-        return self._replace(
-            inputs=self.inputs.copy(),
-            outputs=self.outputs.copy(),
-            states=self.states.copy(),
-            lines=self.lines.copy(),
-        )
+        own = {
+            name: getattr(self, name).copy() for name in ("inputs", "outputs", "states", "lines")
+        }
+        return self._replace(**own)
 
 
 @generating
 def _kernels(
     model: Model, inputs: tuple[str, ...], options: tuple[Any, ...], stored: tuple[Stored, ...]
-) -> tuple[Callable[..., int], Callable[[Machine], float], int]:
+) -> tuple[Callable[..., None], Callable[[Machine], float], int]:
     """Compiled constants of a model, its step, and how many constants there are."""
-    text, names = advance_source(model, inputs, options, stored)
-    made = module(f"{model.name}_step", text + STEP, names)
-    return made["prepare"], made["step"], text.count("constants[") // 2
+    text, names, count = step_source(model, inputs, options, stored)
+    made = module(f"{model.name}_step", text, names)
+    return made["prepare"], made["step"], count
 
 
 class CompiledStep:
@@ -119,48 +104,26 @@ class CompiledStep:
         )
 
     def machine(self, first: Mapping[str, float] | None = None, start: Start = "rest") -> Machine:
-        """A machine at its start.
-
-        Parameters
-        ----------
-        first : mapping of str to float, optional
-            Inputs at the first sample, from which a settled start follows; by default zero.
-        start : {"rest", "steady"}
-            As `Drive.simulate`.
-        """
-        found = self._instance
-        values = {name: float((first or {}).get(name, 0.0)) for name in self.inputs}
+        """A machine at its start, at rest or settled under the `first` inputs, by default zero."""
+        found, first = self._instance, first or {}
+        values = {name: float(first.get(name, 0.0)) for name in self.inputs}
+        newest = np.array([*values.values()])
         places = found.places(self.inputs, self._h)
         constants = np.zeros(self._count)
         self._prepare(found.params, found.given, self._h, constants)
         longest = int(places.whole.max()) if places.whole.size else 0
         lines = np.zeros((len(self.inputs), longest + 3))
         if start == "steady":
-            lines[:] = np.array([*values.values()])[:, None]
-        return Machine(
-            np.array([*values.values()]),
-            np.zeros(len(self.outputs)),
-            found.start(values, self._h, start).flat,
-            lines,
-            places.whole,
-            places.fraction,
-            found.params,
-            found.given,
-            constants,
-            self._h,
-        )
+            lines[:] = newest[:, None]
+        outputs, states = np.zeros(len(self.outputs)), found.start(values, self._h, start).flat
+        own = places.whole, places.fraction, found.params, found.given, constants, self._h
+        return Machine(newest, outputs, states, lines, *own)
 
     def check(self, machine: Machine, margin: float, cause: str = "input") -> None:
         """Refuse what a loop has computed outside the model's equations.
 
-        Parameters
-        ----------
-        machine : Machine
-            As the loop has left it.
-        margin : float
-            The least of the margins that the steps have returned.
-        cause : str
-            What has driven the model, for the sentence.
+        `machine` is as the loop has left it, `margin` the least that the steps have returned, and
+        `cause` what has driven the model, for the sentence.
 
         Raises
         ------
@@ -197,8 +160,7 @@ def compiled_step(
     InputError
         For numbers that do not fit the model, and signals that it does not have.
     """
-    if not is_real(rate) or not 0.0 < rate < np.inf:
-        raise InputError(f"The rate is {rate!r} Hz, but must be a number above 0.")
+    check_rate(rate)
     instance = instance_of(model, p, options=options, given=given)
     return CompiledStep(instance, inputs, stored_of(model, outputs), 1.0 / rate)
 

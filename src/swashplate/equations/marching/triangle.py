@@ -5,7 +5,6 @@ is [J r]ᵀ[J r], and J has the singular values of R's columns. R is made by Hou
 never from the normal equations, whose condition number is squared and which a zero column breaks.
 """
 
-from collections.abc import Iterable
 from math import sqrt
 
 import numpy as np
@@ -14,7 +13,6 @@ from numpy.typing import NDArray
 from swashplate.equations.cache import kernel
 from swashplate.equations.equation import inlined
 from swashplate.equations.marching.pieces import behind
-from swashplate.errors import InputError
 
 Array = NDArray[np.float64]
 
@@ -91,40 +89,6 @@ def absorb(rows: Array, factor: Array, room: Array) -> None:
             factor[j, k] -= along * lead
             for i in range(ROWS):
                 column[i] -= along * pivot[i]
-
-
-def combine(factors: Iterable[Array]) -> Array:
-    """Triangular factor of several problems stacked, from their factors.
-
-    Parameters
-    ----------
-    factors : iterable of (m, k) arrays
-        Triangles, or any rows [J r], with columns of the same meaning.
-
-    Returns
-    -------
-    (k, k) array
-        Upper triangle R, no diagonal element negative, with RᵀR the sum of the given ones' FᵀF.
-
-    Raises
-    ------
-    InputError
-        If there is none, or if their numbers of columns differ.
-    """
-    rows = [np.asarray(factor, dtype=np.float64) for factor in factors]
-    widths = sorted({each.shape[1] for each in rows})
-    if len(widths) != 1:
-        given = "there are none" if not rows else f"they have {' and '.join(map(str, widths))}"
-        raise InputError(f"Factors to combine need columns of the same meaning, but {given}.")
-    stacked = np.concatenate(rows)
-    factor = np.zeros((widths[0], widths[0]))
-    room = aligned(EIGHTH)
-    for first in range(0, stacked.shape[0], ROWS):
-        part = stacked[first : first + ROWS]
-        block = aligned(widths[0], ROWS)
-        block[:, : part.shape[0]] = part.T
-        absorb(block, factor, room)
-    return upright(factor)
 
 
 def upright(factor: Array) -> Array:

@@ -11,6 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from swashplate.equations import Run
 from swashplate.errors import InputError
 from swashplate.full_order import Comparison
 from swashplate.linear import UNITS
@@ -43,7 +44,7 @@ from swashplate.report.style import (
     write,
     zero_line,
 )
-from swashplate.simulation.result import Limit, Signals, Simulation
+from swashplate.simulation.result import Limit, Simulation
 from swashplate.units import display_unit
 
 Flags = NDArray[np.int8]
@@ -133,7 +134,7 @@ def plot_simulation(
 
 
 def plot_signals(
-    run: Signals,
+    run: Run,
     signals: Sequence[str],
     *,
     ax: Axes | Sequence[Axes] | None = None,
@@ -294,7 +295,7 @@ def plot_comparison(simulations: Mapping[str, Simulation], *, title: str | None 
     legend = [handle(name, *look) for name, look in looks.items()]
     heights = [1.2, 2.6, 1.6] if len(simulations) > 1 else [1.2, 2.6]
     figure, axes = sheet(heights, words, legend=legend)
-    volts = all(each.driven_by_voltage for each in simulations.values())
+    volts = all(each.voltage is not None for each in simulations.values())
     labels = ("voltage (V)" if volts else "current (A)", speed.label("shaft speed"))
     for ax, label in zip(axes, (*labels, speed.label("difference")), strict=False):
         dress(ax, label)
@@ -314,7 +315,7 @@ def plot_comparison(simulations: Mapping[str, Simulation], *, title: str | None 
         both = (first.time >= time[0]) & (first.time <= time[-1])
         if each is not first and both.any():
             at = first.time[both]
-            difference = each.at(at, "shaft_speed") - first.shaft_speed[both]
+            difference = np.interp(at, each.time, each.shaft_speed) - first.shaft_speed[both]
             draw(axes[2], at, speed.factor * difference, color, dashes=dashes)
     if len(simulations) > 1:
         said = f"speed less that of {reference}"

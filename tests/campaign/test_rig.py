@@ -1,12 +1,18 @@
+"""The virtual rig: what is simulated, what instruments make of it, and the files of it."""
+
+import tomllib
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
+import polars as pl
 import pytest
 
-from swashplate import Drive, InputError, maneuvers
-from swashplate.campaign import rig
+from swashplate import Drive, FileError, InputError, maneuvers
+from swashplate.campaign import Campaign, ChannelKind, rig
 
 STEP = maneuvers.step(4.0)
+FAST = maneuvers.step(9.0)
 SINE = maneuvers.sine(4.0, 0.2, length=12.0)
 
 
@@ -173,3 +179,173 @@ def test_what_cannot_be_run_is_refused(options: dict, sentence: str) -> None:
     with pytest.raises(InputError) as error:
         rig.run("hoist", **options)
     assert sentence in str(error.value)
+
+
+# --- instruments ---------------------------------------------------------------------------------
+
+
+def seen(
+    *, kinds: tuple[ChannelKind, ...] = ("rectified_current",), **errors: float
+) -> rig.VirtualRun:
+    tests = rig.run("hoist", [FAST], instruments=rig.Instruments(**errors), channels=kinds)
+    return tests.runs[FAST.name]
+
+
+def both(run: rig.VirtualRun) -> np.ndarray:
+    return run.truth.current_positive + run.truth.current_negative
+
+
+def test_the_command_is_put_out_and_read_back_in_codes_of_twelve_bits() -> None:
+    run = seen(command_bits=12, voltage_bits=12, voltage_noise=0.01)
+    for volts in (run.truth.voltage, run.columns["voltage"]):
+        codes = volts * 2048 / 10.0
+        np.testing.assert_allclose(codes, np.rint(codes), atol=1e-9)
+        assert np.abs(volts).max() < 10.0
+    error = run.columns["voltage"] - run.truth.voltage
+    assert error.std() == pytest.approx(0.01, rel=0.05)
+    offset = seen(voltage_offset=0.02)
+    np.testing.assert_allclose(offset.columns["voltage"] - offset.truth.voltage, 0.02, atol=1e-12)
+
+
+def test_the_ammeter_has_gain_zero_noise_and_steps() -> None:
+    run = seen(current_gain_error=0.01, current_zero=4e-3)
+    np.testing.assert_allclose(run.columns["current"], 1.01 * both(run) + 4e-3, rtol=1e-12)
+    run = seen(current_noise=2e-3, current_resolution=5e-4)
+    error = run.columns["current"] - both(run)
+    assert error.std() == pytest.approx(2e-3, rel=0.05)
+    steps = run.columns["current"] / 5e-4
+    np.testing.assert_allclose(steps, np.rint(steps), atol=1e-9)
+
+
+def test_the_dither_shows_at_its_aliases() -> None:
+    run = seen(dither=0.015)
+    held = slice(1024, 3072)  # 2 s to 6 s: the current stands
+    ripple = (run.columns["current"] - both(run))[held]
+    power = np.abs(np.fft.rfft(ripple * np.hanning(ripple.size))) ** 2
+    hertz = np.fft.rfftfreq(ripple.size, 1.0 / 512.0)
+    assert hertz[power.argmax()] == pytest.approx(100.0, abs=0.3)
+    beat = (hertz > 10.0) & (hertz < 14.0)  # the fifth multiple, 500 Hz, at 512 Hz
+    assert power[beat].max() > 100.0 * np.median(power)
+
+
+def test_counts_are_passed_edges_and_roll_over() -> None:
+    run = seen(kinds=("encoder_counts",), encoder_step=4)
+    turns = run.truth.shaft_position * 400.0 * 120.0 / 19.0 / (2.0 * np.pi)
+    assert np.all(run.columns["counts"] % 4 == 0.0)
+    assert np.abs(run.columns["counts"] - turns).max() <= 4.0
+    small = seen(kinds=("encoder_counts",), encoder_step=1, counter_bits=8).columns["counts"]
+    assert small.min() == -128.0
+    assert small.max() == 127.0
+
+
+def test_stamps_tell_the_jitter_and_keep_the_order() -> None:
+    run = seen(kinds=("shaft_speed",), jitter=2e-4, stamp_resolution=1e-6)
+    stamps = run.columns["time"]
+    assert (stamps - run.truth.time)[1:-1].std() == pytest.approx(2e-4, rel=0.05)
+    speed = np.interp(stamps, run.truth.time, run.truth.shaft_speed)
+    np.testing.assert_allclose(run.columns["shaft_speed"], speed, atol=2e-3)
+    assert np.diff(seen(jitter=1.0).columns["time"]).min() > 0.0
+
+
+def test_rows_and_cells_are_lost() -> None:
+    run = seen(lost_rows=0.05, longest_loss=20, empty_cells=0.01)
+    assert run.columns["time"].size == pytest.approx(0.95 * run.truth.time.size, rel=0.03)
+    assert np.isfinite(run.columns["time"]).all()
+    assert np.isnan(run.columns["current"]).mean() == pytest.approx(0.01, abs=0.006)
+
+
+@pytest.mark.parametrize(
+    ("change", "sentence"),
+    [
+        ({"jitter": -1.0}, "jitter must be 0 or more, not -1."),
+        ({"dither": float("nan")}, "dither must be finite, not nan."),
+        ({"lost_rows": 2.0}, "lost_rows must be a share, at most 1, not 2."),
+        ({"dither_frequency": 0.0}, "dither_frequency must be positive, not 0."),
+    ],
+)
+def test_impossible_instruments_are_refused(change: dict[str, float], sentence: str) -> None:
+    with pytest.raises(InputError) as error:
+        replace(rig.Instruments(), **change)
+    assert str(error.value) == sentence
+
+
+# --- files ---------------------------------------------------------------------------------------
+
+
+def content(folder: Path) -> dict[str, bytes]:
+    return {
+        path.relative_to(folder).as_posix(): path.read_bytes()
+        for path in sorted(folder.rglob("*"))
+        if path.is_file()
+    }
+
+
+@pytest.fixture(scope="module")
+def harsh() -> rig.VirtualTests:
+    return rig.run("hoist", [STEP, SINE], severity="harsh", seed=4)
+
+
+def test_csv_logs_read_back_as_they_were(harsh: rig.VirtualTests, tmp_path: Path) -> None:
+    rig.write(harsh, tmp_path)
+    path = tmp_path / "hoist_step_4_V.csv"
+    assert path.read_text("utf-8").startswith("# virtual: simulated by swashplate ")
+    table = pl.read_csv(path, comment_prefix="#")
+    columns = harsh.runs[STEP.name].columns
+    assert table.columns == ["time", "voltage", "current", "counts"]
+    assert table["counts"].dtype == pl.Int64
+    for name, values in columns.items():
+        read = table[name].cast(pl.Float64).fill_null(np.nan).to_numpy()
+        np.testing.assert_array_equal(read, values)
+
+
+@pytest.mark.parametrize("severity", ["clean", "realistic", "harsh"])
+def test_a_campaign_reads_what_is_written(severity: rig.Severity, tmp_path: Path) -> None:
+    tests = rig.run("hoist", [STEP, SINE], severity=severity, validate=[SINE.name])
+    read = Campaign.from_toml(rig.write(tests, tmp_path / "new" / "folder"))
+    assert read.virtual
+    assert "Virtual" in read.title
+    assert [each.maneuver for each in read] == ["step +4 V", "sine 4 V 0.2 Hz"]
+    assert [each.role for each in read] == ["fit", "validate"]
+    for experiment, run in zip(read, tests.runs.values(), strict=True):
+        channel = experiment["counts"]
+        truth = np.interp(channel.time, run.truth.time, run.truth.shaft_position)
+        # a count is 2.5 mrad
+        bound = {"clean": 1e-12, "realistic": 2.6e-3, "harsh": 2.6e-3}[severity]
+        assert np.abs(channel.values - truth).max() < bound
+
+
+def test_the_truth_lies_apart_and_complete(tmp_path: Path) -> None:
+    tools = replace(rig.SEVERITIES["realistic"], backlash=0.01)
+    tests = rig.run("hoist", [STEP], perturb=0.1, instruments=tools, seed=12)
+    assert tests.severity == "custom"
+    rig.write(tests, tmp_path)
+    truth = tomllib.loads((tmp_path / "truth" / "truth.toml").read_text("utf-8"))
+    assert truth["virtual"] is True
+    assert truth["seed"] == 12
+    assert rig.Instruments(**truth["instruments"]) == tools
+    assert {"swashplate", "numpy"} <= truth["versions"].keys()
+    assert Drive.from_toml(tmp_path / "truth" / truth["drive"]) == tests.drive
+    assert tests.drive != Drive.preset("hoist")
+
+
+def test_a_drive_of_ones_own_lies_beside_the_campaign(tmp_path: Path) -> None:
+    crane = Drive.preset("hoist").scale(Z10=0.9).renamed('my "crane"')
+    tests = rig.run(crane, {"a/b": STEP}, counts_per_turn=2500.0)
+    path = rig.write(tests, tmp_path)
+    read = Campaign.from_toml(path)
+    assert list(read.axes) == ['my "crane"']
+    assert read.axes['my "crane"'].drive == "drive.toml"
+    assert Drive.from_toml(tmp_path / "drive.toml") == crane
+    assert (tmp_path / "my_crane_a-b.csv").exists()
+
+
+def test_a_folder_that_holds_something_is_kept(harsh: rig.VirtualTests, tmp_path: Path) -> None:
+    (tmp_path / "notes.txt").write_text("mine")
+    with pytest.raises(FileError, match="is not empty; name a new folder, or allow overwriting"):
+        rig.write(harsh, tmp_path)
+    assert content(tmp_path) == {"notes.txt": b"mine"}
+    rig.write(harsh, tmp_path, overwrite=True)
+    rig.write(harsh, tmp_path, overwrite=True)
+    assert (tmp_path / "notes.txt").read_text() == "mine"
+    with pytest.raises(FileError, match="is a file; name a folder"):
+        rig.write(harsh, tmp_path / "notes.txt")

@@ -1,0 +1,649 @@
+"""A virtual test rig: a drive with known parameters, seen through the instruments of a campaign.
+
+`run` simulates the tests and reads them with `Instruments`, of one of the `SEVERITIES` or of one's
+own; `write` makes of them the files that a campaign leaves: logs, a campaign.toml and, apart, the
+truth. Refinements that a fit is to find, or to miss, are parameters of the drive that is simulated.
+Everything that is written says that it is virtual.
+
+>>> from swashplate.campaign import rig
+>>> tests = rig.run("hoist", seed=1)
+>>> rig.write(tests, "virtual-hoist")
+
+What a test campaign of this kind had is known in words: a 12-bit command, one true-RMS ammeter
+around both leads, a 100 Hz dither that beats in 512 Hz samples, an encoder. The sizes of the errors
+are assumed, as is usual for such instruments.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import asdict, dataclass, fields, replace
+from functools import partial
+from hashlib import blake2b
+from importlib.metadata import version
+from math import inf, isfinite, pi
+from pathlib import Path
+from platform import python_version
+from types import MappingProxyType
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from swashplate.__about__ import __version__
+from swashplate.campaign.schema import (
+    CHANNEL_KINDS,
+    KINDS,
+    SIGNALS,
+    ChannelKind,
+    axis_lines,
+    run_lines,
+)
+from swashplate.documents import toml_string
+from swashplate.drive import Drive
+from swashplate.equations.marching.record import SOURCE_RATE
+from swashplate.errors import FileError, InputError, ParameterError
+from swashplate.maneuvers import Maneuver, source_tests
+from swashplate.maneuvers.pieces import positive, whole
+from swashplate.simulation.result import Simulation
+from swashplate.tables import write_text, write_whole
+
+Array = NDArray[np.float64]
+Generator = np.random.Generator
+Severity = Literal["clean", "realistic", "harsh"]
+
+FULL_SCALE = 10.0
+"""Range of the command's converters, either way. [V]"""
+FARTHEST = 0.4
+"""Of the way to the next grid point a sample strays at most, so that the stamps increase. [1]"""
+FULL_CURRENT = 1.2
+"""Current at which the card's pulses would be as long as their period: 24 V on 20 Ω. [A]"""
+TRIES = 100
+"""Draws after which no set of parameters within the rules is expected any more."""
+COUNTS_PER_TURN = {"hoist": 400.0 * 120.0 / 19.0, "luff": 635.0 * 4.0, "slew": 81_000.0 * 7.0}
+"""Counts in a turn of the output: 2526.3, 2540 and 567,000 in Kruse's tables."""
+HELD_BACK = {
+    "hoist": ("step +6.5 V", "step -6.5 V", "sine 6.5 V 0.1 Hz"),
+    "slew": ("sine 4 V 0.1 Hz",),
+    "luff": ("step +6.5 V", "sine 6.5 V 0.1 Hz"),
+}
+"""Kruse's tests kept for validation: those of middle size, within what the others excite."""
+COLUMNS: Mapping[str, str] = {"rectified_current": "current", "encoder_counts": "counts"}
+"""Columns that are not called as the kind of their channel."""
+DRIVE_FILE = "drive.toml"
+"""Parameters of the drive that was simulated, beside truth.toml; or, beside campaign.toml, those of
+the one that a fit starts from."""
+
+
+@dataclass(frozen=True)
+class Instruments:
+    """What lies between the signals and the log, every error one number; 0 is none.
+
+    `dataclasses.replace` switches one error on or off.
+
+    Raises
+    ------
+    InputError
+        If a number is negative (offset, gain and zero error may be) or not finite, or a share
+        above 1.
+    """
+
+    command_bits: int = 0
+    """Bits of the converter that puts the command out over ±10 V: what the drive gets has its
+    steps. [1]"""
+    voltage_bits: int = 0
+    """Bits of the converter that reads it back. As fine as the other, it reads the same steps but
+    for noise; without the other, slow commands cross thresholds up to half a step off. [1]"""
+    voltage_noise: float = 0.0
+    """White noise before the converter that reads. [V]"""
+    voltage_offset: float = 0.0
+    """Zero error of the readback. [V]"""
+
+    current_noise: float = 0.0
+    """White noise of the ammeter's output, after the rectifier. [A]"""
+    current_resolution: float = 0.0
+    """Step of the converter that reads the ammeter. [A]"""
+    current_gain_error: float = 0.0
+    """Share by which the ammeter reads too much. [1]"""
+    current_zero: float = 0.0
+    """Reading without a current. [A]"""
+    dither: float = 0.0
+    """Half the height of the current's ripple at half of the full current of 1.2 A. [A]"""
+    dither_frequency: float = 100.0
+    """Frequency of the card's pulse width modulation. [Hz]"""
+
+    encoder_step: int = 0
+    """Counts by which the counter moves at once; 0 is a position without steps. [1]"""
+    counter_bits: int = 0
+    """Bits of a signed counter that rolls over; 0 is one that is wide enough. [1]"""
+    backlash: float = 0.0
+    """Play between the shaft and the encoder, or another instrument of its position. [rad]"""
+    transducer_noise: float = 0.0
+    """White noise of every other channel, as a share of its largest value in the run. [1]"""
+
+    jitter: float = 0.0
+    """Standard deviation of the instants sampled about the grid, which the stamps have. [s]"""
+    stamp_resolution: float = 0.0
+    """Step to which the stamps are rounded. [s]"""
+    lost_rows: float = 0.0
+    """Share of rows that are missing. [1]"""
+    longest_loss: int = 1
+    """Most rows that are lost at once. [1]"""
+    empty_cells: float = 0.0
+    """Share of cells without a number, apart from the stamps. [1]"""
+    longest_gap: int = 1
+    """Most cells of a column that are empty one after another. [1]"""
+
+    def __post_init__(self) -> None:
+        for each in fields(self):
+            name, value = each.name, getattr(self, each.name)
+            low, high, what = 0.0, inf, "0 or more" if value < 0.0 else "finite"
+            if name in ("voltage_offset", "current_gain_error", "current_zero"):
+                low = -inf
+            elif name in ("lost_rows", "empty_cells"):
+                high, what = 1.0, "a share, at most 1"
+            elif name in ("dither_frequency", "longest_loss", "longest_gap") and value <= 0.0:
+                low, what = 1e-300, "positive"
+            if not (isfinite(value) and low <= value <= high):
+                raise InputError(f"{name} must be {what}, not {value:g}.")
+
+
+SEVERITIES: Mapping[Severity, Instruments] = MappingProxyType(
+    {
+        "clean": Instruments(),
+        "realistic": Instruments(
+            command_bits=12,
+            voltage_bits=12,
+            voltage_noise=0.0008,
+            current_noise=0.002,
+            current_resolution=0.0005,
+            dither=0.015,
+            encoder_step=1,
+            transducer_noise=0.002,
+            jitter=2e-6,
+            stamp_resolution=1e-6,
+            lost_rows=0.0005,
+        ),
+        "harsh": Instruments(
+            voltage_bits=12,
+            voltage_noise=0.01,
+            voltage_offset=0.02,
+            current_noise=0.005,
+            current_resolution=0.0005,
+            current_gain_error=0.01,
+            current_zero=0.004,
+            dither=0.03,
+            encoder_step=1,
+            counter_bits=16,
+            transducer_noise=0.01,
+            jitter=200e-6,
+            stamp_resolution=1e-6,
+            lost_rows=0.01,
+            longest_loss=20,
+            empty_cells=0.002,
+            longest_gap=10,
+        ),
+    }
+)
+"""Instruments by how bad they are.
+
+clean: none. The log holds the model's own numbers at k/512 s, so that a fit can find the parameters
+to as many digits as it likes. realistic: noise of mean zero and nothing systematic (no zero or gain
+error, no lag; jitter as of a clock in hardware, which never lets a sample beside a step pass the
+card's dead zone), so that a fit of the right model is unbiased and its confidence intervals can be
+compared with the truth. harsh: zero and gain errors, jitter that moves steps by a part of a sample,
+gaps and a counter that rolls over.
+"""
+
+
+@dataclass(frozen=True, eq=False)
+class VirtualRun:
+    """One simulated test."""
+
+    name: str
+    """Of the maneuver."""
+    stem: str
+    """Of its file: axis and maneuver."""
+    role: Literal["fit", "validate"]
+    columns: Mapping[str, Array]
+    """What was logged, SI: ``"time"`` [s], ``"voltage"`` [V] and the channels; NaN is an empty
+    cell. Arrays of one length; rows that were lost are missing in all of them."""
+    truth: Simulation
+    """What really happened."""
+
+
+@dataclass(frozen=True, eq=False)
+class VirtualTests:
+    """A simulated campaign: its logs and its truth."""
+
+    axis: str
+    nominal: Drive
+    """What a fit starts from."""
+    preset: str | None
+    """Name of the packaged drive that `nominal` is, if it is one."""
+    drive: Drive
+    """What was simulated."""
+    instruments: Instruments
+    severity: str
+    """``"clean"``, ``"realistic"``, ``"harsh"`` or ``"custom"``."""
+    seed: int
+    channels: tuple[ChannelKind, ...]
+    counts_per_turn: float
+    runs: Mapping[str, VirtualRun]
+    """By the names of the maneuvers, in their order."""
+
+    def __repr__(self) -> str:
+        return (
+            f"VirtualTests({self.axis!r}, {len(self.runs)} runs, {self.severity}, seed {self.seed})"
+        )
+
+
+def run(
+    drive: str | Drive,
+    maneuvers: Mapping[str, Maneuver] | Sequence[Maneuver] | None = None,
+    *,
+    seed: int = 1,
+    severity: Severity = "realistic",
+    instruments: Instruments | None = None,
+    truth: Drive | None = None,
+    perturb: float = 0.0,
+    axis: str | None = None,
+    channels: Sequence[ChannelKind] = ("rectified_current", "encoder_counts"),
+    counts_per_turn: float | None = None,
+    validate: Collection[str] | None = None,
+) -> VirtualTests:
+    """Simulate the tests of a campaign and log them.
+
+    Parameters
+    ----------
+    drive : str or Drive
+        Name of a packaged drive, or a drive: the one that a fit starts from.
+    maneuvers : mapping or sequence of Maneuver, optional
+        By default Kruse's tests of the axis.
+    seed : int
+        Not negative. The same seed gives the same logs, each of them whatever runs beside it.
+    severity : {"clean", "realistic", "harsh"}
+        How bad the instruments are, see `SEVERITIES`.
+    instruments : Instruments, optional
+        One's own instead.
+    truth : Drive, optional
+        What is simulated instead of `drive`, with refinements for example; the decay of its card
+        takes over within a step.
+    perturb : float
+        Multiply every value of what is simulated by a factor drawn by chance, whose logarithm is
+        at most this, 0.5 at most, and has half of it as standard deviation. Zeros, infinite limits
+        and parameters without effect stay. [1]
+    axis : {"hoist", "slew", "luff"}, optional
+        Whose tests and encoder they are; by default the one that the drive is called after.
+    channels : sequence of str
+        Kinds of channel to log, as in a campaign file. Those other than current and counts are the
+        simulated signals with white noise.
+    counts_per_turn : float, optional
+        Of the encoder, for one turn of the shaft; by default the axis's.
+    validate : collection of str, optional
+        Names of the runs that are kept for validation; by default, of Kruse's tests, those of
+        middle size (`HELD_BACK`), and none of others.
+
+    Returns
+    -------
+    VirtualTests
+        Logs and truth in memory; `write` makes files of them.
+
+    Raises
+    ------
+    InputError
+        For an unknown name, a number out of range, two maneuvers of one name, or a maneuver that
+        cannot be simulated at 512 Hz; or if no draw of `perturb` keeps the rules of a parameter
+        set.
+    """
+    nominal = Drive.preset(drive) if isinstance(drive, str) else drive
+    seed, axis, kinds = whole("seed", seed), axis or nominal.name, tuple(channels)
+    simulated = truth if truth is not None else nominal
+    if perturb:
+        simulated = _perturbed(simulated, perturb, seed)
+    # a real card's decay does not wait for the next sample of a log (docs/decisions/0008)
+    simulated = Drive(replace(simulated.parameters, card_switch="split"))
+    listed = source_tests(axis) if maneuvers is None else maneuvers
+    tests = dict(listed if isinstance(listed, Mapping) else ((m.name, m) for m in listed))
+    held_back = HELD_BACK[axis] if validate is None and maneuvers is None else validate or ()
+    # as files' names: hoist_step_+4_V, hoist_ramp_+1_V-s
+    stems = [re.sub(r"[^\w.+-]+", "_", f"{axis} {name}".replace("/", "-")) for name in tests]
+    possible = [kind for kind in CHANNEL_KINDS if kind != "other"]
+    unknown = [kind for kind in kinds if kind not in possible]
+    missing = [name for name in held_back if name not in tests]
+    turn = COUNTS_PER_TURN.get(axis, 1.0)
+    if counts_per_turn is not None:
+        turn = positive("counts_per_turn", counts_per_turn)
+    why = ""
+    if severity not in SEVERITIES:
+        why = f"severity is {severity!r}; it is one of {', '.join(SEVERITIES)}"
+    elif len(tests) < len(listed):
+        why = "Two maneuvers have the same name; give them in a mapping by name"
+    elif not tests:
+        why = "A campaign needs at least one maneuver"
+    elif unknown:
+        why = f"There is no channel {unknown[0]!r}; there are {', '.join(possible)}"
+    elif not kinds or len(set(kinds)) < len(kinds):
+        why = "channels must be one or more kinds, each once"
+    elif counts_per_turn is None and axis not in COUNTS_PER_TURN and "encoder_counts" in kinds:
+        why = f"The encoder of '{axis}' is not known: give counts_per_turn, or as axis one of "
+        why += ", ".join(COUNTS_PER_TURN)
+    elif missing:
+        why = f"There is no run '{missing[0]}' to validate; there are {', '.join(tests)}"
+    elif len({stem.lower() for stem in stems}) < len(stems):
+        why = "Two maneuvers would have the same file; give them other names"
+    if why:
+        raise InputError(f"{why}.")
+    tools, runs = SEVERITIES[severity] if instruments is None else instruments, {}
+    for stem, (name, maneuver) in zip(stems, tests.items(), strict=True):
+        command = maneuver.sample(SOURCE_RATE)
+        if (largest := float(np.abs(command).max())) > FULL_SCALE:
+            raise InputError(f"The command reaches {largest:g} V, but the card takes ±10 V.")
+        happened = simulated.simulate(_converted(command, tools.command_bits))
+        columns = _logged(happened, kinds, tools, turn, seed, name)
+        role: Literal["fit", "validate"] = "validate" if name in held_back else "fit"
+        runs[name] = VirtualRun(name, stem, role, columns, happened)
+    called = severity if tools == SEVERITIES[severity] else "custom"
+    preset = drive if isinstance(drive, str) else None
+    return VirtualTests(axis, nominal, preset, simulated, tools, called, seed, kinds, turn, runs)
+
+
+def _perturbed(drive: Drive, spread: float, seed: int) -> Drive:
+    """A drive whose every value is multiplied by chance, within a spread of the logarithm."""
+    if not 0.0 < spread <= 0.5:
+        raise InputError(f"perturb must be above 0 and at most 0.5, not {spread:g}.")
+    parameters = drive.parameters
+    columns = [
+        column
+        for parameter in parameters.values()
+        if parameter.status != "inactive"
+        for column in parameter.definition.columns
+        if parameters.numbers[column] != 0.0 and np.isfinite(parameters.numbers[column])
+    ]
+    generator = _stream(seed, "parameters")
+    for _ in range(TRIES):
+        logarithms = 0.5 * spread * generator.standard_normal(len(columns))
+        while (far := np.abs(logarithms) > spread).any():
+            logarithms[far] = 0.5 * spread * generator.standard_normal(int(far.sum()))
+        factors = np.exp(logarithms).tolist()
+        try:
+            drawn = drive.scale(**dict(zip(columns, factors, strict=True)))
+        except ParameterError:
+            continue
+        title = f"{parameters.title}; values within ±{100 * spread:g} % by seed {seed}"
+        return drawn.renamed(drive.name, title)
+    raise InputError(
+        f"No draw of {TRIES} within ±{100 * spread:g} % keeps the rules of {drive.name}'s "
+        "parameters; take a smaller spread."
+    )
+
+
+# --- readings -------------------------------------------------------------------------------------
+
+
+def _stream(seed: int, *names: str) -> Generator:
+    """Random numbers that depend on the seed and on names, on nothing else.
+
+    So a run is the same whatever runs before it, and an instrument that is switched off takes no
+    numbers from the others.
+    """
+    words = [
+        int.from_bytes(blake2b(name.encode(), digest_size=8).digest(), "little") for name in names
+    ]
+    return np.random.default_rng(np.random.SeedSequence([seed, *words]))
+
+
+def _logged(
+    truth: Simulation,
+    kinds: tuple[ChannelKind, ...],
+    tools: Instruments,
+    counts_per_turn: float,
+    seed: int,
+    name: str,
+) -> dict[str, Array]:
+    """What the instruments make of a run; each has its own stream of chance."""
+    grid = truth.time
+    # the stamps are those of the instants sampled, which stay in order however large the jitter is
+    strayed = tools.jitter * _stream(seed, name, "time").standard_normal(grid.size)
+    bound = FARTHEST * (grid[1] - grid[0] if grid.size > 1 else 0.0)
+    instants = np.clip(grid + np.clip(strayed, -bound, bound), grid[0], grid[-1])
+
+    def at_instants(signal: Array | None) -> Array:
+        # the drive is marched on the grid: what lies between is not known better than by lines
+        assert signal is not None
+        return signal if not tools.jitter else np.interp(instants, grid, signal)
+
+    def read(kind: ChannelKind | Literal["voltage"]) -> Array:
+        chance = _stream(seed, name, kind)
+        if kind == "rectified_current":
+            both = at_instants(truth.current_positive), at_instants(truth.current_negative)
+            return _ammeter(instants, both, tools, chance)
+        signal: Array = getattr(truth, "voltage" if kind == "voltage" else SIGNALS[kind])
+        if kind in ("position", "encoder_counts") and tools.backlash:
+            signal = _play(signal, tools.backlash)
+        signal = at_instants(signal)
+        if kind == "voltage":
+            noise = tools.voltage_noise * chance.standard_normal(grid.size)
+            return _converted(signal + tools.voltage_offset + noise, tools.voltage_bits)
+        if kind == "encoder_counts":
+            return _counter(signal * (counts_per_turn / (2.0 * pi)), tools, chance)
+        noise = tools.transducer_noise * np.abs(signal).max() * chance.standard_normal(grid.size)
+        return np.asarray(signal + noise)
+
+    def lost(share: float, longest: int, *names: str) -> NDArray[np.bool_]:
+        """In runs of 1 to `longest`, together about a share of all."""
+        mask, chance = np.zeros(grid.size, dtype=np.bool_), _stream(seed, name, *names)
+        begins = np.flatnonzero(chance.random(grid.size) < share / (0.5 * (1 + longest)))
+        lengths = chance.integers(1, longest, size=begins.size, endpoint=True)
+        for begin, length in zip(begins.tolist(), lengths.tolist(), strict=True):
+            mask[begin : begin + length] = True
+        return mask
+
+    columns = {"voltage": read("voltage"), **{COLUMNS.get(k, k): read(k) for k in kinds}}
+    if tools.empty_cells:
+        for column, values in columns.items():
+            gaps = lost(tools.empty_cells, tools.longest_gap, "empty", column)
+            columns[column] = np.where(gaps, np.nan, values)
+    kept = ~lost(tools.lost_rows, tools.longest_loss, "rows")
+    if not kept.any():
+        raise InputError(f"{name}: lost_rows leaves no row; take a smaller share.")
+    columns = {"time": _rounded(instants, tools.stamp_resolution), **columns}
+    return {column: values[kept] for column, values in columns.items()}
+
+
+def _rounded(values: Array, step: float) -> Array:
+    """Values rounded to whole steps, as the nearest decimals where the step is one; 0 is none."""
+    if not step:
+        return values
+    per_unit = 1.0 / step
+    if abs(per_unit - round(per_unit)) < 1e-6 * per_unit:
+        # division by a whole number gives the float that the decimal number is read as
+        return np.asarray(np.rint(values * round(per_unit)) / round(per_unit) + 0.0)
+    return np.asarray(np.rint(values / step) * step + 0.0)
+
+
+def _converted(voltage: Array, bits: int) -> Array:
+    """Codes of b bits over ±10 V: whole multiples of 20/2ᵇ V, up to one below 10 V. [V]"""
+    if not bits:
+        return voltage
+    half = 2.0 ** (bits - 1)
+    codes = np.clip(np.rint(voltage / FULL_SCALE * half), -half, half - 1.0)
+    # 0.0 turns -0.0 into 0.0, which reads better in a log
+    return np.asarray(codes * (FULL_SCALE / half) + 0.0)
+
+
+def _ammeter(
+    instants: Array, both: tuple[Array, Array], tools: Instruments, chance: Generator
+) -> Array:
+    """The ammeter around both leads, from their currents (m,), magnitudes, at instants (m,). [A]
+
+    The reading is (1 + gain error) (|I₊ + ripple| + |I₋ + ripple|) + zero error + noise. Pulses of
+    the length D T, D = I / I_full, raise the current of an inductive coil along a straight line and
+    let it fall along another: a triangle of mean zero whose height goes with D (1 − D). It has all
+    multiples of the frequency; at 512 Hz the fifth of 100 Hz shows at 12 Hz.
+    """
+    passed = np.mod(tools.dither_frequency * instants + float(chance.random()), 1.0)
+    reading = np.zeros(instants.size)
+    for mean in both:
+        duty = np.clip(mean / FULL_CURRENT, 0.0, 1.0)
+        rising = 2.0 * passed / np.maximum(duty, 1e-9) - 1.0
+        falling = 1.0 - 2.0 * (passed - duty) / np.maximum(1.0 - duty, 1e-9)
+        height = 4.0 * tools.dither * duty * (1.0 - duty)
+        reading += np.abs(mean + height * np.where(passed < duty, rising, falling))
+    noise = tools.current_noise * chance.standard_normal(instants.size)
+    reading = (1.0 + tools.current_gain_error) * reading + tools.current_zero + noise
+    return _rounded(reading, tools.current_resolution)
+
+
+def _counter(counts: Array, tools: Instruments, chance: Generator) -> Array:
+    """The encoder's counter, 0 at the first sample, from positions (n,). [count]
+
+    It shows how many edges were passed. Where between two edges the shaft stands at first is
+    chance, so that on average the steps are no error. A counter of b bits counts from −2ᵇ⁻¹ to
+    2ᵇ⁻¹ − 1 and begins anew.
+    """
+    first = float(chance.random())
+    if tools.encoder_step:
+        step = float(tools.encoder_step)
+        counts = step * (np.floor(counts / step + first) - np.floor(counts[:1] / step + first))
+    if tools.counter_bits:
+        half = 2.0 ** (tools.counter_bits - 1)
+        counts = np.mod(counts + half, 2.0 * half) - half
+    return np.asarray(counts)
+
+
+def _play(position: Array, width: float) -> Array:
+    """Position (n,) behind a gear with backlash of a width: the play operator. [rad]
+
+    yₙ = max(xₙ − b/2, min(xₙ + b/2, yₙ₋₁)), in the middle of the gap at first.
+    """
+    behind, driven = float(position[0]), np.empty_like(position)
+    for n, x in enumerate(position):
+        behind = driven[n] = max(x - 0.5 * width, min(x + 0.5 * width, behind))
+    return driven
+
+
+# --- files ----------------------------------------------------------------------------------------
+
+
+def write(tests: VirtualTests, folder: str | Path, *, overwrite: bool = False) -> Path:
+    """Files that a campaign leaves, and the truth beside them.
+
+    Parameters
+    ----------
+    tests : VirtualTests
+        What `run` simulated.
+    folder : path
+        New or empty: logs as CSV, named after axis and maneuver, and campaign.toml. In its folder
+        ``truth`` lie truth.toml and the parameters that were simulated.
+    overwrite : bool
+        Allow a folder that holds something, and replace files of the same names.
+
+    Returns
+    -------
+    path
+        Of campaign.toml, written last: where it is, everything is.
+
+    Raises
+    ------
+    FileError
+        If the folder is not empty or something cannot be written.
+    """
+    place = Path(folder)
+    try:
+        if place.exists() and not place.is_dir():
+            raise FileError(f"{place} is a file; name a folder.")
+        if place.is_dir() and not overwrite and any(place.iterdir()):
+            raise FileError(f"{place} is not empty; name a new folder, or allow overwriting.")
+        (place / "truth").mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise FileError(f"{place} cannot be written: {error.strerror or error}.") from None
+    for each in tests.runs.values():
+        write_whole(place / f"{each.stem}.csv", partial(_write_log, tests, each))
+    if tests.preset is None:
+        tests.nominal.to_toml(place / DRIVE_FILE)
+    tests.drive.to_toml(place / "truth" / DRIVE_FILE)
+    write_text(_truth_text(tests), place / "truth" / "truth.toml")
+    campaign = place / "campaign.toml"
+    write_text(_campaign_text(tests), campaign)
+    return campaign
+
+
+def _refinements(tests: VirtualTests) -> str:
+    return ", ".join(tests.drive.parameters.refinements) or "none"
+
+
+def _write_log(tests: VirtualTests, run: VirtualRun, path: Path) -> None:
+    """A CSV: an empty cell for NaN, whole numbers for an encoder that counts them."""
+    import polars as pl
+
+    table = pl.DataFrame(dict(run.columns), nan_to_null=True)
+    counts = run.columns.get("counts")
+    if counts is not None and np.array_equal(counts, np.rint(counts), equal_nan=True):
+        table = table.with_columns(pl.col("counts").cast(pl.Int64))
+    with path.open("wb") as file:
+        note = (
+            f"# virtual: simulated by swashplate {__version__}, no measurement; axis {tests.axis}, "
+            f"{run.name}, instruments {tests.severity}, refinements {_refinements(tests)}, "
+            f"seed {tests.seed}\n"
+        )
+        file.write(note.encode())
+        table.write_csv(file)
+
+
+def _campaign_text(tests: VirtualTests) -> str:
+    """Text of the campaign file.
+
+    The input is joined by straight lines, because that is what was simulated between two samples.
+    """
+    missing = ['missing = "drop"    # cells without a number'] * bool(tests.instruments.empty_cells)
+    own = [
+        f'drive = "{tests.preset or DRIVE_FILE}"    # the model that a fit starts from',
+        'time = { column = "time", unit = "s" }',
+        'start = "rest"',
+    ]
+    given = ['kind = "voltage"', 'column = "voltage"', 'unit = "V"', 'interpolation = "linear"']
+    channels = {}
+    for kind in tests.channels:
+        column = COLUMNS.get(kind, kind)
+        entries = [f'kind = "{kind}"', f'column = "{column}"']
+        if kind == "encoder_counts":
+            entries.append(f"counts_per_turn = {tests.counts_per_turn!r}    # of the shaft")
+            if tests.instruments.counter_bits:
+                entries.append(f"rolls_over_at = {2**tests.instruments.counter_bits}")
+        else:
+            entries.append(f'unit = "{KINDS[kind].units[0]}"')
+        channels[column] = [*entries, *missing]
+    lines = [
+        f"# Virtual tests, simulated by swashplate {__version__}: nothing here was measured.",
+        f"# Instruments: {tests.severity}; refinements: {_refinements(tests)}; seed {tests.seed}.",
+        "# What was simulated stands in truth/truth.toml: open it only after the fit.",
+        f"title = {toml_string(f'Virtual tests, {tests.axis}')}",
+        "virtual = true",
+        "",
+        *axis_lines(tests.axis, own, [*given, *missing], channels),
+    ]
+    for run in tests.runs.values():
+        lines += run_lines(f"{run.stem}.csv", run.role)
+    return "\n".join(lines)
+
+
+def _truth_text(tests: VirtualTests) -> str:
+    """What was simulated: instruments, seed and versions; the drive has its own file."""
+    from tomlkit import dumps
+
+    packages = ("numpy", "numba")
+    content = {
+        "virtual": True,
+        "axis": tests.axis,
+        "drive": DRIVE_FILE,
+        "severity": tests.severity,
+        "seed": tests.seed,
+        "counts_per_turn": tests.counts_per_turn,
+        "runs": list(tests.runs),
+        "instruments": asdict(tests.instruments),
+        "versions": {"swashplate": __version__, "python": python_version()}
+        | {each: version(each) for each in packages},
+    }
+    return f"# The truth behind the virtual tests beside this folder.\n{dumps(content)}"
