@@ -169,7 +169,7 @@ def test_a_result_that_is_of_no_use_ends_with_1(
     assert result.stderr.startswith("Not usable: ")
     assert "bound" in result.stderr
     said = " ".join(result.stdout.split())
-    assert "write J = { relative = [0.99, 2.02] } under [stages.free] of the stage 'card'" in said
+    assert "widen J under [stages.free] of the stage 'card' and fit again." in said
     # whoever takes the drive along hears of it, and so do those who get the files
     said = run("export", "fitted", "--c", "folder").stdout
     assert "! The fit of this drive says: Not usable: " in said
@@ -187,7 +187,7 @@ def test_refusals(refused: Words, campaign: Path, tmp_path: Path) -> None:
     assert "no parameter 'Z61'" in refused(*fit, "--setup", "bad.toml")
     (tmp_path / "bad.toml").write_text(SETUP.replace("[0.5, 2.0]", "[2.0, 0.5]", 1), "utf-8")
     said = refused(*fit, "--setup", "bad.toml")
-    assert "bad.toml: stages 1.free.J: relative = [2, 0.5] must rise: write [0.5, 2]" in said
+    assert "bad.toml: stages 1.free.J.relative: [2, 0.5] must rise: write [0.5, 2]" in said
     (tmp_path / "bad.toml").write_text(SETUP.replace("relative", "relativ", 1), "utf-8")
     assert "perhaps 'relative' is meant" in refused(*fit, "--setup", "bad.toml")
     text = campaign.read_text("utf-8").replace('role = "fit"', 'role = "ignore"')

@@ -238,11 +238,7 @@ REFUSED: dict[str, tuple[Callable[[], Problem], str]] = {
     ),
     "no value": (
         lambda: problem(OWN, trial("a"), free=FREE[:1]),
-        "valve has no value of gain: let it be free, fix it, or give p",
-    ),
-    "unknown signal": (
-        lambda: problem(OwnModel(valve, given=Load(), signals={"position": "y"}), trial("a")),
-        "valve has no signal 'y'; it has opening, position",
+        "valve has no value of gain: let it be free, or fix it",
     ),
     "no channel": (
         lambda: Problem(OWN, (renamed(trial("a"), "y"),), Unknowns(FREE), ("y",), {"y": 1.0}),

@@ -9,8 +9,8 @@ from tests.identification.test_prior_weights import problem
 
 from swashplate import InputError
 from swashplate.identification.intervals import uncertainty
-from swashplate.identification.problem import Problem, linearised_fit
-from swashplate.identification.solving import Loss, influence, solve
+from swashplate.identification.problem import Loss, Problem, influence, linearised_fit
+from swashplate.identification.solving import solve
 from swashplate.identification.unknowns import Unknown, Unknowns
 
 
@@ -26,7 +26,7 @@ def level(seed: int, *, count: int = 500, outliers: float = 0.1) -> Problem:
     return replace(made, experiments=(replace(run, channels={"y": y}),), unknowns=unknowns)
 
 
-@pytest.mark.parametrize("loss", ["linear", "soft_l1", "huber", "cauchy", "arctan"])
+@pytest.mark.parametrize("loss", ["linear", "soft_l1", "cauchy"])
 def test_the_influence_is_the_gradient_that_scipy_searches_with(loss: Loss) -> None:
     residuals = np.random.default_rng(3).standard_cauchy(40)
     found = least_squares(lambda x: residuals + x, np.zeros(1), loss=loss, max_nfev=1)

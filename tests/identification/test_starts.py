@@ -6,11 +6,8 @@ import numpy as np
 import pytest
 
 from swashplate.errors import DomainError, InputError
-from swashplate.identification.solving import (
-    Evaluation,
-    sobol_starts,
-    solve_from,
-)
+from swashplate.identification.problem import Evaluation
+from swashplate.identification.solving import sobol_starts, solve_from
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,7 @@ from swashplate.identification.assessment import Assessment
 from swashplate.identification.fitting import StageFit
 from swashplate.identification.problem import Problem
 from swashplate.identification.setup import Stage
-from swashplate.identification.solving import StartResult, solve
+from swashplate.identification.solving import Solution, solve
 from swashplate.identification.unknowns import Unknown, Unknowns
 from swashplate.identification.validation import RunQuality, compared, part_of_range
 from swashplate.identification.verdict import Criterion
@@ -196,8 +196,8 @@ def test_an_interrupted_fit_is_not_usable(experiment, measured, stage) -> None:
     assert "did not converge (too many evaluations)" in found.headline
 
 
-def start(cost: float) -> StartResult:
-    return StartResult(0, (0.0,), (0.0,), 9.0, cost, 10, True, "done", 0.1)
+def start(cost: float) -> Solution:
+    return Solution(np.zeros(1), cost, 10, True, False, "done")
 
 
 def test_starts_that_agree_and_starts_that_do_not(stage) -> None:

@@ -17,9 +17,9 @@ from swashplate.campaign import rig
 from swashplate.identification.assessment import Judged, StageProfile
 from swashplate.identification.fitting import Fit, fit
 from swashplate.identification.profile import Point, Profile
-from swashplate.identification.resampling import CrossValidation, Fold, HeldRun
+from swashplate.identification.resampling import CrossValidation, Fold
 from swashplate.identification.setup import Setup
-from swashplate.identification.solving import StartResult
+from swashplate.identification.solving import Solution
 from swashplate.identification.validation import Measures, predict
 from swashplate.identification.verdict import verdict
 from swashplate.report.fit_report import print_report, write_fit_report, write_validation_report
@@ -102,7 +102,7 @@ def validation(judged: Judged):
 
 
 STARTS = tuple(
-    StartResult(number, (0.0,), (0.0,), 9.0, cost, 10, number != 2, "done", 0.1)
+    Solution(np.zeros(1), cost, 10, number != 2, False, "done", number=number)
     for number, cost in enumerate((3.0, 3.0, 70.0, float("inf")))
 )
 HEADS = ("run", "parameter", "channel", "fold", "quantity")
@@ -403,9 +403,9 @@ def test_each_run_has_a_light_and_links(read: Page, write, campaign, validation)
 
 
 def test_cross_validation_has_a_section(write) -> None:
-    held = HeldRun("a", "step +4 V", "current", "A", Measures(10, 0.05, 0.5), 0.2)
-    folds = tuple(Fold(number, ("a",), (), (held,), True, "") for number in range(2))
-    page = write(folds=CrossValidation(0, 2, folds))
+    held = {"current": Measures(10, 0.05, 0.5)}
+    folds = tuple(Fold(number, ("a",), (), held, True) for number in range(2))
+    page = write(folds=CrossValidation(0, 2, folds, held, {"current": "A"}))
     (row,) = page.rows("held-out")
     assert (row["fit %"], row["RMSE held out"], row["unit"]) == ("90.00", "50", "mA")
     assert [each[0] for each in page.tables["folds"][1:]] == ["1", "2"]

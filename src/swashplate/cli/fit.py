@@ -47,7 +47,7 @@ if TYPE_CHECKING:
     from swashplate.campaign import Campaign
     from swashplate.identification.assessment import Judged
     from swashplate.identification.drive_model import Parameters
-    from swashplate.identification.solving import Progress, StartResult
+    from swashplate.identification.solving import Progress, Solution
     from swashplate.identification.verdict import Verdict
     from swashplate.parameters.parameter_set import ParameterSet
 
@@ -63,7 +63,7 @@ MEASURES = (
     "'of its range' below means RMSE over the largest less the smallest value measured."
 )
 
-Loss = Literal["linear", "soft_l1", "huber", "cauchy", "arctan"]
+Loss = Literal["linear", "soft_l1", "cauchy"]
 Role = Literal["validate", "fit", "all"]
 CAMPAIGN = Path("campaign.toml")
 
@@ -146,7 +146,7 @@ def fit(
         nominal: Parameters
         if model is not None:
             nominal = ModelSetup.from_file(model).nominal(runs)
-            plan = nominal.setup.setup
+            plan = nominal.setup
         else:
             plan = setup_of(campaign, chosen, setup)
             drive = campaign.drive(chosen) if begin is None else None
@@ -161,7 +161,7 @@ def fit(
                 f"{evaluations}, cost {now.cost:.6g}"
             )
 
-        def ended(stage: str, one: StartResult, done: int) -> None:
+        def ended(stage: str, one: Solution, done: int) -> None:
             words = f"{stage}: {done} of {starts + 1} starts, the last to cost {one.cost:.6g}"
             shown(words, done / (starts + 1))
 
@@ -267,12 +267,12 @@ def _written(found: Judged, out: Path) -> list[str]:
     from tomlkit import dumps
 
     from swashplate.drive import Drive
-    from swashplate.identification.setup import ModelParameters, setup_text
+    from swashplate.identification.setup import ModelSetup, setup_text
     from swashplate.identification.tables import estimates_table
 
     made_folder(out)
     parameters = found.result.parameters
-    if isinstance(parameters, ModelParameters):
+    if isinstance(parameters, ModelSetup):
         numbers = {name: float(value) for name, value in parameters.numbers.items()}
         write_text(dumps({parameters.name: numbers}), out / NUMBERS)
         lines = [f"Numbers:   {out / NUMBERS}"]

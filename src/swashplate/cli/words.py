@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from swashplate.campaign import Campaign, Experiment
     from swashplate.cli.options import Sampling
     from swashplate.drive import Drive
-    from swashplate.identification.setup import ModelParameters
+    from swashplate.identification.setup import ModelSetup
     from swashplate.maneuvers import Maneuver
     from swashplate.parameters.parameter_set import Change, ParameterSet
     from swashplate.simulation.result import Simulation
@@ -157,7 +157,7 @@ def configuration_of(word: str, setup: str | None, name: str) -> str:
     return setup or (str(own) if own.is_file() else name)
 
 
-def model_parameters_of(folder: str, file: Path, runs: Sequence[Experiment]) -> ModelParameters:
+def model_parameters_of(folder: str, file: Path, runs: Sequence[Experiment]) -> ModelSetup:
     """A model of one's own with the numbers that a fit wrote into its folder.
 
     Raises

@@ -3,7 +3,6 @@ from .cache import generated as generated
 from .cache import kernel as kernel
 from .derivatives import declared as declared
 from .derivatives import derive as derive
-from .discretise import discretised as discretised
 from .equation import closure as closure
 from .equation import closure_hash as closure_hash
 from .equation import equation as equation
@@ -27,6 +26,7 @@ from .marching.use import stepper as stepper
 from .model import Model as Model
 from .model import Tap as Tap
 from .model import Window as Window
+from .model import discretised as discretised
 from .model import join as join
 from .model import parameter_paths as parameter_paths
 from .model import state_paths as state_paths

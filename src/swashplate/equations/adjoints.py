@@ -13,12 +13,11 @@ Conventions where a derivative does not exist:
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 from swashplate.equations import expressions as ex
-from swashplate.equations.code import Call, Choice, Code, Function, Item, Let, Rule, fresh_name
+from swashplate.equations.code import Call, Choice, Code, Function, Item, Let, fresh_name
 from swashplate.equations.expressions import ONE, ZERO, Node, make, minus, negative, times
 from swashplate.equations.writing import function_text, named_by_text
 from swashplate.errors import EquationError
@@ -26,6 +25,10 @@ from swashplate.errors import EquationError
 Bars = dict[str, Node]
 """Adjoints by the names of what they belong to."""
 Guards = tuple[tuple[Node, bool], ...]
+Moved = dict[str, list[tuple[Node, Node]]]
+"""Names that get their values together: partials of each, and what they are by."""
+Tape = list["Moved | tuple[Choice, list[Tape]]"]
+"""What moves, in the order in which it is done; of a choice its two sides."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -88,37 +91,33 @@ class Derivatives:
     def __init__(
         self, code: Code, results: Sequence[Node], by: Sequence[str], *, chained: bool = False
     ) -> None:
-        self.taken = {*code.taken}
-        self.active = set(by)
+        self.taken, self.active = {*code.taken}, set(by)
         self.links: dict[str, Bars] = {}
         """Results that are names, with their derivatives."""
-        self.meaning: dict[str, Node] = {}
         self.divisors: set[Node] = set()
         self.said: set[Node] = set()
         """Expressions of the forward sweep."""
         self.hints: dict[Node, str] = {}
         self.items: list[Item] = []
-        tape: list[Any] = []
-        self.forward(code.kept(results), self.items, tape)
+        tape = self.forward(code.kept(results), self.items)
         for node in results:
-            self.divide(node)
+            self.note(node)
         defined = [name for each in tape for name in _defined(each)] if chained else []
         place = {name: k for k, name in enumerate(defined)}
         found: dict[int, Bars] = {}
         # links first: a name that is defined earlier may be met on the way from a later one
         for o in sorted(range(len(results)), key=lambda o: place.get(results[o].value, len(place))):
-            bars: Bars = {}
-            stem = results[o].value if results[o].op == "name" else f"{o}"
+            result, bars = results[o], Bars()
+            stem = result.value if result.op == "name" else f"{o}"
             label = "" if len(results) == 1 else f"{_word(stem)}_"
-            self.push(results[o], ONE, (), bars)
+            self.push(result, ONE, (), bars)
             self.sweep(tape, bars, self.items, label)
             found[o] = bars
             for name in by:
-                if name in bars:
-                    self.suggest(bars[name], f"d_{label}{_word(name)}")
-            if results[o].op == "name" and results[o].value in place:
+                self.suggest(bars.get(name, ZERO), f"d_{label}{_word(name)}")
+            if result.op == "name" and result.value in place:
                 # by names, so that what is multiplied with them is written once
-                self.links[results[o].value] = bars
+                self.links[result.value] = bars
         self.entries = tuple(
             (o, i)
             for o in range(len(results))
@@ -127,13 +126,13 @@ class Derivatives:
         )
         self.partials = [found[o][by[i]] for o, i in self.entries]
 
-    def divide(self, node: Node) -> None:
-        """Note what the forward sweep says, and what it divides by: that may be done again."""
+    def note(self, node: Node) -> None:
+        """Remember what the forward sweep says, and divides by: that may be done again."""
         self.said.add(node.same)
         if node.op == "/":
             self.divisors.add(node.args[1])
         for each in node.args:
-            self.divide(each)
+            self.note(each)
 
     def suggest(self, node: Node, name: str) -> None:
         """Remember a name for an expression, unless the forward sweep has said it."""
@@ -146,58 +145,55 @@ class Derivatives:
 
     # -- forward -----------------------------------------------------------------------------------
 
-    def forward(self, items: Sequence[Item], out: list[Item], tape: list[Any]) -> None:
+    def forward(self, items: Sequence[Item], out: list[Item]) -> Tape:
         """Do what is written, and remember what moves."""
+        tape: Tape = []
         for each in items:
-            if isinstance(each, Let):
-                self.divide(each.node)
-                self.meaning[each.name] = each.node
-                out.append(each)
-                if self.moving(each.node):
-                    self.active.add(each.name)
-                    tape.append(each)
-            elif isinstance(each, Rule):
-                out += [*each.items, *(Let(name, node) for name, node in each.results)]
-                moved = {}
-                for (name, _), slopes in zip(each.results, each.slopes, strict=True):
-                    moved[name] = [(b, a) for a, b in slopes if self.moving(a)]
-                    self.active |= {name} if moved[name] else set()
-                tape.append(moved)
-            elif isinstance(each, Choice):
+            if isinstance(each, Choice):
                 made = Choice(each.test, [], [], each.merged)
-                tapes: tuple[list[Any], list[Any]] = ([], [])
-                self.forward(each.then, made.then, tapes[0])
-                self.forward(each.other, made.other, tapes[1])
-                for name, one, two in each.merged:
-                    self.divide(one)
-                    self.divide(two)
-                    if self.moving(one) or self.moving(two):
+                sides = [self.forward(each.then, made.then), self.forward(each.other, made.other)]
+                for name, *ends in each.merged:
+                    for node in ends:
+                        self.note(node)
+                    if any(map(self.moving, ends)):
                         self.active.add(name)
                 out.append(made)
-                tape.append((made, tapes))
+                tape.append((made, sides))
+                continue
+            if isinstance(each, Let):
+                self.note(each.node)
+                out.append(each)
+                moved: Moved = {each.name: [(ONE, each.node)]}
+            elif isinstance(each, Call):
+                moved = self.call(each, out)
             else:
-                self.call(each, out, tape)
+                out += each.items
+                pairs = zip(each.results, each.slopes, strict=True)
+                moved = {name: [(b, a) for a, b in slopes] for name, slopes in pairs}
+            moved = {n: [each for each in m if self.moving(each[1])] for n, m in moved.items()}
+            self.active |= {name for name, each in moved.items() if each}
+            tape.append(moved)
+        return tape
 
-    def call(self, call: Call, out: list[Item], tape: list[Any]) -> None:
+    def call(self, call: Call, out: list[Item]) -> Moved:
         """Call a function with its derivatives, where its arguments move."""
         by = tuple(k for k, node in enumerate(call.arguments) if self.moving(node))
         if not by or call.derivative is None:
             out.append(call)
-            return
+            return {}
         derived = call.derivative(by)
         partials: list[str] = []
-        moved: dict[str, list[tuple[Node, Node]]] = {name: [] for name in call.results}
+        moved: Moved = {name: [] for name in call.results}
         for o, i in derived.entries:
             result = call.results[o]
             partials.append(fresh_name(f"{result}_by_{_word(derived.inputs[i])}", self.taken))
             moved[result].append((ex.name(partials[-1]), call.arguments[by[i]]))
-            self.active.add(result)
         out.append(Call(derived, call.arguments, (*call.results, *partials)))
-        tape.append(moved)
+        return moved
 
     # -- backward ----------------------------------------------------------------------------------
 
-    def sweep(self, tape: list[Any], bars: Bars, out: list[Item], label: str) -> None:
+    def sweep(self, tape: Tape, bars: Bars, out: list[Item], label: str) -> None:
         """Carry adjoints backwards over what has been computed, down to the inputs."""
         for each in reversed(tape):
             for known in [n for n in _defined(each) if n in self.links and n in bars]:
@@ -205,27 +201,17 @@ class Derivatives:
                 self.suggest(weight, f"d_{label}{known}")
                 for name, slope in self.links[known].items():
                     bars[name] = ex.plus(bars.get(name, ZERO), times(weight, slope))
-            if isinstance(each, Let):
-                weight = bars.pop(each.name, ZERO)
-                self.suggest(weight, f"d_{label}{each.name}")
-                self.push(each.node, weight, (), bars)
-            elif isinstance(each, dict):
-                for name, moved in each.items():
-                    weight = bars.pop(name, ZERO)
-                    self.suggest(weight, f"d_{label}{name}")
-                    for partial, argument in moved:
-                        self.push(argument, times(weight, partial), (), bars)
-            else:
-                choice, tapes = each
-                self.choice(choice, tapes, bars, out, label)
+            if isinstance(each, tuple):
+                self.choice(*each, bars, out, label)
+                continue
+            for name, moved in each.items():
+                weight = bars.pop(name, ZERO)
+                self.suggest(weight, f"d_{label}{name}")
+                for partial, argument in moved:
+                    self.push(argument, times(weight, partial), (), bars)
 
     def choice(
-        self,
-        choice: Choice,
-        tapes: tuple[list[Any], list[Any]],
-        bars: Bars,
-        out: list[Item],
-        label: str,
+        self, choice: Choice, tapes: list[Tape], bars: Bars, out: list[Item], label: str
     ) -> None:
         """Carry adjoints back through both sides of a choice."""
         weights = {n: bars.pop(n) for n, _, _ in choice.merged if n in bars}
@@ -234,21 +220,17 @@ class Derivatives:
         made = Choice(choice.test, [], [], [], again=choice.number)
         ways: list[Bars] = []
         for side, arm in enumerate((made.then, made.other)):
-            own = dict(bars)
+            ways.append(dict(bars))
             for name, *nodes in choice.merged:
-                if name in weights:
-                    self.push(nodes[side], weights[name], (), own)
-            self.sweep(tapes[side], own, arm, label)
-            ways.append(own)
-        one, two = ways
-        for name in {**one, **two}:
-            first, second = one.get(name, ZERO), two.get(name, ZERO)
+                self.push(nodes[side], weights.get(name, ZERO), (), ways[side])
+            self.sweep(tapes[side], ways[side], arm, label)
+        for name in {**ways[0], **ways[1]}:
+            first, second = (way.get(name, ZERO) for way in ways)
             if first is not second:
                 merged = fresh_name(f"d_{label}{_word(name)}", self.taken)
                 made.merged.append((merged, first, second))
-                bars[name] = ex.name(merged)
-            else:
-                bars[name] = first
+                first = ex.name(merged)
+            bars[name] = first
         out.append(made)
 
     def push(self, node: Node, weight: Node, guards: Guards, bars: Bars) -> None:
@@ -265,14 +247,14 @@ class Derivatives:
         if op == "name":
             amount = ex.masked(guards, weight)
             bars[node.value] = ex.plus(bars.get(node.value, ZERO), amount)
-        elif op in ("min", "max"):
-            first = args[0] if len(args) == 2 else make(op, *args[:-1])
-            test = make("<" if op == "min" else ">", first, args[-1])
-            self.push(first, weight, (*guards, (test, True)), bars)
-            self.push(args[-1], weight, (*guards, (test, False)), bars)
-        elif op == "if":
-            self.push(args[1], weight, (*guards, (args[0], True)), bars)
-            self.push(args[2], weight, (*guards, (args[0], False)), bars)
+        elif op in ("min", "max", "if"):
+            if op == "if":
+                test, one, two = args
+            else:
+                one, two = args[0] if len(args) == 2 else make(op, *args[:-1]), args[-1]
+                test = make("<" if op == "min" else ">", one, two)
+            self.push(one, weight, (*guards, (test, True)), bars)
+            self.push(two, weight, (*guards, (test, False)), bars)
         else:
             for argument, slope in self.slopes(node):
                 if self.moving(argument):
@@ -296,11 +278,10 @@ class Derivatives:
             by = ex.inverse(b)
             yield a, lambda w: times(w, by)
             yield b, lambda w: negative(times(times(w, by), node))
-        elif op == "**":
+        elif op == "**" and node.value:
             n = node.value
-            if n:
-                rest = ONE if n == 1 else a if n == 2 else make("**", a, value=n - 1)
-                yield a, lambda w: times(times(ex.number(float(n)), w), rest)
+            rest = ONE if n == 1 else a if n == 2 else make("**", a, value=n - 1)
+            yield a, lambda w: times(times(ex.number(float(n)), w), rest)
         elif op == "abs":
             test = make(">=", a, ZERO)
             yield a, lambda w: ex.choose(test, w, negative(w))
@@ -312,51 +293,43 @@ class Derivatives:
             by = self.over(node)
             yield a, lambda w: times(w, times(a, by))
             yield b, lambda w: times(w, times(b, by))
-        elif op != "floor":
-            slope = self.slope(op, a, node)
+        elif op in FUNCTIONS:
+            slope = FUNCTIONS[op](a, node, self.over)
             yield a, lambda w: times(w, slope)
-
-    def slope(self, op: str, a: Node, node: Node) -> Node:
-        """Derivative of a function of one number, from its argument and its value."""
-        square = make("*", a, a)
-        if op == "sqrt":
-            return times(ex.number(0.5), self.over(node))
-        if op == "exp":
-            return node
-        if op == "log":
-            return ex.inverse(a)
-        if op == "sin":
-            return make("cos", a)
-        if op == "cos":
-            return negative(make("sin", a))
-        if op == "tan":
-            return ex.plus(ONE, make("*", node, node))
-        if op == "atan":
-            return ex.inverse(ex.plus(ONE, square))
-        arc = self.over(make("sqrt", minus(ONE, square)))
-        return negative(arc) if op == "acos" else arc
 
     def over(self, node: Node) -> Node:
         """1 over something not negative; 0 where it is zero, if it can be."""
-        if node in self.divisors or ex.positive(node, self.meaning.get):
-            return ex.inverse(node)
-        return ex.finite_inverse(node)
+        return ex.inverse(node) if node in self.divisors else ex.finite_inverse(node)
 
 
-def _defined(each: Any) -> Iterable[str]:
+def _arc(a: Node, over: Callable[[Node], Node]) -> Node:
+    return over(make("sqrt", minus(ONE, make("*", a, a))))
+
+
+FUNCTIONS: dict[str, Callable[[Node, Node, Callable[[Node], Node]], Node]] = {
+    "sqrt": lambda a, value, over: times(ex.number(0.5), over(value)),
+    "exp": lambda a, value, over: value,
+    "log": lambda a, value, over: ex.inverse(a),
+    "sin": lambda a, value, over: make("cos", a),
+    "cos": lambda a, value, over: negative(make("sin", a)),
+    "tan": lambda a, value, over: ex.plus(ONE, make("*", value, value)),
+    "atan": lambda a, value, over: ex.inverse(ex.plus(ONE, make("*", a, a))),
+    "asin": lambda a, value, over: _arc(a, over),
+    "acos": lambda a, value, over: negative(_arc(a, over)),
+}
+"""Derivatives of functions of one number, from its argument, its value and `Derivatives.over`."""
+
+
+def _defined(each: Moved | tuple[Choice, list[Tape]]) -> list[str]:
     """Names that get their values in a place of the tape."""
-    if isinstance(each, Let):
-        return (each.name,)
-    return each if isinstance(each, dict) else (name for name, _, _ in each[0].merged)
+    return [name for name, _, _ in each[0].merged] if isinstance(each, tuple) else [*each]
 
 
 def _light(node: Node) -> bool:
     """Whether nothing but signs and literal factors lie between an expression and its names."""
-    if node.op in ex.LEAVES:
-        return True
-    if node.op == "*":
-        return any(ex.is_number(a) for a in node.args) and all(_light(a) for a in node.args)
-    return node.op in ("+", "-", "neg") and all(_light(a) for a in node.args)
+    if node.op == "*" and not any(ex.is_number(a) for a in node.args):
+        return False
+    return node.op in ("number", "name", "+", "-", "*", "neg") and all(map(_light, node.args))
 
 
 def _word(path: str) -> str:

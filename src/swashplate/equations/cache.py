@@ -11,7 +11,7 @@ import pickle
 import re
 import sys
 import tempfile
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from functools import cache, cached_property
 from glob import escape
 from hashlib import blake2b
@@ -23,7 +23,7 @@ from warnings import warn
 
 from numba import __version__ as numba_version
 from numba import config, njit
-from numba.core.caching import CompileResultCacheImpl, FunctionCache, IndexDataCacheFile
+from numba.core.caching import FunctionCache, IndexDataCacheFile
 from numba.misc.appdirs import AppDirs
 
 from swashplate.equations.equation import JIT_OFF, closure_hash, hash_of, is_function, known
@@ -38,27 +38,13 @@ UNCACHED = (
 )
 DAY = 86400.0
 """[s]"""
-UNUSED = 60.0 * DAY
-"""Time after which a generated module that nobody used is removed. [s]"""
-LARGEST = 1_000_000_000
-"""Size that all generated modules may have with their machine code. [bytes]"""
-MOST_CLOSURES = 48
-"""Functions made by one function of which machine code is kept."""
+UNUSED = 30.0 * DAY
+"""Time after which a generated module that nobody used is removed, and machine code is made anew.
+[s]"""
 DOCSTRING = re.compile(r'^ *""".*?"""\n', re.MULTILINE | re.DOTALL)
 
 
 # --- kernels --------------------------------------------------------------------------------------
-
-
-def _modified(path: Path) -> float:
-    try:
-        return path.stat().st_mtime
-    except FileNotFoundError:  # another worker was quicker
-        return 0.0
-
-
-class _KernelCacheImpl(CompileResultCacheImpl):
-    pass
 
 
 class _Index(IndexDataCacheFile):
@@ -74,24 +60,6 @@ class _Index(IndexDataCacheFile):
         self._save_data(name, data)
         overloads[key] = name
         self._save_index(overloads)  # type: ignore[no-untyped-call]
-        self._drop_moved()
-
-    def _drop_moved(self) -> None:
-        """Remove what was kept of the same function when it stood on another line of its file."""
-        function, _, rest = self._index_name.rpartition("-")
-        line, _, version = rest.partition(".")
-        if "locals" in function:  # such a name stands for several functions: the latest stay
-            old = sorted(Path(self._cache_path).glob(f"{escape(function)}-*.nbi"), key=_modified)
-            for path in old[:-MOST_CLOSURES]:
-                for each in path.parent.glob(f"{escape(path.stem)}.*"):
-                    each.unlink(missing_ok=True)
-            return
-        for path in Path(self._cache_path).glob(
-            f"{escape(function)}-*.{version.partition('.')[0]}.*"
-        ):
-            other = path.name.removeprefix(f"{function}-").partition(".")[0]
-            if other.isdecimal() and other != line:
-                path.unlink(missing_ok=True)
 
     def load(self, key: Any) -> Any:
         try:
@@ -122,11 +90,8 @@ class _Index(IndexDataCacheFile):
 class _KernelCache(FunctionCache):
     """Numba's cache of a function, stamped by all that the function reaches, when first asked."""
 
-    _impl_class = _KernelCacheImpl
-
     def __init__(self, function: Any) -> None:
-        self._name = repr(function)
-        self._py_func = function
+        self._name, self._py_func = repr(function), function
         self._impl = self._impl_class(function)  # type: ignore[no-untyped-call]
         self._cache_path = self._impl.locator.get_cache_path()
         self.enable()  # type: ignore[no-untyped-call]
@@ -134,9 +99,9 @@ class _KernelCache(FunctionCache):
     @cached_property
     def _cache_file(self) -> _Index:  # type: ignore[override]
         stamp = f"{closure_hash(self._py_func)} {numba_version}"
-        base = self._impl.filename_base
         if self._py_func.__closure__ is not None:
             stamp += f" {_cells(self._py_func)}"
+        base = self._impl.filename_base
         if "locals" in base:  # one of several functions of this name, which do not displace another
             base = f"{base}.{hash_of({'': stamp})[:12]}"
         return _Index(self._cache_path, base, stamp)  # type: ignore[no-untyped-call]
@@ -181,28 +146,26 @@ def kernel(function: Callable[P, R]) -> Callable[P, R]:
     RuntimeWarning
         If there is no place for the cache; the function works all the same.
     """
-    known[plain(function)] = None
-    without: Any = {"no_cfunc_wrapper": True}
-    compiled: Any = njit(nogil=True, error_model="numpy", **without)(function)
-    if not JIT_OFF:
-        on_disk(compiled, function)
-    return compiled  # type: ignore[no-any-return]
+    return _kept(function, no_cfunc_wrapper=True)
 
 
 def subroutine(function: Callable[P, R]) -> Callable[P, R]:
     """A `kernel` that only kernels call: no arguments from Python, no counting of references."""
-    known[plain(function)] = None
-    without: Any = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True, "_nrt": False}
-    compiled: Any = njit(nogil=True, error_model="numpy", **without)(function)
-    if not JIT_OFF:
-        on_disk(compiled, function)
-    return compiled  # type: ignore[no-any-return]
+    return _kept(function, no_cfunc_wrapper=True, no_cpython_wrapper=True, _nrt=False)
 
 
 def pasted(function: Callable[P, R]) -> Callable[P, R]:
     """A `subroutine` of one caller, which takes in its code: compiled once, and not twice."""
     known[plain(function)] = None
     return njit(nogil=True, error_model="numpy", inline="always")(function)
+
+
+def _kept(function: Callable[P, R], **options: Any) -> Callable[P, R]:
+    known[plain(function)] = None
+    compiled: Any = njit(nogil=True, error_model="numpy", **options)(function)
+    if not JIT_OFF:
+        on_disk(compiled, function)
+    return compiled  # type: ignore[no-any-return]
 
 
 def on_disk(compiled: Any, function: Callable[..., Any]) -> None:
@@ -280,7 +243,7 @@ def generated(name: str, text: str, names: Mapping[str, Any]) -> dict[str, Any]:
         with os.fdopen(handle, "w", encoding="utf-8") as file:
             file.write(text)
         Path(temporary).replace(path)
-        _tidy_daily(path.parent)
+        _tidy(path.parent)
     module = ModuleType(f"swashplate_generated.{stem}")
     module.__file__ = str(path)
     module.__dict__.update(names)
@@ -289,45 +252,17 @@ def generated(name: str, text: str, names: Mapping[str, Any]) -> dict[str, Any]:
     return module.__dict__
 
 
-def _tidy_daily(folder: Path) -> None:
-    """Remove what nobody needs any more, at most once a day."""
+def _tidy(folder: Path) -> None:
+    """Remove generated modules that were not used lately, and old machine code, once a day."""
     mark = folder / "tidied"
     try:
-        if not mark.exists() or time() - mark.stat().st_mtime > DAY:
-            mark.touch()
-            tidy([folder, *_beside(folder)])
-    except OSError:  # another process tidies, or the folder is no longer ours
+        if mark.exists() and time() - mark.stat().st_mtime < DAY:
+            return
+        mark.touch()
+        # Numba keeps machine code beside the modules, or in folders beside theirs
+        places = [folder, folder / "__pycache__", *folder.parent.glob(f"{escape(folder.name)}_*")]
+        for path in [each for place in places for each in place.glob("*.*")]:
+            if time() - path.stat().st_mtime > UNUSED:
+                path.unlink()
+    except OSError:  # another process tidies at once, or the folder is no longer ours
         return
-
-
-def _beside(folder: Path) -> list[Path]:
-    """Where Numba keeps the machine code of the modules in a folder."""
-    return [folder / "__pycache__", *folder.parent.glob(f"{escape(folder.name)}_*")]
-
-
-def tidy(folders: Iterable[Path], unused: float = UNUSED, largest: int = LARGEST) -> None:
-    """Remove generated modules that were not used lately, with their machine code.
-
-    Those go that nobody used for a time [s], and beyond a size of all files [bytes] those first
-    that were not used for longest. Whatever belongs to one module begins with its name. Other
-    processes may use the folders at once: what they miss, they write and compile anew.
-    """
-    modules: dict[str, list[Path]] = {}
-    used: dict[str, float] = {}
-    sizes: dict[str, int] = {}
-    for path in (each for folder in folders if folder.is_dir() for each in folder.iterdir()):
-        stem, dot, _ = path.name.partition(".")
-        try:
-            found = path.stat()
-        except FileNotFoundError:
-            continue
-        if dot and path.is_file():
-            modules.setdefault(stem, []).append(path)
-            used[stem] = max(used.get(stem, 0.0), found.st_mtime)
-            sizes[stem] = sizes.get(stem, 0) + found.st_size
-    total = sum(sizes.values())
-    for stem in sorted(modules, key=used.__getitem__):
-        if time() - used[stem] > unused or total > largest:
-            total -= sizes[stem]
-            for path in modules[stem]:
-                path.unlink(missing_ok=True)

@@ -83,11 +83,9 @@ def leaves(value: Value, path: str = "") -> Iterator[tuple[str, Node]]:
 
 def rebuilt(value: Value, nodes: Iterator[Node]) -> Value:
     """The same structure with other scalars in it."""
-    if isinstance(value, Node):
-        return next(nodes)
     if isinstance(value, Tuple):
         return Tuple(value.cls, tuple(rebuilt(each, nodes) for each in value.items))
-    return value
+    return next(nodes) if isinstance(value, Node) else value
 
 
 def alike(one: Value, two: Value) -> bool:
@@ -107,9 +105,9 @@ def fixed(value: Any) -> Value | None:
     if isinstance(value, int | float):
         return ex.number(value)
     if isinstance(value, tuple):
-        items = tuple(fixed(each) for each in value)
+        items = [each for each in map(fixed, value) if each is not None]
         cls = type(value) if is_named_tuple(type(value)) else None
-        return None if None in items else Tuple(cls, typing.cast("tuple[Value, ...]", items))
+        return Tuple(cls, tuple(items)) if len(items) == len(value) else None
     return None
 
 
@@ -139,10 +137,10 @@ class Choice:
 
 @dataclass(eq=False)
 class Rule:
-    """What an equation says whose derivatives are declared."""
+    """Items that lead to results whose derivatives are declared."""
 
     items: list[Item]
-    results: list[tuple[str, Node]]
+    results: tuple[str, ...]
     slopes: list[list[tuple[Node, Node]]]
     """Of each result the arguments that move it, with the derivatives by them."""
 
@@ -204,35 +202,34 @@ def compiled_names(names: Mapping[str, Any]) -> dict[str, Any]:
     return {k: v.compiled if isinstance(v, Function) else v for k, v in names.items()}
 
 
+def _reads(nodes: Iterable[Node]) -> set[str]:
+    return set().union(*(node.reads for node in nodes))
+
+
 def live(items: Iterable[Item], needed: set[str]) -> list[Item]:
     """Items that some names need; what these need is added to them."""
     kept: list[Item] = []
     for item in reversed([*items]):
-        if isinstance(item, Let):
-            if item.name not in needed:
-                continue
-            needed |= item.node.reads
-        elif isinstance(item, Choice):
+        if isinstance(item, Choice):
             merged = [each for each in item.merged if each[0] in needed]
-            one = needed.union(*(a.reads for _, a, _ in merged))
-            two = needed.union(*(b.reads for _, _, b in merged))
+            one = needed | _reads(a for _, a, _ in merged)
+            two = needed | _reads(b for _, _, b in merged)
             then, other = live(item.then, one), live(item.other, two)
             if not (merged or then or other):
                 continue
             needed |= one | two | item.test.reads
             item = replace(item, then=then, other=other, merged=merged)
-        elif isinstance(item, Rule):
-            if needed.isdisjoint(name for name, _ in item.results):
+        elif isinstance(item, Let):
+            if item.name not in needed:
                 continue
-            needed |= frozenset[str]().union(
-                *(node.reads for _, node in item.results),
-                *(node.reads for each in item.slopes for pair in each for node in pair),
-            )
+            needed |= item.node.reads
+        elif needed.isdisjoint(item.results):
+            continue
+        elif isinstance(item, Rule):
+            needed |= _reads(node for each in item.slopes for pair in each for node in pair)
             live(item.items, needed)
         else:
-            if needed.isdisjoint(item.results):
-                continue
-            needed |= frozenset[str]().union(*(node.reads for node in item.arguments))
+            needed |= _reads(item.arguments)
         kept.append(item)
     return kept[::-1]
 
@@ -265,14 +262,13 @@ class Code:
     @property
     def repeats(self) -> bool:
         """Whether loops are run in it."""
-        return any(isinstance(each, Call) for each in self.items)
+        within = (each.items if isinstance(each, Rule) else (each,) for each in self.items)
+        return any(isinstance(each, Call) for items in within for each in items)
 
     def fresh(self, stem: str) -> str:
         """A name that is not yet taken."""
         stem = stem.replace(".", "_")
-        if stem[0].isdigit():  # an item of a tuple without names
-            stem = f"value_{stem}"
-        name = fresh_name(stem, self.taken)
+        name = fresh_name(f"value_{stem}" if stem[0].isdigit() else stem, self.taken)
         if self.under_way:
             self.origins[name] = self.under_way[-1].name
         return name
@@ -299,11 +295,11 @@ class Code:
 
     def kept(self, wanted: Iterable[Node]) -> list[Item]:
         """Items that some results need."""
-        return live(self.items, set().union(*(node.reads for node in wanted)))
+        return live(self.items, _reads(wanted))
 
     def reads(self, wanted: Iterable[Node]) -> set[str]:
         """Names from outside that some results need, decisions included."""
-        needed: set[str] = set().union(*(node.reads for node in wanted))
+        needed = _reads(wanted)
         live(self.items, needed)
         return needed
 
@@ -331,33 +327,43 @@ def arguments(
             f"{source.file}, line {source.node.lineno}: the types of {source.name} are not all "
             f"known ({error}): define them above, at the top of the file."
         ) from None
+    said = dict(_said(options.items(), ""))
     names = [each.arg for each in source.arguments]
-    return {name: _argument(hints[name], name, name, options, lengths) for name in names}
+    return {name: _argument(hints[name], name, name, said, lengths) for name in names}
+
+
+def _said(options: Iterable[tuple[str, Any]], prefix: str) -> Iterator[tuple[str, Any]]:
+    """Values of options, and of all below those that are tuples, by their paths."""
+    for name, value in options:
+        yield f"{prefix}{name}", value
+        if isinstance(value, tuple):
+            fields = getattr(value, "_fields", map(str, range(len(value))))
+            yield from _said(zip(fields, value, strict=True), f"{prefix}{name}.")
 
 
 def _argument(
     hint: Any, path: str, text: str, options: Mapping[str, Any], lengths: Mapping[str, int]
 ) -> Value:
+    """Value of an argument, or of what is at a path below one, called `text` in Python."""
     origin, args = typing.get_origin(hint), typing.get_args(hint)
-    if origin is typing.Annotated:
-        return _argument(args[0], path, text, options, lengths)
     if hint in (float, int, bool):
         return ex.name(text, hint.__name__)
+    if origin is typing.Annotated:
+        return _argument(args[0], path, text, options, lengths)
     if origin in (typing.Union, types.UnionType) and type(None) in args:
-        value = _option(path, options)
-        inner = [a for a in args if a is not type(None)]
-        if value is None or value == "unknown" or inner == [bool]:
+        value = options.get(path, "unknown")
+        if value is False or not isinstance(value, bool | int | float | tuple | str | None):
+            raise EquationError(
+                f"The option {path} is {value!r}: options are None (off) or True (on)."
+            )
+        (inner,) = (each for each in args if each is not type(None))
+        if value is None or value == "unknown" or inner is bool:
             return Flag(value, path)
-        return _argument(inner[0], path, text, options, lengths)
+        return _argument(inner, path, text, options, lengths)
     if is_named_tuple(hint):
         hints = typing.get_type_hints(hint, include_extras=True)
-        return Tuple(
-            hint,
-            tuple(
-                _argument(hints.get(f, float), f"{path}.{f}", f"{text}.{f}", options, lengths)
-                for f in hint._fields
-            ),
-        )
+        below = [(hints.get(f, float), f"{path}.{f}", f"{text}.{f}") for f in hint._fields]
+        return Tuple(hint, tuple(_argument(*each, options, lengths) for each in below))
     if origin is tuple:
         if len(args) == 2 and args[1] is Ellipsis:
             if path not in lengths:
@@ -366,34 +372,9 @@ def _argument(
                     "many elements it has."
                 )
             args = (args[0],) * lengths[path]
-        return Tuple(
-            None,
-            tuple(
-                _argument(a, f"{path}.{i}", f"{text}[{i}]", options, lengths)
-                for i, a in enumerate(args)
-            ),
-        )
+        below = [(each, f"{path}.{i}", f"{text}[{i}]") for i, each in enumerate(args)]
+        return Tuple(None, tuple(_argument(*each, options, lengths) for each in below))
     raise EquationError(
         f"{path} of type {hint} cannot be an argument of an equation: it takes float, int, bool, "
         "bool | None for an option, tuples and named tuples of them."
     )
-
-
-def _option(path: str, options: Mapping[str, Any]) -> Any:
-    """Value of an option, said for it or for a tuple that holds it; "unknown" if neither."""
-    parts = path.split(".")
-    for n in range(len(parts), 0, -1):
-        value = options.get(".".join(parts[:n]), "unknown")
-        if isinstance(value, str):
-            continue
-        for each in parts[n:]:
-            value = value[int(each)] if each.isdigit() else getattr(value, each)
-        if (
-            value is None
-            or value is True
-            or isinstance(value, tuple)
-            or (type(value) in (float, int))
-        ):
-            return value
-        raise EquationError(f"The option {path} is {value!r}: options are None (off) or True (on).")
-    return "unknown"

@@ -7,10 +7,10 @@ from hashlib import blake2b
 from typing import Any, TypeVar
 
 from swashplate.equations.adjoints import Derived, derived_function, listing
-from swashplate.equations.code import GENERATING, Code, arguments, leaves
+from swashplate.equations.code import GENERATING, Code, Value, arguments, leaves
 from swashplate.equations.equation import inlined, module_of
 from swashplate.equations.reading import RULES, read
-from swashplate.equations.syntax import Parsed, parsed, plain
+from swashplate.equations.syntax import parsed, plain
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -40,7 +40,7 @@ def declared(function: Any) -> Callable[[F], F]:
     """
 
     def decorate(rule: F) -> F:
-        parsed(rule, typed=False)
+        parsed(rule)
         compiled: F = inlined(rule)
         RULES[plain(function)] = compiled
         _made.clear()
@@ -52,7 +52,6 @@ def declared(function: Any) -> Callable[[F], F]:
 def derive(
     function: Any,
     by: str | tuple[str, ...],
-    outputs: str | tuple[str, ...] | None = None,
     options: Mapping[str, Any] | None = None,
     lengths: Mapping[str, int] | None = None,
 ) -> Derived:
@@ -65,8 +64,6 @@ def derive(
     by : str or tuple of str
         Dotted paths of arguments; a path to a tuple means all floats below it. Without any, the
         function has the values alone, with the options decided.
-    outputs : str or tuple of str, optional
-        Dotted paths of the wanted results; all if omitted. A single float is called "value".
     options : mapping, optional
         Of argument paths to None or True, or to a tuple of options. Branches on them are decided
         here, so that the structure of zeros is exact.
@@ -84,89 +81,48 @@ def derive(
         If a path is unknown, an option that is tested has no value, or the equation uses what
         equations may not.
     """
+    by = (by,) if isinstance(by, str) else by
+    options, lengths = dict(options or {}), dict(lengths or {})
     with GENERATING:
-        said = [repr(sorted(each.items())) for each in (options or {}, lengths or {})]
-        key = (plain(function), by, outputs, *said)
+        said = repr((by, sorted(options.items()), sorted(lengths.items())))
+        key = (plain(function), said)
         if key not in _made:
-            _made[key] = _derive(function, by, outputs, options or {}, lengths or {})
+            given = arguments(parsed(function), options, lengths)
+            digest = blake2b(said.encode(), digest_size=3).hexdigest()
+            _made[key] = _derived(function, by, given, f"_{digest}" if options else "")
         return _made[key]
 
 
-def _derive(
-    function: Any,
-    by: str | tuple[str, ...],
-    outputs: str | tuple[str, ...] | None,
-    options: Mapping[str, Any],
-    lengths: Mapping[str, int],
-) -> Derived:
+def _derived(function: Any, by: tuple[str, ...], given: Mapping[str, Value], mark: str) -> Derived:
+    """What `derive` makes for some arguments; `mark` ends its name."""
     source = parsed(function)
-    given = arguments(source, options, lengths)
     floats = {
         f"{name}.{path}" if path else name: node.value
         for name, value in given.items()
         for path, node in leaves(value)
         if node.kind == "float"
     }
-    inputs = _below(source, floats, (by,) if isinstance(by, str) else by, [*given])
-    code = Code(given, ruled=True)
-    result = read(code, function, given)
-    known = {path or "value": node for path, node in leaves(result)}
-    wanted = list(known)
-    if outputs is not None:
-        wanted = []
-        for path in (outputs,) if isinstance(outputs, str) else outputs:
-            found = [p for p in known if p == path or p.startswith(f"{path}.")]
-            if not found:
-                source.refuse(None, f"no result {path}", f"there are {', '.join(known)}")
-            wanted += [p for p in found if p not in wanted]
-    says = f"{source.name} with its options decided"
-    if inputs:
-        says = f"{source.name} with its derivatives by {listing(inputs)}"
-    where = f"{module_of(source.function)}, line {source.node.lineno}"
-    return derived_function(
-        _name(source, inputs, outputs, options),
-        f"{says} ({where}).",
-        _formals(source),
-        code,
-        [(path, known[path]) for path in wanted],
-        [(path, floats[path]) for path in inputs],
-        chained=True,
-    )
-
-
-def _below(
-    source: Parsed, floats: Mapping[str, str], by: tuple[str, ...], names: list[str]
-) -> tuple[str, ...]:
-    """Paths of floats below some paths of arguments."""
-    out: list[str] = []
+    inputs: dict[str, str] = {}
     for path in by:
-        below = [p for p in floats if p == path or p.startswith(f"{path}.")]
+        below = {p: n for p, n in floats.items() if p == path or p.startswith(f"{path}.")}
         if not below:
             first = path.split(".")[0]
-            offer = [p for p in floats if p.startswith(f"{first}.")] if first in names else names
+            offer = [p for p in floats if p.startswith(f"{first}.")] if first in given else given
             said = ", ".join(offer) or "none below it"
             source.refuse(None, f"no float at {path}", f"there are {said}")
-        out += [p for p in below if p not in out]
-    return tuple(out)
-
-
-def _name(source: Parsed, inputs: tuple[str, ...], outputs: Any, options: Any) -> str:
-    """Name of a derived function: by what, and a short hash unless that says all."""
+        inputs |= below
+    code = Code(given, ruled=True)
+    results = [(path or "value", node) for path, node in leaves(read(code, function, given))]
     label = "_".join(path.rpartition(".")[2] for path in inputs)
-    if inputs and len(label) <= 32 and outputs is None and not options:
-        return f"{source.name}_by_{label}"
-    digest = blake2b(repr((inputs, outputs, options)).encode(), digest_size=3).hexdigest()
-    many = label if 0 < len(label) <= 32 else len(inputs)
-    return f"{source.name}_by_{many}_{digest}" if inputs else f"{source.name}_decided_{digest}"
-
-
-def _formals(source: Parsed) -> list[str]:
-    """Arguments with their defaults as far as these are numbers, from the end."""
-    formals: list[str] = []
-    defaults = source.defaults
-    for each in reversed(source.arguments):
-        value = defaults.get(each.arg, ...)
-        plainly = value is None or isinstance(value, bool | int | float)
-        defaults = defaults if plainly else {}
-        formals.insert(0, f"{each.arg}={value!r}" if each.arg in defaults else each.arg)
-    return formals
+    label = label if len(label) <= 32 else f"{len(inputs)}"
+    name = f"{source.name}_by_{label}{mark}" if inputs else f"{source.name}_decided{mark}"
+    says = f"derivatives by {listing([*inputs])}" if inputs else "options decided"
+    return derived_function(
+        name,
+        f"{source.name} with its {says} ({module_of(source.function)}, line {source.node.lineno}).",
+        [each.arg for each in source.arguments],
+        code,
+        results,
+        [*inputs.items()],
+        chained=True,
+    )

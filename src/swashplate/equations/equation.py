@@ -130,21 +130,17 @@ def interpreted(function: Any) -> Any:
 
 
 def _names(code: CodeType) -> Iterator[str]:
-    yield from code.co_names
-    yield from code.co_freevars
+    yield from (*code.co_names, *code.co_freevars)
     for each in code.co_consts:
         if isinstance(each, CodeType):
             yield from _names(each)
 
 
-def _is_number(thing: Any) -> bool:
-    if isinstance(thing, tuple):
-        return all(_is_number(each) for each in thing)
-    return thing is None or isinstance(thing, bool | int | float | complex | str)
-
-
 def _is_constant(thing: Any) -> bool:
-    return _is_number(thing) or (hasattr(thing, "tobytes") and hasattr(thing, "dtype"))
+    if isinstance(thing, tuple):
+        return all(map(_is_constant, thing))
+    number = thing is None or isinstance(thing, bool | int | float | complex | str)
+    return number or (hasattr(thing, "tobytes") and hasattr(thing, "dtype"))
 
 
 def is_function(thing: Any) -> bool:
@@ -152,25 +148,24 @@ def is_function(thing: Any) -> bool:
     return isinstance(plain(thing), FunctionType) and (plain(thing) is not thing or thing in known)
 
 
-def _reached(function: FunctionType) -> Iterator[tuple[str, Any]]:
-    """What a function's own code reads from outside."""
-    names = dict.fromkeys(_names(function.__code__))
+def _reached(thing: Any) -> Iterator[tuple[str, Any]]:
+    """What a function's own code, or the types of its arguments or fields, name outside."""
+    f = plain(thing)
+    names = [] if is_named_tuple(f) else list(dict.fromkeys(_names(f.__code__)))
     for name in names:
         try:
-            found = resolved(function, name)
+            found = resolved(f, name)
         except NameError:
             continue
         if isinstance(found, ModuleType):
-            for attribute in names:
-                inner = getattr(found, attribute, None)
-                if inner is not None and (is_function(inner) or isinstance(inner, int | float)):
-                    yield attribute, inner
+            inner = ((each, getattr(found, each, None)) for each in names)
+            yield from ((k, v) for k, v in inner if is_function(v) or isinstance(v, int | float))
         elif is_function(found) or is_named_tuple(found) or _is_constant(found):
             yield name, found
-    for hint in function.__annotations__.values():
-        if isinstance(hint, str):
+    for hint in f.__annotations__.values():
+        if isinstance(hint, str) and not is_named_tuple(f):
             try:
-                hint = resolved(function, hint)
+                hint = resolved(f, hint)
             except NameError:
                 continue
         if is_named_tuple(hint):
@@ -191,22 +186,20 @@ def closure(function: Any) -> dict[str, Any]:
         Of two things of one name, the second has its module's name before its own.
     """
     found: dict[str, Any] = {plain(function).__name__: function}
-    pending: list[Any] = [function]
+    met, pending = {plain(function)}, [function]
     while pending:
         thing = pending.pop()
-        if is_named_tuple(thing):
-            inner = [(h.__name__, h) for h in thing.__annotations__.values() if is_named_tuple(h)]
-        else:
-            inner = list(_reached(plain(thing)))
-        for name, each in inner:
-            if any(plain(each) is plain(v) for v in found.values()) and not _is_number(each):
+        for name, each in _reached(thing):
+            number = not (is_function(each) or is_named_tuple(each))
+            if not number and plain(each) in met:
                 continue
             if name in found:
-                if _is_number(each) and repr(found[name]) == repr(each):
+                if number and repr(found[name]) == repr(each):
                     continue
                 name = f"{getattr(each, '__module__', None) or plain(thing).__module__}.{name}"
             found[name] = each
-            if is_function(each) or is_named_tuple(each):
+            if not number:
+                met.add(plain(each))
                 pending.append(each)
     return found
 
@@ -226,16 +219,15 @@ def hash_of(things: dict[str, Any]) -> str:
 
 def _fingerprint(thing: Any) -> str:
     """What of one thing matters to compiled code."""
-    if is_named_tuple(thing):
-        hints = {k: getattr(v, "__name__", str(v)) for k, v in thing.__annotations__.items()}
-        return repr((thing.__name__, thing._fields, thing._field_defaults, hints))
     f = plain(thing)
+    if isinstance(f, FunctionType) or is_named_tuple(f):
+        hints = {k: getattr(v, "__name__", str(v)) for k, v in f.__annotations__.items()}
+    if is_named_tuple(f):
+        return repr((f.__name__, f._fields, f._field_defaults, hints))
     if isinstance(f, FunctionType):
         options = sorted(map(str, getattr(thing, "targetoptions", {}).items()))
-        hints = {k: getattr(v, "__name__", str(v)) for k, v in f.__annotations__.items()}
-        return repr(
-            (_code(f.__code__, f.__doc__), f.__defaults__, f.__kwdefaults__, options, hints)
-        )
+        code = _code(f.__code__, f.__doc__)
+        return repr((code, f.__defaults__, f.__kwdefaults__, options, hints))
     if hasattr(thing, "tobytes"):
         return repr((thing.dtype, thing.shape, blake2b(thing.tobytes()).hexdigest()))
     return repr(thing)
@@ -243,22 +235,15 @@ def _fingerprint(thing: Any) -> str:
 
 def _code(code: CodeType, doc: str | None) -> tuple[Any, ...]:
     """All of a code object but where it stands and what is said about it."""
-    constants = [
-        _code(c, None)
-        if isinstance(c, CodeType)
-        else repr(sorted(map(repr, c)))
-        if isinstance(c, frozenset)
-        else repr(c)
-        for c in code.co_consts
-    ]
+
+    def written(each: Any) -> Any:
+        if isinstance(each, CodeType):
+            return _code(each, None)
+        return repr(sorted(map(repr, each)) if isinstance(each, frozenset) else each)
+
+    constants = [*map(written, code.co_consts)]
     if doc is not None and code.co_consts and code.co_consts[0] == doc:
         constants[0] = "None"
-    return (
-        code.co_code,
-        tuple(constants),
-        code.co_names,
-        code.co_varnames,
-        code.co_freevars,
-        code.co_argcount,
-        code.co_kwonlyargcount,
-    )
+    counts = code.co_argcount, code.co_kwonlyargcount
+    names = code.co_names, code.co_varnames, code.co_freevars
+    return (code.co_code, tuple(constants), *names, *counts)

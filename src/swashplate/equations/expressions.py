@@ -9,7 +9,6 @@ from collections.abc import Callable
 from math import inf, isfinite
 from typing import Any
 
-ARITHMETIC = ("+", "-", "*", "/", "**", "neg")
 COMPARISONS = ("<", "<=", ">", ">=", "==", "!=")
 LOGIC = ("and", "or", "not")
 LEAVES = ("number", "name")
@@ -18,8 +17,18 @@ CALLED = tuple("sqrt exp log sin cos tan asin acos atan atan2 hypot floor".split
 CHEAP = {*LEAVES, *COMPARISONS, *LOGIC, "+", "-", "*", "neg", "min", "max", "abs", "if"}
 """Operations that can be done for nothing on any numbers: no error, no call of a library."""
 
-_PRECEDENCE = {"if": 1, "or": 2, "and": 3, "not": 4, "+": 6, "-": 6, "*": 7, "/": 7, "neg": 8}
-_PRECEDENCE.update({"**": 9}, **dict.fromkeys(COMPARISONS, 5))
+_LEVELS = (
+    ("if",),
+    ("or",),
+    ("and",),
+    ("not",),
+    COMPARISONS,
+    ("+", "-"),
+    ("*", "/"),
+    ("neg",),
+    ("**",),
+)
+_PRECEDENCE = {op: level for level, each in enumerate(_LEVELS, 1) for op in each}
 ATOM = 10
 
 
@@ -38,15 +47,12 @@ class Node:
         self.op, self.args, self.value, self.kind = op, args, value, kind
         self.serial = len(_known)
         self._same: Node | None = None
-        empty: frozenset[str] = frozenset()
-        if op == "name":
-            self.reads = frozenset((value,))
-            self.moves = self.reads if kind == "float" else empty
-        else:
-            self.reads = empty.union(*(a.reads for a in args)) if args else empty
-            moving = args[1:] if op == "if" else args
-            still = kind != "float" or op == "floor" or not moving
-            self.moves = empty if still else empty.union(*(a.moves for a in moving))
+        self.reads: frozenset[str] = frozenset((value,) if op == "name" else ())
+        self.reads = self.reads.union(*(a.reads for a in args))
+        moving = args[1:] if op == "if" else args
+        follows = kind == "float" and op not in ("number", "floor")
+        moves = frozenset[str]().union(*(a.moves for a in moving)) if moving else self.reads
+        self.moves: frozenset[str] = moves if follows else frozenset()
         own = op in CHEAP or (op == "/" and args[1].op == "number" and args[1].value != 0.0)
         self.cheap: bool = own and all(a.cheap for a in args)
 
@@ -71,16 +77,10 @@ _known: dict[tuple[Any, ...], Node] = {}
 def _kind(op: str, args: tuple[Node, ...]) -> str:
     if op in COMPARISONS or op in LOGIC:
         return "bool"
-    if op == "floor":
+    kinds = {a.kind for a in (args[1:] if op == "if" else args)}
+    if op == "floor" or (kinds == {"int"} and op not in ("/", *CALLED)):
         return "int"
-    if op == "if":
-        args = args[1:]
-    kinds = {a.kind for a in args}
-    if op in ("+", "-", "*", "neg", "min", "max", "abs", "if", "**") and kinds == {"int"}:
-        return "int"
-    if op == "if" and kinds == {"bool"}:
-        return "bool"
-    return "float"
+    return "bool" if op == "if" and kinds == {"bool"} else "float"
 
 
 def make(op: str, *args: Node, value: Any = None, kind: str | None = None) -> Node:
@@ -229,27 +229,6 @@ def finite_inverse(a: Node) -> Node:
     return inverse(choose(make(">", a, ZERO), a, number(inf)))
 
 
-def positive(a: Node, definition: Callable[[str], Node | None], strict: bool = True) -> bool:
-    """Whether an expression is certainly above zero (or not below it, unless strict)."""
-    if a.op == "number":
-        return bool(a.value > 0.0 if strict else a.value >= 0.0)
-    if a.op == "name":
-        meaning = definition(a.value)
-        return meaning is not None and positive(meaning, definition, strict)
-    if a.op == "exp":
-        return True
-    if a.op in ("abs", "sqrt"):
-        return not strict or (a.op == "sqrt" and positive(a.args[0], definition))
-    if a.op == "+":
-        weak = all(positive(each, definition, False) for each in a.args)
-        return weak and (not strict or any(positive(each, definition) for each in a.args))
-    if a.op in ("*", "/"):
-        if a.op == "*" and a.args[0] is a.args[1]:
-            return not strict or positive(a.args[0], definition)
-        return all(positive(each, definition, strict) for each in a.args)
-    return False
-
-
 # --- text -----------------------------------------------------------------------------------------
 
 
@@ -259,48 +238,41 @@ def render(node: Node, known: Callable[[Node], str | None], straight: bool = Fal
     In `straight` text a choice between what is `CHEAP` is ``choose(test, one, two)``, and tests are
     joined by ``&`` and ``|``: no branch, which a compiler would take a while to remove.
     """
-    return _render(node, known, straight)[0]
+
+    def part(a: Node, level: int) -> str:
+        text, own = written(a)
+        return text if own >= level else f"({text})"
+
+    def written(node: Node) -> tuple[str, int]:
+        op, args, given = node.op, node.args, known(node)
+        level = _PRECEDENCE.get(op, ATOM)
+        if given is not None:
+            return given, ATOM
+        if op == "name":
+            return node.value, ATOM
+        if op == "number":
+            return repr(node.value), ATOM if repr(node.value)[0] != "-" else _PRECEDENCE["neg"]
+        if straight and op in ("and", "or") and node.cheap:
+            return f" {'&' if op == 'and' else '|'} ".join(part(a, ATOM) for a in args), level
+        if straight and op == "if" and args[1].cheap and args[2].cheap:
+            return f"choose({', '.join(part(a, 1) for a in args)})", ATOM
+        if op == "if":
+            return f"{part(args[1], 2)} if {part(args[0], 2)} else {part(args[2], 1)}", level
+        if op in ("and", "or"):
+            return f" {op} ".join(part(a, level + 1) for a in args), level
+        if op in ("not", "neg"):
+            sign, least = ("not ", level) if op == "not" else ("-", level + 1)
+            return f"{sign}{part(args[0], least)}", level
+        if op == "**":
+            return f"{part(args[0], level + 1)}**{node.value!r}", level
+        if level < ATOM:
+            left = level + 1 if op in COMPARISONS else level
+            return f"{part(args[0], left)} {op} {part(args[1], level + 1)}", level
+        return f"{op}({', '.join(part(a, 1) for a in args)})", ATOM
+
+    return written(node)[0]
 
 
 def text(node: Node) -> str:
     """An expression as Python writes it."""
     return render(node, lambda each: None)
-
-
-def _render(
-    node: Node, known: Callable[[Node], str | None], straight: bool = False
-) -> tuple[str, int]:
-    given = known(node)
-    if given is not None:
-        return given, ATOM
-    op, args = node.op, node.args
-    if op == "number":
-        text = repr(node.value)
-        return text, _PRECEDENCE["neg"] if text.startswith("-") else ATOM
-    if op == "name":
-        return node.value, ATOM
-
-    def part(a: Node, level: int) -> str:
-        text, own = _render(a, known, straight)
-        return text if own >= level else f"({text})"
-
-    level = _PRECEDENCE.get(op, ATOM)
-    if straight and op in ("and", "or") and node.cheap:
-        return f" {'&' if op == 'and' else '|'} ".join(part(a, ATOM) for a in args), level
-    if straight and op == "if" and args[1].cheap and args[2].cheap:
-        return f"choose({', '.join(part(a, 1) for a in args)})", ATOM
-    if op == "if":
-        return f"{part(args[1], 2)} if {part(args[0], 2)} else {part(args[2], 1)}", level
-    if op in ("and", "or"):
-        return f" {op} ".join(part(a, level + 1) for a in args), level
-    if op == "not":
-        return f"not {part(args[0], level)}", level
-    if op == "neg":
-        return f"-{part(args[0], level + 1)}", level
-    if op == "**":
-        return f"{part(args[0], level + 1)}**{node.value!r}", level
-    if op in COMPARISONS:
-        return f"{part(args[0], level + 1)} {op} {part(args[1], level + 1)}", level
-    if op in ("+", "-", "*", "/"):
-        return f"{part(args[0], level)} {op} {part(args[1], level + 1)}", level
-    return f"{op}({', '.join(part(a, 1) for a in args)})", ATOM

@@ -11,7 +11,6 @@ from dataclasses import dataclass, field
 from enum import Enum
 from functools import cache
 from math import inf
-from operator import attrgetter
 from typing import Any, Final, NamedTuple, get_type_hints
 
 import numpy as np
@@ -97,7 +96,7 @@ class Declared(NamedTuple):
         return (f"{self.symbol}_plus", f"{self.symbol}_minus")
 
 
-def declared_by(parameters: type) -> Iterator[Declared]:
+def declared_by(parameters: Any) -> Iterator[Declared]:
     """Parameters that a named tuple declares, in its order.
 
     Parameters
@@ -107,17 +106,16 @@ def declared_by(parameters: type) -> Iterator[Declared]:
         directions of what that declares; so do two fields ``Z16_plus``, with the definition, and
         ``Z16_minus``, marked `MINUS`. A field without a definition is its own name.
     """
-    fields: tuple[str, ...] = parameters._fields  # type: ignore[attr-defined]
     hints = get_type_hints(parameters, include_extras=True)
     both = hints.get("plus") if hints.get("plus") is hints.get("minus") else None
-    for name in fields:
+    for name in parameters._fields:
         hint = hints[name]
         if hasattr(hint, "_fields"):
             directed = name in ("plus", "minus") and both is not None
-            if not directed:
-                yield from (_within(each, (name,)) for each in declared_by(hint))
-            elif name == "plus":
-                yield from (_within(each, ("plus", "minus")) for each in declared_by(hint))
+            prefixes = ("plus", "minus") if directed else (name,)
+            for each in declared_by(hint) if prefixes[0] == name else ():
+                paths = tuple(f"{prefix}.{path}" for prefix in prefixes for path in each.fields)
+                yield each._replace(fields=paths)
             continue
         definition: Any = next(iter(getattr(hint, "__metadata__", ())), Definition(name, ""))
         if definition is MINUS:
@@ -130,34 +128,19 @@ def declared_by(parameters: type) -> Iterator[Declared]:
             yield Declared(name, definition, (name,))
 
 
-def _within(inner: Declared, prefixes: tuple[str, ...]) -> Declared:
-    """The same parameter seen from the tuple around its own."""
-    return inner._replace(
-        fields=tuple(f"{prefix}.{each}" for prefix in prefixes for each in inner.fields)
-    )
-
-
 # --- numbers by dotted paths ----------------------------------------------------------------------
 
 
-_known: dict[Any, tuple[str, ...]] = {}
-
-
-def floats_of(kind: type[Any]) -> tuple[str, ...]:
+def _floats_of(kind: Any) -> tuple[str, ...]:
     """Dotted paths of all floats below a named tuple, e.g. ``plus.V_dz``, in its order."""
-    if kind not in _known:
-        _known[kind] = tuple(_paths(kind, ""))
-    return _known[kind]
-
-
-def _paths(kind: type[Any], prefix: str) -> Iterator[str]:
     hints = get_type_hints(kind)
-    for name in kind._fields:
-        inner = hints[name]
-        if is_named_tuple(inner):
-            yield from _paths(inner, f"{prefix}{name}.")
-        elif inner is float:
-            yield f"{prefix}{name}"
+    below = {n: floats_of(hints[n]) for n in kind._fields if is_named_tuple(hints[n])}
+    own = {n: ("",) for n in kind._fields if hints[n] is float}
+    paths = [(name, path) for name in kind._fields for path in {**below, **own}.get(name, ())]
+    return tuple(f"{name}.{path}".rstrip(".") for name, path in paths)
+
+
+floats_of: Callable[[Any], tuple[str, ...]] = cache(_floats_of)
 
 
 def is_real(value: object) -> bool:
@@ -174,33 +157,17 @@ def value_at(value: Any, path: str) -> Any:
 
 def numbers_of(value: Any) -> list[float]:
     """All floats of a nested named tuple, in the order of `floats_of`."""
-    kind: Any = type(value)
-    return [float(each) for each in _reader(kind)(value)]
+    return [float(value_at(value, path)) for path in floats_of(type(value))]
 
 
-@cache
-def _reader(kind: Any) -> Callable[[Any], tuple[Any, ...]]:
-    paths = floats_of(kind)
-    if len(paths) < 2:
-        return lambda value: tuple(value_at(value, path) for path in paths)
-    return attrgetter(*paths)
-
-
-def made(kind: type[Any], numbers: Mapping[str, float]) -> Any:
-    """A nested named tuple from numbers by path; others keep the type's defaults."""
-    return _made(kind, numbers, "")
-
-
-def _made(kind: type[Any], numbers: Mapping[str, float], prefix: str) -> Any:
-    hints = get_type_hints(kind)
-    defaults = getattr(kind, "_field_defaults", {})
-    values = []
+def made(kind: Any, numbers: Mapping[str, float], prefix: str = "") -> Any:
+    """A nested named tuple from numbers by path, behind a prefix; others keep their defaults."""
+    hints, values = get_type_hints(kind), []
     for name in kind._fields:
         path = f"{prefix}{name}"
         if is_named_tuple(hints[name]):
-            values.append(_made(hints[name], numbers, f"{path}."))
-        elif path in numbers:
-            values.append(float(numbers[path]))
+            values.append(made(hints[name], numbers, f"{path}."))
         else:
-            values.append(defaults[name])
+            number = numbers.get(path)
+            values.append(kind._field_defaults[name] if number is None else float(number))
     return kind(*values)

@@ -3,16 +3,25 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
-from functools import cached_property
-from typing import Any, TypeVar
+from math import inf
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from swashplate.equations import expressions as ex
-from swashplate.equations.adjoints import Derived, derived_function, listing
-from swashplate.equations.code import Call, Code, Function, Tuple, Value, leaves, rebuilt
+from swashplate.equations.adjoints import Derivatives, Derived, derived_function, listing
+from swashplate.equations.code import (
+    Call,
+    Code,
+    Function,
+    Rule,
+    Tuple,
+    Value,
+    alike,
+    leaves,
+    rebuilt,
+)
 from swashplate.equations.equation import inlined
 from swashplate.equations.expressions import ONE, ZERO, Node, make
 from swashplate.equations.syntax import Parsed
@@ -170,232 +179,209 @@ def _named(code: Code, node: Node, stem: str) -> Node:
     return named
 
 
-@dataclass(eq=False)
-class _Inner:
+class _Inner(NamedTuple):
     """An equation that is done many times: straight code of the scalars that it reads."""
 
-    source: Parsed
+    name: str
     code: Code
     leading: list[str]  # Scalars of its first arguments.
     formals: list[str]  # Scalars of the others.
     actuals: list[Node]  # What these stand for where it is called.
     result: Value
 
-    @property
-    def results(self) -> list[tuple[str, Node]]:
-        """Scalars that it returns, by path."""
-        return [(path or "value", node) for path, node in leaves(self.result)]
-
-    @cached_property
     def function(self) -> Function:
         """The equation as a function of scalars."""
-        nodes = [node for _, node in self.results]
-        says = f"{self.source.name} of scalars."
+        nodes = [node for _, node in leaves(self.result)]
         given = [*self.leading, *self.formals]
-        name = f"{self.source.name}_{UNNAMED}"
-        text, names = function_text(name, says, given, self.code, nodes)
+        name = f"{self.name}_{UNNAMED}"
+        text, names = function_text(name, f"{self.name} of scalars.", given, self.code, nodes)
         return Function(*named_by_text(name, text), dict(names))
-
-    def derived(self, by: Sequence[str]) -> Derived:
-        """The same with its derivatives by some of these scalars."""
-        says = f"{self.source.name} of scalars with its derivatives by {listing(by)}."
-        given, named = [*self.leading, *self.formals], [(each, each) for each in by]
-        return derived_function(
-            f"{self.source.name}_{UNNAMED}",
-            says,
-            given,
-            self.code,
-            self.results,
-            named,
-            chained=True,
-        )
 
 
 def _inner(
     outer: Code, source: Parsed, leading: Sequence[Value], rest: Sequence[Value], read: Read
 ) -> _Inner:
+    """An equation whose `leading` arguments the loop gives, the others as where it is called."""
     code = Code(ruled=outer.ruled)
     code.under_way = [*outer.under_way]
     names = [each.arg for each in source.arguments]
-    given, stands_for = {}, dict[str, Node]()
+    given, stands_for = dict[str, Value](), dict[str, Node]()
     for k, (name, value) in enumerate(zip(names, [*leading, *rest], strict=True)):
         nodes = []
         for path, node in leaves(value):
-            if k >= len(leading) and node.op == "number":
-                nodes.append(node)
-                continue
-            formal = code.fresh(f"{name}_{path}" if path else name)
-            stands_for[formal] = node
-            nodes.append(ex.name(formal, node.kind))
+            if k < len(leading) or node.op != "number":
+                formal = code.fresh(f"{name}_{path}" if path else name)
+                stands_for[formal] = node
+                node = ex.name(formal, node.kind)
+            nodes.append(node)
         given[name] = rebuilt(value, iter(nodes))
     result = read(code, source.function, given)
     used = code.reads([node for _, node in leaves(result)])
     count = sum(1 for value in leading for _ in leaves(value))
     first, others = list(stands_for)[:count], list(stands_for)[count:]
     formals = [name for name in others if name in used]
-    return _Inner(source, code, first, formals, [stands_for[n] for n in formals], result)
+    actuals = [stands_for[name] for name in formals]
+    return _Inner(source.name, code, first, formals, actuals, result)
 
 
 def solved(
-    code: Code, residual: Parsed, low: Node, high: Node, rest: Sequence[Value], read: Read
-) -> Node | None:
-    """`root` as a call of a generated function; nothing if the residual is no number."""
+    code: Code, residual: Parsed, low: Value, high: Value, rest: Sequence[Value], read: Read
+) -> Value:
+    """`root` as a call of a generated function, with the rule of its derivatives."""
     inner = _inner(code, residual, [ex.name("x")], rest, read)
-    if not isinstance(inner.result, Node):
-        return None
-    ends = [inner.code.fresh(each) for each in ("low", "high")]
+    if not (isinstance(inner.result, Node) and isinstance(low, Node) and isinstance(high, Node)):
+        code.under_way[-1].refuse(
+            None, "a residual or a bracket that is a tuple", "let each be one float"
+        )
+    function, ends = inner.function(), [inner.code.fresh(each) for each in ("low", "high")]
     given = ", ".join([*ends, *inner.formals])
-    name = f"root_of_{inner.function.name}"
-    line = f"return root({inner.function.name}, {given})"
+    name = f"root_of_{function.name}"
+    line = f"return (root({function.name}, {given}),)"
     text = function_source(f"{name}({given})", f"Root of {residual.name}.", [line], "")
-    function = Function(name, text, {"root": root, inner.function.name: inner.function})
-    result = code.fresh("root")
-    arguments = (low, high, *inner.actuals)
-    code.items.append(Call(function, arguments, (result,), _root_derivative(inner, function, ends)))
-    return ex.name(result)
-
-
-def _root_derivative(
-    inner: _Inner, function: Function, ends: Sequence[str]
-) -> Callable[[tuple[int, ...]], Derived]:
-    """Derivatives of a root: the implicit function theorem within the bracket."""
-    names = [*ends, *inner.formals]
-    low, high = ends
-    (x,) = inner.leading
-
-    def derivative(by: tuple[int, ...]) -> Derived:
-        derived = inner.derived([x, *(names[k] for k in by if k > 1)])
-        code = inner.code
-        partials = {
-            derived.inputs[i]: code.fresh(f"r_{derived.inputs[i]}") for _, i in derived.entries
-        }
-        if x not in partials:
-            inner.source.refuse(None, f"no derivative by {x}", "use the unknown in it")
-        slope, given = partials[x], ", ".join([*ends, *inner.formals])
-        lines = [
-            f"{x} = {function.name}({given})",
-            f"_, {', '.join(partials.values())} = {derived.name}({', '.join([x, *inner.formals])})",
-            f"inside = {low} < {x} < {high}",
-            f"inverse = 1.0 / ({slope} if inside and {slope} != 0.0 else inf)",
-        ]
-        entries, values = [], []
-        ways = {low: f"1.0 if {x} <= {low} else 0.0", high: f"1.0 if {x} >= {high} else 0.0"}
-        ways |= {n: f"-{partial} * inverse if inside else 0.0" for n, partial in partials.items()}
-        for i, k in enumerate(by):
-            if names[k] in ways:
-                entries.append((0, i))
-                values.append(ways[names[k]])
-        made = [f"d_{k}" for k in range(len(values))]
-        lines += [f"{name} = {value}" for name, value in zip(made, values, strict=True)]
-        lines.append(f"return {', '.join([x, *made])}")
-        inputs = tuple(names[k] for k in by)
-        says = f"Root of {inner.source.name} with its derivatives by {listing(inputs)}."
-        name = f"{function.name}_{UNNAMED}"
-        name, text = named_by_text(name, function_source(f"{name}({given})", says, lines, ""))
-        references = {function.name: function, derived.name: derived}
-        return Derived(name, text, references, ("value",), inputs, tuple(entries))
-
-    return derivative
+    solver = Function(name, text, {"root": root, function.name: function})
+    x = ex.name(code.fresh("root"))
+    call = Call(solver, (low, high, *inner.actuals), (x.value,))
+    if not code.ruled:
+        code.items.append(call)
+        return x
+    # the implicit function theorem within the bracket
+    unknown, *others = (each.arg for each in residual.arguments)
+    known = {a: code.named(b, a) for a, b in zip(others, rest, strict=True)}
+    by = [node for each in known.values() for _, node in leaves(each) if node.op == "name"]
+    items, made = code.aside(lambda: read(code, residual.function, {unknown: x, **known}))
+    alone = Code(code.taken, ruled=True)
+    alone.items = items
+    assert isinstance(made, Node)
+    found = Derivatives(alone, [made], [x.value, *(node.value for node in by)])
+    code.taken |= found.taken
+    partials = {i: node for (_, i), node in zip(found.entries, found.partials, strict=True)}
+    if 0 not in partials:
+        residual.refuse(None, f"no derivative by {unknown}", "use the unknown in it")
+    inside = make("and", make("<", low, x), make("<", x, high))
+    divisible = make("and", inside, make("!=", partials[0], ZERO))
+    inverse = make("/", ONE, ex.choose(divisible, partials[0], ex.number(inf)))
+    slopes = [
+        (low, ex.choose(make("<=", x, low), ONE, ZERO)),
+        (high, ex.choose(make(">=", x, high), ONE, ZERO)),
+    ]
+    for i, node in enumerate(by):
+        if i + 1 in partials:
+            slope = make("*", ex.negative(partials[i + 1]), inverse)
+            slopes.append((node, ex.choose(inside, slope, ZERO)))
+    code.items.append(Rule([call, *found.items], (x.value,), [slopes]))
+    return x
 
 
 def repetition(
-    code: Code, step: Parsed, count: Node, state: Value, rest: Sequence[Value], read: Read
-) -> Value | None:
-    """`repeated` as a call of a generated function; nothing if the step returns no state."""
-    if not (
-        isinstance(state, Tuple) and state.cls and all(isinstance(s, Node) for s in state.items)
-    ):
-        return None
+    code: Code, step: Parsed, count: Value, state: Value, rest: Sequence[Value], read: Read
+) -> Value:
+    """`repeated` as a call of a generated function, with one that carries its derivatives along."""
     inner = _inner(code, step, [state, ex.name("number")], rest, read)
-    if not isinstance(inner.result, Tuple) or inner.result.cls is not state.cls:
-        return None
+    if not (
+        isinstance(state, Tuple)
+        and state.cls
+        and all(isinstance(each, Node) for each in state.items)
+        and isinstance(count, Node)
+        and alike(inner.result, state)
+    ):
+        what = f"repeated of {step.name}, which does not return a state"
+        code.under_way[-1].refuse(
+            None, what, "let it take and return the same named tuple of floats"
+        )
     *now, number = inner.leading
     times = inner.code.fresh("count")
-    given = ", ".join([times, *now, *inner.formals])
+    given = [times, *now, *inner.formals]
     states = ", ".join(now) + ("," if len(now) == 1 else "")
     called = ", ".join([*now, f"float({number})", *inner.formals])
+    function = inner.function()
     lines = [
         f"for {number} in range(int({times})):",
-        f"    {states} = {inner.function.name}({called})",
+        f"    {states} = {function.name}({called})",
         f"return {states}",
     ]
-    name = f"repeated_{inner.function.name}"
-    text = function_source(f"{name}({given})", f"{step.name}, repeated.", lines, "")
-    function = Function(name, text, {inner.function.name: inner.function})
+    name = f"repeated_{function.name}"
+    text = function_source(f"{name}({', '.join(given)})", f"{step.name}, repeated.", lines, "")
+    loop = Function(name, text, {function.name: function})
     results = tuple(code.fresh(each) for each in state.fields)
-    nodes = [node for _, node in leaves(state)]
-    derivative = _repeated_derivative(inner, function, times)
-    code.items.append(Call(function, (count, *nodes, *inner.actuals), results, derivative))
+    arguments = (count, *(node for _, node in leaves(state)), *inner.actuals)
+
+    def derivative(by: tuple[int, ...]) -> Derived:
+        return _carried(inner, name, given, called, [given[k] for k in by if k > 0], by)
+
+    code.items.append(Call(loop, arguments, results, derivative))
     return rebuilt(state, iter([ex.name(each) for each in results]))
 
 
-def _repeated_derivative(
-    inner: _Inner, function: Function, times: str
-) -> Callable[[tuple[int, ...]], Derived]:
-    """Derivatives of a loop: those of the state by every input, carried along step by step."""
+def _carried(
+    inner: _Inner,
+    loop: str,
+    given: list[str],
+    called: str,
+    inputs: list[str],
+    by: tuple[int, ...],
+) -> Derived:
+    """A loop with the derivatives of its state by some inputs, carried along step by step.
+
+    `given` are the loop's arguments, `called` those of its step, and `by` the numbers of the
+    `inputs` among them.
+    """
     *now, number = inner.leading
-    names = [times, *now, *inner.formals]
-
-    def derivative(by: tuple[int, ...]) -> Derived:
-        inputs, code = [names[k] for k in by if k > 0], inner.code
-        derived = inner.derived([*now, *(each for each in inputs if each not in now)])
-        width = len(inputs)
-        fresh = [code.fresh(each) for each in ("slopes", "c")]
-        slopes, c = fresh
-        new = [code.fresh(f"new_{each}") for each in now]
-        before = [code.fresh(f"by_{each}") for each in now]
-        partials = [code.fresh(f"d_{new[o]}_{derived.inputs[i]}") for o, i in derived.entries]
-        carried, direct = [list[str]() for _ in now], []
-        reach = [{i} for i in range(len(now))]
-        follows = [set[str]() for _ in now]
-        for partial, (o, i) in zip(partials, derived.entries, strict=True):
-            path = derived.inputs[i]
-            if path in now:
-                carried[o].append(f"{partial} * {before[now.index(path)]}")
-                reach[o].add(now.index(path))
-            else:
-                direct.append(f"{slopes}[{o * width + inputs.index(path)}] += {partial}")
-                follows[o].add(path)
-        for _ in now:
-            reach = [set[int]().union(*(reach[k] for k in each)) for each in reach]
-        followed = [{now[k] for k in each}.union(*(follows[k] for k in each)) for each in reach]
-        entries = [
-            (o, by.index(names.index(path)))
-            for o in range(len(now))
-            for path in inputs
-            if path in followed[o]
+    code, width = inner.code, len(inputs)
+    every = [*now, *(each for each in inputs if each not in now)]
+    step = derived_function(
+        f"{inner.name}_{UNNAMED}",
+        f"{inner.name} of scalars with its derivatives by {listing(every)}.",
+        [*inner.leading, *inner.formals],
+        code,
+        [*leaves(inner.result)],
+        [(each, each) for each in every],
+        chained=True,
+    )
+    slopes, c = code.fresh("slopes"), code.fresh("c")
+    new = [code.fresh(f"new_{each}") for each in now]
+    before = [code.fresh(f"by_{each}") for each in now]
+    partials = [code.fresh(f"d_{new[o]}_{every[i]}") for o, i in step.entries]
+    place = {
+        (o, each): f"{slopes}[{o * width + k}"
+        for o in range(len(now))
+        for k, each in enumerate(inputs)
+    }
+    carried, direct = [list[str]() for _ in now], []
+    follows = [{each} for each in now]  # Inputs that a state follows, at first itself.
+    for partial, (o, i) in zip(partials, step.entries, strict=True):
+        if i < len(now):
+            carried[o].append(f"{partial} * {before[i]}")
+        else:
+            direct.append(f"{place[o, every[i]]}] += {partial}")
+        follows[o].add(every[i])
+    for _ in now:
+        follows = [
+            each.union(*(follows[now.index(s)] for s in each if s in now)) for each in follows
         ]
-        called = [*now, f"float({number})", *inner.formals]
-        lines = [
-            f"{slopes} = blank({len(now) * width})",
-            *(
-                f"{slopes}[{k * width + inputs.index(each)}] = 1.0"
-                for k, each in enumerate(now)
-                if each in inputs
-            ),
-            f"for {number} in range(int({times})):",
-            f"    {', '.join([*new, *partials])}, = {derived.name}({', '.join(called)})",
-            f"    for {c} in range({width}):",
-            *(f"        {each} = {slopes}[{k * width} + {c}]" for k, each in enumerate(before)),
-            *(
-                f"        {slopes}[{k * width} + {c}] = {' + '.join(terms) or '0.0'}"
-                for k, terms in enumerate(carried)
-            ),
-            *(f"    {line}" for line in direct),
-            f"    {', '.join(now)}, = {', '.join(new)},",
-            "return "
-            + ", ".join(
-                [*now, *(f"{slopes}[{o * width + inputs.index(names[by[i]])}]" for o, i in entries)]
-            )
-            + ",",
-        ]
-        given = [names[k] for k in by]
-        says = f"{inner.source.name}, repeated, with its derivatives by {listing(given)}."
-        name = f"{function.name}_{UNNAMED}"
-        name, text = named_by_text(
-            name, function_source(f"{name}({', '.join(names)})", says, lines, "")
-        )
-        references = {"blank": blank, derived.name: derived}
-        return Derived(name, text, references, tuple(now), tuple(given), tuple(entries))
-
-    return derivative
+    entries = [(o, each) for o in range(len(now)) for each in inputs if each in follows[o]]
+    lines = [
+        f"{slopes} = blank({len(now) * width})",
+        *(f"{place[k, each]}] = 1.0" for k, each in enumerate(now) if each in inputs),
+        f"for {number} in range(int({given[0]})):",
+        f"    {', '.join([*new, *partials])}, = {step.name}({called})",
+        f"    for {c} in range({width}):",
+        *(f"        {each} = {slopes}[{k * width} + {c}]" for k, each in enumerate(before)),
+        *(
+            f"        {slopes}[{k * width} + {c}] = {' + '.join(terms) or '0.0'}"
+            for k, terms in enumerate(carried)
+        ),
+        *(f"    {line}" for line in direct),
+        f"    {', '.join(now)}, = {', '.join(new)},",
+        f"return {', '.join([*now, *(f'{place[each]}]' for each in entries)])},",
+    ]
+    moved = [given[k] for k in by]
+    says = f"{inner.name}, repeated, with its derivatives by {listing(moved)}."
+    name = f"{loop}_{UNNAMED}"
+    text = function_source(f"{name}({', '.join(given)})", says, lines, "")
+    return Derived(
+        *named_by_text(name, text),
+        {"blank": blank, step.name: step},
+        tuple(now),
+        tuple(moved),
+        tuple((o, moved.index(each)) for o, each in entries),
+    )

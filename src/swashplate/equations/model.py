@@ -24,14 +24,14 @@ Equations name the arguments that they need; the names mean
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from importlib import import_module
 from types import FunctionType
 from typing import Any, Literal, NamedTuple, get_args, get_type_hints
 
-from swashplate.equations.equation import equation
+from swashplate.equations.equation import equation, equation_of_text
 from swashplate.equations.fields import floats_of
 from swashplate.equations.syntax import is_named_tuple, plain
 from swashplate.errors import InputError
@@ -175,7 +175,8 @@ class Model:
     def __post_init__(self) -> None:
         if not self.parts:
             object.__setattr__(self, "parts", (self,))
-            self._check()
+            for wrong in _wrong(self):
+                raise InputError(wrong)
 
     def __repr__(self) -> str:
         return f"Model({self.name!r}, {len(floats_of(self.parameters))} parameters)"
@@ -202,13 +203,9 @@ class Model:
         """Inputs of a single model with their types, float or Window."""
         if self.inputs is not None:
             return dict(get_type_hints(self.inputs))
-        found: dict[str, type[Any]] = {}
-        for each in self._equations:
-            for name in arguments_of(each):
-                if name not in ARGUMENTS:
-                    tap = self.taps.get(name)
-                    found[name] = Window if tap is not None and tap.width else float
-        return found
+        asked = [name for each in self.equations for name in arguments_of(each)]
+        windows = {name for name, tap in self.taps.items() if tap.width}
+        return {n: Window if n in windows else float for n in asked if n not in ARGUMENTS}
 
     @cached_property
     def signals(self) -> type[Any] | None:
@@ -227,18 +224,14 @@ class Model:
     def signal_names(self) -> tuple[str, ...]:
         """Signals that a simulation of a single model has, integrals apart."""
         own = floats_of(self.signals) if self.signals is not None else ()
-        states = tuple(path for path in floats_of(self.state) if path not in own)
-        return (*own, *states)
+        return tuple(dict.fromkeys((*own, *floats_of(self.state))))
 
     @cached_property
     def external(self) -> tuple[str, ...]:
         """Signals that come from outside, in the order in which the parts ask for them."""
-        found: dict[str, None] = {}
-        for i, part in enumerate(self.parts):
-            for name in part.input_types:
-                if self.link_of(i, name) is None:
-                    found[part.tap(name).signal] = None
-        return tuple(found)
+        asked = [(i, name) for i, part in enumerate(self.parts) for name in part.input_types]
+        outside = [self.parts[i].tap(name) for i, name in asked if self.link_of(i, name) is None]
+        return tuple(dict.fromkeys(tap.signal for tap in outside))
 
     def link_of(self, part: int, name: str) -> Link | None:
         """Where an input of a part comes from, None if from outside."""
@@ -246,10 +239,8 @@ class Model:
         link = self.links.get(signal)
         if link is not None and link.after < part:
             return link
-        for j in range(part - 1, -1, -1):
-            if signal in self.parts[j].signal_names:
-                return Link(signal, (Source(j, signal),))
-        return None
+        source = _source(self.parts[:part], signal)
+        return Link(signal, (source,)) if source else None
 
     def prefix(self, part: int) -> str:
         """What stands before a part's paths: its name and a dot, if there are several."""
@@ -268,66 +259,59 @@ class Model:
         """Whether an input is read through a tap, and not simply at n."""
         return name in self.taps
 
-    @cached_property
-    def _equations(self) -> tuple[Equation, ...]:
+    @property
+    def equations(self) -> tuple[Equation, ...]:
+        """Its equations that may ask for inputs."""
         all_of_them = (self.sample, self.step, self.limits, self.domain, self.rest, self.settled)
         return tuple(each for each in all_of_them if each is not None)
 
-    def _check(self) -> None:
-        if not str(self.name).isidentifier():
-            raise InputError(f"A model is called by one word, as 'valve', not {self.name!r}.")
-        for type_ in (self.parameters, self.state, self.inputs, self.options, self.given):
-            if type_ is not None and not is_named_tuple(type_):
-                raise InputError(
-                    f"Model {self.name}: {type_!r} must be a named tuple, as in "
-                    "'class State(NamedTuple): position: float'."
-                )
-        for type_ in (self.parameters, self.state, self.given):
-            if type_ is not None:
-                self._check_floats(type_)
-        for word in ("step", "sample", "constants", "rest", "settled", "limits", "domain"):
-            made = getattr(self, word)
-            if not isinstance(plain(made), FunctionType) and not (made is None and word != "step"):
-                raise InputError(f"Model {self.name}: {word} must be an equation, not {made!r}.")
-        known = set(self.input_types)
-        for each in self._equations:
-            for name in arguments_of(each):
-                if name not in ARGUMENTS and name not in known:
-                    raise InputError(
-                        f"Model {self.name}: {plain(each).__name__} asks for '{name}', which "
-                        f"is none of {', '.join((*ARGUMENTS, *known))}."
-                    )
-        for name, tap in self.taps.items():
-            if name not in known:
-                raise InputError(f"Model {self.name}: there is a tap on '{name}', but no input.")
-            if tap.hold not in get_args(Hold):
-                raise InputError(
-                    f"Model {self.name}: '{name}' is held as '{tap.hold}'; there are "
-                    f"{', '.join(get_args(Hold))}."
-                )
-            if tap.delay and tap.delay not in floats_of(self.parameters):
-                raise InputError(
-                    f"Model {self.name}: the delay of '{name}' is '{tap.delay}', but the "
-                    f"parameters are {', '.join(floats_of(self.parameters))}."
-                )
-        for name in [path for paths in self.free_start.values() for path in paths]:
-            if name not in floats_of(self.state):
-                raise InputError(
-                    f"Model {self.name}: free_start names '{name}', but the state has "
-                    f"{', '.join(floats_of(self.state))}."
-                )
 
-    def _check_floats(self, type_: type[Any]) -> None:
-        """Refuse fields that are no numbers."""
-        for name, hint in get_type_hints(type_).items():
-            if is_named_tuple(hint):
-                self._check_floats(hint)
-            elif hint is not float:
-                raise InputError(
-                    f"Model {self.name}: {type_.__name__}.{name} is of type "
-                    f"{getattr(hint, '__name__', hint)}, but must be a float or a named tuple of "
-                    "floats."
-                )
+def _wrong(model: Model) -> Iterator[str]:
+    """What keeps a single model from being marched, in sentences."""
+    says = f"Model {model.name}: "
+    if not str(model.name).isidentifier():
+        yield f"A model is called by one word, as 'valve', not {model.name!r}."
+    for type_ in (model.parameters, model.state, model.inputs, model.options, model.given):
+        if type_ is not None and not is_named_tuple(type_):
+            yield (
+                f"{says}{type_!r} must be a named tuple, as in "
+                "'class State(NamedTuple): position: float'."
+            )
+    for type_ in (model.parameters, model.state, model.given):
+        for field_, kind in _no_floats(type_) if type_ is not None else ():
+            must = "but must be a float or a named tuple of floats"
+            yield f"{says}{field_} is of type {kind}, {must}."
+    for word in ("step", "sample", "constants", "rest", "settled", "limits", "domain"):
+        made = getattr(model, word)
+        if not isinstance(plain(made), FunctionType) and not (made is None and word != "step"):
+            yield f"{says}{word} must be an equation, not {made!r}."
+    known, parameters = [*model.input_types], floats_of(model.parameters)
+    for each in model.equations:
+        for name in arguments_of(each):
+            if name not in (*ARGUMENTS, *known):
+                choice = ", ".join((*ARGUMENTS, *known))
+                yield f"{says}{plain(each).__name__} asks for '{name}', which is none of {choice}."
+    for name, tap in model.taps.items():
+        if name not in known:
+            yield f"{says}there is a tap on '{name}', but no input."
+        if tap.hold not in get_args(Hold):
+            yield f"{says}'{name}' is held as '{tap.hold}'; there are {', '.join(get_args(Hold))}."
+        if tap.delay and tap.delay not in parameters:
+            choice = ", ".join(parameters)
+            yield f"{says}the delay of '{name}' is '{tap.delay}', but the parameters are {choice}."
+    states = floats_of(model.state)
+    for name in [path for paths in model.free_start.values() for path in paths]:
+        if name not in states:
+            yield f"{says}free_start names '{name}', but the state has {', '.join(states)}."
+
+
+def _no_floats(type_: type[Any]) -> Iterator[tuple[str, str]]:
+    """Fields that are no numbers, with their types' names."""
+    for name, hint in get_type_hints(type_).items():
+        if is_named_tuple(hint):
+            yield from _no_floats(hint)
+        elif hint is not float:
+            yield f"{type_.__name__}.{name}", getattr(hint, "__name__", str(hint))
 
 
 def _imported(module: str, name: str) -> Model:
@@ -368,32 +352,29 @@ def join(
         raise InputError(f"Joined models need names of their own, not {', '.join(names)}.")
     linked = {}
     for signal, made_by in (links or {}).items():
-        sources = tuple(_source(name, single, each) for each in arguments_of(made_by))
-        linked[signal] = Link(signal, sources, made_by)
+        sources = [_source(single, each) for each in arguments_of(made_by)]
+        if None in sources:
+            asked = arguments_of(made_by)[sources.index(None)]
+            known = ", ".join(each for part in single for each in part.signal_names)
+            raise InputError(
+                f"Model {name}: a link asks for '{asked}', but the parts have {known}."
+            )
+        linked[signal] = Link(signal, tuple(each for each in sources if each), made_by)
 
     def gathered(attribute: str) -> Any:
         present = [(p.name, getattr(p, attribute)) for p in single if getattr(p, attribute)]
         return NamedTuple(f"{name.title()}{attribute.title()}", present)
 
-    return Model(
-        name,
-        gathered("parameters"),
-        gathered("state"),
-        single[0].step,
-        options=gathered("options"),
-        given=gathered("given"),
-        parts=single,
-        links=linked,
-        **changes,
-    )
+    kinds = {each: gathered(each) for each in ("parameters", "state", "options", "given")}
+    return Model(name, step=single[0].step, parts=single, links=linked, **kinds, **changes)
 
 
-def _source(name: str, parts: Sequence[Model], signal: str) -> Source:
+def _source(parts: Sequence[Model], signal: str) -> Source | None:
+    """Where a signal of some parts comes from: of the last that has it."""
     for j in range(len(parts) - 1, -1, -1):
         if signal in parts[j].signal_names:
             return Source(j, signal)
-    known = ", ".join(each for part in parts for each in part.signal_names)
-    raise InputError(f"Model {name}: a link asks for '{signal}', but the parts have {known}.")
+    return None
 
 
 def parameter_paths(model: Model) -> tuple[str, ...]:
@@ -419,3 +400,137 @@ def arguments_of(equation: Equation) -> tuple[str, ...]:
     code = plain(equation).__code__
     names: tuple[str, ...] = code.co_varnames[: code.co_argcount]
     return names
+
+
+# --- continuous equations on the grid -------------------------------------------------------------
+
+Method = Literal["euler", "heun", "midpoint", "rk4"]
+
+
+class Tableau(NamedTuple):
+    """Explicit Runge-Kutta method (Hairer, Nørsett and Wanner 1993, II.1)."""
+
+    stages: tuple[tuple[float, ...], ...]
+    """Of each slope behind the first, the weights of those before it."""
+    weights: tuple[float, ...]
+    """Of the slopes, in the step."""
+
+
+TABLEAUS: dict[str, Tableau] = {
+    "euler": Tableau((), (1.0,)),
+    "heun": Tableau(((1.0,),), (0.5, 0.5)),
+    "midpoint": Tableau(((0.5,),), (0.0, 1.0)),
+    "rk4": Tableau(((0.5,), (0.0, 0.5), (0.0, 0.0, 1.0)), (1 / 6, 1 / 3, 1 / 3, 1 / 6)),
+}
+
+
+def discretised(
+    rates: Equation, method: Method = "rk4", *, substeps: int = 1, project: Equation | None = None
+) -> Equation:
+    """Step of a model whose equation gives the rates of change of its state.
+
+    Parameters
+    ----------
+    rates : equation
+        d(state)/dt of ``state`` and of inputs, ``p``, ``k``, ``options`` and ``given`` as a step
+        has them. It returns the type of the state, each number in its unit per second.
+    method : {"euler", "heun", "midpoint", "rk4"}
+        Explicit Runge-Kutta method, of order 1, 2, 2 and 4.
+    substeps : int
+        Steps of the method from one sample to the next, of equal length.
+    project : equation, optional
+        Of the same arguments: the state within its bounds, such as end stops, done to the state at
+        the end of each sub-step.
+
+    Returns
+    -------
+    equation
+        The `step` of a `Model`; `source` shows its text. Derivatives are those of this step, not
+        of the differential equation.
+
+    Raises
+    ------
+    InputError
+        For another method, fewer sub-steps than 1, or equations that cannot be a right-hand side.
+
+    Notes
+    -----
+    Inputs are held over the step at what their taps give at its beginning. An input that is
+    straight between samples keeps the method's order on a finer grid only, or with a tap that has
+    a delay of a step at least: ``Tap("command", "delay", ahead=1.0, hold="mean")`` is its mean over
+    the step.
+    """
+    if method not in TABLEAUS:
+        raise InputError(f"There is no method '{method}'; there are {', '.join(get_args(Method))}.")
+    if type(substeps) is not int or substeps < 1:
+        raise InputError(f"substeps is {substeps!r}, but must be a whole number, at least 1.")
+    kind = _state_of(rates)
+    names: dict[str, Any] = {"rates": rates, "project": project}
+    hints = get_type_hints(plain(rates), include_extras=True)
+    if project is not None:
+        if _state_of(project) is not kind:
+            raise InputError(
+                f"{plain(project).__name__} must return a {kind.__name__}, as "
+                f"{plain(rates).__name__} does."
+            )
+        hints = {**get_type_hints(plain(project), include_extras=True), **hints}
+    del hints["return"]
+    names |= {f"{name}_type": hint for name, hint in hints.items()}
+
+    def state(weights: tuple[float, ...], kind: Any = kind, path: str = "") -> str:
+        """Text of the state at the beginning of a sub-step, moved by weighted slopes."""
+        if not is_named_tuple(kind):
+            factors = ["" if each == 1.0 else f"{each!r} * " for each in weights]
+            moves = zip(factors, weights, range(1, len(weights) + 1), strict=True)
+            terms = [f" + sub_step * {f}slope_{j}{path}" for f, each, j in moves if each != 0.0]
+            return f"state{path}{''.join(terms)}"
+        word = f"{kind.__name__}_at{path.replace('.', '_')}"
+        names[word], inner = kind, get_type_hints(kind)
+        return f"{word}({', '.join(state(weights, inner[f], f'{path}.{f}') for f in kind._fields)})"
+
+    def call(word: str, equation: Equation, at: str) -> str:
+        given = [at if name == "state" else name for name in arguments_of(equation)]
+        return f"{word}({', '.join(given)})"
+
+    tableau = TABLEAUS[method]
+    lines = [f"slope_1 = {call('rates', rates, 'state')}"]
+    for i, row in enumerate(tableau.stages):
+        lines.append(f"slope_{i + 2} = {call('rates', rates, state(row))}")
+    lines.append(f"state = {state(tableau.weights)}")
+    if project is not None:
+        lines.append(f"state = {call('project', project, 'state')}")
+    name = f"{plain(rates).__name__}_{method}"
+    arguments = [*(f"{name}: {name}_type" for name in hints), "h: float"]
+    text = [
+        f"def {name}({', '.join(arguments)}) -> state_type:",
+        f'    """Step of {plain(rates).__name__}: {method}, {substeps} a sample."""',
+        f"    sub_step = h / {float(substeps)!r}",
+        f"    for _ in range({substeps}):",
+        *(f"        {line}" for line in lines),
+        "    return state",
+        "",
+    ]
+    made: Equation = equation_of_text("\n".join(text), name, names)
+    return made
+
+
+def _state_of(equation: Equation) -> type[Any]:
+    """Type of the state that an equation takes and returns."""
+    name, arguments = plain(equation).__name__, arguments_of(equation)
+    hints: dict[str, type[Any]] = get_type_hints(plain(equation))
+    kind = hints.get("return")
+    if kind is None or not is_named_tuple(kind) or hints.get("state") is not kind:
+        raise InputError(
+            f"{name} must take the state and return its type, as in 'def {name}(state: State, ...) "
+            "-> State'."
+        )
+    for each in ("h", "signals"):
+        if each in arguments:
+            raise InputError(
+                f"{name} asks for '{each}', which is known at samples only: a rate of change "
+                "depends on the state at any instant."
+            )
+    for each in arguments:
+        if each == "sub_step" or each.startswith("slope_"):
+            raise InputError(f"{name}: the name '{each}' is taken; call the argument otherwise.")
+    return kind

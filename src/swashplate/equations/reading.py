@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import ast
-from collections.abc import Mapping, Sequence
-from types import FunctionType, ModuleType
-from typing import Any
+from collections.abc import Callable, Mapping, Sequence
+from inspect import Parameter, Signature
+from types import FunctionType, ModuleType, SimpleNamespace
+from typing import Any, TypeVar
 from weakref import WeakKeyDictionary
 
 from swashplate.equations import expressions as ex
@@ -36,25 +37,23 @@ from swashplate.equations.syntax import (
     is_named_tuple,
     parsed,
     plain,
-    whole,
 )
 
-Environment = dict[str, Value]
+Way = tuple[list[Item], Value]
+"""What is done one way of a decision, and what comes of it."""
+
+Names = dict[str, Value]
+R = TypeVar("R")
 
 RULES: WeakKeyDictionary[FunctionType, Any] = WeakKeyDictionary()
 """Equations that return the derivatives of others."""
+LOOPS = {
+    "root": ("residual, low, high", ("the unknown",), solved),
+    "repeated": ("step, count, state", ("a state", "the number of the repetition"), repetition),
+}
+"""What loops take ahead of the rest, what their equation takes ahead of it, how they are made."""
 FEW = 8
 """Operations that may be done in vain, so that a branch becomes a conditional expression."""
-ARGUMENTS = {"atan2": (2, 2), "hypot": (2, 2), "min": (2, 99), "max": (2, 99)}
-"""Least and largest number of arguments of functions that take more than one."""
-LOOPS = {
-    "root": ("residual, low, high", "give it low, high and the rest"),
-    "repeated": (
-        "step, count, state",
-        "let it take a state, the number of the repetition and the rest",
-    ),
-}
-"""What loops take before the arguments of their equation, and what such an equation must take."""
 
 
 def read(code: Code, equation: Any, given: Mapping[str, Value]) -> Value:
@@ -70,55 +69,47 @@ def read(code: Code, equation: Any, given: Mapping[str, Value]) -> Value:
     source = parsed(equation)
     if source in code.under_way:
         source.refuse(None, "a call of itself", "write a loop over a literal range")
-    environment = {each.arg: given[each.arg] for each in source.arguments if each.arg in given}
-    for name, default in source.defaults.items():
-        value = fixed(default)
-        if value is not None:
-            environment.setdefault(name, value)
+    defaults = {name: fixed(each) for name, each in source.defaults.items()}
+    known = {name: each for name, each in defaults.items() if each is not None} | dict(given)
+    known = {each.arg: known[each.arg] for each in source.arguments if each.arg in known}
     code.under_way.append(source)
     try:
         rule = RULES.get(plain(equation)) if code.ruled else None
         if rule is not None:
-            return _ruled(code, source, parsed(rule), environment)
-        return _Reader(source, code).result(environment)
+            return _ruled(code, source, parsed(rule), known)
+        return _Reader(source, code).result(known)
     finally:
         code.under_way.pop()
 
 
-def _ruled(code: Code, source: Parsed, rule: Parsed, environment: Environment) -> Value:
+def _ruled(code: Code, source: Parsed, rule: Parsed, known: Mapping[str, Value]) -> Value:
     """An equation with declared derivatives: both are done, and stay together."""
-    given = {name: code.named(value, name) for name, value in environment.items()}
+    given = {name: code.named(value, name) for name, value in known.items()}
     code.ruled = False  # what is declared is not differentiated
     try:
         items, (result, slopes) = code.aside(
-            lambda: (
-                _Reader(source, code).result(given),
-                _Reader(rule, code).result({**given}),
-            )
+            lambda: (_Reader(source, code).result(given), _Reader(rule, code).result(given))
         )
     finally:
         code.ruled = True
-    by = [node for value in given.values() for _, node in leaves(value) if node.kind == "float"]
-    nodes, found = list(leaves(result)), [node for _, node in leaves(slopes)]
+    below = [(name, *leaf) for name, value in given.items() for leaf in leaves(value)]
+    by = {".".join(filter(None, (a, b))): node for a, b, node in below if node.kind == "float"}
+    nodes, found = [*leaves(result)], [node for _, node in leaves(slopes)]
     if len(found) != len(by) * len(nodes):
-        names = [
-            f"{name}.{path}" if path else name
-            for name, value in given.items()
-            for path, node in leaves(value)
-            if node.kind == "float"
-        ]
         rule.refuse(
             None,
             f"a number of derivatives that is not {len(by) * len(nodes)}",
-            f"return those by {', '.join(names)}, in order",
+            f"return those by {', '.join(by)}, in order",
         )
-    results, each = [], []
-    for i, (path, node) in enumerate(nodes):
-        results.append((code.fresh(f"{source.name}_{path}" if path else source.name), node))
-        pairs = zip(by, found[i * len(by) : (i + 1) * len(by)], strict=True)
-        each.append([(a, b) for a, b in pairs if a.op != "number" and not ex.is_number(b, 0.0)])
-    code.items.append(Rule(items, results, each))
-    return rebuilt(result, iter([ex.name(name, node.kind) for name, node in results]))
+    results = {}
+    for path, node in nodes:
+        name = code.fresh(f"{source.name}_{path}" if path else source.name)
+        items.append(Let(name, node))
+        pairs = [(argument, found.pop(0)) for argument in by.values()]
+        moved = [(a, b) for a, b in pairs if a.op != "number" and not ex.is_number(b, 0.0)]
+        results[name] = (ex.name(name, node.kind), moved)
+    code.items.append(Rule(items, (*results,), [moved for _, moved in results.values()]))
+    return rebuilt(result, iter([node for node, _ in results.values()]))
 
 
 class _Reader:
@@ -126,104 +117,96 @@ class _Reader:
 
     def __init__(self, source: Parsed, code: Code) -> None:
         self.source, self.code, self.refuse = source, code, source.refuse
-        self.local = set(source.function.__code__.co_varnames)
+        self.local = source.local
+        self.env: Names = {}
 
-    def result(self, given: Environment) -> Value:
+    def result(self, given: Mapping[str, Value]) -> Value:
         """What the equation returns for some arguments."""
-        named = {name: self.code.named(value, name) for name, value in given.items()}
-        value = self.block(self.source.node.body, named)
+        self.env = {name: self.code.named(value, name) for name, value in given.items()}
+        return self.returned(self.source.node.body)
+
+    def returned(self, statements: Sequence[ast.stmt]) -> Value:
+        """What statements return that certainly do."""
+        value = self.block(statements)
         assert value is not None  # a checked equation ends in a return
         return value
 
     # -- statements --------------------------------------------------------------------------------
 
-    def block(self, statements: Sequence[ast.stmt], env: Environment) -> Value | None:
+    def block(self, statements: Sequence[ast.stmt]) -> Value | None:
         """Do statements; what they return, if they do."""
-        pending = list(statements)
+        pending = [*statements]
         while pending:
-            each = pending.pop(0)
-            if isinstance(each, ast.Return):
-                assert each.value is not None
-                return self.value(each.value, env)
-            if isinstance(each, ast.If):
-                test = self.test(each.test, env)
-                if test.op == "number":
-                    pending[:0] = each.body if test.value else each.orelse
-                elif has_return([each]):
-                    return self.returned(test, each, pending, env)
-                else:
-                    self.merge(test, each, env)
-            elif isinstance(each, ast.For):
-                pending[:0] = self.unrolled(each)
-            else:
-                self.assignment(each, env)
+            match each := pending.pop(0):
+                case ast.Return(value=ast.expr() as value):
+                    return self.value(value)
+                case ast.If():
+                    test = self.test(each.test)
+                    if test.op == "number":
+                        pending[:0] = each.body if test.value else each.orelse
+                    elif has_return([each]):
+                        one, _ = self.way(self.returned, [*each.body, *pending])
+                        two, _ = self.way(self.returned, [*each.orelse, *pending])
+                        return self.either(each, test, one, two, "value")
+                    else:
+                        self.merge(test, each)
+                case ast.For(target=target, iter=ast.Call(args=args)):
+                    for i in reversed(range(*map(ast.literal_eval, args))):
+                        number = ast.copy_location(ast.Constant(i), each)
+                        set_counter = ast.copy_location(ast.Assign([target], number), each)
+                        pending[:0] = [set_counter, *each.body]
+                case ast.Assign(targets=targets, value=value):
+                    made = self.value(value)
+                    for target in targets:
+                        self.bind(target, made)
+                case ast.AnnAssign(target=target, value=ast.expr() as value):
+                    self.bind(target, self.value(value))
+                case ast.AugAssign(target=ast.Name(id=name) as target):
+                    left = ast.copy_location(ast.Name(name), each)
+                    term = ast.copy_location(ast.BinOp(left, each.op, each.value), each)
+                    self.bind(target, self.value(term))
         return None
 
-    def returned(
-        self, test: Node, each: ast.If, behind: Sequence[ast.stmt], env: Environment
-    ) -> Value:
-        """What either way of an `if` that returns leads to, with all that stands behind it."""
-        then, one = self.code.aside(lambda: self.block([*each.body, *behind], dict(env)))
-        other, two = self.code.aside(lambda: self.block([*each.orelse, *behind], dict(env)))
-        assert one is not None
-        assert two is not None
-        if not alike(one, two):
-            self.refuse(
-                None, "results of different structure", "return the same tuple on every way"
-            )
-        return self.either(test, (then, one), (other, two), "value")
+    def way(self, read: Callable[[Any], R], what: Any) -> tuple[tuple[list[Item], R], Names]:
+        """What one way of a decision comes to, and its names; those here stay as they are."""
+        outer, self.env = self.env, dict(self.env)
+        try:
+            return self.code.aside(lambda: read(what)), self.env
+        finally:
+            self.env = outer
 
-    def merge(self, test: Node, each: ast.If, env: Environment) -> None:
+    def merge(self, test: Node, each: ast.If) -> None:
         """An `if` that does not return: what both of its ways set is merged."""
-        one, two = dict(env), dict(env)
-        then, _ = self.code.aside(lambda: self.block(each.body, one))
-        other, _ = self.code.aside(lambda: self.block(each.orelse, two))
+        (then, _), one = self.way(self.block, each.body)
+        (other, _), two = self.way(self.block, each.orelse)
         changed = [n for n in {**one, **two} if one.get(n) is not two.get(n)]
         for name in [n for n in changed if n not in one or n not in two]:
-            env.pop(name, None)  # without a value one way: refused where it is read
+            self.env.pop(name, None)  # without a value one way: refused where it is read
             changed.remove(name)
         for name in changed:
             if not alike(one[name], two[name]):
                 self.refuse(each, f"{name} of two structures", "give it the same kind of value")
-        values = (Tuple(None, tuple(way[n] for n in changed)) for way in (one, two))
-        first, second = values
-        found = self.either(test, (then, first), (other, second), changed)
+        names = SimpleNamespace(_fields=tuple(changed))
+        first, second = (Tuple(names, tuple(env[n] for n in changed)) for env in (one, two))
+        found = self.code.named(self.either(each, test, (then, first), (other, second), ""), "")
         assert isinstance(found, Tuple)
-        env.update(zip(changed, found.items, strict=True))
+        self.env.update(zip(changed, found.items, strict=True))
 
-    def either(
-        self,
-        test: Node,
-        one: tuple[list[Item], Value],
-        two: tuple[list[Item], Value],
-        stems: str | Sequence[str],
-    ) -> Value:
+    def either(self, at: ast.AST, test: Node, one: Way, two: Way, stem: str) -> Value:
         """The value of one of two ways: conditional expressions where both are cheap."""
         (then, first), (other, second) = one, two
-        pairs = [
-            (path, a, b) for (path, a), (_, b) in zip(leaves(first), leaves(second), strict=True)
-        ]
-        ends = [a for _, a, _ in pairs], [b for _, _, b in pairs]
-        if _cheap(then, ends[0]) and _cheap(other, ends[1]):
-            meanings = _meanings(then), _meanings(other)
-            flat = [
-                ex.choose(test, ex.substitute(a, meanings[0]), ex.substitute(b, meanings[1]))
-                for _, a, b in pairs
-            ]
-            made = rebuilt(first, iter(flat))
-            if isinstance(stems, str):
-                return made
-            assert isinstance(made, Tuple)
-            items = zip(made.items, stems, strict=True)
-            return Tuple(None, tuple(self.code.named(value, stem) for value, stem in items))
-        choice = Choice(test, then, other, [])
-        nodes = []
+        if not alike(first, second):
+            self.refuse(at, "results of different structure", "give the same tuple on every way")
+        pairs = [(*a, b) for a, (_, b) in zip(leaves(first), leaves(second), strict=True)]
+        flat, more = _flat(then, [a for _, a, _ in pairs]), _flat(other, [b for _, _, b in pairs])
+        if flat is not None and more is not None:
+            return rebuilt(
+                first, iter([ex.choose(test, *ab) for ab in zip(flat, more, strict=True)])
+            )
+        choice, nodes = Choice(test, then, other, []), []
         for path, a, b in pairs:
             if a is not b:
-                where, _, rest = path.partition(".")
-                stem = stems if isinstance(stems, str) else stems[int(where)]
-                tail = path if isinstance(stems, str) else rest
-                name = self.code.fresh(f"{stem}_{tail}" if tail else stem)
+                name = self.code.fresh("_".join(filter(None, (stem, path))))
                 choice.merged.append((name, a, b))
                 a = ex.name(name, make("if", test, a, b).kind)
             nodes.append(a)
@@ -231,46 +214,24 @@ class _Reader:
             self.code.items.append(choice)
         return rebuilt(first, iter(nodes))
 
-    def unrolled(self, loop: ast.For) -> list[ast.stmt]:
-        """The statements of a loop, once for each number of its range."""
-        assert isinstance(loop.iter, ast.Call)
-        out: list[ast.stmt] = []
-        for i in range(*(whole(a) for a in loop.iter.args)):
-            number = ast.copy_location(ast.Constant(i), loop)
-            out += [ast.copy_location(ast.Assign([loop.target], number), loop), *loop.body]
-        return out
-
-    def assignment(self, each: ast.stmt, env: Environment) -> None:
-        if isinstance(each, ast.Assign):
-            value = self.value(each.value, env)
-            for target in each.targets:
-                self.bind(target, value, env)
-        elif isinstance(each, ast.AnnAssign):
-            assert each.value is not None
-            self.bind(each.target, self.value(each.value, env), env)
-        elif isinstance(each, ast.AugAssign):
-            assert isinstance(each.target, ast.Name)
-            left = ast.copy_location(ast.Name(each.target.id, ast.Load()), each)
-            term = ast.copy_location(ast.BinOp(left, each.op, each.value), each)
-            self.bind(each.target, self.value(term, env), env)
-
-    def bind(self, target: ast.expr, value: Value, env: Environment) -> None:
+    def bind(self, target: ast.expr, value: Value) -> None:
+        """Give a name its value, or each of several in a tuple."""
         if isinstance(target, ast.Tuple):
             if not isinstance(value, Tuple) or len(value.items) != len(target.elts):
                 self.refuse(
                     target, "an unpacking of something else", "unpack a tuple of as many values"
                 )
             for each, item in zip(target.elts, value.items, strict=True):
-                self.bind(each, item, env)
+                self.bind(each, item)
             return
         assert isinstance(target, ast.Name)
-        env[target.id] = self.code.named(value, target.id)
+        self.env[target.id] = self.code.named(value, target.id)
 
     # -- expressions -------------------------------------------------------------------------------
 
-    def test(self, node: ast.expr, env: Environment) -> Node:
+    def test(self, node: ast.expr) -> Node:
         """A decision; an option that is on counts as true."""
-        value = self.value(node, env)
+        value = self.value(node)
         if isinstance(value, Flag):
             return ex.number(self.known(node, value) is not None)
         if isinstance(value, Node):
@@ -280,256 +241,214 @@ class _Reader:
     def known(self, node: ast.AST, option: Flag) -> Any:
         """Value of an option, refused where it was not said."""
         if option.value == "unknown":
-            self.refuse(
-                node,
-                f"a test of the option {option.text}, whose value is not known",
-                f'say options={{"{option.text}": None}}, or True',
-            )
+            what = f"a test of the option {option.text}, whose value is not known"
+            self.refuse(node, what, f'say options={{"{option.text}": None}}, or True')
         return option.value
 
-    def scalar(self, node: ast.expr, env: Environment) -> Node:
+    def scalar(self, node: ast.expr) -> Node:
         """Value of an expression that has to be a number."""
-        value = self.value(node, env)
+        value = self.value(node)
         if isinstance(value, Node):
             return value
         if isinstance(value, Flag):
             self.refuse(node, "arithmetic with an option", "test it with `is None`")
         self.refuse(node, "arithmetic with a tuple", "name its elements")
 
-    def value(self, node: ast.expr, env: Environment) -> Value:
+    def value(self, node: ast.expr) -> Value:
         """Value of any expression."""
-        made: Value = getattr(self, f"on_{type(node).__name__.lower()}")(node, env)
-        return made
+        match node:
+            case ast.Constant(value=None):
+                return Flag(None)
+            case ast.Constant(value=int(number) | float(number)):
+                return ex.number(number)
+            case ast.Tuple(elts=items):
+                return Tuple(None, tuple(map(self.value, items)))
+            case ast.Name(id=name) if name in self.env:
+                return self.env[name]
+            case ast.Name(id=name):
+                if name in self.local:
+                    instead = "give it a value on every way"
+                    self.refuse(node, f"{name} without a value on some way", instead)
+                return self.constant(node, name, self.outside(node))
+            case ast.Attribute():
+                return self.field(node)
+            case ast.Subscript():
+                return self.element(node)
+            case ast.UnaryOp(op=ast.Not()):
+                test = self.test(node.operand)
+                return ex.number(not test.value) if test.op == "number" else make("not", test)
+            case ast.UnaryOp():
+                inner = self.scalar(node.operand)
+                if isinstance(node.op, ast.UAdd):
+                    return inner
+                return ex.number(-inner.value) if inner.op == "number" else make("neg", inner)
+            case ast.BinOp():
+                return self.arithmetic(node)
+            case ast.Compare():
+                return self.comparison(node)
+            case ast.BoolOp():
+                return self.joined(node)
+            case ast.IfExp():
+                test = self.test(node.test)
+                if test.op == "number":
+                    return self.value(node.body if test.value else node.orelse)
+                one, _ = self.way(self.value, node.body)
+                two, _ = self.way(self.value, node.orelse)
+                return self.either(node, test, one, two, "chosen")
+            case ast.Call():
+                return self.call(node)
+        self.refuse(node, "this expression", "use arithmetic")
 
-    def on_constant(self, node: ast.Constant, env: Environment) -> Value:
-        return Flag(None) if node.value is None else ex.number(node.value)  # type: ignore[arg-type]
-
-    def on_tuple(self, node: ast.Tuple, env: Environment) -> Value:
-        return Tuple(None, tuple(self.value(each, env) for each in node.elts))
-
-    def on_unaryop(self, node: ast.UnaryOp, env: Environment) -> Value:
-        if isinstance(node.op, ast.Not):
-            test = self.test(node.operand, env)
-            return ex.number(not test.value) if test.op == "number" else make("not", test)
-        inner = self.scalar(node.operand, env)
-        if isinstance(node.op, ast.UAdd):
-            return inner
-        return ex.number(-inner.value) if inner.op == "number" else make("neg", inner)
-
-    def on_name(self, node: ast.Name, env: Environment) -> Value:
-        if node.id in env:
-            return env[node.id]
-        if node.id in self.local:
-            self.refuse(
-                node, f"{node.id} without a value on some way", "give it a value on every way"
-            )
+    def outside(self, node: ast.expr) -> Any:
+        """What a name, or a name in a module, stands for outside the equation."""
         try:
-            return self.constant(node, node.id, self.source.resolve(node.id))
-        except NameError:
-            self.refuse(node, f"the unknown name {node.id}", "define or import it")
+            return self.source.called(node)
+        except (NameError, AttributeError):
+            self.refuse(node, f"the unknown name {ast.unparse(node)}", "define or import it")
 
     def constant(self, node: ast.AST, text: str, found: Any) -> Value:
         """Value of something that stands outside the equation."""
         value = fixed(found)
         if value is None:
-            self.refuse(
-                node,
-                f"{text}, which is {type(found).__name__}",
-                "of what stands outside, an equation reads numbers only",
-            )
+            what = f"{text}, which is {type(found).__name__}"
+            self.refuse(node, what, "of what stands outside, an equation reads numbers only")
         return value
 
-    def on_attribute(self, node: ast.Attribute, env: Environment) -> Value:
+    def field(self, node: ast.Attribute) -> Value:
         """Value of a field, or of a constant of a module."""
         base = node.value
-        if isinstance(base, ast.Name) and base.id not in env and base.id not in self.local:
-            try:
-                module = self.source.resolve(base.id)
-            except NameError:
-                self.refuse(node, f"the unknown name {base.id}", "define or import it")
-            if isinstance(module, ModuleType):
-                return self.constant(node, node.attr, getattr(module, node.attr, module))
-        value = self.value(base, env)
+        module = isinstance(base, ast.Name) and base.id not in {*self.local, *self.env}
+        if module and isinstance(self.outside(base), ModuleType):
+            return self.constant(node, node.attr, self.outside(node))
+        value = self.value(base)
         if not isinstance(value, Tuple) or value.cls is None or node.attr not in value.fields:
-            self.refuse(
-                node, f"the field {node.attr}, which is unknown", "name a field of the named tuple"
-            )
+            what = f"the field {node.attr}, which is unknown"
+            self.refuse(node, what, "name a field of the named tuple")
         return value.items[value.fields.index(node.attr)]
 
-    def on_subscript(self, node: ast.Subscript, env: Environment) -> Value:
+    def element(self, node: ast.Subscript) -> Value:
         """Value of an element of a tuple."""
-        index = self.scalar(node.slice, env)
-        if index.op != "number" or type(index.value) is not int:
+        index, value = self.scalar(node.slice), self.value(node.value)
+        if index.op != "number" or index.kind != "int":
             self.refuse(node.slice, "an index that is no whole number", "write the number")
-        value = self.value(node.value, env)
         if not isinstance(value, Tuple) or not -len(value.items) <= index.value < len(value.items):
             self.refuse(node, f"the element {index.value}, which is not there", "count from 0")
-        return value.items[index.value]
+        found: Value = value.items[index.value]
+        return found
 
-    def on_binop(self, node: ast.BinOp, env: Environment) -> Node:
+    def arithmetic(self, node: ast.BinOp) -> Node:
         """Value of an arithmetic operation, exactly as written."""
-        op = ARITHMETIC[type(node.op)]
-        left = self.scalar(node.left, env)
+        op, left = ARITHMETIC[type(node.op)], self.scalar(node.left)
         if op == "**":
-            return make("**", left, value=whole(node.right))
-        right = self.scalar(node.right, env)
+            return make("**", left, value=ast.literal_eval(node.right))
+        right = self.scalar(node.right)
         if left.kind == right.kind == "int" and left.op == right.op == "number" and op != "/":
-            return ex.number(
-                {"+": int.__add__, "-": int.__sub__, "*": int.__mul__}[op](left.value, right.value)
-            )
-        one = op == "*" and (ex.is_number(left, 1.0) or ex.is_number(right, 1.0))
-        if one and left.kind == right.kind == "float":  # a factor that is known to be one
-            return right if ex.is_number(left, 1.0) else left
+            counted = {"+": int.__add__, "-": int.__sub__, "*": int.__mul__}[op]
+            return ex.number(counted(left.value, right.value))
+        if op == "*" and left.kind == right.kind == "float":  # a factor that is known to be one
+            for one, other in ((left, right), (right, left)):
+                if ex.is_number(one, 1.0):
+                    return other
         return make(op, left, right)
 
-    def on_compare(self, node: ast.Compare, env: Environment) -> Node:
+    def comparison(self, node: ast.Compare) -> Node:
         """A comparison, also of several terms, and `is None`."""
-        left = self.value(node.left, env)
-        found = ex.number(True)
+        left, found = self.value(node.left), ex.number(True)
         for op, right_node in zip(node.ops, node.comparators, strict=True):
             if isinstance(op, ast.Is | ast.IsNot):
                 missing = isinstance(left, Flag) and self.known(node, left) is None
-                found = _both(found, ex.number(missing == isinstance(op, ast.Is)))
+                found = _joined(found, ex.number(missing == isinstance(op, ast.Is)), True)
                 continue
-            right = self.scalar(right_node, env)
+            right = self.scalar(right_node)
             if not isinstance(left, Node):
                 self.refuse(node, "a comparison of a tuple", "compare its elements")
-            found = _both(found, make(COMPARISONS[type(op)], left, right))
+            found = _joined(found, make(COMPARISONS[type(op)], left, right), True)
             left = right
         return found
 
-    def on_boolop(self, node: ast.BoolOp, env: Environment) -> Node:
+    def joined(self, node: ast.BoolOp) -> Node:
         """`and` and `or`; what must not be done in vain is put behind the test."""
         conjunction = isinstance(node.op, ast.And)
         test = ex.number(conjunction)
         for each in node.values:
             if test.op == "number" and bool(test.value) != conjunction:
                 return test
-            items, more = self.code.aside(lambda each=each: self.test(each, env))  # type: ignore[misc]
+            (items, more), _ = self.way(self.test, each)
             if test.op == "number" or (not items and more.cheap):
                 self.code.items += items
                 test = _joined(test, more, conjunction)
                 continue
-            none: tuple[list[Item], Value] = ([], ex.number(not conjunction))
-            way: tuple[list[Item], Value] = (items, more)
-            one, two = (way, none) if conjunction else (none, way)
-            found = self.either(test, one, two, "test")
+            one: Way = (items, more)
+            two: Way = ([], ex.number(not conjunction))
+            one, two = (one, two) if conjunction else (two, one)
+            found = self.either(node, test, one, two, "test")
             assert isinstance(found, Node)
             test = found
         return test
 
-    def on_ifexp(self, node: ast.IfExp, env: Environment) -> Value:
-        """Value of a conditional expression."""
-        test = self.test(node.test, env)
-        if test.op == "number":
-            return self.value(node.body if test.value else node.orelse, env)
-        one = self.code.aside(lambda: self.value(node.body, env))
-        two = self.code.aside(lambda: self.value(node.orelse, env))
-        if not alike(one[1], two[1]):
-            self.refuse(node, "a value of two structures", "give it the same kind of value")
-        return self.either(test, one, two, "chosen")
-
     # -- calls -------------------------------------------------------------------------------------
 
-    def callee(self, function: ast.expr) -> Any:
-        """What a call calls."""
-        try:
-            if isinstance(function, ast.Name):
-                return self.source.resolve(function.id)
-            assert isinstance(function, ast.Attribute)
-            assert isinstance(function.value, ast.Name)
-            return getattr(self.source.resolve(function.value.id), function.attr)
-        except (NameError, AttributeError):
-            called = ast.unparse(function)
-            self.refuse(function, f"a call of the unknown {called}", "define or import it")
-
-    def on_call(self, node: ast.Call, env: Environment) -> Value:
+    def call(self, node: ast.Call) -> Value:
         """Value of a call."""
-        found = self.callee(node.func)
+        found = self.outside(node.func)
         if found in MATH or found in CHOICES:
-            args = [self.scalar(each, env) for each in node.args]
-            op = MATH.get(found) or CHOICES[found]
-            low, high = ARGUMENTS.get(op, (1, 1))
-            if not low <= len(args) <= high or node.keywords:
-                self.refuse(node, f"{op} of {len(args)} arguments", f"give it {low}")
-            return make(op, *args)
+            return self.function(node, MATH.get(found) or CHOICES[found])
         if is_named_tuple(found):
-            given = self.arguments(node, env, found._fields, {})
-            return Tuple(found, tuple(given[name] for name in found._fields))
-        special = {plain(root): self.root, plain(repeated): self.repeated}
-        special[plain(interpolate)] = self.interpolate
-        if plain(found) in special:
-            return special[plain(found)](node, env)
+            return Tuple(found, tuple(self.arguments(node, found._fields, ()).values()))
+        kind = plain(found)
+        if kind is plain(root) or kind is plain(repeated):
+            return self.loop(node, kind.__name__)
+        if kind is plain(interpolate):
+            return self.table(self.arguments(node, ("x", "knots", "values"), ()), node)
         if not _is_equation(found):
             text = ast.unparse(node.func)
             self.refuse(node, f"a call of {text}", f"make {text} an @equation")
         callee = parsed(found)
         names = [each.arg for each in callee.arguments]
-        return read(self.code, found, self.arguments(node, env, names, callee.defaults))
+        return read(self.code, found, self.arguments(node, names, callee.defaults))
 
-    def arguments(
-        self, node: ast.Call, env: Environment, names: Sequence[str], defaults: Mapping[str, Any]
-    ) -> Environment:
-        """Values for arguments of these names."""
-        given: Environment = {}
-        if len(node.args) > len(names):
-            self.refuse(node, "a call with too many arguments", f"give {len(names)}")
-        for name, each in zip(names, node.args, strict=False):
-            given[name] = self.value(each, env)
-        for keyword in node.keywords:
-            if keyword.arg is None or keyword.arg not in names or keyword.arg in given:
-                self.refuse(node, f"the argument {keyword.arg}", f"of {', '.join(names)}")
-            given[keyword.arg] = self.value(keyword.value, env)
-        for name in names:
-            if name not in given:
-                if name not in defaults:
-                    self.refuse(node, f"a call without {name}", "give a value for it")
-                given[name] = self.constant(node, name, defaults[name])
-        return given
+    def function(self, node: ast.Call, op: str) -> Node:
+        """Value of a function of numbers."""
+        args = [self.scalar(each) for each in node.args]
+        least = 2 if op in ("atan2", "hypot", "min", "max") else 1
+        exactly = len(args) == least or (len(args) > least and op in ("min", "max"))
+        if not exactly or node.keywords:
+            self.refuse(node, f"{op} of {len(args)} arguments", f"give it {least}")
+        return make(op, *args)
 
-    def root(self, node: ast.Call, env: Environment) -> Value:
-        """Value of `root`."""
-        residual, (low, high, *rest) = self.inner(node, env, "root", 1)
-        found = solved(self.code, residual, low, high, rest, read)
-        if found is None:
-            self.refuse(node, "a residual that is a tuple", "return one float")
-        return found
+    def arguments(self, node: ast.Call, names: Sequence[str], optional: Any) -> Names:
+        """Values for arguments of these names, in their order as far as they are given."""
+        positional = [self.value(each) for each in node.args]
+        by_name = {str(each.arg): self.value(each.value) for each in node.keywords}
+        defaults = {name: None if name in optional else Parameter.empty for name in names}
+        taken = [
+            Parameter(name, Parameter.POSITIONAL_OR_KEYWORD, default=defaults[name])
+            for name in names
+        ]
+        try:
+            return Signature(taken).bind(*positional, **by_name).arguments
+        except TypeError as error:
+            what = f"a call of {ast.unparse(node.func)} with {error}"
+            self.refuse(node, what, f"it takes {', '.join(names)}")
 
-    def repeated(self, node: ast.Call, env: Environment) -> Value:
-        """Value of `repeated`."""
-        step, (count, state, *rest) = self.inner(node, env, "repeated", 2)
-        found = repetition(self.code, step, count, state, rest, read)
-        if found is None:
-            what = f"repeated of {step.name}, which does not return a state"
-            self.refuse(node, what, "let it take and return the same named tuple of floats")
-        return found
-
-    def inner(
-        self, node: ast.Call, env: Environment, word: str, leading: int
-    ) -> tuple[Parsed, list[Any]]:
-        """The equation that a loop is given by its name, and the loop's other arguments.
-
-        `leading` are the arguments of the equation that the loop itself gives it.
-        """
-        taken, takes = LOOPS[word]
+    def loop(self, node: ast.Call, word: str) -> Value:
+        """Value of `root` or `repeated`: the equation by its name, and the other arguments."""
+        takes, own, make_of = LOOPS[word]
         if len(node.args) < 3 or node.keywords:
-            self.refuse(node, f"{word} with other arguments", f"write {word}({taken}, a, b, ...)")
+            self.refuse(node, f"{word} with other arguments", f"write {word}({takes}, a, b, ...)")
         first = node.args[0]
-        named = isinstance(first, ast.Attribute)
-        named |= isinstance(first, ast.Name) and first.id not in self.local
-        found = self.callee(first) if named else None
+        named = isinstance(first, ast.Name | ast.Attribute) and ast.unparse(first) not in self.local
+        found = self.outside(first) if named else None
         if not _is_equation(found):
             self.refuse(node, f"{word} of something else", "give it the name of an @equation")
-        numbers = [self.scalar(each, env) for each in node.args[1 : 4 - leading]]
-        rest = [self.value(each, env) for each in node.args[4 - leading :]]
-        inner = parsed(found)
-        if len(inner.arguments) != leading + len(node.args) - 3:
-            self.refuse(node, f"{word} of {inner.name} with other arguments", takes)
-        return inner, [*numbers, *rest]
+        inner, values = parsed(found), [self.value(each) for each in node.args[1:]]
+        if len(inner.arguments) != len(own) + len(values) - 2:
+            what = f"{word} of {inner.name} with other arguments"
+            self.refuse(node, what, f"let it take {', '.join(own)} and the rest")
+        return make_of(self.code, inner, values[0], values[1], values[2:], read)
 
-    def interpolate(self, node: ast.Call, env: Environment) -> Value:
+    def table(self, given: Mapping[str, Value], node: ast.Call) -> Value:
         """Value of `interpolate`."""
-        given = self.arguments(node, env, ("x", "knots", "values"), {})
         x, knots, values = (self.code.named(value, name) for name, value in given.items())
         if not (
             isinstance(x, Node)
@@ -547,10 +466,6 @@ class _Reader:
         return interpolated(self.code, x, *numbers)
 
 
-def _both(one: Node, two: Node) -> Node:
-    return _joined(one, two, True)
-
-
 def _joined(one: Node, two: Node, conjunction: bool) -> Node:
     """Two tests joined by `and` or `or`; known ones vanish."""
     for known, rest in ((one, two), (two, one)):
@@ -561,26 +476,20 @@ def _joined(one: Node, two: Node, conjunction: bool) -> Node:
     return make(word, *parts)
 
 
-def _cheap(items: Sequence[Item], ends: Sequence[Node]) -> bool:
-    """Whether items are so few operations that they can be done whatever a test says."""
-    if not all(isinstance(each, Let) and each.node.cheap for each in items):
-        return False
-    if not all(node.cheap for node in ends):
-        return False
-    nodes = [*(each.node for each in items if isinstance(each, Let)), *ends]
-    return not items or sum(map(ex.size, nodes)) <= FEW
-
-
-def _meanings(items: Sequence[Item]) -> dict[str, Node]:
-    """What the names of cheap items stand for, all told."""
+def _flat(items: Sequence[Item], ends: Sequence[Node]) -> list[Node] | None:
+    """Ends with the items in them, nothing if they cannot be done whatever a test says."""
     meanings: dict[str, Node] = {}
+    operations = sum(map(ex.size, ends)) if items else 0
     for each in items:
-        assert isinstance(each, Let)
+        if not isinstance(each, Let) or not each.node.cheap:
+            return None
+        operations += ex.size(each.node)
         meanings[each.name] = ex.substitute(each.node, meanings)
-    return meanings
+    if operations > FEW or not all(node.cheap for node in ends):
+        return None
+    return [ex.substitute(node, meanings) for node in ends]
 
 
 def _is_equation(found: Any) -> bool:
     """Whether something may be an equation: a function that is compiled, if any is."""
-    interpreted = JIT_OFF
-    return isinstance(plain(found), FunctionType) and (plain(found) is not found or interpreted)
+    return isinstance(plain(found), FunctionType) and (plain(found) is not found or JIT_OFF)

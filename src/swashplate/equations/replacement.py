@@ -70,11 +70,7 @@ def found_at(places: Mapping[str, str]) -> Replacement:
 
 def uses(model: Model, equation: Equation) -> bool:
     """Whether any of a model's equations is or calls this one."""
-    return any(
-        is_function(getattr(part, each.name)) and _reaches(getattr(part, each.name), equation)
-        for part in model.parts
-        for each in fields(part)
-    )
+    return any(_leading(part, equation) for part in model.parts)
 
 
 def replaced(
@@ -127,31 +123,28 @@ def again(model: Model, made: Replacement) -> Model:
     return replaced(model, *made)
 
 
-def _part(part: Model, old: Equation, new: Equation, parameters: type[Any] | None) -> Model:
+def _part(part: Model, old: Equation, new: Equation, parameters: Any) -> Model:
     """A part with the replacement, itself if it does not use the equation."""
-    equations = {
-        each.name: getattr(part, each.name)
-        for each in fields(part)
-        if is_function(getattr(part, each.name))
-    }
-    leading = {name: each for name, each in equations.items() if _reaches(each, old)}
+    leading = _leading(part, old)
     if not leading:
         return part
     own: Any = part.parameters
-    more: Any = parameters
-    kind = own if more is None else _extended(own, more)
+    kind = _extended(own, parameters) if parameters else own
     names = {part.parameters.__name__: kind}
     made = {plain(old): _called_like(old, new, part.name, kind)}
-    return replace(
-        part,
-        parts=(),
-        parameters=kind,
-        **{name: _rebuilt(each, old, made, names) for name, each in leading.items()},
-    )
+    rebuilt = {name: _rebuilt(each, old, made, names) for name, each in leading.items()}
+    return replace(part, parts=(), parameters=kind, **rebuilt)
+
+
+def _leading(part: Model, old: Equation) -> dict[str, Equation]:
+    """Equations of a part that are another one, or call it, by the part's fields."""
+    found = {each.name: getattr(part, each.name) for each in fields(part)}
+    return {name: each for name, each in found.items() if _reaches(each, old)}
 
 
 def _reaches(function: Any, old: Equation) -> bool:
-    return any(plain(each) is plain(old) for each in closure(function).values())
+    known = closure(function).values() if is_function(function) else ()
+    return any(plain(each) is plain(old) for each in known)
 
 
 @cache
@@ -196,37 +189,30 @@ def _called_like(old: Equation, new: Equation, part: str, kind: type[Any]) -> Eq
             f"{more[0]}; replace an equation that calls it and takes p."
         )
     hints = get_type_hints(plain(old)) | {"p": kind}
-    names: dict[str, Any] = {"own_equation": new}
-    texts = {}
-    for each in (*taken, "return"):
-        texts[each] = f"Type_{each}"
-        names[texts[each]] = hints[each]
-    arguments = ", ".join(f"{each}: {texts[each]}" for each in taken)
+    names: dict[str, Any] = {f"Type_{each}": hints[each] for each in (*taken, "return")}
+    arguments = ", ".join(f"{each}: Type_{each}" for each in taken)
     passed = ", ".join((*taken, *(f"p.{each}" for each in more)))
-    text = f"def {name}({arguments}) -> {texts['return']}:\n    return own_equation({passed})\n"
-    return equation_of_text(text, name, names)  # type: ignore[no-any-return]
+    text = f"def {name}({arguments}) -> Type_return:\n    return own_equation({passed})\n"
+    return equation_of_text(text, name, names | {"own_equation": new})  # type: ignore[no-any-return]
 
 
 def _rebuilt(function: Any, old: Equation, made: dict[Any, Any], names: Mapping[str, Any]) -> Any:
-    """A function that leads to the old equation, leading to the new one."""
-    if plain(function) not in made:
-        f: Any = plain(function)
+    """Anything, and a function that leads to the old equation leading to the new one."""
+    f: Any = plain(function)
+    if not _reaches(function, old):
+        return function
+    if f not in made:
         space = {**f.__globals__, **{k: v for k, v in names.items() if k in f.__globals__}}
-        for name, each in f.__globals__.items():
-            if name in f.__code__.co_names and is_function(each) and _reaches(each, old):
-                space[name] = _rebuilt(each, old, made, names)
-        cells = tuple(
-            CellType(_rebuilt(cell.cell_contents, old, made, names))
-            if is_function(cell.cell_contents) and _reaches(cell.cell_contents, old)
-            else cell
-            for cell in f.__closure__ or ()
-        )
-        copy = FunctionType(f.__code__, space, f.__name__, f.__defaults__, cells or None)
+        called = [name for name in f.__code__.co_names if name in f.__globals__]
+        space |= {n: _rebuilt(f.__globals__[n], old, made, names) for n in called if n not in names}
+        inner = [_rebuilt(each.cell_contents, old, made, names) for each in f.__closure__ or ()]
+        cells = tuple(map(CellType, inner)) or None
+        copy = FunctionType(f.__code__, space, f.__name__, f.__defaults__, cells)
         copy.__kwdefaults__, copy.__module__ = f.__kwdefaults__, f.__module__
         copy.__annotations__ = {
             key: names.get(each.__name__, each) if is_named_tuple(each) else each
             for key, each in f.__annotations__.items()
         }
         copy.__doc__, copy.__qualname__ = f.__doc__, f.__qualname__
-        made[plain(function)] = equation(copy)
-    return made[plain(function)]
+        made[f] = equation(copy)
+    return made[f]

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from hashlib import blake2b
+from textwrap import TextWrapper
 from typing import TYPE_CHECKING
 
 from swashplate.equations import expressions as ex
@@ -31,21 +32,12 @@ if TYPE_CHECKING:
 
 WIDTH = 96
 """Characters of a line."""
-TERM = 76
-"""Characters of an expression, beyond which parts of it get names."""
+SHORT = 30
+"""Characters of a result, beyond which it gets a name."""
 STEMS = {
-    "sqrt": "root",
-    "exp": "power",
-    "/": "ratio",
-    "*": "product",
-    "+": "total",
-    "-": "difference",
-    "if": "chosen",
-    ">": "above",
-    ">=": "above",
-    "<": "below",
-    "<=": "below",
-}
+    "sqrt": "root", "exp": "power", "/": "ratio", "*": "product", "+": "total", "-": "difference",
+    "if": "chosen", ">": "above", ">=": "above", "<": "below", "<=": "below",
+}  # fmt: skip
 
 
 class _Region:
@@ -55,10 +47,9 @@ class _Region:
         self, items: Iterable[Item], parent: _Region | None = None, behind: _Region | None = None
     ) -> None:
         self.items, self.behind = [*items], behind
-        self.around = {self}
-        for each in (parent, behind):
-            self.around |= each.around if each else set()
-        self.sides: dict[int, tuple[_Region, _Region]] = {}
+        self.around: set[_Region] = {self}.union(
+            *(each.around for each in (parent, behind) if each)
+        )
         self.seen: set[Node] = set()
         self.known: dict[Node, str] = {}
 
@@ -68,7 +59,6 @@ def _spread(items: Iterable[Item]) -> Iterator[Item]:
     for item in items:
         if isinstance(item, Rule):
             yield from _spread(item.items)
-            yield from (Let(name, node) for name, node in item.results)
         elif isinstance(item, Choice):
             yield replace(item, then=[*_spread(item.then)], other=[*_spread(item.other)])
         else:
@@ -96,16 +86,14 @@ class Writer:
         self.functions: dict[str, Function] = {}
         self.inner: dict[str, str] = {}
         self.uses: dict[Node, list[_Region]] = {}
-        self.sides: dict[int, tuple[_Region, _Region]] = {}
+        self.sides: dict[int, list[_Region]] = {}
         self.needed = set[str]().union(*(node.reads for node in results))
         top = _Region(live(_spread(items), self.needed))
         self.count(top, set(), results)
         self.lines = self.region(top, "")
-        self.texts = self.results(results, top)
+        self.texts = [self.result(node, top) for node in results]
 
-    # -- what is shared ----------------------------------------------------------------------------
-
-    def count(self, region: _Region, seen: set[Node], ends: Sequence[Node] = ()) -> None:
+    def count(self, region: _Region, seen: set[Node], ends: Iterable[Node]) -> None:
         """Count how often expressions are needed, and where."""
 
         def visit(node: Node) -> None:
@@ -125,26 +113,16 @@ class Writer:
             elif isinstance(item, Choice):
                 visit(item.test)
                 behind = self.sides.get(item.again, (None, None))
-                ways = (
-                    (item.then, [a for _, a, _ in item.merged]),
-                    (
-                        item.other,
-                        [b for _, _, b in item.merged],
-                    ),
-                )
-                sides = []
-                for (items, merged), other in zip(ways, behind, strict=True):
-                    side = _Region(items, region, other)
-                    self.count(side, seen | (other.seen if other else set()), merged)
-                    sides.append(side)
-                self.sides[item.number] = sides[0], sides[1]
+                ways = zip((item.then, item.other), behind, strict=True)
+                sides = [_Region(items, region, other) for items, other in ways]
+                one, two = [a for _, a, _ in item.merged], [b for _, _, b in item.merged]
+                for side, merged in zip(sides, (one, two), strict=True):
+                    known = side.behind.seen if side.behind else set()
+                    self.count(side, seen | known, merged)
+                self.sides[item.number] = sides
         for node in ends:
             visit(node)
         region.seen = seen
-
-    def shared(self, node: Node, region: _Region) -> bool:
-        """Whether an expression is needed more than once here."""
-        return sum(region in each.around for each in self.uses.get(node.same, ())) > 1
 
     # -- lines -------------------------------------------------------------------------------------
 
@@ -152,58 +130,28 @@ class Writer:
         """Text of an expression, by the names that are known here."""
         return ex.render(node, lambda each: region.known.get(each.same), self.straight)
 
-    def define(self, node: Node, region: _Region, pad: str, name: str | None = None) -> list[str]:
+    def settle(self, node: Node, region: _Region, pad: str) -> list[str]:
+        """Lines that give names to the parts of an expression that are needed again."""
+        if node.op in ex.LEAVES or node.same in region.known:
+            return []
+        lines = [line for each in node.args for line in self.settle(each, region, pad)]
+        again = sum(region in each.around for each in self.uses.get(node.same, ())) > 1
+        return lines + self.define(node, region, pad) if again and not _trivial(node) else lines
+
+    def define(self, node: Node, region: _Region, pad: str, name: str = "") -> list[str]:
         """Lines that give an expression a name."""
-        if name is None:
-            name = fresh_name(self.hints.get(node.same) or STEMS.get(node.op, "part"), self.taken)
         lines: list[str] = []
-        text = self.fitted(node, region, pad, lines, len(name))
+        if node.same not in region.known:
+            lines = [line for each in node.args for line in self.settle(each, region, pad)]
+        name = name or fresh_name(
+            self.hints.get(node.same) or STEMS.get(node.op, "part"), self.taken
+        )
+        text = self.text(node, region)
         if node.op not in ex.LEAVES:
             region.known.setdefault(node.same, name)
         if pad:
             self.inner.setdefault(name, "False" if node.kind == "bool" else "0.0")
-        if len(pad) + len(name) + len(text) + 3 > WIDTH:  # names alone are too long
-            return [*lines, f"{pad}{name} = (", f"{pad}    {text}", f"{pad})"]
-        return [*lines, f"{pad}{name} = {text}"]
-
-    def fitted(self, node: Node, region: _Region, pad: str, lines: list[str], used: int = 0) -> str:
-        """Text of an expression; what is in it more than once, or too long, gets names."""
-        if node.same not in region.known:
-            for each in node.args:
-                self.settle(each, region, pad, lines)
-        room = max(TERM - used - max(len(pad) - 8, 0), 32)
-        text = self.text(node, region)
-        while len(text) > room:
-            best = self.longest(node, region, room) or self.longest(node, region, TERM)
-            if best is None:
-                break
-            lines += self.define(best, region, pad)
-            text = self.text(node, region)
-        return text
-
-    def longest(self, node: Node, region: _Region, room: int) -> Node | None:
-        """The longest part of an expression that has no name yet and fits into `room`."""
-        best: Node | None = None
-        longest = 12
-        pending = list(node.args)
-        while pending:
-            each = pending.pop()
-            if each.same in region.known or each.op in ex.LEAVES:
-                continue
-            length = len(self.text(each, region))
-            if longest < length <= room:
-                best, longest = each, length
-            pending += each.args
-        return best
-
-    def settle(self, node: Node, region: _Region, pad: str, lines: list[str]) -> None:
-        """Names for the parts of an expression that are needed again."""
-        if node.op in ex.LEAVES or node.same in region.known:
-            return
-        for each in node.args:
-            self.settle(each, region, pad, lines)
-        if not _trivial(node) and self.shared(node, region):
-            lines += self.define(node, region, pad)
+        return [*lines, *assigned(name, text, pad)]
 
     def region(self, region: _Region, pad: str) -> list[str]:
         """Lines of items that are done together."""
@@ -218,36 +166,29 @@ class Writer:
         return lines
 
     def call(self, item: Call, region: _Region, pad: str) -> list[str]:
-        """Lines of a call."""
-        lines: list[str] = []
+        """Lines of a call, whose results are a tuple."""
         self.functions[item.function.name] = item.function
-        given = [self.fitted(node, region, pad, lines) for node in item.arguments]
+        lines = [line for each in item.arguments for line in self.settle(each, region, pad)]
+        given = ", ".join(self.text(node, region) for node in item.arguments)
         targets = [name if name in self.needed else "_" for name in item.results]
         if pad:
             self.inner |= dict.fromkeys(targets, "0.0")
-        function = f"{item.function.name}("
-        left = ", ".join(targets) + ("," if item.derivative is None and len(targets) == 1 else "")
-        if len(pad) + len(left) + len(function) + 4 <= WIDTH:
-            return [*lines, *listed(f"{left} = {function}", given, ")", pad)]
-        tail = listed(function, given, ")", pad)
-        head = [f"{pad}(", *filled(targets, pad), f"{pad})"]
-        return [*lines, *head[:-1], f"{head[-1]} = {tail[0].strip()}", *tail[1:]]
+        left = ", ".join(targets) + ("," if len(targets) == 1 else "")
+        return [*lines, *assigned(left, f"{item.function.name}({given})", pad)]
 
-    def results(self, nodes: Sequence[Node], region: _Region) -> list[str]:
-        """Texts of results, with names for those that are long or have one waiting."""
-        for node in nodes:
-            self.settle(node, region, "", self.lines)
-            if node.op in ex.LEAVES or _trivial(node) or node.same in region.known:
-                continue
-            if node.same in self.hints or len(self.text(node, region)) > 30:
-                self.lines += self.define(node, region, "")
-        return [self.fitted(node, region, "", self.lines) for node in nodes]
+    def result(self, node: Node, region: _Region) -> str:
+        """Text of a result, by a name where it is long or has one waiting."""
+        self.lines += self.settle(node, region, "")
+        text = self.text(node, region)
+        known = node.op in ex.LEAVES or _trivial(node) or node.same in region.known
+        if not known and (node.same in self.hints or len(text) > SHORT):
+            self.lines += self.define(node, region, "")
+        return self.text(node, region)
 
     def choice(self, item: Choice, region: _Region, pad: str) -> list[str]:
         """Lines of an `if` and its `else`."""
-        lines: list[str] = []
-        self.settle(item.test, region, pad, lines)
-        text = self.fitted(item.test, region, pad, lines)
+        lines = self.settle(item.test, region, pad)
+        text = self.text(item.test, region)
         made = []
         for k, side in enumerate(self.sides[item.number]):
             side.known = {**region.known, **(side.behind.known if side.behind else {})}
@@ -257,8 +198,10 @@ class Writer:
             made.append(inner)
         then, other = made
         if not then:
-            return [*lines, f"{pad}if not ({text}):", *other]
-        return [*lines, f"{pad}if {text}:", *then, *([f"{pad}else:", *other] if other else [])]
+            return [*lines, *bracketed("if not (", text, "):", pad), *other]
+        fits = len(pad) + len(text) < WIDTH - 4
+        head = [f"{pad}if {text}:"] if fits else bracketed("if (", text, "):", pad)
+        return [*lines, *head, *then, *([f"{pad}else:", *other] if other else [])]
 
 
 def _trivial(node: Node) -> bool:
@@ -273,6 +216,33 @@ def lines_of(code: Code, wanted: Iterable[Node], straight: bool = False) -> list
 
 
 # --- functions ------------------------------------------------------------------------------------
+
+
+def bracketed(start: str, text: str, end: str, pad: str = "") -> list[str]:
+    """Text within brackets, on one line or on as many as it takes."""
+    one, inner = f"{pad}{start}{text}{end}", f"{pad}    "
+    if len(one) <= WIDTH:
+        return [one]
+    wrapper = TextWrapper(
+        WIDTH,
+        initial_indent=inner,
+        subsequent_indent=inner,
+        break_long_words=False,
+        break_on_hyphens=False,
+    )
+    return [f"{pad}{start}", *wrapper.wrap(text), f"{pad}{end}"]
+
+
+def assigned(left: str, text: str, pad: str = "") -> list[str]:
+    """Lines of an assignment."""
+    one = f"{pad}{left} = {text}"
+    if len(one) <= WIDTH:
+        return [one]
+    if len(left) <= WIDTH // 2:
+        return bracketed(f"{left} = (", text, ")", pad)
+    *head, last = bracketed("(", left, ")", pad)
+    first, *tail = bracketed("(", text, ")", pad)
+    return [*head, f"{last} = {first.strip()}", *tail]
 
 
 def indented(lines: Iterable[str]) -> list[str]:
@@ -303,14 +273,15 @@ def function_text(
         writer = Writer(taken, code.items, results)
     else:
         writer = Writer(taken | swept.taken, swept.items, results, swept.hints)
-    inner = [f"    {line}" for line in writer.lines]
-    end = "," if len(results) == 1 and swept is not None else ""
-    back = f"    return {', '.join(writer.texts) or '()'}{end}"
-    if len(back) > WIDTH:
-        back = "\n".join(listed("return (", writer.texts, ")", "    "))
-    return "\n".join(
-        [*listed(f"def {name}(", list(formals), "):", ""), *documented(says), *inner, back, ""]
-    ), writer.functions
+    back = ", ".join(writer.texts) or "()"
+    if len(results) == 1 and swept is not None:
+        back += ","
+    fits = len(back) < WIDTH - 10
+    lines = [*writer.lines, *([f"return {back}"] if fits else bracketed("return (", back, ")"))]
+    head = bracketed(f"def {name}(", ", ".join(formals), "):")
+    if len(says) > WIDTH - 6:
+        says = "\n    (".join(says.rsplit(" (", 1))
+    return "\n".join([*head, f'    """{says}"""', *indented(lines), ""]), writer.functions
 
 
 UNNAMED = "00000000"
@@ -321,30 +292,3 @@ def named_by_text(name: str, text: str) -> tuple[str, str]:
     """A name for a function that no other has in place of one with `UNNAMED`, and its text."""
     digest = blake2b(text.encode(), digest_size=4).hexdigest()
     return name.replace(UNNAMED, digest), text.replace(UNNAMED, digest, 1)
-
-
-def documented(says: str) -> list[str]:
-    """A docstring, on as many lines as it takes."""
-    if len(says) + 10 <= WIDTH + 4:
-        return [f'    """{says}"""']
-    head, _, tail = says.rpartition(" (")
-    return [f'    """{head}', f'    ({tail}"""'] if head else [f'    """{says[:WIDTH]}"""']
-
-
-def listed(start: str, parts: Sequence[str], end: str, pad: str) -> list[str]:
-    """Parts within brackets, on one line or on as many as it takes."""
-    one = f"{pad}{start}{', '.join(parts)}{end}"
-    if len(one) <= WIDTH:
-        return [one]
-    return [f"{pad}{start}", *filled(parts, pad), f"{pad}{end}"]
-
-
-def filled(parts: Sequence[str], pad: str) -> list[str]:
-    """Parts on lines of their own within brackets."""
-    lines, line = list[str](), f"{pad}    "
-    for part in parts:
-        if len(line) + len(part) + 1 > WIDTH and line.strip():
-            lines.append(line.rstrip())
-            line = f"{pad}    "
-        line += f"{part}, "
-    return [*lines, line.rstrip()] if line.strip() else lines

@@ -9,7 +9,7 @@ from datetime import date
 from functools import cached_property
 from hashlib import blake2b
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,7 +21,12 @@ from swashplate.campaign.experiment import Experiment
 from swashplate.documents import read_json
 from swashplate.errors import FileError, InputError
 from swashplate.identification import tables
-from swashplate.identification.drive_model import Parameters, stage_problem, with_estimates
+from swashplate.identification.drive_model import (
+    Parameters,
+    stage_problem,
+    start_currents_of,
+    with_estimates,
+)
 from swashplate.identification.fitting import Fit, StageFit, smooth
 from swashplate.identification.identifiability import Identifiability, identifiability
 from swashplate.identification.intervals import (
@@ -34,7 +39,7 @@ from swashplate.identification.intervals import (
     slopes_by_fixed,
     uncertainty,
 )
-from swashplate.identification.problem import LinearisedFit, linearised_fit
+from swashplate.identification.problem import LinearisedFit, Loss, linearised_fit
 from swashplate.identification.profile import Profile, checked_ends, profiles_of
 from swashplate.identification.resampling import (
     Bootstrap,
@@ -42,8 +47,8 @@ from swashplate.identification.resampling import (
     bootstraps_of,
     cross_validate,
 )
-from swashplate.identification.setup import ModelParameters, ModelSetup, Setup
-from swashplate.identification.solving import Loss, Solution, StartResult
+from swashplate.identification.setup import ModelSetup, Setup
+from swashplate.identification.solving import Solution
 from swashplate.identification.unknowns import Unknown, Unknowns
 from swashplate.identification.validation import RunQuality, predict, run_qualities
 from swashplate.identification.verdict import LIMITS, REQUIRED, Verdict, verdict
@@ -200,7 +205,7 @@ class Judged(Result):
             axis=self.runs[0].axis,
             campaign=str(self.campaign.path),
             runs={each.name: fingerprint(each) for each in self.runs},
-            nominal=dict(start.numbers) if isinstance(start, ModelParameters) else dump_set(start),
+            nominal=dict(start.numbers) if isinstance(start, ModelSetup) else dump_set(start),
             setup=self.result.setup,
             stages=tuple(
                 StoredStage(
@@ -374,7 +379,7 @@ class StoredStage(Entry):
     unknowns: tuple[Unknown, ...]
     """With what their priors are worth."""
     solution: Solution
-    starts: tuple[StartResult, ...]
+    starts: tuple[Solution, ...]
 
 
 class FitFile(Entry):
@@ -448,13 +453,13 @@ def load_fit(
         raise InputError(f"{path} is the fit of a model of your own: give that, with --model FILE.")
     else:
         nominal = model.nominal(experiments)
-    if isinstance(nominal, ModelParameters) and nominal.setup.setup != file.setup:
+    if isinstance(nominal, ModelSetup) and nominal.setup != file.setup:
         raise InputError(f"{path} is the fit of another model, or of other bounds: fit again.")
-    parameters, stages = smooth(nominal), list[StageFit]()
+    parameters, stages, starts = smooth(nominal), list[StageFit](), dict[str, Any]()
     for stage, entry in zip(file.setup.stages, file.stages, strict=False):
         uncertain = file.setup.standard_uncertainty
         problem = stage_problem(
-            stage, parameters, experiments, threads=threads, uncertain=uncertain
+            stage, parameters, experiments, threads=threads, uncertain=uncertain, starts=starts
         )
         ours, theirs = (
             (name, [(unknown.name, unknown.run) for unknown in unknowns])
@@ -467,6 +472,7 @@ def load_fit(
             )
         problem = replace(problem, unknowns=Unknowns(entry.unknowns))
         parameters = with_estimates(parameters, problem, entry.solution.vector)
+        starts |= start_currents_of(problem, entry.solution.vector)
         stages.append(StageFit(stage, problem, entry.solution, parameters, entry.starts))
     found = Fit(file.setup, nominal, tuple(stages))
     return Judged(campaign, found, experiments, {}, file.profiles, file.folds, file.notes)

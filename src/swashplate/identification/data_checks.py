@@ -17,9 +17,8 @@ from swashplate.campaign.quality import beyond_the_card, spiked, turned, unsigne
 from swashplate.errors import InputError
 from swashplate.identification.drive_model import SIGNALS, simulated_run
 from swashplate.identification.model import EquationModel
-from swashplate.identification.problem import Problem
+from swashplate.identification.problem import Loss, Problem
 from swashplate.identification.setup import ModelSetup
-from swashplate.identification.solving import Loss
 from swashplate.parameters.parameter_set import ParameterSet
 from swashplate.parameters.rules import FULL_VOLTAGE
 

@@ -31,22 +31,15 @@ from swashplate.identification.drive_model import (
     Parameters,
     at_rate_of,
     stage_problem,
+    start_currents_of,
     with_estimates,
 )
 from swashplate.identification.faults import measurement_error
 from swashplate.identification.intervals import weighed
 from swashplate.identification.model import Model, OwnModel
-from swashplate.identification.problem import Problem
-from swashplate.identification.setup import ModelParameters, ModelSetup, Range, Setup, Stage
-from swashplate.identification.solving import (
-    Loss,
-    Progress,
-    Solution,
-    StartResult,
-    sobol_starts,
-    solve,
-    solve_from,
-)
+from swashplate.identification.problem import Loss, Problem
+from swashplate.identification.setup import ModelSetup, Range, Setup, Stage
+from swashplate.identification.solving import Progress, Solution, sobol_starts, solve, solve_from
 from swashplate.identification.unknowns import Unknown
 from swashplate.parameters.definitions import columns_of
 from swashplate.parameters.parameter_set import ParameterSet
@@ -58,6 +51,16 @@ if TYPE_CHECKING:
 
 P = TypeVar("P", bound=Parameters)
 Array = NDArray[np.float64]
+
+OTHERS = 6
+"""Starts besides the nominal one where that ends far from what was measured: of 856 sound campaigns
+five did; of two of them two and four of these starts reached the best."""
+UNEXPLAINED = 5.0
+"""Residuals over their known measurement error from which another optimum is looked for."""
+SPREAD = 0.05
+"""Standard deviation of the logarithm by which a drawn parameter differs from the nominal one."""
+OF_FORCES = ("Z19", "Z21")
+"""The solenoids' coefficients that are drawn where a set-up frees forces: those of odd powers."""
 
 
 @dataclass(frozen=True)
@@ -72,7 +75,7 @@ class Search:
     """Folder that keeps each result as it is ready, a folder in it for each stage."""
     resume: bool = False
     """Take what is in the store instead of computing it again."""
-    watch: Callable[[str, StartResult, int], None] | None = None
+    watch: Callable[[str, Solution, int], None] | None = None
     """Told the stage, each result and how many there are by now."""
 
 
@@ -85,7 +88,7 @@ class StageFit(Result):
     solution: Solution
     parameters: Parameters
     """The drive, or the model of one's own, with what was found."""
-    starts: tuple[StartResult, ...] = ()
+    starts: tuple[Solution, ...] = ()
     """How each start ended, where there was more than one."""
 
     @property
@@ -94,19 +97,14 @@ class StageFit(Result):
         return self.problem.unknowns.values(self.solution.vector)
 
     def bounds_reached(self) -> tuple[str, ...]:
-        """Sentences on unknowns that ended at a bound: the line that moves it, if there is one."""
-        point, said = self.problem.unknowns.at(self.solution.vector), []
-        for each, side in zip(point, point.at_bound.tolist(), strict=True):
-            if each.run is None and side:
-                line, end = self.stage.widened(each, side), "upper" if side > 0 else "lower"
-                bound = f"{each.name} ended at its {end} bound"
-                said.append(
-                    f"{bound}, the {'greatest' if side > 0 else 'least'} value that it may have."
-                    if line is None
-                    else f"{bound}; to let it go on, write {line} of the stage "
-                    f"'{self.stage.name}' and fit again."
-                )
-        return tuple(said)
+        """Sentences on unknowns of the machine that ended at a bound, and what to do about it."""
+        point = self.problem.unknowns.at(self.solution.vector)
+        return tuple(
+            f"{each.name} ended at its {'upper' if side > 0 else 'lower'} bound: "
+            f"{self.stage.beyond(each, side)}."
+            for each, side in zip(point, point.at_bound.tolist(), strict=True)
+            if each.run is None and side
+        )
 
     @property
     def drive(self) -> Drive:
@@ -117,7 +115,7 @@ class StageFit(Result):
         InputError
             If it is a model of one's own.
         """
-        if isinstance(self.parameters, ModelParameters):
+        if isinstance(self.parameters, ModelSetup):
             raise InputError(f"{self.parameters.name} is a model of your own, no drive.")
         return Drive(self.parameters)
 
@@ -142,6 +140,11 @@ class Fit(Result):
         """The fitted drive; refused where a model of one's own was fitted."""
         return self.stages[-1].drive
 
+    @property
+    def interrupted(self) -> bool:
+        """Whether it was stopped before the last stage's optimum."""
+        return self.stages[-1].solution.interrupted
+
     @cached_property
     def assessments(self) -> tuple[Assessment, ...]:
         """What the data tell of each stage's unknowns, and how well the runs are followed."""
@@ -163,23 +166,15 @@ class Fit(Result):
 
         said = list(self.doubts)
         for each in self.assessments:
-            solution = each.stage.solution
-            said.append(
-                f"{each.stage.stage.name}: {solution.message} after {solution.evaluations} "
-                "evaluations."
-            )
+            name, found = each.stage.stage.name, each.stage.solution
+            said.append(f"{name}: {found.message} after {found.evaluations} evaluations.")
             said += [*each.identifiability.sentences(), *each.uncertainty.sentences()]
             said += each.stage.bounds_reached()
         return (*said, fixed_line(self))
 
-    @property
-    def interrupted(self) -> bool:
-        """Whether it was stopped before the last stage's optimum."""
-        return self.stages[-1].solution.interrupted
-
 
 def fit(
-    model: Drive | Parameters | ModelSetup | Model | Equations,
+    model: Drive | Parameters | Model | Equations,
     tests: Campaign | Sequence[Experiment],
     free: Setup | Mapping[str, Range | Unknown] | None = None,
     *,
@@ -232,47 +227,34 @@ def fit(
     >>> fit(Drive.preset("hoist"), campaign, load_setup("hoist"))
     >>> fit(valve, campaign, {"lag": (0.005, 0.06, 0.5), "gain": (0.1, 1.0, 10.0)})
     """
-    experiments = tests.select(role="fit") if isinstance(tests, Campaign) else tuple(tests)
-    if not experiments:
+    runs = tests.select(role="fit") if isinstance(tests, Campaign) else tuple(tests)
+    if not runs:
         raise InputError("There is no run to fit.")
     nominal = model.parameters if isinstance(model, Drive) else model
-    doubts = refuse_unsound(spike_findings(experiments, loss))
+    doubts = refuse_unsound(spike_findings(runs, loss))
     if isinstance(nominal, ParameterSet):
         if not isinstance(free, Setup):
             raise InputError(
                 "A drive needs a Setup, such as load_setup('hoist'), for what is free."
             )
         setup = free
-        doubts += refuse_unsound(check_runs(experiments, smooth(nominal)))
-        nominal, changed = at_rate_of(experiments, nominal)
-        doubts = (*doubts, *changed)
-    elif not isinstance(nominal, ModelParameters):
-        own = nominal
-        if not isinstance(own, ModelSetup):
-            entries = free if isinstance(free, Mapping) else {}
-            named = tuple(channels), dict(noise or {}), dict(fixed or {})
-            own = ModelSetup(own, entries, "", *named)
-        doubts += refuse_unsound(check_model(experiments, own))
-        nominal = own.nominal(experiments)
-        setup = own.setup
+        doubts += refuse_unsound(check_runs(runs, smooth(nominal)))
+        nominal, changed = at_rate_of(runs, nominal)
+        doubts += changed
     else:
-        setup = nominal.setup.setup
-    parameters, stages = smooth(nominal), []
+        if not isinstance(nominal, ModelSetup):
+            entries = free if isinstance(free, Mapping) else {}
+            nominal = ModelSetup(nominal, entries, "", tuple(channels), noise or {}, fixed or {})
+        doubts += refuse_unsound(check_model(runs, nominal))
+        nominal = nominal if nominal.numbers else nominal.nominal(runs)
+        setup = nominal.setup
+    parameters, stages, starts = smooth(nominal), list[StageFit](), dict[str, Mapping[str, float]]()
     for stage in setup.stages:
+        uncertain = setup.standard_uncertainty
         problem = stage_problem(
-            stage, parameters, experiments, threads=threads, uncertain=setup.standard_uncertainty
+            stage, parameters, runs, threads=threads, uncertain=uncertain, starts=starts
         )
         refuse_unsound(check_rank(f"Stage {stage.name}", problem))
-        begin: Array | None = None
-        results: tuple[StartResult, ...] = ()
-        if search is not None and search.starts > 0:
-            results = _searched(stage, problem, search, tolerance, max_evaluations)
-            best = min(results, key=lambda each: each.cost)
-            begin = np.array(best.vector)
-            if len(results) <= search.starts:
-                solution = _stopped(best, len(results), 1 + search.starts)
-                stages.append(StageFit(stage, problem, solution, parameters, results))
-                break
         solved = partial(
             solve,
             loss=loss,
@@ -280,31 +262,53 @@ def fit(
             max_evaluations=max_evaluations,
             watch=None if watch is None else partial(watch, stage.name),
         )
-        solution = solved(problem, begin)
-        if search is None and loss == "linear" and _unexplained(problem, solution):
-            results = _from_elsewhere(problem, solution, tolerance, max_evaluations)
-            best = min(results, key=lambda each: each.cost)
-            if len(results) <= OTHERS:
-                solution = _stopped(best, len(results), 1 + OTHERS)
-            elif best.number and best.cost < solution.cost:
-                again = solved(problem, np.array(best.vector))
-                solution = replace(again, start_cost=solution.start_cost)
-        if any(each.prior is not None for each in problem.unknowns) and not solution.interrupted:
-            # what the residuals are worth is known only now
-            problem = weighed(problem, solution.vector)
-            solution = solved(problem, solution.vector)
+        problem, solution, several = _solved(stage, problem, solved, search)
         parameters = with_estimates(parameters, problem, solution.vector)
-        stages.append(StageFit(stage, problem, solution, parameters, results))
+        starts = {**starts, **start_currents_of(problem, solution.vector)}
+        stages.append(StageFit(stage, problem, solution, parameters, several))
         if solution.interrupted:
             break
     return Fit(setup, nominal, tuple(stages), doubts)
 
 
-OTHERS = 6
-"""Starts besides the nominal one where that ends far from what was measured: of 856 sound campaigns
-five did; of two of them two and four of these starts reached the best."""
-UNEXPLAINED = 5.0
-"""Residuals over their known measurement error from which another optimum is looked for."""
+def _solved(
+    stage: Stage, problem: Problem, solved: partial[Solution], search: Search | None
+) -> tuple[Problem, Solution, tuple[Solution, ...]]:
+    """A stage's problem, its priors weighed, its optimum, and how several starts ended."""
+    limits = {key: solved.keywords[key] for key in ("tolerance", "max_evaluations")}
+    several: tuple[Solution, ...] = ()
+    wanted = search.starts if search is not None else 0
+    if search is not None and wanted:
+        several = _searched(stage, problem, search, limits)
+        best = min(several, key=lambda each: each.cost)
+        if len(several) <= wanted:
+            return problem, _stopped(several, 1 + wanted), several
+        solution = solved(problem, best.vector)
+    else:
+        solution = solved(problem)
+    if search is None and solution.loss == "linear" and _unexplained(problem, solution):
+        try:
+            others = solve_from(problem, [*sobol_starts(problem, OTHERS, 0)], **limits)
+        except KeyboardInterrupt:  # before the first of them ended
+            others = ()
+        several = solution, *(replace(each, number=each.number + 1) for each in others)
+        best = min(several, key=lambda each: each.cost)
+        if len(several) <= OTHERS:
+            solution = _stopped(several, 1 + OTHERS)
+        elif best.number:
+            solution = solved(problem, best.vector)
+    if any(each.prior is not None for each in problem.unknowns) and not solution.interrupted:
+        # what the residuals are worth is known only now
+        problem = weighed(problem, solution.vector)
+        solution = solved(problem, solution.vector)
+    return problem, solution, several
+
+
+def _stopped(several: Sequence[Solution], planned: int) -> Solution:
+    """The best of some starts as what an interrupted search found."""
+    words = f"interrupted after {len(several)} of {planned} starts: the best of them"
+    best = min(several, key=lambda each: each.cost)
+    return replace(best, converged=False, interrupted=True, message=words)
 
 
 def _unexplained(problem: Problem, solution: Solution) -> bool:
@@ -322,19 +326,6 @@ def _unexplained(problem: Problem, solution: Solution) -> bool:
     return any(float(r @ r) > UNEXPLAINED**2 * r.size for r in joined)
 
 
-def _from_elsewhere(
-    problem: Problem, found: Solution, tolerance: float, max_evaluations: int
-) -> tuple[StartResult, ...]:
-    """The nominal start's result, and those of others over the bounds."""
-    starts = [*sobol_starts(problem, OTHERS, 0)]
-    try:
-        others = solve_from(problem, starts, tolerance=tolerance, max_evaluations=max_evaluations)
-    except KeyboardInterrupt:  # before the first of them ended
-        others = ()
-    nominal = StartResult.of(0, problem.start, found)
-    return nominal, *(replace(each, number=each.number + 1) for each in others)
-
-
 def smooth(parameters: P) -> P:
     """The set with the decay's switch split within the step.
 
@@ -347,12 +338,9 @@ def smooth(parameters: P) -> P:
 
 
 def _searched(
-    stage: Stage,
-    problem: Problem,
-    search: Search,
-    tolerance: float,
-    max_evaluations: int,
-) -> tuple[StartResult, ...]:
+    stage: Stage, problem: Problem, search: Search, limits: Mapping[str, float]
+) -> tuple[Solution, ...]:
+    """How the nominal start and the others that are wanted ended."""
     # starts run side by side, so each of them runs on one thread
     alone = replace(problem, threads=1)
     watch = search.watch
@@ -361,15 +349,14 @@ def _searched(
         [problem.start, *sobol_starts(alone, search.starts, search.seed)],
         executor=search.executor,
         store=None if search.store is None else search.store / stage.name,
-        origin=_origin(stage, problem, tolerance, max_evaluations),
+        origin=_origin(stage, problem, limits),
         resume=search.resume,
-        tolerance=tolerance,
-        max_evaluations=max_evaluations,
         watch=None if watch is None else (lambda result, done: watch(stage.name, result, done)),
+        **limits,
     )
 
 
-def _origin(stage: Stage, problem: Problem, *settings: object) -> dict[str, str]:
+def _origin(stage: Stage, problem: Problem, limits: Mapping[str, float]) -> dict[str, str]:
     """Fingerprints of all that the result of a start depends on."""
     known: object = (problem.start.tolist(), sorted(problem.fixed.items()))
     if isinstance(problem.model, DriveModel):
@@ -380,42 +367,19 @@ def _origin(stage: Stage, problem: Problem, *settings: object) -> dict[str, str]
     for experiment, weights in zip(problem.experiments, problem.weights, strict=True):
         arrays = [experiment.input.time, experiment.input.values]
         for name, weight in weights.items():
-            channel = experiment[name]
-            arrays += [channel.time, channel.values, weight]
+            arrays += [experiment[name].time, experiment[name].values, weight]
         for array in arrays:
             digest.update(np.ascontiguousarray(array).tobytes())
+    marks = {
+        "stage of the fit configuration": stage.model_dump_json(),
+        "tolerances": sorted(limits.items()),
+        "nominal values": known,
+    }
     return {
         "version of swashplate": __version__,
-        "stage of the fit configuration": _mark(stage.model_dump_json()),
-        "tolerances": _mark(settings),
-        "nominal values": _mark(known),
+        **{k: blake2b(repr(v).encode(), digest_size=8).hexdigest() for k, v in marks.items()},
         "runs and their weights": digest.hexdigest(),
     }
-
-
-def _mark(content: object) -> str:
-    return blake2b(repr(content).encode(), digest_size=8).hexdigest()
-
-
-def _stopped(best: StartResult, done: int, starts: int) -> Solution:
-    """The best of some starts as what an interrupted search found."""
-    return Solution(
-        np.array(best.vector),
-        best.cost,
-        best.start_cost,
-        best.evaluations,
-        False,
-        True,
-        f"interrupted after {done} of {starts} starts: the best of them",
-        best.seconds,
-    )
-
-
-SPREAD = 0.05
-"""Standard deviation of the logarithm by which a drawn parameter differs from the nominal one."""
-
-OF_FORCES = ("Z19", "Z21")
-"""The solenoids' coefficients that are drawn where a set-up frees forces: those of odd powers."""
 
 
 def drawn(nominal: Drive, setup: Setup, seed: int, *, spread: float = SPREAD) -> Drive:

@@ -5,13 +5,15 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
-from typing import TYPE_CHECKING, NamedTuple, TypeVar
+from typing import TYPE_CHECKING, Literal, NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from swashplate.campaign.experiment import Channel, Experiment
 from swashplate.equations import Model as OfEquations
+from swashplate.equations.marching.jacobian import triangle
+from swashplate.equations.marching.observation import ObservedRecord
 from swashplate.errors import InputError
 from swashplate.identification.model import (
     OFFSET,
@@ -24,7 +26,6 @@ from swashplate.identification.model import (
     refused_channel,
     simulated,
 )
-from swashplate.identification.solving import Evaluation, Loss, influence
 from swashplate.identification.unknowns import Unknowns
 from swashplate.results import Result, short
 
@@ -33,9 +34,22 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 Part = TypeVar("Part")
+Loss = Literal["linear", "soft_l1", "cauchy"]
 
 
-@dataclass(frozen=True)
+class Evaluation(NamedTuple):
+    """Residuals and their derivatives by the solver's vector at one point."""
+
+    def __repr__(self) -> str:
+        return short(self)
+
+    residuals: Array
+    """(m,) residuals, or any vector of which sum of squares and gradient are the same."""
+    jacobian: Array
+    """(m, K)"""
+
+
+@dataclass(frozen=True, eq=False)
 class Problem(Result):
     """Half the weighted sum of squares of all experiments, as a function of the unknowns.
 
@@ -61,7 +75,7 @@ class Problem(Result):
     """Linear map of a channel's samples, (m,) or (m, k), before they are compared: a position that
     drifts by its motion since the last anchor, for example."""
     _last: dict[tuple[bytes, bool], Evaluation] = field(
-        default_factory=dict, repr=False, init=False, compare=False
+        default_factory=dict, repr=False, init=False
     )
 
     def __post_init__(self) -> None:
@@ -105,91 +119,64 @@ class Problem(Result):
         return sum(int(np.count_nonzero(w)) for run in self.weights for w in run.values())
 
     def evaluate(self, vector: Array, *, compressed: bool = True) -> Evaluation:
-        """Residuals and Jacobian by the vector, see `solving.Objective`; the last ones are kept."""
+        """Residuals and Jacobian by the vector; compressed, as a triangular factor of a few rows.
+
+        The last ones are kept.
+
+        Raises
+        ------
+        DomainError
+            If the model does not hold there.
+        """
         key = vector.tobytes(), compressed
         if key not in self._last:
+            small = compressed and self.compare is None and isinstance(self.model, EquationModel)
+            parts = self._each(lambda k: (self._reduced if small else self._full)(vector, k))
+            parts.append(Evaluation(*self.unknowns.prior_rows(vector)))
+            residuals, jacobians = zip(*parts, strict=True)
             self._last.clear()
-            self._last[key] = self._evaluated(vector, compressed)
+            self._last[key] = Evaluation(np.concatenate(residuals), np.vstack(jacobians))
         return self._last[key]
 
-    def _evaluated(self, vector: Array, compressed: bool) -> Evaluation:
-        if compressed and self.compare is None and isinstance(self.model, EquationModel):
-            parts = self._each(lambda k: self._reduced(vector, k))
-        else:
-            parts = self._each(lambda k: self._full(vector, k))
-        residuals, rows = self.unknowns.prior_rows(vector)
-        return Evaluation(
-            np.concatenate([*(part.residuals for part in parts), residuals]),
-            np.vstack([*(part.jacobian for part in parts), rows]),
-        )
-
     def cost(self, vector: Array) -> float:
-        """Half the sum of squares."""
-        residuals, _ = self.unknowns.prior_rows(vector)
-        costs = self._each(lambda k: float(np.sum(self.residuals(vector, k) ** 2)))
-        return 0.5 * (sum(costs) + float(residuals @ residuals))
+        """Half the sum of squares alone, which is quicker."""
+
+        def squares(number: int) -> float:
+            experiment, total = self.experiments[number], 0.0
+            for name, output in self.outputs(vector, number).items():
+                residual = self._compared(experiment[name], output - experiment[name].values)
+                total += float(np.sum((self.weights[number][name] * residual) ** 2))
+            return total
+
+        priors, _ = self.unknowns.prior_rows(vector)
+        return 0.5 * (sum(self._each(squares)) + float(priors @ priors))
 
     def outputs(self, vector: Array, number: int) -> Mapping[str, Array]:
         """Simulated samples of the fitted channels of one experiment, offsets included."""
-        experiment = self.experiments[number]
-        values, own = self._values(vector, number), self.model_values(vector, number)
-        outputs = simulated(self.model, own, experiment)
+        experiment, values = self.experiments[number], self._values(vector, number)
+        outputs = simulated(self.model, self.model_values(vector, number), experiment)
         return {
             name: self._output(outputs, experiment, name) + values.get(f"{OFFSET}{name}", 0.0)
             for name in self.weights[number]
         }
 
-    def residuals(self, vector: Array, number: int) -> Array:
-        """Weighted residuals of one experiment, channel after channel, ignored samples as 0."""
-        outputs, experiment = self.outputs(vector, number), self.experiments[number]
-        return np.concatenate(
-            [
-                weight * self._compared(experiment[name], outputs[name] - experiment[name].values)
-                for name, weight in self.weights[number].items()
-            ]
-        )
-
     def linearised(self, vector: Array, number: int) -> Mapping[str, Linearised]:
         """Weighted residuals of each channel of one experiment and derivatives by the vector."""
-        experiment = self.experiments[number]
+        experiment, run = self.experiments[number], self.experiments[number].name
         values, own = self._values(vector, number), self.model_values(vector, number)
-        names = self._names(number)
-        inner = [name for name in names if name in own]
-        outputs = linearised(self.model, own, experiment, inner)
-        chain = self.unknowns.chain(vector, names, experiment.name)
-        made = {}
+        names = [name for name in self.unknowns.targets(vector, run) if name in own]
+        outputs = linearised(self.model, own, experiment, names)
+        chain, made = self.unknowns.chain(vector, names, run), {}
         for name, weight in self.weights[number].items():
+            channel, zero = experiment[name], f"{OFFSET}{name}"
             output = self._output(outputs, experiment, name)
-            by = np.zeros((weight.size, len(names)))
-            by[:, [names.index(each) for each in inner]] = output.by
-            offset = f"{OFFSET}{name}"
-            if offset in names:
-                by[:, names.index(offset)] = 1.0
-            shifted = output.values + values.get(offset, 0.0) - experiment[name].values
+            shifted = output.values + values.get(zero, 0.0) - channel.values
+            by = output.by @ chain + self.unknowns.chain(vector, [zero], run)
             made[name] = Linearised(
-                weight * self._compared(experiment[name], shifted),
-                weight[:, None] * self._compared(experiment[name], by @ chain),
+                weight * self._compared(channel, shifted),
+                weight[:, None] * self._compared(channel, by),
             )
         return made
-
-    def _compared(self, channel: Channel, rows: Array) -> Array:
-        return rows if self.compare is None else self.compare(channel, rows)
-
-    def _full(self, vector: Array, number: int) -> Evaluation:
-        parts = self.linearised(vector, number).values()
-        return Evaluation(
-            np.concatenate([part.values for part in parts]), np.vstack([part.by for part in parts])
-        )
-
-    def _reduced(self, vector: Array, number: int) -> Evaluation:
-        experiment = self.experiments[number]
-        names = self._names(number)
-        assert isinstance(self.model, EquationModel)
-        triangle = self.model.reduce(
-            self._values(vector, number), experiment, names, self.weights[number]
-        )
-        chain = self.unknowns.chain(vector, names, experiment.name)
-        return Evaluation(triangle[:, -1], triangle[:, :-1] @ chain)
 
     def model_values(self, vector: Array, number: int) -> dict[str, float]:
         """Values by the model's names for one experiment; a channel's zero is none of them."""
@@ -200,12 +187,8 @@ class Problem(Result):
     def _values(self, vector: Array, number: int) -> dict[str, float]:
         return {**self.fixed, **self.unknowns.targets(vector, self.experiments[number].name)}
 
-    def _names(self, number: int) -> list[str]:
-        """Names in the model that the unknowns of one experiment set."""
-        run = self.experiments[number].name
-        return [
-            target for each in self.unknowns if each.run in (None, run) for target in each.targets
-        ]
+    def _compared(self, channel: Channel, rows: Array) -> Array:
+        return rows if self.compare is None else self.compare(channel, rows)
 
     @staticmethod
     def _output(outputs: Mapping[str, Part], experiment: Experiment, name: str) -> Part:
@@ -213,19 +196,47 @@ class Problem(Result):
             raise refused_channel(experiment, name, outputs)
         return outputs[name]
 
+    def _full(self, vector: Array, number: int) -> Evaluation:
+        values, by = zip(*self.linearised(vector, number).values(), strict=True)
+        return Evaluation(np.concatenate(values), np.vstack(by))
+
+    def _reduced(self, vector: Array, number: int) -> Evaluation:
+        """A triangular factor of [J r] of one experiment, without ever holding J."""
+        assert isinstance(self.model, EquationModel)
+        experiment, (observed, names, asked, moves) = self.experiments[number], self._own[number]
+        values = self._values(vector, number)
+        offsets = [values.get(f"{OFFSET}{name}", 0.0) for name in self.weights[number]]
+        ready = self.model.ready(values, experiment, observed, asked, offsets)
+        found = triangle(ready.instance, observed, ready.paths, ready.own, moved=ready.moved)
+        chain = self.unknowns.chain(vector, names, experiment.name)
+        return Evaluation(found.factor[:, -1], found.factor[:, :-1] @ moves @ chain)
+
+    @cached_property
+    def _own(self) -> list[tuple[ObservedRecord, list[str], list[str], Array]]:
+        """Each experiment as the march of a model of equations sees it.
+
+        With the names of its unknowns, free zeros last; the columns that they ask for; and the
+        derivatives of those columns, and of one for each zero, by the names.
+        """
+        from scipy.linalg import block_diag
+
+        assert isinstance(self.model, EquationModel)
+        made = []
+        for number, experiment in enumerate(self.experiments):
+            names = list(self.unknowns.targets(self.start, experiment.name))
+            zeros = [z for name in self.weights[number] if (z := f"{OFFSET}{name}") in names]
+            others = [name for name in names if name not in zeros]
+            observed = self.model.observed(experiment, self.weights[number], zeros)
+            asked, by = self.model.columns(others)
+            made.append((observed, [*others, *zeros], asked, block_diag(by, np.eye(len(zeros)))))
+        return made
+
     def _each(self, work: Callable[[int], Part]) -> list[Part]:
-        """What is found for each experiment; each thread has a lot of them, dealt in turn."""
-        count = len(self.experiments)
-        lots = [range(k, count, self.threads) for k in range(min(self.threads, count))]
-        if len(lots) == 1:
-            return [work(number) for number in lots[0]]
-        done = _pool(self.threads).map(lambda lot: [work(number) for number in lot], lots)
-        found = {
-            k: part
-            for lot, parts in zip(lots, done, strict=True)
-            for k, part in zip(lot, parts, strict=True)
-        }
-        return [found[number] for number in range(count)]
+        """What is found for each experiment, in their order."""
+        numbers = range(len(self.experiments))
+        if min(self.threads, len(numbers)) == 1:
+            return [work(number) for number in numbers]
+        return list(_pool(self.threads).map(work, numbers))
 
 
 @lru_cache
@@ -255,25 +266,28 @@ def noise_scales(experiments: Sequence[Experiment], channels: Sequence[str]) -> 
         stated = [each.noise for each in having if each.noise is not None]
         if stated:
             scales[name] = float(np.sqrt(np.mean(np.square(stated))))
-            continue
-        if having[0].encoder is not None:
+        elif having[0].encoder is not None:
             # rounding to whole counts leaves an error between -1/2 and 1/2 of one
             scales[name] = abs(having[0].encoder.angle_per_count) / np.sqrt(12.0)
-            continue
-        # an ignored spike says nothing of the range
-        used = [each.values[each.used] for each in having if each.used.any()]
-        scales[name] = 0.01 * max((float(np.ptp(each)) for each in used), default=0.0)
+        else:
+            # an ignored spike says nothing of the range
+            used = [each.values[each.used] for each in having if each.used.any()]
+            scales[name] = 0.01 * max((float(np.ptp(each)) for each in used), default=0.0)
         if scales[name] == 0.0:
             raise InputError(f"The channel '{name}' never changes: nothing can be fitted to it.")
     return scales
 
 
+# --- at the optimum -------------------------------------------------------------------------------
+
 TOLERANCE = 1e-10
 """Singular values below this part of the largest count as zero.
 
 With exact derivatives a gauge of the hoist set-up lies at 1e-15 and the faintest direction that the
-tests do tell at 2e-5. Derivatives by central differences are good to about 1e-9: use 1e-6 there.
+tests do tell at 2e-5. Derivatives by central differences are good to about 1e-9: those take
+`BY_DIFFERENCES`.
 """
+BY_DIFFERENCES = 1e-6
 
 
 class LinearisedRun(NamedTuple):
@@ -293,11 +307,6 @@ class LinearisedRun(NamedTuple):
     """(n, K) derivatives of `residual` by the solver's vector."""
     weight: Array | None = None
     """(n,) the factors w; None where all are alike. Samples of factor 0 are dropped."""
-
-    @property
-    def label(self) -> str:
-        """Experiment and channel, for people."""
-        return f"{self.name}, {self.channel}"
 
 
 @dataclass(frozen=True, eq=False)
@@ -380,8 +389,7 @@ class LinearisedFit(Result):
             raise InputError(
                 f"{self.samples} sample{'s' if self.samples > 1 else ''} for {self.rank} "
                 f"parameter{'s' if self.rank > 1 else ''} leave nothing to estimate the noise "
-                "from; take "
-                "more samples or fewer parameters."
+                "from; take more samples or fewer parameters."
             )
 
 
@@ -426,8 +434,17 @@ def whitening(
     return inverse, determined
 
 
-BY_DIFFERENCES = 1e-6
-"""Singular values of difference derivatives below this part of the largest count as zero."""
+def influence(residuals: Array, loss: Loss) -> tuple[Array, Array]:
+    """ψ of each residual, half the derivative of its loss, and the derivative of that.
+
+    The losses are SciPy's, of residuals in units of their noise (Huber 1981, chapter 4).
+    """
+    z = residuals**2
+    if loss == "soft_l1":
+        return residuals / np.sqrt(1.0 + z), (1.0 + z) ** -1.5
+    if loss == "cauchy":
+        return residuals / (1.0 + z), (1.0 - z) / (1.0 + z) ** 2
+    return residuals, np.ones_like(residuals)
 
 
 def linearised_fit(problem: Problem, vector: Array, loss: Loss = "linear") -> LinearisedFit:
@@ -460,21 +477,19 @@ def linearised_fit(problem: Problem, vector: Array, loss: Loss = "linear") -> Li
             if used.any():
                 columns = experiment[name].time, part.values, part.by, weights[name]
                 runs.append(LinearisedRun(experiment.name, name, *(each[used] for each in columns)))
-    if loss != "linear":
-        for name in problem.channels:
-            mine = [k for k, run in enumerate(runs) if run.channel == name]
-            parts = [influence(runs[k].residual, loss) for k in mine]
-            slope = float(np.mean(np.concatenate([slopes for _, slopes in parts] or [np.ones(1)])))
-            if not slope > 0.0:
-                raise InputError(
-                    f"Most residuals of {name} lie in the tails of the loss '{loss}', which says "
-                    "nothing of them: state a larger noise for it, or take the loss 'linear'."
-                )
-            for k, (bounded, _) in zip(mine, parts, strict=True):
-                runs[k] = runs[k]._replace(residual=bounded / slope)
+    for name in problem.channels if loss != "linear" else ():
+        mine = [k for k, run in enumerate(runs) if run.channel == name]
+        parts = [influence(runs[k].residual, loss) for k in mine]
+        slope = float(np.mean(np.concatenate([slopes for _, slopes in parts] or [np.ones(1)])))
+        if not slope > 0.0:
+            raise InputError(
+                f"Most residuals of {name} lie in the tails of the loss '{loss}', which says "
+                "nothing of them: state a larger noise for it, or take the loss 'linear'."
+            )
+        for k, (bounded, _) in zip(mine, parts, strict=True):
+            runs[k] = runs[k]._replace(residual=bounded / slope)
     _, prior = problem.unknowns.prior_rows(vector)
     worths = [each.prior.worth for each in problem.unknowns if each.prior is not None]
-    exact = isinstance(problem.model, Differentiable)
-    tolerance = TOLERANCE if exact else BY_DIFFERENCES
+    tolerance = TOLERANCE if isinstance(problem.model, Differentiable) else BY_DIFFERENCES
     variables = problem.unknowns.at(vector)
     return LinearisedFit(tuple(runs), variables, prior, tolerance, np.array(worths))

@@ -13,7 +13,7 @@ from swashplate.errors import DomainError, InputError
 from swashplate.executors import Executor, Serial
 from swashplate.identification.drive_model import DriveModel
 from swashplate.identification.problem import TOLERANCE, LinearisedFit, Problem
-from swashplate.identification.solving import Evaluation, solve
+from swashplate.identification.solving import solve
 from swashplate.identification.unknowns import Vector
 from swashplate.results import Result
 
@@ -43,6 +43,9 @@ CLOSE = 1e-3
 
 FURTHEST = 300.0
 """Largest distance looked at, in first steps."""
+
+MOST = 40
+"""Largest number of points a side."""
 
 HALVINGS = 6
 """How often a step is halved at the edge of the model's domain."""
@@ -104,27 +107,12 @@ def profile(
     rise: float,
     step: float,
     bounds: tuple[float, float] = (-np.inf, np.inf),
-    *,
-    most: int = 40,
 ) -> Profile:
     """Profile of one unknown: outwards from the optimum both ways, each point from the last.
 
-    Parameters
-    ----------
-    minimise : callable
-        See `Minimise`. It may raise DomainError where the model does not hold.
-    vector, cost :
-        The optimum (K,), and its half sum of squares.
-    index : int
-        Number of the unknown.
-    rise : float
-        Of the cost at which the interval ends.
-    step : float
-        About one standard error of the unknown's number, positive: how far the first step goes.
-    bounds : (float, float)
-        Of the unknown's number.
-    most : int
-        Largest number of points a side.
+    The optimum is a vector (K,) with its half sum of squares; the interval ends where that has
+    risen by `rise`. `step`, positive, is about one standard error of the unknown's number in the
+    vector, `bounds` are those of the number. `minimise` may raise DomainError.
 
     Raises
     ------
@@ -140,31 +128,27 @@ def profile(
     if not bounds[0] <= vector[index] <= bounds[1]:
         raise InputError("The optimum of a profile lies outside the bounds of its parameter.")
     optimum = Point(float(vector[index]), cost, vector)
-    lower = _side(minimise, optimum, index, rise, -step, bounds[0], most)
-    upper = _Side([], "open", None, None)
+    lower = _side(minimise, optimum, index, rise, -step, bounds[0])
+    upper = _Side([], "open")
     if lower.better is None:
-        upper = _side(minimise, optimum, index, rise, step, bounds[1], most)
+        upper = _side(minimise, optimum, index, rise, step, bounds[1])
     better = lower.better or upper.better
-    return Profile(
-        index,
-        cost,
-        (*reversed(lower.points), optimum, *upper.points),
-        rise,
-        lower.end if better is None else None,
-        upper.end if better is None else None,
-        (lower.ending, upper.ending),
-        better,
-    )
+    points = sorted([*lower.points, optimum, *upper.points], key=lambda point: point.number)
+    ends = (lower.end, upper.end) if better is None else (None, None)
+    return Profile(index, cost, tuple(points), rise, *ends, (lower.ending, upper.ending), better)
 
 
 class _Side(NamedTuple):
     """One side of a profile."""
 
     points: list[Point]
-    """Outwards."""
     ending: Ending
-    end: float | None
-    better: Point | None
+    end: float | None = None
+    better: Point | None = None
+
+
+class _BetterOptimum(Exception):  # noqa: N818  it is a find, no error
+    """A point that costs less than the optimum."""
 
 
 def _side(
@@ -174,17 +158,19 @@ def _side(
     rise: float,
     step: float,
     bound: float,
-    most: int,
+    most: int = MOST,
 ) -> _Side:
     """Outwards until the cost has risen enough, or something else ends the side.
 
-    `step` is that of about one standard error, negative downwards.
+    `step` is that of about one standard error, negative downwards; `most` points are looked at.
     """
-    points: list[Point] = []
-    sign, step = float(np.sign(step)), abs(step)
+    points, sign, step = list[Point](), float(np.sign(step)), abs(step)
 
-    def at(distance: float) -> Point | None:
-        """The least cost there; None outside the model's domain."""
+    def height(distance: float) -> float | None:
+        """Root of the least cost's rise over the threshold's; None outside the model's domain.
+
+        It is nearly a straight line.
+        """
         number = optimum.number + sign * distance
         near = min((optimum, *points), key=lambda point: abs(point.number - number))
         start = near.vector.copy()
@@ -193,108 +179,78 @@ def _side(
             cost, vector = minimise(index, number, start)
         except DomainError:
             return None
-        return Point(number, float(cost), vector) if np.isfinite(cost) else None
+        if not np.isfinite(cost):
+            return None
+        if cost < optimum.cost - BETTER * rise:
+            raise _BetterOptimum(Point(number, float(cost), vector))
+        points.append(Point(number, float(cost), vector))
+        return float(np.sqrt(max(cost - optimum.cost, 0.0) / rise))
 
-    def improves(point: Point) -> bool:
-        return point.cost < optimum.cost - BETTER * rise
+    def walked() -> tuple[Ending, float | None]:
+        """How the side ended, and how far from the optimum the cost has risen just enough."""
+        near, low, stride, halvings = 0.0, 0.0, STRIDE * step, 0
+        while len(points) < most:
+            distance = min(near + stride, abs(bound - optimum.number))
+            if distance <= near:
+                return "bound", None
+            if distance > FURTHEST * step:
+                break
+            now = height(distance)
+            if now is None:
+                if halvings == HALVINGS:
+                    return "domain", None
+                halvings, stride = halvings + 1, 0.5 * stride
+                continue
+            if now >= 1.0:
+                return "crossed", _crossing(height, near, low, distance, now)
+            # slowly, so that the next start is good and a flat stretch is not leapt over
+            stride *= float(np.clip(STRIDE / max(now - low, 0.1 * STRIDE), 0.3, 2.5))
+            near, low = distance, now
+        return "open", None
 
-    def height(point: Point) -> float:
-        # the root of the rise over the threshold's is nearly a straight line
-        return float(np.sqrt(max(point.cost - optimum.cost, 0.0) / rise))
+    try:
+        ending, distance = walked()
+    except _BetterOptimum as found:
+        return _Side(points, "better optimum", better=found.args[0])
+    end = None if distance is None else optimum.number + sign * distance
+    return _Side(points, ending, end)
 
-    before, stride, halvings = (0.0, 0.0), STRIDE * step, 0
-    while len(points) < most:
-        distance = min(before[0] + stride, abs(bound - optimum.number))
-        if distance <= before[0]:
-            return _Side(points, "bound", None, None)
-        if distance > FURTHEST * step:
-            break
-        point = at(distance)
-        if point is None:
-            if halvings == HALVINGS:
-                return _Side(points, "domain", None, None)
-            halvings, stride = halvings + 1, 0.5 * stride
-            continue
-        if improves(point):
-            return _Side(points, "better optimum", None, point)
-        points.append(point)
-        now = height(point)
-        if now >= 1.0:
-            break
-        gained = max(now - before[1], 0.1 * STRIDE)
-        before = (distance, now)
-        # slowly, so that the next start is good and a flat stretch is not leapt over
-        stride *= float(np.clip(STRIDE / gained, 0.3, 2.5))
-    if not points or height(points[-1]) < 1.0:
-        return _Side(points, "open", None, None)
-    # where it has risen just enough, by false position (Illinois) in the root
-    (near, low), (far, high) = (before[0], before[1] - 1.0), (distance, now - 1.0)
+
+def _crossing(
+    height: Callable[[float], float | None], near: float, low: float, far: float, high: float
+) -> float:
+    """Distance of height 1 between two, by false position (Illinois)."""
+    low, high = low - 1.0, high - 1.0
     distance = far
     for _ in range(12):
         if abs(high) <= CLOSE:
-            distance = far
             break
         distance = far - high * (far - near) / (high - low)
-        point = at(distance)
-        if point is None:
+        now = height(distance)
+        if now is None:
             break
-        if improves(point):
-            return _Side(points, "better optimum", None, point)
-        points.append(point)
-        points.sort(key=lambda each: abs(each.number - optimum.number))
-        value = height(point) - 1.0
-        if abs(value) <= CLOSE:
-            break
-        if value * high < 0.0:
+        if (now - 1.0) * high < 0.0:
             near, low = far, high
         else:
             low *= 0.5
-        far, high = distance, value
-    return _Side(points, "crossed", optimum.number + sign * distance, None)
-
-
-@dataclass(frozen=True, eq=False)
-class _Beside:
-    """A problem with one of its unknowns fixed, as `solving.Objective` has it."""
-
-    problem: Problem
-    index: int
-    number: float
-    """Of the fixed unknown, in the solver's vector."""
-    start: Array
-    """(K - 1,)"""
-
-    @property
-    def bounds(self) -> tuple[Array, Array]:
-        low, high = self.problem.bounds
-        return np.delete(low, self.index), np.delete(high, self.index)
-
-    def evaluate(self, vector: Array, *, compressed: bool = True) -> Evaluation:
-        whole = self.problem.evaluate(self.whole(vector), compressed=compressed)
-        return Evaluation(whole.residuals, np.delete(whole.jacobian, self.index, axis=1))
-
-    def cost(self, vector: Array) -> float:
-        return self.problem.cost(self.whole(vector))
-
-    def whole(self, vector: Array) -> Array:
-        return np.insert(vector, self.index, self.number)
+        far, high = distance, now - 1.0
+    return distance
 
 
 def minimiser(problem: Problem, *, tolerance: float = 1e-8, max_evaluations: int = 60) -> Minimise:
     """What `profile` asks for: the least cost with one unknown fixed."""
 
     def minimise(index: int, number: float, start: Array) -> tuple[float, Array]:
-        low, high = problem.bounds
-        others = np.delete(np.clip(start, low, high), index)
-        if not others.size:
-            vector = np.array([number])
-            return problem.cost(vector), vector
-        beside = _Beside(problem, index, number, others)
-        found = solve(beside, tolerance=tolerance, max_evaluations=max_evaluations)
-        return found.cost, beside.whole(found.vector)
+        if start.size == 1:
+            return problem.cost(start), start
+        limits = {"tolerance": tolerance, "max_evaluations": max_evaluations}
+        found = solve(problem, start, fixed={index: number}, **limits)  # type: ignore[arg-type]
+        return found.cost, found.vector
 
     return minimise
 
+
+# --- where derivatives mislead --------------------------------------------------------------------
 
 SWITCHING = ("V_dz", "J_", "lim", "I_t", "Z13", "Z14", "Z15", "Z16", "Z17")
 """What the names of a drive's parameters begin with at which its equations switch."""
@@ -390,12 +346,11 @@ def _unneeded(problem: Problem, vector: Array, index: int, cost: float, rise: fl
     It is given up where a first linear step leaves far too much. Then it is followed for a few
     evaluations at a time, until the cost falls so slowly that the tries left would not do.
     """
-    start = vector.copy()
+    start, minimise = vector.copy(), minimiser(problem, tolerance=1e-6, max_evaluations=LOOK)
     start[index] = problem.bounds[1][index]
-    others = _Beside(problem, index, float(start[index]), np.delete(start, index))
-    minimise = minimiser(problem, tolerance=1e-6, max_evaluations=LOOK)
     try:
-        residuals, jacobian = others.evaluate(others.start)
+        residuals, jacobian = problem.evaluate(start)
+        jacobian = np.delete(jacobian, index, axis=1)
         step = np.linalg.lstsq(jacobian, residuals, rcond=TOLERANCE)[0]
         left = 0.5 * float(np.sum((residuals - jacobian @ step) ** 2))
         if left - cost > HOPELESS * rise:
@@ -414,14 +369,7 @@ def _unneeded(problem: Problem, vector: Array, index: int, cost: float, rise: fl
     return False
 
 
-class _Work(NamedTuple):
-    """What a worker needs to follow a profile."""
-
-    problem: Problem
-    vector: Array
-    cost: float
-    rises: dict[int, float]
-    steps: Array
+# --- of a stage -----------------------------------------------------------------------------------
 
 
 def profiles_of(
@@ -431,21 +379,10 @@ def profiles_of(
     executor: Executor | None = None,
     watch: Callable[[int], None] | None = None,
 ) -> dict[str, Profile]:
-    """Profile likelihoods of a stage's unknowns.
+    """Profile likelihoods of a stage's unknowns by name, in their order.
 
-    Parameters
-    ----------
-    assessment : Assessment
-        Of the stage.
-    names : sequence of str, optional
-        Which unknowns; by default all of the machine that have an interval.
-    executor, watch :
-        Where they are followed, here by default; told how many are done.
-
-    Returns
-    -------
-    dict of str to Profile
-        In the order of the unknowns. What earlier stages do not know is not in them.
+    By default of all unknowns of the machine that have an interval. What earlier stages do not know
+    is not in them. `watch` is told how many are done.
 
     Raises
     ------
@@ -471,8 +408,7 @@ def profiles_of(
     quantiles = stdtrit(found.own.degrees_of_freedom, 0.5 + 0.5 * found.level)
     every = quantiles**2 * found.inflation * cost / fit.spare_samples
     rises = {k: float(every[k]) for k in chosen}
-    steps = found.own.standard_errors
-    shared = _Work(replace(problem, threads=1), vector, cost, rises, steps)
+    shared = replace(problem, threads=1), vector, cost, rises, found.own.standard_errors
     made: dict[str, Profile] = {}
     for position, each in (executor or Serial()).run(_profiled, shared, chosen):
         made[variables.names[chosen[position]]] = each
@@ -481,10 +417,10 @@ def profiles_of(
     return {variables.names[k]: made[variables.names[k]] for k in chosen}
 
 
-def _profiled(shared: _Work, index: int) -> Profile:
-    low, high = (float(each[index]) for each in shared.problem.bounds)
-    step = float(shared.steps[index])
+def _profiled(shared: tuple[Problem, Array, float, dict[int, float], Array], index: int) -> Profile:
+    problem, vector, cost, rises, steps = shared
+    low, high = (float(each[index]) for each in problem.bounds)
+    step = float(steps[index])
     if not (np.isfinite(step) and step > 0.0):
         step = 0.01 * (high - low)
-    least, rise = minimiser(shared.problem), shared.rises[index]
-    return profile(least, shared.vector, shared.cost, index, rise, step, (low, high))
+    return profile(minimiser(problem), vector, cost, index, rises[index], step, (low, high))

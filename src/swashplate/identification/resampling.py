@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from copy import copy
-from dataclasses import dataclass, replace
-from math import sqrt
-from typing import TYPE_CHECKING, NamedTuple
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,16 +17,17 @@ from swashplate.executors import Executor, Serial
 from swashplate.identification.drive_model import (
     DriveModel,
     Parameters,
+    Starts,
     simulated_current,
-    stage_problem,
+    start_currents_of,
 )
-from swashplate.identification.fitting import Fit, Search, StageFit, fit, smooth
+from swashplate.identification.fitting import Search, StageFit, fit
 from swashplate.identification.noise import grid_of, noise_colours, unweighted, without_lines
-from swashplate.identification.problem import LinearisedFit, Problem
+from swashplate.identification.problem import LinearisedFit, Loss, Problem
 from swashplate.identification.setup import Setup
-from swashplate.identification.solving import Loss, solve
+from swashplate.identification.solving import NO_EFFECT, solve
 from swashplate.identification.unknowns import Unknowns
-from swashplate.identification.validation import Measures, predict, with_speeds
+from swashplate.identification.validation import Measures, measures, predict, with_speeds
 from swashplate.parameters.parameter_set import ParameterSet
 from swashplate.results import Result
 
@@ -35,18 +35,6 @@ if TYPE_CHECKING:
     from swashplate.identification.assessment import Assessment
 
 Array = NDArray[np.float64]
-
-
-class HeldRun(NamedTuple):
-    """How well one channel of a run is predicted by a fit that did not see it."""
-
-    run: str
-    maneuver: str
-    channel: str
-    unit: str
-    measures: Measures
-    mean: float
-    """Of what was measured. [unit]"""
 
 
 @dataclass(frozen=True)
@@ -57,11 +45,12 @@ class Fold(Result):
     """From 0."""
     held: tuple[str, ...]
     """Names of the runs that were held out."""
-    lost: tuple[str, ...]
-    """Unknowns that only the runs held out tell of: this fold's fit does not determine them."""
-    runs: tuple[HeldRun, ...]
-    converged: bool
-    failure: str
+    lost: tuple[str, ...] = ()
+    """Unknowns on which no run left in the fold depends: where its fit leaves them is chance."""
+    measures: Mapping[str, Measures] = field(default_factory=dict)
+    """Measures of each channel over the runs that were held out."""
+    converged: bool = False
+    failure: str = ""
     """Why there is no fit, or empty."""
 
 
@@ -73,25 +62,10 @@ class CrossValidation(Result):
     planned: int
     """How many folds there were to be."""
     folds: tuple[Fold, ...]
-
-    @property
-    def measures(self) -> dict[str, Measures]:
-        """Measures of each channel over all runs, each predicted by a fit that did not see it."""
-        runs, made = [run for fold in self.folds for run in fold.runs], {}
-        for name in dict.fromkeys(run.channel for run in runs):
-            alike = [run for run in runs if run.channel == name]
-            samples = np.array([run.measures.samples for run in alike])
-            share, means = samples / samples.sum(), np.array([run.mean for run in alike])
-            rmse, spread = (np.array(x) for x in zip(*(r.measures[1:] for r in alike), strict=True))
-            # as if all samples were of one run: about the mean of all
-            variance = float(share @ (spread**2 + (means - share @ means) ** 2))
-            made[name] = Measures(int(samples.sum()), sqrt(share @ rmse**2), sqrt(variance))
-        return made
-
-    @property
-    def units(self) -> dict[str, str]:
-        """SI unit of each channel."""
-        return {run.channel: run.unit for fold in self.folds for run in fold.runs}
+    measures: Mapping[str, Measures]
+    """Measures of each channel over all runs, each predicted by a fit that did not see it."""
+    units: Mapping[str, str]
+    """SI unit of each channel."""
 
     def sentences(self) -> tuple[str, ...]:
         """What must be known besides the numbers."""
@@ -106,15 +80,12 @@ class CrossValidation(Result):
                 said.append(f"{name} did not converge.")
             if fold.lost:
                 said.append(
-                    f"{name} loses {', '.join(fold.lost)}: only the held-out runs "
-                    f"determine {'them' if len(fold.lost) > 1 else 'it'}, so their prediction is "
-                    "not reliable."
+                    f"{name} loses {', '.join(fold.lost)}, on which no other run depends: its "
+                    "prediction is not reliable."
                 )
         return tuple(said)
 
 
-LEFT = 0.01
-"""Share of what all runs tell of an unknown, below which the runs left in a fold do not tell it."""
 ONE_WAY = 0.25
 """A command whose smaller extreme is below this part of the larger one goes one way."""
 
@@ -134,20 +105,15 @@ def cross_validate(
 
     Parameters
     ----------
-    experiments : sequence of Experiment
-        The runs of the fit.
-    nominal : ParameterSet or ModelParameters
-        Where each fit begins: not at the fit to all runs, which has seen those that are held out.
-    setup : Setup
-        Stages and free parameters.
+    experiments, nominal, setup, loss :
+        As of `fitting.fit`: each fit begins at nominal values, not at the fit to all runs, which
+        has seen those that are held out.
     folds : int
         Parts, at least 2 and at most as many as there are runs: then each run is one.
     seed : int
         Of the dealing; the same seed, the same folds.
     executor : Executor, optional
-        Where the fits run; here, one after another, by default. The results do not depend on it.
-    loss : Loss
-        As of `fitting.fit`.
+        Where the fits run; here by default. The results do not depend on it.
     watch : callable, optional
         Told of each fold and how many there are by now. Ctrl-C ends it; folds that are done are
         returned.
@@ -161,16 +127,30 @@ def cross_validate(
     here = executor or Serial()
     # fits run side by side elsewhere, so each of them runs on one thread
     shared = tuple(experiments), nominal, setup, loss, None if isinstance(here, Serial) else 1
-    done: dict[int, Fold] = {}
+    done: dict[int, tuple[Fold, list[_Held]]] = {}
     try:
-        for _, fold in here.run(_fold, shared, list(enumerate(parts))):
-            done[fold.number] = fold
+        for place, found in here.run(_fold, shared, list(enumerate(parts))):
+            done[place] = found
             if watch is not None:
-                watch(fold, len(done))
+                watch(found[0], len(done))
     except KeyboardInterrupt:
         if not done:
             raise
-    return CrossValidation(seed, len(parts), tuple(done[number] for number in sorted(done)))
+    ended = [done[place] for place in sorted(done)]
+    held = [each for _, of_fold in ended for each in of_fold]
+    units = {name: unit for name, unit, *_ in held}
+    made = tuple(fold for fold, _ in ended)
+    return CrossValidation(seed, len(parts), made, _measured(held), units)
+
+
+_Held = tuple[str, str, Array, Array]
+"""Channel, unit, and what was measured and predicted of the samples that count in one run."""
+
+
+def _measured(held: Sequence[_Held]) -> dict[str, Measures]:
+    """Measures of each channel over some runs."""
+    names = dict.fromkeys(name for name, *_ in held)
+    return {n: measures(*((a, b, None) for name, _, a, b in held if name == n)) for n in names}
 
 
 def deal(experiments: Sequence[Experiment], folds: int, seed: int) -> tuple[tuple[int, ...], ...]:
@@ -208,53 +188,34 @@ def deal(experiments: Sequence[Experiment], folds: int, seed: int) -> tuple[tupl
 def _fold(
     shared: tuple[tuple[Experiment, ...], Parameters, Setup, Loss, int | None],
     item: tuple[int, tuple[int, ...]],
-) -> Fold:
+) -> tuple[Fold, list[_Held]]:
     (experiments, nominal, setup, loss, threads), (number, part) = shared, item
-    held = [experiments[place] for place in part]
+    left_out = [experiments[place] for place in part]
     others = [each for place, each in enumerate(experiments) if place not in part]
-    names = tuple(each.name for each in held)
+    names = tuple(each.name for each in left_out)
     try:
         result = fit(nominal, others, setup, loss=loss, threads=threads, search=Search(0))
         if result.stages[-1].solution.interrupted:
             raise KeyboardInterrupt
-        predicted = with_speeds(predict(result.parameters, held))
+        predicted = with_speeds(predict(result.parameters, left_out))
     except (InputError, DomainError) as error:
-        return Fold(number, names, (), (), False, str(error))
-    runs = []
+        return Fold(number, names, failure=str(error)), []
+    held = []
     for each in predicted:
-        run, channel = each.experiment, each.experiment[each.channel]
-        mean = float(channel.values[channel.used].mean())
-        named = (run.name, run.maneuver, each.channel, channel.unit)
-        runs.append(HeldRun(*named, each.measures, mean))
-    converged = all(each.solution.converged for each in result.stages)
-    return Fold(number, names, _lost(result, held, threads), tuple(runs), converged, "")
-
-
-def _lost(result: Fit, held: Sequence[Experiment], threads: int | None) -> tuple[str, ...]:
-    """Unknowns that the runs held out tell, and those left in do not."""
-    lost, before = [], smooth(result.nominal)
+        channel = each.experiment[each.channel]
+        samples = channel.values[channel.used], each.simulated[channel.used]
+        held.append((each.channel, channel.unit, *samples))
+    lost = list[str]()
     for stage in result.stages:
-        parameters, before = before, stage.parameters
-        try:
-            apart = stage_problem(stage.stage, parameters, held, threads=threads)
-        except InputError:  # none of them has a channel of this stage
-            continue
-        # in the units of all runs: information in other units cannot be compared
-        apart = replace(apart, scales=stage.problem.scales)
-        left, there = (
-            np.sum(problem.evaluate(vector).jacobian ** 2, axis=0)
-            for problem, vector in (
-                (stage.problem, stage.solution.vector),
-                (apart, apart.unknowns.vector_of(stage.values)),
-            )
-        )
-        told = dict(zip(apart.unknowns.names, there, strict=True))
-        lost += [
-            unknown.name
-            for unknown, kept in zip(stage.problem.unknowns, left, strict=True)
-            if unknown.run is None and kept < LEFT * (kept + told.get(unknown.name, 0.0))
-        ]
-    return tuple(lost)
+        effects = np.linalg.norm(stage.problem.evaluate(stage.solution.vector).jacobian, axis=0)
+        least = NO_EFFECT * effects.max()
+        each_one = zip(stage.problem.unknowns, effects, strict=True)
+        lost += [each.name for each, effect in each_one if each.run is None and effect <= least]
+    converged = all(each.solution.converged for each in result.stages)
+    return Fold(number, names, tuple(lost), _measured(held), converged), held
+
+
+# --- bootstrap ------------------------------------------------------------------------------------
 
 
 class NoiseDraws:
@@ -311,6 +272,10 @@ class NoiseDraws:
         return tuple(made)
 
 
+FEWEST_DRAWS = 40
+"""Draws that reach the ends of a 95 % interval."""
+
+
 @dataclass(frozen=True, eq=False)
 class Bootstrap(Result):
     """Estimates from other noise."""
@@ -329,23 +294,21 @@ class Bootstrap(Result):
         """(draws, K) in their own units."""
         return self.variables.to_values(self.vectors)
 
-    def intervals(self, level: float = 0.95) -> tuple[tuple[float, float] | None, ...]:
-        """Percentile intervals in own units; None for what is fixed or undetermined.
+    def intervals(self) -> tuple[tuple[float, float] | None, ...]:
+        """Percentile intervals of 95 % in own units; None for what is fixed or undetermined.
 
         Raises
         ------
         InputError
-            If the level is not between 0 and 1, or too few draws reach its ends.
+            If too few draws reach their ends.
         """
-        if not 0.0 < level < 1.0:
-            raise InputError(f"The level {level:g} of an interval must lie between 0 and 1.")
         draws = self.vectors.shape[0]
-        if 0.5 * (1.0 - level) * draws < 1.0:
+        if draws < FEWEST_DRAWS:
             raise InputError(
-                f"{draws} draws do not reach the ends of a {100.0 * level:g} % interval; take "
-                f"{int(np.ceil(2.0 / (1.0 - level)))} or more."
+                f"{draws} draws do not reach the ends of a 95 % interval; take {FEWEST_DRAWS} or "
+                "more."
             )
-        ends = np.quantile(self.values, [0.5 - 0.5 * level, 0.5 + 0.5 * level], axis=0)
+        ends = np.quantile(self.values, [0.025, 0.975], axis=0)
         return tuple(
             (float(low), float(high)) if known else None
             for low, high, known in zip(*ends, self.determined, strict=True)
@@ -363,9 +326,6 @@ class Bootstrap(Result):
         return tuple(said)
 
 
-_Stages = Sequence[tuple[StageFit, NoiseDraws]]
-
-
 def bootstraps_of(
     assessments: Sequence[Assessment],
     draws: int = 1000,
@@ -376,23 +336,8 @@ def bootstraps_of(
 ) -> dict[str, Bootstrap]:
     """Fit all stages again and again to what they simulate with other noise of the same colour.
 
-    Parameters
-    ----------
-    assessments : sequence of Assessment
-        Of the stages. In each draw a pump is driven by the current of the card of that draw.
-    draws : int
-        How many times, at least 2.
-    seed : int
-        Of the noise; draw k is the same on any executor.
-    executor : Executor, optional
-        Where the fits run; here by default.
-    watch : callable, optional
-        Told how many are done.
-
-    Returns
-    -------
-    dict of str to Bootstrap
-        By stage.
+    Results by stage. In each draw a pump is driven by the current of the card of that draw; draw k
+    of a seed is the same on any executor. `watch` is told how many are done.
 
     Raises
     ------
@@ -424,21 +369,26 @@ def bootstraps_of(
     return made
 
 
-def _refitted(shared: _Stages, number: int) -> tuple[Array, ...] | None:
+def _refitted(
+    shared: Sequence[tuple[StageFit, NoiseDraws]], number: int
+) -> tuple[Array, ...] | None:
     """The vectors of all stages fitted to one draw; None if a fit did not end."""
     vectors: list[Array] = []
-    parameters: ParameterSet | None = None
+    card: tuple[ParameterSet, Starts] | None = None
     for stage, noise in shared:
         problem = _redrawn(stage, noise, number)
         model = problem.model
-        if parameters is not None and isinstance(model, DriveModel):
+        if card is not None and isinstance(model, DriveModel):
             # another card, whose current drives the pump where it did before
+            parameters, starts = card
             currents = {
-                each.name: simulated_current(each, parameters)
+                each.name: simulated_current(each, parameters, starts.get(each.name, {}))
                 for each in problem.experiments
-                if stage.stage.current == "simulated" and each.input.kind == "voltage"
+                if model.currents
+                and stage.stage.current == "simulated"
+                and each.input.kind == "voltage"
             }
-            currents = {**model.currents, **(currents if model.currents else {})}
+            currents = {**model.currents, **currents}
             model = DriveModel(parameters, model.part, currents, model.forces)
             problem = replace(problem, model=model)
         try:
@@ -449,7 +399,8 @@ def _refitted(shared: _Stages, number: int) -> tuple[Array, ...] | None:
             return None
         vectors.append(solution.vector)
         if isinstance(model, DriveModel) and model.part == "card":
-            parameters = model.parameters_at(problem.unknowns.targets(solution.vector, ""))
+            found = model.parameters_at(problem.unknowns.targets(solution.vector, ""))
+            card = found, start_currents_of(problem, solution.vector)
     return tuple(vectors)
 
 

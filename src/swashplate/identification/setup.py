@@ -11,7 +11,14 @@ from typing import Annotated, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict, Field, PositiveFloat, model_validator
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    ConfigDict,
+    Field,
+    PositiveFloat,
+    model_validator,
+)
 
 from swashplate.campaign import ChannelKind
 from swashplate.campaign.experiment import Experiment
@@ -19,7 +26,7 @@ from swashplate.campaign.schema import NotNegative, Weight, Window
 from swashplate.documents import parse_toml, read_text, validated
 from swashplate.equations import Model as Equations
 from swashplate.errors import FileError, InputError, ParameterError
-from swashplate.identification.model import OFFSET, Model, OwnModel, simulated
+from swashplate.identification.model import OFFSET, START, OwnModel, simulated
 from swashplate.identification.problem import Problem, noise_scales
 from swashplate.identification.solving import solve
 from swashplate.identification.unknowns import Unknown, Unknowns
@@ -28,6 +35,7 @@ from swashplate.parameters.parameter_set import ParameterSet
 from swashplate.results import Result, short
 
 Array = NDArray[np.float64]
+_SETUPS = files("swashplate.identification").joinpath("setups")
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 Positive = Annotated[PositiveFloat, Field(allow_inf_nan=False)]
 Pair = tuple[Finite, Finite]
@@ -38,12 +46,17 @@ StandardUncertainty = (
 """A standard uncertainty: in SI units, or as "5 %" of the value."""
 COEFFICIENTS = ("Z19", "Z20", "Z21", "Z22")
 """Of the solenoids: what forces stand for."""
+ORDERS = np.arange(1, 5)
+"""Powers of the effective current that they multiply."""
 
 
 class Entry(BaseModel):
     """A table of the file; a key that it does not know is refused."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, populate_by_name=True)
+
+    def __repr__(self) -> str:
+        return short(self)
 
 
 class GivenPrior(Entry):
@@ -53,23 +66,26 @@ class GivenPrior(Entry):
     deviation: PositiveFloat
 
 
-def check_rising(**pairs: tuple[float, float] | None) -> None:
-    """Refuse, in a ValueError, bounds of which the lower one does not stand first."""
-    for name, pair in pairs.items():
-        if pair is not None and not pair[0] < pair[1]:
-            low, high = sorted(pair)
-            raise ValueError(
-                f"{name} = [{pair[0]:g}, {pair[1]:g}] must rise: write [{low:g}, {high:g}]"
-                if low < high
-                else f"{name} = [{pair[0]:g}, {pair[1]:g}] leaves nothing between its ends"
-            )
+def rising(pair: tuple[float, float]) -> tuple[float, float]:
+    """A pair of bounds; refused, in a ValueError, unless the lower one stands first."""
+    if not pair[0] < pair[1]:
+        low, high = sorted(pair)
+        raise ValueError(
+            f"[{pair[0]:g}, {pair[1]:g}] must rise: write [{low:g}, {high:g}]"
+            if low < high
+            else f"[{pair[0]:g}, {pair[1]:g}] leaves nothing between its ends"
+        )
+    return pair
+
+
+Bounds = Annotated[Pair, AfterValidator(rising)]
 
 
 class Free(Entry):
     """How a parameter is free: both directions apart, unless tied."""
 
-    relative: Pair | None = Field(None, description="Bounds as factors on the nominal value.")
-    bounds: Pair | None = Field(None, description="Bounds in SI units.")
+    relative: Bounds | None = Field(None, description="Bounds as factors on the nominal value.")
+    bounds: Bounds | None = Field(None, description="Bounds in SI units.")
     log: bool = Field(False, description="Move the logarithm: for positive numbers.")
     tied: bool = Field(False, description="One value for both directions.")
     prior: GivenPrior | None = Field(
@@ -80,7 +96,6 @@ class Free(Entry):
     def _bounded(self) -> Free:
         if (self.relative is None) == (self.bounds is None):
             raise ValueError("give either relative bounds or bounds")
-        check_rising(relative=self.relative, bounds=self.bounds)
         return self
 
 
@@ -97,17 +112,12 @@ class Forces(Entry):
     minus: tuple[PositiveFloat, PositiveFloat, PositiveFloat, PositiveFloat] = Field(
         description="Of the negative direction, as magnitudes [A]."
     )
-    relative: Pair = Field((0.5, 2.0), description="Bounds as factors on the nominal forces.")
+    relative: Bounds = Field((0.5, 2.0), description="Bounds as factors on the nominal forces.")
 
-    @model_validator(mode="after")
-    def _bounded(self) -> Forces:
-        check_rising(relative=self.relative)
-        return self
-
-    @cached_property
+    @property
     def names(self) -> tuple[str, ...]:
         """Names of the eight forces."""
-        return tuple(f"force_{side}_{k}" for side in ("plus", "minus") for k in (1, 2, 3, 4))
+        return tuple(f"force_{side}_{k}" for side in ("plus", "minus") for k in ORDERS)
 
     @property
     def columns(self) -> tuple[str, ...]:
@@ -115,45 +125,30 @@ class Forces(Entry):
         return tuple(f"{symbol}_{side}" for side in ("plus", "minus") for symbol in COEFFICIENTS)
 
     @cached_property
-    def _maps(self) -> dict[str, Array]:
-        """For each direction the (4, 4) map from forces to coefficients."""
-        signs = {"plus": np.ones(4), "minus": np.array([1.0, -1.0, 1.0, -1.0])}
-        return {
-            side: np.linalg.inv(
-                np.power.outer(np.array(getattr(self, side)), np.arange(1, 5)) * signs[side]
-            )
-            for side in ("plus", "minus")
-        }
+    def _inverse(self) -> Array:
+        """(8, 8) map from forces to coefficients, of F = Z19 i + Z20 i² + Z21 i³ + Z22 i⁴."""
+        zero = np.zeros((4, 4))
+        plus = np.power.outer(self.plus, ORDERS)
+        minus = np.power.outer(self.minus, ORDERS) * (-1.0) ** (ORDERS + 1)
+        return np.linalg.inv(np.block([[plus, zero], [zero, minus]]))
 
     def values(self, parameters: ParameterSet) -> dict[str, float]:
         """The forces of a parameter set, by name. [N]"""
-        forces = {}
-        for side, map_ in self._maps.items():
-            coefficients = [parameters.numbers[f"{symbol}_{side}"] for symbol in COEFFICIENTS]
-            for k, force in enumerate(np.linalg.solve(map_, coefficients), start=1):
-                forces[f"force_{side}_{k}"] = float(force)
-        return forces
+        found = np.linalg.solve(self._inverse, [parameters.numbers[c] for c in self.columns])
+        return dict(zip(self.names, found.tolist(), strict=True))
 
     def coefficients(
         self, values: Mapping[str, float], parameters: ParameterSet
     ) -> dict[str, float]:
         """Coefficients for some forces; those not named are as in the parameter set. [N/Aᵏ]"""
-        forces = {**self.values(parameters), **{k: v for k, v in values.items() if k in self.names}}
-        made = {}
-        for side, map_ in self._maps.items():
-            of_side = np.array([forces[f"force_{side}_{k}"] for k in (1, 2, 3, 4)])
-            for symbol, coefficient in zip(COEFFICIENTS, map_ @ of_side, strict=True):
-                made[f"{symbol}_{side}"] = float(coefficient)
-        return made
+        forces = self.values(parameters)
+        found = self._inverse @ np.array([values.get(name, forces[name]) for name in forces])
+        return dict(zip(self.columns, found.tolist(), strict=True))
 
     def slopes(self, name: str) -> dict[str, float]:
-        """Derivatives of the coefficients by one force. [1/Aᵏ]"""
-        _, side, number = name.split("_")
-        column = self._maps[side][:, int(number) - 1]
-        return {
-            f"{symbol}_{side}": float(slope)
-            for symbol, slope in zip(COEFFICIENTS, column, strict=True)
-        }
+        """Derivatives by one force of the coefficients of its direction. [1/Aᵏ]"""
+        column = self._inverse[:, self.names.index(name)].tolist()
+        return {each: slope for each, slope in zip(self.columns, column, strict=True) if slope}
 
 
 class InputWeight(Window):
@@ -175,9 +170,6 @@ class InputWeight(Window):
 
 class Stage(Entry):
     """One fit: a part of the drive against its channels."""
-
-    def __repr__(self) -> str:
-        return short(self)
 
     name: str
     part: Literal["card", "pump", "chain", "model"] = Field(
@@ -214,49 +206,25 @@ class Stage(Entry):
             raise ValueError("a card alone has no start_pressure")
         return self
 
-    def widened(self, unknown: Unknown, side: int) -> str | None:
-        """The line that moves a bound of an unknown outwards, and the table that it stands in.
-
-        `side` is 1 for the upper bound, -1 for the lower one. None where nothing lies beyond: at
-        the least or greatest value that the parameter may have.
-        """
-        name = unknown.name
-        if name.startswith("force_") and self.forces is not None:
-            pair = _moved(self.forces.relative, side, ratio=True)
-            return f"relative = [{pair[0]:.4g}, {pair[1]:.4g}] under [stages.forces]"
-        if self.part == "model" or (name not in self.free and _symbol(name) not in self.free):
-            low, high = _moved((unknown.low, unknown.high), side, ratio=unknown.log)
-            if self.part != "model":
-                return None
-            return f'"{name}": ({low:.4g}, {unknown.start:.4g}, {high:.4g}) in free of the model'
-        key = name if name in self.free else _symbol(name)
-        limits, entry = find(name), self.free[key]
-        bound = unknown.high if side > 0 else unknown.low
-        lowest = limits.lower if limits.least is None else limits.least
-        if bound >= limits.upper if side > 0 else bound <= lowest:
-            return None
-        if entry.relative is not None:
-            # of a negative nominal value the larger factor makes the lower bound
-            way = side if unknown.start > 0.0 else -side
-            pair = _moved(entry.relative, way, ratio=min(entry.relative) > 0.0)
-            words = [f"relative = [{pair[0]:.4g}, {pair[1]:.4g}]"]
+    def beyond(self, unknown: Unknown, side: int) -> str:
+        """What to do about an unknown of the machine at its lower (-1) or upper (1) bound."""
+        name, table = unknown.name, "free"
+        if self.part == "model":
+            return f"to let it go on, widen '{name}' in free of the model and fit again"
+        if self.forces is not None and name in self.forces.names:
+            name, table = "relative", "forces"
         else:
-            assert entry.bounds is not None
-            low, high = _moved(entry.bounds, side, ratio=entry.log)
-            low, high = max(low, lowest), min(high, limits.upper)
-            words = [f"bounds = [{low:.4g}, {high:.4g}]"]
-        words += [f"{flag} = true" for flag in ("log", "tied") if getattr(entry, flag)]
-        if entry.prior is not None:
-            mean, off = entry.prior.mean, entry.prior.deviation
-            words.append(f"prior = {{ mean = {mean!r}, deviation = {off!r} }}")
-        return f"{key} = {{ {', '.join(words)} }} under [stages.free]"
+            limits = find(name)
+            least = limits.lower if limits.least is None else limits.least
+            if unknown.high >= limits.upper if side > 0 else unknown.low <= least:
+                return f"the {'greatest' if side > 0 else 'least'} value that it may have"
+            name = name if name in self.free else _symbol(name)
+        where = f"{name} under [stages.{table}] of the stage '{self.name}'"
+        return f"to let it go on, widen {where} and fit again"
 
 
 class Setup(Entry):
     """A fit in one stage or several, each starting from what the ones before found."""
-
-    def __repr__(self) -> str:
-        return short(self)
 
     title: str = ""
     stages: tuple[Stage, ...] = Field(min_length=1)
@@ -289,40 +257,23 @@ class Setup(Entry):
             If two stages free the same parameter, or one is driven by a scaled current, which no
             chain makes.
         """
-        free: dict[str, Free] = {}
+        merged: dict[str, Any] = {"free": {}, "weights": {}, "weights_by_input": {}}
         for stage in self.stages:
             if stage.current_scale != 1.0:
                 raise ParameterError(
                     f"The stage '{stage.name}' is driven by {stage.current_scale:g} times the "
                     "measured current, so no joint fit through the card can stand for it."
                 )
-            twice = sorted(set(free) & set(stage.free))
+            twice = sorted(set(merged["free"]) & set(stage.free))
             if twice:
                 raise ParameterError(f"{twice[0]} is free in two stages; a joint fit needs one.")
-            free |= stage.free
+            for key in merged:
+                merged[key] = merged[key] | getattr(stage, key)
         forces = next((each.forces for each in self.stages if each.forces is not None), None)
         pressures = [each.start_pressure for each in self.stages if each.start_pressure is not None]
-        stage = Stage(
-            name="chain",
-            part="chain",
-            free=free,
-            forces=forces,
-            weights={kind: w for each in self.stages for kind, w in each.weights.items()},
-            weights_by_input={
-                kind: w for each in self.stages for kind, w in each.weights_by_input.items()
-            },
-            start_pressure=max(pressures, default=None),
-        )
+        most = max(pressures, default=None)
+        stage = Stage(name="chain", part="chain", forces=forces, start_pressure=most, **merged)
         return self.model_copy(update={"stages": (stage,)})
-
-
-def _moved(pair: Pair, side: int, *, ratio: bool) -> Pair:
-    """A pair with one end moved outwards: by a factor of two, or by as much as lies between."""
-    low, high = pair
-    reach = high - low
-    if side > 0:
-        return low, 2.0 * high if ratio else high + reach
-    return 0.5 * low if ratio else low - reach, high
 
 
 def _symbol(name: str) -> str:
@@ -338,14 +289,8 @@ def deviation(uncertainty: float | str, value: float) -> float:
 
 def setup_names() -> tuple[str, ...]:
     """Names of the packaged set-ups."""
-    folder = files("swashplate.identification").joinpath("setups")
-    return tuple(
-        sorted(
-            each.name.removesuffix(".toml")
-            for each in folder.iterdir()
-            if each.name.endswith(".toml")
-        )
-    )
+    names = (each.name for each in _SETUPS.iterdir())
+    return tuple(sorted(n.removesuffix(".toml") for n in names if n.endswith(".toml")))
 
 
 def load_setup(name: str | Path) -> Setup:
@@ -363,10 +308,9 @@ def load_setup(name: str | Path) -> Setup:
     if name not in setup_names():
         raise ParameterError(
             f"There is no packaged fit configuration '{name}'; there are "
-            f"{', '.join(setup_names())}, or give "
-            "a .toml file."
+            f"{', '.join(setup_names())}, or give a .toml file."
         )
-    text = files("swashplate.identification").joinpath("setups", f"{name}.toml").read_text("utf-8")
+    text = _SETUPS.joinpath(f"{name}.toml").read_text("utf-8")
     return validated(parse_toml(text, f"{name}.toml"), Setup, f"{name}.toml")
 
 
@@ -387,15 +331,13 @@ def setup_text(setup: Setup) -> str:
 
 Range = tuple[float, float, float] | tuple[float, float, float, str]
 """Lower bound, nominal value, upper bound, and the unit if it is said."""
-START = "start."
-"""What the name of a number of the state at the first sample begins with."""
 BY_ORDER = 10.0
 """Ratio of positive bounds from which a range is searched by the logarithm."""
 
 
 @dataclass(frozen=True, eq=False)
 class ModelSetup(Result):
-    """What is to be found of a model of one's own: to it what `Setup` is to a drive.
+    """A model of one's own and what is to be found of it, as set and `Setup` of a drive.
 
     Parameters
     ----------
@@ -415,39 +357,42 @@ class ModelSetup(Result):
         Values of names that are not free.
     standard_uncertainty : mapping of str to float or str
         What values of `fixed` may be off by, one standard deviation, also as ``"5 %"``.
+    numbers : mapping of str to float
+        The model's numbers, nominal or fitted, those of single runs left out; see `nominal`.
+    scales : mapping of str to float
+        What one unit of residual is, by channel: its noise. [unit]
     """
 
-    model: Model | Equations
+    model: Any
     free: Mapping[str, Range | Unknown]
     name: str = ""
     channels: tuple[str, ...] = ()
     noise: Mapping[str, float] = field(default_factory=dict)
     fixed: Mapping[str, float] = field(default_factory=dict)
     standard_uncertainty: Mapping[str, StandardUncertainty] = field(default_factory=dict)
+    numbers: Mapping[str, float] = field(default_factory=dict)
+    scales: Mapping[str, float] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        model = self.model
-        own = OwnModel(model) if isinstance(model, Equations) else model
+        own = OwnModel(self.model) if isinstance(self.model, Equations) else self.model
         if not callable(getattr(own, "simulate", None)):
             raise InputError(
-                f"A {type(model).__name__} is no model: give a Model of equations, or an object "
-                "with simulate(values, experiment)."
+                f"A {type(own).__name__} is no model: give a Model of equations, or an object with "
+                "simulate(values, experiment)."
             )
         equations = own.model if isinstance(own, OwnModel) else own
-        object.__setattr__(self, "model", own)
-        if not self.name:
-            name = getattr(equations, "name", None)
-            object.__setattr__(self, "name", str(name or type(equations).__name__).lower())
+        name = self.name or getattr(equations, "name", None) or type(equations).__name__
         if not self.free:
-            raise InputError(f"Nothing of {self.name} is free: name what is to be found.")
-        unfixed = [name for name in self.standard_uncertainty if name not in self.fixed]
-        if unfixed:
-            raise InputError(
-                f"{unfixed[0]} has a standard uncertainty but no value: name it in fixed, or give "
-                "it a prior if it is free."
-            )
-        free = {name: _unknown(name, entry) for name, entry in self.free.items()}
-        object.__setattr__(self, "free", free)
+            raise InputError(f"Nothing of {name} is free: name what is to be found.")
+        for each in self.standard_uncertainty:
+            if each not in self.fixed:
+                raise InputError(
+                    f"{each} has a standard uncertainty but no value: name it in fixed, or give "
+                    "it a prior if it is free."
+                )
+        object.__setattr__(self, "model", own)
+        object.__setattr__(self, "name", self.name or str(name).lower())
+        object.__setattr__(self, "free", {k: _unknown(k, each) for k, each in self.free.items()})
 
     @classmethod
     def from_file(cls, path: str | Path) -> ModelSetup:
@@ -475,42 +420,40 @@ class ModelSetup(Result):
         module = import_module(file.stem)
         if module.__file__ is None or Path(module.__file__).resolve() != file:
             raise FileError(f"{path}: another module is called {file.stem}; rename the file.")
-        missing = [name for name in ("model", "free") if not hasattr(module, name)]
-        if missing:
-            raise InputError(
-                f"{path} has no '{missing[0]}': it needs model = Model(...) and free = "
-                "{'lag': (0.005, 0.06, 0.5), ...}, lower bound, nominal value and upper bound."
-            )
+        for name in ("model", "free"):
+            if not hasattr(module, name):
+                raise InputError(
+                    f"{path} has no '{name}': it needs model = Model(...) and free = "
+                    "{'lag': (0.005, 0.06, 0.5), ...}, lower bound, nominal value and upper bound."
+                )
         known = ("name", "channels", "noise", "fixed", "standard_uncertainty")
         more = {key: getattr(module, key) for key in known if hasattr(module, key)}
         return cls(module.model, module.free, **more)
 
     @property
-    def stage(self) -> Stage:
-        """The set-up as the only stage of a fit."""
-        free = {}
-        for name, each in self._free.items():
-            known = each.prior
-            prior = (
-                None if known is None else GivenPrior(mean=known.mean, deviation=known.deviation)
-            )
-            free[name] = Free(bounds=(each.low, each.high), log=each.log, prior=prior)
-        return Stage(name=self.name, part="model", free=free)
-
-    @property
     def setup(self) -> Setup:
-        """The set-up as that of a fit in stages."""
+        """The set-up as that of a fit in stages, of which it has one."""
+        free = {}
+        for each in self._unknowns:
+            prior = None
+            if each.prior is not None:
+                prior = GivenPrior(mean=each.prior.mean, deviation=each.prior.deviation)
+            free[each.name] = Free(bounds=(each.low, each.high), log=each.log, prior=prior)
         return Setup(
             title=self.name,
-            stages=(self.stage,),
+            stages=(Stage(name=self.name, part="model", free=free),),
             standard_uncertainty=dict(self.standard_uncertainty),
         )
 
-    def nominal(self, experiments: Sequence[Experiment]) -> ModelParameters:
-        """The model's numbers before a fit to some runs."""
+    @property
+    def _unknowns(self) -> list[Unknown]:
+        return list(self.free.values())  # type: ignore[arg-type]  # made so at the beginning
+
+    def nominal(self, experiments: Sequence[Experiment]) -> ModelSetup:
+        """The set-up with the numbers before a fit to some runs."""
         problem = self.problem(experiments)
         numbers = {**self.fixed, **problem.unknowns.targets(problem.start, "")}
-        return ModelParameters(self, numbers, problem.scales)
+        return replace(self, numbers=numbers, scales=problem.scales)
 
     def problem(self, experiments: Sequence[Experiment], *, threads: int = 1) -> Problem:
         """The problem that it states for some runs.
@@ -522,6 +465,7 @@ class ModelSetup(Result):
         """
         own = {each.name: self.own(each) for each in experiments}
         of_runs = {each.name for unknowns in own.values() for each in unknowns}
+        had = tuple(dict.fromkeys(name for each in experiments for name in each.channels))
         channels = self.channels or self._given(experiments)
         runs = tuple(
             self._with_noise(each)
@@ -529,23 +473,21 @@ class ModelSetup(Result):
             if any(name in each.channels for name in channels)
         )
         if not runs:
-            had = ", ".join(dict.fromkeys(name for each in experiments for name in each.channels))
             raise InputError(
                 f"{self.name} is fitted to {', '.join(channels) or 'nothing'}, but the runs have "
-                f"{had or 'no channel'}."
+                f"{', '.join(had) or 'no channel'}."
             )
-        machine = [each for each in self._free.values() if each.name not in of_runs]
-        unknowns = (*machine, *(unknown for each in runs for unknown in own[each.name]))
+        machine = [each for each in self._unknowns if each.name not in of_runs]
         return Problem(
-            self.model,  # type: ignore[arg-type]  # made one that simulates at the beginning
+            self.model,
             runs,
-            Unknowns(unknowns),
+            Unknowns((*machine, *(unknown for each in runs for unknown in own[each.name]))),
             channels,
             noise_scales(runs, channels),
             dict(self.fixed),
             tuple(
-                {name: deviation(uncertainty, self.fixed[name])}
-                for name, uncertainty in self.standard_uncertainty.items()
+                {name: deviation(each, self.fixed[name])}
+                for name, each in self.standard_uncertainty.items()
             ),
             threads if isinstance(self.model, OwnModel) else 1,
         )
@@ -556,47 +498,9 @@ class ModelSetup(Result):
         states = isinstance(self.model, OwnModel)
         return tuple(
             replace(each, run=experiment.name)
-            for each in self._free.values()
+            for each in self._unknowns
             if each.run is None and (each.name in zeros or (states and each.name.startswith(START)))
         )
-
-    def _with_noise(self, experiment: Experiment) -> Experiment:
-        """The run with the noise of channels that the campaign does not state."""
-        stated = {
-            name: replace(channel, noise=self.noise[name])
-            for name, channel in experiment.channels.items()
-            if channel.noise is None and name in self.noise
-        }
-        return replace(experiment, channels={**experiment.channels, **stated})
-
-    @property
-    def _free(self) -> dict[str, Unknown]:
-        return self.free  # type: ignore[return-value]  # made unknowns at the beginning
-
-    def _given(self, experiments: Sequence[Experiment]) -> tuple[str, ...]:
-        """Names of the channels that the model gives."""
-        if isinstance(self.model, OwnModel):
-            given = [self.model.signals_of(each) for each in experiments]
-            return tuple(dict.fromkeys(name for each in given for name in each))
-        values = {name: each.start for name, each in self._free.items()} | dict(self.fixed)
-        made = [simulated(self.model, values, each) for each in experiments]  # type: ignore[arg-type]
-        return tuple(dict.fromkeys(name for each in made for name in each))
-
-
-@dataclass(frozen=True, eq=False)
-class ModelParameters(Result):
-    """The numbers of a model of one's own: to it what `ParameterSet` is to a drive."""
-
-    setup: ModelSetup
-    numbers: Mapping[str, float]
-    """By the model's names, those of single runs left out."""
-    scales: Mapping[str, float]
-    """What one unit of residual is, by channel: its noise. [unit]"""
-
-    @property
-    def name(self) -> str:
-        """Of the model."""
-        return self.setup.name
 
     def predicted(self, experiment: Experiment) -> Mapping[str, Array]:
         """A run predicted from its input: for each channel (m,) samples at its stamps. [unit]
@@ -604,14 +508,33 @@ class ModelParameters(Result):
         What is free in each run by itself, a beginning of the state or the zero of a sensor, is
         estimated from this run; everything else is as it is.
         """
-        own = tuple(each for each in self.setup.own(experiment) if each.name not in self.numbers)
+        own = tuple(each for each in self.own(experiment) if each.name not in self.numbers)
         channels = tuple(name for name in self.scales if name in experiment.channels)
-        model: Any = self.setup.model
         if not own:
-            found = simulated(model, self.numbers, experiment)
+            found = simulated(self.model, self.numbers, experiment)
             return {name: found[name] for name in channels}
-        problem = Problem(model, (experiment,), Unknowns(own), channels, self.scales, self.numbers)
+        fixed, unknowns = self.numbers, Unknowns(own)
+        problem = Problem(self.model, (experiment,), unknowns, channels, self.scales, fixed)
         return problem.outputs(solve(problem).vector, 0)
+
+    def _with_noise(self, experiment: Experiment) -> Experiment:
+        """The run with the noise of channels that the campaign does not state."""
+        channels = dict(experiment.channels)
+        for name, channel in channels.items():
+            if channel.noise is None and name in self.noise:
+                channels[name] = replace(channel, noise=self.noise[name])
+        return replace(experiment, channels=channels)
+
+    def _given(self, experiments: Sequence[Experiment]) -> tuple[str, ...]:
+        """Names of the channels that the model gives."""
+        values = {each.name: each.start for each in self._unknowns} | dict(self.fixed)
+        given = (
+            self.model.signals_of(each)
+            if isinstance(self.model, OwnModel)
+            else simulated(self.model, values, each)
+            for each in experiments
+        )
+        return tuple(dict.fromkeys(name for each in given for name in each))
 
 
 def _unknown(name: str, entry: Range | Unknown) -> Unknown:

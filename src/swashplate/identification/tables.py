@@ -13,7 +13,7 @@ from swashplate.errors import InputError
 from swashplate.identification.drive_model import DriveModel, true_value
 from swashplate.identification.identifiability import GAUGES
 from swashplate.identification.intervals import LEVEL, Estimate
-from swashplate.identification.setup import ModelParameters
+from swashplate.identification.setup import ModelSetup
 from swashplate.identification.validation import ignored_windows, pooled, with_speeds
 from swashplate.parameters.definitions import CATALOGUE, COLUMNS
 from swashplate.simulation.instance import START_PRESSURE
@@ -188,7 +188,7 @@ def fixed_table(fit: Fit, truth: ParameterSet | None = None) -> Table:
         si=True,
     )
     moved, parameters = _moved(fit), fit.parameters
-    if isinstance(parameters, ModelParameters):
+    if isinstance(parameters, ModelSetup):
         for name, value in parameters.numbers.items():
             if name not in moved:
                 made.add(name, "", value, None, "given with the model", "")
@@ -264,7 +264,7 @@ def runs_tables(qualities: Sequence[RunQuality]) -> list[Table]:
             run, test = each.experiment, each.test
             tested: tuple[float | None, ...] = (None,) * 4
             if test is not None:
-                tested = (test.duration, test.peak[1], test.cross_band, test.peak[0])
+                tested = (test.duration, test.peak[1], test.band, test.peak[0])
             windows = [f"{a:.6g} to {b:.6g} s" for a, b in ignored_windows(run[name])]
             table.add(
                 *(run.name, run.maneuver, run.role, name, start_words(run)),
@@ -331,10 +331,9 @@ def folds_tables(found: CrossValidation, assessments: Sequence[Assessment]) -> l
     for fold in found.folds:
         state = "not fitted" if fold.failure else "converged" if fold.converged else "not converged"
         state = f"{state}; loses {', '.join(fold.lost)}" if fold.lost else state
-        measured = type(found)(found.seed, 1, (fold,)).measures
         fits = (
             f"{name} {'-' if each.fit_percent is None else f'{each.fit_percent:.2f}'} %"
-            for name, each in measured.items()
+            for name, each in fold.measures.items()
         )
         folds.add(fold.number + 1, ", ".join(fold.held), state, ", ".join(fits) or NONE)
     return [held_out, folds]

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from math import exp, isfinite, log, sqrt
-from typing import Annotated
+from math import exp, inf, isfinite
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -108,8 +108,8 @@ def bounded(
     *,
     relative: tuple[float, float] | None = None,
     absolute: tuple[float, float] | None = None,
-    least: float | None = None,
-    **more: object,
+    least: float = -inf,
+    **more: Any,
 ) -> Unknown:
     """An unknown with bounds that are multiples of its nominal value, or numbers.
 
@@ -121,22 +121,14 @@ def bounded(
     ParameterError
         If `relative` is given for a nominal value of 0, which no factor moves.
     """
-    if relative is not None:
-        if nominal == 0.0:
-            raise ParameterError(
-                f"{name} is nominally 0, which no factor moves: give absolute bounds."
-            )
-        low, high = sorted(factor * nominal for factor in relative)
-    else:
-        assert absolute is not None
-        low, high = absolute
-    if least is not None:
-        nominal, low = max(nominal, least), max(low, least)
-    return Unknown(name, nominal, low, high, **more)  # type: ignore[arg-type]
+    if relative is not None and nominal == 0.0:
+        raise ParameterError(f"{name} is nominally 0, which no factor moves: give absolute bounds.")
+    low, high = absolute or sorted(factor * nominal for factor in relative or ())
+    return Unknown(name, max(nominal, least), max(low, least), high, **more)
 
 
 @dataclass(frozen=True, eq=False)
-class Unknowns(Result, Sequence[Unknown]):
+class Unknowns(Result):
     """The unknowns of a fit in the order of the solver's vector, at a point: nominal or estimated.
 
     The solver moves ln(value) of a logarithmic one, else value/scale: a change of 0.01 in its
@@ -148,15 +140,13 @@ class Unknowns(Result, Sequence[Unknown]):
     """(K,) vector of the point; nominal if None. See `at`."""
 
     def __post_init__(self) -> None:
-        taken: set[tuple[str | None, str]] = set()
-        for each in self.items:
-            for target in each.targets:
-                if (each.run, target) in taken:
-                    raise ParameterError(f"{target} is set by two parameters; let one set it.")
-                taken.add((each.run, target))
+        taken = [(each.run, target) for each in self.items for target in each.targets]
+        for k, (_, target) in enumerate(taken):
+            if taken[k] in taken[:k]:
+                raise ParameterError(f"{target} is set by two parameters; let one set it.")
 
-    def __getitem__(self, index):  # type: ignore[no-untyped-def]
-        return self.items[index]
+    def __getitem__(self, place: int) -> Unknown:
+        return self.items[place]
 
     def __len__(self) -> int:
         return len(self.items)
@@ -165,7 +155,7 @@ class Unknowns(Result, Sequence[Unknown]):
         return iter(self.items)
 
     @property
-    def count(self) -> int:  # type: ignore[override]
+    def count(self) -> int:
         """K."""
         return len(self.items)
 
@@ -176,7 +166,7 @@ class Unknowns(Result, Sequence[Unknown]):
             each.name if each.run is None else f"{each.name} ({each.run})" for each in self.items
         )
 
-    def index(self, name: str) -> int:  # type: ignore[override]
+    def index(self, name: str) -> int:
         """Place of an unknown.
 
         Raises
@@ -220,8 +210,8 @@ class Unknowns(Result, Sequence[Unknown]):
 
     @cached_property
     def estimates(self) -> Array:
-        """(K,) values at the point. [unit]"""
-        return np.array(list(self.values(self.vector).values()))
+        """(K,) values at the point, within the bounds. [unit]"""
+        return np.array(self._within(self.vector))
 
     @cached_property
     def at_bound(self) -> NDArray[np.int8]:
@@ -261,52 +251,51 @@ class Unknowns(Result, Sequence[Unknown]):
     def to_values(self, vector: Array) -> Array:
         """(..., K) values of vectors; a logarithm beyond any float's becomes inf or 0."""
         with np.errstate(over="ignore"):
-            return np.where(
-                self.logarithmic,
-                np.exp(np.where(self.logarithmic, vector, 0.0)),
-                np.where(self.logarithmic, 0.0, vector) * self.scales,
-            )
+            powers = np.exp(np.where(self.logarithmic, vector, 0.0))
+        return np.where(
+            self.logarithmic, powers, np.where(self.logarithmic, 0.0, vector) * self.scales
+        )
 
     def to_vector(self, values: Array) -> Array:
         """(..., K) vectors of values, positive where logarithmic."""
         logarithms = np.log(np.where(self.logarithmic, values, 1.0))
         return np.where(self.logarithmic, logarithms, values / self.scales)
 
+    def _within(self, vector: Array) -> list[float]:
+        numbers = zip(self.items, vector.tolist(), strict=True)
+        return [each.to_value(number) for each, number in numbers]
+
     def values(self, vector: Array) -> dict[str, float]:
         """Values by name, within the bounds."""
-        numbers = zip(self.items, vector, strict=True)
-        found = [each.to_value(float(number)) for each, number in numbers]
-        return dict(zip(self.names, found, strict=True))
+        return dict(zip(self.names, self._within(vector), strict=True))
 
     def vector_of(self, values: Mapping[str, float]) -> Array:
         """(K,) vector of some values by name; those not named stay nominal."""
         named = zip(self.names, self.items, strict=True)
         return self.to_vector(np.array([values.get(name, each.start) for name, each in named]))
 
+    def _places(self, run: str) -> dict[str, int]:
+        """Names in the model that the unknowns of one experiment set, and whose number it is."""
+        items = enumerate(self.items)
+        return {name: k for k, each in items if each.run in (None, run) for name in each.targets}
+
     def targets(self, vector: Array, run: str) -> dict[str, float]:
         """Values by the model's names, as one experiment sees them."""
-        return {
-            target: each.to_value(float(number))
-            for each, number in zip(self.items, vector, strict=True)
-            if each.run in (None, run)
-            for target in each.targets
-        }
+        values = self._within(vector)
+        return {name: values[k] for name, k in self._places(run).items()}
 
     def chain(self, vector: Array, targets: Sequence[str], run: str) -> Array:
         """(len(targets), K) derivatives of the model's numbers by the vector."""
-        matrix = np.zeros((len(targets), len(self.items)))
-        rows = {target: row for row, target in enumerate(targets)}
+        matrix, places = np.zeros((len(targets), len(self.items))), self._places(run)
         slopes = self._slopes(vector)
-        for column, each in enumerate(self.items):
-            for target in each.targets if each.run in (None, run) else ():
-                if target in rows:
-                    matrix[rows[target], column] = slopes[column]
+        for row, target in enumerate(targets):
+            if target in places:
+                matrix[row, places[target]] = slopes[places[target]]
         return matrix
 
     def with_worths(self, worths: Sequence[float] | None) -> Unknowns:
         """The same with these worths of the priors, in order; without any priors for None."""
-        given = iter(worths or ())
-        items = []
+        given, items = iter(worths or ()), []
         for each in self.items:
             prior = each.prior
             if prior is not None:
@@ -316,17 +305,11 @@ class Unknowns(Result, Sequence[Unknown]):
 
     def prior_rows(self, vector: Array) -> tuple[Array, Array]:
         """Residuals (p,) of the priors and their derivatives (p, K) by the vector."""
-        having = [k for k, each in enumerate(self.items) if each.prior is not None]
-        residuals, rows = np.zeros(len(having)), np.zeros((len(having), len(self.items)))
-        for row, k in enumerate(having):
-            each, number = self.items[k], float(vector[k])
-            assert each.prior is not None
-            if each.log:
-                residuals[row] = (number - log(each.prior.mean)) / each.prior.deviation
-                rows[row, k] = 1.0 / each.prior.deviation
-            else:
-                residuals[row] = (number * each.scale - each.prior.mean) / each.prior.deviation
-                rows[row, k] = each.scale / each.prior.deviation
-            residuals[row] *= sqrt(each.prior.worth)
-            rows[row] *= sqrt(each.prior.worth)
+        known = [(k, each, each.prior) for k, each in enumerate(self.items) if each.prior]
+        residuals, rows = np.zeros(len(known)), np.zeros((len(known), len(self.items)))
+        for row, (k, each, prior) in enumerate(known):
+            scale, mean = (1.0, np.log(prior.mean)) if each.log else (each.scale, prior.mean)
+            weight = np.sqrt(prior.worth) / prior.deviation
+            residuals[row] = weight * (vector[k] * scale - mean)
+            rows[row, k] = weight * scale
         return residuals, rows

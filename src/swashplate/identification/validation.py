@@ -13,10 +13,10 @@ from scipy.fft import irfft, next_fast_len, rfft
 from swashplate.campaign.experiment import Channel, Experiment
 from swashplate.campaign.speed import speed_of
 from swashplate.errors import InputError
-from swashplate.identification.drive_model import SIGNALS, DriveModel, Parameters, current_record
+from swashplate.identification.drive_model import SIGNALS, DriveModel, Parameters, measured_current
 from swashplate.identification.noise import LONGEST, Grid, correlation_length, grid_of, pair_sums
 from swashplate.identification.problem import Problem
-from swashplate.identification.setup import ModelParameters
+from swashplate.identification.setup import ModelSetup
 from swashplate.parameters.parameter_set import HasParameters, set_of
 from swashplate.results import Result
 
@@ -24,7 +24,9 @@ Array = NDArray[np.float64]
 
 
 LONGEST_SHOWN = 2.0
-"""Largest lag of the curves. [s]"""
+"""Largest lag of the correlation with the input. [s]"""
+FEWEST = 8
+"""Samples that a test of residuals needs."""
 
 DEVIATIONS = 1.96
 """Half width of the bands, in standard deviations: 95 %."""
@@ -40,45 +42,35 @@ SURE = 0.9
 
 @dataclass(frozen=True, eq=False)
 class ResidualTest(Result):
-    """Whiteness of the residuals of one channel of one run, and independence of the input."""
+    """Correlation of the residuals of one channel of one run, with the input above all."""
 
     lags: Array
-    """(m,) from 0. [s]"""
-    autocorrelation: Array
-    """(m,) of the residuals."""
-    white_band: float
-    """Half width of the 95 % band of white noise."""
-    cross_lags: Array
     """(2 m - 1,) positive where the residual comes after the input. [s]"""
-    cross_correlation: Array
+    correlation: Array
     """(2 m - 1,) of the residuals with the input."""
-    cross_band: float
+    band: float
     """Half width of the 95 % band of residuals, coloured as these are, without relation to the
     input."""
     duration: float
-    """Time over which the residuals stay correlated; 0 if they are white. [s]"""
-
-    @property
-    def white(self) -> bool:
-        """Whether nothing but white noise is left."""
-        return self.duration == 0.0
+    """Time over which the residuals stay correlated with themselves; 0 if they are white. [s]"""
 
     @property
     def peak(self) -> tuple[float, float]:
-        """Lag of the largest cross-correlation [s], and its value."""
-        place = int(np.argmax(np.abs(self.cross_correlation)))
-        return float(self.cross_lags[place]), float(self.cross_correlation[place])
+        """Lag of the largest correlation [s], and its value."""
+        place = int(np.argmax(np.abs(self.correlation)))
+        return float(self.lags[place]), float(self.correlation[place])
 
     @property
     def follows(self) -> bool:
         """Whether the residuals follow the input by as much as counts as model error."""
-        return abs(self.peak[1]) >= min(max(FOLLOWS, BANDS * self.cross_band), SURE)
+        return abs(self.peak[1]) >= min(max(FOLLOWS, BANDS * self.band), SURE)
 
     @property
     def verdict(self) -> str:
         """Both in words."""
-        (lag, value), own = self.peak, f"stay correlated over {self.duration:.2g} s"
-        own = "are white" if self.white else own
+        (lag, value), own = self.peak, "are white"
+        if self.duration:
+            own = f"stay correlated over {self.duration:.2g} s"
         if not self.follows:
             return f"The residuals {own} and do not follow the input."
         return (
@@ -90,7 +82,7 @@ class ResidualTest(Result):
 def residual_test(
     time: Array, residual: Array, command: Array, *, longest: float = LONGEST_SHOWN
 ) -> ResidualTest:
-    """Test the residuals of one channel of one run.
+    """Test of the residuals of one channel of one run.
 
     Parameters
     ----------
@@ -99,7 +91,7 @@ def residual_test(
     residual, command : (n,) arrays
         Simulated less measured, weights left out, and the input at the same stamps.
     longest : float
-        Largest lag of the curves; at most a quarter of the run is shown. [s]
+        Largest lag; at most a quarter of the run is looked at. [s]
 
     Raises
     ------
@@ -108,11 +100,11 @@ def residual_test(
 
     Notes
     -----
-    The band of the cross-correlation is 1.96 √(Σ ρ_r ρ_u/n), Bartlett's: two coloured signals
-    without any relation show large correlations by chance.
+    The band is 1.96 √(Σ ρ_r ρ_u/n), Bartlett's: two coloured signals without any relation show
+    large correlations by chance.
     """
-    if time.size < 8:
-        raise InputError(f"{time.size} samples show no correlation; at least 8 are needed.")
+    if time.size < FEWEST:
+        raise InputError(f"{time.size} samples show no correlation; at least {FEWEST} are needed.")
     grid = grid_of(time)
     most = max(int(LONGEST * grid.size), 1)
     shown = min(most, max(int(longest / grid.step), 1))
@@ -121,21 +113,17 @@ def residual_test(
     length = correlation_length(own, counts)
     # beyond the residuals' own length their estimated correlation is chance
     kept = slice(1, max(length, 1) + 1)
-    theirs = _autocorrelation(command, grid, most)[0]
+    theirs, _ = _autocorrelation(command, grid, most)
     inflation = max(1.0, 1.0 + 2.0 * float(own[kept] @ theirs[kept]))
     band = min(DEVIATIONS * float(np.sqrt(inflation / time.size)), 1.0)
-    cross = np.zeros(2 * shown + 1)
+    lags, correlation = np.arange(-shown, shown + 1.0) * grid.step, np.zeros(2 * shown + 1)
     scale = float(np.linalg.norm(residual) * np.linalg.norm(command))
     if scale > 0.0:
         size = next_fast_len(grid.size + shown, real=True)
         spectra = rfft(grid.spread(command), size).conj() * rfft(grid.spread(residual), size)
         products = irfft(spectra, size)
-        cross = np.concatenate([products[size - shown :], products[: shown + 1]]) / scale
-    lags: Array = np.arange(shown + 1.0) * grid.step
-    both = np.concatenate([-lags[:0:-1], lags])
-    white = DEVIATIONS / float(np.sqrt(time.size))
-    duration = length * grid.step
-    return ResidualTest(lags, own[: shown + 1], white, both, cross, band, duration)
+        correlation = np.concatenate([products[size - shown :], products[: shown + 1]]) / scale
+    return ResidualTest(lags, correlation, band, length * grid.step)
 
 
 def _autocorrelation(samples: Array, grid: Grid, lags: int) -> tuple[Array, Array]:
@@ -188,22 +176,22 @@ def measures(*runs: tuple[Array, Array, Array | None]) -> Measures:
         If no sample counts, or one that does is not finite.
     """
     parts = []
-    for of_one in runs:
-        used = np.ones(of_one[0].shape, np.bool_) if of_one[2] is None else of_one[2] > 0.0
-        for what, samples in (("measured", of_one[0]), ("simulated", of_one[1])):
+    for values, simulated, weight in runs:
+        used = np.ones(values.shape, np.bool_) if weight is None else weight > 0.0
+        for what, samples in (("measured", values), ("simulated", simulated)):
             bad = used & ~np.isfinite(samples)
             if bad.any():
                 row = int(np.argmax(bad)) + 1
                 raise InputError(f"Sample {row} of what was {what} is not finite; ignore it.")
-        parts.append((of_one[0][used], of_one[1][used]))
-    measured, simulated = (np.concatenate(column) for column in zip(*parts, strict=True))
+        parts.append(np.stack([values[used], simulated[used]]))
+    measured, errors = np.hstack(parts)
     if not measured.size:
         raise InputError("No sample counts: all are ignored or have weight 0.")
-    mean = float(measured.mean())
+    errors, mean = errors - measured, float(measured.mean())
     # a constant channel's own mean is off by rounding
     about = measured - mean
     about[np.abs(about) <= 4.0 * np.finfo(np.float64).eps * abs(mean)] = 0.0
-    rmse, spread = (float(np.sqrt(np.mean(each**2))) for each in (simulated - measured, about))
+    rmse, spread = (float(np.sqrt(np.mean(each**2))) for each in (errors, about))
     return Measures(measured.size, rmse, spread)
 
 
@@ -239,7 +227,7 @@ def compared(experiment: Experiment, name: str, simulated: Array) -> RunQuality:
     """Quality of one channel of one run, simulated at its stamps."""
     channel = experiment[name]
     used, test = channel.used, None
-    if np.count_nonzero(used) >= 8:
+    if np.count_nonzero(used) >= FEWEST:
         time, residual = channel.time[used], (simulated - channel.values)[used]
         test = residual_test(time, residual, experiment.input.at(time))
     found = measures((channel.values, simulated, channel.weight))
@@ -253,7 +241,7 @@ def predict(
 
     Parameters
     ----------
-    model : Drive, ParameterSet or ModelParameters
+    model : Drive, ParameterSet or ModelSetup
         The drive, or a model of one's own with its numbers.
     experiments : sequence of Experiment
         Runs that it was not fitted to. A voltage goes through the whole chain, a current through
@@ -271,8 +259,8 @@ def predict(
     DomainError
         If the model does not hold under a run's input.
     """
-    parameters = model if isinstance(model, ModelParameters) else set_of(model)
-    if isinstance(parameters, ModelParameters):
+    parameters = model if isinstance(model, ModelSetup) else set_of(model)
+    if isinstance(parameters, ModelSetup):
         return tuple(
             compared(each, name, simulated)
             for each in experiments
@@ -280,20 +268,20 @@ def predict(
             if each[name].used.any()
         )
     made = []
-    for experiment in experiments:
-        if not any(channel.kind in SIGNALS for channel in experiment.channels.values()):
-            raise InputError(f"{experiment.name} has no channel that a drive has.")
-        if experiment.input.kind == "current":
-            model = DriveModel(parameters, "pump", {experiment.name: current_record(experiment)})
-        else:
-            model = DriveModel(parameters, "chain")
-        for name, simulated in model.simulate({}, experiment).items():
-            channel = experiment[name]
-            if channel.is_position and channel.used.any():
+    for each in experiments:
+        if not any(channel.kind in SIGNALS for channel in each.channels.values()):
+            raise InputError(f"{each.name} has no channel that a drive has.")
+        own = DriveModel(parameters)
+        if each.input.kind == "current":
+            own = DriveModel(parameters, "pump", {each.name: measured_current(each)})
+        for name, simulated in own.simulate({}, each).items():
+            channel = each[name]
+            if not channel.used.any():
+                continue
+            zero = 0.0
+            if channel.is_position:
                 zero = np.average(channel.values - simulated, weights=channel.weight)
-                simulated = simulated + zero
-            if channel.used.any():
-                made.append(compared(experiment, name, simulated))
+            made.append(compared(each, name, simulated + zero))
     return tuple(made)
 
 
@@ -306,9 +294,20 @@ def with_speeds(qualities: Iterable[RunQuality]) -> tuple[RunQuality, ...]:
     made: list[RunQuality] = []
     for each in qualities:
         made.append(each)
-        if each.experiment[each.channel].is_position:
-            speed = _speed_quality(each)
-            made += [speed] if speed is not None else []
+        channel = each.experiment[each.channel]
+        if not channel.is_position:
+            continue
+        unread = replace(channel, noise=None, limits=None, encoder=None, counts=None)
+        try:
+            found = speed_of(channel, "exact").speed
+            same = speed_of(replace(unread, values=each.simulated), "exact").speed
+        except InputError:
+            continue
+        name, unit = f"speed from {channel.name}", f"{channel.unit}/s"
+        speed = replace(unread, name=name, kind="shaft_speed", unit=unit, values=found)
+        run = replace(each.experiment, channels={**each.experiment.channels, name: speed})
+        # the residuals of a filtered signal are coloured by the filter: there is no test of them
+        made.append(RunQuality(run, name, same, measures((found, same, speed.weight)), None))
     return tuple(made)
 
 
@@ -360,35 +359,4 @@ def ignored_windows(channel: Channel) -> tuple[tuple[float, float], ...]:
     return tuple(
         (float(channel.time[first]), float(channel.time[after - 1]))
         for first, after in zip(edges[::2], edges[1::2], strict=True)
-    )
-
-
-def _speed_quality(quality: RunQuality) -> RunQuality | None:
-    channel = quality.experiment[quality.channel]
-    plain = replace(channel, values=quality.simulated, encoder=None, counts=None)
-    try:
-        found, same = speed_of(channel, "exact"), speed_of(plain, "exact")
-    except InputError:
-        return None
-    speed = replace(
-        channel,
-        name=f"speed from {channel.name}",
-        kind="shaft_speed",
-        unit=f"{channel.unit}/s",
-        values=found.speed,
-        noise=None,
-        limits=None,
-        encoder=None,
-        counts=None,
-    )
-    experiment = replace(
-        quality.experiment, channels={**quality.experiment.channels, speed.name: speed}
-    )
-    # the residuals of a filtered signal are coloured by the filter: there is no test of them
-    return RunQuality(
-        experiment,
-        speed.name,
-        same.speed,
-        measures((speed.values, same.speed, speed.weight)),
-        None,
     )

@@ -17,7 +17,7 @@ from swashplate.identification.faults import DRIFT, LOSS, Fault, measurement_err
 from swashplate.identification.identifiability import WIDE
 from swashplate.identification.intervals import open_unknowns
 from swashplate.identification.lack_of_fit import LackOfFit, lack_of_fit
-from swashplate.identification.solving import StartResult
+from swashplate.identification.solving import Solution
 from swashplate.identification.validation import (
     FOLLOWS,
     following,
@@ -256,7 +256,7 @@ def _fitted_runs(assessments: Sequence[Assessment]) -> list[Experiment]:
     return list({e.name: e for a in assessments for e in a.stage.problem.experiments}.values())
 
 
-def starts_of(assessments: Sequence[Assessment]) -> dict[str, Sequence[StartResult]]:
+def starts_of(assessments: Sequence[Assessment]) -> dict[str, Sequence[Solution]]:
     """Starts by stage, of the stages that had several."""
     stages = [each.stage for each in assessments]
     return {each.stage.name: each.starts for each in stages if len(each.starts) > 1}

@@ -62,7 +62,8 @@ def wanted_columns(columns: tuple[str, ...]) -> tuple[str, ...]:
     """Columns that are asked for, symbols taken apart; refused where one is asked for twice."""
     names: list[str] = []
     for name in columns:
-        for each in [name] if name == START_PRESSURE else columns_of([name]):
+        at_start = name == START_PRESSURE or name.startswith("start.")
+        for each in [name] if at_start else columns_of([name]):
             if each in names:
                 raise InputError(f"{each} is asked for twice.")
             names.append(each)

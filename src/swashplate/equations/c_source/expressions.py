@@ -32,7 +32,6 @@ from swashplate.equations.syntax import (
     parsed,
     plain,
     unchecked,
-    whole,
 )
 from swashplate.errors import EquationError
 
@@ -244,7 +243,7 @@ class Expressions:
         left = self.number(node.left)
         op = ARITHMETIC[type(node.op)]
         if op == "**":
-            power = whole(node.right)
+            power = ast.literal_eval(node.right)
             if left.kind == INT:
                 self.refuse(node, "a power of a whole number")
             if power == 2 and left.level == 13:

@@ -25,7 +25,6 @@ from swashplate.equations.c_source.text import (
 )
 from swashplate.equations.syntax import (
     Parsed,
-    whole,
 )
 
 if typing.TYPE_CHECKING:
@@ -151,7 +150,7 @@ class Function(Expressions):
         assert isinstance(each.target, ast.Name)
         args = [self.value(a).text for a in each.iter.args]
         start, end = ("0", args[0]) if len(args) == 1 else (args[0], args[1])
-        step = whole(each.iter.args[2]) if len(args) == 3 else 1
+        step = ast.literal_eval(each.iter.args[2]) if len(args) == 3 else 1
         counter = each.target.id
         name = "turn" if counter == "_" else c_name(counter)
         sign, move = ("<", f"+= {step}") if step > 0 else (">", f"-= {-step}")

@@ -21,8 +21,8 @@ from swashplate.identification.drive_model import Parameters
 from swashplate.identification.fitting import Fit, StageFit
 from swashplate.identification.identifiability import Identifiability
 from swashplate.identification.resampling import CrossValidation
-from swashplate.identification.setup import ModelParameters
-from swashplate.identification.solving import StartResult
+from swashplate.identification.setup import ModelSetup
+from swashplate.identification.solving import Solution
 from swashplate.identification.validation import RunQuality, percent
 from swashplate.identification.verdict import Verdict, starts_of, verdict
 from swashplate.parameters.parameter_set import ParameterSet
@@ -122,7 +122,7 @@ def write_validation_report(
 
     Parameters
     ----------
-    drive : ParameterSet or ModelParameters
+    drive : ParameterSet or ModelSetup
         The drive, or the model of one's own, that was held against the runs.
     campaign : Campaign
         The tests.
@@ -184,7 +184,7 @@ def _shared(
     for number, (run, _) in enumerate(found, start=1):
         findings.setdefault(run, []).append(number)
     words = f"Drive {drive.name}"
-    if isinstance(drive, ModelParameters):
+    if isinstance(drive, ModelSetup):
         words = f"Model {drive.name}"
     elif drive.title:
         words += f" ({drive.title})"
@@ -304,27 +304,18 @@ def _live_section(fit: Fit, campaign: Campaign, runs: Sequence[ShownRun]) -> Sec
 
 def _residual_section(runs: Sequence[ShownRun]) -> Section:
     words = (
-        "Left: correlation of the residuals with themselves, and the 95 % band of white noise. "
-        "Right: with the input, positive lags where the residual comes after it, and the 95 % "
-        "band of residuals, coloured as these are, that have no relation to the input."
+        "Correlation of the residuals with the input, positive lags where the residual comes after "
+        "it, and the 95 % band of residuals, coloured as these are, that have no relation to it."
     )
-    heads = ("run", "role", "channel", "autocorrelation", "cross-correlation with the input")
+    heads = ("run", "role", "channel", "correlation with the input")
     made = Table("", tuple(map(Column, (*heads, "verdict"))))
     for each in _qualities(runs):
         if (test := each.test) is not None:
             lag, value = test.peak
-            said = (
-                f"autocorrelation over {test.lags[-1]:.2g} s",
-                f"cross-correlation, largest {value:+.2f} at {lag:.2g} s",
-            )
-            drawn = (
-                charts.lags_chart(test.lags, test.autocorrelation, test.white_band, said[0]),
-                charts.lags_chart(
-                    test.cross_lags, test.cross_correlation, test.cross_band, said[1]
-                ),
-            )
+            said = f"correlation with the input, largest {value:+.2f} at {lag:.2g} s"
+            drawn = charts.lags_chart(test.lags, test.correlation, test.band, said)
             run = each.experiment
-            made.add(run.name, run.role, each.channel, *drawn, test.verdict)
+            made.add(run.name, run.role, each.channel, drawn, test.verdict)
     return Section("residuals", "Residuals", [text(words), Block("table", made, "residuals")])
 
 
@@ -337,7 +328,7 @@ def _setup_section(
 ) -> Section:
     made = Table("", (Column(""), Column("")))
     made.add("campaign", str(campaign.path))
-    if isinstance(drive, ModelParameters):
+    if isinstance(drive, ModelSetup):
         made.add("model", drive.name)
     else:
         made.add("drive", f"{drive.name}, card {drive.card}" if drive.card else drive.name)
@@ -487,7 +478,7 @@ def _correlations(assessment: Assessment, general: Sequence[bool]) -> list[Block
     return blocks
 
 
-def _starts_section(several: Mapping[str, Sequence[StartResult]]) -> Section:
+def _starts_section(several: Mapping[str, Sequence[Solution]]) -> Section:
     blocks = []
     for stage, results in several.items():
         failed = sum(not each.cost < 1e300 for each in results)
