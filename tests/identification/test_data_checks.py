@@ -241,10 +241,7 @@ def nothing(speed: np.ndarray) -> np.ndarray:
 @pytest.mark.parametrize(
     ("runs", "said"),
     [
-        ((*GOOD, run("again", held(8.0), lambda speed: -speed)), "In again 'speed' goes against"),
         ((run("timid", held(0.1)),), "timid: its command stays between 0 and 0.1 V"),
-        ((run("flat", np.zeros(1025)),), "flat: its command stays between 0 and 0 V"),
-        ((*GOOD, run("dead", held(8.0), np.zeros_like)), "dead: 'speed' never changes"),
         ((*GOOD, run("empty", held(8.0), nothing)), "0 samples that can be used"),
         ((*GOOD, run("one", np.zeros(1))), "1 samples that can be used"),
     ],

@@ -1,6 +1,6 @@
 """Which run tells of which unknown, and which further test would tell most."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 
@@ -149,29 +149,6 @@ def run(name: str, volts: float, noise: float = 0.0) -> Experiment:
     return Experiment(name, "hoist", name, "fit", "rest", None, signal, {"speed": channel})
 
 
-SMALL = (run("up 1 V", 1.0), run("up 2 V", 2.0))
-"""A campaign of small positive steps."""
-
-
-def judged(names: Sequence[str], *tests: maneuvers.Maneuver):
-    known = bench(HOIST.parameters, setup(*names), SMALL)
-    candidates = [known.candidate(each) for each in tests]
-    return advise(known.present, candidates, known.variables)
-
-
-def test_stops_need_tests_that_reach_them_both_ways() -> None:
-    tests = [maneuvers.step(volts) for volts in (2.0, -2.0, 5.0, -5.0, 9.0, -9.0)]
-    found = judged(("Z13", "Z10"), *tests)
-    assert {each.candidate for each in found[:2]} == {"step 9 V", "step -9 V"}
-    by_test = {each.candidate: each.newly_determined for each in found}
-    assert by_test["step 9 V"] == ("Z13_plus",)
-    assert by_test["step -9 V"] == ("Z13_minus",)
-    assert by_test["step 5 V"] == by_test["step -5 V"] == by_test["step 2 V"] == ()
-    best = best_for_each(found)
-    assert best["Z13_plus"].candidate == "step 9 V"
-    assert best["Z13_minus"].candidate == "step -9 V"
-
-
 def test_a_plan_by_hand() -> None:
     """After the first choice its like is worth little: the plan turns to the other unknown."""
     variables = unknowns_of("ab", np.ones(2))
@@ -246,12 +223,6 @@ def test_what_is_known_is_what_a_fit_of_the_same_tests_knows(hoist_tests: Campai
     ratio = np.array([now[k] / errors[name] for k, name in enumerate(known.variables.names)])
     assert 0.5 < np.median(ratio) < 2.0
     assert (np.abs(np.log(ratio)) < np.log(4.0)).all(), ratio
-
-
-def test_a_drive_of_other_values_has_no_noise_to_tell() -> None:
-    other = Drive(smooth(Drive.preset("hoist").replace(Z10=18.0).parameters))
-    with pytest.raises(InputError, match="The drive misses 'speed' by .* % of its range"):
-        bench(other.parameters, setup("Z10"), [run("up", 5.0, 0.04)], fitted=True)
 
 
 def test_sensors_of_a_fresh_plan() -> None:

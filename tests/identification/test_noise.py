@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from scipy.linalg import matmul_toeplitz
 from scipy.signal import lfilter
 from tests.identification.linear import linear_fit, unknowns_of
 
@@ -215,8 +216,7 @@ def test_errors_are_those_of_the_true_noise(rho: float, weighted: bool) -> None:
         for _ in range(20)
     ]
     columns = (weight**2)[:, None] * DESIGN
-    lags = np.abs(np.subtract.outer(np.arange(N), np.arange(N)))
-    inner = RUNS * columns.T @ (rho**lags @ columns)
+    inner = RUNS * columns.T @ matmul_toeplitz(rho ** np.arange(N), columns)
     inverse = np.linalg.inv(RUNS * DESIGN.T @ columns)
     expected = np.sqrt(np.diag(inverse @ inner @ inverse))
     # each from 4 runs of 8 s: about 20 independent frequencies, 20 campaigns

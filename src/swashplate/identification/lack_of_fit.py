@@ -114,9 +114,11 @@ class _Block(NamedTuple):
 
     def factor(self, places: Mapping[Key, int]) -> Array:
         """(<= n, P + 1) triangular factor of its own columns and the residual, among all others."""
-        factor = triangular_factor(np.column_stack([*self.columns.values(), self.residual]))
+        # a run in one direction tells nothing of the parameters of the other
+        moving = {key: column for key, column in self.columns.items() if column.any()}
+        factor = triangular_factor(np.column_stack([*moving.values(), self.residual]))
         made = np.zeros((len(factor), len(places) + 1))
-        made[:, [*(places[key] for key in self.columns), -1]] = factor
+        made[:, [*(places[key] for key in moving), -1]] = factor
         return made
 
     def against_known(self, places: Mapping[Key, int], shift: Array) -> Iterator[ChannelFit]:
