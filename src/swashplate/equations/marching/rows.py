@@ -121,17 +121,16 @@ def place(
     plan: Plan,
     r: int,
     block: tuple[int, int],
-    stamps: tuple[int, int],
+    stamps: tuple[int, int, int],
     sink: Sink,
-    to: int,
     aside: Array,
 ) -> None:
     """Weighted rows of the problem at some stamps of an observation.
 
-    `block` is its first sample and how many it has, `stamps` the first one and how many they are,
-    which go to places of the sink from `to` on; `aside` is room for a row.
+    `block` is its first sample and how many it has, `stamps` the first one, how many they are, and
+    from where on they go into the sink; `aside` is room for a row.
     """
-    (first, size), (at, count) = block, stamps
+    (first, size), (at, count, to) = block, stamps
     derived, long = sink.to.size, sink.rows.shape[1]
     cell, fraction, weight = (
         behind(plan.cell, at),
@@ -227,7 +226,7 @@ def march_observed(
                         many = i
                         break
                 to = used if folded else at
-                place(flat, program, plan, r, (first, count), (at, many), sink, to, aside)
+                place(flat, program, plan, r, (first, count), (at, many, to), sink, aside)
                 at += many
                 used += many if folded else 0
                 if folded and used == long:
