@@ -28,10 +28,10 @@ def pump_with(**values: float) -> Pump:
 
 
 def partials(
-    function: Any, by: tuple[str, ...], *arguments: Any, outputs: Any = None, **options: Any
+    function: Any, by: tuple[str, ...], *arguments: Any, **options: Any
 ) -> tuple[float, ...]:
     """Partials of one result by some inputs, zeros included; interpreted and compiled the same."""
-    derived = derive(function, by, outputs, options)
+    derived = derive(function, by, options)
     got = derived.python(*arguments)
     assert tuple(derived.compiled(*arguments)) == pytest.approx(got, rel=1e-14)
     found = dict(zip(derived.entries, got[len(derived.outputs) :], strict=True))
