@@ -154,6 +154,7 @@ def fitted(fit_and_folder: tuple[Fit, Path]) -> Path:
     return fit_and_folder[1]
 
 
+@pytest.mark.slow
 def test_a_stored_fit_gives_drives_of_its_quoted_errors(fit_and_folder):
     result, fitted = fit_and_folder
     drawn = stored_draws(fitted, draws=400, seed=1)

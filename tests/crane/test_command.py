@@ -47,6 +47,7 @@ def test_run_compares_variants_and_writes_signals_and_a_figure(tmp_path):
 JUDGE = ["judge", "tg3637", "--seeds", "3", "--no-remedies"]
 
 
+@pytest.mark.slow
 def test_judge_ends_with_the_verdict_as_its_exit_code(tmp_path):
     page, table = tmp_path / "judge.html", tmp_path / "judge.csv"
     fails = said(*JUDGE, "--out", str(table), "--plot", str(tmp_path / "judge.png"))
@@ -81,6 +82,7 @@ def test_follow_and_sectors_print_their_tables(tmp_path):
     assert bearings == ["0", "90", "180", "270"]
 
 
+@pytest.mark.slow
 def test_run_writes_its_scene(tmp_path):
     scene = tmp_path / "scene.html"
     made = said("run", "tg3637", "--length", "5", "--sea", "ss2", "--scene", str(scene))

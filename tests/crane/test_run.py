@@ -194,6 +194,7 @@ lagging = Model("lagging", Gains, Filtered, follow, sample=offset)
 """A law of one's own: the tip follows the load behind a lag, which damps as a delay does."""
 
 
+@pytest.mark.slow
 def test_law_of_ones_own_damps_in_the_same_loop(crane, slewed):
     law = control.Law(lagging, Gains(0.2, 2.0))
     none, damped = (crane.simulate(slewed, control=each, actuation="ideal") for each in (None, law))
@@ -311,6 +312,7 @@ def test_loaded_hoist_lowers_faster_by_its_leakage(leaking):
     assert loaded.load_torque[n, 2] == pytest.approx(mean, rel=0.015)
 
 
+@pytest.mark.slow
 @pytest.mark.interpreted
 def test_stepper_takes_the_samples_of_a_loaded_run_with_a_hook(leaking):
     stick = Stick.trapezoid(hoist=0.5, luff=0.5, duration=0.6, start=0.1, ramp=0.2, length=0.8)

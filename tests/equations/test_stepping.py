@@ -32,7 +32,9 @@ VOLTAGE = 6.0 * np.sin(np.arange(700) / 90.0) ** 3
 
 
 @pytest.mark.interpreted
-@pytest.mark.parametrize(("name", "rate"), [("slew", 512.0), ("hoist", 1024.0)])
+@pytest.mark.parametrize(
+    ("name", "rate"), [pytest.param("slew", 512.0, marks=pytest.mark.slow), ("hoist", 1024.0)]
+)
 def test_step_of_a_drive_gives_the_numbers_of_its_simulation(name, rate):
     drive = Drive.preset(name).at_every_rate()
     compiled = drive.compiled_step(("shaft_speed", "swash_angle", "current"), rate=rate)
@@ -45,6 +47,7 @@ def test_step_of_a_drive_gives_the_numbers_of_its_simulation(name, rate):
     )
 
 
+@pytest.mark.slow
 def test_step_takes_measured_inputs_and_begins_settled():
     drive = Drive.preset("hoist").replace(motor_leakage=1e-6, motor_constant=250.0)
     torque = 3e4 * (1.0 + np.sin(np.arange(VOLTAGE.size) / 40.0))

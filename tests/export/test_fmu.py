@@ -135,7 +135,7 @@ class Master:
         return made
 
 
-@pytest.fixture(params=["2.0", "3.0"])
+@pytest.fixture(params=["2.0", pytest.param("3.0", marks=pytest.mark.slow)])
 def fmi(request: pytest.FixtureRequest) -> str:
     return request.param
 

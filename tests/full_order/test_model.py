@@ -92,6 +92,7 @@ IDLE = (
 """What does not matter to the calm record."""
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", QUANTITIES)
 def test_derivatives_are_exact_where_nothing_switches(
     hoist: FullOrderDrive, name: str, calm: Mapping[str, Array]
@@ -116,6 +117,7 @@ def stops(limited: FullOrderDrive) -> Mapping[str, Array]:
     return dict(zip(QUANTITIES, found.T, strict=True))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", QUANTITIES)
 def test_derivatives_pass_through_limits(
     limited: FullOrderDrive, name: str, stops: Mapping[str, Array]
@@ -130,6 +132,7 @@ def test_derivatives_pass_through_limits(
     assert name == "relief_pressure" or np.abs(stops[name]).max() > 10.0 * noise
 
 
+@pytest.mark.slow
 def test_that_record_meets_every_limit(limited: FullOrderDrive) -> None:
     run = limited.simulate(STOPS, substeps=STEPS)
     for hold in (run.spool_hold, run.relief_hold, run.plate_hold):

@@ -129,6 +129,7 @@ def test_a_name_that_no_parameter_has_is_refused(campaign: Campaign) -> None:
 # --- earlier stages -------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_slopes_are_those_of_fitting_again(campaign: Campaign) -> None:
     """Move an estimate of the card, fit the pump again, and see how far it follows."""
     card, pump = assess(fit(Drive.preset("hoist"), campaign, load_setup("hoist")).stages)

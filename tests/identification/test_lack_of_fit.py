@@ -96,6 +96,7 @@ def test_late_stamps_of_the_command_are_the_fixed_delay(sound) -> None:
     assert "equal to other values of the fixed tau" in " ".join(sound[1].assumed)
 
 
+@pytest.mark.slow
 def test_a_longer_delay_than_the_fixed_one_is_named(tmp_path: Path) -> None:
     nominal = Drive.preset("slew")
     tau = nominal.parameters.numbers["tau"]
@@ -108,6 +109,7 @@ def test_a_longer_delay_than_the_fixed_one_is_named(tmp_path: Path) -> None:
     assert "parameter values not to be trusted because residuals of counts are" in found.headline
 
 
+@pytest.mark.slow
 def test_a_load_is_named(tmp_path: Path) -> None:
     nominal = Drive.preset("slew")
     lost = np.radians(0.08)
@@ -141,6 +143,7 @@ def test_a_clipped_ammeter_is_found_with_the_limits_to_state(tmp_path: Path) -> 
     assert ", 0.2] in its channel" in said[0]
 
 
+@pytest.mark.slow
 def test_a_counter_that_does_not_follow_is_no_stop_of_the_machine(tmp_path: Path) -> None:
     def lose(columns: dict[str, np.ndarray]) -> None:
         apart = np.diff(columns["time"])
@@ -155,6 +158,7 @@ def test_a_counter_that_does_not_follow_is_no_stop_of_the_machine(tmp_path: Path
     assert lack_of_fit(assessments).causes[0].name == "loss at the largest speeds of counts"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "said"),
     [("counts", "scale of counts, or of the fixed Z10, off"), ("current", "scale of current off")],
@@ -186,6 +190,7 @@ def lagged(time: np.ndarray, values: np.ndarray, lag: float) -> np.ndarray:
     return made
 
 
+@pytest.mark.slow
 def test_lag_and_late_stamps_are_named_together(tmp_path: Path) -> None:
     def slow(columns: dict[str, np.ndarray]) -> None:
         columns["counts"] = np.floor(lagged(columns["time"], columns["counts"], 0.03))
@@ -201,6 +206,7 @@ def test_lag_and_late_stamps_are_named_together(tmp_path: Path) -> None:
     assert misfit.likely in found.headline
 
 
+@pytest.mark.slow
 def test_a_slow_clamp_is_named(tmp_path: Path) -> None:
     def slow(columns: dict[str, np.ndarray]) -> None:
         columns["current"] = lagged(columns["time"], columns["current"], 0.02)

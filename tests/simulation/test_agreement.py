@@ -139,6 +139,7 @@ def test_a_batch_by_current_gives_the_same_bits(hoist: Drive) -> None:
     assert np.array_equal(pumps[0], alone.shaft_speed)
 
 
+@pytest.mark.slow
 def test_stamps_and_a_measured_load_count_everywhere(hoist: Drive) -> None:
     """In a batch and in derivatives as in a simulation, at the command's stamps."""
     drive = hoist.replace(**LOAD)

@@ -10,7 +10,11 @@ REFINED = {"line_stiffness": 1e3, "motor_leakage": 1e-3, "load_inertia": 1.0}
 
 
 @pytest.mark.traced
-@pytest.mark.parametrize("refinements", [{}, REFINED], ids=["plain", "refined"])
+@pytest.mark.parametrize(
+    "refinements",
+    [{}, pytest.param(REFINED, marks=pytest.mark.slow)],
+    ids=["plain", "refined"],
+)
 def test_numbers_that_overflow_are_refused(hoist: Drive, refinements: dict[str, float]) -> None:
     drive = hoist.replace(**LARGE, **refinements)
     with pytest.raises(DomainError, match="overflow under this voltage"):

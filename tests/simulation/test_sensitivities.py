@@ -114,6 +114,7 @@ COMPILED_LONG = (
     "decay from within a step",
     "steep",
     "steady start, leaking",
+    "load",
 )
 
 
