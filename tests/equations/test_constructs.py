@@ -402,6 +402,16 @@ def balanced(a: float, b: float, s: Spring) -> float:
     return b * root(excess, -b, 2.0 * b, a * a, s)
 
 
+@equation
+def counted_once(a: float, b: float) -> float:
+    s, end = Spring(b, a), repeated(swung, 3.0, Swing(a, b), Spring(b, a), a)
+    return root(excess, -3.0, 3.0, a, s) + end.angle
+
+
+def test_a_number_that_is_two_arguments_counts_once(derivative: Callable[..., float]) -> None:
+    check(counted_once, derivative, ("a", "b"), a=0.7, b=1.3)
+
+
 def test_roots(derivative: Callable[..., float]) -> None:
     spring = Spring(1.5, 0.1)
     x = root(excess, -3.0, 3.0, 0.7, spring)

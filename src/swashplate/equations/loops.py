@@ -247,7 +247,8 @@ def solved(
     # the implicit function theorem within the bracket
     unknown, *others = (each.arg for each in residual.arguments)
     known = {a: code.named(b, a) for a, b in zip(others, rest, strict=True)}
-    by = [node for each in known.values() for _, node in leaves(each) if node.op == "name"]
+    numbers = (node for each in known.values() for _, node in leaves(each) if node.op == "name")
+    by = list(dict.fromkeys(numbers))  # once each, also where two arguments are the same number
     items, made = code.aside(lambda: read(code, residual.function, {unknown: x, **known}))
     alone = Code(code.taken, ruled=True)
     alone.items = items
