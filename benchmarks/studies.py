@@ -63,8 +63,8 @@ def full_order_rows() -> Iterator[Row]:
     """30 s of the five-state model, by the compiled march."""
     hoist = FullOrderDrive.preset("hoist")
     command = maneuvers.sine(6.5, 0.1, length=30.0).sample(512.0)
-    current = hoist.drive.simulate(command).current
-    march = _median_of(9, lambda: hoist.simulate_current(current))
+    run = hoist.drive.simulate(command)
+    march = _median_of(9, lambda: hoist.follow(run))
     yield _limited("full-order model, compiled march", march, MARCHED)
 
 
