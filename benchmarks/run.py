@@ -6,6 +6,7 @@ python benchmarks/run.py [--write]
 import argparse
 from collections.abc import Iterator
 
+import crane
 import exports
 import fits
 import processes
@@ -30,6 +31,7 @@ def measured() -> Iterator[table.Row]:
     yield from processes.hour_rows()
     yield from processes.command_rows()
     yield from processes.first_use_rows()
+    yield from crane.crane_rows()
 
 
 def main() -> None:
