@@ -6,7 +6,6 @@ python benchmarks/run.py [--write]
 import argparse
 from collections.abc import Iterator
 
-import crane
 import exports
 import fits
 import processes
@@ -14,6 +13,8 @@ import rows
 import studies
 import table
 from rich.console import Console
+
+import crane
 
 
 def measured() -> Iterator[table.Row]:
