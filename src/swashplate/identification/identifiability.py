@@ -54,10 +54,12 @@ class Gauge:
         """
         symbols, values = [symbol_of(name) for name in variables.names], variables.estimates
         known = {**(fixed or {}), **dict(zip(symbols, values.tolist(), strict=True))}
-        still: Move = lambda value, known: 0.0  # noqa: E731
         pairs = zip(symbols, values.tolist(), strict=True)
         try:
-            slopes = [self.moves.get(symbol, still)(value, known) for symbol, value in pairs]
+            slopes = [
+                self.moves[symbol](value, known) if symbol in self.moves else 0.0
+                for symbol, value in pairs
+            ]
         except KeyError:
             return np.zeros(variables.count)
         return np.array(slopes) / variables.slopes
