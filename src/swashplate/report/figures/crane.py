@@ -242,9 +242,13 @@ def _polar(result: Sweep, title: str, looks: dict[str, style.Stroke], *said: str
     ax.set_theta_zero_location("N")
     ax.set_theta_direction(-1)
     mean, floor = np.degrees(result.mean()[..., 0]), np.log10(0.05)
-    around = np.append(result.points, result.points[0] + 2.0 * np.pi)
+    # closed where the bearings go all the way around, not where they are part of a circle
+    again = result.points[:1] + 2.0 * np.pi
+    gap = again - result.points[-1]
+    again = again[gap <= 1.5 * np.diff(result.points).max(initial=0.0)]
+    around = np.append(result.points, again)
     for values, (color, dashes) in zip(mean.T, looks.values(), strict=True):
-        radius = np.log10(np.maximum(np.append(values, values[0]), 0.05)) - floor
+        radius = np.log10(np.maximum(np.append(values, values[: again.size]), 0.05)) - floor
         ax.plot(around, radius, color=color, linestyle=dashes, linewidth=1.4)
     shown = [each for each in (0.1, 0.3, 1.0, 3.0, 10.0, 30.0) if each <= 1.3 * np.nanmax(mean)]
     ax.set_ylim(0.0, np.log10(1.3 * np.nanmax(mean)) - floor)
