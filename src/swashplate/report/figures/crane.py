@@ -17,6 +17,7 @@ from swashplate.errors import InputError
 from swashplate.report import style
 from swashplate.report.lines import SHADES, draw, fit_time, shade_handle, stretches
 from swashplate.simulation.result import Limit
+from swashplate.tables import count
 
 Array = NDArray[np.float64]
 
@@ -157,22 +158,22 @@ class Look(NamedTuple):
     below: str
     label: str
     remark: str
-    """Of the number of seaways."""
+    """Of how many seaways there are."""
 
 
 LOOKS = {
-    "bearing": Look("Swing over the bearing of the boom", "", "", "RMS, mean of {} seaways"),
+    "bearing": Look("Swing over the bearing of the boom", "", "", "RMS, mean of {}"),
     "height": Look(
         "Seaways in which the load swings less than {:g}°",
         "significant height of the waves (m)",
         "share of seaways (%)",
-        "{} seaways a height",
+        "{} a height",
     ),
     "orifice": Look(
         "Swing over the size of the luff drive's orifice",
         "orifice of the luff drive, to the identified one",
         "swing, RMS (deg)",
-        "mean of {} seaways with its 95 % interval",
+        "mean of {} with its 95 % interval",
     ),
     "stick": Look(
         "Residual swing after a slew",
@@ -193,7 +194,7 @@ def plot_sweep(result: Sweep, *, limit_deg: float = 3.0, title: str = "") -> Fig
     look, looks, points = LOOKS[result.over], style.strokes(result.names), result.points
     words = title or look.title.format(limit_deg)
     sea = seaway_words(result.sea, result.over != "height")
-    said = (sea, look.remark.format(len(result.values)), assumed(result.crane))
+    said = (sea, look.remark.format(count(len(result.values), "seaway")), assumed(result.crane))
     if result.over == "bearing":
         return _polar(result, words, looks, *said)
     stick = result.over == "stick"
@@ -295,7 +296,7 @@ def plot_follow(result: Followable, *, title: str = "") -> Figure:
 def plot_judgment(result: Judgment, *, title: str = "") -> Figure:
     """Figure of a judgment: swing of every variant in every seaway, and what limits its drives."""
     names, study = list(reversed(result.names)), result.study
-    words = title or f"Swing in {len(study.seeds)} seaways"
+    words = title or f"Swing in {count(len(study.seeds), 'seaway')}"
     figure, (ax,) = style.sheet([0.42 * len(names) + 0.3], words, lines=1)
     said = "bars: mean with its 95 % interval"
     remark(ax, seaway_words(study.sea), said, assumed(study.crane), right=True)
