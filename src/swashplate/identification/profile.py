@@ -147,7 +147,7 @@ class _Side(NamedTuple):
     better: Point | None = None
 
 
-class _BetterOptimum(Exception):  # noqa: N818  it is a find, no error
+class _BetterOptimumError(Exception):
     """A point that costs less than the optimum."""
 
 
@@ -182,7 +182,7 @@ def _side(
         if not np.isfinite(cost):
             return None
         if cost < optimum.cost - BETTER * rise:
-            raise _BetterOptimum(Point(number, float(cost), vector))
+            raise _BetterOptimumError(Point(number, float(cost), vector))
         points.append(Point(number, float(cost), vector))
         return float(np.sqrt(max(cost - optimum.cost, 0.0) / rise))
 
@@ -210,7 +210,7 @@ def _side(
 
     try:
         ending, distance = walked()
-    except _BetterOptimum as found:
+    except _BetterOptimumError as found:
         return _Side(points, "better optimum", better=found.args[0])
     end = None if distance is None else optimum.number + sign * distance
     return _Side(points, ending, end)
@@ -243,8 +243,8 @@ def minimiser(problem: Problem, *, tolerance: float = 1e-8, max_evaluations: int
     def minimise(index: int, number: float, start: Array) -> tuple[float, Array]:
         if start.size == 1:
             return problem.cost(start), start
-        limits = {"tolerance": tolerance, "max_evaluations": max_evaluations}
-        found = solve(problem, start, fixed={index: number}, **limits)  # type: ignore[arg-type]
+        fixed, most = {index: number}, max_evaluations
+        found = solve(problem, start, fixed=fixed, tolerance=tolerance, max_evaluations=most)
         return found.cost, found.vector
 
     return minimise

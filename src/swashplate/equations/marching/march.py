@@ -39,9 +39,18 @@ voltage target counts coming cost rate integral shown choose width
 """
 RESERVED = {*_OWN.split(), *(name for name in vars(math) if not name.startswith("_"))}
 """Names that the kernels use themselves."""
-MACHINE = (
-    "inputs lines whole fraction params given h constants states outputs".split()  # noqa: SIM905
-)
+MACHINE = [
+    "inputs",
+    "lines",
+    "whole",
+    "fraction",
+    "params",
+    "given",
+    "h",
+    "constants",
+    "states",
+    "outputs",
+]
 """What a step takes from a `Machine`."""
 
 

@@ -49,9 +49,16 @@ def seaway_words(sea: Seaway | None, height: bool = True) -> str:
 def remark(ax: Axes, *said: str, rows: int = 0, right: bool = False) -> None:
     """Write grey words above a panel, over so many rows of a legend."""
     words, side = "; ".join(filter(None, said)), 1.0 if right else 0.0
-    how = {"fontsize": style.SMALL, "color": style.GREY, "ha": "right" if right else "left"}
-    place = {"xycoords": "axes fraction", "textcoords": "offset points"}
-    ax.annotate(words, (side, 1.0), xytext=(0.0, 5.0 + 13.0 * rows), **place, **how)  # type: ignore[arg-type]
+    ax.annotate(
+        words,
+        (side, 1.0),
+        xytext=(0.0, 5.0 + 13.0 * rows),
+        xycoords="axes fraction",
+        textcoords="offset points",
+        fontsize=style.SMALL,
+        color=style.GREY,
+        ha="right" if right else "left",
+    )
 
 
 def _panels(
