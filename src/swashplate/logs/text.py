@@ -142,20 +142,57 @@ class _Table:
         FileError
             For a row of too many or too few fields, a cell that holds no number, a NUL byte.
         """
-        import polars as pl
-
         begin, count, clocks = 1, 0, dict[int, _Clock]()
         for piece in _pieces(self.path, self.encoding, self.skipped):
-            texts = pl.Series("text", [piece[:-1]]).str.split("\n").explode()
-            lines = pl.DataFrame([texts]).with_row_index("line", begin)
-            begin += len(texts)
-            rows = lines.filter((pl.col("line") >= self.first) & self._holds_a_row())
-            if rows.height:
-                cells = self._cells(rows, count)
+            end, header = begin + piece.count("\n"), max(self.first - begin, 0)
+            lines: Sequence[int] = range(begin + header, end)
+            numbers = [each for each in positions if each not in clocks]
+            cells = self._plain_cells(piece.split("\n", header)[-1], len(lines), numbers)
+            if cells is None:
+                rows = self._rows(piece, begin)
+                cells, lines = self._cells(rows, count), rows["line"].to_list()
+            begin = end
+            if lines:
                 yield [
-                    self._numbers(cells, rows["line"], each, count, clocks) for each in positions
+                    self._numbers(cells[f"field_{each}"], lines, each, count, clocks)
+                    for each in positions
                 ]
-            count += rows.height
+            count += len(lines)
+
+    def _plain_cells(
+        self, text: str, lines: int, numbers: Sequence[int]
+    ) -> polars.DataFrame | None:
+        """Cells of lines that are rows, of plain numbers in the columns `numbers`; None if not."""
+        import polars as pl
+
+        delimiter, width, comma = self.layout.delimiter, self.layout.width, self.layout.decimal
+        # a point may mark thousands where commas are decimal
+        special = ('"', "\0", *self.marks, *("." if comma == "," else ""))
+        if delimiter == " " or lines < 1 or any(each in text for each in special):
+            return None
+        kinds = [pl.Float64 if i in numbers else pl.String for i in range(width)]
+        try:
+            cells = pl.read_csv(
+                text.encode(),
+                has_header=False,
+                separator=delimiter,
+                quote_char=None,
+                decimal_comma=comma == ",",
+                schema={f"field_{i}": kind for i, kind in enumerate(kinds)},
+            )
+        except pl.exceptions.PolarsError:
+            return None
+        # Polars refuses a row of too many fields, and fills one of too few, or a blank one
+        filled = cells[:, -1].null_count() == 0
+        return cells if filled or text.count(delimiter) == lines * (width - 1) else None
+
+    def _rows(self, piece: str, begin: int) -> polars.DataFrame:
+        """Lines of a piece that are rows, with their numbers; `begin` is that of the first line."""
+        import polars as pl
+
+        texts = pl.Series("text", [piece[:-1]]).str.split("\n").explode()
+        lines = pl.DataFrame([texts]).with_row_index("line", begin)
+        return lines.filter((pl.col("line") >= self.first) & self._holds_a_row())
 
     def _holds_a_row(self) -> polars.Expr:
         """Whether a line is neither comment nor blank; one of nothing but tabs has empty cells."""
@@ -168,7 +205,7 @@ class _Table:
         comment = "|".join(map(re.escape, self.marks))
         return filled & ~text.str.contains(f"^(?:{comment})") if comment else filled
 
-    def _cells(self, rows: polars.DataFrame, count: int) -> polars.Series:
+    def _cells(self, rows: polars.DataFrame, count: int) -> polars.DataFrame:
         """Rows taken apart into ``field_0``, ``field_1`` ..., before which there are `count`."""
         import polars as pl
 
@@ -195,9 +232,8 @@ class _Table:
                         f"{self.path} has misplaced quotes in {place(row)}: {said}."
                     ) from None
             texts, delimiter = pl.Series(unquoted, dtype=pl.String), _SEPARATOR
-        cells = texts.str.split_exact(delimiter, width)
-        last, more = (cells.struct.field(f"field_{i}") for i in (width - 1, width))
-        wrong = last.is_null() | more.is_not_null()
+        cells = texts.str.split_exact(delimiter, width).struct.unnest()
+        wrong = cells[f"field_{width - 1}"].is_null() | cells[f"field_{width}"].is_not_null()
         if wrong.any():
             row = int(wrong.arg_max() or 0)
             has = len(texts[row].split(delimiter))
@@ -208,14 +244,15 @@ class _Table:
 
     def _numbers(
         self,
-        cells: polars.Series,
-        lines: polars.Series,
+        texts: polars.Series,
+        lines: Sequence[int],
         position: int,
         count: int,
         clocks: dict[int, _Clock],
     ) -> Array:
         """A column of a piece, before which there are `count` rows."""
-        texts = cells.struct.field(f"field_{position}")
+        if texts.dtype.is_float():
+            return texts.to_numpy()
         found, kind = _numbers_of(texts, self.layout.decimal), "number"
         if count == 0 and isinstance(found, _NoNumber):
             form = date_form(found.cell.strip())
