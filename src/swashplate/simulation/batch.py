@@ -8,6 +8,7 @@ from __future__ import annotations
 import os
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from pathlib import Path
 from typing import Any, Unpack
 
@@ -207,7 +208,7 @@ class _Sets:
 
     def __getstate__(self) -> dict[str, Any]:
         """Without what other processes have no use for."""
-        return {**self.__dict__, "place": None}
+        return {k: v for k, v in self.__dict__.items() if k != "compared"} | {"place": None}
 
     @property
     def record(self) -> Record:
@@ -218,6 +219,7 @@ class _Sets:
         """Where outputs of some blocks go."""
         return Path(self.to or "") / f"{blocks[0][0][0]:08d}.parquet"
 
+    @cached_property
     def compared(self) -> tuple[Array, Array]:
         """Measured values and weights on the march's grid, zero weight between the samples."""
         # zeros that nobody writes to take no memory
@@ -262,9 +264,9 @@ def _march(shared: _Sets, blocks: Sequence[Block]) -> list[tuple[dict[int, float
     outputs: none where these are in their place already.
     """
     made, record, keep = [], shared.record, shared.cost is None
-    measured, weight = shared.compared()
+    measured, weight = shared.compared
     inputs = {name: each.values for name, each in shared.records.items()}
-    table = {"time": record.time}
+    table = {"time": record.time} if shared.to is not None else {}
     for sets, options in blocks:
         padded, size = np.resize(sets, LANES), sets.size
         lanes = lanes_of(shared.model, tuple(inputs), options, shared.output)

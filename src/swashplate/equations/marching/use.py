@@ -326,15 +326,18 @@ def sensitivities(
 
 
 @generating
-def _steps(step: Callable[[Machine], float]) -> Callable[..., float]:
+def _steps(step: Callable[[Machine], float]) -> Callable[..., tuple[float, bool]]:
     """The compiled march over the steps of one sample."""
 
     @kernel
     def steps(
         inputs: Array, held: NDArray[np.bool_], substeps: int, machine: Machine,
         rates: NDArray[np.int64], totals: Array,
-    ) -> float:  # fmt: skip
-        """Advance by one sample, from the inputs before to these; `totals` as in `StepperState`."""
+    ) -> tuple[float, bool]:  # fmt: skip
+        """Advance by one sample, from the inputs before to these; `totals` as in `StepperState`.
+
+        Returns the least margin of the domain, and whether the state is finite.
+        """
         worst = np.inf
         for j in range(substeps):
             for i in range(held.size):
@@ -347,7 +350,11 @@ def _steps(step: Callable[[Machine], float]) -> Callable[..., float]:
                 rate = machine.outputs[rates[r]]
                 totals[0, r] = totals[0, r] + 0.5 * machine.h * (totals[1, r] + rate)
                 totals[1, r] = rate
-        return worst
+        inputs[0] = inputs[1]
+        finite = True
+        for state in machine.states:
+            finite = finite and np.isfinite(state)
+        return worst, finite
 
     return steps
 
@@ -458,7 +465,6 @@ class Stepper(Generic[S]):
                     f"The {name} is {value:g}, but must be a finite number within ±{bound:g}."
                 )
         machine, totals, values, begun = self._state
-        values[0] = values[1]
         values[1] = inputs
         if not begun:
             if self._start == "steady":
@@ -466,10 +472,11 @@ class Stepper(Generic[S]):
                 machine = self._compiled.machine(first, "steady")
             self._state = StepperState(machine, totals, values, True)
         substeps = self._substeps if begun else 1
-        worst = self._steps(values, self._held, substeps, machine, self._rates, totals)
+        worst, finite = self._steps(values, self._held, substeps, machine, self._rates, totals)
         if not begun:
             totals[0] = 0.0
-        self._compiled.check(machine, worst, self.inputs[0])
+        if not (worst > 0.0 and finite):
+            self._compiled.check(machine, worst, self.inputs[0])
         row = [*inputs, *machine.outputs.tolist(), *totals[0].tolist()]
         return self._sample([row[at] for at in self._order])
 
