@@ -1,6 +1,9 @@
 """Damaged and hostile files: each ends in one sentence that names the file and the place."""
 
+import os
 import struct
+import subprocess
+import sys
 import zlib
 from collections.abc import Callable
 from pathlib import Path
@@ -243,3 +246,20 @@ def test_a_damaged_file_ends_in_one_sentence(tmp_path, name, write, said):
     assert sentence.isprintable()
     assert sentence.endswith(".")
     assert ". " not in sentence, "more than one sentence"
+
+
+@pytest.mark.slow
+def test_nothing_is_left_behind_of_a_damaged_file(tmp_path):
+    path, spare = tmp_path / "log.mf4", tmp_path / "spare"
+    spare.mkdir()
+    mdf(path)
+    content = path.read_bytes()
+    # not finished, so that its library repairs a copy first, and cut, so that it cannot
+    path.write_bytes(content[:60] + b"\1\0" + content[62:300])
+    reading = f"from swashplate.logs import open_log; open_log({str(path)!r})"
+    environment = os.environ | dict.fromkeys(("TMPDIR", "TEMP", "TMP"), str(spare))
+    ended = subprocess.run(
+        [sys.executable, "-c", reading], env=environment, capture_output=True, text=True
+    )
+    assert "cannot be read as MDF" in ended.stderr
+    assert not list(spare.iterdir())

@@ -68,6 +68,8 @@ class _Other:
 
     def __init__(self) -> None:
         self._errors = tempfile.TemporaryFile()  # noqa: SIM115 - closed in _ended
+        # what libraries leave behind of a damaged file goes with the process
+        self._scratch = tempfile.TemporaryDirectory(ignore_cleanup_errors=True)
         threads = min(4, os.cpu_count() or 1)  # each takes a share of the memory that it may have
         self._process = subprocess.Popen(
             [sys.executable, "-c", _START.format(path=sys.path)],
@@ -76,6 +78,7 @@ class _Other:
             stderr=self._errors,
             env={
                 **os.environ,
+                **dict.fromkeys(("TMPDIR", "TEMP", "TMP"), self._scratch.name),
                 "POLARS_MAX_THREADS": str(threads),
                 "RUST_BACKTRACE": "0",
                 # a block is read with little ahead of it, and given back before the next
@@ -83,7 +86,7 @@ class _Other:
                 "_RJEM_MALLOC_CONF": "dirty_decay_ms:0,muzzy_decay_ms:0",
             },
         )
-        self._end = finalize(self, _ended, self._process, self._errors)
+        self._end = finalize(self, _ended, self._process, self._errors, self._scratch)
 
     @classmethod
     def ask(cls, path: Path, question: Sequence[Any]) -> tuple[dict[str, Any], list[Array]]:
@@ -139,7 +142,11 @@ class _Other:
         return answer, arrays
 
 
-def _ended(process: subprocess.Popen[bytes], errors: IO[bytes]) -> None:
+def _ended(
+    process: subprocess.Popen[bytes],
+    errors: IO[bytes],
+    scratch: tempfile.TemporaryDirectory[str],
+) -> None:
     for pipe in (process.stdin, process.stdout):
         if pipe is not None:
             with suppress(BrokenPipeError):  # a question that was never read
@@ -150,6 +157,7 @@ def _ended(process: subprocess.Popen[bytes], errors: IO[bytes]) -> None:
         process.kill()
         process.wait()
     errors.close()
+    scratch.cleanup()
 
 
 # --- long logs ------------------------------------------------------------------------------------
