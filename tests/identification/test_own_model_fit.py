@@ -201,3 +201,32 @@ def test_refusals(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
             ModelSetup.from_file(tmp_path / f"{name}.py")
     with pytest.raises(FileError, match="no Python file"):
         ModelSetup.from_file(tmp_path / "none.py")
+
+
+class Slow(NamedTuple):
+    lag: float
+
+
+@equation
+def slow_step(state: State, command: float, supply: float, p: Slow, h: float) -> State:
+    return State(state.place + h / p.lag * (GAIN * command * supply - state.place))
+
+
+def limited(seed: int) -> Experiment:
+    """A test of a servo that has a rate limit in place of a lag."""
+    test, place, rows = run(f"run {seed}", seed), 0.0, []
+    for u, s in zip(test.input.values, test["supply"].values, strict=True):
+        rows.append(place)
+        place += np.clip((GAIN * u * s - place) / (RATE * 0.05), -0.05, 0.05)
+    measured = np.array(rows) + 1e-3 * np.random.default_rng(seed).standard_normal(COUNT)
+    place_channel = replace(test["place"], values=measured)
+    return replace(test, channels={**test.channels, "place": place_channel})
+
+
+def test_what_a_model_leaves_out_is_not_called_an_error_of_the_sensor() -> None:
+    lagging = Model("lagging", parameters=Slow, state=State, step=slow_step)
+    found = fit(lagging, campaign(*map(limited, range(40))), {"lag": (0.01, 0.1, 3.0)})
+    headline = verdict(assess(found.stages), predict(found.parameters, [limited(99)])).headline
+    # the sensor's scale is right, and its noise is not stated
+    assert "scale of place off by" not in headline.split("(")[0]
+    assert "because the residuals show that the model leaves something out" in headline

@@ -456,7 +456,7 @@ def _fits(misfit: LackOfFit, side: _Side, assessments: Sequence[Assessment]) -> 
             state, failure = ("seen", f"{channel} {words}") if lost else ("not seen", "")
             yield Criterion(each.name, state, "none", why, failure)
         elif each.instrumental and each.visible:
-            yield _of_instrument(each, wrong)
+            yield _of_instrument(each, wrong, known=bool(misfit.ratios))
     if misfit.clipped:
         why = "values beyond it were not measured, and bias the fit"
         failure = misfit.clipped[0].rstrip(".")
@@ -485,17 +485,24 @@ def _drift(fault: Fault) -> Criterion:
     )
 
 
-def _of_instrument(fault: Fault, wrong: Sequence[Fault]) -> Criterion:
-    """That an instrument's error is small; of several that seem wrong the likeliest one is."""
+def _of_instrument(fault: Fault, wrong: Sequence[Fault], *, known: bool) -> Criterion:
+    """That an instrument's error is small; of several that seem wrong the likeliest one is.
+
+    Where no measurement error is known, only what explains the residuals is taken for the cause.
+    """
     limit, size = fault.kind.plausible / 3.0, f"{fault.size:+.2g} {fault.kind.unit}"
     first = fault in wrong[:1]
     value = size if first or abs(fault.size) <= limit else "not seen"
+    failure = f"{fault.words} off by {size}"
+    if not (known or fault.explains):
+        part = f"{100.0 * fault.share:.2g} % of their squares look like {fault.name} off by {size}"
+        failure = f"the residuals show that the model leaves something out ({part})"
     return Criterion(
         fault.name,
         f"see {wrong[0].name}" if fault in wrong[1:] else value,
         f"{limit:.2g} {fault.kind.unit}",
         "a larger error would be visible in these logs",
-        f"{fault.words} off by {size}" if first else "",
+        failure if first else "",
         "values",
     )
 
