@@ -189,6 +189,16 @@ def test_slow_model_errors_white_noise_and_short_runs_have_no_lines() -> None:
     assert without_lines(linear_fit([short], unknowns_of("abc", np.ones(3))))[1] == ()
 
 
+@pytest.mark.parametrize("size", [512, 546])
+def test_a_line_at_half_the_rate(size):
+    # spectra of an even number of frequencies and, at 546 samples, of an odd one
+    turning = (-1.0) ** np.arange(size) + 0.1 * np.random.default_rng(1).normal(size=size)
+    run = LinearisedRun("a", "current", TIME[:size], turning, np.ones((size, 1)), None)
+    _, lines = without_lines(linear_fit([run], unknowns_of("a", [1.0])))
+    assert lines[0].frequency == pytest.approx(RATE / 2.0, rel=0.005)
+    assert lines[0].share > 0.9
+
+
 def test_errors_are_those_of_the_noise_under_a_ripple() -> None:
     """Estimates scatter by the noise alone, as the ripple averages out; errors say so."""
     rng = np.random.default_rng(2)

@@ -486,15 +486,19 @@ def _frequencies(runs: Sequence[Array], grids: Sequence[Grid]) -> list[float]:
     freedom = 2.0 * len(runs), 2.0 * len(runs) * (count - 1.0)
     # the upper quantile of F is one over the lower one with its freedoms exchanged
     limit = 1.0 / float(fdtri(*freedom[::-1], FALSE_ALARM / looks))
-    told = (ratio > limit) & (frequencies > LOWEST * bandwidth) & (frequencies < 0.5 / step)
+    # at half the rate itself a sine is zero; the last frequency of an odd size lies below it
+    highest = (1.0 - 1e-9) * 0.5 / step
+    told = (ratio > limit) & (frequencies > LOWEST * bandwidth) & (frequencies < highest)
     chosen: list[float] = []
     for place in np.argsort(-np.where(told, explained, 0.0)):
         if not told[place] or len(chosen) == MOST:
             break
         near = abs(np.array(chosen) - frequencies[place]) < bandwidth
         if not near.any():
-            # the parabola through the maximum and its neighbours; 0 and the end are never told
-            low, middle, high = explained[place - 1 : place + 2]
+            # the parabola through the maximum and its neighbours; the last frequency has one, and
+            # zero is never told
+            low, middle, *after = explained[place - 1 : place + 2]
+            high = after[0] if after else low
             bend = low - 2.0 * middle + high
             aside = np.clip(0.5 * (low - high) / bend, -0.5, 0.5) if bend < 0.0 else 0.0
             chosen.append(float(frequencies[place] + aside * frequencies[1]))
