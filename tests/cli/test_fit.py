@@ -44,8 +44,12 @@ def campaign(done: Words, tmp_path: Path) -> Path:
 def test_a_campaign_becomes_a_drive(
     done: Words, refused: Words, campaign: Path, tmp_path: Path
 ) -> None:
-    said = done("fit", "virtual/campaign.toml", "--setup", "setup.toml", "--out", "fitted")
-    assert re.search(r": searched for [\d.]+ s, judged for [\d.]+ s, wrote for [\d.]+ s\n", said)
+    words = ("--setup", "setup.toml", "--out", "fitted", "--timing")
+    said = done("fit", "virtual/campaign.toml", *words)
+    (times,) = re.findall(r"^Time: +(.*)$", said, re.MULTILINE)
+    parts = dict(each.removesuffix(" s").rsplit(" ", 1) for each in times.split(", "))
+    assert [*parts] == ["start and kernels", "reading", "search", "judging", "report"]
+    assert all(float(each) >= 0.0 for each in parts.values())
     assert "Stage card" in said
     assert "Stage pump" in said
     fitted = Drive.from_toml(tmp_path / "fitted" / "drive.toml")

@@ -140,8 +140,8 @@ def test_usage(run, words, said):
 
 
 def test_too_little_memory_is_a_sentence(refused, monkeypatch):
-    def exhausted(*_: object) -> None:
+    def exhausted(*_: object, **__: object) -> None:
         raise MemoryError
 
-    monkeypatch.setattr("swashplate.cli.simulate.simulated", exhausted)
+    monkeypatch.setattr("swashplate.Drive.simulate", exhausted)
     assert "not enough memory" in refused("simulate", "hoist", "step:9")
