@@ -67,9 +67,8 @@ class Clock:
         begun, before = perf_counter(), generating_time()
         yield
         kernels = generating_time() - before
-        spent = {name: perf_counter() - begun - kernels, "start and kernels": kernels}
-        for each, seconds in spent.items():
-            self.parts[each] = self.parts.get(each, 0.0) + seconds
+        self.parts["start and kernels"] += kernels
+        self.parts[name] = self.parts.get(name, 0.0) + perf_counter() - begun - kernels
 
     def __str__(self) -> str:
         return ", ".join(f"{name} {seconds:.2f} s" for name, seconds in self.parts.items())
