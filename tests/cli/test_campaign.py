@@ -1,24 +1,30 @@
-import json
+"""``campaign``, ``rig``, ``excitation`` and ``advise``: tests, and what they are worth."""
+
+import re
 from collections.abc import Callable
 from pathlib import Path
 
+import polars as pl
 import pytest
+from typer.testing import Result
 
 from swashplate import Campaign, Drive
 
-# --- campaign -------------------------------------------------------------------------------------
-
-
-Done = Callable[..., str]
-
-
+Words = Callable[..., str]
 COUNTS = ("--counts-per-turn", "1000")
-
-
 ROWS = [
     f"{k / 100},{4 if k > 20 else 0},{0.4 if k > 20 else 0},{7 * max(k - 20, 0)}"
     for k in range(100)
 ]
+
+
+def steps(*volts: float) -> tuple[str, ...]:
+    """Short steps, as options."""
+    tests = [f"step:{each},start=0.5,stop=2.5,length=4" for each in volts]
+    return tuple(word for each in tests for word in ("--maneuver", each))
+
+
+# --- campaign files -------------------------------------------------------------------------------
 
 
 @pytest.fixture
@@ -30,7 +36,7 @@ def logs(tmp_path: Path) -> list[str]:
     return names
 
 
-def test_from_logs_to_a_check(done: Done, logs: list[str], tmp_path: Path) -> None:
+def test_from_logs_to_a_check(run: Callable[..., Result], done: Words, logs: list[str]) -> None:
     said = done("campaign", "init", *logs, *COUNTS, "--drive", "hoist")
     assert "Draft: campaign.toml" in said
     said = done("campaign", "check")
@@ -39,35 +45,27 @@ def test_from_logs_to_a_check(done: Done, logs: list[str], tmp_path: Path) -> No
     # the logs are made up: a hoist turns at 98 deg/s, these counts at 252
     assert "'encoder_counts' moves" in " ".join(said.split())
     assert "1 finding, marked" in said
+    assert run("campaign", "check", "--strict").exit_code == 1
 
 
-def test_strict_fails_on_findings(
-    run: Callable[..., object], done: Done, logs: list[str], tmp_path: Path
-) -> None:
+def test_a_wrong_sign_and_a_long_name(done: Words, logs: list[str], tmp_path: Path) -> None:
     done("campaign", "init", *logs, *COUNTS)
-    path = tmp_path / "campaign.toml"
-    path.write_text(
-        path.read_text("utf-8").replace("counts_per_turn", "sign = -1\ncounts_per_turn"), "utf-8"
-    )
-    said = " ".join(done("campaign", "check").split())
-    assert "moves against the input: should its sign be -1? " in said
-    result = run("campaign", "check", "--strict")
-    assert result.exit_code == 1  # type: ignore[attr-defined]
+    path, name = tmp_path / "campaign.toml", "encoder_counts_of_the_drum_behind_the_gear"
+    text = path.read_text("utf-8").replace("counts_per_turn", "sign = -1\ncounts_per_turn")
+    path.write_text(text.replace("channels.encoder_counts", f"channels.{name}"), "utf-8")
+    said = done("campaign", "check")
+    assert "moves against the input: should its sign be -1? " in " ".join(said.split())
+    # folded, so that the columns behind it are there: the last one counts lost counts
+    lines = said.splitlines()
+    rows = [k for k, line in enumerate(lines) if re.match(r"encoder_counts_of\S*  .* 0$", line)]
+    assert [lines[k].split()[0] + lines[k + 1].strip() for k in rows] == [name] * 2
 
 
-def test_the_schema_is_json(done: Done) -> None:
-    schema = json.loads(done("campaign", "schema"))
-    assert {"axes", "runs", "title"} <= set(schema["properties"])
-    assert "counts_per_turn" in schema["$defs"]["Channel"]["properties"]
-
-
-def test_a_close_look(done: Done, refused: Callable[..., str], logs: list[str]) -> None:
+def test_a_close_look(done: Words, refused: Words, logs: list[str]) -> None:
     done("campaign", "init", *logs, *COUNTS, "--drive", "hoist")
     look = ("campaign", "plot", "--run", "lift", "--channel")
-    for channel in ("encoder_counts", "rectified_current"):
-        assert f"Figure: {channel}.svg" in done(
-            *look, channel, "--to", "0.5", "--out", f"{channel}.svg"
-        )
+    said = done(*look, "encoder_counts", "--to", "0.5", "--out", "counts.svg")
+    assert "Figure: counts.svg" in said
     assert "go together" in refused("campaign", "plot", "--run", "lift")
     assert "no channel 'speed'" in refused(*look, "speed")
 
@@ -83,37 +81,32 @@ file = "log.csv"
 """
 
 
-def test_a_close_look_at_a_tacho_beside_the_drive_before_any_fit(
-    done: Done, tmp_path: Path
+def test_a_tacho_beside_the_drive_before_any_fit(
+    done: Words, refused: Words, tmp_path: Path
 ) -> None:
     rows = [f"{k / 100},{4 if k > 20 else 0},{98 if k > 40 else 0}" for k in range(300)]
     (tmp_path / "log.csv").write_text("\n".join(["time,u,n", *rows]) + "\n", "utf-8")
-    look = ("campaign", "plot", "--run", "log", "--channel", "tacho", "--to", "2")
-    for name, text in (("with", TACHO), ("without", TACHO.replace('drive = "hoist"', ""))):
+    look = ("campaign", "plot", "--run", "log", "--channel", "tacho", "--to", "2", "--force")
+    for drive in ('drive = "hoist"', ""):
+        text = TACHO.replace('drive = "hoist"', drive)
         (tmp_path / "campaign.toml").write_text(text, "utf-8")
-        done(*look, "--out", f"{name}.svg")
-    shown, alone = ((tmp_path / f"{name}.svg").read_text("utf-8") for name in ("with", "without"))
-    assert "measured less simulated" in shown
-    assert "measured less simulated" not in alone
-
-
-def test_volts_that_were_declared_as_millivolts(
-    refused: Callable[..., str], tmp_path: Path
-) -> None:
-    rows = [f"{k / 100},{4 if k > 20 else 0},{98 if k > 40 else 0}" for k in range(300)]
-    (tmp_path / "log.csv").write_text("\n".join(["time,u,n", *rows]) + "\n", "utf-8")
+        done(*look, "--out", "look.svg")
+        drawn = (tmp_path / "look.svg").read_text("utf-8")
+        assert ("measured less simulated" in drawn) == bool(drive)
     (tmp_path / "campaign.toml").write_text(TACHO.replace('"V"', '"mV"'), "utf-8")
-    said = " ".join(refused("fit", "campaign.toml", "--setup", "hoist", "--out", "fit").split())
+    said = refused("fit", "campaign.toml", "--setup", "hoist", "--out", "fit")
     assert 'if the log is in V, write unit = "V": it then reaches 4 V' in said
 
 
 def test_what_a_draft_leaves_out_stands_before_the_command_to_run(
-    done: Done, tmp_path: Path
+    done: Words, tmp_path: Path
 ) -> None:
     rows = [f"{k},{row}" for k, row in enumerate(ROWS)]
     text = "\n".join(["Nr,time [s],voltage [V],current [A],Geber", *rows]) + "\n"
     (tmp_path / "log.csv").write_text(text, "utf-8")
-    said = done("campaign", "init", "log.csv", *COUNTS, "--drive", "hoist").splitlines()
+    (tmp_path / "fitted").mkdir()
+    done("whatif", "hoist", "--scale", "pump=1.1", "--out", "fitted/drive.toml")
+    said = done("campaign", "init", "log.csv", *COUNTS, "--drive", "fitted").splitlines()
     assert said[2:] == [
         "  Columns that are not used: Nr, Geber",
         "  No column looks like an encoder's counts among Nr, Geber; counts_per_turn = 1000 is "
@@ -121,48 +114,19 @@ def test_what_a_draft_leaves_out_stands_before_the_command_to_run(
         "Then run",
         "  swashplate campaign check campaign.toml",
     ]
-    assert "! axis 'hoist': no channel measures its motion" in done("campaign", "check")
-
-
-def _below(text: str, line: str) -> list[str]:
-    """The line below one."""
-    lines = text.splitlines()
-    return [lines[lines.index(line) + 1].strip()]
-
-
-def test_long_names_are_not_cut(done: Done, logs: list[str], tmp_path: Path) -> None:
-    done("campaign", "init", *logs, *COUNTS)
-    path, name = tmp_path / "campaign.toml", "encoder_counts_of_the_drum_behind_the_gear"
-    path.write_text(path.read_text("utf-8").replace("channels.encoder_counts", f"channels.{name}"))
-    said = done("campaign", "check")
-    assert "…" not in said
-    # folded, so that the columns behind it are there: the last one counts lost counts
-    rows = [line for line in said.splitlines() if line.startswith("encoder_counts_of")]
-    assert [line.split()[0] + rest for line in rows for rest in _below(said, line)] == [name] * 2
-    assert all(line.split()[-1] == "0" for line in rows)
-
-
-def test_a_drive_out_of_a_folder(done: Done, logs: list[str], tmp_path: Path) -> None:
-    (tmp_path / "fitted").mkdir()
-    done("whatif", "hoist", "--scale", "pump=1.1", "--out", "fitted/drive.toml")
-    done("campaign", "init", *logs, *COUNTS, "--drive", "fitted")
     assert 'drive = "fitted/drive.toml"' in (tmp_path / "campaign.toml").read_text("utf-8")
-    done("campaign", "check")
+    said = " ".join(done("campaign", "check").split())
+    assert "no channel measures its motion" in said
 
 
-# --- rig ------------------------------------------------------------------------------------------
-
-
-Words = Callable[..., str]
-
-
-SHORT = ("--maneuver", "step:4,start=0.5,stop=1,length=2")
+# --- virtual tests --------------------------------------------------------------------------------
 
 
 def test_refinements_and_backlash_change_the_logs(done: Words, tmp_path: Path) -> None:
-    done("rig", "slew", "--out", "a", "--severity", "clean", *SHORT)
-    done("rig", "slew", "--out", "b", "--severity", "clean", "--backlash-deg", "0.1", *SHORT)
-    done("rig", "slew", "--out", "c", "--severity", "clean", "--set", "cam_ripple=0.02", *SHORT)
+    short = ("--severity", "clean", "--maneuver", "step:4,start=0.5,stop=1,length=2")
+    done("rig", "slew", "--out", "a", *short)
+    done("rig", "slew", "--out", "b", "--backlash-deg", "0.1", *short)
+    done("rig", "slew", "--out", "c", "--set", "cam_ripple=0.02", *short)
     first, *others = (
         next(iter(Campaign.from_toml(tmp_path / name / "campaign.toml"))) for name in "abc"
     )
@@ -176,11 +140,79 @@ def test_refinements_and_backlash_change_the_logs(done: Words, tmp_path: Path) -
     assert truth.parameters.refinements == ("cam_ripple",)
 
 
-def test_rig_refusals(refused: Words, done: Words) -> None:
-    assert "no parameter 'wobble'" in refused("rig", "hoist", "--out", "x", "--set", "wobble=1")
-    assert "backlash must be 0 or more" in refused(
-        "rig", "hoist", "--out", "x", "--backlash-deg", "-1"
+# --- what tests are worth -------------------------------------------------------------------------
+
+CARD = """
+[[stages]]
+name = "card"
+part = "card"
+free.J = { relative = [0.5, 2.0] }
+free.lim1_plus = { relative = [0.5, 2.0], log = true }
+"""
+PUMP = """
+[[stages]]
+name = "pump"
+part = "pump"
+free.{} = {{ relative = [0.5, 2.0], log = true }}
+free.{} = {{ relative = [0.5, 2.0], log = true }}
+"""
+
+
+def section(said: str, title: str) -> dict[str, str]:
+    """Rows of a table by their first cell."""
+    rows = said.split(title, 1)[1].split("─\n", 1)[1].split("\n\n", 1)[0]
+    cells = [[*re.split(r"  +", line.strip(), maxsplit=1), ""] for line in rows.splitlines()]
+    return {row[0]: row[1] for row in cells}
+
+
+def test_small_positive_steps_want_large_and_negative_ones(done: Words, tmp_path: Path) -> None:
+    done("rig", "hoist", "--out", "virtual", *steps(1, 2))
+    (tmp_path / "setup.toml").write_text(PUMP.format("Z13", "Z19"), "utf-8")
+    words = ("virtual/campaign.toml", "--setup", "setup.toml", *steps(2, -2, 9, -9))
+    said = done("advise", *words, "--tests", "2", "--out", "advice.csv")
+    best = section(said, "For each parameter")
+    assert best["Z13_plus"].endswith("step 9 V")
+    assert best["Z13_minus"].endswith("step -9 V")
+    assert "step -" in best["Z19_minus"]
+    tests = section(said, "Tests")
+    # the large negative one tells of the negative force and the negative stop at once
+    assert [*tests][:: len(tests) - 1] == ["step -9 V", "step 2 V"]
+    assert "Z13_minus, Z19_minus" in tests["step -9 V"]
+    assert [*section(said, "A plan")] == ["step -9 V", "step 9 V"]
+    table = pl.read_csv(tmp_path / "advice.csv")
+    # no other test determines it
+    known = table.filter(pl.col("error of Z13_minus").is_not_null())
+    assert known["test"].to_list() == ["step -9 V"]
+    # a fitted drive brings its noise
+    Drive.preset("hoist").to_toml(tmp_path / "fitted.toml")
+    assert "(residuals of the drive)" in done("advise", *words[:5], "--drive", "fitted.toml")
+
+
+def test_a_fresh_plan_needs_a_drive_alone(done: Words, refused: Words) -> None:
+    said = done("advise", "hoist", "--setup", "hoist", *steps(2, -2), "--top", "2")
+    assert {"step 2 V", "step -2 V"} <= set(section(said, "Tests"))
+    assert "encoder_counts: noise 0.000718 rad (rounding of Kruse's encoder)" in said
+    assert "--axis belongs to a campaign" in refused("advise", "hoist", "--axis", "hoist")
+
+
+def test_what_positive_steps_determine(done: Words, tmp_path: Path) -> None:
+    done("rig", "hoist", "--out", "virtual", "--severity", "clean", *steps(2, 9, 0.1))
+    (tmp_path / "setup.toml").write_text(CARD + PUMP.format("Z8", "Z13"), "utf-8")
+    words = ("virtual/campaign.toml", "--setup")
+    said = done("excitation", *words, "setup.toml", "--out", "runs.csv")
+    assert said.startswith("! hoist_step_0.1_V: its command stays between 0 and 0.1 V")
+    rows = {line.split("  ")[0]: re.split("  +", line.strip()) for line in said.splitlines()}
+    assert rows["J_plus"][-1][:2] == "##"
+    assert rows["J_minus"][1:] == ["a command beyond the dead zone", "0", "..."]
+    assert rows["Z13_plus"][-1] == ".#."  # only the step of 9 V reaches the stop
+    said = " ".join(said.split())
+    assert (
+        "J_minus needs a command beyond the dead zone (minus), which no sample shows: fix" in said
     )
-    assert "no packaged set, file or folder 'crane'" in refused("rig", "crane", "--out", "x")
-    done("rig", "slew", "--out", "y", *SHORT)
-    assert "empty" in refused("rig", "slew", "--out", "y", *SHORT)
+    assert "run 2: hoist_step_9_V" in said
+    table = pl.read_csv(tmp_path / "runs.csv")
+    assert set(table["stage"]) == {"card", "pump"}
+    shares = table.select(pl.sum_horizontal(pl.col("^hoist_.*$"))).to_series()
+    assert set(shares.round(9)) == {0.0, 1.0}
+    (tmp_path / "mine.toml").write_text(PUMP.format("Z8", "Z13_plus"), "utf-8")
+    assert "The fit configuration can stay as it is." in done("excitation", *words, "mine.toml")

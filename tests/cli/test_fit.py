@@ -1,3 +1,6 @@
+"""``fit``, ``validate``, ``report`` and ``demo``: from tests to a drive, its verdict, its page."""
+
+import csv
 import os
 import re
 import signal
@@ -11,9 +14,13 @@ import pytest
 from tests.cli.conftest import STEPS
 from typer.testing import Result
 
-from swashplate import Drive
+from swashplate import Campaign, Drive
+from swashplate.identification.assessment import Judged
+from swashplate.identification.fitting import Fit, fit
+from swashplate.identification.setup import Setup
 
 Words = Callable[..., str]
+CAMPAIGN = "virtual/campaign.toml"
 SETUP = """
 [[stages]]
 name = "card"
@@ -35,19 +42,25 @@ def campaign(done: Words, tmp_path: Path) -> Path:
     truth = Drive.preset("hoist").replace(Z16=(1.3e-4, 1.3e-4), J=(0.26, 0.31))
     truth.to_toml(tmp_path / "truth.toml")
     done("rig", "truth.toml", "--out", "virtual", *STEPS)
-    path = tmp_path / "virtual" / "campaign.toml"
+    path = tmp_path / CAMPAIGN
     path.write_text(path.read_text("utf-8").replace('drive = "drive.toml"', 'drive = "hoist"'))
     (tmp_path / "setup.toml").write_text(SETUP, "utf-8")
     return path
 
 
+# --- fit ------------------------------------------------------------------------------------------
+
+
 def test_a_campaign_becomes_a_drive(
     done: Words, refused: Words, campaign: Path, tmp_path: Path
 ) -> None:
-    said = done("fit", "virtual/campaign.toml", "--setup", "setup.toml", "--out", "fitted")
-    assert re.search(r": searched for [\d.]+ s, judged for [\d.]+ s, wrote for [\d.]+ s\n", said)
-    assert "Stage card" in said
-    assert "Stage pump" in said
+    words = ("fit", CAMPAIGN, "--setup", "setup.toml", "--out", "fitted")
+    said = done(*words, "--timing")
+    (times,) = re.findall(r"^Time: +(.*)$", said, re.MULTILINE)
+    parts = dict(each.removesuffix(" s").rsplit(" ", 1) for each in times.split(", "))
+    assert [*parts] == ["start and kernels", "reading", "search", "judging", "report"]
+    assert all(float(each) >= 0.0 for each in parts.values())
+    assert said.index("Stage card") < said.index("Stage pump")
     fitted = Drive.from_toml(tmp_path / "fitted" / "drive.toml")
     assert fitted["Z16"].value == pytest.approx((1.3e-4, 1.3e-4), rel=2e-3)
     assert fitted["J"].value == pytest.approx((0.26, 0.31), rel=2e-3)
@@ -69,49 +82,20 @@ def test_a_campaign_becomes_a_drive(
     advice = done("advise", "fitted", "--maneuver", "step:4", "--tests", "1")
     assert "Z16_plus" in advice
     assert "Z13" not in advice
-    again = ("fit", "virtual/campaign.toml", "--setup", "setup.toml", "--out", "fitted")
-    assert "fitted/drive.toml exists already" in refused(*again)
+    assert "fitted/drive.toml exists already" in refused(*words)
 
 
 @pytest.mark.slow
-def test_starts_are_resumed_after_a_kill(campaign: Path, tmp_path: Path) -> None:
-    command = [sys.executable, "-m", "swashplate", "fit", "virtual/campaign.toml"]
-    command += ["--setup", "setup.toml", "--out", "fitted", "--starts", "12", "--jobs", "1"]
-    store = tmp_path / "fitted" / "starts" / "card"
-    running = subprocess.Popen(
-        command, cwd=tmp_path, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
-    )
-    deadline = time.monotonic() + 120.0
-    while not (store.exists() and len(list(store.glob("start-*.json"))) >= 2):
-        assert running.poll() is None, "it ended before it could be killed"
-        assert time.monotonic() < deadline
-        time.sleep(0.005)
-    os.kill(running.pid, signal.SIGKILL)
-    running.wait()
-    kept = {path: path.stat().st_mtime_ns for path in store.glob("start-*.json")}
-    again = subprocess.run(
-        [*command, "--resume"], cwd=tmp_path, capture_output=True, text=True, check=True
-    )
-    assert "Stage pump" in again.stdout
-    assert len(list(store.glob("start-*.json"))) == 13
-    assert {path: path.stat().st_mtime_ns for path in kept} == kept
-    whole = [word if word != "fitted" else "whole" for word in command]
-    subprocess.run(whole, cwd=tmp_path, capture_output=True, check=True)
-    assert (tmp_path / "fitted" / "drive.toml").read_text("utf-8") == (
-        tmp_path / "whole" / "drive.toml"
-    ).read_text("utf-8")
-
-
-@pytest.mark.slow
-def test_ctrl_c_stops_the_whole_search_and_resume_goes_on(campaign: Path, tmp_path: Path) -> None:
-    command = [sys.executable, "-m", "swashplate", "fit", "virtual/campaign.toml", "--no-report"]
-    command += ["--setup", "setup.toml", "--starts", "12", "--jobs", "2", "--out"]
+@pytest.mark.parametrize("how", [signal.SIGKILL, signal.SIGINT], ids=["kill", "Ctrl-C"])
+def test_an_interrupted_search_goes_on(campaign: Path, tmp_path: Path, how: signal.Signals) -> None:
+    command = [sys.executable, "-m", "swashplate", "fit", CAMPAIGN, "--no-report", "--starts", "6"]
+    command += ["--setup", "setup.toml", "--out"]
     store = tmp_path / "fitted" / "starts"
     running = subprocess.Popen(
-        [*command, "fitted"],
+        [*command, "fitted", "--jobs", "2" if how == signal.SIGINT else "1"],
         cwd=tmp_path,
         stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
+        stderr=subprocess.DEVNULL,
         text=True,
         start_new_session=True,
     )
@@ -120,16 +104,20 @@ def test_ctrl_c_stops_the_whole_search_and_resume_goes_on(campaign: Path, tmp_pa
         assert running.poll() is None, "it ended before it could be interrupted"
         assert time.monotonic() < deadline
         time.sleep(0.005)
-    os.killpg(running.pid, signal.SIGINT)  # as a terminal does
+    os.killpg(running.pid, how)  # as a terminal does
     said, _ = running.communicate(timeout=60.0)
-    assert running.returncode == 130
-    assert "Interrupted in the stage 'card': interrupted after " in said
-    assert "--resume goes on" in said
-    assert "Usable" not in said
+    if how == signal.SIGINT:
+        assert running.returncode == 130
+        assert "Interrupted in the stage 'card': interrupted after " in said
+        assert "--resume goes on" in said
+        assert "Usable" not in said
     assert not (store / "pump").exists()
     assert not (tmp_path / "fitted" / "drive.toml").exists()
+    kept = {path: path.stat().st_mtime_ns for path in store.glob("card/start-*.json")}
     for words in ([*command, "fitted", "--resume"], [*command, "whole"]):
-        subprocess.run(words, cwd=tmp_path, capture_output=True, check=True)
+        subprocess.run([*words, "--jobs", "1"], cwd=tmp_path, capture_output=True, check=True)
+    assert len(list(store.glob("card/start-*.json"))) == 7
+    assert {path: path.stat().st_mtime_ns for path in kept} == kept
     resumed, whole = ((tmp_path / name / "drive.toml").read_text() for name in ("fitted", "whole"))
     assert resumed == whole
 
@@ -137,25 +125,18 @@ def test_ctrl_c_stops_the_whole_search_and_resume_goes_on(campaign: Path, tmp_pa
 @pytest.mark.slow
 def test_all_that_can_be_asked_for_besides(done: Words, campaign: Path, tmp_path: Path) -> None:
     asked = ("--folds", "2", "--bootstrap", "40", "--profile", "Z8", "--profile", "J_plus")
-    setup = ("--setup", "setup.toml", "--jobs", "1")
-    said = done("fit", "virtual/campaign.toml", *setup, *asked)
-    assert "bootstrap" in said
+    said = done("fit", CAMPAIGN, "--setup", "setup.toml", "--jobs", "1", *asked)
     assert "40 draws of noise" in said
     assert "Cross-validation" in said
     assert "Fixed at their nominal values: V_dz, G1" in said
-    header, *rows = (tmp_path / "fitted" / "estimates.csv").read_text("utf-8").splitlines()
-    assert "bootstrap lower 95 %,bootstrap upper 95 %" in header
+    with (tmp_path / "fitted" / "estimates.csv").open(encoding="utf-8") as file:
+        rows = [row for row in csv.DictReader(file) if "offset" not in row["parameter"]]
     # by other noise of the same kind the estimates move about as far as the errors say
-    columns = header.split(",")
     for row in rows:
-        entry = dict(zip(columns, row.split(","), strict=True))
-        if "offset" in entry["parameter"]:
-            continue
-        wide = [float(entry[f"{name} 95 %"]) for name in ("lower", "upper")]
-        drawn = [float(entry[f"bootstrap {name} 95 %"]) for name in ("lower", "upper")]
-        assert 0.3 < (drawn[1] - drawn[0]) / (wide[1] - wide[0]) < 2.0, entry["parameter"]
-    page = (tmp_path / "fitted" / "report.html").read_text("utf-8")
-    assert "profile" in page.lower()
+        low, high = (float(row[f"{side} 95 %"]) for side in ("lower", "upper"))
+        least, most = (float(row[f"bootstrap {side} 95 %"]) for side in ("lower", "upper"))
+        assert 0.3 < (most - least) / (high - low) < 2.0, row["parameter"]
+    assert "profile" in (tmp_path / "fitted" / "report.html").read_text("utf-8").lower()
 
 
 def test_a_result_that_is_of_no_use_ends_with_1(
@@ -164,7 +145,7 @@ def test_a_result_that_is_of_no_use_ends_with_1(
     narrow = SETUP.replace("relative = [0.5, 2.0]", "relative = [0.99, 1.01]")
     (tmp_path / "narrow.toml").write_text(narrow, "utf-8")
     words = ("--setup", "narrow.toml", "--no-report", "--evaluations", "900")
-    result = run("fit", "virtual/campaign.toml", *words)
+    result = run("fit", CAMPAIGN, *words)
     assert result.exit_code == 1
     assert result.stderr.startswith("Not usable: ")
     assert "bound" in result.stderr
@@ -177,19 +158,156 @@ def test_a_result_that_is_of_no_use_ends_with_1(
     assert "Not usable: " in values.read_text("utf-8")
 
 
-def test_refusals(refused: Words, campaign: Path, tmp_path: Path) -> None:
-    fit = ("fit", "virtual/campaign.toml")
-    assert "no packaged fit configuration 'boom'" in refused(*fit, "--setup", "boom")
-    assert "no axis 'boom'; it has hoist" in refused(*fit, "--axis", "boom")
-    assert "20 draws do not reach the ends" in refused(*fit, "--bootstrap", "20")
-    assert "no parameter 'Z99'" in refused(*fit, "--setup", "setup.toml", "--profile", "Z99")
-    (tmp_path / "bad.toml").write_text(SETUP.replace("Z16", "Z61"), "utf-8")
-    assert "no parameter 'Z61'" in refused(*fit, "--setup", "bad.toml")
-    (tmp_path / "bad.toml").write_text(SETUP.replace("[0.5, 2.0]", "[2.0, 0.5]", 1), "utf-8")
-    said = refused(*fit, "--setup", "bad.toml")
-    assert "bad.toml: stages 1.free.J.relative: [2, 0.5] must rise: write [0.5, 2]" in said
-    (tmp_path / "bad.toml").write_text(SETUP.replace("relative", "relativ", 1), "utf-8")
-    assert "perhaps 'relative' is meant" in refused(*fit, "--setup", "bad.toml")
-    text = campaign.read_text("utf-8").replace('role = "fit"', 'role = "ignore"')
-    campaign.write_text(text, "utf-8")
-    assert "no run of the axis 'hoist' has the role 'fit'" in refused(*fit)
+def test_fits_that_are_refused(refused: Words, virtual: Path, tmp_path: Path) -> None:
+    (tmp_path / "setup.toml").write_text(SETUP, "utf-8")
+    for words, said in (
+        ("--setup boom", "no packaged fit configuration 'boom'"),
+        ("--axis boom", "no axis 'boom'; it has hoist"),
+        ("--bootstrap 20", "20 draws do not reach the ends"),
+        ("--setup setup.toml --profile Z99", "no parameter 'Z99'"),
+    ):
+        assert said in refused("fit", CAMPAIGN, *words.split())
+    for old, new, said in (
+        ("Z16", "Z61", "no parameter 'Z61'"),
+        ("[0.5, 2.0]", "[2.0, 0.5]", "stages 1.free.J.relative: [2, 0.5] must rise: write [0.5, 2"),
+        ("relative", "relativ", "perhaps 'relative' is meant"),
+    ):
+        (tmp_path / "bad.toml").write_text(SETUP.replace(old, new, 1), "utf-8")
+        assert said in refused("fit", CAMPAIGN, "--setup", "bad.toml")
+    virtual.write_text(virtual.read_text("utf-8").replace('role = "fit"', 'role = "ignore"'))
+    assert "no run of the axis 'hoist' has the role 'fit'" in refused("fit", CAMPAIGN)
+
+
+# --- validate -------------------------------------------------------------------------------------
+
+
+def test_a_drive_beside_the_runs_that_were_held_out(
+    done: Words, held_out: Path, tmp_path: Path
+) -> None:
+    said = done("validate", "hoist", CAMPAIGN, "--out", "found")
+    assert "hoist_step_-5_V" in said
+    assert "hoist_step_4_V" not in said
+    assert re.search(r"\ncurrent +\n.* mA ", said, re.DOTALL)
+    assert re.search(r"\nspeed from counts +\n.* deg/s ", said, re.DOTALL)
+    assert "'of its range' below means" in " ".join(said.split())
+    assert "Predicts speed from counts to 0." in said
+    assert "<svg" in (tmp_path / "found" / "report.html").read_text("utf-8")
+    with (tmp_path / "found" / "measures.csv").open(encoding="utf-8") as file:
+        rows = {row["channel"]: row for row in csv.DictReader(file)}
+    assert set(rows) == {"current", "counts", "speed from counts"}
+    # the published drive itself: what is left is the instruments' error
+    assert float(rows["speed from counts"]["fit_percent"]) > 97.0
+    assert rows["counts"]["unit"] == "rad"
+    assert rows["current"]["initial_state"] == "rest"
+    assert abs(float(rows["current"]["correlation_with_input"])) < 0.5
+    assert rows["speed from counts"]["correlation_with_input"] == ""
+    assert "follow the input" not in said
+
+
+def test_a_drive_that_is_not_usable_ends_with_1(
+    run: Callable[..., Result], held_out: Path, tmp_path: Path
+) -> None:
+    """A drive of too low a gain misses the more the larger the command."""
+    Drive.preset("hoist").scale(Z10=0.4, J=0.4).to_toml(tmp_path / "wrong.toml")
+    result = run("validate", "wrong.toml", CAMPAIGN)
+    assert result.exit_code == 1
+    assert result.stderr.startswith("Not usable: ")
+    assert "NOT MET" in result.stdout
+    assert "current: the residuals of 1 of 1 runs follow the input" in result.stdout
+
+
+def test_validations_that_are_refused(refused: Words, held_out: Path) -> None:
+    command = ("validate", "hoist", CAMPAIGN)
+    assert "no axis 'boom'; it has hoist" in refused(*command, "--axis", "boom")
+    assert "There is no file none.toml" in refused("validate", "none.toml", str(held_out))
+    text = held_out.read_text("utf-8").replace('role = "validate"', 'role = "ignore"')
+    held_out.write_text(text, "utf-8")
+    assert "no run of the axis 'hoist' has the role 'validate'; another" in refused(*command)
+
+
+# --- report ---------------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def fitted(held_out: Path, tmp_path: Path) -> Fit:
+    """A fit and what it keeps of itself, in the folder fitted."""
+    free = {"card": ("J_plus", (0.5, 2.0)), "pump": ("Z10", (0.8, 1.25))}
+    stages = [
+        {"name": part, "part": part, "free": {name: {"relative": bounds}}}
+        for part, (name, bounds) in free.items()
+    ]
+    campaign = Campaign.from_toml(held_out)
+    runs = campaign.select(role="fit")
+    setup = Setup.model_validate({"stages": stages})
+    found = fit(Drive.preset("hoist").parameters, runs, setup)
+    (tmp_path / "fitted").mkdir()
+    Drive(found.parameters).to_toml(tmp_path / "fitted" / "drive.toml")
+    Judged(campaign, found, runs, notes={"seed": "7"}).store(tmp_path / "fitted" / "fit.json")
+    return found
+
+
+def test_the_report_is_written_again(done: Words, fitted: Fit, tmp_path: Path) -> None:
+    said = done("report", "fitted", CAMPAIGN, "--truth", "virtual/truth")
+    assert "Report:    fitted/report.html" in said
+    assert "Usable: predicts held-out speed from counts to 0." in said
+    page = (tmp_path / "fitted" / "report.html").read_text("utf-8")
+    assert f"{fitted.stages[1].values['Z10']:.2f}" in page
+    assert '<th class="n">truth</th>' in page
+    assert '<th scope="row">seed</th><td>7</td>' in page
+    words = ("fitted/drive.toml", CAMPAIGN, "--data", "all.parquet")
+    assert "Samples, in SI: all.parquet" in done("report", *words)
+    assert '<th class="n">truth</th>' not in (tmp_path / "fitted/report.html").read_text("utf-8")
+
+
+def test_reports_that_are_refused(refused: Words, fitted: Fit, tmp_path: Path) -> None:
+    command = ("report", "fitted", CAMPAIGN)
+    assert "There is no fit.json in virtual" in refused("report", "virtual", CAMPAIGN)
+    assert "There is no file truth.toml" in refused(*command, "--truth", "truth.toml")
+    Drive.preset("hoist").replace(Z10=9.0).to_toml(tmp_path / "fitted" / "mine.toml")
+    said = refused("report", "fitted/mine.toml", CAMPAIGN)
+    assert "mine.toml is not the drive that fitted/fit.json found" in said
+    path = tmp_path / CAMPAIGN
+    text = path.read_text("utf-8")
+    path.write_text(text.replace("virtual = true", "virtual = false"), "utf-8")
+    assert "nobody knows its truth" in refused(*command, "--truth", "virtual/truth")
+    path.write_text(text.replace('role = "fit"', 'role = "fit"\nweight = 2.0', 1), "utf-8")
+    assert "is not as it was when fitted/fit.json was fitted" in refused(*command)
+
+
+# --- demo -----------------------------------------------------------------------------------------
+
+
+@pytest.mark.slow
+def test_the_main_job(done, tmp_path):
+    printed = done("demo", "--out", "sub/demo")
+    folder = tmp_path / "sub/demo"
+    assert len(list((folder / "virtual").glob("*.csv"))) == 13
+    assert (folder / "report.html").stat().st_size < 2_000_000
+    fitted, truth = (
+        Drive.from_toml(folder / name) for name in ("drive.toml", "virtual/truth/drive.toml")
+    )
+    for volts in (-6.5, -2.0, 2.0, 6.5):
+        assert fitted.steady_speed(volts) == pytest.approx(truth.steady_speed(volts), rel=2e-3)
+    inside, counted = map(int, re.search(r"for (\d+) of (\d+) parameters", printed).groups())
+    assert counted > 30
+    assert inside > 0.8 * counted
+    for name in ("drive.toml", "estimates.csv", "report.html"):
+        assert f"sub/demo/{name}" in printed
+    check_readme(printed)
+
+
+def check_readme(printed: str) -> None:
+    """The README shows lines of this output, with all but the last digits of its numbers."""
+    readme = (Path(__file__).parents[2] / "README.md").read_text("utf-8")
+    (shown,) = re.findall(r"```text\n(parameter .*?)```", readme, re.DOTALL)
+    lines = [line.split() for line in printed.splitlines()]
+    for words in (line.split() for line in shown.splitlines()):
+        if words != ["..."] and "─" not in words[0]:
+            assert any(len(words) == len(each) and all(map(alike, words, each)) for each in lines)
+
+
+def alike(shown: str, printed: str) -> bool:
+    try:
+        return float(printed) == pytest.approx(float(shown), rel=2e-3)
+    except ValueError:
+        return printed == shown

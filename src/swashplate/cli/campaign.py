@@ -1,4 +1,4 @@
-"""``swashplate campaign``, ``rig`` and ``guess``: measured tests, virtual ones, a first guess."""
+"""``swashplate campaign``, ``rig``, ``guess``, ``excitation``, ``advise``: tests, their worth."""
 
 from __future__ import annotations
 
@@ -6,41 +6,24 @@ import shlex
 from dataclasses import replace
 from math import radians
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import Annotated, Literal
 
 import typer
 
-from swashplate.cli.options import (
-    AxisName,
-    DriveChoice,
-    command,
-)
-from swashplate.cli.terminal import (
-    FORCED,
-    Outputs,
-    check_free,
-    note,
-    say,
-    show,
-    working,
-)
-from swashplate.cli.words import (
-    campaign_of,
-    drive_file,
-    drive_of,
-    maneuver_of,
-    pairs_of,
-    runs_to_fit,
-)
+from swashplate.cli import words
+from swashplate.cli.options import AxisName, DriveChoice, TableFile, command
+from swashplate.cli.terminal import FORCED, Outputs, bullets, check_free, note, say, show, working
 from swashplate.errors import InputError
-from swashplate.tables import FIGURE, count, ended, write_text
-
-if TYPE_CHECKING:
-    from swashplate.campaign import Campaign
+from swashplate.tables import FIGURE, TABLE, Column, Table, count, ended, joined, write_text
 
 LEGEND = (
     "jitter and longest gap in ms; clip: % of the samples at the ends of the instrument's range;\n"
     "stuck: longest standstill of a noisy signal in s; lost: jumps that no motion explains"
+)
+INFORMATION = (
+    "Under 'runs', one letter a run: # gives 20 % or more of the information, + gives less, . "
+    "gives none, - is not fitted here. 'effect' is how much 1 % of the value changes all residuals "
+    "together; 1 is one standard deviation of noise."
 )
 Severity = Literal["clean", "realistic", "harsh"]
 CAMPAIGN = Path("campaign.toml")
@@ -50,6 +33,9 @@ app = typer.Typer(
     no_args_is_help=True,
     rich_markup_mode="rich",
 )
+
+
+# --- campaign files -------------------------------------------------------------------------------
 
 
 def init(
@@ -86,14 +72,15 @@ def init(
 
     target = out or logs[0].parent / "campaign.toml"
     Outputs((target, None))
+    file = None if drive is None else words.drive_file(drive)
+    if file is not None:  # a drive as a campaign file names it
+        place, root = file.resolve(), target.parent.resolve()
+        drive = (place.relative_to(root) if place.is_relative_to(root) else place).as_posix()
+    kinds = {name: kind for kind, name in words.pairs_of("--column", column, "voltage=u")}
+    units = dict(words.pairs_of("--unit", unit, "u=mV"))
     with working("Reading"):
         text = draft_campaign(
-            logs,
-            target.parent,
-            _from(target.parent, drive),
-            counts_per_turn,
-            columns={name: kind for kind, name in pairs_of("--column", column, "voltage=u")},
-            units=dict(pairs_of("--unit", unit, "u=mV")),
+            logs, target.parent, drive, counts_per_turn, columns=kinds, units=units
         )
     write_text(text, target)
     note(f"Draft: {target}")
@@ -103,17 +90,7 @@ def init(
         open_ends = (f"# {FIXME}", f'column = "{FIXME}"')
         if line.startswith((UNUSED, NO_ENCODER)) or any(each in line for each in open_ends):
             note(f"  {line.lstrip('# ')}")
-    note("Then run")
-    note(f"  swashplate campaign check {shlex.quote(str(target))}")
-
-
-def _from(folder: Path, drive: str | None) -> str | None:
-    """A drive as a campaign file in a folder names it."""
-    file = None if drive is None else drive_file(drive)
-    if file is None:
-        return drive
-    place, root = file.resolve(), folder.resolve()
-    return (place.relative_to(root) if place.is_relative_to(root) else place).as_posix()
+    note(f"Then run\n  swashplate campaign check {shlex.quote(str(target))}")
 
 
 def check(path: Path = CAMPAIGN, *, strict: bool = False) -> None:
@@ -131,31 +108,24 @@ def check(path: Path = CAMPAIGN, *, strict: bool = False) -> None:
       swashplate campaign check
       swashplate campaign check harbour/campaign.toml --strict
     """
-    from swashplate.campaign import (
-        Campaign,
-        campaign_findings,
-        examine,
-        quality_table,
-        unsigned_currents,
-    )
-    from swashplate.cli.words import check_kind
+    from swashplate import campaign as tests
     from swashplate.identification.data_checks import beside_the_drives
 
-    check_kind(path, "campaign")
+    words.check_kind(path, "campaign")
     with working(f"Reading {path}"):
-        campaign = Campaign.from_toml(path)
-        unsigned = {name for _, name in unsigned_currents(campaign)}
-        qualities = {each.name: examine(each, unsigned) for each in campaign}
-        of_file = dict.fromkeys((*campaign_findings(campaign), *beside_the_drives(campaign)))
+        campaign = tests.Campaign.from_toml(path)
+        unsigned = {name for _, name in tests.unsigned_currents(campaign)}
+        qualities = {each.name: tests.examine(each, unsigned) for each in campaign}
+        of_file = dict.fromkeys((*tests.campaign_findings(campaign), *beside_the_drives(campaign)))
     roles = [each.role for each in campaign]
     counted = ", ".join(f"{roles.count(role)} to {role}" for role in dict.fromkeys(roles))
-    virtual = " (virtual)" if campaign.virtual else ""
+    virtual = " (virtual)" * campaign.virtual
     note(f"{campaign.title}{virtual}: {len(campaign)} experiments ({counted})")
     for experiment in campaign:
-        show(quality_table(experiment, qualities[experiment.name]))
-        for text in experiment.notes:
-            say(f"- {text}.")
-        for each in qualities[experiment.name]:
+        found = qualities[experiment.name]
+        show(tests.quality_table(experiment, found))
+        bullets(f"{text}." for text in experiment.notes)
+        for each in found:
             for text in each.findings:
                 say(ended(f"! {each.signal}: {text}"))
     note(LEGEND)
@@ -199,6 +169,8 @@ def plot(
       swashplate campaign plot --run hoistr6 --channel counts --from 5.8 --to 6.6
     """
     from swashplate.campaign import Campaign
+    from swashplate.identification import predict
+    from swashplate.identification.drive_model import SIGNALS
     from swashplate.report.figures import plot_campaign
 
     files = Outputs((out, FIGURE))
@@ -211,40 +183,22 @@ def plot(
             f"--run and --channel go together: give both, or none for the overview{known}."
         )
     if run is not None and channel is not None:
-        _close_look(files, out, campaign, run, channel, begin, end)
+        experiment, shown, simulated = campaign[run], campaign[run][channel], None
+        drive = campaign.axes[experiment.axis].drive
+        if shown.kind in SIGNALS and drive is not None and not shown.is_position:
+            found = predict(campaign.drive(experiment.axis), [experiment])
+            simulated = next((each.simulated for each in found if each.channel == channel), None)
+        window = words.window_of(shown.time, begin, end)
+        how = {"window": window, "title": f"{run}, {channel}"}
+        files.draw(out, "plot_channel", shown, simulated, **how)
     else:
-        title = f"{campaign.title} (virtual)" if campaign.virtual else campaign.title
+        title = campaign.title + " (virtual)" * campaign.virtual
         figures = plot_campaign(campaign.experiments, title=title)
         several = [out.with_stem(f"{out.stem}-{k}") for k in range(1, len(figures) + 1)]
         check_free(*several)
         for path, figure in zip([out] if len(figures) == 1 else several, figures, strict=True):
             files.draw(path, figure)
     files.say()
-
-
-def _close_look(
-    files: Outputs,
-    out: Path,
-    campaign: Campaign,
-    run: str,
-    name: str,
-    begin: float | None,
-    end: float | None,
-) -> None:
-    from swashplate.identification.drive_model import SIGNALS
-
-    experiment, channel = campaign[run], campaign[run][name]
-    first, last = float(channel.time[0]), float(channel.time[-1])
-    window = (first if begin is None else begin, last if end is None else end)
-    how = {"window": None if begin is end is None else window, "title": f"{run}, {name}"}
-    simulated = None
-    known = channel.kind in SIGNALS and campaign.axes[experiment.axis].drive is not None
-    if known and not channel.is_position:
-        from swashplate.identification import predict
-
-        found = predict(campaign.drive(experiment.axis), [experiment])
-        simulated = next((each.simulated for each in found if each.channel == name), None)
-    files.draw(out, "plot_channel", channel, simulated, **how)
 
 
 def schema() -> None:
@@ -262,6 +216,9 @@ command(app, "init")(init)
 command(app, "check")(check)
 command(app, "plot")(plot)
 command(app, "schema")(schema)
+
+
+# --- virtual tests --------------------------------------------------------------------------------
 
 
 def rig(
@@ -297,14 +254,13 @@ def rig(
       swashplate campaign check virtual-hoist/campaign.toml
     """
     from swashplate.campaign import rig as bench
-    from swashplate.tables import Column, Table
 
     check_free(out)
     with working("Simulating"):
-        nominal = drive_of(drive.drive)
+        nominal = words.drive_of(drive.drive)
         tests = bench.run(
-            nominal if drive_file(drive.drive) else drive.drive,
-            None if not maneuver else [maneuver_of(each, nominal) for each in maneuver],
+            nominal if words.drive_file(drive.drive) else drive.drive,
+            [words.maneuver_of(each, nominal) for each in maneuver or ()] or None,
             seed=seed,
             severity=severity,
             instruments=replace(bench.SEVERITIES[severity], backlash=radians(backlash_deg)),
@@ -313,15 +269,17 @@ def rig(
         )
     with working("Writing"):
         path = bench.write(tests, out, overwrite=FORCED.get())
-    numbers = (Column("rows", "d"), Column("s", ".4g"))
-    words = (Column("log"), Column("maneuver", wrap=True), Column("role"))
-    made = Table("", (*words, *numbers))
+    text = (Column("log"), Column("maneuver", wrap=True), Column("role"))
+    made = Table("", (*text, Column("rows", "d"), Column("s", ".4g")))
     for run in tests.runs.values():
         time = run.columns["time"]
         made.add(f"{run.stem}.csv", run.name, run.role, time.size, float(time[-1] - time[0]))
     show(made)
     note(f"Campaign: {path}")
     note(f"Truth:    {path.parent / 'truth'} (open it only after the fit)")
+
+
+# --- before a fit, and between fits ---------------------------------------------------------------
 
 
 def guess(path: Path = CAMPAIGN, *, axis: AxisName = None, out: Path | None = None) -> None:
@@ -339,32 +297,145 @@ def guess(path: Path = CAMPAIGN, *, axis: AxisName = None, out: Path | None = No
       swashplate guess logs/campaign.toml
       swashplate fit logs/campaign.toml --from logs/start.toml --setup logs/setup.toml
     """
-    from swashplate.campaign import (
-        fit_configuration,
-        guess_drive,
-        guess_table,
-        guessed_set,
-        spiked,
-    )
+    from swashplate import campaign as tests
     from swashplate.drive import Drive
 
     with working(f"Reading {path}"):
-        campaign, chosen = campaign_of(path, axis)
-        runs = runs_to_fit(campaign, chosen)
+        campaign, chosen = words.campaign_of(path, axis)
+        runs = words.runs_to_fit(campaign, chosen)
         folder = path.parent if out is None else out
         start, setup = folder / "start.toml", folder / "setup.toml"
         check_free(start, setup)
-        for sentence, _ in spiked(runs).values():
+        for sentence, _ in tests.spiked(runs).values():
             note(f"! {sentence}.")
-        found = guess_drive(runs)
-        parameters = guessed_set(found, path.name)
+        found = tests.guess_drive(runs)
+        parameters = tests.guessed_set(found, path.name)
         folder.mkdir(parents=True, exist_ok=True)
         Drive(parameters).to_toml(start)
-        write_text(fit_configuration(found, parameters), setup)
-    show(guess_table(found))
+        write_text(tests.fit_configuration(found, parameters), setup)
+    show(tests.guess_table(found))
     note(f"These numbers alone: fit {found.fit_percent:.1f} % of the mean speeds (100 % is best).")
     note(f"Start:             {start}")
     note(f"Fit configuration: {setup}")
-    note("Then run")
-    words = ["swashplate", "fit", str(path), "--from", str(start), "--setup", str(setup)]
-    note(f"  {shlex.join(words)}")
+    then = ["swashplate", "fit", str(path), "--from", str(start), "--setup", str(setup)]
+    note(f"Then run\n  {shlex.join(then)}")
+
+
+def excitation(
+    path: Path = CAMPAIGN,
+    *,
+    axis: AxisName = None,
+    setup: str | None = None,
+    begin: str | None = None,
+    out: TableFile = None,
+) -> None:
+    """Show before a fit which parameters the runs determine, and what to fix.
+
+    Simulates the runs with the drive as it is: how much each parameter changes
+    what was measured, by which run, and which can change together without
+    effect: those are to be fixed, or tested further.
+
+    For example:
+      swashplate excitation virtual/campaign.toml
+      swashplate excitation harbour/campaign.toml --setup mine.toml --from worn.toml
+      swashplate excitation harbour/campaign.toml --out runs.csv
+    """
+    from swashplate.identification.data_checks import check_runs, refuse_unsound
+    from swashplate.identification.experiment_design import outlook
+    from swashplate.identification.fitting import smooth
+
+    files = Outputs((out, TABLE))
+    with working(f"Reading {path}"):
+        _, runs, plan, drive = words.fit_of(path, axis, setup, begin)
+    with working("Simulating"):
+        doubts = refuse_unsound(check_runs(runs, smooth(drive)))
+        looks = [outlook(stage, smooth(drive), runs) for stage in plan.stages]
+    names = [each.name for each in runs]
+    shown = [look.table(names) for look in looks]
+    files.write(out, "Table", joined(shown).write)
+    for sentence in doubts:
+        say(f"! {sentence}")
+    for look, table in zip(looks, shown, strict=True):
+        show(table)
+        # what no run exercises is said with its reason
+        bullets(replace(look.identifiability, unexcited=()).sentences(), look.sentences())
+    note("")
+    for number, name in enumerate(names, start=1):
+        note(f"run {number}: {name}")
+    say(INFORMATION)
+    if all(look.identifiability.complete for look in looks):
+        note("The fit configuration can stay as it is.")
+    files.say()
+
+
+def advise(
+    word: str,
+    *,
+    drive: str | None = None,
+    axis: AxisName = None,
+    setup: str | None = None,
+    maneuver: list[str] | None = None,
+    top: int = 10,
+    tests: int = 4,
+    out: TableFile = None,
+) -> None:
+    """Recommend the test that determines each parameter best.
+
+    Ranks tests by the information that they would add to those made so far, at
+    the drive's present values. Errors are standard errors from noise alone; a
+    drive that differs from its model is known less well.
+
+    Options:
+      word CAMPAIGN.toml|AXIS|SET.toml: Tests made so far; or only a drive, for a fresh plan.
+      drive SET.toml: The fitted drive: noise is then that of its residuals.
+      maneuver MANEUVER: A test to judge instead of the usual ones. May be repeated.
+      top: Tests to list.
+      tests: Tests in the plan.
+
+    For example:
+      swashplate advise hoist                                      a fresh plan
+      swashplate advise harbour/campaign.toml --drive fitted/drive.toml
+      swashplate advise harbour/campaign.toml --maneuver step:-9 --top 1
+    """
+    from swashplate.campaign import KINDS
+    from swashplate.drive import Drive
+    from swashplate.identification import experiment_design as design
+    from swashplate.identification.fitting import smooth
+    from swashplate.identification.setup import load_setup
+
+    files = Outputs((out, TABLE))
+    with working("Judging tests"):
+        if words.file_kind(Path(word)) == "campaign":
+            _, runs, plan, start = words.fit_of(Path(word), axis, setup, drive)
+            bench = design.bench(smooth(start), plan, runs, fitted=drive is not None)
+        else:
+            if axis is not None:
+                raise InputError("--axis belongs to a campaign; a drive is one axis.")
+            start, own = words.parameters_of(drive or word), Path(word) / words.CONFIGURATION
+            plan = load_setup(setup or (str(own) if own.is_file() else start.name))
+            bench = design.bench(smooth(start), plan)
+        machine = Drive(bench.parameters)
+        named = [words.maneuver_of(each, machine) for each in maneuver or ()]
+        trials = {each.name: each for each in named or design.default_maneuvers()}
+        at_hand = [bench.candidate(each) for each in trials.values()]
+        ranked = design.advise(bench.present, at_hand, bench.variables)
+        in_turn = design.in_turn(bench.present, at_hand, bench.variables, tests)
+    files.write(out, "Table", design.advice_table("", ranked).write)
+    show(design.advice_table("Tests", ranked[:top]))
+    if in_turn:
+        title = "A plan, each test chosen in addition to those before it"
+        show(design.advice_table(title, in_turn))
+        errors = zip(in_turn[-1].names, in_turn[-1].after, strict=True)
+        undetermined = [name for name, error in errors if not error <= 1.0]
+        if undetermined:
+            say(f"- After these, {', '.join(undetermined)} would still not be known to 100 %.")
+    show(design.best_tests_table(ranked))
+    for each in bench.sensors:
+        noise = f"{each.noise:.3g} {KINDS[each.kind].units[0]} ({each.origin})"
+        note(f"{each.kind}: noise {noise}, one independent sample every {each.memory:.3g} s")
+    say(
+        "Errors are standard errors in per cent of the value, from noise alone and at these values "
+        "of the drive; '-' is not determined (100 % and more). 'better' is by how much what is "
+        "known already would be known better, on the mean."
+    )
+    files.say()

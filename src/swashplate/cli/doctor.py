@@ -6,6 +6,7 @@ import os
 import platform
 import sys
 from importlib import metadata
+from math import degrees
 
 import typer
 
@@ -47,49 +48,29 @@ def doctor() -> None:
     made.add("cores", str(available_cores()), "")
     if os.environ.get("NUMBA_DISABLE_JIT", "0") != "0":
         made.add("NUMBA_DISABLE_JIT", "set", "nothing is compiled, all is a hundred times slower")
-    for library in LIBRARIES:
-        made.add(library, _version(library), "")
-    for name, (library, enables) in EXTRAS.items():
-        made.add(f"extra {name}", _version(library), enables)
+    extras = {f"extra {name}": entry for name, entry in EXTRAS.items()}
+    for what, (library, enables) in {**{e: (e, "") for e in LIBRARIES}, **extras}.items():
+        try:
+            made.add(what, metadata.version(library), enables)
+        except metadata.PackageNotFoundError:
+            made.add(what, "-", enables)
     show(made)
     with working("Simulating the hoist"):
-        speed = _simulated()
+        from swashplate.drive import Drive
+        from swashplate.equations.cache import UNCACHED, cache_folder
+        from swashplate.maneuvers import step
+
+        run = Drive.preset("hoist").simulate(step(9.0, start=0.0, stop=10.0, length=10.0))
+    speed = degrees(float(run.shaft_speed[-1]))
     well = abs(speed - FULL_SPEED_DEG_S) < DIGITS
-    say(
-        f"A step of 9 V takes the hoist to {speed:.1f} deg/s, "
-        + ("as published." if well else f"but {FULL_SPEED_DEG_S} deg/s is published.")
-    )
+    found = "as published." if well else f"but {FULL_SPEED_DEG_S} deg/s is published."
+    say(f"A step of 9 V takes the hoist to {speed:.1f} deg/s, {found}")
     note(f"Installed in {sys.prefix}")
-    note(_kernels())
-    if not well:
-        raise typer.Exit(1)
-
-
-def _version(library: str) -> str:
-    try:
-        return metadata.version(library)
-    except metadata.PackageNotFoundError:
-        return "-"
-
-
-def _simulated() -> float:
-    """Speed at the end of the step. [deg/s]"""
-    from math import degrees
-
-    from swashplate.drive import Drive
-    from swashplate.maneuvers import step
-
-    run = Drive.preset("hoist").simulate(step(9.0, start=0.0, stop=10.0, length=10.0))
-    return degrees(float(run.shaft_speed[-1]))
-
-
-def _kernels() -> str:
-    """Where the machine code is kept, and how much of it."""
-    from swashplate.equations.cache import UNCACHED, cache_folder
-
     kept = cache_folder()
     if kept is None:
-        return UNCACHED
-    files = list(kept.rglob("*.nbc"))
-    size = sum(each.stat().st_size for each in files)
-    return f"Compiled kernels: {len(files)} files, {size / 1e6:.1f} MB, below {kept}"
+        note(UNCACHED)
+    else:
+        sizes = [each.stat().st_size for each in kept.rglob("*.nbc")]
+        note(f"Compiled kernels: {len(sizes)} files, {sum(sizes) / 1e6:.1f} MB, below {kept}")
+    if not well:
+        raise typer.Exit(1)

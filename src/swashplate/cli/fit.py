@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
-from time import perf_counter
+from time import perf_counter, process_time
 from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
-from swashplate.cli.options import (
-    AxisName,
-    Required,
-    option,
-)
+from swashplate.cli import words
+from swashplate.cli.options import AxisName, Required, option
 from swashplate.cli.terminal import (
     Outputs,
     bullets,
@@ -24,29 +24,14 @@ from swashplate.cli.terminal import (
     side,
     working,
 )
-from swashplate.cli.words import (
-    CONFIGURATION,
-    DRIVE,
-    NUMBERS,
-    campaign_of,
-    model_parameters_of,
-    parameters_of,
-    runs_to_fit,
-)
+from swashplate.cli.words import CONFIGURATION, DRIVE, NUMBERS
 from swashplate.errors import InputError
-from swashplate.tables import (
-    TABLE,
-    Form,
-    check_folder,
-    joined,
-    made_folder,
-    write_text,
-)
+from swashplate.tables import TABLE, Form, check_folder, joined, made_folder, write_text
 
 if TYPE_CHECKING:
-    from swashplate.campaign import Campaign
     from swashplate.identification.assessment import Judged
     from swashplate.identification.drive_model import Parameters
+    from swashplate.identification.setup import Setup
     from swashplate.identification.solving import Progress, Solution
     from swashplate.identification.verdict import Verdict
     from swashplate.parameters.parameter_set import ParameterSet
@@ -66,6 +51,27 @@ MEASURES = (
 Loss = Literal["linear", "soft_l1", "cauchy"]
 Role = Literal["validate", "fit", "all"]
 CAMPAIGN = Path("campaign.toml")
+
+
+class Clock:
+    """Where the time goes, part after part; kernels are loaded in any of them, and count apart."""
+
+    def __init__(self) -> None:
+        self.parts = {"start and kernels": process_time()}
+
+    @contextmanager
+    def part(self, name: str) -> Iterator[None]:
+        """Count what is done to a part."""
+        from swashplate.equations.code import generating_time
+
+        begun, before = perf_counter(), generating_time()
+        yield
+        kernels = generating_time() - before
+        self.parts["start and kernels"] += kernels
+        self.parts[name] = self.parts.get(name, 0.0) + perf_counter() - begun - kernels
+
+    def __str__(self) -> str:
+        return ", ".join(f"{name} {seconds:.2f} s" for name, seconds in self.parts.items())
 
 
 def fit(
@@ -91,6 +97,7 @@ def fit(
     loss: Loss = "linear",
     require: Required = 10.0,
     report: Annotated[bool, option("Write report.html, one file that works offline.")] = True,
+    timing: bool = False,
 ) -> None:
     """Identify a drive, or a model of your own, from its tests.
 
@@ -112,6 +119,7 @@ def fit(
       dask ADDRESS: Run them on the cluster of this scheduler.
       resume: Continue a search: keep the starts that DIR holds already.
       loss: Robust loss functions reduce the weight of outliers.
+      timing: Print where the time went, from the start of the process.
 
     For example:
       swashplate rig hoist --out virtual --perturb 0.1
@@ -121,6 +129,7 @@ def fit(
       swashplate fit valve/campaign.toml --model valve.py
       swashplate simulate fitted/drive.toml step:9
     """
+    clock = Clock()
     if 0 < bootstrap < FEWEST_DRAWS:
         raise InputError(
             f"{bootstrap} draws do not reach the ends of a 95 % interval; take {FEWEST_DRAWS} or "
@@ -129,31 +138,27 @@ def fit(
     check_folder(out)
     if not resume:
         made = [DRIVE, CONFIGURATION, NUMBERS, "estimates.csv", STORED]
-        made += ["report.html"] if report else []
-        check_free(*(out / each for each in made))
+        check_free(*(out / each for each in (*made, *["report.html"] * report)))
     if model is not None and (setup is not None or begin is not None or joint):
         raise InputError(f"{model} says what is free and where it begins: leave out the others.")
-    with working("Starting"):
+    with working("Starting"), clock.part("start and kernels"):
         from swashplate.executors import Dask, Processes
         from swashplate.identification.assessment import judge_fit
-        from swashplate.identification.drive_model import setup_of
         from swashplate.identification.fitting import Search
-        from swashplate.identification.fitting import fit as fitted
+        from swashplate.identification.fitting import fit as fit_runs
         from swashplate.identification.setup import ModelSetup
-    with working(f"Reading {path}"):
-        campaign, chosen = campaign_of(path, axis)
-        runs = runs_to_fit(campaign, chosen)
+    with working(f"Reading {path}"), clock.part("reading"):
         nominal: Parameters
-        if model is not None:
+        plan: Setup
+        if model is None:
+            campaign, runs, plan, nominal = words.fit_of(path, axis, setup, begin)
+        else:
+            campaign, chosen = words.campaign_of(path, axis)
+            runs = words.runs_to_fit(campaign, chosen)
             nominal = ModelSetup.from_file(model).nominal(runs)
             plan = nominal.setup
-        else:
-            plan = setup_of(campaign, chosen, setup)
-            drive = campaign.drive(chosen) if begin is None else None
-            nominal = parameters_of(begin or "") if drive is None else drive.parameters
     executor = Dask(dask) if dask is not None else Processes(jobs or None)
-    begun = perf_counter()
-    with long_work("Fitting") as shown:
+    with long_work("Fitting") as shown, clock.part("search"):
 
         def watch(stage: str, now: Progress) -> None:
             shown(
@@ -162,24 +167,15 @@ def fit(
             )
 
         def ended(stage: str, one: Solution, done: int) -> None:
-            words = f"{stage}: {done} of {starts + 1} starts, the last to cost {one.cost:.6g}"
-            shown(words, done / (starts + 1))
+            said = f"{stage}: {done} of {starts + 1} starts, the last to cost {one.cost:.6g}"
+            shown(said, done / (starts + 1))
 
         search = Search(starts, seed, executor, out / "starts", resume, ended) if starts else None
-        result = fitted(
-            nominal,
-            runs,
-            plan,
-            loss=loss,
-            max_evaluations=evaluations,
-            search=search,
-            watch=watch,
-        )
+        fitted = partial(fit_runs, max_evaluations=evaluations, watch=watch)
+        result = fitted(nominal, runs, plan, loss=loss, search=search)
         if joint and len(plan.stages) > 1 and not result.interrupted:
             # from where the stages ended: from afar a joint fit is often caught on its way
-            staged, whole = result.parameters, plan.joint()
-            result = fitted(staged, runs, whole, max_evaluations=evaluations, watch=watch)
-    searched = perf_counter()
+            result = fitted(result.parameters, runs, plan.joint())
     if result.interrupted and starts:
         last = result.stages[-1]
         note(
@@ -187,7 +183,7 @@ def fit(
             "command with --resume goes on; nothing is written but the starts."
         )
         raise typer.Exit(INTERRUPTED)
-    with working("Judging") as status:
+    with working("Judging") as status, clock.part("judging"):
         found = judge_fit(
             campaign,
             runs,
@@ -204,13 +200,12 @@ def fit(
             watch=status.update,
         )
         verdict = found.verdict
-    judged = perf_counter()
-    lines = _written(found, out)
-    lines += [_reported(found, out)] if report else []
-    virtual = " (virtual)" if campaign.virtual else ""
-    note(f"{campaign.title}{virtual}: {_spent(begun, searched, judged)}")
+    with clock.part("report"):
+        lines = _written(found, out)
+        lines += [_reported(found, out)] if report else []
+    note(f"{campaign.title}{' (virtual)' * campaign.virtual}")
     _say_fit(found)
-    for line in lines:
+    for line in [*lines, f"Time:      {clock}"] if timing else lines:
         note(line)
     if result.interrupted:
         note("Interrupted: this is the best so far, not an optimum.")
@@ -218,22 +213,9 @@ def fit(
     _say_verdict(verdict)
 
 
-def _spent(begun: float, searched: float, judged: float) -> str:
-    """Where the time went until now, from the clock at three instants. [s]"""
-    return (
-        f"searched for {searched - begun:.2f} s, judged for {judged - searched:.2f} s, wrote for "
-        f"{perf_counter() - judged:.2f} s"
-    )
-
-
 def _say_fit(found: Judged) -> None:
     """What was found, stage by stage, and how well each run is followed."""
-    from swashplate.identification.tables import (
-        estimates_table,
-        fixed_line,
-        folds_tables,
-        runs_tables,
-    )
+    from swashplate.identification import tables
 
     for run in found.runs:
         for sentence in run.notes:
@@ -243,22 +225,21 @@ def _say_fit(found: Judged) -> None:
     for each in found.assessments:
         name, solution = each.stage.stage.name, each.stage.solution
         bootstrap = found.bootstraps.get(name)
-        show(estimates_table(each, bootstrap=bootstrap))
+        show(tables.estimates_table(each, bootstrap=bootstrap))
         say(f"{name}: {solution.message} after {solution.evaluations} evaluations.")
         drawn = () if bootstrap is None else bootstrap.sentences()
         bullets(each.identifiability.sentences(), each.uncertainty.sentences(), drawn)
         bullets(each.stage.bounds_reached())
     for profile in found.profiles:
         bullets(profile.profile.sentences(found.name_of(profile)))
-    say(fixed_line(found.result))
-    note("")
-    note("Runs that were fitted")
-    show(*runs_tables([quality for each in found.assessments for quality in each.runs]))
+    say(tables.fixed_line(found.result))
+    note("\nRuns that were fitted")
+    show(*tables.runs_tables([quality for each in found.assessments for quality in each.runs]))
     if found.predicted:
         note("Runs that were held out and predicted")
-        show(*runs_tables(found.predicted))
+        show(*tables.runs_tables(found.predicted))
     if found.folds is not None:
-        show(folds_tables(found.folds, found.assessments)[0])
+        show(tables.folds_tables(found.folds, found.assessments)[0])
         bullets(found.folds.sentences())
 
 
@@ -345,6 +326,7 @@ def validate(
       swashplate validate hoist harbour/campaign.toml --role all --out validation
     """
     from swashplate.identification import tables
+    from swashplate.identification.assessment import versions
     from swashplate.identification.validation import predict, with_speeds
     from swashplate.identification.verdict import verdict
 
@@ -352,8 +334,8 @@ def validate(
         check_folder(out)
         check_free(out / "measures.csv", out / "report.html")
     with working(f"Reading {path}"):
-        parameters: Parameters | None = None if model else parameters_of(drive)
-        campaign, chosen = campaign_of(path, axis)
+        parameters: Parameters | None = None if model else words.parameters_of(drive)
+        campaign, chosen = words.campaign_of(path, axis)
         wanted = ("fit", "validate") if role == "all" else (role,)
         runs = [each for each in campaign.select(axis=chosen) if each.role in wanted]
     if not runs:
@@ -362,33 +344,32 @@ def validate(
             "another one is asked for with --role."
         )
     with working("Predicting"):
-        if parameters is None:
-            assert model is not None
-            parameters = model_parameters_of(drive, model, runs)
+        if model is not None:
+            parameters = words.model_parameters_of(drive, model, runs)
+        assert parameters is not None
         predicted = predict(parameters, runs)
         if not predicted:
             raise InputError(f"{path}: all samples of these runs are ignored; nothing is left.")
         judged = verdict((), predicted, required=require / 100.0)
-        qualities = with_speeds(predicted)
+        measures = tables.runs_tables(with_speeds(predicted))
+    lines = []
     if out is not None:
-        from swashplate.identification.assessment import versions
         from swashplate.report.fit_report import write_validation_report
 
         with working("Writing the report"):
-            made_folder(out)
-            joined(tables.runs_tables(qualities)).write(out / "measures.csv")
+            joined(measures).write(made_folder(out) / "measures.csv")
             page, notes = out / "report.html", {**versions(), "drive from": drive}
             write_validation_report(
                 parameters, campaign, page, predicted, judged=judged, notes=notes
             )
-    virtual = " (virtual)" if campaign.virtual else ""
+        lines = [f"Measures:  {out / 'measures.csv'}", f"Report:    {page}"]
+    virtual = " (virtual)" * campaign.virtual
     note(f"{campaign.title}{virtual}, {chosen}: {parameters.name} from {drive}")
-    show(*tables.runs_tables(qualities))
+    show(*measures)
     say(MEASURES)
     bullets(judged.sentences)
-    if out is not None:
-        note(f"Measures:  {out / 'measures.csv'}")
-        note(f"Report:    {out / 'report.html'}")
+    for line in lines:
+        note(line)
     _say_verdict(judged)
 
 
@@ -419,23 +400,35 @@ def report(
       swashplate report fitted virtual/campaign.toml --pdf report.pdf
     """
     from swashplate.campaign import Campaign
+    from swashplate.identification.assessment import load_fit
+    from swashplate.identification.setup import ModelSetup
     from swashplate.report.fit_report import find_browser, print_report, shown_runs, write_samples
 
     files = Outputs((data, TABLE), (pdf, Form("a printed report", (".pdf",))))
     if pdf is not None:
         find_browser()
     folder = fitted if fitted.is_dir() else fitted.parent
+    place = folder / STORED
     with working(f"Reading {path}"):
-        if not (folder / STORED).is_file():
+        if not place.is_file():
             raise InputError(
                 f"There is no {STORED} in {folder}: give a folder that 'swashplate fit' wrote, or "
                 "judge a drive alone with 'swashplate validate'."
             )
-        true = None if truth is None else parameters_of(truth)
+        true = None if truth is None else words.parameters_of(truth)
         campaign = Campaign.from_toml(path)
         if true is not None and not campaign.virtual:
             raise InputError(f"{path} is not virtual: nobody knows its truth, leave out --truth.")
-        found = _stored(fitted, folder / STORED, campaign, model)
+        own = None if model is None else ModelSetup.from_file(model)
+        found = load_fit(place, campaign, model=own)
+        if fitted.suffix.lower() == ".toml":
+            given, numbers = words.parameters_of(str(fitted)).numbers, found.result.parameters
+            other = [name for name, value in numbers.numbers.items() if given[name] != value]
+            if other:
+                raise InputError(
+                    f"{fitted} is not the drive that {place} found ({', '.join(other[:3])} "
+                    "differ): judge it with 'swashplate validate'."
+                )
     with working("Judging"):
         verdict = found.verdict
     note(_reported(found, folder, true))
@@ -444,24 +437,6 @@ def report(
     files.write(data, "Samples, in SI", lambda to: write_samples(runs, to))
     files.say()
     say(verdict.headline)
-
-
-def _stored(fitted: Path, place: Path, campaign: Campaign, model: Path | None) -> Judged:
-    """The stored fit; of a drive that is named, the one beside it that found it."""
-    from swashplate.identification.assessment import load_fit
-    from swashplate.identification.setup import ModelSetup
-
-    own = None if model is None else ModelSetup.from_file(model)
-    stored = load_fit(place, campaign, model=own)
-    if fitted.suffix.lower() == ".toml":
-        given, numbers = parameters_of(str(fitted)).numbers, stored.result.parameters.numbers
-        other = [name for name, value in numbers.items() if given[name] != value]
-        if other:
-            raise InputError(
-                f"{fitted} is not the drive that {place} found ({', '.join(other[:3])} differ): "
-                "judge it with 'swashplate validate'."
-            )
-    return stored
 
 
 def demo(*, out: Path = Path("demo"), seed: int = 1) -> None:
@@ -481,10 +456,12 @@ def demo(*, out: Path = Path("demo"), seed: int = 1) -> None:
     """
     from swashplate.campaign import Campaign, rig
     from swashplate.drive import Drive
+    from swashplate.identification import tables
     from swashplate.identification.assessment import judge_fit
     from swashplate.identification.fitting import drawn, fit
     from swashplate.identification.setup import load_setup
-    from swashplate.identification.tables import estimates_table, runs_tables, truth_count
+    from swashplate.identification.validation import with_speeds
+    from swashplate.report.figures import plot_channel, save_figure
 
     if not (out / "virtual" / "truth").is_dir():  # an earlier demo is replaced, nothing else
         check_free(out)
@@ -492,47 +469,31 @@ def demo(*, out: Path = Path("demo"), seed: int = 1) -> None:
     with long_work("", 5) as begin:
         begin("testing the virtual hoist")
         truth = drawn(Drive.preset("hoist"), setup, seed)
-        tests = rig.run("hoist", truth=truth, seed=seed)
-        path = rig.write(tests, out / "virtual", overwrite=True)
+        path = rig.write(rig.run("hoist", truth=truth, seed=seed), out / "virtual", overwrite=True)
         begin("reading its logs")
         campaign = Campaign.from_toml(path)
         begin("fitting the card, then pump and motor")
-        begun = perf_counter()
-        runs = campaign.select(role="fit")
-        start = campaign.drive("hoist").parameters
-        result = fit(start, runs, setup)
-        searched = perf_counter()
+        tests, start = campaign.select(role="fit"), campaign.drive("hoist").parameters
+        result = fit(start, tests, setup)
         begin("computing intervals and verdict")
-        found = judge_fit(campaign, runs, start, setup, result, seed=seed)
+        found = judge_fit(campaign, tests, start, setup, result, seed=seed)
         verdict = found.verdict
-        judged = perf_counter()
-        tables = [estimates_table(each, truth=truth.parameters) for each in found.assessments]
         begin("writing the report")
         lines = [*_written(found, out), _reported(found, out, truth.parameters)]
-        lines.append(_result_drawn(found, out))
-        spent = _spent(begun, searched, judged)
+        runs = with_speeds(found.predicted)
+        run = [e for e in runs if e.experiment[e.channel].kind == "shaft_speed"][-1]
+        title = f"{run.experiment.run}: held out, predicted from the voltage"
+        if run.measures.fit_percent is not None:
+            title += f", fit {run.measures.fit_percent:.1f} %"
+        figure = plot_channel(run.experiment[run.channel], run.simulated, title=title)
+        save_figure(figure, out / "result.png")
     note(f"Campaign:  {path}")
-    show(*tables)
-    inside, counted = truth_count(tables)
+    made = [tables.estimates_table(e, truth=truth.parameters) for e in found.assessments]
+    show(*made)
+    inside, counted = tables.truth_count(made)
     say(f"The truth lies within the 95 % interval for {inside} of {counted} parameters.")
-    note("")
-    note("Held out of the fit, and predicted")
-    show(*runs_tables(found.predicted))
+    note("\nHeld out of the fit, and predicted")
+    show(*tables.runs_tables(found.predicted))
     say(verdict.headline)
-    note(f"Time, compiling included where it was the first: {spent}")
-    for line in lines:
+    for line in [*lines, f"Figure:    {out / 'result.png'}"]:
         note(line)
-
-
-def _result_drawn(found: Judged, out: Path) -> str:
-    """Draw a predicted run beside what was measured; a line that says so."""
-    from swashplate.identification.validation import with_speeds
-    from swashplate.report.figures import plot_channel, save_figure
-
-    judged = [(each, each.experiment[each.channel]) for each in with_speeds(found.predicted)]
-    run, channel = [pair for pair in judged if pair[1].kind == "shaft_speed"][-1]
-    title = f"{run.experiment.run}: held out, predicted from the voltage"
-    if run.measures.fit_percent is not None:
-        title += f", fit {run.measures.fit_percent:.1f} %"
-    save_figure(plot_channel(channel, run.simulated, title=title), out / "result.png")
-    return f"Figure:    {out / 'result.png'}"

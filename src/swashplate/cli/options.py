@@ -9,7 +9,7 @@ from __future__ import annotations
 import inspect
 import re
 from collections.abc import Callable, Mapping
-from dataclasses import MISSING, dataclass, fields, is_dataclass
+from dataclasses import MISSING, dataclass, field, fields, is_dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal, get_origin, get_type_hints
@@ -121,22 +121,20 @@ class DriveChoice:
 
 @dataclass(frozen=True)
 class Sampling:
-    """How a command is sampled, and read where it is a file."""
+    """How a command is sampled, and read where it is a file; no options say how a run begins."""
 
     rate: float = 512.0
     interpolation: Interpolation | None = None
     time_column: str = "time"
     column: str = "voltage"
+    start: Start = field(default="rest", init=False)
+    clip: bool = field(default=False, init=False)
 
-    @property
-    def start(self) -> Start:
-        """How a run begins where no option says it."""
-        return "rest"
+    def __post_init__(self) -> None:
+        """Refuse a rate out of range, before anything is sampled."""
+        from swashplate.equations.marching.record import least_substeps
 
-    @property
-    def clip(self) -> bool:
-        """Whether a voltage out of range is clipped, where no option says it."""
-        return False
+        least_substeps(self.rate)
 
 
 @dataclass(frozen=True)
@@ -209,8 +207,7 @@ def command(
             units, drum = words.pop("units", ""), words.pop("drum", None)
             FORCED.set(words.pop("force", False))
             for name, group in groups.items():
-                own = [each.name for each in fields(group)]
-                words[name] = group(**{each: words.pop(each) for each in own})
+                words[name] = group(**{each.name: words.pop(each.name) for each in _spread(group)})
             with shown_in([each.strip() for each in units.split(",") if each.strip()], drum):
                 function(**words)
 
@@ -243,16 +240,13 @@ def _described(given: inspect.Parameter, entries: Mapping[str, re.Match[str]]) -
 
 
 def _spread(group: Any) -> list[inspect.Parameter]:
-    hints = get_type_hints(group, include_extras=True)
-    return [
-        inspect.Parameter(
-            each.name,
-            # what must be given is an argument
-            inspect.Parameter.POSITIONAL_OR_KEYWORD
-            if each.default is MISSING
-            else inspect.Parameter.KEYWORD_ONLY,
-            default=inspect.Parameter.empty if each.default is MISSING else each.default,
-            annotation=hints[each.name],
-        )
-        for each in fields(group)
-    ]
+    """A group's fields as parameters; what must be given is an argument."""
+    hints, made = get_type_hints(group, include_extras=True), []
+    for each in fields(group):
+        must = each.default is MISSING
+        kind = inspect.Parameter.POSITIONAL_OR_KEYWORD if must else inspect.Parameter.KEYWORD_ONLY
+        default = inspect.Parameter.empty if must else each.default
+        hint = hints[each.name]
+        if each.init:
+            made.append(inspect.Parameter(each.name, kind, default=default, annotation=hint))
+    return made

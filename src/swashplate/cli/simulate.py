@@ -4,30 +4,14 @@ from __future__ import annotations
 
 from importlib import resources
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import typer
 
-from swashplate.cli.options import (
-    DriveChoice,
-    FigureFile,
-    Simulating,
-    TableFile,
-)
+from swashplate.cli import words
+from swashplate.cli.options import DriveChoice, FigureFile, Sampling, Simulating, TableFile
 from swashplate.cli.terminal import Outputs, note, say, show, working
-from swashplate.cli.words import (
-    changes_between,
-    drive_of,
-    maneuver_of,
-    parameters_of,
-    simulated,
-)
 from swashplate.documents import parse_toml
-from swashplate.tables import FIGURE, TABLE, Column, Table
-
-if TYPE_CHECKING:
-    from swashplate.drive import Drive
-    from swashplate.simulation.result import Simulation
+from swashplate.tables import FIGURE, TABLE, Column, Table, quantity, write_table
 
 
 def simulate(
@@ -61,13 +45,10 @@ def simulate(
     with working("Simulating"):
         from swashplate.analysis.outcomes import run_tables
 
-        name, run = simulated(drive.chosen, command, sampling)
+        name, run = words.simulated(drive.chosen, command, sampling)
         tables, title = run_tables(run), f"{drive.title}, {name}"
     files.write(out, "All signals, in SI", run.write)
-    window = None
-    if begin is not None or end is not None:
-        first, last = float(run.time[0]), float(run.time[-1])
-        window = (first if begin is None else begin, last if end is None else end)
+    window = words.window_of(run.time, begin, end)
     files.draw(plot, "plot_simulation", run, window=window, title=title)
     duration = f"{run.time[-1] - run.time[0]:.6g} s"
     drive.note(f"{title}: {run.time.size} samples at {sampling.rate:g} Hz, {duration}")
@@ -99,46 +80,34 @@ def compare(
       swashplate compare hoist luff
       swashplate compare hoist mine.toml --maneuver sine:6.5,0.1 --plot both.png
     """
-    from swashplate.equations.marching.record import least_substeps
-
     files = Outputs((out, TABLE), (plot, FIGURE))
-    least_substeps(rate)  # a rate out of range is refused before anything is sampled
     with working("Simulating"):
         from swashplate.analysis.outcomes import rms_difference, side_by_side
-        from swashplate.tables import quantity
 
-        drives = _labelled(first, second)
-        command = maneuver_of(maneuver, *drives.values())
-        voltage = command.sample(rate)
+        pair = (words.drive_of(first), words.drive_of(second))
+        labels = [each.name for each in pair]
+        if labels[0] == labels[1]:  # then by what was typed
+            labels = [first, second if second != first else f"{second} (2)"]
+        drives = dict(zip(labels, pair, strict=True))
+        command = words.maneuver_of(maneuver, *pair)
+        voltage = command.sample(Sampling(rate).rate)
         runs = {label: drive.simulate(voltage, rate) for label, drive in drives.items()}
         made = side_by_side(drives, runs)
         rms = rms_difference(*(run.shaft_speed for run in runs.values()))
     title = f"{' and '.join(runs)}, {command.name}"
-    files.write(out, "Voltage and both speeds, in SI", lambda path: _write_speeds(runs, path))
+
+    def write(path: Path) -> None:
+        import polars as pl
+
+        run, speeds = runs[labels[0]], {f"shaft_speed {k}": e.shaft_speed for k, e in runs.items()}
+        write_table(pl.DataFrame({"time": run.time, "voltage": run.voltage, **speeds}), path)
+
+    files.write(out, "Voltage and both speeds, in SI", write)
     files.draw(plot, "plot_comparison", runs, title=title)
     note(title)
     show(made)
     note(f"rms difference of the speeds: {quantity(rms, 'rad/s', spec='.2f')}")
     files.say()
-
-
-def _labelled(first: str, second: str) -> dict[str, Drive]:
-    """Both drives by name, or by what was typed where they have the same name."""
-    drives = (drive_of(first), drive_of(second))
-    labels = (drives[0].name, drives[1].name)
-    if labels[0] == labels[1]:
-        labels = (first, second if second != first else f"{second} (2)")
-    return dict(zip(labels, drives, strict=True))
-
-
-def _write_speeds(runs: dict[str, Simulation], path: Path) -> None:
-    import polars as pl
-
-    from swashplate.tables import write_table
-
-    run = next(iter(runs.values()))
-    speeds = {f"shaft_speed {label}": each.shaft_speed for label, each in runs.items()}
-    write_table(pl.DataFrame({"time": run.time, "voltage": run.voltage, **speeds}), path)
 
 
 def axes() -> None:
@@ -149,13 +118,11 @@ def axes() -> None:
     """
     # their files as they stand: nothing is checked or compiled for a list of names
     made = Table("", (Column("name"), Column("drive", wrap=True), Column("control card")))
-    for path in sorted(
-        (resources.files("swashplate.parameters") / "sets").iterdir(), key=lambda p: p.name
-    ):
-        if path.name.endswith(".toml"):
-            found = parse_toml(path.read_text("utf-8"), path.name)
-            card = found["control_card"]
-            made.add(found["name"], found["title"], card if isinstance(card, str) else "its own")
+    sets = (resources.files("swashplate.parameters") / "sets").iterdir()
+    for path in sorted((each for each in sets if each.name.endswith(".toml")), key=str):
+        found = parse_toml(path.read_text("utf-8"), path.name)
+        card = found["control_card"]
+        made.add(found["name"], found["title"], card if isinstance(card, str) else "its own")
     show(made)
 
 
@@ -173,14 +140,14 @@ def show_parameters(drive: DriveChoice, *, toml: bool = False) -> None:
       swashplate show hoist --toml > mine.toml    (a start for your own drive)
     """
     # in SI: a rod's drive has angles inside, which chosen units of its motion would change
-    parameters = drive_of(drive.drive, drive.values or (), drive.factors or ()).parameters
+    parameters = words.drive_of(drive.drive, drive.values or (), drive.factors or ()).parameters
     if toml:
         from swashplate.parameters.files import dump_set
 
         typer.echo(dump_set(parameters), nl=False)
         return
     say(f"{parameters.name}: {parameters.title}")
-    for line in changes_between(parameters_of(drive.drive), parameters):
+    for line in words.changes_between(words.parameters_of(drive.drive), parameters):
         note(line)
     show(*parameters.tables())
     rate = "any rate" if parameters.rate is None else f"{parameters.rate:g} Hz"

@@ -30,86 +30,72 @@ side = Console(stderr=True, markup=False, highlight=False, emoji=False)
 """Standard error: what a pipe must not carry."""
 
 
-def _texts(table: Table) -> list[list[str]]:
-    """The words of the head and of each row."""
-    pairs = zip(table.columns, table.heads(), strict=True)
-    heads = ["" if column is UNIT else head for column, head in pairs]
-    return [heads, *(table.texts(row) for row in table.rows)]
-
-
 def _widths(texts: Sequence[Sequence[str]]) -> list[int]:
     columns = zip(*texts, strict=True)
     return [max(len(line) for cell in column for line in cell.split("\n")) for column in columns]
 
 
-def _rich(
-    table: Table,
-    texts: Sequence[Sequence[str]],
-    widths: Sequence[int] = (),
-    places: Sequence[int] = (),
-) -> rich.table.Table:
-    """A table, or some of its columns; numbers are never cut."""
-    made = rich.table.Table(
-        title=table.title or None,
-        title_justify="left",
-        title_style="bold",
-        caption=table.caption or None,
-        caption_justify="left",
-        box=box.SIMPLE_HEAD,
-        show_edge=False,
-        pad_edge=False,
-        collapse_padding=True,
-    )
-    places = places or range(len(table.columns))
-    whole = _widths(texts)
-    for place in places:
-        column = table.columns[place]
-        made.add_column(
-            texts[0][place],
-            justify="right" if column.spec else "left",
-            no_wrap=not column.wrap,
-            width=widths[place] if widths else None,
-            min_width=whole[place] if column.spec else None,
-            # a name that is too long goes on in the next line
-            overflow="ellipsis" if column.spec else "fold",
-        )
-    for row, cells in zip(table.rows, texts[1:], strict=True):
-        if row.section:
-            made.add_section()
-        made.add_row(*(cells[place] for place in places))
-    return made
-
-
 def _blocks(table: Table, line: int) -> Iterator[rich.table.Table]:
     """A table for lines of a length, in one block or, of too many numbers, in several.
 
-    Heads are broken first; every block begins with the columns before the first number.
+    Numbers are never cut. Heads are broken first; every block begins with the columns before the
+    first number.
     """
-    texts = _texts(table)
-    widths = _widths(texts)
+    columns, every = table.columns, range(len(table.columns))
+    heads = ["" if columns[k] is UNIT else head for k, head in enumerate(table.heads())]
+    rows = [table.texts(row) for row in table.rows]
+    whole, broken = _widths([heads, *rows]), list[int]()
 
     def length(places: Sequence[int]) -> int:
-        return sum(widths[k] for k in places) + BETWEEN * (len(places) - 1)
+        return sum((broken or whole)[k] for k in places) + BETWEEN * (len(places) - 1)
 
-    every = range(len(table.columns))
-    numbers = [k for k in every if table.columns[k].spec]
-    if length(every) <= line or not numbers or any(each.wrap for each in table.columns):
-        yield _rich(table, texts)
+    def block(places: Sequence[int]) -> rich.table.Table:
+        made = rich.table.Table(
+            title=table.title or None,
+            title_justify="left",
+            title_style="bold",
+            caption=table.caption or None,
+            caption_justify="left",
+            box=box.SIMPLE_HEAD,
+            show_edge=False,
+            pad_edge=False,
+            collapse_padding=True,
+        )
+        least = _widths([heads, *rows])
+        for k in places:
+            made.add_column(
+                heads[k],
+                justify="right" if columns[k].spec else "left",
+                no_wrap=not columns[k].wrap,
+                width=broken[k] if broken else None,
+                min_width=least[k] if columns[k].spec else None,
+                # a name that is too long goes on in the next line
+                overflow="ellipsis" if columns[k].spec else "fold",
+            )
+        for row, cells in zip(table.rows, rows, strict=True):
+            if row.section:
+                made.add_section()
+            made.add_row(*(cells[k] for k in places))
+        return made
+
+    numbers = [k for k in every if columns[k].spec]
+    if length(every) <= line or not numbers or any(each.wrap for each in columns):
+        yield block(every)
         return
-    cells = _widths(texts[1:] or texts)
-    for k, head in enumerate(texts[0]):
-        broken = fill(head.replace(" %", NARROW), max(cells[k], LEAST))
-        texts[0][k] = broken.replace(NARROW, " %")
-    widths = [each if k in numbers else min(each, LONGEST) for k, each in enumerate(_widths(texts))]
-    lead = block = list(every[: numbers[0]])
+    for k, cells in enumerate(_widths(rows or [heads])):
+        words = fill(heads[k].replace(" %", NARROW), max(cells, LEAST))
+        heads[k] = words.replace(NARROW, " %")
+    wide = enumerate(_widths([heads, *rows]))
+    broken = [each if k in numbers else min(each, LONGEST) for k, each in wide]
+    lead = places = list(every[: numbers[0]])
     for k in every[numbers[0] :]:
-        unit = [k + 1] if k + 1 in every and table.columns[k + 1] is UNIT else []
-        full = table.columns[k] is not UNIT and length([*block, k, *unit]) > line
-        if full and len(block) > len(lead):
-            yield _rich(table, texts, widths, block)
-            block = lead
-        block = [*block, k]
-    yield _rich(table, texts, widths, block)
+        unit = [k + 1] if k + 1 in every and columns[k + 1] is UNIT else []
+        full = columns[k] is not UNIT and length([*places, k, *unit]) > line
+        if full and len(places) > len(lead):
+            yield block(places)
+            places = lead
+        places = [*places, k]
+    yield block(places)
 
 
 def show(*tables: Table) -> None:

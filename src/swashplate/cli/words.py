@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterable, Sequence
+from dataclasses import replace
 from difflib import get_close_matches
 from math import isfinite
 from pathlib import Path
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING, Any
 
 from swashplate.documents import parse_toml, read_text
 from swashplate.errors import FileError, InputError
@@ -18,22 +19,17 @@ if TYPE_CHECKING:
     from swashplate.campaign import Campaign, Experiment
     from swashplate.cli.options import Sampling
     from swashplate.drive import Drive
-    from swashplate.identification.setup import ModelSetup
+    from swashplate.identification.setup import ModelSetup, Setup
     from swashplate.maneuvers import Maneuver
     from swashplate.parameters.parameter_set import Change, ParameterSet
-    from swashplate.simulation.result import Simulation
-
-    Value = TypeVar("Value")
+    from swashplate.simulation.result import Array, Simulation
 
 _NUMBER = r"[+-]?(?:(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?|inf\b|nan\b)"
 _VALUE = re.compile(rf"\s*({_NUMBER})(?:/({_NUMBER}))?\s*((?:1/)?[^\W\d_].*|°.*)?")
 _ENDING = re.compile(r"\.[A-Za-z]\w*$")
-DRIVE = "drive.toml"
-"""The drive in a folder that a fit wrote."""
-CONFIGURATION = "setup.toml"
-"""The fit configuration in such a folder."""
-NUMBERS = "parameters.toml"
-"""What a fit of a model of one's own writes in the place of a drive."""
+DRIVE, CONFIGURATION, NUMBERS = "drive.toml", "setup.toml", "parameters.toml"
+"""In a folder that a fit wrote: the drive, its fit configuration, and what stands in the place of
+both for a model of one's own."""
 UNFELT, FEELING = "load_torque", ("motor_leakage", "motor_constant")
 """A load, and what makes the speed depend on it."""
 SURPRISING = 1000.0
@@ -41,6 +37,9 @@ SURPRISING = 1000.0
 
 # --- files and what they are ----------------------------------------------------------------------
 
+_NAMES = {"log": "a log", "campaign": "a campaign", "drive": "a drive"}
+_NAMES["setup"] = "a fit configuration"
+_MARKS = {"runs": "campaign", "stages": "setup", "control_card": "drive", "pump_motor": "drive"}
 _INSTEAD = {
     ("log", "campaign"): "make a campaign of it with 'swashplate campaign init {}'",
     ("log", "drive"): "a drive is a packaged name, a parameter file or the folder of a fit",
@@ -48,12 +47,6 @@ _INSTEAD = {
     ("setup", "campaign"): "name the campaign first, and this file with --setup",
     ("campaign", "drive"): "name a drive here, and the campaign where CAMPAIGN.toml stands",
     ("setup", "drive"): "name a drive here, and this file with --setup",
-}
-_NAMES = {
-    "log": "a log",
-    "campaign": "a campaign",
-    "drive": "a drive",
-    "setup": "a fit configuration",
 }
 
 
@@ -67,8 +60,7 @@ def file_kind(path: Path) -> str:
         found = parse_toml(read_text(path), str(path))
     except FileError:
         return ""
-    marks = {"runs": "campaign", "stages": "setup", "control_card": "drive", "pump_motor": "drive"}
-    return next((kind for mark, kind in marks.items() if mark in found), "")
+    return next((kind for mark, kind in _MARKS.items() if mark in found), "")
 
 
 def check_kind(path: Path, wanted: str) -> None:
@@ -111,6 +103,18 @@ def runs_to_fit(campaign: Campaign, axis: str) -> tuple[Experiment, ...]:
     return tuple(runs)
 
 
+def fit_of(
+    path: Path, axis: str | None, setup: str | None, begin: str | None
+) -> tuple[Campaign, tuple[Experiment, ...], Setup, ParameterSet]:
+    """What a fit is about: campaign, runs to fit, what is free, and the drive it begins at."""
+    from swashplate.identification.drive_model import setup_of
+
+    campaign, chosen = campaign_of(path, axis)
+    plan = setup_of(campaign, chosen, setup)
+    start = campaign.drive(chosen).parameters if begin is None else parameters_of(begin)
+    return campaign, runs_to_fit(campaign, chosen), plan, start
+
+
 def drive_file(word: str) -> Path | None:
     """The parameter file that a word means, None for a packaged set.
 
@@ -124,8 +128,8 @@ def drive_file(word: str) -> Path | None:
     """
     from swashplate.parameters.files import preset_names
 
-    place = Path(word)
-    if word in preset_names():
+    place, packaged = Path(word), preset_names()
+    if word in packaged:
         return None
     if place.is_dir():
         if not (place / DRIVE).is_file():
@@ -138,8 +142,7 @@ def drive_file(word: str) -> Path | None:
         check_kind(place, "drive")
         return place
     raise InputError(
-        f"There is no packaged set, file or folder '{word}'; packaged are "
-        f"{', '.join(preset_names())}."
+        f"There is no packaged set, file or folder '{word}'; packaged are {', '.join(packaged)}."
     )
 
 
@@ -151,12 +154,6 @@ def parameters_of(word: str) -> ParameterSet:
     return load_preset(word) if file is None else load_set(file)
 
 
-def configuration_of(word: str, setup: str | None, name: str) -> str:
-    """The fit configuration for a drive: the one asked for, a fit folder's own, or its name's."""
-    own = Path(word) / CONFIGURATION
-    return setup or (str(own) if own.is_file() else name)
-
-
 def model_parameters_of(folder: str, file: Path, runs: Sequence[Experiment]) -> ModelSetup:
     """A model of one's own with the numbers that a fit wrote into its folder.
 
@@ -165,8 +162,6 @@ def model_parameters_of(folder: str, file: Path, runs: Sequence[Experiment]) -> 
     InputError
         If the folder has none of this model.
     """
-    from dataclasses import replace
-
     from swashplate.identification.setup import ModelSetup
 
     setup = ModelSetup.from_file(file)
@@ -183,18 +178,75 @@ def model_parameters_of(folder: str, file: Path, runs: Sequence[Experiment]) -> 
 
 # --- changes and levers ---------------------------------------------------------------------------
 
+Reader = Callable[[str, list[float], str], Any]
+"""Makes a value of name, numbers and unit: None where they are not what it reads."""
+
+
+def assigned(option: str, words: Iterable[str], example: str, read: Reader) -> dict[str, Any]:
+    """What words such as ``Z16=1.2e-4/1.5e-4`` or ``Z16=0.12mm`` say, by name, each given once."""
+    found: dict[str, Any] = {}
+    for word in words:
+        name, equals, given = (part.strip() for part in word.partition("="))
+        match = _VALUE.fullmatch(given) if equals else None
+        value = None
+        if match is not None:
+            numbers = [float(number) for number in match.group(1, 2) if number]
+            value = read(name, numbers, (match[3] or "").strip())
+        if value is None:
+            raise InputError(f"{option} cannot read '{word}'; write it as {example}.")
+        if name in found:
+            raise InputError(f"{option} gives {name} twice; give it once.")
+        found[name] = value
+    return found
+
+
+def _measured(known: Callable[[str], Any]) -> Reader:
+    """Reads one number or two, in SI or with a unit, of what is known by a name."""
+    from swashplate.units import to_si
+
+    def read(name: str, numbers: list[float], unit: str) -> Change:
+        found = known(name)
+        what = f"{name} ({found.name})"
+        si = [to_si(each, unit, found.unit, what) if unit else each for each in numbers]
+        return si[0] if len(si) == 1 else (si[0], si[1])
+
+    return read
+
+
+def _factors(known: Callable[[str], Any], *counts: int) -> Reader:
+    """Reads so many numbers without a unit, if the name is known."""
+
+    def read(name: str, numbers: list[float], unit: str) -> Change | None:
+        known(name)
+        if unit or len(numbers) not in counts:
+            return None
+        return numbers[0] if len(numbers) == 1 else (numbers[0], numbers[1])
+
+    return read
+
 
 def drive_of(word: str, values: Sequence[str] = (), factors: Sequence[str] = ()) -> Drive:
     """The drive of a name or file, with values set and then scaled, by parameter or by lever."""
     from swashplate.drive import Drive
+    from swashplate.parameters.definitions import find
+
+    def valued(name: str) -> Any:
+        if _is_lever(name):
+            words = f"{name} is a lever, which has no value of its own: --scale {name}=1.5."
+            raise InputError(words)
+        return find(name)
+
+    def scaled(name: str, numbers: list[float], unit: str) -> Any:
+        if _is_lever(name):
+            return _factors(str, 1)(name, numbers, unit)
+        return _factors(find, 1, 2)(name, numbers, unit)
 
     set_as = "Z16=1.2e-4, Z16=1.2e-4/1.5e-4 (plus/minus) or Z16_plus=0.12mm"
     scaled_as = "Z16=1.5, Z16=1.5/1.2 (plus/minus) or orifice=1.5"
-    chosen: dict[str, Change] = assigned("--set", values, set_as, _value)
-    scaled: dict[str, Change] = assigned("--scale", factors, scaled_as, _factor)
-    levers = {k: v for k, v in scaled.items() if isinstance(v, float) and _is_lever(k)}
-    own = {name: change for name, change in scaled.items() if name not in levers}
-    drive = Drive(parameters_of(word)).replace(**chosen).scale(**own)
+    chosen = assigned("--set", values, set_as, _measured(valued))
+    changes = assigned("--scale", factors, scaled_as, scaled)
+    levers = {name: changes.pop(name) for name in [*changes] if _is_lever(name)}
+    drive = Drive(parameters_of(word)).replace(**chosen).scale(**changes)
     if levers:
         from swashplate.analysis.whatif import pulled
 
@@ -210,6 +262,37 @@ def _is_lever(name: str) -> bool:
     from swashplate.analysis.whatif import LEVERS
 
     return name in LEVERS
+
+
+def physical_values(words: Sequence[str]) -> dict[str, Change]:
+    """Physical values in SI from words such as ``oil_volume=100cm^3``."""
+    from swashplate.full_order.physical_set import chosen_quantity
+
+    example = "oil_volume=1e-4 or oil_volume=100cm^3"
+    return assigned("--physical", words, example, _measured(chosen_quantity))
+
+
+def factors_of(words: Sequence[str]) -> dict[str, float]:
+    """Factors by lever or parameter from words such as ``orifice=1.5``."""
+    from swashplate.analysis.whatif import find_lever
+
+    return assigned("--scale", words, "orifice=1.5", _factors(find_lever, 1))
+
+
+def ranges_of(words: Sequence[str], usual: Range) -> dict[str, Range]:
+    """Ranges of factors by lever from words such as ``pump`` or ``pump=0.8/1.5``."""
+    from swashplate.analysis.whatif import find_lever
+
+    whole = [word if "=" in word else f"{word}={usual[0]}/{usual[1]}" for word in words]
+    return assigned("--lever", whole, "pump or pump=0.8/1.5", _factors(find_lever, 2))
+
+
+def pairs_of(option: str, given: Sequence[str] | None, example: str) -> list[tuple[str, str]]:
+    """What stands before and behind the equals sign of each."""
+    for each in given or ():
+        if "=" not in each:
+            raise InputError(f"{option} {each} has no equals sign: write {option} {example}.")
+    return [(each.partition("=")[0], each.partition("=")[2]) for each in given or ()]
 
 
 def changes_between(before: ParameterSet, after: ParameterSet) -> list[str]:
@@ -235,102 +318,6 @@ def changes_between(before: ParameterSet, after: ParameterSet) -> list[str]:
                 f"! {old.symbol} is {max(far):.3g} times what it was: is it meant in {old.unit}?"
             )
     return lines
-
-
-def assigned(
-    option: str,
-    words: Iterable[str],
-    example: str,
-    read: Callable[[str, list[float], str], Value | None],
-) -> dict[str, Value]:
-    """What words such as ``Z16=1.2e-4/1.5e-4`` or ``Z16=0.12mm`` say, by name, each given once.
-
-    `read` makes a value of name, numbers and unit, None where they are not what it reads.
-    """
-    found: dict[str, Value] = {}
-    for word in words:
-        name, equals, given = (part.strip() for part in word.partition("="))
-        match = _VALUE.fullmatch(given) if equals else None
-        value = None
-        if match is not None:
-            numbers = [float(number) for number in match.group(1, 2) if number]
-            value = read(name, numbers, (match[3] or "").strip())
-        if value is None:
-            raise InputError(f"{option} cannot read '{word}'; write it as {example}.")
-        if name in found:
-            raise InputError(f"{option} gives {name} twice; give it once.")
-        found[name] = value
-    return found
-
-
-def _one_or_both(numbers: Sequence[float]) -> Change:
-    return numbers[0] if len(numbers) == 1 else (numbers[0], numbers[1])
-
-
-def _value(name: str, numbers: list[float], unit: str) -> Change:
-    from swashplate.parameters.definitions import find
-    from swashplate.units import to_si
-
-    if _is_lever(name):
-        raise InputError(f"{name} is a lever, which has no value of its own: --scale {name}=1.5.")
-    definition = find(name)
-    if unit:
-        what = f"{name} ({definition.name})"
-        numbers = [to_si(number, unit, definition.unit, what) for number in numbers]
-    return _one_or_both(numbers)
-
-
-def _factor(name: str, numbers: list[float], unit: str) -> Change | None:
-    from swashplate.parameters.definitions import find
-
-    if _is_lever(name):
-        return numbers[0] if len(numbers) == 1 and not unit else None
-    find(name)
-    return None if unit else _one_or_both(numbers)
-
-
-def physical_values(words: Sequence[str]) -> dict[str, Change]:
-    """Physical values in SI from words such as ``oil_volume=100cm^3``."""
-    from swashplate.full_order.physical_set import chosen_quantity
-    from swashplate.units import to_si
-
-    def read(name: str, numbers: list[float], unit: str) -> Change:
-        quantity = chosen_quantity(name)
-        what = f"{name} ({quantity.name})"
-        return _one_or_both([to_si(x, unit, quantity.unit, what) if unit else x for x in numbers])
-
-    return assigned("--physical", words, "oil_volume=1e-4 or oil_volume=100cm^3", read)
-
-
-def factors_of(words: Sequence[str]) -> dict[str, float]:
-    """Factors by lever or parameter from words such as ``orifice=1.5``."""
-    from swashplate.analysis.whatif import find_lever
-
-    def read(name: str, numbers: list[float], unit: str) -> float | None:
-        find_lever(name)
-        return numbers[0] if len(numbers) == 1 and not unit else None
-
-    return assigned("--scale", words, "orifice=1.5", read)
-
-
-def ranges_of(words: Sequence[str], usual: Range) -> dict[str, Range]:
-    """Ranges of factors by lever from words such as ``pump`` or ``pump=0.8/1.5``."""
-    from swashplate.analysis.whatif import find_lever
-
-    def read(name: str, numbers: list[float], unit: str) -> Range | None:
-        find_lever(name)
-        return (numbers[0], numbers[1]) if len(numbers) == 2 and not unit else None
-
-    whole = [word if "=" in word else f"{word}={usual[0]}/{usual[1]}" for word in words]
-    return assigned("--lever", whole, "pump or pump=0.8/1.5", read)
-
-
-def pairs_of(option: str, given: Sequence[str] | None, example: str) -> list[tuple[str, str]]:
-    """What stands before and behind the equals sign of each."""
-    for each in given or ():
-        if "=" not in each:
-            raise InputError(f"{option} {each} has no equals sign: write {option} {example}.")
-    return [(each.partition("=")[0], each.partition("=")[2]) for each in given or ()]
 
 
 # --- commands -------------------------------------------------------------------------------------
@@ -359,34 +346,45 @@ def maneuver_of(word: str, *drives: Drive) -> Maneuver:
 
 def simulated(drive: Drive, command: str, options: Sampling) -> tuple[str, Simulation]:
     """Name of a command, a maneuver or a file, and the drive's simulation over it."""
-    from swashplate.equations.marching.record import least_substeps
-    from swashplate.logs import read_series
+    from swashplate.logs import open_log, read_series
 
-    least_substeps(options.rate)  # a rate out of range is refused before anything is sampled
-    interpolation, time = options.interpolation, None
-    if _is_file(command):
-        _check_columns(command, options)
+    head = command.partition(":")[0]  # stairs:2/4/0 is no path
+    if not ("/" in head or _ENDING.search(head) or Path(command).is_file()):
+        maneuver = maneuver_of(command, drive)
+        name, where, values, time = maneuver.name, "", maneuver.sample(options.rate), None
+    else:
+        kind = file_kind(Path(command))
+        if kind not in ("log", ""):
+            words = "not a command: name a maneuver such as step:9, or a log."
+            raise InputError(f"{command} is {_NAMES[kind]}, {words}")
+        log = open_log(command)
+        columns = (("--time-column", options.time_column), ("--column", options.column))
+        for option, column in columns:
+            try:
+                log.find(column)
+            except InputError as error:
+                raise InputError(f"{str(error).rstrip('.')}, with {option}.") from None
         series = read_series(command, options.column, "V", time_column=options.time_column)
-        if interpolation is None:
+        if options.interpolation is None:
             raise InputError(
                 f"{command} needs --interpolation linear (a straight line from row to row) or "
                 "--interpolation previous (each row held until the next)."
             )
         name, where, values, time = Path(command).name, f"{command}: ", series.values, series.time
-    else:
-        maneuver = maneuver_of(command, drive)
-        name, where, values = maneuver.name, "", maneuver.sample(options.rate)
+    between, start, clip = options.interpolation, options.start, options.clip
     try:
         return name, drive.simulate(
-            values,
-            options.rate,
-            time=time,
-            interpolation=interpolation,
-            start=options.start,
-            clip=options.clip,
+            values, options.rate, time=time, interpolation=between, start=start, clip=clip
         )
     except InputError as error:
         raise InputError(f"{where}{error}") from None
+
+
+def window_of(time: Array, begin: float | None, end: float | None) -> tuple[float, float] | None:
+    """The part of a record that --from and --to name; None for all of it. [s]"""
+    first, last = float(time[0]), float(time[-1])
+    whole = begin is None and end is None
+    return None if whole else (first if begin is None else begin, last if end is None else end)
 
 
 def trial_of(drive: Drive, command: str, options: Sampling) -> tuple[str, Trial]:
@@ -394,27 +392,4 @@ def trial_of(drive: Drive, command: str, options: Sampling) -> tuple[str, Trial]
     from swashplate.analysis.outcomes import trial
 
     name, run = simulated(drive, command, options)
-    assert run.voltage is not None  # the command line simulates voltages only
-    return name, trial(drive, run.voltage, options.rate)
-
-
-def _is_file(word: str) -> bool:
-    head = word.partition(":")[0]  # stairs:2/4/0 is no path
-    return "/" in head or _ENDING.search(head) is not None or Path(word).is_file()
-
-
-def _check_columns(path: str, options: Sampling) -> None:
-    """Say with which option another column is named, if one is not there."""
-    from swashplate.logs import open_log
-
-    kind = file_kind(Path(path))
-    if kind in ("campaign", "drive", "setup"):
-        raise InputError(
-            f"{path} is {_NAMES[kind]}, not a command: name a maneuver such as step:9, or a log."
-        )
-    log = open_log(path)
-    for option, name in (("--time-column", options.time_column), ("--column", options.column)):
-        try:
-            log.find(name)
-        except InputError as error:
-            raise InputError(f"{str(error).rstrip('.')}, with {option}.") from None
+    return name, trial(drive, run["voltage"], options.rate)

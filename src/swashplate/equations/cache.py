@@ -228,7 +228,8 @@ def generated(name: str, text: str, names: Mapping[str, Any]) -> dict[str, Any]:
     The file's name carries a hash of the text without its docstrings, and of all that its names
     reach; many processes may write it at once.
     """
-    used = {n: v for n, v in names.items() if re.search(rf"\b{re.escape(n)}\b", text)}
+    words = set(re.findall(r"\w+", text))
+    used = {n: v for n, v in names.items() if n in words}
     reached = {n: closure_hash(v) if is_function(v) else v for n, v in used.items()}
     digest = blake2b(digest_size=8)
     digest.update(DOCSTRING.sub("", text).encode())

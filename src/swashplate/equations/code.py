@@ -15,6 +15,7 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property, lru_cache, wraps
 from itertools import count
 from threading import RLock
+from time import perf_counter
 from typing import Any, ParamSpec, TypeVar
 
 from swashplate.equations import expressions as ex
@@ -33,6 +34,9 @@ RESERVED = {*FUNCTIONS, "inf", "nan", "range", "int", "float", "None", "True", "
 """Names that texts use themselves."""
 
 
+_clock = {"depth": 0.0, "seconds": 0.0}
+
+
 def generating(function: Callable[P, R]) -> Callable[P, R]:
     """Remember what a function generates, and let one thread at a time do so."""
     remembered = lru_cache(maxsize=256)(function)
@@ -40,9 +44,20 @@ def generating(function: Callable[P, R]) -> Callable[P, R]:
     @wraps(function)
     def alone(*args: P.args, **kwargs: P.kwargs) -> R:
         with GENERATING:
-            return remembered(*args, **kwargs)  # type: ignore[arg-type]
+            begun, _clock["depth"] = perf_counter(), _clock["depth"] + 1.0
+            try:
+                return remembered(*args, **kwargs)  # type: ignore[arg-type]
+            finally:
+                _clock["depth"] -= 1.0
+                if not _clock["depth"]:
+                    _clock["seconds"] += perf_counter() - begun
 
     return alone
+
+
+def generating_time() -> float:
+    """Time for which this process read equations, wrote code, and loaded or compiled it. [s]"""
+    return _clock["seconds"]
 
 
 # --- values ---------------------------------------------------------------------------------------

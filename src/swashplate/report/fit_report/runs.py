@@ -277,5 +277,5 @@ def packed(values: Array, step: float | None = None) -> dict[str, Any]:
     order = int(np.argmin(sizes))
     number = np.where(orders[order] < 0, -2 * orders[order] - 1, 2 * orders[order]).astype("<u4")
     planes = number.view(np.uint8).reshape(-1, 4).T.tobytes()
-    code = b64encode(compress(planes, 9)).decode("ascii")
+    code = b64encode(compress(planes, 6)).decode("ascii")
     return {"size": values.size, "zero": zero, "step": step, "order": order, "code": code}
