@@ -23,11 +23,16 @@ DEAD, GAIN, LAG, DELAY = (0.8, 0.5), (0.4, 0.6), 0.15, 0.06
 
 
 def machine(
-    command: np.ndarray, top: float = np.inf, pull: float = np.inf, lag: float = LAG
+    command: np.ndarray,
+    top: float = np.inf,
+    pull: float = np.inf,
+    lag: float = LAG,
+    jump: float = 0.0,
 ) -> np.ndarray:
-    """Speed behind dead zone, gain, top speed, acceleration, lag and delay, in steps of 2 ms."""
+    """Speed behind dead zone, jump, gain, limits, lag and delay, in steps of 2 ms."""
     late = np.interp(TIME - DELAY, TIME, command)
     target = GAIN[0] * np.maximum(late - DEAD[0], 0.0) - GAIN[1] * np.maximum(-late - DEAD[1], 0.0)
+    target += jump * ((late > DEAD[0]) * 1.0 - (late < -DEAD[1]))
     target = np.clip(target, -top, top)
     speed = np.zeros(TIME.size)
     for n in range(1, TIME.size):
@@ -80,6 +85,28 @@ def test_limits_are_found_where_they_act() -> None:
     assert found.top_speed == pytest.approx((2.0, 2.0), rel=0.02)
     assert found.acceleration == pytest.approx((4.0, 4.0), rel=0.1)
     assert found.gain == pytest.approx(GAIN, rel=0.05)
+
+
+def test_a_jump_at_the_edge_of_the_dead_zone_is_found() -> None:
+    found = guess_drive(runs(jump=0.3))
+    assert found.jump == pytest.approx((0.3, 0.3), rel=0.1)
+    assert found.dead_zone == pytest.approx(DEAD, abs=0.05)
+    assert found.gain == pytest.approx(GAIN, rel=0.03)
+    parameters = guessed_set(found, "campaign.toml")
+    steady = Drive(parameters).steady_speed([-1.1 * DEAD[1], 1.1 * DEAD[0]])
+    expected = [-0.3 - 0.1 * GAIN[1] * DEAD[1], 0.3 + 0.1 * GAIN[0] * DEAD[0]]
+    assert steady == pytest.approx(expected, rel=0.2)
+    assert "J_plus" in fit_configuration(found, parameters)
+    none = guess_drive(runs())
+    assert none.jump == (0.0, 0.0)
+    assert "J_plus" not in fit_configuration(none, guessed_set(none, "x"))
+
+
+def test_a_lag_that_is_not_seen_stays_fixed() -> None:
+    found = guess_drive(runs(lag=1e-4, pull=4.0))
+    text = fit_configuration(found, guessed_set(found, "x"))
+    assert "Z16_plus" in text
+    assert "Z8 =" not in text
 
 
 def test_a_guess_becomes_a_drive_and_a_fit_configuration() -> None:

@@ -1,9 +1,9 @@
 """First guesses of an unknown machine's numbers, read off its logs.
 
-What a drive does between command and speed is, at first sight, a dead zone, a gain, a top speed and
-a greatest acceleration each way, one delay and one lag. `guess_drive` finds these by least squares
-on mean speeds and puts them into the drive "neutral"; `fit_configuration` frees them, with bounds
-about them. Both are where a fit begins, not its result.
+What a drive does between command and speed is, at first sight, a dead zone, a jump at its edge, a
+gain, a top speed and a greatest acceleration each way, one delay and one lag. `guess_drive` finds
+these by least squares on mean speeds and puts them into the drive "neutral"; `fit_configuration`
+frees them, with bounds about them. Both are where a fit begins, not its result.
 """
 
 from __future__ import annotations
@@ -37,6 +37,8 @@ LAGS = (0.02, 0.06, 0.2, 0.6)
 DELAYS = (0.0, 0.04, 0.12, 0.3)
 DEAD_ZONES = (0.02, 0.1, 0.25)
 """Where the search begins; dead zones as shares of the largest command each way. [s], [s], [1]"""
+SHORTEST = 0.005
+"""Lag below which it is none. [s]"""
 LONGEST_DELAY = 1.0
 """[s]"""
 FEWEST = 40
@@ -52,6 +54,11 @@ ANGLE = 0.2
 STEEPEST = 30.0
 """Volts that a radian takes at least, so that at 10 V and at the upper bounds of all gains the
 solenoids do not overpower the feedback spring. [V/rad]"""
+JUMPS = (0.03, 0.12)
+"""Jumps from which the search for one begins, over the greatest speed. [1]"""
+EDGE = 0.01
+"""Command over which a jump is complete, over the largest one: a sudden one would be felt by no
+small change of a dead zone, as marches go in steps. [1]"""
 NONE = 30.0
 """Logarithm of a limit, over the greatest speed, that is none. [1]"""
 FAR_STOP = 0.39
@@ -71,6 +78,8 @@ class Guess(NamedTuple):
     """[V]"""
     gain: tuple[float, float]
     """Speed for a volt beyond the dead zone. [unit/V]"""
+    jump: tuple[float, float]
+    """Speed right beyond the dead zone, 0 where none was seen. [unit]"""
     top_speed: tuple[float, float]
     """Infinite where none was reached. [unit]"""
     acceleration: tuple[float, float]
@@ -88,19 +97,27 @@ class Guess(NamedTuple):
 
 
 @kernel
-def march_guess(command: Array, h: float, numbers: Array, share: float, position: Array) -> None:
-    """March the position behind dead zone, gain, limits and lag.
+def march_guess(
+    command: Array, h: float, numbers: Array, share: float, edge: float, position: Array
+) -> None:
+    """March the position behind dead zone, jump, gain, limits and lag.
 
-    From a delayed command (n,) [V] with a step [s]; numbers (8,) are dead zones, gains, top speeds
-    and accelerations of plus and minus; `share` is that of the way to its target that the speed
-    takes in a step [1]. `position` (n,) is the output; its first sample gives the speed at first.
+    From a delayed command (n,) [V] with a step [s]; numbers (10,) are dead zones, gains, top
+    speeds, accelerations and jumps of plus and minus; `share` is that of the way to its target that
+    the speed takes in a step [1], `edge` the command over which a jump is complete [V]. `position`
+    (n,) is the output; its first sample gives the speed at first.
     """
     speed = position[0]
     position[0] = 0.0
     for n in range(1, command.size):
         u = command[n - 1]
-        target = min(numbers[2] * max(u - numbers[0], 0.0), numbers[4])
-        target -= min(numbers[3] * max(-u - numbers[1], 0.0), numbers[5])
+        target = 0.0
+        if u > numbers[0]:
+            beyond = u - numbers[0]
+            target = min(numbers[2] * beyond + numbers[8] * min(beyond / edge, 1.0), numbers[4])
+        elif -u > numbers[1]:
+            beyond = -u - numbers[1]
+            target = -min(numbers[3] * beyond + numbers[9] * min(beyond / edge, 1.0), numbers[5])
         last = speed
         speed += min(max(share * (target - speed), -numbers[7] * h), numbers[6] * h)
         position[n] = position[n - 1] + 0.5 * h * (last + speed)
@@ -119,12 +136,13 @@ class _Run(NamedTuple):
     """(m,)"""
 
     def errors(self, numbers: Array) -> Array:
-        """Simulated less measured mean speeds; numbers (10,) end with lag and delay [s]."""
+        """Simulated less measured mean speeds; numbers (12,) end with lag and delay [s]."""
         position = np.empty(self.time.size)
         position[0] = self.start
-        share = float(1.0 - np.exp(-STEP / max(numbers[8], 1e-4)))
-        command = np.interp(self.time - numbers[9], self.time, self.command)
-        march_guess(command, STEP, numbers, share, position)
+        share = float(1.0 - np.exp(-STEP / max(numbers[10], 1e-4)))
+        command = np.interp(self.time - numbers[11], self.time, self.command)
+        edge = EDGE * float(np.abs(self.command).max()) or 1.0
+        march_guess(command, STEP, numbers, share, edge, position)
         there, back = (np.interp(each, self.time, position) for each in (self.ends, self.begins))
         return np.asarray((there - back) / (self.ends - self.begins) - self.speeds)
 
@@ -178,13 +196,13 @@ def guess_drive(experiments: Sequence[Experiment]) -> Guess:
     found = _searched(runs, speeds, size, scale)
     errors = np.concatenate([run.errors(found) for run in runs])
     # numbers of a way that was not tried are the other's
-    pairs = found[:8].reshape(4, 2)
+    pairs = found[:10].reshape(5, 2)
     pairs[:, size == 0.0] = pairs[:, size > 0.0][:, :1]
-    dead, gain, top, pull = ((float(plus), float(minus)) for plus, minus in pairs)
+    dead, gain, top, pull, jump = ((float(plus), float(minus)) for plus, minus in pairs)
     return Guess(
-        *(experiments[0].axis, unit, dead, gain, top, pull),
-        lag=float(found[8]),
-        delay=float(found[9]),
+        *(experiments[0].axis, unit, dead, gain, jump, top, pull),
+        lag=float(found[10]),
+        delay=float(found[11]),
         command=(float(size[0]), float(size[1])),
         speed=scale,
         fit_percent=100.0 * (1.0 - float(np.sqrt(np.mean(errors**2)) / np.std(speeds))),
@@ -211,15 +229,16 @@ def _run(experiment: Experiment, channel: Channel) -> _Run:
     return _Run(grid, drive.at(grid), start, edges[:-1][whole], edges[1:][whole], speeds)
 
 
-LOWEST = np.array([0.0, 0.0, -5.0, -5.0, log(0.002), 0.0, -1.5, -1.5, -2.0, -2.0])
-HIGHEST = np.array([0.95, 0.95, 7.0, 7.0, log(5.0), LONGEST_DELAY, 1.5, 1.5, 6.0, 6.0])
-TYPICAL = np.array([0.05, 0.05, 0.2, 0.2, 0.3, 0.02, 0.1, 0.1, 0.5, 0.5])
+LOWEST = np.array([0.0, 0.0, -5.0, -5.0, log(0.002), 0.0, -1.5, -1.5, -2.0, -2.0, 0.0, 0.0])
+HIGHEST = np.array([0.95, 0.95, 7.0, 7.0, log(5.0), LONGEST_DELAY, 1.5, 1.5, 6.0, 6.0, 0.5, 0.5])
+TYPICAL = np.array([0.05, 0.05, 0.2, 0.2, 0.3, 0.02, 0.1, 0.1, 0.5, 0.5, 0.02, 0.02])
 """Of what is searched for: dead zones over the largest command, logarithms of gains and of the lag,
-the delay [s], and logarithms of top speeds and accelerations over the greatest speed."""
+the delay [s], logarithms of top speeds and accelerations over the greatest speed, and jumps over
+it."""
 
 
 def _searched(runs: Sequence[_Run], speeds: Array, size: Array, scale: float) -> Array:
-    """Numbers (10,) of least squares: a grid first, on which gains are linear, then all at once."""
+    """Numbers (12,) of least squares: a grid first, on which gains are linear, then all at once."""
     from scipy.optimize import least_squares
 
     tried, steepness = size > 0.0, scale / size.max()
@@ -228,11 +247,12 @@ def _searched(runs: Sequence[_Run], speeds: Array, size: Array, scale: float) ->
         return np.concatenate([run.errors(numbers) for run in runs])
 
     def numbers_of(vector: Array) -> Array:
-        """From what is searched for, with or without limits."""
-        limits = np.exp([*vector[6:], *[NONE] * (10 - vector.size)]) * scale
+        """From what is searched for, with or without limits and jumps."""
+        whole = np.concatenate([vector, [NONE] * (10 - vector.size), [0.0] * (12 - vector.size)])
+        limits = np.exp(whole[6:10]) * scale
         limits[limits > np.exp(0.5 * NONE) * scale] = inf
-        gain = np.exp(vector[2:4]) * steepness
-        return np.concatenate([vector[:2] * size, gain, limits, [np.exp(vector[4]), vector[5]]])
+        gain, last = np.exp(whole[2:4]) * steepness, [np.exp(whole[4]), whole[5]]
+        return np.concatenate([whole[:2] * size, gain, limits, whole[10:12] * scale, last])
 
     def best(starts: Iterable[Array]) -> tuple[float, Array]:
         found = []
@@ -255,9 +275,9 @@ def _searched(runs: Sequence[_Run], speeds: Array, size: Array, scale: float) ->
 
     candidates: list[tuple[float, Array, Array]] = []
     for lag, delay, share in product(LAGS, DELAYS, DEAD_ZONES):
-        numbers = np.array([*(share * size), 0.0, 0.0, inf, inf, inf, inf, lag, delay])
+        numbers = np.array([*(share * size), 0.0, 0.0, *[inf] * 4, 0.0, 0.0, lag, delay])
         at_rest = errors(numbers)
-        design = [errors(numbers + np.eye(10)[2 + way]) - at_rest for way in np.flatnonzero(tried)]
+        design = [errors(numbers + np.eye(12)[2 + way]) - at_rest for way in np.flatnonzero(tried)]
         gain, left = np.zeros(2), np.transpose(design)
         gain[tried] = np.linalg.lstsq(left, speeds, rcond=None)[0]
         cost = float(np.sum((left @ gain[tried] - speeds) ** 2))
@@ -273,10 +293,18 @@ def _searched(runs: Sequence[_Run], speeds: Array, size: Array, scale: float) ->
     steeper = plain + np.array([0.0, 0.0, 0.7, 0.7, -0.7, 0.0])
     pull = log(0.7) - plain[4]
     cost, whole = best(np.array([*each, 0.0, 0.0, pull, pull]) for each in (plain, steeper))
-    # a limit that makes no difference was not reached
-    for index in range(6, 10):
+    # the same line behind a larger dead zone
+    back = tried * size.max() / np.maximum(size, size.max() * ONE_WAY) / np.exp(whole[2:4])
+    smaller, jumping = best(
+        np.concatenate([whole[:2] + jump * back, whole[2:], jump * tried]) for jump in JUMPS
+    )
+    whole = np.append(whole, [0.0, 0.0])
+    if SEEN * smaller < cost:
+        cost, whole = smaller, jumping
+    # a limit or a jump that makes no difference was not met
+    for index in range(6, 12):
         without = whole.copy()
-        without[index] = NONE
+        without[index] = NONE if index < 10 else 0.0
         rough = errors(numbers_of(without)) / (0.05 * scale)
         loss = 0.05**2 * float(np.sum(np.sqrt(1.0 + rough**2) - 1.0))
         if loss < SEEN * cost + NEXT_TO_NOTHING * float(np.sum((speeds / scale) ** 2)):
@@ -298,20 +326,21 @@ def guessed_set(guess: Guess, source: str) -> ParameterSet:
     -----
     The greatest speed that was seen is given a swash angle of 0.2 rad at most, which sets Z10; no
     measurement of a speed could tell it. With sin φ = Z5 Z19 I/√Z4 and tan α = sin φ/Z3 the gain is
-    Z10 Z5 Z19 G1/(√Z4 Z3); the lag is 1/(Z1 Z3 Z5 Z8 √(Z9/2)); the acceleration beyond which the
-    orifice opens no further is Z10 Z1 Z8 √(Z9/2) Z16.
+    Z10 Z5 Z19 G1/(√Z4 Z3), and the jump likewise one of J; the lag is 1/(Z1 Z3 Z5 Z8 √(Z9/2)); the
+    acceleration beyond which the orifice opens no further is Z10 Z1 Z8 √(Z9/2) Z16.
     """
     base = Drive.preset("neutral").parameters
     n = base.numbers
     per_angle = max(guess.speed / ANGLE, STEEPEST * max(guess.gain))
     per_ampere = per_angle * n["Z5"] * n["Z19_plus"] / (sqrt(n["Z4"]) * n["Z3"])
-    lag = max(guess.lag, 0.005)
+    lag = max(guess.lag, SHORTEST)
     flow = n["Z1"] * sqrt(0.5 * n["Z9"])
     speed_of_flow = 1.0 / (lag * flow * n["Z3"] * n["Z5"])
     stops = [min(top / per_angle, FAR_STOP) for top in guess.top_speed]
     orifices = [pull / (per_angle * flow * speed_of_flow) for pull in guess.acceleration]
     changed: dict[str, float | tuple[float, float]] = {
         "V_dz": guess.dead_zone,
+        "J": (guess.jump[0] / per_ampere, guess.jump[1] / per_ampere),
         "G1": (guess.gain[0] / per_ampere, guess.gain[1] / per_ampere),
         "tau": guess.delay,
         "Z8": speed_of_flow,
@@ -348,11 +377,13 @@ def fit_configuration(guess: Guess, start: ParameterSet | Drive) -> str:
         if not guess.command[way]:
             lines.append(f"# no run goes {side}: its numbers are those of the other way, fixed")
             continue
-        gain = set_of(start).numbers[f"G1_{side}"]
+        numbers = set_of(start).numbers
+        gain, jump = numbers[f"G1_{side}"], numbers[f"J_{side}"]
         # so that more command never means less current, whatever the gain within its bounds
         curved = 0.2 * gain / guess.command[way]
         lines += [
             f"V_dz_{side} = {{ bounds = [0.0, {0.95 * guess.command[way]:.4g}] }}",
+            *([f"J_{side} = {{ bounds = [0.0, {4.0 * jump:.4g}] }}    # jump"] if jump else []),
             f"G1_{side} = {{ relative = [0.5, 2.0], log = true }}",
             f"G2_{side} = {{ bounds = [{-curved:.4g}, {curved:.4g}] }}    # how the gain bends",
         ]
@@ -361,7 +392,10 @@ def fit_configuration(guess: Guess, start: ParameterSet | Drive) -> str:
         if isfinite(guess.acceleration[way]):
             lines.append(f"Z16_{side} = {{ relative = [0.3, 3.0], log = true }}    # acceleration")
     lines += [
-        "Z8 = { relative = [0.2, 5.0], log = true }    # lag",
+        "Z8 = { relative = [0.2, 5.0], log = true }    # lag"
+        if guess.lag > SHORTEST
+        # the acceleration is that of Z8 times Z16: without a lag nothing tells them apart
+        else "# the lag is too short to be seen: Z8 stays fixed",
         f"tau = {{ bounds = [0.0, {max(2.0 * guess.delay, guess.delay + 0.1):.4g}] }}    # delay",
     ]
     return "\n".join(lines) + "\n"
@@ -374,6 +408,7 @@ def guess_table(found: Guess) -> Table:
     rows = (
         ("dead zone", found.dead_zone, "V", ".3g"),
         ("gain beyond it", found.gain, f"{found.unit}/V", ""),
+        ("jump at its edge", tuple(each or inf for each in found.jump), found.unit, ""),
         ("top speed", found.top_speed, found.unit, ""),
         ("acceleration", found.acceleration, f"{found.unit}^2", ""),
     )
