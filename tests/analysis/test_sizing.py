@@ -115,7 +115,7 @@ def test_refusals(hoist):
     required = Requirements(speed=1.0)
     with pytest.raises(InputError, match="Name at least one lever"):
         size(hoist, required, {})
-    with pytest.raises(InputError, match="must reach from at most 1 to at least 1"):
+    with pytest.raises(InputError, match="must rise from 0 or more and have 1 between them"):
         size(hoist, required, {"pump": (1.2, 2.0)})
     with pytest.raises(InputError, match="only be required with a speed to follow"):
         size(hoist, Requirements(tracking_error=0.1), {"pump": WIDEST})

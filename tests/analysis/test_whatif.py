@@ -10,7 +10,6 @@ from swashplate.analysis import (
     LEVERS,
     OUTCOMES,
     Trial,
-    batch_outcomes,
     find_lever,
     find_outcomes,
     one_at_a_time,
@@ -19,6 +18,7 @@ from swashplate.analysis import (
     pulled,
     pulled_columns,
     speed_per_volt,
+    sweep,
     trial,
     what_if,
 )
@@ -116,7 +116,7 @@ def test_other_outcomes_by_hand():
 def test_a_batch_is_what_single_runs_are(hoist):
     task, chosen = trial(hoist, maneuvers.step(9.0).sample()), tuple(OUTCOMES.values())
     z16 = hoist.parameters.numbers["Z16_plus"] * np.linspace(0.8, 1.2, 11)
-    found = batch_outcomes(hoist, {"Z16_plus": z16}, task, chosen)
+    found = sweep(hoist, {"Z16_plus": z16}, task, chosen)
     for k in (0, 7, 10):
         run = hoist.replace(Z16_plus=float(z16[k])).simulate(task.voltage)
         single = outcome_matrix(run.shaft_speed[None, :], task, chosen)[0]
@@ -128,7 +128,7 @@ def test_a_batch_is_what_single_runs_are(hoist):
 def test_variants_that_cannot_run_and_outcomes_that_are_not(hoist):
     task = trial(hoist, maneuvers.step(9.0, start=0.1, stop=1.0, length=2.0).sample())
     values, chosen = np.array([12.0, -1.0]), find_outcomes(["creep", "final_speed"])
-    found = batch_outcomes(hoist, {"Z10": values}, task, chosen)
+    found = sweep(hoist, {"Z10": values}, task, chosen)
     assert list(found.failures) == [1]
     assert "Z10" in found.failures[1]
     assert np.isnan(found.values[1]).all()

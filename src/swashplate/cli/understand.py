@@ -28,7 +28,7 @@ from swashplate.cli.words import (
     trial_of,
 )
 from swashplate.errors import InputError
-from swashplate.tables import FIGURE, TABLE, quantity
+from swashplate.tables import FIGURE, TABLE, joined, quantity
 
 if TYPE_CHECKING:
     from swashplate.analysis.monte_carlo import Bands
@@ -181,16 +181,16 @@ def whatif(
     with working("Simulating"):
         name, trial = trial_of(choice.chosen, maneuver, sampling)
         result = what_if(choice.chosen, moved, trial, outcomes=CHOSEN)
-    drawn, widths, bands, said = {}, None, {}, list[str]()
+    bands: dict[str, Bands] = {}
+    said = list[str]()
     if uncertainty is not None:
         with working("Drawing drives"):
             from swashplate.analysis import monte_carlo
 
             before = monte_carlo.stored_draws(uncertainty, drive=choice.chosen, campaign=campaign)
             drawn = {AS_IS: before, CHANGED: before.pulled(moved)}
-            widths = {k: monte_carlo.half_widths(result, v, LEVEL) for k, v in drawn.items()}
             bands = {
-                name: monte_carlo.bands(each, trial.voltage, trial.rate, level=LEVEL)
+                name: monte_carlo.bands(each, trial, result.outcomes, level=LEVEL)
                 for name, each in drawn.items()
             }
             said = [*_band_sentences(bands), *before.sentences()]
@@ -201,7 +201,7 @@ def whatif(
     note(title)
     for line in changes_between(result.before.drive.parameters, result.after.drive.parameters):
         note(line)
-    show(result.table(widths))
+    show(result.table(bands))
     bullets(result.sentences(), said)
     files.say()
 
@@ -268,7 +268,7 @@ def size(
         found = sizing.size(drive.chosen, required, ranges, follow=follow)
     files.write(out, "Changed drive", found.drive.to_toml)
     drive.note(drive.title)
-    show(found.table(), sizing.performance_table(found, required))
+    show(*found.tables())
     if found.change == 0.0:
         say("The drive meets it as it is; nothing needs to be changed.")
     elif not drive.changes:  # whatif begins at a drive as its file has it
@@ -301,7 +301,7 @@ def sensitivity(
       swashplate sensitivity hoist --lever orifice --lever pump=0.8/1.5 --plot tornado.png
       swashplate sensitivity slew --maneuver step:4 --out all.csv
     """
-    from swashplate.analysis import one_at_a_time, outcome_table
+    from swashplate.analysis import one_at_a_time
 
     files = Outputs((out, TABLE), (plot, FIGURE))
     with working("Simulating"):
@@ -309,10 +309,10 @@ def sensitivity(
         ranges = ranges_of(levers or PULLED, SPAN)
         found = one_at_a_time(drive.chosen, ranges, trial, outcomes=tuple(outcomes or OUTCOMES))
     title = f"{drive.title}, {name}"
-    files.write(out, "All numbers, in SI", found.table().write)
+    files.write(out, "All numbers, in SI", joined(found.tables(every=True)).write)
     files.draw(plot, "plot_tornado", found, title=f"{title}: each lever by itself")
     drive.note(title)
-    show(*(outcome_table(found, k) for k in range(len(found.outcomes))))
+    show(*found.tables())
     bullets(dict.fromkeys(found.sentences))
     files.say()
 
