@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from swashplate.analysis.outcomes import Outcome, Trial, sweep
+from swashplate.analysis.outcomes import Outcome, Trial, outcome_matrix
 from swashplate.analysis.whatif import pulled
 from swashplate.campaign import Campaign
 from swashplate.documents import read_text
@@ -120,47 +120,39 @@ def drives(assessments: Sequence[Assessment], draws: int = 200, seed: int = 0) -
 
 def _drawn(assessments: Sequence[Assessment], random: np.random.Generator) -> ParameterSet | None:
     """A set with each stage's vector off by a drawn error, None outside bounds or domain."""
-    first = assessments[0].stage.problem
-    off = random.normal(size=len(first.uncertain))  # of the fixed numbers, in standard deviations
-    errors = list[tuple[object, Array]]()  # of each stage, by the covariance that later ones name
-    parameters: ParameterSet | None = None
-    for each in assessments:
-        problem, model, known = each.stage.problem, each.stage.problem.model, each.uncertainty
-        assert isinstance(model, DriveModel)
-        own = known.own.matrix
-        error = random.multivariate_normal(
-            np.zeros(len(own)), own, check_valid="ignore", method="eigh"
-        )
-        for handed in known.handed:
-            error = error + handed.slopes @ next(e for c, e in errors if c is handed.covariance)
-        errors.append((known.sampled, error))
-        vector = each.stage.solution.vector + error + known.fixed @ off
-        low, high = problem.unknowns.bounds
-        if ((vector < low) | (vector > high))[known.own.determined].any():
-            return None
-        try:
-            if parameters is None:
-                parameters = _moved(model.parameters, first.uncertain, off)
-            # a model of its own: the fitted one keeps what it made for other parameters
-            parameters = DriveModel(parameters, model.part, forces=model.forces).parameters_at(
-                problem.unknowns.targets(vector, "")
-            )
-        except (DomainError, ParameterError):
-            return None
-    return parameters
-
-
-def _moved(
-    parameters: ParameterSet, uncertain: Sequence[Mapping[str, float]], off: Array
-) -> ParameterSet:
-    """The set with its fixed numbers off by so many standard uncertainties each."""
-    numbers = parameters.numbers
-    changes = {
-        name: numbers[name] + deviation * each
+    model, uncertain = assessments[0].stage.problem.model, assessments[0].stage.problem.uncertain
+    assert isinstance(model, DriveModel)
+    parameters = model.parameters
+    # of the fixed numbers, in standard uncertainties
+    off = random.normal(size=len(uncertain))
+    fixed = {
+        name: parameters.numbers[name] + size * each
         for together, each in zip(uncertain, off.tolist(), strict=True)
-        for name, deviation in together.items()
+        for name, size in together.items()
     }
-    return parameters.replace(changes, parameters.options) if changes else parameters
+    errors = list[tuple[object, Array]]()  # of each stage, by the covariance that later ones name
+    try:
+        if fixed:
+            parameters = parameters.replace(fixed, parameters.options)
+        for each in assessments:
+            problem, known, own = each.stage.problem, each.uncertainty, each.uncertainty.own.matrix
+            assert isinstance(problem.model, DriveModel)
+            error = random.multivariate_normal(
+                np.zeros(len(own)), own, check_valid="ignore", method="eigh"
+            )
+            for handed in known.handed:
+                error = error + handed.slopes @ next(e for c, e in errors if c is handed.covariance)
+            errors.append((known.sampled, error))
+            vector = each.stage.solution.vector + error + known.fixed @ off
+            low, high = problem.unknowns.bounds
+            if ((vector < low) | (vector > high))[known.own.determined].any():
+                return None
+            # a model of its own: the fitted one keeps what it made for other parameters
+            fresh = DriveModel(parameters, problem.model.part, forces=problem.model.forces)
+            parameters = fresh.parameters_at(problem.unknowns.targets(vector, ""))
+    except (DomainError, ParameterError):
+        return None
+    return parameters
 
 
 # --- drives of a stored fit -----------------------------------------------------------------------
@@ -220,6 +212,8 @@ def stored_draws(
 
 # --- bands ----------------------------------------------------------------------------------------
 
+MOST_SAMPLES = 150_000_000  # Samples of speed that are kept at once: 1.2 GB.
+
 
 @dataclass(frozen=True, eq=False)
 class Bands(Result):
@@ -268,12 +262,20 @@ def bands(
     """
     if not 0.0 < level < 1.0:
         raise InputError(f"The level {level:g} of a band must lie between 0 and 1.")
-    found = sweep(drawn.drives[0], drawn.columns, trial, outcomes)
-    if found.failures:
-        why = next(iter(found.failures.values()))
+    count, size = len(drawn.drives), trial.voltage.size
+    if size * count > MOST_SAMPLES:
+        raise InputError(
+            f"{count} drives over {size} samples take too much memory: take "
+            f"{MOST_SAMPLES // size} drives at most, or give the command at a lower rate."
+        )
+    run = drawn.drives[0].simulate_many(drawn.columns, voltage=trial.voltage, rate=trial.rate)
+    if run.failures:
+        why = next(iter(run.failures.values()))
         raise DomainError(f"A drawn drive cannot be simulated: {why}")
+    assert run.output is not None
     parts = 0.5 - 0.5 * level, 0.5, 0.5 + 0.5 * level
     limits = [each.steady_speed([FULL_VOLTAGE, -FULL_VOLTAGE]) for each in drawn.drives]
-    low, _, high = np.quantile(np.column_stack([limits, found.values]), parts, axis=0)
-    lower, median, upper = np.quantile(found.speeds, parts, axis=0, overwrite_input=True)
-    return Bands(trial.time, lower, median, upper, 0.5 * (high - low), level, len(limits))
+    found = np.column_stack([limits, outcome_matrix(run.output, trial, outcomes)])
+    low, _, high = np.quantile(found, parts, axis=0)
+    lower, median, upper = np.quantile(run.output, parts, axis=0, overwrite_input=True)
+    return Bands(trial.time, lower, median, upper, 0.5 * (high - low), level, count)

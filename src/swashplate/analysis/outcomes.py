@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from difflib import get_close_matches
 from functools import cached_property
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -155,6 +155,15 @@ class Outcome(Result):
         """Unit to show it in: that of its quantity, and per cent for a share."""
         return DisplayUnit("%", 100.0) if self.unit == "1" else display_unit(self.unit)
 
+    @property
+    def spec(self) -> str:
+        """Format of its numbers."""
+        return {"s": "z.3f", "1": "z.2%"}.get(self.unit, "z.2f")
+
+    def add_to(self, table: Table, cells: Sequence[float]) -> None:
+        """Add a row of its values, SI."""
+        table.add(self.words, *cells, unit="" if self.unit == "1" else self.unit, spec=self.spec)
+
 
 OUTCOMES: dict[str, Outcome] = {}
 """Outcomes by name: name and meaning are those of the functions below."""
@@ -270,53 +279,6 @@ def outcome_matrix(speed: Array, trial: Trial, outcomes: Sequence[Outcome]) -> A
     return np.array(made).reshape(len(made), len(speed)).T
 
 
-# --- many drives at once --------------------------------------------------------------------------
-
-MOST_SAMPLES = 150_000_000  # Samples of speed that are kept at once: 1.2 GB.
-
-
-class Sweep(NamedTuple):
-    """What many variants of a drive made of one command."""
-
-    speeds: Array  # (m, n); NaN in all of a variant that failed. [rad/s]
-    values: Array  # (m, K) outcomes; NaN also where a variant has no such outcome.
-    failures: Mapping[int, str]  # Why a variant could not be simulated, by its number.
-
-
-def sweep(
-    drive: Drive, columns: Mapping[str, Array], trial: Trial, outcomes: Sequence[Outcome]
-) -> Sweep:
-    """Simulate many variants of a drive over a command, from rest.
-
-    Parameters
-    ----------
-    drive : Drive
-        What is not varied.
-    columns : mapping of str to (m,) array
-        Values by symbol or column, one a variant, as `Drive.simulate_many` takes them. [SI]
-    trial : Trial
-        The command.
-    outcomes : sequence of Outcome
-        What to take from it, perhaps nothing.
-
-    Raises
-    ------
-    InputError
-        If the columns do not fit the drive or each other, or the speeds take too much memory.
-    """
-    count, size = len(next(iter(columns.values()))), trial.voltage.size
-    if size * count > MOST_SAMPLES:
-        raise InputError(
-            f"{count} drives over {size} samples take too much memory: take "
-            f"{MOST_SAMPLES // size} drives at most, or give the command at a lower rate."
-        )
-    run = drive.simulate_many(columns, voltage=trial.voltage, rate=trial.rate)
-    assert run.output is not None
-    values = outcome_matrix(run.output, trial, outcomes)
-    values[list(run.failures)] = np.nan
-    return Sweep(run.output, values, run.failures)
-
-
 # --- runs in words --------------------------------------------------------------------------------
 
 
@@ -333,25 +295,20 @@ def time_share(run: Simulation, limit: Limit) -> float:
     return float(acts.mean())
 
 
-def _peaks(signals: Sequence[Array]) -> dict[str, list[float]]:
-    """Largest values of signals each way, zero where there is none, by the way's name."""
-    plus = [max(float(each.max()), 0.0) for each in signals]
-    return {"positive": plus, "negative": [min(float(each.min()), 0.0) for each in signals]}
-
-
 def run_tables(run: Simulation) -> tuple[Table, Table]:
     """What a drive did under a command, and how long each of its limits held it back."""
     did = Table("", (Column("Shaft"), Column("", "z.2f"), UNIT))
     position = float(run.shaft_position[-1])
-    for way, speed in _peaks([run.shaft_speed]).items():
-        did.add(f"peak speed, {way}", *speed, unit="rad/s")
+    did.add("peak speed, positive", max(float(run.shaft_speed.max()), 0.0), unit="rad/s")
+    did.add("peak speed, negative", min(float(run.shaft_speed.min()), 0.0), unit="rad/s")
     did.add("speed at the end", float(run.shaft_speed[-1]), unit="rad/s")
     did.add("position at the end", position, unit="rad", spec="z.1f")
     if display_unit("rad").name == "deg":
         did.add("", position / (2.0 * np.pi), unit="turns", spec="z.3f")
-    for way, current in _peaks([run.current]).items():
+    peaks = {"positive": max(run.current.max(), 0.0), "negative": min(run.current.min(), 0.0)}
+    for way, current in peaks.items():
         section = way == "positive"
-        did.add(f"peak current, {way}", *current, unit="A", spec="z.4f", section=section)
+        did.add(f"peak current, {way}", float(current), unit="A", spec="z.4f", section=section)
     held = Table("", (Column("Limit"), Column("share of time", ".1%")))
     for limit in Limit:
         words = str(limit.name).lower().replace("_", " ")
@@ -359,21 +316,15 @@ def run_tables(run: Simulation) -> tuple[Table, Table]:
     return did, held
 
 
-def side_by_side(drives: Mapping[str, Drive], runs: Mapping[str, Simulation]) -> Table:
-    """Two drives or more under the same command: peaks, settled speed and the time to reach it."""
-    voltage = next(iter(runs.values())).voltage
-    assert voltage is not None  # runs by voltage only
-    volts, begin = float(voltage[np.argmax(np.abs(voltage))]), first_move(voltage)
-    settled = [float(drive.steady_speed(volts)) for drive in drives.values()]
-    times: list[float | None] = []  # from the command's first move to 90 % of the settled speed
-    for run, end in zip(runs.values(), settled, strict=True):
-        reached = np.flatnonzero(run.shaft_speed[begin:] * np.sign(end) >= 0.9 * abs(end))
-        there = end != 0.0 and reached.size > 0
-        times.append(float(run.time[begin + reached[0]] - run.time[begin]) if there else None)
-    columns = [Column(label, "z.2f", none="never") for label in runs]
+def side_by_side(runs: Mapping[str, Simulation]) -> Table:
+    """Outcomes of drives under the same command, by the drives' names."""
+    first = next(iter(runs.values()))
+    assert first.voltage is not None  # runs by voltage only
+    task = Trial(first.voltage, first.record.rate, first.shaft_speed)
+    speeds = np.array([run.shaft_speed for run in runs.values()])
+    columns = (Column(name, "z.2f", none="none") for name in runs)
     made = Table("", (Column(""), *columns, UNIT))
-    for way, speeds in _peaks([run.shaft_speed for run in runs.values()]).items():
-        made.add(f"peak speed, {way}", *speeds, unit="rad/s")
-    made.add(f"settled speed at {volts:g} V", *settled, unit="rad/s")
-    made.add("time to 90 % of it", *times, unit="s", spec=".3f")
+    for each in OUTCOMES.values():
+        if each.name != "tracking_error":  # nothing was wanted
+            each.add_to(made, each.compute(speeds, task).tolist())
     return made

@@ -15,7 +15,7 @@ from swashplate.drive import Drive
 from swashplate.errors import DomainError, InputError, ParameterError
 from swashplate.parameters.rules import FULL_VOLTAGE
 from swashplate.results import Result
-from swashplate.tables import UNIT, Cell, Column, Table
+from swashplate.tables import UNIT, Cell, Column, Table, listed, quantity
 from swashplate.units import display_unit
 
 Array = NDArray[np.float64]
@@ -65,26 +65,21 @@ def performance(
             accelerations.append(float(change.max() * STEP_RATE))
     error = None
     if follow is not None:
-        run = drive.simulate(command_for(drive, follow), follow.rate)
+        ratio = [max(speed_per_volt(drive, sign), 1e-300) for sign in (1.0, -1.0)]
+        volts = follow.wanted / np.where(follow.wanted >= 0.0, *ratio)
+        run = drive.simulate(np.clip(volts, -FULL_VOLTAGE, FULL_VOLTAGE), follow.rate)
         error = rms_difference(run.shaft_speed, follow.wanted)
     return Performance(min(speeds), min(accelerations), error)
-
-
-def command_for(drive: Drive, follow: Trial) -> Array:
-    """Voltage in proportion to a wanted speed, by the drive's own ratio, within ±10 V. [V]"""
-    plus, minus = (max(speed_per_volt(drive, sign), 1e-300) for sign in (1.0, -1.0))
-    volts = follow.wanted / np.where(follow.wanted >= 0.0, plus, minus)
-    return np.clip(volts, -FULL_VOLTAGE, FULL_VOLTAGE)
 
 
 # --- what is required -----------------------------------------------------------------------------
 
 REQUIRED = {
-    "speed": ("a speed of", "rad/s", 1.0),
-    "acceleration": ("an acceleration of", "rad/s^2", 1.0),
-    "tracking_error": ("a tracking error of", "rad/s", -1.0),
+    "speed": ("rad/s", 1.0),
+    "acceleration": ("rad/s^2", 1.0),
+    "tracking_error": ("rad/s", -1.0),
 }
-"""What can be required: in words, its unit, and 1 for at least, -1 for at most."""
+"""What can be required, its unit, and 1 for at least, -1 for at most."""
 
 
 @dataclass(frozen=True)
@@ -117,24 +112,24 @@ class Requirements(Result):
     def slacks(self, found: Performance) -> Array:
         """By how much each is met, in the order of `given`: ln of the ratio, negative if not."""
         ratios = [max(getattr(found, name), 1e-300) / each for name, each in self.given.items()]
-        return np.log(ratios) * [REQUIRED[name][2] for name in self.given]
+        return np.log(ratios) * [REQUIRED[name][1] for name in self.given]
 
     def reached(self, found: Sequence[Performance]) -> str:
         """What the best of some drives reach, as the rest of a sentence."""
-        slacks, names = np.array([self.slacks(each) for each in found]), list(self.given)
+        slacks = np.array([self.slacks(each) for each in found])
 
-        def said(k: int, best: Performance) -> str:
-            words, unit, _ = REQUIRED[names[k]]
-            value, limit = (np.degrees(getattr(each, names[k])) for each in (best, self))
-            shown = {"rad/s": "deg/s", "rad/s^2": "deg/s²"}[unit]
-            return f"{words} {value:.4g} {shown} (required {limit:.4g})"
+        def said(name: str, index: int) -> str:
+            unit, wanted = REQUIRED[name][0], self.given[name]
+            done, limit = (
+                quantity(each, unit, spec=".4g") for each in (getattr(found[index], name), wanted)
+            )
+            return f"{name.replace('_', ' ')} {done} (required {limit})"
 
-        best = slacks.argmax(axis=0)
-        missed = [said(k, found[n]) for k, n in enumerate(best) if slacks[n, k] < 0.0]
+        best, nearest = slacks.argmax(axis=0), int(slacks.min(axis=1).argmax())
+        missed = [said(n, best[k]) for k, n in enumerate(self.given) if slacks[best[k], k] < 0.0]
         if missed:
-            return f"reaches {', and '.join(missed)}"
-        nearest = found[int(slacks.min(axis=1).argmax())]
-        each = ", ".join(said(k, nearest) for k in range(len(names)))
+            return f"reaches {listed(missed)}"
+        each = listed([said(name, nearest) for name in self.given])
         return f"meets each requirement, but not all at once: nearest is {each}"
 
 
@@ -163,15 +158,13 @@ class Sizing(Result):
             moved.add(name, factor, factor - 1.0, self.alone[name])
         columns = (Column(each, ".2f") for each in ("required", "as it is", "changed"))
         done = Table("", (Column(""), *columns, UNIT))
-        for name, (_, unit, sign) in REQUIRED.items():
-            before, after = getattr(self.before, name), getattr(self.after, name)
-            if before is None:
-                continue
-            limit: Cell | None = None
-            if (wanted := self.requirements.given.get(name)) is not None:
-                shown = f"{display_unit(unit).factor * wanted:.2f}"
-                limit = Cell(wanted, f"{'>=' if sign > 0.0 else '<='} {shown}")
-            done.add(name.replace("_", " "), limit, before, after, unit=unit)
+        for name, (unit, sign) in REQUIRED.items():
+            before, wanted = getattr(self.before, name), getattr(self.requirements, name)
+            sort, factor = "<>"[sign > 0.0], display_unit(unit).factor
+            limit = None if wanted is None else Cell(wanted, f"{sort}= {factor * wanted:.2f}")
+            if before is not None:
+                words = name.replace("_", " ")
+                done.add(words, limit, before, getattr(self.after, name), unit=unit)
         return moved, done
 
 

@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from difflib import get_close_matches
-from typing import TYPE_CHECKING, NamedTuple
+from math import isnan
+from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from swashplate.analysis.outcomes import (
     OUTCOMES,
@@ -16,15 +17,14 @@ from swashplate.analysis.outcomes import (
     Trial,
     find_outcomes,
     outcome_matrix,
-    sweep,
 )
 from swashplate.drive import Drive
-from swashplate.errors import InputError
-from swashplate.parameters.definitions import CATALOGUE, COLUMNS, REFINEMENTS, columns_of, find
+from swashplate.errors import DomainError, InputError, ParameterError
+from swashplate.parameters.definitions import CATALOGUE, COLUMNS, REFINEMENTS, columns_of
 from swashplate.parameters.rules import FULL_VOLTAGE
 from swashplate.results import Result
 from swashplate.simulation.result import Simulation
-from swashplate.tables import UNIT, Column, Table, quantity
+from swashplate.tables import UNIT, Column, Table, listed, quantity
 
 if TYPE_CHECKING:
     from swashplate.analysis.monte_carlo import Bands
@@ -35,72 +35,59 @@ Range = tuple[float, float]  # Lowest and highest factor on a lever. [1]
 # --- levers ---------------------------------------------------------------------------------------
 
 
-class Lever(NamedTuple):
-    """Something on the machine that a factor can be put on."""
-
-    powers: Mapping[str, float]
-    """By symbol or column: the parameter is multiplied by the factor to this power."""
-    meaning: str  # What it is, and what the model takes it for.
-
-
-MACHINE = {
-    "orifice": Lever(
+MACHINE: Mapping[str, tuple[Mapping[str, float], str]] = {
+    "orifice": (
         {"Z16": 1.0},
         "Opening area of the in-line orifices, as the spool displacement of equal area: the "
         "acceleration limit.",
     ),
-    "orifice_diameter": Lever(
+    "orifice_diameter": (
         {"Z16": 2.0},
         "Bore of the in-line orifices; their area, and with it the opening, goes with its square.",
     ),
-    "pump": Lever(
+    "pump": (
         {"Z10": 1.0, "Z12": 1.0},
         "Displacement of the pump: flow, and speed of the shaft, at the same swash angle.",
     ),
-    "drive_speed": Lever(
+    "drive_speed": (
         {"Z10": 1.0, "Z12": 1.0},
         "Speed of the motor that turns the pump. Flow goes with it as with the displacement; the "
         "control pressure does not, a relief valve holds it.",
     ),
-    "supply_pressure": Lever(
+    "supply_pressure": (
         {"Z9": 1.0},
         "Control pressure that moves the stroking piston: its flow goes with the root.",
     ),
-    "rate_limits": Lever({"lim1": 1.0, "lim2": 1.0}, "Both rate limits of the card's ramps."),
-    "rate_limit_up": Lever({"lim1": 1.0}, "Rate limit of the current away from zero."),
-    "rate_limit_down": Lever({"lim2": 1.0}, "Rate limit of the current towards zero."),
-    "dead_zone": Lever(
-        {"V_dz": 1.0}, "Dead zone of the card's input; 0 is a dead zone compensated in full."
+    "rate_limits": ({"lim1": 1.0, "lim2": 1.0}, "Both rate limits of the card's ramps."),
+    "rate_limit_up": ({"lim1": 1.0}, "Rate limit of the current away from zero."),
+    "rate_limit_down": ({"lim2": 1.0}, "Rate limit of the current towards zero."),
+    "dead_zone": (
+        {"V_dz": 1.0},
+        "Dead zone of the card's input; 0 is a dead zone compensated in full.",
     ),
-    "spool_stroke": Lever({"Z14": 1.0}, "Stroke of the spool: what is left without orifices."),
-    "relief": Lever({"Z15": 1.0}, "Relief pressure of the stroking piston."),
-    "plussing": Lever(
-        {"Z18": 1.0}, "Displacement of the spool at rest, which makes the shaft creep."
-    ),
+    "spool_stroke": ({"Z14": 1.0}, "Stroke of the spool: what is left without orifices."),
+    "relief": ({"Z15": 1.0}, "Relief pressure of the stroking piston."),
+    "plussing": ({"Z18": 1.0}, "Displacement of the spool at rest, which makes the shaft creep."),
 }
-SIDES = {"plus": "positive", "minus": "negative"}
+"""What a factor can be put on: parameters by symbol, multiplied by the factor to some power, and
+what it is, and what the model takes it for."""
 
-
-def _one_way(lever: Lever, side: str) -> Lever:
-    powers = {f"{symbol}_{side}": power for symbol, power in lever.powers.items()}
-    return Lever(powers, f"The same, {SIDES[side]} direction only.")
-
-
-LEVERS: Mapping[str, Lever] = MACHINE | {
-    f"{name}_{side}": _one_way(lever, side)
-    for name, lever in MACHINE.items()
-    for side in SIDES
-    if all(len(columns_of([symbol])) == len(SIDES) for symbol in lever.powers)
+LEVERS: Mapping[str, Mapping[str, float]] = {
+    f"{name}{side}": {f"{symbol}{side}": power for symbol, power in powers.items()}
+    for side in ("", "_plus", "_minus")
+    for name, (powers, _) in MACHINE.items()
+    if not side or all(f"{symbol}{side}" in COLUMNS for symbol in powers)
 }
-"""Levers by name; those of parameters with two directions also for each, as ``orifice_plus``."""
+"""Powers by symbol or column of each lever, by its name; those of parameters with two directions
+also for each, as ``orifice_plus``."""
 
 
-def find_lever(name: str) -> Lever:
-    """A lever by name, or a parameter by its symbol or column; another one is an `InputError`."""
+def find_lever(name: str) -> Mapping[str, float]:
+    """Powers of a lever, or of a parameter by symbol or column; another one is an `InputError`."""
     if name in LEVERS:
         return LEVERS[name]
     if name in CATALOGUE or name in COLUMNS or name in REFINEMENTS:
-        return Lever({name: 1.0}, f"Parameter {name}: {find(name).name}.")
+        return {name: 1.0}
     close = get_close_matches(name, [*LEVERS, *CATALOGUE, *COLUMNS], n=1)
     hint = f" (did you mean {close[0]}?)" if close else ""
     raise InputError(
@@ -112,10 +99,10 @@ def find_lever(name: str) -> Lever:
 def levers_table() -> Table:
     """The levers, which parameters each multiplies, and what it is."""
     made = Table("", (Column("lever"), Column("multiplies"), Column("what it is", wrap=True)))
-    for name, lever in MACHINE.items():
+    for name, (powers, meaning) in MACHINE.items():
         how = {1.0: "", 2.0: " by its square"}
-        by = ", ".join(f"{symbol}{how[power]}" for symbol, power in lever.powers.items())
-        made.add(f"{name} _plus _minus" if f"{name}_plus" in LEVERS else name, by, lever.meaning)
+        by = ", ".join(f"{symbol}{how[power]}" for symbol, power in powers.items())
+        made.add(f"{name} _plus _minus" if f"{name}_plus" in LEVERS else name, by, meaning)
     return made
 
 
@@ -136,56 +123,33 @@ def check_ranges(ranges: Mapping[str, Range], around: float | None = None) -> No
             )
 
 
-def pulled_columns(
-    numbers: Mapping[str, float], factors: Mapping[str, ArrayLike]
-) -> dict[str, Array]:
-    """Values of the parameters that levers move, as `Drive.simulate_many` takes them.
+def pulled(drive: Drive, factors: Mapping[str, float]) -> Drive:
+    """The drive with its levers moved, e.g. by ``{"orifice": 1.5, "pump": 1.5}``.
 
-    Parameters
-    ----------
-    numbers : mapping of str to float
-        Every value of the drive by column. [SI]
-    factors : mapping of str to float or (m,) array_like
-        By lever. Levers that move the same parameter multiply. [1]
-
-    Returns
-    -------
-    dict of str to (m,) array
-        By column such as ``Z16_plus``. [SI]
+    Levers that move the same parameter multiply.
 
     Raises
     ------
     InputError
         For an unknown lever, a refinement without a value, a factor that is negative or NaN, or 0
         times infinity.
+    ParameterError
+        If what comes out breaks a rule.
     """
-    columns: dict[str, Array] = {}
-    for name, given in factors.items():
-        lever, factor = find_lever(name), np.asarray(given, dtype=np.float64)
-        if not (factor >= 0.0).all():
-            bad = factor[~(factor >= 0.0)].flat[0]
-            raise InputError(f"The factor on {name} is {bad:g}, but must be 0 or more.")
-        for symbol, power in lever.powers.items():
+    numbers, moved = drive.parameters.numbers, dict[str, float]()
+    for name, factor in factors.items():
+        powers = find_lever(name)
+        if not factor >= 0.0:
+            raise InputError(f"The factor on {name} is {factor:g}, but must be 0 or more.")
+        for symbol, power in powers.items():
             for column in columns_of([symbol]):
                 if column not in numbers:
                     raise InputError(f"{column} has no value here that a factor could change.")
-                with np.errstate(invalid="ignore"):
-                    moved = np.asarray(columns.get(column, numbers[column]) * factor**power)
-                if np.isnan(moved).any():  # 0 times inf
-                    what, bad = f"{numbers[column]:g}", factor[np.isnan(moved)].flat[0]
-                    raise InputError(f"{column} is {what}, which the factor {bad:g} cannot change.")
-                columns[column] = moved
-    return columns
-
-
-def pulled(drive: Drive, factors: Mapping[str, float]) -> Drive:
-    """The drive with its levers moved, e.g. by ``{"orifice": 1.5, "pump": 1.5}``.
-
-    Raises an `InputError` as `pulled_columns`, and a `ParameterError` if what comes out breaks a
-    rule.
-    """
-    moved = pulled_columns(drive.parameters.numbers, factors)
-    return drive.replace(**{column: float(value) for column, value in moved.items()})
+                moved[column] = moved.get(column, numbers[column]) * factor**power
+                if isnan(moved[column]):  # 0 times inf
+                    what = f"{column} is {numbers[column]:g}"
+                    raise InputError(f"{what}, which the factor {factor:g} cannot change.")
+    return drive.replace(**moved)
 
 
 # --- before and after -----------------------------------------------------------------------------
@@ -205,6 +169,25 @@ class Variant(Result):
     def speed_limits(self) -> tuple[float, float]:
         """Speeds that the largest commands settle at, positive and negative. [rad/s]"""
         return tuple(self.drive.steady_speed([FULL_VOLTAGE, -FULL_VOLTAGE]).tolist())
+
+
+def _variant(
+    drive: Drive, factors: Mapping[str, float], trial: Trial, outcomes: Sequence[Outcome]
+) -> Variant:
+    made = pulled(drive, factors)
+    run = made.simulate(trial.voltage, trial.rate)
+    return Variant(made, run, outcome_matrix(run.shaft_speed[None, :], trial, outcomes)[0])
+
+
+def _undefined(outcomes: Sequence[Outcome], values: Mapping[str, Array]) -> tuple[str, ...]:
+    """Outcomes that variants have not, and why."""
+    said = []
+    for k, outcome in enumerate(outcomes):
+        without = [name for name, each in values.items() if np.isnan(each[k])]
+        if without:
+            who = "all variants" if len(without) == len(values) else listed(without)
+            said.append(f"{who}: no {outcome.name}, {outcome.undefined}.")
+    return tuple(said)
 
 
 @dataclass(frozen=True, eq=False)
@@ -231,13 +214,9 @@ class WhatIf(Result):
         return self.variants[CHANGED]
 
     def sentences(self) -> tuple[str, ...]:
-        """Outcomes that a variant has not, and why."""
-        return tuple(
-            f"{name}: no {outcome.name}, {outcome.undefined}."
-            for name, variant in self.variants.items()
-            for outcome, value in zip(self.outcomes, variant.values, strict=True)
-            if np.isnan(value)
-        )
+        """Outcomes that variants have not, and why."""
+        values = {name: each.values for name, each in self.variants.items()}
+        return _undefined(self.outcomes, values)
 
     def table(self, bands: Mapping[str, Bands] | None = None) -> Table:
         """Speed limits and outcomes of the drive as it is and changed.
@@ -256,13 +235,11 @@ class WhatIf(Result):
             if bands:
                 columns.append(Column("±", "z.2f", none="none"))
                 cells.append(bands[name].half_widths)
-        change = np.divide(
-            values[1], values[0], where=values[0] != 0.0, out=np.full(len(rows), np.nan)
-        )
+        change = values[1] / np.where(values[0] == 0.0, np.nan, values[0]) - 1.0
         made = Table("", (Column(""), *columns, Column("change", "+z.1%"), UNIT))
         for k, (words, unit) in enumerate(rows):
             spec = {"s": "z.3f", "1": "z.2%"}.get(unit, "")
-            row = (float(each[k]) for each in (*cells, change - 1.0))
+            row = (float(each[k]) for each in (*cells, change))
             made.add(words, *row, unit="" if unit == "1" else unit, spec=spec)
         return made
 
@@ -301,12 +278,7 @@ def what_if(
     if len(factors) > 1:
         moved |= {f"{name} x {factor:g}": {name: factor} for name, factor in factors.items()}
     moved[CHANGED] = factors
-    variants = {}
-    for name, own in moved.items():
-        each = pulled(drive, own)
-        run = each.simulate(trial.voltage, trial.rate)
-        values = outcome_matrix(run.shaft_speed[None, :], trial, chosen)[0]
-        variants[name] = Variant(each, run, values)
+    variants = {name: _variant(drive, own, trial, chosen) for name, own in moved.items()}
     return WhatIf(dict(factors), trial, chosen, variants)
 
 
@@ -342,9 +314,8 @@ class OneAtATime(Result):
 
     def _table(self, k: int, every: bool) -> Table:
         outcome, base, swings = self.outcomes[k], float(self.base[k]), self.swings[:, k]
-        spec = {"s": "z.3f", "1": "z.2%"}.get(outcome.unit, "z.2f")
-        number = "none" if np.isnan(base) else quantity(base, outcome.unit, spec=spec)
-        values = (spec, outcome.unit, "none")
+        number = "none" if np.isnan(base) else quantity(base, outcome.unit, spec=outcome.spec)
+        values = (outcome.spec, outcome.unit, "none")
         columns = (
             *(Column(head, of="f") for head in ("outcome", "unit")),
             Column("lever"),
@@ -394,22 +365,19 @@ def one_at_a_time(
     ------
     InputError
         For an unknown lever or outcome, or a range that does not rise.
+    DomainError
+        If the drive as it is leaves the model's domain under the command.
     """
     check_ranges(ranges)
-    names = [AS_IS, *(f"{name} x {f:g}" for name, pair in ranges.items() for f in pair)]
-    factors = {name: np.ones(len(names)) for name in ranges}
-    for number, (name, pair) in enumerate(ranges.items()):
-        factors[name][1 + 2 * number : 3 + 2 * number] = pair
-    chosen = find_outcomes(outcomes)
-    found = sweep(drive, pulled_columns(drive.parameters.numbers, factors), trial, chosen)
-    if 0 in found.failures:
-        raise InputError(f"The drive as it is cannot follow this command: {found.failures[0]}")
-    said = [f"{names[k]} cannot be simulated: {why}" for k, why in found.failures.items()]
-    missing = np.isnan(found.values).sum(axis=0) - len(found.failures)
-    said += [
-        f"{number} of {len(names)} variants have no {each.name}: {each.undefined}."
-        for each, number in zip(chosen, missing, strict=True)
-        if number
-    ]
-    ends = found.values[0], found.values[1::2], found.values[2::2]
-    return OneAtATime(dict(ranges), chosen, *ends, tuple(said))
+    chosen, said = find_outcomes(outcomes), list[str]()
+    found = {AS_IS: _variant(drive, {}, trial, chosen).values}
+    ends = np.full((2, len(ranges), len(chosen)), np.nan)
+    for j, (name, pair) in enumerate(ranges.items()):
+        for end, factor in enumerate(pair):
+            words = f"{name} x {factor:g}"
+            try:
+                found[words] = ends[end, j] = _variant(drive, {name: factor}, trial, chosen).values
+            except (ParameterError, DomainError) as refusal:
+                said.append(f"{words} cannot be simulated: {refusal}")
+    said += _undefined(chosen, found)
+    return OneAtATime(dict(ranges), chosen, found[AS_IS], ends[0], ends[1], tuple(said))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shlex
 from collections.abc import Mapping
+from dataclasses import replace
 from math import radians
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
@@ -122,7 +123,7 @@ def _say_shares(
     files.draw(plot, "plot_limit_timeline", run, wanted=found.wanted, title=title)
     error = quantity(found.error, "rad/s", spec=".3f")
     drive.note(f"{title}: {error} rms from a drive without limits")
-    shares = found.acting()
+    shares = found.table(acting=True)
     if shares.rows:
         show(shares)
     for sentence in found.sentences():
@@ -352,17 +353,14 @@ def compensate(
     files = Outputs((out, compensation.INVERSE_MAP), (plot, FIGURE))
     with working("Inverting"):
         found = compensation.inverse_map(drive.chosen, points)
-        tables = found.tables()
-        if speeds_deg_s:
-            speeds = [radians(each) for each in speeds_deg_s]
-            tables.insert(0, compensation.wanted_table(found, speeds))
+        tables = found.tables([radians(each) for each in speeds_deg_s or ()])
         bought = None
         if stick is not None:
             name, run = simulated(drive.chosen, stick, sampling)
             assert run.voltage is not None  # the command line simulates voltages only
             wanted = compensation.wanted_of_stick(found, run.voltage)
             bought = compensation.improvement(drive.chosen, wanted, run.record.rate, inverse=found)
-            tables.append(bought.table(name))
+            tables.append(replace(bought.table(), title=f"Error of the speed under {name}"))
     files.write(out, "Inverse map, in SI", found.write)
     files.draw(plot, "plot_compensation", found, bought)
     drive.note(f"{drive.title}: voltage for a wanted speed")
