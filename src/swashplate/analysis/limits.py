@@ -111,9 +111,6 @@ class LimitShares(Tabular):
     """Wanted speed, (n,). [rad/s]"""
     error: float
     """Rms tracking error of the drive as it is. [rad/s]"""
-    unlimited_error: float | None
-    """Rms tracking error with every limit taken away: 0 unless another speed was wanted than that
-    drive's. None where it cannot be simulated. [rad/s]"""
     shares: tuple[LimitShare, ...]
 
     @property
@@ -245,4 +242,4 @@ def limit_shares(
             )
         )
     shares.sort(key=lambda each: inf if each.error is None else each.error)
-    return LimitShares(drive.name, run, asked, error, error_of(free), tuple(shares))
+    return LimitShares(drive.name, run, asked, error, tuple(shares))
