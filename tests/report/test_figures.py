@@ -41,7 +41,7 @@ def made(hoist: Drive, step: Simulation, all_limits: Simulation, task: Trial) ->
     luff, neutral = Drive.preset("luff"), Drive.preset("neutral")
     pumps = 12.396 + 0.2 * np.random.default_rng(0).normal(size=30)
     drawn = Draws(tuple(hoist.replace(Z10=each) for each in pumps), 0)
-    band = bands(drawn, task.voltage)
+    band = bands(drawn, task)
     changed = what_if(hoist, {"orifice": 1.5, "pump": 1.5}, task)
     outcomes = ("final_speed", "rise_time", "overshoot")
     one = one_at_a_time(hoist, dict.fromkeys(LEVERS, (0.9, 1.1)), task, outcomes=outcomes)

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple, get_args
+from dataclasses import dataclass, field, fields
+from typing import TYPE_CHECKING, Any, Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +15,7 @@ from swashplate.equations.marching.run import Instance, Part, called
 from swashplate.models.displacement_control import PumpOptions
 from swashplate.models.pump import PumpState
 from swashplate.parameters.rules import FULL_VOLTAGE
-from swashplate.results import Result, Tabular, short
+from swashplate.results import Result, Tabular
 from swashplate.simulation.instance import instance_of
 from swashplate.tables import UNIT, Cell, Column, Table
 
@@ -23,7 +23,6 @@ if TYPE_CHECKING:
     import polars
 
 Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 # --- steady edges ---------------------------------------------------------------------------------
 
@@ -33,26 +32,24 @@ NEARLY_FULL = (1.0 - 1e-9) * FULL_VOLTAGE
 """An edge beyond is none: the speed grows up to full voltage. [V]"""
 
 
-def edge(holds: Callable[[Array], Mask], end: float) -> tuple[float, float | None]:
+def edge(holds: Callable[[Array], NDArray[np.bool_]], end: float) -> tuple[float, float | None]:
     """The last command on the way from 0 V to `end` [V] before something first fails to hold. [V]
 
     `holds` says of commands [V], element by element, whether it does. Both sides of the edge, at
     most 1e-12 V apart: the one inside, 0 V where it does not even hold there, and the one outside,
     None where it holds up to the end.
     """
-    low, high, found = 0.0, end, False
+    low, high = 0.0, end
+    if holds(np.linspace(low, high, GRID + 1)).all():
+        return end, None
     while abs(high - low) > CLOSE:
         grid = np.linspace(low, high, GRID + 1)
-        failed = ~holds(grid)
-        if not failed.any():
+        first = int(np.argmax(~holds(grid)))
+        closer = float(grid[max(first - 1, 0)]), float(grid[first])
+        if closer == (low, high):  # the numbers end before the width does
             break
-        first, found = int(np.argmax(failed)), True
-        if first == 0:
-            return 0.0, float(grid[0])
-        if (low, high) == (float(grid[first - 1]), float(grid[first])):
-            break
-        low, high = float(grid[first - 1]), float(grid[first])
-    return (low, high) if found else (end, None)
+        low, high = closer
+    return low, high
 
 
 def dead_zone(drive: Drive, way: float) -> tuple[float, float | None]:
@@ -74,19 +71,15 @@ def saturation(drive: Drive, way: float) -> float | None:
 # --- acceleration ---------------------------------------------------------------------------------
 
 AcceleratedBy = Literal["valve", "spool stop", "orifice"]
-
-CODES: tuple[AcceleratedBy, ...] = get_args(AcceleratedBy)
 """What sets the flow to the stroking piston: the opening that the solenoids can give, the spool's
 stop Z14, or the in-line orifice Z16."""
 
 INSIDE = 1e-9  # Part of the range of pressure by which a curve ends before it.
 
 
-class AccelerationCurve(NamedTuple):
+@dataclass(frozen=True, eq=False)
+class AccelerationCurve(Result):
     """Acceleration over the speed under one held command, (n,) each."""
-
-    def __repr__(self) -> str:
-        return short(self)
 
     speed: Array  # Rising. [rad/s]
     acceleration: Array  # With its sign. [rad/s²]
@@ -131,7 +124,8 @@ def speed_limits(drive: Drive) -> tuple[float, float]:
 def starting_acceleration(drive: Drive, way: float) -> tuple[float, AcceleratedBy]:
     """Acceleration of the plate upright under the full command, and what sets it. [rad/s²]
 
-    Z10 Z1 Z8 √(Z9/2) x/(1 + Z6) without offset and leakage, x = Z16 where the orifice limits.
+    Z10 Z1 Z8 √(Z9/2) x/(1 + Z6) without offset and leakage, x = Z16 where the orifice limits
+    (Kruse 2001, eqs. 6.67 to 6.71).
     """
     numbers = drive.parameters.numbers
     curve = _curve(drive, way * FULL_VOLTAGE, np.array([numbers["Z2"] / numbers["Z1"]]))
@@ -157,8 +151,8 @@ def _curve(drive: Drive, voltage: float, pressure: Array) -> AccelerationCurve:
     speed, rate, free = np.array([(s.shaft_speed, s.swash_rate, s.spool_free) for s in found]).T
     orifice = np.where(free > 0.0, p.Z16_plus, p.Z16_minus)
     limited = np.minimum(np.abs(free), p.Z14) > orifice
-    code = np.where(limited, 2, np.where(np.abs(free) > p.Z14, 1, 0))
-    return AccelerationCurve(speed, p.Z10 * rate, tuple(CODES[each] for each in code))
+    code, words = np.where(limited, 2, np.abs(free) > p.Z14), get_args(AcceleratedBy)
+    return AccelerationCurve(speed, p.Z10 * rate, tuple(words[each] for each in code))
 
 
 # --- envelope -------------------------------------------------------------------------------------
@@ -169,29 +163,34 @@ SHORTEST, LONGEST = 8.0, 256.0
 """A step lasts so long at first, and at most, until the speed has come to stay. [s]"""
 
 
+def _row(words: str, unit: str, spec: str = "") -> Any:
+    """A field that is a row of the table: in words, its unit and format; None unless known."""
+    return field(default=None, metadata={"row": (words, unit, spec)})
+
+
 @dataclass(frozen=True)
 class Way(Result):
     """What a drive can do one way; everything carries that way's sign, gains are positive. SI."""
 
-    dead_zone: float  # Largest command that moves nothing. [V]
-    smallest_speed: float
-    """Steady speed just beyond it: nothing slower can be held, save the creep. [rad/s]"""
-    gain: float | None
-    """Mean slope of the steady map from the dead zone to saturation or ±10 V. [rad/(s V)]"""
-    smallest_gain: float | None
-    largest_gain: float | None  # Slopes there. [rad/(s V)]
-    saturation_voltage: float | None
-    """Command beyond which the speed stays; None where it grows up to ±10 V. [V]"""
-    top_speed: float  # Steady speed at ±10 V. [rad/s]
-    speed_limit: float
-    """Speed with the swash plate at its stop, or where Z15 holds the pressure. [rad/s]"""
-    acceleration: float  # At rest, under ±10 V. [rad/s²]
-    accelerated_by: AcceleratedBy  # What sets it.
-    starting_rise: float | None
-    """From 10 % to 90 % of a step to ±10 V from rest; None where nothing moves. [s]"""
-    starting_reach: float | None  # From that command to 90 %. [s]
-    stopping_rise: float | None
-    stopping_reach: float | None  # The same after the command is gone. [s]
+    accelerated_by: AcceleratedBy  # What sets the acceleration at rest.
+    dead_zone: float = _row("dead zone up to", "V")  # Largest command that moves nothing.
+    smallest_speed: float = _row("smallest speed", "rad/s")
+    """Steady speed just beyond the dead zone: nothing slower can be held, save the creep."""
+    gain: float | None = _row("gain, mean", "rad/s/V")
+    """Slope of the steady map from the dead zone to saturation or ±10 V."""
+    smallest_gain: float | None = _row("gain, smallest", "rad/s/V")
+    largest_gain: float | None = _row("gain, largest", "rad/s/V")
+    saturation_voltage: float | None = _row("saturation voltage", "V", ".2f")
+    """Command beyond which the speed stays; None where it grows up to ±10 V."""
+    top_speed: float = _row("speed at full voltage", "rad/s")  # Steady, at ±10 V.
+    speed_limit: float = _row("speed limit", "rad/s")
+    """Speed with the swash plate at its stop, or where Z15 holds the pressure."""
+    acceleration: float = _row("acceleration at rest", "rad/s^2", "z.2f")  # Under ±10 V.
+    starting_rise: float | None = _row("starting, 10 to 90 %", "s")
+    """Of a step to ±10 V from rest, as the reach; None where nothing moves."""
+    starting_reach: float | None = _row("starting, to 90 %", "s")  # From the command on.
+    stopping_rise: float | None = _row("stopping, 10 to 90 %", "s")  # Once the command is gone.
+    stopping_reach: float | None = _row("stopping, to 90 %", "s")
 
 
 @dataclass(frozen=True, eq=False)
@@ -213,19 +212,16 @@ class Envelope(Tabular):
 
     def table(self) -> Table:
         """Dead zone, gains, limits and times of both ways."""
-        ways, values = (self.plus, self.minus), ("z.3f", "", "none")
-        heads = (
-            Column("Envelope", key="quantity"),
-            *(
-                Column(name, *values, key=key)
-                for name, key in (("positive", "plus"), ("negative", "minus"))
-            ),
-        )
-        made = Table("", (*heads, UNIT))
-        for key, words, unit, spec in QUANTITIES:
-            made.add(Cell(key, words), *(getattr(way, key) for way in ways), unit=unit, spec=spec)
-            if key == "acceleration":
-                by = (Cell(None, way.accelerated_by) for way in ways)
+        ways = {"plus": "positive", "minus": "negative"}
+        heads = (Column(words, "z.3f", none="none", key=key) for key, words in ways.items())
+        made = Table("", (Column("Envelope", key="quantity"), *heads, UNIT))
+        for each in fields(Way):
+            if "row" in each.metadata:
+                words, unit, spec = each.metadata["row"]
+                values = (getattr(way, each.name) for way in (self.plus, self.minus))
+                made.add(Cell(each.name, words), *values, unit=unit, spec=spec)
+            if each.name == "acceleration":
+                by = (Cell(None, way.accelerated_by) for way in (self.plus, self.minus))
                 made.add(Cell("accelerated_by", "... set by the"), *by)
         both = self.creep, Cell(self.creep, "")
         made.add(Cell("creep", "creep at 0 V"), *both, unit="rad/s", section=True)
@@ -238,83 +234,42 @@ class Envelope(Tabular):
         return self.table().to_polars().filter(pl.col("unit") != "")
 
 
-QUANTITIES = (
-    ("dead_zone", "dead zone up to", "V", ""),
-    ("smallest_speed", "smallest speed", "rad/s", ""),
-    ("gain", "gain, mean", "rad/s/V", ""),
-    ("smallest_gain", "gain, smallest", "rad/s/V", ""),
-    ("largest_gain", "gain, largest", "rad/s/V", ""),
-    ("saturation_voltage", "saturation voltage", "V", ".2f"),
-    ("top_speed", "speed at full voltage", "rad/s", ""),
-    ("speed_limit", "speed limit", "rad/s", ""),
-    ("acceleration", "acceleration at rest", "rad/s^2", "z.2f"),
-    ("starting_rise", "starting, 10 to 90 %", "s", ""),
-    ("starting_reach", "starting, to 90 %", "s", ""),
-    ("stopping_rise", "stopping, 10 to 90 %", "s", ""),
-    ("stopping_reach", "stopping, to 90 %", "s", ""),
-)
-"""Rows of the table: name in a file and in words, unit and format."""
-
-
 def envelope(drive: Drive) -> Envelope:
     """What a drive can do each way.
 
-    Parameters
-    ----------
-    drive : Drive
-        The drive.
-
-    Returns
-    -------
-    Envelope
-        Dead zone, creep, gains, limits of speed and acceleration, times of a full step.
-
-    Notes
-    -----
-    Steady values come from the steady map, the acceleration at rest is
-    Z10 Z1 Z8 √(Z9/2) Z16/(1 + Z6) where the orifice limits it (Kruse 2001, eqs. 6.67 to 6.71), and
-    the times are those of a simulated step.
+    Dead zone, creep and gains of the steady map, limits of speed and acceleration, and the times
+    of a full step, which are those of a simulation.
     """
-    curves = (
-        acceleration_curve(drive, FULL_VOLTAGE),
-        acceleration_curve(drive, -FULL_VOLTAGE),
-    )
     low, high = speed_limits(drive)
-    return Envelope(
-        drive.name,
-        float(drive.steady_speed(0.0)),
-        _way(drive, 1.0, high),
-        _way(drive, -1.0, low),
-        curves,
-        acceleration_curve(drive, 0.0),
+    up, down, released = (
+        acceleration_curve(drive, volts) for volts in (FULL_VOLTAGE, -FULL_VOLTAGE, 0.0)
     )
+    ways = _way(drive, 1.0, high), _way(drive, -1.0, low)
+    creep = float(drive.steady_speed(0.0))
+    return Envelope(drive.name, creep, *ways, (up, down), released)
 
 
 def _way(drive: Drive, way: float, limit: float) -> Way:
     (inside, outside), full = dead_zone(drive, way), way * FULL_VOLTAGE
-    top = float(drive.steady_speed(full))
     acceleration, by = starting_acceleration(drive, way)
-    if outside is None:  # no command moves it
-        return Way(inside, top, *(None,) * 4, top, limit, acceleration, by, *(None,) * 4)
-    saturated = saturation(drive, way)
-    end = full if saturated is None else saturated
-    volts = np.linspace(outside, end, GAIN_POINTS)
-    speeds = drive.steady_speed(volts)
-    slopes = np.diff(speeds) / np.diff(volts)
-    return Way(
-        inside,
-        float(speeds[0]),
-        float((speeds[-1] - speeds[0]) / (volts[-1] - volts[0])),
-        float(slopes.min()),
-        float(slopes.max()),
-        saturated,
-        top,
-        limit,
-        acceleration,
-        by,
-        *_times(drive, 0.0, full),
-        *_times(drive, full, 0.0),
-    )
+    top = float(drive.steady_speed(full))
+    found: dict[str, Any] = {
+        "dead_zone": inside,
+        "smallest_speed": top,
+        "top_speed": top,
+        "speed_limit": limit,
+    }
+    if outside is not None:  # else no command moves it
+        found["saturation_voltage"] = saturated = saturation(drive, way)
+        volts = np.linspace(outside, full if saturated is None else saturated, GAIN_POINTS)
+        speeds = drive.steady_speed(volts)
+        slopes = np.diff(speeds) / np.diff(volts)
+        found["smallest_speed"] = float(speeds[0])
+        found["gain"] = float((speeds[-1] - speeds[0]) / (volts[-1] - volts[0]))
+        found["smallest_gain"], found["largest_gain"] = float(slopes.min()), float(slopes.max())
+        for name, step in (("starting", (0.0, full)), ("stopping", (full, 0.0))):
+            found[f"{name}_rise"], found[f"{name}_reach"] = _times(drive, *step)
+    return Way(by, acceleration=acceleration, **found)
 
 
 def _times(drive: Drive, before: float, after: float) -> tuple[float | None, float | None]:

@@ -77,13 +77,6 @@ class InverseMap(Result):
     """Largest error of the straight lines: steady speed less wanted speed half way between two
     points. [rad/s]"""
 
-    def __repr__(self) -> str:
-        low, high = self.limits
-        return (
-            f"InverseMap({self.name!r}, {self.minus.speed.size} + {self.plus.speed.size} points, "
-            f"{low:.4g} to {high:.4g} rad/s)"
-        )
-
     @property
     def limits(self) -> tuple[float, float]:
         """Lowest and highest speed that a voltage settles at. [rad/s]"""
@@ -100,73 +93,90 @@ class InverseMap(Result):
         Wanted speeds of any shape [rad/s]; one beyond the limits is refused in an `InputError`, as
         is one that is no finite number, or with `clip` the limit is taken. [V]
         """
-        wanted = _finite(speed)
-        low, high = self.limits
-        slack = ROUNDING * (high - low)
-        beyond = wanted.size and (wanted.min() < low - slack or wanted.max() > high + slack)
-        if beyond and not clip:
-            worst = float(wanted.max() if wanted.max() > high else wanted.min())
+        try:
+            wanted = np.asarray(speed, dtype=np.float64)
+        except (TypeError, ValueError):
             raise InputError(
-                f"{self.name} cannot settle at {np.degrees(worst):.6g} deg/s: its speeds reach "
-                f"from {np.degrees(low):.6g} to {np.degrees(high):.6g} deg/s; want less, or clip."
+                "The wanted speed must be a number or a sequence of numbers."
+            ) from None
+        if not np.isfinite(wanted).all():
+            raise InputError("The wanted speed must be finite everywhere.")
+        (low, high), (below, above) = self.limits, self.gap
+        inside, slack = np.clip(wanted, low, high), ROUNDING * (high - low)
+        beyond = wanted[np.abs(wanted - inside) > slack]
+        if beyond.size and not clip:
+            worst, low, high = np.degrees([beyond[np.abs(beyond).argmax()], low, high])
+            raise InputError(
+                f"{self.name} cannot settle at {worst:.6g} deg/s: its speeds reach "
+                f"from {low:.6g} to {high:.6g} deg/s; want less, or clip."
             )
-        wanted = np.clip(wanted, low, high)
-        below, above = self.gap
         # the creep comes first, so that it wins a tie
         held = np.array([self.creep, below, above])
         volts = np.array([0.0, self.minus.voltage[-1], self.plus.voltage[0]])
-        found = volts[np.argmin(np.abs(wanted[..., np.newaxis] - held), axis=-1)]
-        found = np.where(wanted > above, np.interp(wanted, *self.plus), found)
-        return np.asarray(np.where(wanted < below, np.interp(wanted, *self.minus), found))
+        found = volts[np.argmin(np.abs(inside[..., np.newaxis] - held), axis=-1)]
+        found = np.where(inside > above, np.interp(inside, *self.plus), found)
+        return np.asarray(np.where(inside < below, np.interp(inside, *self.minus), found))
 
-    def command(self, speed: ArrayLike, rate: float, *, lead: float | None = None) -> Array:
+    def command(self, speed: ArrayLike, rate: float) -> Array:
         """Voltage over time for a wanted speed over time, with the drive's lag made up for.
 
         Parameters
         ----------
         speed : (n,) array_like
-            Wanted speed, n ≥ 2. [rad/s]
+            Wanted speed, n ≥ 2, without noise. [rad/s]
         rate : float
             Its samples a second. [Hz]
-        lead : float, optional
-            Time by which the wanted speed is run ahead along its tangent, by default `lag`; 0 for
-            the steady map alone. [s]
 
         Returns
         -------
         (n,) array
-            Voltage for wanted + lead · d(wanted)/dt, that sum held within the speed limits. [V]
+            Voltage for wanted + lag · d(wanted)/dt, that sum held within the speed limits. [V]
 
         Raises
         ------
         InputError
-            For a wanted speed beyond the limits, or a rate or lead out of range.
+            For a wanted speed beyond the limits, or a rate out of range.
         """
-        wanted = _finite(speed)
+        self.voltage(speed)  # refuses what cannot be
+        wanted = np.asarray(speed, dtype=np.float64)
         if wanted.ndim != 1 or wanted.size < 2:
             raise InputError("A command needs two or more samples of the wanted speed in one row.")
-        ahead = self.lag if lead is None else lead
-        if not (np.isfinite(rate) and rate > 0.0 and np.isfinite(ahead) and ahead >= 0.0):
-            raise InputError(
-                f"A command needs a rate above 0 Hz and a lead of 0 s or more, not {rate:g} Hz and "
-                f"{ahead:g} s."
-            )
-        plain = self.voltage(wanted)
-        if ahead == 0.0:
-            return plain
-        return self.voltage(wanted + ahead * np.gradient(wanted, 1.0 / rate), clip=True)
+        if not (np.isfinite(rate) and rate > 0.0):
+            raise InputError(f"A command needs a rate above 0 Hz, not {rate:g} Hz.")
+        return self.voltage(wanted + self.lag * np.gradient(wanted, 1.0 / rate), clip=True)
 
     def to_polars(self) -> polars.DataFrame:
         """Table of the points, voltage rising: ``speed`` [rad/s] and ``voltage`` [V], SI."""
-        import polars as pl
+        return self._points(MOST).to_polars()
 
-        rest = np.zeros(1)
-        return pl.DataFrame(
-            {
-                "speed": np.concatenate((self.minus.speed, rest + self.creep, self.plus.speed)),
-                "voltage": np.concatenate((self.minus.voltage, rest, self.plus.voltage)),
-            }
+    def _points(self, most: int) -> Table:
+        """The map at some points each way, and at rest."""
+        made = Table("", (Column("speed", "z.3f", "rad/s"), Column("voltage", "z.4f", "V")))
+        rest = Branch(np.array([self.creep]), np.zeros(1))
+        for branch in (self.minus, rest, self.plus):
+            size = branch.speed.size
+            for n in np.unique(np.linspace(0, size - 1, min(most, size)).round().astype(int)):
+                made.add(float(branch.speed[n]), float(branch.voltage[n]))
+        return made
+
+    def tables(self, speeds: Sequence[float] = ()) -> list[Table]:
+        """Voltages of wanted speeds [rad/s]; the map at a few points; where it holds."""
+        wanted = Table("", (Column("wanted speed", "g", "rad/s"), Column("voltage", "z.4f", "V")))
+        for speed, voltage in zip(speeds, self.voltage(speeds), strict=True):
+            wanted.add(speed, float(voltage))
+        made, total = self._points(MOST_SHOWN), self.minus.speed.size + self.plus.speed.size + 1
+        if len(made.rows) < total:
+            made.caption = f"{len(made.rows)} of {total} points shown"
+        up, down = self.acceleration
+        limits = Table(
+            "", (Column("Limit"), Column("negative", ".3f"), Column("positive", ".3f"), UNIT)
         )
+        limits.add("speed", *self.limits, unit="rad/s")
+        limits.add("slowest that can be held", *self.gap, unit="rad/s", spec="z.3f")
+        limits.add("acceleration at rest", -down, up, unit="rad/s^2", spec=".2f")
+        limits.add("lag", "", 1e3 * self.lag, unit="ms", spec=".1f")
+        limits.add("error of the straight lines", "", self.error, unit="rad/s", spec=".2g")
+        return [*([wanted] if wanted.rows else []), made, limits]
 
     def write(self, path: str | Path) -> None:
         """Write the map as .toml for a controller, or as a table (`to_polars`) .csv or .parquet.
@@ -194,38 +204,6 @@ class InverseMap(Result):
             "plus": {name: each.tolist() for name, each in self.plus._asdict().items()},
         }
         write_text(COMMENTS + dumps(content), path)
-
-    def tables(self) -> list[Table]:
-        """The map, at a few points each way, and between which limits it holds."""
-        made = Table("", (Column("speed", "z.3f", "rad/s"), Column("voltage", "z.4f", "V")))
-        rest = Branch(np.array([self.creep]), np.zeros(1))
-        for branch in (self.minus, rest, self.plus):
-            size = branch.speed.size
-            for n in np.unique(np.linspace(0, size - 1, min(MOST_SHOWN, size)).round().astype(int)):
-                made.add(float(branch.speed[n]), float(branch.voltage[n]))
-        total = self.minus.speed.size + self.plus.speed.size + 1
-        if len(made.rows) < total:
-            made.caption = f"{len(made.rows)} of {total} points shown"
-        up, down = self.acceleration
-        limits = Table(
-            "", (Column("Limit"), Column("negative", ".3f"), Column("positive", ".3f"), UNIT)
-        )
-        limits.add("speed", *self.limits, unit="rad/s")
-        limits.add("slowest that can be held", *self.gap, unit="rad/s", spec="z.3f")
-        limits.add("acceleration at rest", -down, up, unit="rad/s^2", spec=".2f")
-        limits.add("lag", "", 1e3 * self.lag, unit="ms", spec=".1f")
-        limits.add("error of the straight lines", "", self.error, unit="rad/s", spec=".2g")
-        return [made, limits]
-
-
-def _finite(speed: ArrayLike) -> Array:
-    try:
-        wanted = np.asarray(speed, dtype=np.float64)
-    except (TypeError, ValueError):
-        raise InputError("The wanted speed must be a number or a sequence of numbers.") from None
-    if not np.isfinite(wanted).all():
-        raise InputError("The wanted speed must be finite everywhere.")
-    return wanted
 
 
 # --- of a drive -----------------------------------------------------------------------------------
@@ -265,31 +243,30 @@ def inverse_map(drive: Drive, points: int = 101) -> InverseMap:
     plus, minus = (_branch(drive, way, points) for way in (1.0, -1.0))
     creep = float(drive.steady_speed(0.0))
     if not minus.speed[-1] <= creep <= plus.speed[0]:
+        low, at, high = np.degrees([minus.speed[-1], creep, plus.speed[0]])
         raise DomainError(
-            f"{drive.name} creeps at {np.degrees(creep):.4g} deg/s at 0 V, but the smallest "
-            f"commands make it {np.degrees(minus.speed[-1]):.4g} and "
-            f"{np.degrees(plus.speed[0]):.4g} deg/s, so that its steady map has no inverse; check "
-            "Z17, Z18 and the card's J."
+            f"{drive.name} creeps at {at:.4g} deg/s at 0 V, but the smallest commands make it "
+            f"{low:.4g} and {high:.4g} deg/s, so that its steady map has no inverse; check Z17, "
+            "Z18 and the card's J."
         )
-    acceleration = tuple(abs(starting_acceleration(drive, way)[0]) for way in (1.0, -1.0))
-    return InverseMap(
-        drive.name,
-        minus,
-        plus,
-        creep,
-        (acceleration[0], acceleration[1]),
-        _lag(drive, plus, minus),
-        max(_error(drive, branch) for branch in (plus, minus)),
-    )
+    up, down = (abs(starting_acceleration(drive, way)[0]) for way in (1.0, -1.0))
+    errors, lags = [], []
+    for branch in (plus, minus):
+        middle, volts = (0.5 * (each[1:] + each[:-1]) for each in branch)
+        errors.append(float(np.abs(drive.steady_speed(volts) - middle).max()))
+        # of slow small motions half way up the map
+        model = drive.linearize(float(0.5 * (branch.voltage[0] + branch.voltage[-1])))
+        phase = float(np.angle(model.response([LAG_FREQUENCY])[0, 0]))
+        lags.append(-phase / (2.0 * np.pi * LAG_FREQUENCY))
+    return InverseMap(drive.name, minus, plus, creep, (up, down), 0.5 * sum(lags), max(errors))
 
 
 def _branch(drive: Drive, way: float, points: int) -> Branch:
     """Points of one way, from the lower voltage to the higher."""
-    start = dead_zone(drive, way)[1]
-    end = saturation(drive, way)
+    start, end = dead_zone(drive, way)[1], saturation(drive, way)
     end = way * FULL_VOLTAGE if end is None else end
-    side = "positive" if way > 0.0 else "negative"
     if start is None or start == end:
+        side = "positive" if way > 0.0 else "negative"
         raise DomainError(
             f"No {side} command up to {FULL_VOLTAGE:g} V moves {drive.name}, so its steady map has "
             "no inverse; check V_dz, J, G1 to G3 and Z17."
@@ -304,30 +281,6 @@ def _branch(drive: Drive, way: float, points: int) -> Branch:
             f"{volts[n + 1]:.4g} V, so its steady map has no inverse there; check G1, G2 and G3."
         )
     return Branch(speed, volts)
-
-
-def _error(drive: Drive, branch: Branch) -> float:
-    middle = 0.5 * (branch.speed[1:] + branch.speed[:-1])
-    volts = 0.5 * (branch.voltage[1:] + branch.voltage[:-1])
-    return float(np.abs(drive.steady_speed(volts) - middle).max())
-
-
-def _lag(drive: Drive, plus: Branch, minus: Branch) -> float:
-    """Lag of slow small motions half way up the map, mean of both ways. [s]"""
-    lags = []
-    for branch in (plus, minus):
-        model = drive.linearize(float(0.5 * (branch.voltage[0] + branch.voltage[-1])))
-        phase = float(np.angle(model.response([LAG_FREQUENCY])[0, 0]))
-        lags.append(-phase / (2.0 * np.pi * LAG_FREQUENCY))
-    return 0.5 * sum(lags)
-
-
-def wanted_table(found: InverseMap, speeds: Sequence[float]) -> Table:
-    """The voltage for each wanted speed. [rad/s]"""
-    made = Table("", (Column("wanted speed", "g", "rad/s"), Column("voltage", "z.4f", "V")))
-    for speed, voltage in zip(speeds, found.voltage(speeds), strict=True):
-        made.add(speed, float(voltage))
-    return made
 
 
 # --- what the map buys ----------------------------------------------------------------------------
@@ -347,26 +300,14 @@ class Improvement(Result):
         """Rms of speed less wanted speed of each way. [rad/s]"""
         return {k: rms_difference(run.shaft_speed, self.wanted) for k, run in self.runs.items()}
 
-    def table(self, command: str) -> Table:
-        """Errors of the speed under a command, by its name, controller by controller.
-
-        Raises
-        ------
-        InputError
-            If the command asks for standstill only.
-        """
+    def table(self) -> Table:
+        """Errors of the speed, controller by controller."""
+        columns = (Column("rms", ".3f", "rad/s"), Column("largest", ".3f", "rad/s"))
+        made = Table("Error of the speed", (Column("Controller"), *columns, Column("rms", ".1%")))
         rms = self.rms
-        plainest = next(iter(rms.values()))
-        if plainest == 0.0:
-            raise InputError(
-                f"{command} asks for nothing but standstill; take one that moves the drive."
-            )
-        heads = (("Controller",), ("rms", ".3f", "rad/s"), ("largest", ".3f", "rad/s"))
-        columns = (*(Column(*head) for head in heads), Column("rms", ".1%"))
-        made = Table(f"Error of the speed under {command}", columns)
         for name, run in self.runs.items():
             largest = float(np.abs(run.shaft_speed - self.wanted).max())
-            made.add(name, rms[name], largest, rms[name] / plainest)
+            made.add(name, rms[name], largest, rms[name] / rms["straight line"])
         return made
 
 
@@ -415,11 +356,16 @@ def improvement(
     Raises
     ------
     InputError
-        For a wanted speed beyond the drive's limits, or a record that cannot be simulated.
+        For a wanted speed beyond the drive's limits, one of standstill only, or a record that
+        cannot be simulated.
     """
     chosen = inverse_map(drive) if inverse is None else inverse
     led = chosen.command(wanted_speed, rate)
     wanted = np.array(wanted_speed, dtype=np.float64)
+    if not wanted.any():
+        raise InputError(
+            "The wanted speed is standstill throughout; take one that moves the drive."
+        )
     commands = {
         "straight line": proportional_command(chosen, wanted),
         "inverse map": chosen.voltage(wanted),

@@ -2,19 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import atan, inf
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Unpack
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from swashplate.analysis.outcomes import rms_difference, time_share
-from swashplate.drive import Drive
-from swashplate.equations.marching.record import SOURCE_RATE, Interpolation
+from swashplate.analysis.outcomes import checked_speed, rms_difference, time_share
+from swashplate.drive import Drive, Given
+from swashplate.equations.marching.record import SOURCE_RATE
 from swashplate.equations.marching.run import Start
-from swashplate.errors import DomainError, InputError, SwashplateError
+from swashplate.errors import DomainError, ParameterError, SwashplateError
+from swashplate.parameters.definitions import columns_of
 from swashplate.parameters.parameter_set import Change
 from swashplate.results import Result, Tabular
 from swashplate.simulation.result import Limit, Simulation
@@ -34,74 +34,56 @@ form of the spool ends."""
 WIDEST = 1.5  # Largest angle of a plate without a stop; the model ends at a right angle. [rad]
 
 
-class Removal(NamedTuple):
+@dataclass(frozen=True)
+class Removal(Result):
     """A limit, the component behind it, and the changes that take it away."""
 
     limit: str  # In words.
     component: str  # What would have to change in the machine.
     flag: Limit | None  # How a simulation marks it, None for what acts always or is not marked.
-    changes: Callable[[Mapping[str, float]], Mapping[str, Change]]
-    """What takes it away from a drive of these values."""
-
-    def of(self, drive: Drive) -> dict[str, Change]:
-        """The changes that alter anything in this drive; none if it has no such limit."""
-        numbers, made = drive.parameters.numbers, {}
-        for name, value in self.changes(numbers).items():
-            both = drive[name].values if name in drive.parameters else (numbers[name],)
-            if any(value != old for old in both):
-                made[name] = value
-        return made
+    changes: dict[str, Change]  # What takes it away, SI.
 
 
-def _dead_zone(numbers: Mapping[str, float]) -> dict[str, Change]:
+def removals(drive: Drive) -> list[Removal]:
+    """What can be taken away from a drive, in the order of the chain, where that alters anything.
+
+    The plussing, which no force limits, because the creep that it makes is an error, too.
+    """
+    numbers = drive.parameters.numbers
     # with the card's jump left as it is, a solenoid's dead zone beyond it would stay
-    return {"V_dz": 0.0, "Z17": min(numbers["Z17"], numbers["J_plus"], numbers["J_minus"])}
+    jump = min(numbers["Z17"], numbers["J_plus"], numbers["J_minus"])
+    plate = min(atan(FEEDBACK_ARM / numbers["Z3"]), WIDEST)
+    stops = {name: max(plate, numbers[name]) for name in ("Z13_plus", "Z13_minus")}
+    larger = "pump: larger, or a smaller motor (Z10, Z13)"
+    compensated = "card: dead-zone compensation (V_dz, or an inverse map)"
+    ramp = {"lim1": inf, "lim2": inf}
+    known = (
+        Removal("dead zone", compensated, Limit.DEAD_ZONE, {"V_dz": 0.0, "Z17": jump}),
+        Removal("current rate", "card: faster ramp (lim1, lim2)", Limit.CURRENT_RATE, {**ramp}),
+        Removal("final decay", "card: no decay of the current (I_t2)", None, {"I_t2": 0.0}),
+        Removal("delay", "card: shorter delay (tau)", None, {"tau": 0.0}),
+        Removal("orifice", "in-line orifice: larger bore (Z16)", Limit.ORIFICE, {"Z16": inf}),
+        Removal("spool stop", "spool: longer stroke (Z14)", Limit.SPOOL, {"Z14": inf}),
+        Removal("swash stop", larger, Limit.SWASH_STOP, {**stops}),
+        Removal("relief valve", "relief valve: higher setting (Z15)", Limit.RELIEF, {"Z15": inf}),
+        Removal("plussing", "spool: centred at rest (Z18)", None, {"Z18": 0.0}),
+    )
 
+    def altered(changes: dict[str, Change]) -> dict[str, Change]:
+        pairs = changes.items()
+        return {k: v for k, v in pairs if any(numbers[c] != v for c in columns_of([k]))}
 
-def _swash_stop(numbers: Mapping[str, float]) -> dict[str, Change]:
-    widest = min(atan(FEEDBACK_ARM / numbers["Z3"]), WIDEST)
-    return {name: max(widest, numbers[name]) for name in ("Z13_plus", "Z13_minus")}
-
-
-def _to(**changes: Change) -> Callable[[Mapping[str, float]], Mapping[str, Change]]:
-    """The same changes for any drive."""
-    return lambda _: changes
-
-
-REMOVALS = (
-    Removal(
-        *("dead zone", "card: dead-zone compensation (V_dz, or an inverse map)"),
-        *(Limit.DEAD_ZONE, _dead_zone),
-    ),
-    Removal(
-        *("current rate", "card: faster ramp (lim1, lim2)", Limit.CURRENT_RATE),
-        _to(lim1=inf, lim2=inf),
-    ),
-    Removal("final decay", "card: no decay of the current (I_t2)", None, _to(I_t2=0.0)),
-    Removal("delay", "card: shorter delay (tau)", None, _to(tau=0.0)),
-    Removal("orifice", "in-line orifice: larger bore (Z16)", Limit.ORIFICE, _to(Z16=inf)),
-    Removal("spool stop", "spool: longer stroke (Z14)", Limit.SPOOL, _to(Z14=inf)),
-    Removal(
-        *("swash stop", "pump: larger, or a smaller motor (Z10, Z13)"),
-        *(Limit.SWASH_STOP, _swash_stop),
-    ),
-    Removal("relief valve", "relief valve: higher setting (Z15)", Limit.RELIEF, _to(Z15=inf)),
-    Removal("plussing", "spool: centred at rest (Z18)", None, _to(Z18=0.0)),
-)
-"""What can be taken away, in the order of the chain; the plussing, which no force limits, because
-the creep that it makes is an error, too."""
+    made = [replace(each, changes=altered(each.changes)) for each in known]
+    return [each for each in made if each.changes]
 
 
 # --- what each of them costs ----------------------------------------------------------------------
 
 
 @dataclass(frozen=True)
-class LimitShare(Result):
+class LimitShare(Removal):
     """What one limit costs."""
 
-    limit: str  # In words.
-    component: str  # What would have to change in the machine.
-    changes: dict[str, Change]  # The changes that took it away, SI.
     time_share: float | None
     """Share of the record's samples at which it acts, of the dead zone only those with a command
     other than 0 V; None for what no flag marks."""
@@ -129,57 +111,43 @@ class LimitShares(Tabular):
     """Wanted speed, (n,). [rad/s]"""
     error: float
     """Rms tracking error of the drive as it is. [rad/s]"""
-    unlimited_error: float | None
-    """Rms tracking error with every limit taken away: 0 unless another speed was wanted than that
-    drive's. None where it cannot be simulated. [rad/s]"""
     shares: tuple[LimitShare, ...]
 
     @property
     def first(self) -> LimitShare | None:
         """The limit to change first; None if no single change makes the error smaller."""
-        best = self.shares[0] if self.shares else None
-        return best if best is not None and (best.error_share or 0.0) > 0.0 else None
+        return next((each for each in self.shares[:1] if (each.error_share or 0.0) > 0.0), None)
 
     def sentences(self) -> list[str]:
         """What to change first, and what cannot be left out."""
-        first = self.first
-        if first is None or first.error is None or first.error_share is None:
-            said = ["No single change makes the error smaller."]
-        else:
-            error = quantity(first.error, "rad/s", spec=".3f")
+        first, said = self.first, ["No single change makes the error smaller."]
+        if first is not None and first.error is not None:
+            share = 1.0 - first.error / self.error
             said = [
                 f"Change first: {first.component}. Without this limit the error falls by "
-                f"{100.0 * first.error_share:.1f} % to {error} rms."
+                f"{100.0 * share:.1f} % to {quantity(first.error, 'rad/s', spec='.3f')} rms."
             ]
         failed = (each for each in self.shares if each.failure)
         return said + [f"Not without the {each.limit}: {each.failure}" for each in failed]
 
-    def table(self) -> Table:
-        """What each limit costs, the costliest first."""
+    def table(self, *, acting: bool = False) -> Table:
+        """What each limit costs, the costliest first; or only those that do something here."""
         errors = ("rad/s", "none")
-        made = Table(
-            "",
-            (
-                Column("Limit", key="limit"),
-                *(Column(name, of="f") for name in ("component", "failure")),
-                Column("share of time", ".1%", key="time_share"),
-                Column("error without it\n", ".3f", *errors, key="error"),
-                Column("share of error", "z.1%", key="error_share"),
-                Column("error if alone\n", ".3f", *errors, key="alone"),
-            ),
+        columns = (
+            Column("Limit", key="limit"),
+            *(Column(name, of="f") for name in ("component", "failure")),
+            Column("share of time", ".1%", key="time_share"),
+            Column("error without it\n", ".3f", *errors, key="error"),
+            Column("share of error", "z.1%", key="error_share"),
+            Column("error if alone\n", ".3f", *errors, key="alone"),
         )
+        made = Table("", columns)
         for each in self.shares:
+            if acting and not (each.time_share or each.error_share or each.failure or each.alone):
+                continue
             time = Cell(0.0, "never") if each.time_share == 0.0 else each.time_share
             words = each.limit, each.component, each.failure
-            numbers = time, each.error, each.error_share, each.alone
-            made.add(*words, *numbers)
-        return made
-
-    def acting(self) -> Table:
-        """The table without the limits that do nothing here."""
-        made, shares = self.table(), self.shares
-        does = [s.time_share or s.error_share or s.failure or s.alone for s in shares]
-        made.rows = [row for row, each in zip(made.rows, does, strict=True) if each]
+            made.add(*words, time, each.error, each.error_share, each.alone)
         return made
 
     def to_polars(self) -> polars.DataFrame:
@@ -192,11 +160,9 @@ def limit_shares(
     voltage: ArrayLike,
     rate: float = SOURCE_RATE,
     *,
-    time: ArrayLike | None = None,
-    interpolation: Interpolation | None = None,
     start: Start = "rest",
-    clip: bool = False,
     wanted: ArrayLike | None = None,
+    **given: Unpack[Given],
 ) -> LimitShares:
     """Share of time and of error due to each limit of a drive under a command, ranked.
 
@@ -204,8 +170,8 @@ def limit_shares(
     ----------
     drive : Drive
         The drive.
-    voltage, rate, time, interpolation, start, clip :
-        The command, as in `Drive.simulate`.
+    voltage, rate, start, **given :
+        The command and what was measured beside it, as in `Drive.simulate`.
     wanted : (n,) array_like, optional
         Speed that was wanted at the samples; by default what the drive would do without any of its
         limits. [rad/s]
@@ -232,69 +198,48 @@ def limit_shares(
     simulated again and compared with the same wanted speed. That, by default, still has the lags of
     the card's filter and of the valve, so that only the limits make an error.
     """
-    run = drive.simulate(
-        voltage, rate, time=time, interpolation=interpolation, start=start, clip=clip
-    )
-    present = {each: changes for each in REMOVALS if (changes := each.of(drive))}
-    built = {each: _changed(drive, changes) for each, changes in present.items()}
-    unlimited, removed = drive, dict[Removal, dict[str, Change]]()
-    for removal, changes in present.items():  # as many at once as the model's domain allows
-        more = _changed(unlimited, changes)
-        if not isinstance(built[removal], str) and not isinstance(more, str):
-            unlimited, removed[removal] = more, changes
-    asked = _free_speed(unlimited, run, start) if wanted is None else np.array(wanted, dtype=float)
-    if asked.shape != run.shaft_speed.shape or not np.isfinite(asked).all():
-        raise InputError(
-            f"The wanted speed must be {run.shaft_speed.size} finite numbers, one a sample."
-        )
-    error = rms_difference(run.shaft_speed, asked)
+    run = drive.simulate(voltage, rate, start=start, **given)
 
-    def error_of(other: Drive | str) -> tuple[float | None, str]:
-        """Its error over the same command, or why there is none."""
-        if isinstance(other, str):
-            return None, other
+    def speed_without(*limits: Removal) -> Array | str:
+        """Speed over the same command, or why there is none."""
+        changes = {name: value for each in limits for name, value in each.changes.items()}
         try:
-            again = simulate_drive(other.parameters, run.records, start)
+            other = drive.replace(**changes).parameters
+            return simulate_drive(other, run.records, start).shaft_speed
         except SwashplateError as refusal:
-            return None, str(refusal)
-        return rms_difference(again.shaft_speed, asked), ""
+            return str(refusal)
 
-    shares = []
-    for removal, changes in present.items():
-        without, failure = error_of(built[removal])
-        others = {k: v for each, c in removed.items() if each is not removal for k, v in c.items()}
-        fall = None
-        if without is not None:
-            fall = (error - without) / error if error > 0.0 else 0.0
+    present, removed, unlimited = removals(drive), list[Removal](), drive
+    for each in present:  # as many at once as the model's domain allows
+        try:
+            unlimited = unlimited.replace(**each.changes)
+        except ParameterError:
+            continue
+        removed.append(each)
+    free = speed_without(*removed)
+    if wanted is None and isinstance(free, str):
+        raise DomainError(
+            "Without its limits the drive cannot be simulated, so that there is no speed to "
+            f"compare with; give the one that is wanted ({free.rstrip('.')})."
+        )
+    asked = checked_speed(free if wanted is None else wanted, run.shaft_speed.size)
+
+    def error_of(speed: Array | str) -> float | None:
+        return None if isinstance(speed, str) else rms_difference(speed, asked)
+
+    error, shares = rms_difference(run.shaft_speed, asked), []
+    for each in present:
+        speed = speed_without(each)
+        without = error_of(speed)
         shares.append(
             LimitShare(
-                removal.limit,
-                removal.component,
-                changes,
-                None if removal.flag is None else time_share(run, removal.flag),
-                without,
-                fall,
-                error_of(_changed(drive, others))[0],
-                failure,
+                **vars(each),
+                time_share=None if each.flag is None else time_share(run, each.flag),
+                error=without,
+                error_share=None if without is None else 1.0 - without / error if error else 0.0,
+                alone=error_of(speed_without(*(one for one in removed if one is not each))),
+                failure=speed if isinstance(speed, str) else "",
             )
         )
     shares.sort(key=lambda each: inf if each.error is None else each.error)
-    return LimitShares(drive.name, run, asked, error, error_of(unlimited)[0], tuple(shares))
-
-
-def _changed(drive: Drive, changes: Mapping[str, Change]) -> Drive | str:
-    """The drive with changes, or why there is none such."""
-    try:
-        return drive.replace(**changes)
-    except SwashplateError as refusal:
-        return str(refusal)
-
-
-def _free_speed(unlimited: Drive, run: Simulation, start: Start) -> Array:
-    try:
-        return simulate_drive(unlimited.parameters, run.records, start).shaft_speed
-    except SwashplateError as refusal:
-        raise DomainError(
-            f"Without its limits the drive cannot be simulated, so that there is no speed to "
-            f"compare with; give the one that is wanted ({str(refusal).rstrip('.')})."
-        ) from None
+    return LimitShares(drive.name, run, asked, error, tuple(shares))

@@ -8,14 +8,14 @@ from json import JSONDecodeError, loads
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
-from swashplate.analysis.outcomes import batch_outcomes, batch_speeds
-from swashplate.analysis.whatif import WhatIf, pulled
+from swashplate.analysis.outcomes import Outcome, Trial, outcome_matrix
+from swashplate.analysis.whatif import pulled
 from swashplate.campaign import Campaign
 from swashplate.documents import read_text
 from swashplate.drive import Drive
-from swashplate.errors import DomainError, FileError, InputError
+from swashplate.errors import DomainError, FileError, InputError, ParameterError
 from swashplate.identification.assessment import Assessment, assess, load_fit
 from swashplate.identification.drive_model import DriveModel
 from swashplate.parameters.parameter_set import ParameterSet
@@ -66,30 +66,6 @@ class Draws(Result):
         return tuple(said)
 
 
-def _errors(
-    covariances: Sequence[Array],
-    slopes: Sequence[Mapping[int, Array]],
-    random: np.random.Generator,
-) -> list[Array]:
-    """Errors of all stages' vectors, (K,) each, drawn together; stages in the order of the fit.
-
-    `covariances` (K, K) are those of each stage's own noise, `slopes` (K, K_earlier) by the number
-    of an earlier stage by how much its errors move this one's.
-
-    Notes
-    -----
-    δ₁ = ε₁ and δ₂ = S δ₁ + ε₂ with independent normal ε: then cov(δ₂) = S cov(δ₁) Sᵀ + own, which
-    is the quoted covariance, and cov(δ₂, δ₁) = S cov(δ₁).
-    """
-    drawn: list[Array] = []
-    for own, moved in zip(covariances, slopes, strict=True):
-        error = random.multivariate_normal(
-            np.zeros(len(own)), own, check_valid="ignore", method="eigh"
-        )
-        drawn.append(error + sum(slope @ drawn[earlier] for earlier, slope in moved.items()))
-    return drawn
-
-
 def drives(assessments: Sequence[Assessment], draws: int = 200, seed: int = 0) -> Draws:
     """Drives that a fit's tests allow, drawn from the errors of its estimates.
 
@@ -110,27 +86,17 @@ def drives(assessments: Sequence[Assessment], draws: int = 200, seed: int = 0) -
     Notes
     -----
     Errors are normal in the solver's vector, so that a logarithmic parameter is log-normal. What
-    the card's stage does not know moves pump and motor as the fit would follow it, see
-    `identification.intervals`.
+    the card's stage does not know moves pump and motor as the fit would follow it: δ₁ = ε₁ and
+    δ₂ = S δ₁ + ε₂ with independent normal ε, see `identification.intervals`. Fixed parameters with
+    a standard uncertainty are drawn as well, and the estimates follow them.
     """
     if not assessments:
         raise InputError("A Monte Carlo needs the assessment of at least one stage.")
     if draws < 1:
         raise InputError(f"There must be at least one draw, not {draws}.")
-    known = [each.uncertainty for each in assessments]
-    covariances = [each.own.matrix for each in known]
-    slopes = [
-        {
-            earlier: each.slopes
-            for each in found.handed
-            for earlier in range(number)
-            if known[earlier].sampled is each.covariance
-        }
-        for number, found in enumerate(known)
-    ]
     random, made, redrawn = np.random.default_rng(seed), list[Drive](), 0
     while len(made) < draws:
-        parameters = _parameters(assessments, _errors(covariances, slopes, random))
+        parameters = _drawn(assessments, random)
         if parameters is not None:
             made.append(Drive(parameters))
             continue
@@ -152,24 +118,40 @@ def drives(assessments: Sequence[Assessment], draws: int = 200, seed: int = 0) -
     return Draws(tuple(made), redrawn, fixed)
 
 
-def _parameters(assessments: Sequence[Assessment], errors: Sequence[Array]) -> ParameterSet | None:
-    """The set with each stage's vector off by an error, None outside bounds or domain."""
-    parameters: ParameterSet | None = None
-    for each, error in zip(assessments, errors, strict=True):
-        problem, model = each.stage.problem, each.stage.problem.model
-        assert isinstance(model, DriveModel)
-        vector = each.stage.solution.vector + error
-        low, high = problem.unknowns.bounds
-        if ((vector < low) | (vector > high))[each.uncertainty.own.determined].any():
-            return None
-        begin = model.parameters if parameters is None else parameters
-        try:
-            # a model of its own: the fitted one keeps what it made for other parameters
-            parameters = DriveModel(begin, model.part, forces=model.forces).parameters_at(
-                problem.unknowns.targets(vector, "")
+def _drawn(assessments: Sequence[Assessment], random: np.random.Generator) -> ParameterSet | None:
+    """A set with each stage's vector off by a drawn error, None outside bounds or domain."""
+    model, uncertain = assessments[0].stage.problem.model, assessments[0].stage.problem.uncertain
+    assert isinstance(model, DriveModel)
+    parameters = model.parameters
+    # of the fixed numbers, in standard uncertainties
+    off = random.normal(size=len(uncertain))
+    fixed = {
+        name: parameters.numbers[name] + size * each
+        for together, each in zip(uncertain, off.tolist(), strict=True)
+        for name, size in together.items()
+    }
+    errors = list[tuple[object, Array]]()  # of each stage, by the covariance that later ones name
+    try:
+        if fixed:
+            parameters = parameters.replace(fixed, parameters.options)
+        for each in assessments:
+            problem, known, own = each.stage.problem, each.uncertainty, each.uncertainty.own.matrix
+            assert isinstance(problem.model, DriveModel)
+            error = random.multivariate_normal(
+                np.zeros(len(own)), own, check_valid="ignore", method="eigh"
             )
-        except DomainError:
-            return None
+            for handed in known.handed:
+                error = error + handed.slopes @ next(e for c, e in errors if c is handed.covariance)
+            errors.append((known.sampled, error))
+            vector = each.stage.solution.vector + error + known.fixed @ off
+            low, high = problem.unknowns.bounds
+            if ((vector < low) | (vector > high))[known.own.determined].any():
+                return None
+            # a model of its own: the fitted one keeps what it made for other parameters
+            fresh = DriveModel(parameters, problem.model.part, forces=problem.model.forces)
+            parameters = fresh.parameters_at(problem.unknowns.targets(vector, ""))
+    except (DomainError, ParameterError):
+        return None
     return parameters
 
 
@@ -208,7 +190,10 @@ def stored_draws(
     place, path = Path(folder), Path(folder) / STORED
     if not path.is_file():
         raise InputError(f"{place} holds no {STORED}: give a folder that a fit wrote.")
-    tests = _campaign_of(path) if campaign is None else Path(campaign)
+    try:
+        tests = Path(loads(read_text(path))["campaign"]) if campaign is None else Path(campaign)
+    except (JSONDecodeError, KeyError, TypeError) as error:
+        raise FileError(f"{path} is no stored fit: {error}.") from None
     if campaign is None and not tests.is_file():
         raise InputError(
             f"{path} was fitted to {tests}, which is not there: say where the campaign is."
@@ -225,24 +210,22 @@ def stored_draws(
     return drives(assess(fit.stages), draws, seed)
 
 
-def _campaign_of(path: Path) -> Path:
-    try:
-        return Path(loads(read_text(path))["campaign"])
-    except (JSONDecodeError, KeyError, TypeError) as error:
-        raise FileError(f"{path} is no stored fit: {error}.") from None
-
-
 # --- bands ----------------------------------------------------------------------------------------
+
+MOST_SAMPLES = 150_000_000  # Samples of speed that are kept at once: 1.2 GB.
 
 
 @dataclass(frozen=True, eq=False)
 class Bands(Result):
-    """Where the speed lies at each instant."""
+    """Where the speed lies at each instant, and each outcome."""
 
     time: Array  # (n,) [s]
     lower: Array  # (n,) [rad/s]
     median: Array  # (n,) [rad/s]
     upper: Array  # (n,) [rad/s]
+    half_widths: Array
+    """(2 + K,) half of the intervals of the speed limits, positive and negative [rad/s], and of
+    each outcome in its unit."""
     level: float  # Part of the drives between lower and upper, instant by instant.
     draws: int  # Drives that it is taken from.
 
@@ -254,17 +237,19 @@ class Bands(Result):
         return float(width[at]), float(self.time[at])
 
 
-def bands(drawn: Draws, voltage: ArrayLike, rate: float = 512.0, *, level: float = 0.95) -> Bands:
-    """Band of the shaft's speed over drawn drives, instant by instant.
+def bands(
+    drawn: Draws, trial: Trial, outcomes: Sequence[Outcome] = (), *, level: float = 0.95
+) -> Bands:
+    """Band of the shaft's speed over drawn drives, instant by instant, and of their outcomes.
 
     Parameters
     ----------
     drawn : Draws
         See `drives`.
-    voltage : (n,) array_like
-        Command, from rest. [V]
-    rate : float
-        Samples a second. [Hz]
+    trial : Trial
+        The command, from rest.
+    outcomes : sequence of Outcome
+        Of which intervals are wanted, such as `WhatIf.outcomes`.
     level : float
         Part of the drives within the band, between 0 and 1.
 
@@ -277,22 +262,20 @@ def bands(drawn: Draws, voltage: ArrayLike, rate: float = 512.0, *, level: float
     """
     if not 0.0 < level < 1.0:
         raise InputError(f"The level {level:g} of a band must lie between 0 and 1.")
-    volts = np.asarray(voltage, dtype=np.float64)
-    speeds, failures = batch_speeds(drawn.drives[0], drawn.columns, volts, rate)
-    if failures:
-        raise DomainError(f"A drawn drive cannot be simulated: {next(iter(failures.values()))}")
+    count, size = len(drawn.drives), trial.voltage.size
+    if size * count > MOST_SAMPLES:
+        raise InputError(
+            f"{count} drives over {size} samples take too much memory: take "
+            f"{MOST_SAMPLES // size} drives at most, or give the command at a lower rate."
+        )
+    run = drawn.drives[0].simulate_many(drawn.columns, voltage=trial.voltage, rate=trial.rate)
+    if run.failures:
+        why = next(iter(run.failures.values()))
+        raise DomainError(f"A drawn drive cannot be simulated: {why}")
+    assert run.output is not None
     parts = 0.5 - 0.5 * level, 0.5, 0.5 + 0.5 * level
-    lower, median, upper = np.quantile(speeds, parts, axis=0, overwrite_input=True)
-    return Bands(np.arange(volts.size) / rate, lower, median, upper, level, len(speeds))
-
-
-def half_widths(result: WhatIf, draws: Draws, level: float = 0.95) -> Array:
-    """Half of the intervals that hold a part of the drives drawn for one of the variants.
-
-    (2 + K,): of the speed limits, positive and negative [rad/s], and of each outcome in its unit.
-    """
-    found = batch_outcomes(draws.drives[0], draws.columns, result.trial, result.outcomes)
-    speeds = [each.steady_speed([FULL_VOLTAGE, -FULL_VOLTAGE]) for each in draws.drives]
-    values = np.column_stack([np.array(speeds), found.values])
-    low, high = np.quantile(values, [0.5 - 0.5 * level, 0.5 + 0.5 * level], axis=0)
-    return np.asarray(0.5 * (high - low))
+    limits = [each.steady_speed([FULL_VOLTAGE, -FULL_VOLTAGE]) for each in drawn.drives]
+    found = np.column_stack([limits, outcome_matrix(run.output, trial, outcomes)])
+    low, _, high = np.quantile(found, parts, axis=0)
+    lower, median, upper = np.quantile(run.output, parts, axis=0, overwrite_input=True)
+    return Bands(trial.time, lower, median, upper, 0.5 * (high - low), level, count)

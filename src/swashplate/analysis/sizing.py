@@ -2,163 +2,93 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import product
+from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from swashplate.analysis.outcomes import Direction, Performance, Trial, performance
+from swashplate.analysis.outcomes import Trial, rms_difference, speed_per_volt
 from swashplate.analysis.whatif import Range, check_ranges, pulled
 from swashplate.drive import Drive
 from swashplate.errors import DomainError, InputError, ParameterError
+from swashplate.parameters.rules import FULL_VOLTAGE
 from swashplate.results import Result
-from swashplate.tables import UNIT, Cell, Column, Table
+from swashplate.tables import UNIT, Cell, Column, Table, listed, quantity
 from swashplate.units import display_unit
 
 Array = NDArray[np.float64]
-Slack = Callable[[Array], Array]
-"""From (L,) factors to (r,) slacks, all 0 or more where the factors satisfy."""
 
-# --- search ---------------------------------------------------------------------------------------
+# --- what a drive can do --------------------------------------------------------------------------
 
-SCANNED = 6  # ln₂ of the points of a Sobol sequence that are tried besides the corners.
-MOST_CORNERS = 64
-FINEST = 1e-9  # Part of the way to which an end is bisected.
-ALONG = 33  # Points along a single factor's range.
+Direction = Literal["both", "positive", "negative"]
+STEP_LENGTH, STEP_RATE = 2.0, 512.0  # Of the full step that shows the largest acceleration. [s, Hz]
 
 
-def smallest_change(slack: Slack, low: Array, high: Array) -> Array | None:
-    """Factors with the least Σ (factor - 1)² of those that satisfy, None if none was found.
+class Performance(NamedTuple):
+    """What a drive can do; of two directions the worse one."""
+
+    speed: float  # That the largest command settles at. [rad/s]
+    acceleration: float  # Largest one after a full step from rest. [rad/s²]
+    tracking_error: float | None
+    """RMS difference from the wanted speed, None where none is wanted. [rad/s]"""
+
+
+def performance(
+    drive: Drive, follow: Trial | None = None, *, direction: Direction = "both"
+) -> Performance:
+    """What a drive can do.
 
     Parameters
     ----------
-    slack : callable
-        The inequalities, as `Slack`.
-    low, high : (L,) array
-        Range of each factor, 1 within.
+    drive : Drive
+        From rest.
+    follow : Trial, optional
+        Its wanted speed is to be followed. The command is in proportion to it, by the drive's own
+        ratio (see `speed_per_volt`), and ends at ±10 V: a larger pump is given less voltage.
+    direction : {"both", "positive", "negative"}
+        Which speed and acceleration count.
 
-    Returns
-    -------
-    (L,) array or None
-        Satisfies exactly: the last step is a bisection that ends on the right side.
-
-    Notes
-    -----
-    The box is scanned (each factor alone, corners and a Sobol sequence); from the two best points
-    on, SLSQP minimises the change under the inequalities, with derivatives by differences; what it
-    finds is drawn towards 1, as a whole and factor by factor, as far as the inequalities allow.
+    Raises
+    ------
+    DomainError
+        If the drive leaves the model's domain.
     """
-    from scipy.optimize import minimize
-    from scipy.stats.qmc import Sobol
-
-    unchanged = np.ones(low.size)
-    if _met(slack, unchanged):
-        return unchanged
-    scanned = list(Sobol(low.size, scramble=False).random_base2(SCANNED))
-    if 2**low.size <= MOST_CORNERS:
-        scanned += [np.array(corner, dtype=float) for corner in product((0, 1), repeat=low.size)]
-    points = [low + point * (high - low) for point in scanned]
-    for k in range(low.size):
-        factor = smallest_alone(slack, low, high, k)
-        points += [] if factor is None else [_with(unchanged, k, factor)]
-    good = sorted((point for point in points if _met(slack, point)), key=_change)
-    found = [_drawn_in(slack, each) for each in good[:2]]
-    for start in list(found):
-        solved = minimize(
-            _change,
-            start,
-            jac=lambda x: 2.0 * (x - 1.0),
-            method="SLSQP",
-            bounds=list(zip(low, high, strict=True)),
-            constraints={"type": "ineq", "fun": lambda x: slack(np.clip(x, low, high))},
-            options={"maxiter": 60, "ftol": 1e-10, "eps": 1e-5},
-        )
-        moved = np.clip(solved.x, low, high)
-        # SLSQP may have stopped on the wrong side: a little farther from 1
-        beyond = np.clip(1.0 + 1.001 * (moved - 1.0), low, high)
-        for each in (moved, start + 1.0001 * (moved - start), beyond):
-            if _met(slack, each):
-                found.append(_drawn_in(slack, each))
-                break
-    return min(found, key=_change, default=None)
+    speeds, accelerations = [], []
+    for name, sign in (("positive", 1.0), ("negative", -1.0)):
+        if direction in (name, "both"):
+            voltage = np.full(int(STEP_LENGTH * STEP_RATE) + 1, sign * FULL_VOLTAGE)
+            voltage[0] = 0.0
+            speeds.append(abs(drive.steady_speed(sign * FULL_VOLTAGE)))
+            change = sign * np.diff(drive.simulate(voltage, STEP_RATE).shaft_speed)
+            accelerations.append(float(change.max() * STEP_RATE))
+    error = None
+    if follow is not None:
+        ratio = [max(speed_per_volt(drive, sign), 1e-300) for sign in (1.0, -1.0)]
+        volts = follow.wanted / np.where(follow.wanted >= 0.0, *ratio)
+        run = drive.simulate(np.clip(volts, -FULL_VOLTAGE, FULL_VOLTAGE), follow.rate)
+        error = rms_difference(run.shaft_speed, follow.wanted)
+    return Performance(min(speeds), min(accelerations), error)
 
 
-def smallest_alone(slack: Slack, low: Array, high: Array, index: int) -> float | None:
-    """The factor nearest to 1 that satisfies by itself, the others being 1; None if none does."""
-    unchanged = np.ones(low.size)
-    if _met(slack, unchanged):
-        return 1.0
-    ends = []
-    for end in (float(low[index]), float(high[index])):
-        before = 1.0
-        for factor in np.linspace(1.0, end, ALONG)[1:] if end != 1.0 else ():
-            goal = _with(unchanged, index, factor)
-            if _met(slack, goal):
-                ends.append(float(_bisected(slack, _with(unchanged, index, before), goal)[index]))
-                break
-            before = float(factor)
-    return min(ends, key=lambda factor: abs(factor - 1.0), default=None)
+# --- what is required -----------------------------------------------------------------------------
 
-
-def _drawn_in(slack: Slack, point: Array) -> Array:
-    """A point that satisfies, moved towards 1 as a whole and then factor by factor."""
-    drawn = _bisected(slack, np.ones(point.size), point)
-    for k in range(point.size):
-        drawn = _bisected(slack, _with(drawn, k, 1.0), drawn)
-    return drawn
-
-
-def _bisected(slack: Slack, wanted: Array, good: Array) -> Array:
-    """The end of what satisfies, on the way from a point that does to a wanted one."""
-    if _met(slack, wanted):
-        return wanted
-    low, high = 0.0, 1.0
-    while high - low > FINEST:
-        middle = 0.5 * (low + high)
-        if _met(slack, wanted + middle * (good - wanted)):
-            high = middle
-        else:
-            low = middle
-    return good if high == 1.0 else wanted + high * (good - wanted)
-
-
-def _with(point: Array, index: int, factor: float) -> Array:
-    moved = point.copy()
-    moved[index] = factor
-    return moved
-
-
-def _met(slack: Slack, point: Array) -> bool:
-    return bool(slack(point).min() >= 0.0)
-
-
-def _change(point: Array) -> float:
-    return float(np.sum((point - 1.0) ** 2))
-
-
-# --- sizing ---------------------------------------------------------------------------------------
-
-WIDEST: Range = (0.5, 2.0)  # Factors that a lever may take unless others are given.
 REQUIRED = {
-    "speed": ("a speed of", "rad/s", ">="),
-    "acceleration": ("an acceleration of", "rad/s^2", ">="),
-    "tracking_error": ("a tracking error of", "rad/s", "<="),
+    "speed": ("rad/s", 1.0),
+    "acceleration": ("rad/s^2", 1.0),
+    "tracking_error": ("rad/s", -1.0),
 }
-"""What can be required: in words, its unit, and how it is compared."""
+"""What can be required, its unit, and 1 for at least, -1 for at most."""
 
 
 @dataclass(frozen=True)
 class Requirements(Result):
     """What is required; None is not."""
 
-    speed: float | None = None
-    """At least. [rad/s]"""
-    acceleration: float | None = None
-    """At least. [rad/s²]"""
-    tracking_error: float | None = None
-    """At most, RMS. [rad/s]"""
+    speed: float | None = None  # At least. [rad/s]
+    acceleration: float | None = None  # At least. [rad/s²]
+    tracking_error: float | None = None  # At most, RMS. [rad/s]
     direction: Direction = "both"
     """In which directions speed and acceleration are required."""
 
@@ -179,19 +109,35 @@ class Requirements(Result):
         values = {name: getattr(self, name) for name in REQUIRED}
         return {name: value for name, value in values.items() if value is not None}
 
-    def slacks(self, found: Performance) -> dict[str, float]:
-        """By how much each requirement is met: ln of the ratio, negative where it is not. [1]"""
-        return {
-            name: (1.0 if REQUIRED[name][2] == ">=" else -1.0)
-            * float(np.log(max(getattr(found, name), 1e-300) / value))
-            for name, value in self.given.items()
-        }
+    def slacks(self, found: Performance) -> Array:
+        """By how much each is met, in the order of `given`: ln of the ratio, negative if not."""
+        ratios = [max(getattr(found, name), 1e-300) / each for name, each in self.given.items()]
+        return np.log(ratios) * [REQUIRED[name][1] for name in self.given]
+
+    def reached(self, found: Sequence[Performance]) -> str:
+        """What the best of some drives reach, as the rest of a sentence."""
+        slacks = np.array([self.slacks(each) for each in found])
+
+        def said(name: str, index: int) -> str:
+            unit, wanted = REQUIRED[name][0], self.given[name]
+            done, limit = (
+                quantity(each, unit, spec=".4g") for each in (getattr(found[index], name), wanted)
+            )
+            return f"{name.replace('_', ' ')} {done} (required {limit})"
+
+        best, nearest = slacks.argmax(axis=0), int(slacks.min(axis=1).argmax())
+        missed = [said(n, best[k]) for k, n in enumerate(self.given) if slacks[best[k], k] < 0.0]
+        if missed:
+            return f"reaches {listed(missed)}"
+        each = listed([said(name, nearest) for name in self.given])
+        return f"meets each requirement, but not all at once: nearest is {each}"
 
 
 @dataclass(frozen=True, eq=False)
 class Sizing(Result):
     """The smallest change that meets the requirements."""
 
+    requirements: Requirements
     factors: Mapping[str, float]  # By lever; 1 leaves it alone.
     drive: Drive  # The changed drive.
     before: Performance
@@ -202,15 +148,27 @@ class Sizing(Result):
     @property
     def change(self) -> float:
         """Root of the summed squares of (factor - 1). [1]"""
-        return float(np.sqrt(sum((factor - 1.0) ** 2 for factor in self.factors.values())))
+        return float(np.sqrt(_change(np.array([*self.factors.values()]))))
 
-    def table(self) -> Table:
-        """How far each lever moves, and how far it would have to by itself."""
+    def tables(self) -> tuple[Table, Table]:
+        """How far each lever moves, and by itself; what is required, as it is and changed."""
         heads = Column("lever"), Column("factor", ".4f"), Column("change", "+z.2%")
-        made = Table("", (*heads, Column("enough by itself", ".4f", none="no")))
+        moved = Table("", (*heads, Column("enough by itself", ".4f", none="no")))
         for name, factor in self.factors.items():
-            made.add(name, factor, factor - 1.0, self.alone[name])
-        return made
+            moved.add(name, factor, factor - 1.0, self.alone[name])
+        columns = (Column(each, ".2f") for each in ("required", "as it is", "changed"))
+        done = Table("", (Column(""), *columns, UNIT))
+        for name, (unit, sign) in REQUIRED.items():
+            before, wanted = getattr(self.before, name), getattr(self.requirements, name)
+            sort, factor = "<>"[sign > 0.0], display_unit(unit).factor
+            limit = None if wanted is None else Cell(wanted, f"{sort}= {factor * wanted:.2f}")
+            if before is not None:
+                words = name.replace("_", " ")
+                done.add(words, limit, before, getattr(self.after, name), unit=unit)
+        return moved, done
+
+
+WIDEST: Range = (0.5, 2.0)  # Factors that a lever may take unless others are given.
 
 
 def size(
@@ -246,68 +204,142 @@ def size(
     if requirements.tracking_error is not None and follow is None:
         raise InputError("A tracking error can only be required with a speed to follow.")
     check_ranges(ranges, around=1.0)
-    names = list(ranges)
-    low, high = (np.array([pair[k] for pair in ranges.values()]) for k in (0, 1))
-    known: dict[bytes, Array] = {}
+    names, (low, high) = list(ranges), np.array(list(ranges.values()), dtype=np.float64).T
+    tried: dict[tuple[float, ...], Performance | None] = {}
 
-    def done(point: Array) -> Performance:
-        changed = pulled(drive, dict(zip(names, point, strict=True)))
-        return performance(changed, follow, direction=requirements.direction)
+    def done(point: Array) -> Performance | None:
+        key = tuple(point.tolist())
+        if key not in tried:
+            try:
+                changed = pulled(drive, dict(zip(names, key, strict=True)))
+                tried[key] = performance(changed, follow, direction=requirements.direction)
+            except (ParameterError, DomainError):
+                tried[key] = None
+        return tried[key]
 
     def slack(point: Array) -> Array:
-        key = point.tobytes()
-        if key not in known:
-            try:
-                known[key] = np.array(list(requirements.slacks(done(point)).values()))
-            except (ParameterError, DomainError):
-                # as far from all requirements as no drive that can be simulated is
-                known[key] = np.full(len(requirements.given), -1e3)
-        return known[key]
+        found = done(point)
+        # as far from all requirements as no drive that can be simulated is
+        return (
+            np.full(len(requirements.given), -1e3) if found is None else requirements.slacks(found)
+        )
 
     before = performance(drive, follow, direction=requirements.direction)
     point = smallest_change(slack, low, high)
-    if point is None:
+    after = None if point is None else done(point)
+    if point is None or after is None:
         words = ", ".join(f"{name} x {pair[0]:g} to {pair[1]:g}" for name, pair in ranges.items())
-        points = np.array([np.frombuffer(key) for key in known])
-        reached = _reached(requirements, points, np.array(list(known.values())), done)
+        reached = requirements.reached([each for each in tried.values() if each is not None])
         raise InputError(f"Within {words} the {drive.name} {reached}.")
-    factors = {name: float(factor) for name, factor in zip(names, point, strict=True)}
+    factors = dict(zip(names, point.tolist(), strict=True))
     alone = {name: smallest_alone(slack, low, high, k) for k, name in enumerate(names)}
-    return Sizing(factors, pulled(drive, factors), before, done(point), alone)
+    return Sizing(requirements, factors, pulled(drive, factors), before, after, alone)
 
 
-def _reached(
-    required: Requirements, points: Array, slacks: Array, done: Callable[[Array], Performance]
-) -> str:
-    """What is reachable instead, of all points that were tried."""
+# --- search ---------------------------------------------------------------------------------------
 
-    def said(name: str, index: int) -> str:
-        words, unit, _ = REQUIRED[name]
-        reached, limit = (np.degrees(getattr(x, name)) for x in (done(points[index]), required))
-        shown = "deg/s²" if unit == "rad/s^2" else "deg/s"
-        return f"{words} {reached:.4g} {shown} (required {limit:.4g})"
-
-    best = slacks.argmax(axis=0)
-    missed = [k for k in range(len(required.given)) if slacks[best[k], k] < 0.0]
-    names = list(required.given)
-    if missed:
-        return f"reaches {', and '.join(said(names[k], int(best[k])) for k in missed)}"
-    nearest = int(slacks.min(axis=1).argmax())
-    return (
-        "meets each requirement, but not all at once: nearest is "
-        f"{', '.join(said(name, nearest) for name in names)}"
-    )
+Slack = Callable[[Array], Array]
+"""From (L,) factors to (r,) slacks, all 0 or more where the factors satisfy."""
+SCANNED = 6  # log₂ of the points of a Sobol sequence that are tried.
+FINEST = 1e-9  # Part of the way to which an end is bisected.
+ALONG = 32  # Points along a single factor's range.
 
 
-def performance_table(found: Sizing, required: Requirements) -> Table:
-    """What is required, what the drive does as it is, and what it does when changed."""
-    columns = (Column(each, ".2f") for each in ("required", "as it is", "changed"))
-    made = Table("", (Column(""), *columns, UNIT))
-    for name, (_, unit, sign) in REQUIRED.items():
-        before, after = getattr(found.before, name), getattr(found.after, name)
-        if before is None or after is None:
-            continue
-        wanted = getattr(required, name)
-        limit = wanted and Cell(wanted, f"{sign} {display_unit(unit).factor * wanted:.2f}")
-        made.add(name.replace("_", " "), limit, before, after, unit=unit)
-    return made
+def smallest_change(slack: Slack, low: Array, high: Array) -> Array | None:
+    """Factors with the least Σ (factor - 1)² of those that satisfy, None if none was found.
+
+    Parameters
+    ----------
+    slack : callable
+        The inequalities, as `Slack`.
+    low, high : (L,) array
+        Range of each factor, 1 within.
+
+    Returns
+    -------
+    (L,) array or None
+        Satisfies exactly: the last step is a bisection that ends on the right side.
+
+    Notes
+    -----
+    The box is scanned (each factor alone, and a Sobol sequence with faces and corners); from the
+    two best points on, SLSQP minimises the change under the inequalities, with derivatives by
+    differences; what it finds is drawn towards 1, as a whole and factor by factor, as far as the
+    inequalities allow.
+    """
+    from scipy.optimize import minimize
+    from scipy.stats.qmc import Sobol
+
+    unchanged = np.ones(low.size)
+    if _met(slack, unchanged):
+        return unchanged
+    # a quarter of the sequence's range lies beyond each side of the box: faces and corners
+    inner = np.clip(2.0 * Sobol(low.size, scramble=False).random_base2(SCANNED) - 0.5, 0.0, 1.0)
+    points = [low, high, *(low + inner * (high - low))]
+    for k in range(low.size):
+        factor = smallest_alone(slack, low, high, k)
+        points += [] if factor is None else [_with(unchanged, k, factor)]
+
+    def drawn_in(point: Array) -> Array:
+        drawn = _edge(slack, unchanged, point)
+        for k in range(point.size):
+            drawn = _edge(slack, _with(drawn, k, 1.0), drawn)
+        return drawn
+
+    good = sorted((point for point in points if _met(slack, point)), key=_change)
+    found = [drawn_in(each) for each in good[:2]]
+    for start in list(found):
+        solved = minimize(
+            _change,
+            start,
+            jac=lambda x: 2.0 * (x - 1.0),
+            method="SLSQP",
+            bounds=list(zip(low, high, strict=True)),
+            constraints={"type": "ineq", "fun": lambda x: slack(np.clip(x, low, high))},
+            options={"maxiter": 60, "ftol": 1e-10, "eps": 1e-5},
+        )
+        # SLSQP may have stopped on the wrong side: back towards where it began
+        found.append(drawn_in(_edge(slack, np.clip(solved.x, low, high), start)))
+    return min(found, key=_change, default=None)
+
+
+def smallest_alone(slack: Slack, low: Array, high: Array, index: int) -> float | None:
+    """The factor nearest to 1 that satisfies by itself, the others being 1; None if none does."""
+    unchanged, reached = np.ones(low.size), list[float]()
+    for end in (float(low[index]), float(high[index])):
+        before = unchanged
+        for factor in np.linspace(1.0, end, ALONG + 1):
+            goal = _with(unchanged, index, float(factor))
+            if _met(slack, goal):
+                reached.append(float(_edge(slack, before, goal)[index]))
+                break
+            before = goal
+    return min(reached, key=lambda factor: abs(factor - 1.0), default=None)
+
+
+def _edge(slack: Slack, start: Array, goal: Array) -> Array:
+    """First point that satisfies on the way from a start to a goal that does, by bisection."""
+    if _met(slack, start):
+        return start
+    low, high = 0.0, 1.0
+    while high - low > FINEST:
+        middle = 0.5 * (low + high)
+        if _met(slack, start + middle * (goal - start)):
+            high = middle
+        else:
+            low = middle
+    return goal if high == 1.0 else start + high * (goal - start)
+
+
+def _with(point: Array, index: int, factor: float) -> Array:
+    moved = point.copy()
+    moved[index] = factor
+    return moved
+
+
+def _met(slack: Slack, point: Array) -> bool:
+    return bool(slack(point).min() >= 0.0)
+
+
+def _change(point: Array) -> float:
+    return float(np.sum((point - 1.0) ** 2))

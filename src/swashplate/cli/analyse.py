@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shlex
+from dataclasses import replace
 from math import degrees, isfinite, radians
 from pathlib import Path
 from typing import Annotated, Literal
@@ -21,7 +22,7 @@ from swashplate.cli.options import (
 )
 from swashplate.cli.terminal import Outputs, bullets, note, say, show, working
 from swashplate.errors import InputError
-from swashplate.tables import FIGURE, TABLE, quantity
+from swashplate.tables import FIGURE, TABLE, joined, quantity
 
 LEVEL, SPAN = 0.95, (0.9, 1.1)
 """Of bands, and the factors of a lever that names none."""
@@ -90,8 +91,9 @@ def limits(
     files.draw(plot, "plot_limit_timeline", run, wanted=shares.wanted, title=title)
     error = quantity(shares.error, "rad/s", spec=".3f")
     drive.note(f"{title}: {error} rms from a drive without limits")
-    if shares.acting().rows:
-        show(shares.acting())
+    acting = shares.table(acting=True)
+    if acting.rows:
+        show(acting)
     for sentence in shares.sentences():
         say(sentence)
     files.say()
@@ -150,15 +152,14 @@ def whatif(
     with working("Simulating"):
         name, trial = words.trial_of(choice.chosen, maneuver, sampling)
         result = what_if(choice.chosen, moved, trial, outcomes=(*OUTCOMES, "travel"))
-    widths, bands, said = None, {}, list[str]()
+    bands, said = dict[str, monte_carlo.Bands](), list[str]()
     if uncertainty is not None:
         with working("Drawing drives"):
             before = monte_carlo.stored_draws(uncertainty, drive=choice.chosen, campaign=campaign)
             drawn = {AS_IS: before, CHANGED: before.pulled(moved)}
-            widths = {k: monte_carlo.half_widths(result, v, LEVEL) for k, v in drawn.items()}
             said.append(f"± is half of the interval that holds {LEVEL:.0%} of the drives.")
             for which, each in drawn.items():
-                band = monte_carlo.bands(each, trial.voltage, trial.rate, level=LEVEL)
+                band = monte_carlo.bands(each, trial, result.outcomes, level=LEVEL)
                 bands[which], (width, when) = band, band.widest
                 said.append(
                     f"Band of {band.draws} drives, {which}: at most "
@@ -172,7 +173,7 @@ def whatif(
     before_it, after = result.before.drive.parameters, result.after.drive.parameters
     for line in words.changes_between(before_it, after):
         note(line)
-    show(result.table(widths))
+    show(result.table(bands))
     bullets(result.sentences(), said)
     files.say()
 
@@ -228,7 +229,7 @@ def size(
         found = sizing.size(drive.chosen, required, ranges, follow=follow)
     files.write(out, "Changed drive", found.drive.to_toml)
     drive.note(drive.title)
-    show(found.table(), sizing.performance_table(found, required))
+    show(*found.tables())
     if found.change == 0.0:
         say("The drive meets it as it is; nothing needs to be changed.")
     elif not drive.changes:  # whatif begins at a drive as its file has it
@@ -261,7 +262,7 @@ def sensitivity(
       swashplate sensitivity hoist --lever orifice --lever pump=0.8/1.5 --plot tornado.png
       swashplate sensitivity slew --maneuver step:4 --out all.csv
     """
-    from swashplate.analysis import one_at_a_time, outcome_table
+    from swashplate.analysis import one_at_a_time
 
     files = Outputs((out, TABLE), (plot, FIGURE))
     with working("Simulating"):
@@ -269,10 +270,10 @@ def sensitivity(
         ranges = words.ranges_of(levers or (*PULLED, "plussing"), SPAN)
         found = one_at_a_time(drive.chosen, ranges, trial, outcomes=tuple(outcomes or OUTCOMES))
     title = f"{drive.title}, {name}"
-    files.write(out, "All numbers, in SI", found.table().write)
+    files.write(out, "All numbers, in SI", joined(found.tables(every=True)).write)
     files.draw(plot, "plot_tornado", found, title=f"{title}: each lever by itself")
     drive.note(title)
-    show(*(outcome_table(found, k) for k in range(len(found.outcomes))))
+    show(*found.tables())
     bullets(dict.fromkeys(found.sentences))
     files.say()
 
@@ -312,15 +313,12 @@ def compensate(
     files = Outputs((out, compensation.INVERSE_MAP), (plot, FIGURE))
     with working("Inverting"):
         found, bought = compensation.inverse_map(drive.chosen, points), None
-        tables = found.tables()
-        if speeds_deg_s:
-            speeds = [radians(each) for each in speeds_deg_s]
-            tables.insert(0, compensation.wanted_table(found, speeds))
+        tables = found.tables([radians(each) for each in speeds_deg_s or ()])
         if stick is not None:
             name, run = words.simulated(drive.chosen, stick, sampling)
             wanted = compensation.wanted_of_stick(found, run["voltage"])
             bought = compensation.improvement(drive.chosen, wanted, run.record.rate, inverse=found)
-            tables.append(bought.table(name))
+            tables.append(replace(bought.table(), title=f"Error of the speed under {name}"))
     files.write(out, "Inverse map, in SI", found.write)
     files.draw(plot, "plot_compensation", found, bought)
     drive.note(f"{drive.title}: voltage for a wanted speed")

@@ -67,9 +67,8 @@ def compare(
 ) -> None:
     """Compare two drives over the same maneuver.
 
-    The settled speed is the one that the maneuver's largest voltage would lead
-    to if it were held. The time to 90 % of it counts from the moment at which
-    the voltage first changes. --out writes the voltage and both speeds.
+    Shows outcomes of both, such as the final speed, at the last moment at which
+    the voltage is at its largest. --out writes the voltage and both speeds.
 
     Options:
       first A: A packaged drive or a TOML file.
@@ -92,7 +91,7 @@ def compare(
         command = words.maneuver_of(maneuver, *pair)
         voltage = command.sample(Sampling(rate).rate)
         runs = {label: drive.simulate(voltage, rate) for label, drive in drives.items()}
-        made = side_by_side(drives, runs)
+        made = side_by_side(runs)
         rms = rms_difference(*(run.shaft_speed for run in runs.values()))
     title = f"{' and '.join(runs)}, {command.name}"
 

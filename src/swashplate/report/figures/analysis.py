@@ -23,7 +23,6 @@ from swashplate.analysis import (
     OneAtATime,
     Way,
     WhatIf,
-    outcome_unit,
     proportional_command,
 )
 from swashplate.errors import InputError
@@ -346,9 +345,9 @@ def plot_tornado(result: OneAtATime, *, title: str | None = None) -> Figure:
     shown = [k for k in range(len(result.outcomes)) if np.isfinite(result.base[k])]
     if not shown:
         raise InputError("None of the outcomes is defined for this command: nothing to draw.")
-    columns = min(len(shown), 2)
+    columns, levers = min(len(shown), 2), list(result.ranges)
     rows = -(-len(shown) // columns)
-    figure = new_figure(WIDTH, HEAD + ROW + rows * (0.22 * len(result.levers) + 0.75) + 0.5 * FOOT)
+    figure = new_figure(WIDTH, HEAD + ROW + rows * (0.22 * len(result.ranges) + 0.75) + 0.5 * FOOT)
     write_title(figure, "Each lever by itself" if title is None else title)
     legend = []
     for end, (words, color) in enumerate((("lower", BLUE), ("upper", VERMILION))):
@@ -362,7 +361,7 @@ def plot_tornado(result: OneAtATime, *, title: str | None = None) -> Figure:
         ax.axis("off")
     for ax, k in zip(panels, shown, strict=False):
         outcome, swings = result.outcomes[k], np.nan_to_num(result.swings[:, k])
-        order, unit = np.argsort(swings, kind="stable"), outcome_unit(outcome)
+        order, unit = np.argsort(swings, kind="stable"), outcome.shown
         base = unit.factor * result.base[k]
         dress(ax, "", unit.label(outcome.words))
         for place, lever in enumerate(order):
@@ -375,7 +374,7 @@ def plot_tornado(result: OneAtATime, *, title: str | None = None) -> Figure:
             ax.set_xlim(base - half, base + half)
             ax.text(0.5, 0.5, "no lever moves it", transform=ax.transAxes, fontsize=SMALL)
         ax.axvline(base, color=INK, linewidth=0.8, zorder=3.0)
-        names = [result.levers[lever].replace("_", " ") for lever in order]
+        names = [levers[lever].replace("_", " ") for lever in order]
         ax.set_yticks(range(len(names)), labels=names)
         ax.set_ylim(-0.6, len(names) - 0.4)
         ax.grid(False, axis="y")

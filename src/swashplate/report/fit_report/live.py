@@ -236,12 +236,12 @@ def _levers(values: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
     """Levers with the numbers that they move and the powers with which they do."""
     made = []
     for name in SHOWN:
-        lever = LEVERS[name]
+        powers = LEVERS[name]
         moves = [
-            (each["number"], lever.powers[key])
+            (each["number"], powers[key])
             for each in values
             for key in (each["symbol"], each["column"])
-            if key in lever.powers and each["value"] not in (0.0, 1e30)
+            if key in powers and each["value"] not in (0.0, 1e30)
         ]
         if moves:
             words = name.replace("_", " ").capitalize()
