@@ -93,6 +93,8 @@ def guess(column: Column) -> ColumnGuess:
     stem, _, ending = name.rpartition("_")
     if column.unit is None and stem:
         found = _by_name(column, stem)
+        if found.kind == "other" and ending in ("V", "mV"):
+            found = replace(found, kind="voltage")
         try:
             if found.role == "time":
                 to_si(1.0, ending, "s", "")

@@ -126,8 +126,8 @@ def check(path: Path = CAMPAIGN, *, strict: bool = False) -> None:
         show(tests.quality_table(experiment, found))
         bullets(f"{text}." for text in experiment.notes)
         for each in found:
-            for text in each.findings:
-                say(ended(f"! {each.signal}: {text}"))
+            for text in each.findings:  # unbroken: a line to paste may be in it
+                note(ended(f"! {each.signal}: {text}"))
     note(LEGEND)
     for text in of_file:
         say(ended(f"! {text}"))
@@ -306,14 +306,14 @@ def guess(path: Path = CAMPAIGN, *, axis: AxisName = None, out: Path | None = No
         folder = path.parent if out is None else out
         start, setup = folder / "start.toml", folder / "setup.toml"
         check_free(start, setup)
-        for sentence, _ in tests.spiked(runs).values():
-            note(f"! {sentence}.")
         found = tests.guess_drive(runs)
         parameters = tests.guessed_set(found, path.name)
         folder.mkdir(parents=True, exist_ok=True)
         Drive(parameters).to_toml(start)
         write_text(tests.fit_configuration(found, parameters), setup)
     show(tests.guess_table(found))
+    for sentence, _ in tests.spiked(runs).values():
+        note(f"! {sentence}.")
     note(f"These numbers alone: fit {found.fit_percent:.1f} % of the mean speeds (100 % is best).")
     note(f"Start:             {start}")
     note(f"Fit configuration: {setup}")

@@ -572,10 +572,12 @@ def _remarks(
 def _maneuvers(tested: Mapping[str, Experiment]) -> str:
     """``ramps, steps and sines of up to 0.3 Hz from -9 to 9 V``."""
     runs, fastest = list(tested.values()), 0.0
+    several = {each: f"{each}s" for each in ("ramp", "step", "sine", "chirp")}
+    several["unnamed"] = "unnamed motions"
     kinds = dict[str, None]()
     for each in runs:
         word = each.maneuver.split(" ")[0]
-        kinds[f"{word}s" if word in ("ramp", "step", "sine", "chirp") else word] = None
+        kinds[several.get(word, word)] = None
         if each.recognised is not None:
             fastest = max(fastest, each.recognised.frequency or 0.0)
     low = min(float(each.input.values.min()) for each in runs)
