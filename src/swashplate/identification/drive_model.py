@@ -21,7 +21,7 @@ from swashplate.equations.marching.observation import Observation, ObservedRecor
 from swashplate.equations.marching.record import SLOWEST, SOURCE_RATE, Record, even_rate, record_of
 from swashplate.errors import DomainError, InputError, ParameterError
 from swashplate.executors import available_cores
-from swashplate.identification.model import START, EquationModel
+from swashplate.identification.model import EquationModel
 from swashplate.identification.problem import Problem, noise_scales
 from swashplate.identification.setup import (
     Forces,
@@ -36,7 +36,7 @@ from swashplate.parameters.definitions import SWITCHES, columns_of, find, is_col
 from swashplate.parameters.parameter_set import ParameterSet
 from swashplate.parameters.rules import FULL_VOLTAGE
 from swashplate.results import Result
-from swashplate.simulation.instance import START_PRESSURE, at_every_rate
+from swashplate.simulation.instance import PRESSURE, START, at_every_rate
 from swashplate.simulation.residuals import Ready, made_ready
 from swashplate.simulation.result import Limit, Simulation
 from swashplate.simulation.run import check_voltage, simulate_drive
@@ -55,6 +55,8 @@ CURRENTS: tuple[ChannelKind, ...] = (
     "current_plus",
     "current_minus",
 )
+START_PRESSURE = "start_pressure"
+"""Name of δP at the first sample, where it is an unknown of the experiment."""
 START_CURRENTS = ("start_current_plus", "start_current_minus")
 """Names of a channel's current at the first sample, where it is an unknown of the experiment."""
 LARGEST_START_PRESSURE = 4e6
@@ -145,8 +147,7 @@ def simulated_current(
     card begins at rest or settled, as the experiment does.
     """
     record = voltage_record(experiment)
-    fine = replace(record, rate=record.rate * record.substeps, substeps=1)
-    seen = Observation("current", fine.time, np.zeros(fine.time.size))
+    seen = Observation("current", record.points, np.zeros(record.values.size))
     observed = ObservedRecord(record, (seen,), "voltage", experiment.begins)
     # refinements begin behind the card
     ready = DriveModel(parameters.plain, "card").ready(start, experiment, observed, ())
@@ -264,13 +265,11 @@ class DriveModel(Result, EquationModel):
     ) -> Ready:
         """The drive with numbers; see `EquationModel.ready`."""
         states = {
-            path.removeprefix(START): values[name]
-            for name in START_CURRENTS
+            column.removeprefix(START): values[name]
+            for name in (START_PRESSURE, *START_CURRENTS)
             if name in values
-            for path in self.moves(name)
+            for column in self.moves(name)
         }
-        if START_PRESSURE in values:
-            states[START_PRESSURE] = values[START_PRESSURE]
         own = Own(states, offsets)
         try:
             return made_ready(self.parameters_at(values), observed, columns, own)
@@ -286,7 +285,9 @@ class DriveModel(Result, EquationModel):
             leaves = ("now", "out") if self.parameters.rate is None else ("now", "before", "out")
             side = name.removeprefix("start_current_")
             return {f"{START}card.{side}.{leaf}": 1.0 for leaf in leaves}
-        return {name: 1.0} if is_column(name) or name == START_PRESSURE else {}
+        if name == START_PRESSURE:
+            return {f"{START}{PRESSURE}": 1.0}
+        return {name: 1.0} if is_column(name) else {}
 
     def parameters_at(self, values: Mapping[str, float]) -> ParameterSet:
         """The parameter set for some values of the unknowns.

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
@@ -18,16 +18,15 @@ from swashplate.equations.marching.jacobian import jacobian, residuals
 from swashplate.equations.marching.layout import started_by
 from swashplate.equations.marching.observation import Observation, ObservedRecord
 from swashplate.equations.marching.observation import Own as EngineOwn
-from swashplate.equations.marching.record import Record, even_rate, gridded
+from swashplate.equations.marching.record import Record, even_rate, on_grid
 from swashplate.errors import DomainError, InputError
 from swashplate.results import Result, short
+from swashplate.simulation.instance import START
 from swashplate.simulation.residuals import Ready
 
 Array = NDArray[np.float64]
 OFFSET = "offset "
 """What the name of a channel's free zero begins with."""
-START = "start."
-"""What the name of a number of the state at the first sample begins with."""
 
 
 class Model(Protocol):
@@ -307,13 +306,15 @@ class OwnModel(Result, EquationModel):
 
     model: Equations
     rate: float | None = None
-    """Steps a second; by default the input's samples. Needed where its stamps are not even. [Hz]"""
+    """Samples a second; by default the input's. Needed where its stamps are not even. [Hz]"""
     options: Any = None
     given: Any = None
     """The model's givens, or a mapping of them by the experiments' names."""
     begin: Mapping[str, str] = field(default_factory=dict)
     """Channel that says where a number of the state begins, by its path: at the first sample that
     counts."""
+    substeps: int | None = None
+    """Steps of the model a sample; by default one."""
 
     def signals_of(self, experiment: Experiment) -> Mapping[str, str]:
         """Signal of the model for each channel that it gives; one of none is refused."""
@@ -353,12 +354,17 @@ class OwnModel(Result, EquationModel):
                 f"{experiment.name}: the stamps of its input are not even, so the model needs a "
                 f"rate, as in OwnModel({model.name}, rate=100.0)."
             )
-        record = Record(command.values, float(command.time[0]), rate, 1)
-        if rate != even:
-            record = gridded(command.values, command.time, rate, command.interpolation)
+        record = on_grid(
+            {left[0]: command.values},
+            rate,
+            time=None if rate == even else command.time,
+            interpolation=command.interpolation,
+            substeps=self.substeps,
+        )[left[0]]
+        record = replace(record, start=float(command.time[0]))
         channels = [experiment[name] for name in others]
-        on_grid = {c.name: np.interp(record.time, c.time, c.values) for c in channels}
-        return left[0], record, on_grid
+        beside = {c.name: np.interp(record.points, c.time, c.values) for c in channels}
+        return left[0], record, beside
 
     def ready(
         self,

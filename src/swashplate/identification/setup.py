@@ -26,13 +26,14 @@ from swashplate.campaign.schema import NotNegative, Weight, Window
 from swashplate.documents import parse_toml, read_text, validated
 from swashplate.equations import Model as Equations
 from swashplate.errors import FileError, InputError, ParameterError
-from swashplate.identification.model import OFFSET, START, OwnModel, simulated
+from swashplate.identification.model import OFFSET, OwnModel, simulated
 from swashplate.identification.problem import Problem, noise_scales
 from swashplate.identification.solving import solve
 from swashplate.identification.unknowns import Prior, Unknown, Unknowns
 from swashplate.parameters.definitions import find
 from swashplate.parameters.parameter_set import ParameterSet
 from swashplate.results import Result, short
+from swashplate.simulation.instance import START
 
 Array = NDArray[np.float64]
 _SETUPS = files("swashplate.identification").joinpath("setups")
