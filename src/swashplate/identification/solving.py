@@ -18,7 +18,7 @@ from swashplate.executors import Executor, Serial
 from swashplate.identification.problem import Evaluation, Loss, Problem
 from swashplate.identification.unknowns import Vector
 from swashplate.results import Result
-from swashplate.tables import write_text
+from swashplate.tables import made_folder, write_text
 
 Array = NDArray[np.float64]
 Finite = Annotated[float, Field(allow_inf_nan=False)]
@@ -242,8 +242,7 @@ def _returned(memory: _Memory, vector: Array) -> tuple[Array | None, NDArray[np.
         values = np.linspace(low[k], high[k], VALUES)
         far = (values - vector[k]) * (start[k] - vector[k]) < 0.0
         for value in values[np.lexsort((np.abs(values - vector[k]), far))]:
-            trial = point.copy()
-            trial[k] = value
+            trial = np.where(np.arange(point.size) == k, value, point)
             if effects(trial)[k] > SOME_EFFECT * nominal[k]:
                 point, lost[k] = trial, True
                 break
@@ -256,12 +255,8 @@ def _returned(memory: _Memory, vector: Array) -> tuple[Array | None, NDArray[np.
 def sobol_starts(problem: Problem, count: int, seed: int) -> Iterator[Array]:
     """So many points (K,) spread evenly over the bounds; others where the model does not hold.
 
-    The same seed gives the same points, however many are asked for.
-
-    Raises
-    ------
-    InputError
-        If hardly any point can be used.
+    The same seed gives the same points, however many are asked for. If hardly any point can be
+    used, an `InputError` says so.
     """
     from scipy.stats.qmc import Sobol
 
@@ -269,22 +264,19 @@ def sobol_starts(problem: Problem, count: int, seed: int) -> Iterator[Array]:
     sequence = Sobol(low.size, scramble=True, rng=np.random.default_rng(seed))
     found, tried = 0, 0
     while found < count:
-        for point in sequence.random(8):
-            tried += 1
-            vector = low + point * (high - low)
-            try:
-                problem.cost(vector)
-            except DomainError:
-                continue
-            yield vector
-            found += 1
-            if found == count:
-                return
         if tried > TRIES * (found + 1):
             raise InputError(
                 f"Of {tried} starts within the bounds only {found} lie in the model's domain; "
                 "narrow the bounds."
             )
+        tried += 1
+        vector = low + sequence.random(1)[0] * (high - low)
+        try:
+            problem.cost(vector)
+        except DomainError:
+            continue
+        found += 1
+        yield vector
 
 
 class _StartFile(BaseModel):
@@ -363,7 +355,7 @@ def _solve_one(
     try:
         solution = solved(problem, start)
     except DomainError as error:
-        solution = Solution(start, np.inf, 1, False, False, str(error))
+        return Solution(start, np.inf, 1, False, False, str(error), number=number)
     if solution.interrupted:
         raise KeyboardInterrupt
     return replace(solution, number=number)
@@ -373,22 +365,17 @@ def _stored(
     store: Path, origin: dict[str, str], starts: Sequence[Array], resume: bool
 ) -> dict[int, Solution]:
     """Results that a folder holds; the folder is made if there is none."""
-    try:
-        store.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise FileError(f"{store} cannot be made: {error.strerror or error}.") from None
-    done = {}
-    for path in sorted(store.glob("start-*.json")):
-        if not resume:
-            raise FileError(
-                f"{store} holds the starts of an earlier fit: resume it, or remove the folder."
-            )
+    done, files = {}, sorted(made_folder(store).glob("start-*.json"))
+    if files and not resume:
+        raise FileError(
+            f"{store} holds the starts of an earlier fit: resume it, or remove the folder."
+        )
+    for path in files:
         try:
             file = read_json(path, _StartFile)
         except SwashplateError as error:
-            raise FileError(
-                f"{str(error).rstrip('.')}: it is no result of a start, remove it."
-            ) from None
+            said = str(error).rstrip(".")
+            raise FileError(f"{said}: it is no result of a start, remove it.") from None
         differing = [name for name, mark in origin.items() if file.origin.get(name) != mark]
         result = file.result
         if not differing and result.number < len(starts):
