@@ -190,8 +190,8 @@ def fit(
     ----------
     model : Drive, ParameterSet, Model or ModelSetup
         A drive: where to begin, and what stays fixed. The decay's switch is split, see `smooth`,
-        and the card's filter one that holds at the rate of the runs. Or a model of one's own: of
-        equations, an `OwnModel` of them, any object with `simulate`, or a `ModelSetup`.
+        the card's filter holds at the rate of the runs. Or a model of one's own: of equations,
+        an `OwnModel` of them, any object with `simulate`, or a `ModelSetup`.
     tests : Campaign or sequence of Experiment
         The runs to fit; of a campaign those with the role ``"fit"``.
     free : Setup or mapping of str to (low, nominal, high) or Unknown
@@ -228,20 +228,19 @@ def fit(
         raise InputError("There is no run to fit.")
     nominal = model.parameters if isinstance(model, Drive) else model
     doubts = refuse_unsound(spike_findings(runs, loss))
-    if isinstance(nominal, ParameterSet):
-        if not isinstance(free, Setup):
-            raise InputError("A drive needs a Setup for what is free, such as load_setup('hoist').")
-        setup = free
-        doubts += refuse_unsound(check_runs(runs, smooth(nominal)))
-        nominal, changed = at_rate_of(runs, nominal)
-        doubts += changed
-    else:
+    if not isinstance(nominal, ParameterSet):
         if not isinstance(nominal, ModelSetup):
             entries = free if isinstance(free, Mapping) else {}
             nominal = ModelSetup(nominal, entries, "", tuple(channels), noise or {}, fixed or {})
         doubts += refuse_unsound(check_model(runs, nominal))
         nominal = nominal if nominal.numbers else nominal.nominal(runs)
-        setup = nominal.setup
+        free = nominal.setup
+    elif isinstance(free, Setup):
+        doubts += refuse_unsound(check_runs(runs, smooth(nominal)))
+        nominal, changed = at_rate_of(runs, nominal)
+        doubts += changed
+    else:
+        raise InputError("A drive needs a Setup for what is free, such as load_setup('hoist').")
 
     def solved(stage: Stage, problem: Problem) -> Solved:
         refuse_unsound(check_rank(f"Stage {stage.name}", problem))
@@ -249,7 +248,7 @@ def fit(
         limits = {"tolerance": tolerance, "max_evaluations": max_evaluations}
         return _solved(stage, problem, partial(solve, loss=loss, watch=told, **limits), search)
 
-    return Fit(setup, nominal, staged(setup, nominal, runs, solved, threads=threads), doubts)
+    return Fit(free, nominal, staged(free, nominal, runs, solved, threads=threads), doubts)
 
 
 def staged(

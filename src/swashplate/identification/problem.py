@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import cached_property, lru_cache
+from functools import cached_property, lru_cache, partial
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple, TypeVar
 
 import numpy as np
@@ -75,18 +75,15 @@ class Problem(Result):
     compare: Callable[[Channel, Array], Array] | None = None
     """Linear map of a channel's samples, (m,) or (m, k), before they are compared: a position that
     drifts by its motion since the last anchor, for example."""
-    _last: dict[tuple[bytes, bool], Evaluation] = field(
-        default_factory=dict, repr=False, init=False
-    )
+    _last: dict[Any, Evaluation] = field(default_factory=dict, repr=False, init=False)
 
     def __post_init__(self) -> None:
         if isinstance(self.model, OfEquations):
             object.__setattr__(self, "model", OwnModel(self.model))
-        if not self.unknowns:
-            raise InputError("A fit needs at least one parameter.")
-        if not self.experiments:
-            raise InputError("A fit needs at least one experiment.")
-        if not any(weight.any() for run in self.weights for weight in run.values()):
+        for what, there in (("parameter", self.unknowns), ("experiment", self.experiments)):
+            if not there:
+                raise InputError(f"A fit needs at least one {what}.")
+        if not self.samples:
             raise InputError(
                 f"No sample of {', '.join(self.channels) or 'any channel'} counts: all are ignored "
                 "or there are none."
@@ -105,14 +102,11 @@ class Problem(Result):
     @cached_property
     def weights(self) -> tuple[Mapping[str, Array], ...]:
         """For each experiment and fitted channel the (m,) factors on the residuals."""
-        return tuple(
-            {
-                name: np.sqrt(each[name].weight) / self.scales[name]
-                for name in self.channels
-                if name in each.channels
-            }
-            for each in self.experiments
-        )
+        found = []
+        for each in self.experiments:
+            names = [name for name in self.channels if name in each.channels]
+            found.append({n: np.sqrt(each[n].weight) / self.scales[n] for n in names})
+        return tuple(found)
 
     @property
     def samples(self) -> int:
@@ -127,9 +121,9 @@ class Problem(Result):
         key = vector.tobytes(), compressed
         if key not in self._last:
             small = compressed and self.compare is None and isinstance(self.model, EquationModel)
-            parts = self._each(lambda k: (self._reduced if small else self._full)(vector, k))
-            parts.append(Evaluation(*self.unknowns.prior_rows(vector)))
-            residuals, jacobians = zip(*parts, strict=True)
+            parts = self._each(partial(self._reduced if small else self._full, vector))
+            priors = Evaluation(*self.unknowns.prior_rows(vector))
+            residuals, jacobians = zip(*parts, priors, strict=True)
             self._last.clear()
             self._last[key] = Evaluation(np.concatenate(residuals), np.vstack(jacobians))
         return self._last[key]
@@ -173,9 +167,8 @@ class Problem(Result):
 
     def model_values(self, vector: Array, number: int) -> dict[str, float]:
         """Values by the model's names for one experiment; a channel's zero is none of them."""
-        zeros = {f"{OFFSET}{name}" for name in self.channels}
-        values = self._values(vector, number)
-        return {name: value for name, value in values.items() if name not in zeros}
+        zeros = [f"{OFFSET}{name}" for name in self.channels]
+        return {k: v for k, v in self._values(vector, number).items() if k not in zeros}
 
     def _values(self, vector: Array, number: int) -> dict[str, float]:
         return {**self.fixed, **self.unknowns.targets(vector, self.experiments[number].name)}
@@ -410,11 +403,11 @@ def influence(residuals: Array, loss: Loss) -> tuple[Array, Array]:
 
     The losses are SciPy's, of residuals in units of their noise (Huber 1981, chapter 4).
     """
-    z = residuals**2
+    z = 1.0 + residuals**2
     if loss == "soft_l1":
-        return residuals / np.sqrt(1.0 + z), (1.0 + z) ** -1.5
+        return residuals / np.sqrt(z), z**-1.5
     if loss == "cauchy":
-        return residuals / (1.0 + z), (1.0 - z) / (1.0 + z) ** 2
+        return residuals / z, (2.0 - z) / z**2
     return residuals, np.ones_like(residuals)
 
 

@@ -13,14 +13,7 @@ from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import (
-    AfterValidator,
-    BaseModel,
-    ConfigDict,
-    Field,
-    PositiveFloat,
-    model_validator,
-)
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, PositiveFloat, model_validator
 
 from swashplate.campaign import ChannelKind
 from swashplate.campaign.experiment import Experiment
@@ -105,13 +98,9 @@ class Forces(Entry):
     )
     relative: Bounds = Field((0.5, 2.0), description="Bounds as factors on the nominal forces.")
 
-    names: ClassVar[tuple[str, ...]] = tuple(
-        f"force_{side}_{k}" for side in SIDES for k in (1, 2, 3, 4)
-    )
+    names: ClassVar = tuple(f"force_{side}_{k}" for side in SIDES for k in (1, 2, 3, 4))
     """Names of the eight forces."""
-    columns: ClassVar[tuple[str, ...]] = tuple(
-        f"{symbol}_{side}" for side in SIDES for symbol in COEFFICIENTS
-    )
+    columns: ClassVar = tuple(f"{symbol}_{side}" for side in SIDES for symbol in COEFFICIENTS)
     """The parameters that they stand for."""
 
     @cached_property
@@ -198,19 +187,18 @@ class Stage(Entry):
 
     def beyond(self, unknown: Unknown, side: int) -> str:
         """What to do about an unknown of the machine at its lower (-1) or upper (1) bound."""
-        name, table = unknown.name, "free"
+        name = unknown.name
         if self.part == "model":
             return f"to let it go on, widen '{name}' in free of the model and fit again"
         if self.forces is not None and name in self.forces.names:
-            name, table = "relative", "forces"
+            where = "relative under [stages.forces]"
         else:
             limits = find(name)
             least = limits.lower if limits.least is None else limits.least
             if unknown.high >= limits.upper if side > 0 else unknown.low <= least:
                 return f"the {'greatest' if side > 0 else 'least'} value that it may have"
-            name = name if name in self.free else _symbol(name)
-        where = f"{name} under [stages.{table}] of the stage '{self.name}'"
-        return f"to let it go on, widen {where} and fit again"
+            where = f"{name if name in self.free else _symbol(name)} under [stages.free]"
+        return f"to let it go on, widen {where} of the stage '{self.name}' and fit again"
 
 
 class Setup(Entry):
@@ -371,18 +359,18 @@ class ModelSetup(Result):
                 "simulate(values, experiment)."
             )
         equations = own.model if isinstance(own, OwnModel) else own
-        name = self.name or getattr(equations, "name", None) or type(equations).__name__
+        kind = getattr(equations, "name", None) or type(equations).__name__
+        name = self.name or str(kind).lower()
         if not self.free:
             raise InputError(f"Nothing of {name} is free: name what is to be found.")
-        for each in self.standard_uncertainty:
-            if each not in self.fixed:
-                raise InputError(
-                    f"{each} has a standard uncertainty but no value: name it in fixed, or give "
-                    "it a prior if it is free."
-                )
-        object.__setattr__(self, "model", own)
-        object.__setattr__(self, "name", self.name or str(name).lower())
-        object.__setattr__(self, "free", {k: _unknown(k, each) for k, each in self.free.items()})
+        if unknown := [each for each in self.standard_uncertainty if each not in self.fixed]:
+            raise InputError(
+                f"{unknown[0]} has a standard uncertainty but no value: name it in fixed, or give "
+                "it a prior if it is free."
+            )
+        free = {key: _unknown(key, each) for key, each in self.free.items()}
+        for key, made in {"model": own, "name": name, "free": free}.items():
+            object.__setattr__(self, key, made)
 
     @classmethod
     def from_file(cls, path: str | Path) -> ModelSetup:
@@ -435,10 +423,7 @@ class ModelSetup(Result):
 
     def problem(self, experiments: Sequence[Experiment], *, threads: int = 1) -> Problem:
         """The problem that it states for some runs, one of which has a channel that is fitted."""
-        values = {each.name: each.start for each in self.free.values()} | dict(self.fixed)
-        channels = tuple(self.channels) or tuple(
-            dict.fromkeys(c for each in experiments for c in _given(self.model, values, each))
-        )
+        channels = tuple(self.channels) or self._given(experiments)
         runs = [each for each in experiments if any(name in each.channels for name in channels)]
         if not runs:
             had = dict.fromkeys(name for each in experiments for name in each.channels)
@@ -468,12 +453,19 @@ class ModelSetup(Result):
             threads if isinstance(self.model, OwnModel) else 1,
         )
 
+    def _given(self, experiments: Sequence[Experiment]) -> tuple[str, ...]:
+        """Names of the channels that the model gives."""
+        values = {each.name: each.start for each in self.free.values()} | dict(self.fixed)
+        own = self.model.signals_of if isinstance(self.model, OwnModel) else None
+        given = [own(each) if own else simulated(self.model, values, each) for each in experiments]
+        return tuple(dict.fromkeys(name for each in given for name in each))
+
     def own(self, experiment: Experiment) -> tuple[Unknown, ...]:
         """The unknowns of a single run: where its state begins, and the zeros of its sensors."""
-        names = {f"{OFFSET}{name}" for name in experiment.channels}
-        if isinstance(self.model, OwnModel):
-            names |= {name for name in self.free if name.startswith(START)}
-        free = [each for each in self.free.values() if each.run is None and each.name in names]
+        zeros = {f"{OFFSET}{name}" for name in experiment.channels}
+        states = (START,) if isinstance(self.model, OwnModel) else ()
+        free = [each for each in self.free.values() if each.run is None]
+        free = [each for each in free if each.name in zeros or each.name.startswith(states)]
         return tuple(replace(each, run=experiment.name) for each in free)
 
     def predicted(self, experiment: Experiment) -> Mapping[str, Array]:
@@ -490,12 +482,6 @@ class ModelSetup(Result):
         known = channels, self.scales, self.numbers
         problem = Problem(self.model, (experiment,), Unknowns(own), *known)
         return problem.outputs(solve(problem).vector, 0)
-
-
-def _given(model: Any, values: Mapping[str, float], run: Experiment) -> Mapping[str, object]:
-    """What a model gives of a run, by the channels' names."""
-    own = isinstance(model, OwnModel)
-    return model.signals_of(run) if own else simulated(model, values, run)
 
 
 def _unknown(name: str, entry: Range | Unknown) -> Unknown:
