@@ -282,8 +282,19 @@ def _solved(
     limits = {key: solved.keywords[key] for key in ("tolerance", "max_evaluations")}
     several: tuple[Solution, ...] = ()
     if search is not None and search.starts:
-        several, planned = _searched(stage, problem, search, limits), 1 + search.starts
-        solution = min(several, key=lambda each: each.cost)
+        # starts run side by side, so each of them runs on one thread
+        alone, planned = replace(problem, threads=1), 1 + search.starts
+        several = solve_from(
+            alone,
+            [problem.start, *sobol_starts(alone, search.starts, search.seed)],
+            executor=search.executor,
+            store=None if search.store is None else search.store / stage.name,
+            origin=_origin(stage, problem, limits),
+            resume=search.resume,
+            watch=None if search.watch is None else partial(search.watch, stage.name),
+            **limits,
+        )
+        solution = several[0]
     else:
         solution, planned = solved(problem), 1 + OTHERS
     if search is None and solution.loss == "linear" and _unexplained(problem, solution):
@@ -328,24 +339,6 @@ def smooth(parameters: P) -> P:
     """
     drive = isinstance(parameters, ParameterSet)
     return replace(parameters, card_switch="split") if drive else parameters
-
-
-def _searched(
-    stage: Stage, problem: Problem, search: Search, limits: Mapping[str, float]
-) -> tuple[Solution, ...]:
-    """How the nominal start and the others that are wanted ended."""
-    # starts run side by side, so each of them runs on one thread
-    alone, watch = replace(problem, threads=1), search.watch
-    return solve_from(
-        alone,
-        [problem.start, *sobol_starts(alone, search.starts, search.seed)],
-        executor=search.executor,
-        store=None if search.store is None else search.store / stage.name,
-        origin=_origin(stage, problem, limits),
-        resume=search.resume,
-        watch=None if watch is None else (lambda result, done: watch(stage.name, result, done)),
-        **limits,
-    )
 
 
 def _origin(stage: Stage, problem: Problem, limits: Mapping[str, float]) -> dict[str, str]:

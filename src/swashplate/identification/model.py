@@ -5,7 +5,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any, NamedTuple, Protocol, TypeVar, runtime_checkable
+from typing import Any, NamedTuple, Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,6 +29,9 @@ OFFSET = "offset "
 
 class Model(Protocol):
     """A model of the machine; with `simulate` alone it is differentiated by central differences.
+
+    One that knows its derivatives has ``linearise(values, experiment, names)`` as well, which gives
+    for each channel a `Linearised`.
 
     Examples
     --------
@@ -73,17 +76,6 @@ class Linearised(NamedTuple):
     """(m, k) derivatives by the names asked for, in their order."""
 
 
-@runtime_checkable
-class Differentiable(Protocol):
-    """A model that knows its derivatives."""
-
-    def linearise(
-        self, values: Mapping[str, float], experiment: Experiment, names: Sequence[str]
-    ) -> Mapping[str, Linearised]:
-        """Simulate with derivatives by some of the unknowns; otherwise as `Model.simulate`."""
-        ...
-
-
 RELATIVE_STEP = 1e-6
 """Step of the central differences, in units of each number's size."""
 
@@ -110,12 +102,9 @@ def simulated(
 def linearised(
     model: Model, values: Mapping[str, float], experiment: Experiment, names: Sequence[str]
 ) -> Mapping[str, Linearised]:
-    """Simulation with derivatives, the model's own or central differences; raises as `simulated`.
-
-    Arguments are those of `Differentiable.linearise`.
-    """
-    if isinstance(model, Differentiable):
-        made = model.linearise(values, experiment, names)
+    """Simulation with derivatives by names, its own or differences; raises as `simulated`."""
+    if own := getattr(model, "linearise", None):
+        made: Mapping[str, Linearised] = own(values, experiment, names)
         _check(made, experiment, len(names))
         return made
     middle = simulated(model, values, experiment)
@@ -239,7 +228,7 @@ class EquationModel(ABC):
     def linearise(
         self, values: Mapping[str, float], experiment: Experiment, names: Sequence[str]
     ) -> Mapping[str, Linearised]:
-        """Simulate with derivatives; see `model.Differentiable`."""
+        """Simulate with derivatives; see `model.Model`."""
         observed, (columns, chain) = self.observed(experiment), self.columns(names)
         found = self.ready(values, experiment, Asked(observed, columns)).jacobian(observed)
         flat, by, rows = found.residuals, found.columns @ chain, observed.rows_of

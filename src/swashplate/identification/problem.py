@@ -17,7 +17,6 @@ from swashplate.errors import InputError
 from swashplate.identification.model import (
     OFFSET,
     Asked,
-    Differentiable,
     EquationModel,
     Linearised,
     Model,
@@ -443,6 +442,6 @@ def linearised_fit(problem: Problem, vector: Array, loss: Loss = "linear") -> Li
             runs[k] = runs[k]._replace(residual=bounded / slope)
     unknowns = problem.unknowns
     worths = np.array([each.worth for each in unknowns if each.prior is not None])
-    tolerance = TOLERANCE if isinstance(problem.model, Differentiable) else BY_DIFFERENCES
+    tolerance = TOLERANCE if hasattr(problem.model, "linearise") else BY_DIFFERENCES
     prior = unknowns.prior_rows(vector)[1]
     return LinearisedFit(tuple(runs), unknowns.at(vector), prior, tolerance, worths)
