@@ -180,9 +180,11 @@ def at_rate_of(
     It then has the filter's differential equation, if a run is marched at another rate than the one
     that its recursion belongs to.
     """
-    own = parameters.rate
-    for each in experiments if own is not None else ():
-        rate = 1.0 / voltage_record(each).step if each.input.kind == "voltage" else own
+    own, runs = parameters.rate, [each for each in experiments if each.input.kind == "voltage"]
+    if own is None:
+        return parameters, ()
+    for each in runs:
+        rate = 1.0 / voltage_record(each).step
         if abs(rate / own - 1.0) > OTHER_RATE:
             return at_every_rate(parameters), (
                 f"{each.name} is simulated at {rate:.4g} Hz, but the card's filter of "
@@ -274,7 +276,7 @@ def _at(model: DriveModel, values: tuple[tuple[str, float], ...]) -> ParameterSe
         raise DomainError(str(error)) from None
 
 
-def kinds_of(part: Part) -> tuple[ChannelKind, ...]:
+def kinds_of(part: str) -> tuple[ChannelKind, ...]:
     """Kinds of the channels that a part of the drive gives."""
     return tuple(k for k in SIGNALS if part == "chain" or (k in CURRENTS) == (part == "card"))
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from hashlib import blake2b
 from pathlib import Path
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -245,7 +245,7 @@ def fit(
     def solved(stage: Stage, problem: Problem) -> Solved:
         refuse_unsound(check_rank(f"Stage {stage.name}", problem))
         told = None if watch is None else partial(watch, stage.name)
-        limits = {"tolerance": tolerance, "max_evaluations": max_evaluations}
+        limits: dict[str, Any] = {"tolerance": tolerance, "max_evaluations": max_evaluations}
         return _solved(stage, problem, partial(solve, loss=loss, watch=told, **limits), search)
 
     return Fit(free, nominal, staged(free, nominal, runs, solved, threads=threads), doubts)
@@ -337,8 +337,9 @@ def smooth(parameters: P) -> P:
     Sampled, as published, it makes the current jump by up to 0.7 mA as any of the card's parameters
     varies, and a fit ends where it was caught (docs/decisions/0008).
     """
-    drive = isinstance(parameters, ParameterSet)
-    return replace(parameters, card_switch="split") if drive else parameters
+    if isinstance(parameters, ParameterSet):
+        return replace(parameters, card_switch="split")
+    return parameters
 
 
 def _origin(stage: Stage, problem: Problem, limits: Mapping[str, float]) -> dict[str, str]:

@@ -212,10 +212,10 @@ class EquationModel(ABC):
         signals, seen = self.signals_of(experiment), []
         for name in signals if weights is None else weights:
             signal, channel = part_of(signals, experiment, name), experiment[name]
-            zero = np.zeros(channel.time.size)
-            against = (zero,) if weights is None else (channel.values, weights[name])
-            free = f"{OFFSET}{name}" in offsets
-            seen.append(Observation(signal, channel.time, *against, free_offset=free))
+            against: tuple[Array, Array | float] = np.zeros(channel.time.size), 1.0
+            if weights is not None:
+                against = channel.values, weights[name]
+            seen.append(Observation(signal, channel.time, *against, f"{OFFSET}{name}" in offsets))
         by, record, others = self.driven(experiment)
         return ObservedRecord(record, seen, by, experiment.begins, others)
 
