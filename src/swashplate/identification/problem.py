@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property, lru_cache, partial
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple, TypeVar
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple, TypeVar, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -181,36 +181,32 @@ class Problem(Result):
 
     def _reduced(self, vector: Array, number: int) -> Evaluation:
         """A triangular factor of [J r] of one experiment, without ever holding J."""
-        model: Any = self.model
-        experiment, (observed, names, asked, moves) = self.experiments[number], self._own[number]
-        values = self._values(vector, number)
+        experiment, (observed, names, zeros, asked, by) = (
+            self.experiments[number],
+            self._own[number],
+        )
+        values, model = self._values(vector, number), cast("EquationModel", self.model)
         offsets = [values.get(f"{OFFSET}{name}", 0.0) for name in self.weights[number]]
         ready = model.ready(values, experiment, Asked(observed, asked, offsets))
-        factor = ready.triangle(observed).factor
-        chain = self.unknowns.chain(vector, names, experiment.name)
-        return Evaluation(factor[:, -1], factor[:, :-1] @ moves @ chain)
+        factor, chain = ready.triangle(observed).factor, partial(self.unknowns.chain, vector)
+        jacobian = factor[:, : len(asked)] @ by @ chain(names, experiment.name)
+        jacobian += factor[:, len(asked) : -1] @ chain(zeros, experiment.name)
+        return Evaluation(factor[:, -1], jacobian)
 
     @cached_property
-    def _own(self) -> list[tuple[ObservedRecord, list[str], list[str], Array]]:
+    def _own(self) -> list[tuple[ObservedRecord, list[str], list[str], list[str], Array]]:
         """Each experiment as the march of a model of equations sees it.
 
-        With the names of its unknowns, free zeros last; the columns that they ask for; and the
-        derivatives of those columns, and of one for each zero, by the names.
+        With the names of its unknowns and of its free zeros; the columns that the former ask for,
+        and the derivatives of these columns by them.
         """
-        model: Any = self.model
-        made = []
+        model, made = cast("EquationModel", self.model), []
         for experiment, weights in zip(self.experiments, self.weights, strict=True):
-            names = list(self.unknowns.targets(self.start, experiment.name))
-            zeros = [z for name in weights if (z := f"{OFFSET}{name}") in names]
-            others = [name for name in names if name not in zeros]
-            observed, (asked, by) = (
-                model.observed(experiment, weights, zeros),
-                model.columns(others),
-            )
-            moves = np.zeros((len(asked) + len(zeros), len(names)))
-            moves[: len(asked), : len(others)] = by
-            moves[len(asked) :, len(others) :] = np.eye(len(zeros))
-            made.append((observed, [*others, *zeros], asked, moves))
+            targets = self.unknowns.targets(self.start, experiment.name)
+            zeros = [zero for name in weights if (zero := f"{OFFSET}{name}") in targets]
+            names = [name for name in targets if name not in zeros]
+            observed = model.observed(experiment, weights, zeros)
+            made.append((observed, names, zeros, *model.columns(names)))
         return made
 
     def _each(self, work: Callable[[int], Part]) -> list[Part]:
