@@ -153,13 +153,13 @@ def simulated_run(experiment: Experiment, parameters: ParameterSet) -> Simulatio
     An `InputError` says that its input is neither a voltage nor a current, or cannot be marched, a
     `DomainError` that the model does not hold under it.
     """
-    given = experiment.input
+    part: Part = "pump" if experiment.input.kind == "current" else "chain"
     try:
-        driven = measured_current if given.kind == "current" else voltage_record
-        records = {"current" if given.kind == "current" else "voltage": driven(experiment)}
-        return simulate_drive(parameters, records, experiment.begins, experiment.start_pressure)
+        driver, record, _ = DriveModel(parameters, part).driven(experiment)
+        begin = experiment.begins, experiment.start_pressure
+        return simulate_drive(parameters, {driver: record}, *begin)
     except InputError as error:
-        raise InputError(f"{given.source}: {error}") from None
+        raise InputError(f"{experiment.input.source}: {error}") from None
 
 
 def limits_reached(experiment: Experiment, parameters: ParameterSet) -> set[str]:
@@ -212,7 +212,7 @@ class DriveModel(Result, EquationModel):
     """Values of what is not unknown."""
     part: Part = "chain"
     currents: Mapping[str, Record] = field(default_factory=dict)
-    """For the pump alone, the signed current of each experiment by its name. [A]"""
+    """For the pump alone, signed currents by the experiments' names, if not as measured. [A]"""
     forces: Forces | None = None
     """The forces that stand for the solenoids' coefficients."""
 
@@ -223,12 +223,11 @@ class DriveModel(Result, EquationModel):
         return {name: SIGNALS[each.kind] for name, each in channels if each.kind in kinds}
 
     def driven(self, experiment: Experiment) -> tuple[str, Record, Mapping[str, Array]]:
-        """The experiment's voltage, or the current that drives the pump."""
+        """The experiment's voltage, or the current that drives the pump, measured if not given."""
         if self.part != "pump":
             return "voltage", voltage_record(experiment), {}
-        if experiment.name not in self.currents:
-            raise InputError(f"{experiment.name} has no current to drive the pump.")
-        return "current", self.currents[experiment.name], {}
+        given = self.currents.get(experiment.name)
+        return "current", measured_current(experiment) if given is None else given, {}
 
     def ready(self, values: Mapping[str, float], experiment: Experiment, asked: Asked) -> Ready:
         """The drive with numbers; see `EquationModel.ready`."""

@@ -317,39 +317,30 @@ BY_ORDER = 10.0
 class ModelSetup(Result):
     """A model of one's own and what is to be found of it, as set and `Setup` of a drive.
 
-    Parameters
-    ----------
-    model : Model
-        Of equations, an `OwnModel` of them with more said, or any object with `simulate`.
-    free : mapping of str to (low, nominal, high), (low, nominal, high, unit) or Unknown
-        What is to be found, by the model's names. A range of positive bounds, the upper one at
-        least ten times the lower one, is searched by its logarithm. ``"start.PATH"`` of a state and
-        ``"offset CHANNEL"``, the zero of a sensor, are free in each run by themselves.
-    name : str
-        For tables and files; the model's by default.
-    channels : tuple of str
-        Those that are fitted; all that the model gives by default.
-    noise : mapping of str to float
-        Standard deviation of a channel, where the campaign does not state it. [unit]
-    fixed : mapping of str to float
-        Values of names that are not free.
-    standard_uncertainty : mapping of str to float or str
-        What values of `fixed` may be off by, one standard deviation, also as ``"5 %"``.
-    numbers : mapping of str to float
-        The model's numbers, nominal or fitted, those of single runs left out; see `nominal`.
-    scales : mapping of str to float
-        What one unit of residual is, by channel: its noise. [unit]
+    An entry of `free` is (low, nominal, high), (low, nominal, high, unit) or an `Unknown`. A range
+    of positive bounds, the upper one at least ten times the lower one, is searched by its
+    logarithm. ``"start.PATH"`` of a state and ``"offset CHANNEL"``, the zero of a sensor, are free
+    in each run by themselves.
     """
 
     model: Any
+    """A model of equations, an `OwnModel` of them with more said, or an object with `simulate`."""
     free: Mapping[str, Any]
+    """What is to be found, by the model's names."""
     name: str = ""
+    """For tables and files; the model's by default."""
     channels: tuple[str, ...] = ()
+    """Those that are fitted; all that the model gives by default."""
     noise: Mapping[str, float] = field(default_factory=dict)
+    """Standard deviation of a channel, where the campaign does not state it. [unit]"""
     fixed: Mapping[str, float] = field(default_factory=dict)
+    """Values of names that are not free."""
     standard_uncertainty: Mapping[str, StandardUncertainty] = field(default_factory=dict)
+    """What values of `fixed` may be off by, one standard deviation, also as ``"5 %"``."""
     numbers: Mapping[str, float] = field(default_factory=dict)
+    """The model's numbers, nominal or fitted, those of single runs left out; see `nominal`."""
     scales: Mapping[str, float] = field(default_factory=dict)
+    """What one unit of residual is, by channel: its noise. [unit]"""
 
     def __post_init__(self) -> None:
         own = OwnModel(self.model) if isinstance(self.model, Equations) else self.model
