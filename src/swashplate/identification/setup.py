@@ -17,7 +17,7 @@ from pydantic import AfterValidator, BaseModel, ConfigDict, Field, PositiveFloat
 
 from swashplate.campaign import ChannelKind
 from swashplate.campaign.experiment import Experiment
-from swashplate.campaign.schema import NotNegative, Weight, Window
+from swashplate.campaign.schema import Finite, NotNegative, Positive, Weight, Window
 from swashplate.documents import parse_toml, read_text, validated
 from swashplate.equations import Model as Equations
 from swashplate.errors import FileError, InputError, ParameterError
@@ -33,8 +33,6 @@ from swashplate.simulation.instance import START
 
 Array = NDArray[np.float64]
 _SETUPS = files("swashplate.identification").joinpath("setups")
-Finite = Annotated[float, Field(allow_inf_nan=False)]
-Positive = Annotated[PositiveFloat, Field(allow_inf_nan=False)]
 Pair = tuple[Finite, Finite]
 StandardUncertainty = (
     Annotated[PositiveFloat, Field(strict=True, allow_inf_nan=False)]
