@@ -306,7 +306,6 @@ def prewhitened_scores(fit):
     """Sandwich of prewhitened scores (Andrews and Monahan 1992): an AR(1) of each score and run."""
     from swashplate.identification.noise import covariance_of
 
-    fit.check_spare_samples()
     middle = np.zeros((fit.rank, fit.rank))
     for run in fit.runs:
         scores = (run.jacobian @ fit.whitening) * run.residual[:, None]

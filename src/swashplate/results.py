@@ -10,6 +10,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence, Set
 from dataclasses import fields, is_dataclass
+from importlib import import_module
 from pathlib import Path
 from textwrap import shorten
 from typing import TYPE_CHECKING, Any, ClassVar
@@ -156,15 +157,11 @@ class Tabular(Result, ABC):
 
 
 def figures() -> Any:
-    """The package of figures, imported when one is drawn."""
-    from swashplate.report import figures
-
-    return figures
+    """The package of figures, imported when one is drawn; by name, as it stands above results."""
+    return import_module("swashplate.report.figures")
 
 
 def _library(name: str) -> Any:
-    from importlib import import_module
-
     try:
         return import_module(name)
     except ImportError:

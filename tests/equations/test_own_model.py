@@ -145,6 +145,10 @@ def test_stamps_and_sub_steps_are_a_finer_grid(way) -> None:
     assert (run.active("high") == (run["position"] == SHORT.high)).all()
     assert run.active("high").any()
     assert (run.active("low") == (run["position"] == SHORT.low)).all()
+    table = run.to_polars()
+    assert table.columns == [*run.names, "limit_low", "limit_high"]
+    assert all((table[name].to_numpy() == run[name]).all() for name in run.names)
+    assert (table["limit_high"].to_numpy() == run.active("high")).all()
     many = simulate_many(
         stopped, P, {"gain": [0.3, 0.4]}, inputs, output="travel", given=SHORT, **way
     )

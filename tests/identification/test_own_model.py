@@ -173,6 +173,28 @@ def test_uneven_stamps_are_put_on_a_grid(hold) -> None:
         problem(OWN, run).cost(Unknowns(FREE).start)
 
 
+def lagging(state: Rod, command: float, p: Valve, h: float) -> Rod:
+    """Euler's method, which the step's length shows in."""
+    opening = state.opening + h * (command - state.opening) / p.lag
+    return Rod(opening, state.position + h * p.gain * opening)
+
+
+@pytest.mark.parametrize("hold", ["previous", "linear"])
+def test_sub_steps_of_a_fit_are_those_of_a_simulation(hold) -> None:
+    coarse = Model("coarse", Valve, Rod, equation(lagging))
+    way = {"interpolation": hold, "substeps": 3}
+    made = simulate(coarse, TRUTH, {"command": COMMAND}, RATE, **way)["position"]
+    run = trial("a")
+    channels = {"position": replace(run["position"], values=made)}
+    run = replace(run, input=replace(run.input, interpolation=hold), channels=channels)
+    expected = {"lag": TRUTH.lag, "gain": TRUTH.gain}
+    values = found(problem(OwnModel(coarse, substeps=3), run, free=FREE[:2]))
+    assert values == pytest.approx(expected, rel=1e-7)
+    assert found(problem(coarse, run, free=FREE[:2]))["lag"] != pytest.approx(TRUTH.lag, rel=0.01)
+    with pytest.raises(InputError, match="substeps is 0, but must be a whole number"):
+        problem(OwnModel(coarse, substeps=0), run).cost(Unknowns(FREE).start)
+
+
 class Pushed(NamedTuple):
     gain: float
 

@@ -161,7 +161,7 @@ def test_everything_together_stays_finite(axis: Drive, tmp_path: Path) -> None:
         assert np.isfinite(getattr(run, name)).all()
     run.write(tmp_path / "run.csv")
     header = (tmp_path / "run.csv").read_text("utf-8").splitlines()[0]
-    assert header.endswith("motor_torque,motor_pressure_drop")
+    assert "motor_torque,motor_pressure_drop" in header
 
 
 def test_next_to_nothing_of_each_is_next_to_nothing(hoist: Drive) -> None:

@@ -136,7 +136,7 @@ def everything_observed(command: np.ndarray, start: str = "rest") -> ObservedRec
 
 
 OWN = Own(
-    {"start_pressure": 2e4},
+    {"pump.pressure": 2e4},
     offsets=(0.0, 0.0, 0.0, 0.0, 0.1, -0.2, 0.0, 0.0, 0.0),
 )
 
@@ -148,14 +148,14 @@ def test_derivatives_are_those_of_differences(name: str) -> None:
     """By an experiment's own unknowns and some parameters; by all of them: test_sensitivities."""
     command, changes, start = SCENES[name]
     drive, observed = drive_of(changes), everything_observed(command, start)
-    columns = ("Z8", "Z16_plus", "G1_minus", "omega_plus", "tau", "start_pressure")
+    columns = ("Z8", "Z16_plus", "G1_minus", "omega_plus", "tau", "start.pump.pressure")
     found = jacobian(drive.parameters, observed, columns, OWN)
     assert found.names[len(columns) :] == observed.own_columns
     assert np.array_equal(found.residuals, residuals(drive.parameters, observed, OWN))
 
     def at(column: str, offset: float) -> np.ndarray:
-        if column == "start_pressure":
-            own = OWN._replace(start={"start_pressure": 2e4 + offset})
+        if column == "start.pump.pressure":
+            own = OWN._replace(start={"pump.pressure": 2e4 + offset})
         elif column in observed.own_columns:
             values = list(OWN.offsets)
             values[int(column[-2])] += offset
@@ -166,7 +166,7 @@ def test_derivatives_are_those_of_differences(name: str) -> None:
         return residuals(drive.parameters, observed, own)
 
     for j, column in enumerate(found.names):
-        size = {"start_pressure": 2e4, **drive.parameters.numbers}.get(column, 1e-2)
+        size = {"start.pump.pressure": 2e4, **drive.parameters.numbers}.get(column, 1e-2)
         exact, differences = found.columns[:, j], []
         assert np.abs(exact).max() > 0.0
         for h in (2e-6 * size, 5e-5 * size, 1e-3 * size):
@@ -184,7 +184,7 @@ def test_derivatives_are_those_of_differences(name: str) -> None:
 @pytest.mark.traced
 @pytest.mark.parametrize("start", ["rest", "steady"])
 def test_a_start_pressure_is_that_of_a_simulation(hoist: Drive, start: str) -> None:
-    observed, own = observed_at_samples(3.0 + SWING, start), Own({"start_pressure": -5e4})
+    observed, own = observed_at_samples(3.0 + SWING, start), Own({"pump.pressure": -5e4})
     found = residuals(hoist.parameters, observed, own)
     run = simulate_drive(hoist.parameters, {"voltage": observed.record}, start, -5e4)
     assert run.stroker_pressure[0] == -5e4
@@ -192,7 +192,7 @@ def test_a_start_pressure_is_that_of_a_simulation(hoist: Drive, start: str) -> N
         assert np.array_equal(found[observed.rows_of(number)], simulated(run, signal)), signal
 
 
-FREE = ("Z8", "G1", "Z16", "tau", "Z6", "start_pressure", "Z10", "Z12", "lim1_minus")
+FREE = ("Z8", "G1", "Z16", "tau", "Z6", "start.pump.pressure", "Z10", "Z12", "lim1_minus")
 
 
 @pytest.mark.parametrize("columns", [FREE, ALL_COLUMNS, ()], ids=["some", "all", "own alone"])
@@ -292,12 +292,12 @@ def test_refusals(hoist: Drive) -> None:
         residuals(hoist.parameters, observed_at_samples(HARD, signals=["torque"]))
     with pytest.raises(ParameterError, match="no parameter 'Z99'"):
         triangle(hoist.parameters, observed, ["Z99"])
-    with pytest.raises(InputError, match="start_pressure is a column, so Own needs a value"):
-        jacobian(hoist.parameters, observed, ["start_pressure"])
+    with pytest.raises(InputError, match="start.pump.pressure is a column, so Own needs a value"):
+        jacobian(hoist.parameters, observed, ["start.pump.pressure"])
     with pytest.raises(InputError, match="must be a finite number, not nan"):
-        residuals(hoist.parameters, observed, Own({"start_pressure": np.nan}))
+        residuals(hoist.parameters, observed, Own({"pump.pressure": np.nan}))
     with pytest.raises(DomainError, match="the pressure at the start is 1e\\+07 Pa, but"):
-        residuals(hoist.parameters, observed, Own({"start_pressure": 1e7}))
+        residuals(hoist.parameters, observed, Own({"pump.pressure": 1e7}))
     current = ObservedRecord(
         record_of([0.0, 3.0, 3.0], RATE, what="current"),
         [Observation("shaft_speed", [0.0], [0.0])],

@@ -14,7 +14,6 @@ from .fitting import fit as fit
 from .identifiability import Identifiability as Identifiability
 from .intervals import Uncertainty as Uncertainty
 from .intervals import uncertainty as uncertainty
-from .model import Differentiable as Differentiable
 from .model import Linearised as Linearised
 from .model import Model as Model
 from .model import OwnModel as OwnModel

@@ -7,12 +7,10 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from datetime import date
 from functools import cached_property
-from hashlib import blake2b
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict
 
 from swashplate.__about__ import __version__
@@ -23,11 +21,8 @@ from swashplate.errors import FileError, InputError
 from swashplate.identification import tables
 from swashplate.identification.drive_model import (
     Parameters,
-    stage_problem,
-    start_currents_of,
-    with_estimates,
 )
-from swashplate.identification.fitting import Fit, StageFit, smooth
+from swashplate.identification.fitting import Fit, Solved, StageFit, fingerprint, staged
 from swashplate.identification.identifiability import Identifiability, identifiability
 from swashplate.identification.intervals import (
     Handed,
@@ -39,7 +34,7 @@ from swashplate.identification.intervals import (
     slopes_by_fixed,
     uncertainty,
 )
-from swashplate.identification.problem import LinearisedFit, Loss, linearised_fit
+from swashplate.identification.problem import LinearisedFit, Loss, Problem, linearised_fit
 from swashplate.identification.profile import Profile, checked_ends, profiles_of
 from swashplate.identification.resampling import (
     Bootstrap,
@@ -47,7 +42,7 @@ from swashplate.identification.resampling import (
     bootstraps_of,
     cross_validate,
 )
-from swashplate.identification.setup import ModelSetup, Setup
+from swashplate.identification.setup import ModelSetup, Setup, Stage
 from swashplate.identification.solving import Solution
 from swashplate.identification.unknowns import Unknown, Unknowns
 from swashplate.identification.validation import RunQuality, predict, run_qualities
@@ -60,8 +55,6 @@ from swashplate.tables import Table, write_text
 
 if TYPE_CHECKING:
     from swashplate.executors import Executor
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -455,12 +448,10 @@ def load_fit(
         nominal = model.nominal(experiments)
     if isinstance(nominal, ModelSetup) and nominal.setup != file.setup:
         raise InputError(f"{path} is the fit of another model, or of other bounds: fit again.")
-    parameters, stages, starts = smooth(nominal), list[StageFit](), dict[str, Any]()
-    for stage, entry in zip(file.setup.stages, file.stages, strict=False):
-        uncertain = file.setup.standard_uncertainty
-        problem = stage_problem(
-            stage, parameters, experiments, threads=threads, uncertain=uncertain, starts=starts
-        )
+    entries = iter(file.stages)
+
+    def stored(stage: Stage, problem: Problem) -> Solved:
+        entry = next(entries)
         ours, theirs = (
             (name, [(unknown.name, unknown.run) for unknown in unknowns])
             for name, unknowns in ((stage.name, problem.unknowns), (entry.name, entry.unknowns))
@@ -470,23 +461,8 @@ def load_fit(
                 f"{path}: stage {entry.name} has other parameters than its fit configuration "
                 "makes: fit again."
             )
-        problem = replace(problem, unknowns=Unknowns(entry.unknowns))
-        parameters = with_estimates(parameters, problem, entry.solution.vector)
-        starts |= start_currents_of(problem, entry.solution.vector)
-        stages.append(StageFit(stage, problem, entry.solution, parameters, entry.starts))
-    found = Fit(file.setup, nominal, tuple(stages))
+        return replace(problem, unknowns=Unknowns(entry.unknowns)), entry.solution, entry.starts
+
+    begun = file.setup.model_copy(update={"stages": file.setup.stages[: len(file.stages)]})
+    found = Fit(file.setup, nominal, staged(begun, nominal, experiments, stored, threads=threads))
     return Judged(campaign, found, experiments, {}, file.profiles, file.folds, file.notes)
-
-
-def fingerprint(experiment: Experiment) -> str:
-    """Hash of a run's input and channels: stamps, samples and weights."""
-    digest = blake2b(digest_size=8)
-    start = (experiment.start, experiment.start_pressure, experiment.input.interpolation)
-    digest.update(repr(start).encode())
-    arrays = [experiment.input.time, experiment.input.values]
-    for name, channel in experiment.channels.items():
-        digest.update(f"{name} {channel.kind}".encode())
-        arrays += [channel.time, channel.values, channel.weight]
-    for array in arrays:
-        digest.update(np.ascontiguousarray(array).tobytes())
-    return digest.hexdigest()

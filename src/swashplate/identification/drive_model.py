@@ -4,24 +4,24 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import lru_cache
 from types import MappingProxyType
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from swashplate.campaign import ChannelKind, applying, inside
 from swashplate.campaign.campaign import Campaign
-from swashplate.campaign.experiment import Channel, Experiment, InputSignal
+from swashplate.campaign.experiment import Experiment, InputSignal
 from swashplate.campaign.samples import signed_by_command
 from swashplate.campaign.schema import SIGNALS as SIGNALS
 from swashplate.drive import Drive
-from swashplate.equations.marching.jacobian import residuals
 from swashplate.equations.marching.observation import Observation, ObservedRecord, Own
 from swashplate.equations.marching.record import SLOWEST, SOURCE_RATE, Record, even_rate, record_of
 from swashplate.errors import DomainError, InputError, ParameterError
 from swashplate.executors import available_cores
-from swashplate.identification.model import START, EquationModel
+from swashplate.identification.model import OFFSET, Asked, EquationModel
 from swashplate.identification.problem import Problem, noise_scales
 from swashplate.identification.setup import (
     Forces,
@@ -30,13 +30,14 @@ from swashplate.identification.setup import (
     Stage,
     deviation,
     load_setup,
+    setup_names,
 )
 from swashplate.identification.unknowns import Unknown, Unknowns, bounded
 from swashplate.parameters.definitions import SWITCHES, columns_of, find, is_column
 from swashplate.parameters.parameter_set import ParameterSet
 from swashplate.parameters.rules import FULL_VOLTAGE
 from swashplate.results import Result
-from swashplate.simulation.instance import START_PRESSURE, at_every_rate
+from swashplate.simulation.instance import PRESSURE, START, at_every_rate
 from swashplate.simulation.residuals import Ready, made_ready
 from swashplate.simulation.result import Limit, Simulation
 from swashplate.simulation.run import check_voltage, simulate_drive
@@ -55,6 +56,8 @@ CURRENTS: tuple[ChannelKind, ...] = (
     "current_plus",
     "current_minus",
 )
+START_PRESSURE = "start_pressure"
+"""Name of δP at the first sample, where it is an unknown of the experiment."""
 START_CURRENTS = ("start_current_plus", "start_current_minus")
 """Names of a channel's current at the first sample, where it is an unknown of the experiment."""
 LARGEST_START_PRESSURE = 4e6
@@ -63,6 +66,13 @@ OTHER_RATE = 0.01
 """Part by which a rate must differ to be another one."""
 REST = 0.01
 """Share of the largest command below which it has no sign of its own. [1]"""
+REACHED = (
+    (Limit.SWASH_STOP, "swash_angle", "Z13"),
+    (Limit.ORIFICE, "orifice_opening", "Z16"),
+    (Limit.SPOOL, "", "Z14"),
+    (Limit.RELIEF, "", "Z15"),
+)
+"""Limits, the signal whose sign says which side acts, and the parameter that sets them."""
 
 # --- what drives an experiment --------------------------------------------------------------------
 
@@ -81,13 +91,7 @@ def _record(signal: InputSignal) -> Record:
 
 
 def voltage_record(experiment: Experiment) -> Record:
-    """An experiment's command on the march's grid.
-
-    Raises
-    ------
-    InputError
-        If its input is no voltage, or leaves the card's range.
-    """
+    """An experiment's command on the march's grid; refused unless it is a voltage in the range."""
     if experiment.input.kind != "voltage":
         raise InputError(
             f"{experiment.name} is driven by a {experiment.input.kind}, not by a voltage: fit the "
@@ -101,37 +105,28 @@ def measured_current(experiment: Experiment, scale: float = 1.0) -> Record:
 
     Of an experiment driven by a current, or with a channel of it: signed, of both solenoids, or of
     one ammeter around both leads, which is given the command's sign. Positive towards positive
-    speed.
-
-    Raises
-    ------
-    InputError
-        If no current was measured.
+    speed. An `InputError` says that no current was measured.
     """
     drive = experiment.input
     if drive.kind == "current":
         return _record(replace(drive, values=scale * drive.values))
-    for channel, values in _signed_channels(experiment):
-        signed = scale * values
-        return _record(InputSignal("current", "A", channel.time, signed, "linear", channel.source))
-    raise InputError(
-        f"{experiment.name} has no measured current to drive the pump: it needs a channel of the "
-        "kind signed_current, current_plus and current_minus, or rectified_current."
-    )
-
-
-def _signed_channels(experiment: Experiment) -> Iterator[tuple[Channel, Array]]:
-    """Measured currents, the best first, and their values with a sign. [A]"""
-    for channel in experiment.of_kind("signed_current"):
-        yield channel, channel.values
+    signed = [(each, each.values) for each in experiment.of_kind("signed_current")]
     both = experiment.of_kind("current_plus"), experiment.of_kind("current_minus")
     for plus, minus in zip(*both, strict=False):
-        yield plus, plus.values - np.interp(plus.time, minus.time, minus.values)
+        signed.append((plus, plus.values - np.interp(plus.time, minus.time, minus.values)))
     for channel in experiment.of_kind("rectified_current"):
-        command = experiment.input.at(channel.time)
+        command = drive.at(channel.time)
         # noise about zero leaves readings just below it, and a command at rest without a sign
-        level = REST * float(np.abs(command).max())
-        yield channel, signed_by_command(np.maximum(channel.values, 0.0), command, level=level)
+        level, reading = REST * float(np.abs(command).max()), np.maximum(channel.values, 0.0)
+        signed.append((channel, signed_by_command(reading, command, level=level)))
+    if not signed:
+        raise InputError(
+            f"{experiment.name} has no measured current to drive the pump: it needs a channel of "
+            "the kind signed_current, current_plus and current_minus, or rectified_current."
+        )
+    channel, values = signed[0]
+    made = InputSignal("current", "A", channel.time, scale * values, "linear", channel.source)
+    return _record(made)
 
 
 def simulated_current(
@@ -145,30 +140,24 @@ def simulated_current(
     card begins at rest or settled, as the experiment does.
     """
     record = voltage_record(experiment)
-    fine = replace(record, rate=record.rate * record.substeps, substeps=1)
-    seen = Observation("current", fine.time, np.zeros(fine.time.size))
+    seen = Observation("current", record.points, np.zeros(record.values.size))
     observed = ObservedRecord(record, (seen,), "voltage", experiment.begins)
     # refinements begin behind the card
-    ready = DriveModel(parameters.plain, "card").ready(start, experiment, observed, ())
-    return replace(record, values=residuals(ready.instance, observed, ready.own))
+    ready = DriveModel(parameters.plain, "card").ready(start, experiment, Asked(observed))
+    return replace(record, values=ready.residuals(observed))
 
 
 def simulated_run(experiment: Experiment, parameters: ParameterSet) -> Simulation:
     """An experiment as a parameter set has it, whatever was measured.
 
-    Raises
-    ------
-    InputError
-        If the input is neither a voltage nor a current, or cannot be marched.
-    DomainError
-        If the model does not hold under it.
+    An `InputError` says that its input is neither a voltage nor a current, or cannot be marched, a
+    `DomainError` that the model does not hold under it.
     """
+    part: Part = "pump" if experiment.input.kind == "current" else "chain"
     try:
-        if experiment.input.kind == "current":
-            records = {"current": measured_current(experiment)}
-        else:
-            records = {"voltage": voltage_record(experiment)}
-        return simulate_drive(parameters, records, experiment.begins, experiment.start_pressure)
+        driver, record, _ = DriveModel(parameters, part).driven(experiment)
+        begin = experiment.begins, experiment.start_pressure
+        return simulate_drive(parameters, {driver: record}, *begin)
     except InputError as error:
         raise InputError(f"{experiment.input.source}: {error}") from None
 
@@ -176,16 +165,11 @@ def simulated_run(experiment: Experiment, parameters: ParameterSet) -> Simulatio
 def limits_reached(experiment: Experiment, parameters: ParameterSet) -> set[str]:
     """Columns of the limits that act in a run, such as ``"Z16_plus"``, of Z13 to Z16."""
     run, found = simulated_run(experiment, parameters), set[str]()
-    sides = (
-        ("Z13", Limit.SWASH_STOP, run.swash_angle),
-        ("Z16", Limit.ORIFICE, run.orifice_opening),
-    )
-    for symbol, limit, signal in sides:
+    for limit, signal, symbol in REACHED:
         acts = run.active(limit)
-        found |= {f"{symbol}_plus"} if (acts & (signal > 0.0)).any() else set()
-        found |= {f"{symbol}_minus"} if (acts & (signal < 0.0)).any() else set()
-    both = {"Z14": Limit.SPOOL, "Z15": Limit.RELIEF}
-    return found | {symbol for symbol, limit in both.items() if run.active(limit).any()}
+        sides = {"_plus": run[signal] > 0.0, "_minus": run[signal] < 0.0} if signal else {"": acts}
+        found |= {symbol + side for side, there in sides.items() if (acts & there).any()}
+    return found
 
 
 def at_rate_of(
@@ -196,16 +180,15 @@ def at_rate_of(
     It then has the filter's differential equation, if a run is marched at another rate than the one
     that its recursion belongs to.
     """
-    if parameters.rate is None:
+    own, runs = parameters.rate, [each for each in experiments if each.input.kind == "voltage"]
+    if own is None:
         return parameters, ()
-    for each in experiments:
-        rate = parameters.rate
-        if each.input.kind == "voltage":
-            rate = 1.0 / voltage_record(each).step
-        if abs(rate / parameters.rate - 1.0) > OTHER_RATE:
+    for each in runs:
+        rate = 1.0 / voltage_record(each).step
+        if abs(rate / own - 1.0) > OTHER_RATE:
             return at_every_rate(parameters), (
                 f"{each.name} is simulated at {rate:.4g} Hz, but the card's filter of "
-                f"{parameters.name} is a recursion for {parameters.rate:g} Hz: the fit takes the "
+                f"{parameters.name} is a recursion for {own:g} Hz: the fit takes the "
                 "differential equation with the same poles, which holds at every rate.",
             )
     return parameters, ()
@@ -229,16 +212,9 @@ class DriveModel(Result, EquationModel):
     """Values of what is not unknown."""
     part: Part = "chain"
     currents: Mapping[str, Record] = field(default_factory=dict)
-    """For the pump alone, the signed current of each experiment by its name. [A]"""
+    """For the pump alone, signed currents by the experiments' names, if not as measured. [A]"""
     forces: Forces | None = None
     """The forces that stand for the solenoids' coefficients."""
-    _last: dict[tuple[tuple[str, float], ...], ParameterSet] = field(
-        default_factory=dict, repr=False, init=False
-    )
-
-    def __getstate__(self) -> dict[str, object]:
-        """Without what can be made again."""
-        return {**super().__getstate__(), "_last": {}}
 
     def signals_of(self, experiment: Experiment) -> Mapping[str, str]:
         """Signal for each channel that this part of the drive gives."""
@@ -247,33 +223,23 @@ class DriveModel(Result, EquationModel):
         return {name: SIGNALS[each.kind] for name, each in channels if each.kind in kinds}
 
     def driven(self, experiment: Experiment) -> tuple[str, Record, Mapping[str, Array]]:
-        """The experiment's voltage, or the current that drives the pump."""
+        """The experiment's voltage, or the current that drives the pump, measured if not given."""
         if self.part != "pump":
             return "voltage", voltage_record(experiment), {}
-        if experiment.name not in self.currents:
-            raise InputError(f"{experiment.name} has no current to drive the pump.")
-        return "current", self.currents[experiment.name], {}
+        given = self.currents.get(experiment.name)
+        return "current", measured_current(experiment) if given is None else given, {}
 
-    def ready(
-        self,
-        values: Mapping[str, float],
-        experiment: Experiment,
-        observed: ObservedRecord,
-        columns: Sequence[str],
-        offsets: Sequence[float] = (),
-    ) -> Ready:
+    def ready(self, values: Mapping[str, float], experiment: Experiment, asked: Asked) -> Ready:
         """The drive with numbers; see `EquationModel.ready`."""
         states = {
-            path.removeprefix(START): values[name]
-            for name in START_CURRENTS
+            column.removeprefix(START): values[name]
+            for name in (START_PRESSURE, *START_CURRENTS)
             if name in values
-            for path in self.moves(name)
+            for column in self.moves(name)
         }
-        if START_PRESSURE in values:
-            states[START_PRESSURE] = values[START_PRESSURE]
-        own = Own(states, offsets)
+        parameters, own = self.parameters_at(values), Own(states, asked.offsets)
         try:
-            return made_ready(self.parameters_at(values), observed, columns, own)
+            return made_ready(parameters, asked.observed, asked.columns, own)
         except InputError as error:  # a filter that is unstable at this step
             raise DomainError(str(error)) from None
 
@@ -286,70 +252,53 @@ class DriveModel(Result, EquationModel):
             leaves = ("now", "out") if self.parameters.rate is None else ("now", "before", "out")
             side = name.removeprefix("start_current_")
             return {f"{START}card.{side}.{leaf}": 1.0 for leaf in leaves}
-        return {name: 1.0} if is_column(name) or name == START_PRESSURE else {}
+        if name == START_PRESSURE:
+            return {f"{START}{PRESSURE}": 1.0}
+        return {name: 1.0} if is_column(name) else {}
 
     def parameters_at(self, values: Mapping[str, float]) -> ParameterSet:
-        """The parameter set for some values of the unknowns.
-
-        Raises
-        ------
-        DomainError
-            If a value breaks a rule.
-        """
+        """The set for some values of the unknowns; a `DomainError` if one breaks a rule."""
         forces = () if self.forces is None else self.forces.names
-        own = {n: value for n, value in values.items() if is_column(n) or n in forces}
-        key = tuple(own.items())
-        # runs of one evaluation share their parameters, and checking a set takes a while
-        if (last := self._last.get(key)) is not None:
-            return last
-        changes = {name: v for name, v in own.items() if is_column(name)}
-        if self.forces is not None:
-            changes |= self.forces.coefficients(own, self.parameters)
-        try:
-            # whatever the values, the equations stay those that the fit began with
-            made = self.parameters.replace(changes, self.parameters.options)
-        except ParameterError as error:
-            raise DomainError(str(error)) from None
-        self._last.clear()
-        self._last[key] = made
-        return made
+        return _at(self, tuple((n, v) for n, v in values.items() if is_column(n) or n in forces))
 
 
-def kinds_of(part: Part) -> tuple[ChannelKind, ...]:
+@lru_cache(maxsize=8)
+def _at(model: DriveModel, values: tuple[tuple[str, float], ...]) -> ParameterSet:
+    """The set with values; runs of one evaluation share it, as checking its rules takes a while."""
+    changes = {name: value for name, value in values if is_column(name)}
+    if model.forces is not None:
+        changes |= model.forces.coefficients(dict(values), model.parameters)
+    try:
+        # whatever the values, the equations stay those that the fit began with
+        return model.parameters.replace(changes, model.parameters.options)
+    except ParameterError as error:
+        raise DomainError(str(error)) from None
+
+
+def kinds_of(part: str) -> tuple[ChannelKind, ...]:
     """Kinds of the channels that a part of the drive gives."""
     return tuple(k for k in SIGNALS if part == "chain" or (k in CURRENTS) == (part == "card"))
 
 
 def true_value(unknown: Unknown, model: DriveModel, truth: ParameterSet) -> float | None:
     """What an unknown of the machine really is; None for one of a single experiment."""
-    if unknown.run is not None:
-        return None
     forces = model.forces.values(truth) if model.forces is not None else {}
-    return {**truth.numbers, **forces}[unknown.targets[0]]
+    return {**truth.numbers, **forces}[unknown.targets[0]] if unknown.run is None else None
 
 
 # --- from a stage of a fit configuration to its problem -------------------------------------------
 
 
 def setup_of(campaign: Campaign, axis: str, name: str | None = None) -> Setup:
-    """The set-up of a name, or the packaged one of the axis's drive.
-
-    Raises
-    ------
-    InputError
-        If none is named and the drive has no packaged one.
-    """
-    if name is not None:
-        return load_setup(name)
-    drive = campaign.drive(axis).name
-    try:
-        return load_setup(drive)
-    except ParameterError:
+    """The set-up of a name, or the packaged one of the axis's drive; an `InputError` for none."""
+    drive = campaign.drive(axis).name if name is None else ""
+    if name is None and drive not in setup_names():
         raise InputError(
             f"There is no packaged fit configuration for the drive '{drive}': give one of your "
             "own, a .toml file with stages and free parameters; 'swashplate guess' reads one off "
             "the logs."
-        ) from None
+        )
+    return load_setup(name or drive)
 
 
 def stage_problem(
@@ -365,60 +314,30 @@ def stage_problem(
 
     `parameters` are the nominal values, those of earlier stages already found; `uncertain` standard
     uncertainties of what stays fixed, as of `Setup`; `starts` currents at the first sample that a
-    stage before estimated, see `start_currents_of`. Threads are all cores by default.
-
-    Raises
-    ------
-    InputError
-        If no experiment has a channel that the stage fits, none that it weighs, or no current that
-        the stage asks for.
-    ParameterError
-        If a free parameter is unknown or its bounds are wrong.
+    stage before estimated, see `start_currents_of`. Threads are all cores by default. An
+    `InputError` says that no run has what the stage fits or asks for, a `ParameterError` that a
+    free parameter is unknown or its bounds are wrong.
     """
     threads = threads or available_cores()
     if isinstance(parameters, ModelSetup):
         return parameters.problem(experiments, threads=threads)
     if stage.part == "model":
         raise InputError("part = 'model' needs a model of your own, not a drive.")
-    kinds = stage.channels or kinds_of(stage.part)
-    all_channels = [each for run in experiments for each in run.channels.items()]
-    channels = tuple(dict.fromkeys(name for name, each in all_channels if each.kind in kinds))
+    channels = _channels_of(stage, experiments)
     runs = tuple(each for each in experiments if any(name in each.channels for name in channels))
-    if not channels:
-        had = ", ".join(dict.fromkeys(each.kind for _, each in all_channels)) or "no channel"
-        hint = ""
-        if stage.part == "card":
-            hint = "; without a current, let 'swashplate guess' write start and fit configuration"
-        raise InputError(
-            f"The stage '{stage.name}' fits {', '.join(kinds)}, but the runs to fit have "
-            f"{had}{hint}."
-        )
-    weighed = [*stage.weights, *stage.weights_by_input]
-    fitted = {each.kind for name, each in all_channels if name in channels}
-    if weighed and not fitted & set(weighed):  # they would be lost in silence
-        raise InputError(
-            f"The stage '{stage.name}' weighs {', '.join(dict.fromkeys(weighed))}, but the runs "
-            f"have {', '.join(sorted(fitted))}: add weights for that, or take a fit configuration "
-            "without."
-        )
     currents = {}
     for each in runs if stage.part == "pump" else ():
         if stage.current == "measured" or each.input.kind == "current":
             currents[each.name] = measured_current(each, stage.current_scale)
         else:
-            start = starts.get(each.name, {})
-            currents[each.name] = simulated_current(each, parameters, start)
+            currents[each.name] = simulated_current(each, parameters, starts.get(each.name, {}))
     free = _of_the_machine(stage, parameters)
     begin = {column: each.start for each in free for column in each.targets if column in SWITCHES}
     on = parameters.options | {SWITCHES[column] for column in begin}
+    begun = parameters.replace(begin, on) if begin else parameters
     own = [unknown for each in runs for unknown in _of_a_run(stage, each, channels, parameters)]
     return Problem(
-        DriveModel(
-            parameters.replace(begin, on) if begin else parameters,
-            stage.part,
-            currents,
-            stage.forces,
-        ),
+        DriveModel(begun, stage.part, currents, stage.forces),
         tuple(_weighted(each, stage) for each in runs),
         Unknowns((*free, *own)),
         channels,
@@ -431,6 +350,29 @@ def stage_problem(
     )
 
 
+def _channels_of(stage: Stage, experiments: Sequence[Experiment]) -> tuple[str, ...]:
+    """Names of the channels that a stage fits; weights of others would be lost in silence."""
+    kinds = stage.channels or kinds_of(stage.part)
+    had = [(name, each.kind) for run in experiments for name, each in run.channels.items()]
+    fitted = {kind for _, kind in had if kind in kinds}
+    if not fitted:
+        hint = ""
+        if stage.part == "card":
+            hint = "; without a current, let 'swashplate guess' write start and fit configuration"
+        raise InputError(
+            f"The stage '{stage.name}' fits {', '.join(kinds)}, but the runs to fit have "
+            f"{', '.join(dict.fromkeys(kind for _, kind in had)) or 'no channel'}{hint}."
+        )
+    weighed = {**stage.weights, **stage.weights_by_input}
+    if weighed and not fitted & set(weighed):
+        raise InputError(
+            f"The stage '{stage.name}' weighs {', '.join(weighed)}, but the runs have "
+            f"{', '.join(sorted(fitted))}: add weights for that, or take a fit configuration "
+            "without."
+        )
+    return tuple(dict.fromkeys(name for name, kind in had if kind in kinds))
+
+
 def start_currents_of(problem: Problem, vector: Array) -> Starts:
     """Currents at the first sample that a stage estimated, by run; for the stages after it."""
     found: dict[str, dict[str, float]] = {}
@@ -441,13 +383,7 @@ def start_currents_of(problem: Problem, vector: Array) -> Starts:
 
 
 def with_estimates(parameters: Parameters, problem: Problem, vector: Array) -> Parameters:
-    """The parameters with what a stage found, at a point of its problem.
-
-    Raises
-    ------
-    DomainError
-        If a value breaks a rule.
-    """
+    """The parameters with what a stage found; a `DomainError` if a value breaks a rule."""
     found = problem.unknowns.targets(vector, "")
     if isinstance(parameters, ModelSetup):
         return replace(parameters, numbers={**parameters.numbers, **found}, scales=problem.scales)
@@ -476,28 +412,17 @@ def _of_the_machine(stage: Stage, parameters: ParameterSet) -> list[Unknown]:
     """Unknowns of the drive: free parameters, both directions apart unless tied, then forces."""
     unknowns: list[Unknown] = []
     for name, entry in stage.free.items():
-        definition = find(name)
-        columns = definition.columns if name == definition.symbol else (name,)
-        unknowns += [
-            bounded(
-                name if entry.tied else group[0],
-                float(np.mean([_nominal(parameters, column) for column in group])),
-                relative=entry.relative,
-                absolute=entry.bounds,
-                least=-np.inf if definition.least is None else definition.least,
-                unit=definition.unit,
-                log=entry.log,
-                prior=entry.prior,
-                sets=group,
-            )
-            for group in ([columns] if entry.tied else [(each,) for each in columns])
-        ]
+        definition, columns = find(name), tuple(columns_of([name]))
+        least = -np.inf if definition.least is None else definition.least
+        how: Any = {"unit": definition.unit, "log": entry.log, "prior": entry.prior}
+        for group in [columns] if entry.tied else [(each,) for each in columns]:
+            nominal = float(np.mean([_nominal(parameters, column) for column in group]))
+            own, bounds = name if entry.tied else group[0], (entry.relative, entry.bounds)
+            unknowns.append(bounded(own, nominal, *bounds, least, sets=group, **how))
     if stage.forces is not None:
-        relative = stage.forces.relative
-        unknowns += [
-            bounded(name, value, relative=relative, unit="N", log=value > 0.0)
-            for name, value in stage.forces.values(parameters).items()
-        ]
+        for name, value in stage.forces.values(parameters).items():
+            log = value > 0.0
+            unknowns.append(bounded(name, value, stage.forces.relative, unit="N", log=log))
     return unknowns
 
 
@@ -519,7 +444,7 @@ def _of_a_run(
             # far enough both ways never to be reached
             first, reach = float(channel.values[0]), 1.0 + 10.0 * float(np.ptp(channel.values))
             ends = first - reach, first + reach
-            yield Unknown(f"offset {name}", first, *ends, channel.unit, run=run)
+            yield Unknown(f"{OFFSET}{name}", first, *ends, channel.unit, run=run)
     if stage.part != "card" and (stage.start_pressure is not None or estimated):
         most = stage.start_pressure or LARGEST_START_PRESSURE
         yield Unknown(START_PRESSURE, 0.0, -most, most, "Pa", run=run)
@@ -527,7 +452,6 @@ def _of_a_run(
     if estimated and measured and stage.part != "pump" and experiment.input.kind == "voltage":
         first = float(measured_current(experiment).values[0])
         if first != 0.0:  # else neither channel can be told driven
-            side, sign = ("plus", 1.0) if first > 0.0 else ("minus", -1.0)
-            most = 2.0 * abs(Drive(parameters).steady_current(sign * FULL_VOLTAGE))
-            start = min(abs(first), 0.9 * most)
-            yield Unknown(f"start_current_{side}", start, 0.0, most, "A", run=run)
+            name, full = START_CURRENTS[first < 0.0], np.copysign(FULL_VOLTAGE, first)
+            most = 2.0 * abs(Drive(parameters).steady_current(float(full)))
+            yield Unknown(name, min(abs(first), 0.9 * most), 0.0, most, "A", run=run)

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from hashlib import blake2b
 from pathlib import Path
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,7 +36,7 @@ from swashplate.identification.drive_model import (
 )
 from swashplate.identification.faults import measurement_error
 from swashplate.identification.intervals import weighed
-from swashplate.identification.model import Model, OwnModel
+from swashplate.identification.model import EquationModel, Model
 from swashplate.identification.problem import Loss, Problem
 from swashplate.identification.setup import ModelSetup, Range, Setup, Stage
 from swashplate.identification.solving import Progress, Solution, sobol_starts, solve, solve_from
@@ -51,6 +51,8 @@ if TYPE_CHECKING:
 
 P = TypeVar("P", bound=Parameters)
 Array = NDArray[np.float64]
+Solved = tuple[Problem, Solution, tuple[Solution, ...]]
+"""A stage's problem, its priors weighed, its optimum, and how several starts ended."""
 
 OTHERS = 6
 """Starts besides the nominal one where that ends far from what was measured: of 856 sound campaigns
@@ -99,22 +101,16 @@ class StageFit(Result):
     def bounds_reached(self) -> tuple[str, ...]:
         """Sentences on unknowns of the machine that ended at a bound, and what to do about it."""
         point = self.problem.unknowns.at(self.solution.vector)
+        ends = {-1: "lower", 1: "upper"}
         return tuple(
-            f"{each.name} ended at its {'upper' if side > 0 else 'lower'} bound: "
-            f"{self.stage.beyond(each, side)}."
+            f"{each.name} ended at its {ends[side]} bound: {self.stage.beyond(each, side)}."
             for each, side in zip(point, point.at_bound.tolist(), strict=True)
             if each.run is None and side
         )
 
     @property
     def drive(self) -> Drive:
-        """The drive with what was found.
-
-        Raises
-        ------
-        InputError
-            If it is a model of one's own.
-        """
+        """The drive with what was found; an `InputError` if it is a model of one's own."""
         if isinstance(self.parameters, ModelSetup):
             raise InputError(f"{self.parameters.name} is a model of your own, no drive.")
         return Drive(self.parameters)
@@ -194,8 +190,8 @@ def fit(
     ----------
     model : Drive, ParameterSet, Model or ModelSetup
         A drive: where to begin, and what stays fixed. The decay's switch is split, see `smooth`,
-        and the card's filter one that holds at the rate of the runs. Or a model of one's own: of
-        equations, an `OwnModel` of them, any object with `simulate`, or a `ModelSetup`.
+        the card's filter holds at the rate of the runs. Or a model of one's own: of equations,
+        an `OwnModel` of them, any object with `simulate`, or a `ModelSetup`.
     tests : Campaign or sequence of Experiment
         The runs to fit; of a campaign those with the role ``"fit"``.
     free : Setup or mapping of str to (low, nominal, high) or Unknown
@@ -232,70 +228,87 @@ def fit(
         raise InputError("There is no run to fit.")
     nominal = model.parameters if isinstance(model, Drive) else model
     doubts = refuse_unsound(spike_findings(runs, loss))
-    if isinstance(nominal, ParameterSet):
-        if not isinstance(free, Setup):
-            raise InputError(
-                "A drive needs a Setup, such as load_setup('hoist'), for what is free."
-            )
-        setup = free
-        doubts += refuse_unsound(check_runs(runs, smooth(nominal)))
-        nominal, changed = at_rate_of(runs, nominal)
-        doubts += changed
-    else:
+    if not isinstance(nominal, ParameterSet):
         if not isinstance(nominal, ModelSetup):
             entries = free if isinstance(free, Mapping) else {}
             nominal = ModelSetup(nominal, entries, "", tuple(channels), noise or {}, fixed or {})
         doubts += refuse_unsound(check_model(runs, nominal))
         nominal = nominal if nominal.numbers else nominal.nominal(runs)
-        setup = nominal.setup
+        free = nominal.setup
+    elif isinstance(free, Setup):
+        doubts += refuse_unsound(check_runs(runs, smooth(nominal)))
+        nominal, changed = at_rate_of(runs, nominal)
+        doubts += changed
+    else:
+        raise InputError("A drive needs a Setup for what is free, such as load_setup('hoist').")
+
+    def solved(stage: Stage, problem: Problem) -> Solved:
+        refuse_unsound(check_rank(f"Stage {stage.name}", problem))
+        told = None if watch is None else partial(watch, stage.name)
+        limits: dict[str, Any] = {"tolerance": tolerance, "max_evaluations": max_evaluations}
+        return _solved(stage, problem, partial(solve, loss=loss, watch=told, **limits), search)
+
+    return Fit(free, nominal, staged(free, nominal, runs, solved, threads=threads), doubts)
+
+
+def staged(
+    setup: Setup,
+    nominal: Parameters,
+    runs: Sequence[Experiment],
+    solved: Callable[[Stage, Problem], Solved],
+    *,
+    threads: int | None = None,
+) -> tuple[StageFit, ...]:
+    """The stages of a set-up, each from what the ones before found, until one is interrupted."""
     parameters, stages, starts = smooth(nominal), list[StageFit](), dict[str, Mapping[str, float]]()
     for stage in setup.stages:
         uncertain = setup.standard_uncertainty
         problem = stage_problem(
             stage, parameters, runs, threads=threads, uncertain=uncertain, starts=starts
         )
-        refuse_unsound(check_rank(f"Stage {stage.name}", problem))
-        solved = partial(
-            solve,
-            loss=loss,
-            tolerance=tolerance,
-            max_evaluations=max_evaluations,
-            watch=None if watch is None else partial(watch, stage.name),
-        )
-        problem, solution, several = _solved(stage, problem, solved, search)
+        problem, solution, several = solved(stage, problem)
         parameters = with_estimates(parameters, problem, solution.vector)
-        starts = {**starts, **start_currents_of(problem, solution.vector)}
+        starts |= start_currents_of(problem, solution.vector)
         stages.append(StageFit(stage, problem, solution, parameters, several))
         if solution.interrupted:
             break
-    return Fit(setup, nominal, tuple(stages), doubts)
+    return tuple(stages)
 
 
 def _solved(
     stage: Stage, problem: Problem, solved: partial[Solution], search: Search | None
-) -> tuple[Problem, Solution, tuple[Solution, ...]]:
-    """A stage's problem, its priors weighed, its optimum, and how several starts ended."""
+) -> Solved:
+    """See `Solved`."""
     limits = {key: solved.keywords[key] for key in ("tolerance", "max_evaluations")}
     several: tuple[Solution, ...] = ()
-    wanted = search.starts if search is not None else 0
-    if search is not None and wanted:
-        several = _searched(stage, problem, search, limits)
-        best = min(several, key=lambda each: each.cost)
-        if len(several) <= wanted:
-            return problem, _stopped(several, 1 + wanted), several
-        solution = solved(problem, best.vector)
+    if search is not None and search.starts:
+        # starts run side by side, so each of them runs on one thread
+        alone, planned = replace(problem, threads=1), 1 + search.starts
+        several = solve_from(
+            alone,
+            [problem.start, *sobol_starts(alone, search.starts, search.seed)],
+            executor=search.executor,
+            store=None if search.store is None else search.store / stage.name,
+            origin=_origin(stage, problem, limits),
+            resume=search.resume,
+            watch=None if search.watch is None else partial(search.watch, stage.name),
+            **limits,
+        )
+        solution = several[0]
     else:
-        solution = solved(problem)
+        solution, planned = solved(problem), 1 + OTHERS
     if search is None and solution.loss == "linear" and _unexplained(problem, solution):
         try:
             others = solve_from(problem, [*sobol_starts(problem, OTHERS, 0)], **limits)
         except KeyboardInterrupt:  # before the first of them ended
             others = ()
         several = solution, *(replace(each, number=each.number + 1) for each in others)
+    if several:
         best = min(several, key=lambda each: each.cost)
-        if len(several) <= OTHERS:
-            solution = _stopped(several, 1 + OTHERS)
-        elif best.number:
+        if len(several) < planned:
+            words = f"interrupted after {len(several)} of {planned} starts: the best of them"
+            solution = replace(best, converged=False, interrupted=True, message=words)
+        elif search is not None or best.number:
             solution = solved(problem, best.vector)
     if any(each.prior is not None for each in problem.unknowns) and not solution.interrupted:
         # what the residuals are worth is known only now
@@ -304,56 +317,29 @@ def _solved(
     return problem, solution, several
 
 
-def _stopped(several: Sequence[Solution], planned: int) -> Solution:
-    """The best of some starts as what an interrupted search found."""
-    words = f"interrupted after {len(several)} of {planned} starts: the best of them"
-    best = min(several, key=lambda each: each.cost)
-    return replace(best, converged=False, interrupted=True, message=words)
-
-
 def _unexplained(problem: Problem, solution: Solution) -> bool:
     """Whether residuals of a channel are far larger than its known measurement error."""
-    if solution.interrupted or not isinstance(problem.model, DriveModel | OwnModel):
+    if solution.interrupted or not isinstance(problem.model, EquationModel):
         return False  # any object with simulate may take minutes
     left: dict[str, list[Array]] = {}
     for number, experiment in enumerate(problem.experiments):
         for name, output in problem.outputs(solution.vector, number).items():
             channel = experiment[name]
-            error = measurement_error(channel)
-            if error is not None:
+            if (error := measurement_error(channel)) is not None:
                 left.setdefault(name, []).append((output - channel.values)[channel.used] / error)
-    joined = [np.concatenate(parts) for parts in left.values()]
+    joined = map(np.concatenate, left.values())
     return any(float(r @ r) > UNEXPLAINED**2 * r.size for r in joined)
 
 
 def smooth(parameters: P) -> P:
-    """The set with the decay's switch split within the step.
+    """The set with the decay's switch split within the step; a model of one's own has none.
 
     Sampled, as published, it makes the current jump by up to 0.7 mA as any of the card's parameters
     varies, and a fit ends where it was caught (docs/decisions/0008).
     """
     if isinstance(parameters, ParameterSet):
         return replace(parameters, card_switch="split")
-    return parameters  # a model of one's own has no card
-
-
-def _searched(
-    stage: Stage, problem: Problem, search: Search, limits: Mapping[str, float]
-) -> tuple[Solution, ...]:
-    """How the nominal start and the others that are wanted ended."""
-    # starts run side by side, so each of them runs on one thread
-    alone = replace(problem, threads=1)
-    watch = search.watch
-    return solve_from(
-        alone,
-        [problem.start, *sobol_starts(alone, search.starts, search.seed)],
-        executor=search.executor,
-        store=None if search.store is None else search.store / stage.name,
-        origin=_origin(stage, problem, limits),
-        resume=search.resume,
-        watch=None if watch is None else (lambda result, done: watch(stage.name, result, done)),
-        **limits,
-    )
+    return parameters
 
 
 def _origin(stage: Stage, problem: Problem, limits: Mapping[str, float]) -> dict[str, str]:
@@ -363,43 +349,36 @@ def _origin(stage: Stage, problem: Problem, limits: Mapping[str, float]) -> dict
         drive = problem.model.parameters
         forms = drive.pressure_root, drive.coulomb_sign, drive.rate, sorted(drive.options)
         known = sorted(drive.numbers.items()), forms
-    digest = blake2b(digest_size=16)
-    for experiment, weights in zip(problem.experiments, problem.weights, strict=True):
-        arrays = [experiment.input.time, experiment.input.values]
-        for name, weight in weights.items():
-            arrays += [experiment[name].time, experiment[name].values, weight]
-        for array in arrays:
-            digest.update(np.ascontiguousarray(array).tobytes())
     marks = {
         "stage of the fit configuration": stage.model_dump_json(),
         "tolerances": sorted(limits.items()),
         "nominal values": known,
+        "runs and their weights": (problem.scales, [*map(fingerprint, problem.experiments)]),
     }
-    return {
-        "version of swashplate": __version__,
-        **{k: blake2b(repr(v).encode(), digest_size=8).hexdigest() for k, v in marks.items()},
-        "runs and their weights": digest.hexdigest(),
-    }
+    hashes = {k: blake2b(repr(v).encode(), digest_size=8).hexdigest() for k, v in marks.items()}
+    return {"version of swashplate": __version__, **hashes}
+
+
+def fingerprint(experiment: Experiment) -> str:
+    """Hash of a run's input and channels: stamps, samples and weights."""
+    digest = blake2b(digest_size=8)
+    start = (experiment.start, experiment.start_pressure, experiment.input.interpolation)
+    digest.update(repr(start).encode())
+    arrays = [experiment.input.time, experiment.input.values]
+    for name, channel in experiment.channels.items():
+        digest.update(f"{name} {channel.kind}".encode())
+        arrays += [channel.time, channel.values, channel.weight]
+    for array in arrays:
+        digest.update(np.ascontiguousarray(array).tobytes())
+    return digest.hexdigest()
 
 
 def drawn(nominal: Drive, setup: Setup, seed: int, *, spread: float = SPREAD) -> Drive:
     """A drive that differs from a nominal one in what a set-up frees, and in nothing else.
 
-    Parameters
-    ----------
-    nominal : Drive
-        About which it is drawn.
-    setup : Setup
-        Its free parameters are multiplied by log-normal factors, both directions apart.
-    seed : int
-        Not negative.
-    spread : float
-        Standard deviation of the factors' logarithms.
-
-    Raises
-    ------
-    ParameterError
-        If what was drawn breaks a rule: draw with another seed.
+    Each free parameter is multiplied by a log-normal factor, both directions apart, of which the
+    logarithm has the standard deviation `spread`. The seed is not negative. A `ParameterError` says
+    that what was drawn breaks a rule: draw with another seed.
     """
     random = np.random.default_rng(seed)
     names = [name for stage in setup.stages for name in columns_of(list(stage.free))]

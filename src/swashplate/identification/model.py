@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, field
-from typing import Any, NamedTuple, Protocol, runtime_checkable
+from dataclasses import dataclass, field, replace
+from typing import Any, NamedTuple, Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,24 +14,24 @@ from swashplate.campaign.experiment import Experiment
 from swashplate.equations import Model as Equations
 from swashplate.equations import instance_of, parameter_paths, state_paths
 from swashplate.equations.fields import made
-from swashplate.equations.marching.jacobian import jacobian, residuals
 from swashplate.equations.marching.layout import started_by
-from swashplate.equations.marching.observation import Observation, ObservedRecord
-from swashplate.equations.marching.observation import Own as EngineOwn
-from swashplate.equations.marching.record import Record, even_rate, gridded
+from swashplate.equations.marching.observation import Observation, ObservedRecord, Own
+from swashplate.equations.marching.record import Record, even_rate, on_grid
 from swashplate.errors import DomainError, InputError
 from swashplate.results import Result, short
+from swashplate.simulation.instance import START
 from swashplate.simulation.residuals import Ready
 
 Array = NDArray[np.float64]
 OFFSET = "offset "
 """What the name of a channel's free zero begins with."""
-START = "start."
-"""What the name of a number of the state at the first sample begins with."""
 
 
 class Model(Protocol):
     """A model of the machine; with `simulate` alone it is differentiated by central differences.
+
+    One that knows its derivatives has ``linearise(values, experiment, names)`` as well, which gives
+    for each channel a `Linearised`.
 
     Examples
     --------
@@ -76,69 +76,16 @@ class Linearised(NamedTuple):
     """(m, k) derivatives by the names asked for, in their order."""
 
 
-@runtime_checkable
-class Differentiable(Protocol):
-    """A model that knows its derivatives."""
-
-    def linearise(
-        self, values: Mapping[str, float], experiment: Experiment, names: Sequence[str]
-    ) -> Mapping[str, Linearised]:
-        """Simulate with derivatives by some of the unknowns; otherwise as `Model.simulate`."""
-        ...
-
-
 RELATIVE_STEP = 1e-6
 """Step of the central differences, in units of each number's size."""
-
-
-def linearised(
-    model: Model, values: Mapping[str, float], experiment: Experiment, names: Sequence[str]
-) -> Mapping[str, Linearised]:
-    """Simulation with derivatives: the model's own, or central differences.
-
-    Parameters
-    ----------
-    model : Model
-        With or without `linearise`.
-    values, experiment, names :
-        As in `Differentiable.linearise`.
-
-    Raises
-    ------
-    DomainError
-        If the model does not hold there, or yields a number that is not finite.
-    InputError
-        If it returns something else than it must.
-    """
-    if isinstance(model, Differentiable):
-        made = model.linearise(values, experiment, names)
-        _check(made, experiment, len(names))
-        return made
-    middle, columns = simulated(model, values, experiment), list[Mapping[str, Array]]()
-    for name in names:
-        step = RELATIVE_STEP * max(abs(values[name]), 1e-3)
-        above, below = (
-            simulated(model, {**values, name: values[name] + way}, experiment)
-            for way in (step, -step)
-        )
-        columns.append({c: (above[c] - below[c]) / (2.0 * step) for c in middle})
-    return {
-        channel: Linearised(output, np.reshape([c[channel] for c in columns], (-1, output.size)).T)
-        for channel, output in middle.items()
-    }
 
 
 def simulated(
     model: Model, values: Mapping[str, float], experiment: Experiment
 ) -> Mapping[str, Array]:
-    """What a model simulates, checked.
+    """What a model simulates; a `DomainError` names a sample that is not finite.
 
-    Raises
-    ------
-    DomainError
-        If a number is not finite.
-    InputError
-        If what it returns is no array of real numbers for each channel, one a sample.
+    Anything but one real number a sample for each channel is refused in an `InputError`.
     """
     outputs = model.simulate(values, experiment)
     _check(outputs, experiment)
@@ -150,6 +97,27 @@ def simulated(
                 f"{experiment[name].time[row]:g} s."
             )
     return outputs
+
+
+def linearised(
+    model: Model, values: Mapping[str, float], experiment: Experiment, names: Sequence[str]
+) -> Mapping[str, Linearised]:
+    """Simulation with derivatives by names, its own or differences; raises as `simulated`."""
+    if own := getattr(model, "linearise", None):
+        made: Mapping[str, Linearised] = own(values, experiment, names)
+        _check(made, experiment, len(names))
+        return made
+    middle = simulated(model, values, experiment)
+    found = {c: Linearised(y, np.empty((y.size, len(names)))) for c, y in middle.items()}
+    for k, name in enumerate(names):
+        step = RELATIVE_STEP * max(abs(values[name]), 1e-3)
+        above, below = (
+            simulated(model, {**values, name: values[name] + way}, experiment)
+            for way in (step, -step)
+        )
+        for channel, part in found.items():
+            part.by[:, k] = (above[channel] - below[channel]) / (2.0 * step)
+    return found
 
 
 def _check(made: object, experiment: Experiment, names: int | None = None) -> None:
@@ -183,23 +151,28 @@ def _check(made: object, experiment: Experiment, names: int | None = None) -> No
                 )
 
 
-def refused_channel(experiment: Experiment, name: str, known: Collection[str]) -> InputError:
-    """What to say of a channel that the model does not give."""
-    return InputError(
-        f"{experiment.name}: the model gives no '{name}'; it gives {', '.join(known)}."
-    )
+Part = TypeVar("Part")
+
+
+def part_of(outputs: Mapping[str, Part], experiment: Experiment, channel: str) -> Part:
+    """What a model gives for a channel; an `InputError` if it gives nothing."""
+    if channel not in outputs:
+        known = ", ".join(outputs)
+        raise InputError(f"{experiment.name}: the model gives no '{channel}'; it gives {known}.")
+    return outputs[channel]
+
+
+class Asked(NamedTuple):
+    """What is asked of a model: an experiment as the march sees it, and derivatives by columns."""
+
+    observed: ObservedRecord
+    columns: Sequence[str] = ()
+    offsets: Sequence[float] = ()  # Of the observations, where they are free.
 
 
 @dataclass(frozen=True, eq=False)
 class EquationModel(ABC):
     """What every model of equations has in common; see `OwnModel` and `DriveModel`."""
-
-    _plain: dict[Experiment, ObservedRecord] = field(default_factory=dict, repr=False, init=False)
-    """Experiments as the march sees them, all channels unweighted: made once for each."""
-
-    def __getstate__(self) -> dict[str, object]:
-        """Without what can be made again."""
-        return {**self.__dict__, "_plain": {}}
 
     @abstractmethod
     def signals_of(self, experiment: Experiment) -> Mapping[str, str]:
@@ -210,15 +183,8 @@ class EquationModel(ABC):
         """Signal that drives the model, its record, and other external signals on its grid."""
 
     @abstractmethod
-    def ready(
-        self,
-        values: Mapping[str, float],
-        experiment: Experiment,
-        observed: ObservedRecord,
-        columns: Sequence[str],
-        offsets: Sequence[float] = (),
-    ) -> Ready:
-        """The model with numbers and offsets of observations; columns as the engine names them."""
+    def ready(self, values: Mapping[str, float], experiment: Experiment, asked: Asked) -> Ready:
+        """The model with numbers; columns as the engine names them."""
 
     def moves(self, name: str) -> Mapping[str, float]:
         """Derivatives by a name of the columns that it moves."""
@@ -243,45 +209,31 @@ class EquationModel(ABC):
         without, all channels that the model gives, against zero. `offsets` are the names of the
         free zeros.
         """
-        signals, observations = self.signals_of(experiment), []
+        signals, seen = self.signals_of(experiment), []
         for name in signals if weights is None else weights:
-            if name not in signals:
-                raise refused_channel(experiment, name, signals)
-            channel = experiment[name]
-            if weights is None:
-                plain = Observation(signals[name], channel.time, np.zeros(channel.time.size))
-                observations.append(plain)
-                continue
-            seen, free = (channel.time, channel.values, weights[name]), f"{OFFSET}{name}" in offsets
-            observations.append(Observation(signals[name], *seen, free_offset=free))
+            signal, channel = part_of(signals, experiment, name), experiment[name]
+            against: tuple[Array, Array | float] = np.zeros(channel.time.size), 1.0
+            if weights is not None:
+                against = channel.values, weights[name]
+            seen.append(Observation(signal, channel.time, *against, f"{OFFSET}{name}" in offsets))
         by, record, others = self.driven(experiment)
-        return ObservedRecord(record, observations, by, experiment.begins, others)
-
-    def _simulable(self, experiment: Experiment) -> ObservedRecord:
-        if experiment not in self._plain:
-            self._plain[experiment] = self.observed(experiment)
-        return self._plain[experiment]
+        return ObservedRecord(record, seen, by, experiment.begins, others)
 
     def simulate(self, values: Mapping[str, float], experiment: Experiment) -> Mapping[str, Array]:
         """Simulate the measured channels; see `model.Model`."""
-        observed = self._simulable(experiment)
-        ready = self.ready(values, experiment, observed, ())
-        flat = residuals(ready.instance, observed, ready.own)
-        channels = enumerate(self.signals_of(experiment))
-        return {name: flat[observed.rows_of(k)] for k, name in channels}
+        observed, signals = self.observed(experiment), enumerate(self.signals_of(experiment))
+        flat = self.ready(values, experiment, Asked(observed)).residuals(observed)
+        return {name: flat[observed.rows_of(k)] for k, name in signals}
 
     def linearise(
         self, values: Mapping[str, float], experiment: Experiment, names: Sequence[str]
     ) -> Mapping[str, Linearised]:
-        """Simulate with derivatives; see `model.Differentiable`."""
-        observed, (columns, chain) = self._simulable(experiment), self.columns(names)
-        ready = self.ready(values, experiment, observed, columns)
-        found = jacobian(ready.instance, observed, ready.paths, ready.own, moved=ready.moved)
-        by, made = found.columns @ chain, {}
-        for k, name in enumerate(self.signals_of(experiment)):
-            rows = observed.rows_of(k)
-            made[name] = Linearised(found.residuals[rows], by[rows])
-        return made
+        """Simulate with derivatives; see `model.Model`."""
+        observed, (columns, chain) = self.observed(experiment), self.columns(names)
+        found = self.ready(values, experiment, Asked(observed, columns)).jacobian(observed)
+        flat, by, rows = found.residuals, found.columns @ chain, observed.rows_of
+        channels = enumerate(self.signals_of(experiment))
+        return {name: Linearised(flat[rows(k)], by[rows(k)]) for k, name in channels}
 
 
 @dataclass(frozen=True, eq=False)
@@ -307,13 +259,15 @@ class OwnModel(Result, EquationModel):
 
     model: Equations
     rate: float | None = None
-    """Steps a second; by default the input's samples. Needed where its stamps are not even. [Hz]"""
+    """Samples a second; by default the input's. Needed where its stamps are not even. [Hz]"""
     options: Any = None
     given: Any = None
     """The model's givens, or a mapping of them by the experiments' names."""
     begin: Mapping[str, str] = field(default_factory=dict)
     """Channel that says where a number of the state begins, by its path: at the first sample that
     counts."""
+    substeps: int | None = None
+    """Steps of the model a sample; by default one."""
 
     def signals_of(self, experiment: Experiment) -> Mapping[str, str]:
         """Signal of the model for each channel that it gives; one of none is refused."""
@@ -330,15 +284,13 @@ class OwnModel(Result, EquationModel):
     def driven(self, experiment: Experiment) -> tuple[str, Record, Mapping[str, Array]]:
         """The experiment's input on the grid, and external signals that are channels.
 
-        Raises
-        ------
-        InputError
-            If stamps are uneven and no rate is said, or it is not clear which signal the input is.
+        Refused where stamps are uneven and no rate is said, or it is not clear which signal the
+        input is.
         """
         model, command = self.model, experiment.input
         defaults = {p.tap(name).signal for p in model.parts for name in p.defaults}
-        others = [name for name in model.external if name in experiment.channels]
-        left = [name for name in model.external if name not in others]
+        others = [experiment[name] for name in model.external if name in experiment.channels]
+        left = [name for name in model.external if name not in experiment.channels]
         left = [name for name in left if name not in defaults] or left
         if len(left) != 1:
             raise InputError(
@@ -353,53 +305,35 @@ class OwnModel(Result, EquationModel):
                 f"{experiment.name}: the stamps of its input are not even, so the model needs a "
                 f"rate, as in OwnModel({model.name}, rate=100.0)."
             )
-        record = Record(command.values, float(command.time[0]), rate, 1)
-        if rate != even:
-            record = gridded(command.values, command.time, rate, command.interpolation)
-        channels = [experiment[name] for name in others]
-        on_grid = {c.name: np.interp(record.time, c.time, c.values) for c in channels}
-        return left[0], record, on_grid
+        record = on_grid(
+            {left[0]: command.values},
+            rate,
+            time=None if rate == even else command.time,
+            interpolation=command.interpolation,
+            substeps=self.substeps,
+        )[left[0]]
+        record = replace(record, start=float(command.time[0]))
+        return left[0], record, {c.name: np.interp(record.points, c.time, c.values) for c in others}
 
-    def ready(
-        self,
-        values: Mapping[str, float],
-        experiment: Experiment,
-        observed: ObservedRecord,
-        columns: Sequence[str],
-        offsets: Sequence[float] = (),
-    ) -> Ready:
-        """The model with numbers; see `EquationModel.ready`.
-
-        Raises
-        ------
-        InputError
-            If a name is not known, or a parameter has no value.
-        """
+    def ready(self, values: Mapping[str, float], experiment: Experiment, asked: Asked) -> Ready:
+        """The model with numbers; a name that is not known, or no value of one, is refused."""
         model, given = self.model, self.given
-        paths, states = parameter_paths(model), state_paths(model)
-        numbers, begin = dict[str, float](), dict[str, float]()
+        paths, states, begin = parameter_paths(model), state_paths(model), dict[str, float]()
         for path, channel in self.begin.items():
             measured = experiment[channel]
             begin[path] = float(measured.values[int(np.argmax(measured.used))])
         for name, value in values.items():
-            if name in paths:
-                numbers[name] = value
-            elif name.startswith(START):
-                for i, part in enumerate(model.parts):
-                    prefix = f"{part.name}." if len(model.parts) > 1 else ""
-                    for path in started_by(model, i, name):
-                        begin[f"{prefix}{path}"] = value
-            elif not name.startswith(OFFSET):
-                raise InputError(
-                    f"{model.name} has no parameter '{name}'; it has {', '.join(paths)}."
-                )
+            for i in range(len(model.parts)):
+                begin |= {f"{model.prefix(i)}{s}": value for s in started_by(model, i, name)}
+            if name not in paths and not name.startswith((START, OFFSET)):
+                known = ", ".join(paths)
+                raise InputError(f"{model.name} has no parameter '{name}'; it has {known}.")
         for path in begin:
             if path not in states:
-                raise InputError(
-                    f"{model.name} has no state '{path}' to begin at; it has {', '.join(states)}."
-                )
+                known = ", ".join(states)
+                raise InputError(f"{model.name} has no state '{path}' to begin at; it has {known}.")
         try:
-            p = made(model.parameters, numbers)
+            p = made(model.parameters, {name: values[name] for name in values if name in paths})
         except KeyError as error:
             raise InputError(
                 f"{model.name} has no value of {error.args[0]}: let it be free, or fix it."
@@ -409,4 +343,4 @@ class OwnModel(Result, EquationModel):
                 raise InputError(f"{model.name} has no given numbers for {experiment.name}.")
             given = given[experiment.name]
         instance = instance_of(model, p, options=self.options, given=given)
-        return Ready(instance, EngineOwn(begin, offsets), columns)
+        return Ready(instance, Own(begin, asked.offsets), asked.columns)

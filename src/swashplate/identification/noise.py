@@ -261,8 +261,7 @@ class _Sandwich:
     """(JᵀJ)⁻¹ M (JᵀJ)⁻¹ in the making: M, the unknowns' variances, the squares of their parts."""
 
     def __init__(self, fit: LinearisedFit) -> None:
-        fit.check_spare_samples()
-        self.fit = fit
+        self.fit, self.spare = fit, fit.spare_samples  # refused where there are none
         self.middle: Array = fit.whitening.T @ fit.prior_middle @ fit.whitening
         self.total: Array = np.einsum("ki,ij,kj->k", fit.whitening, self.middle, fit.whitening)
         self.squares: Array = np.zeros(fit.variables.count)

@@ -4,30 +4,30 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import cached_property, lru_cache
-from typing import TYPE_CHECKING, Literal, NamedTuple, TypeVar
+from functools import cached_property, lru_cache, partial
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple, TypeVar, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
 from swashplate.campaign.experiment import Channel, Experiment
 from swashplate.equations import Model as OfEquations
-from swashplate.equations.marching.jacobian import triangle
 from swashplate.equations.marching.observation import ObservedRecord
 from swashplate.errors import InputError
 from swashplate.identification.model import (
     OFFSET,
-    Differentiable,
+    Asked,
     EquationModel,
     Linearised,
     Model,
     OwnModel,
     linearised,
-    refused_channel,
+    part_of,
     simulated,
 )
 from swashplate.identification.unknowns import Unknowns
 from swashplate.results import Result, short
+from swashplate.tables import count
 
 if TYPE_CHECKING:
     from concurrent.futures import ThreadPoolExecutor
@@ -74,18 +74,15 @@ class Problem(Result):
     compare: Callable[[Channel, Array], Array] | None = None
     """Linear map of a channel's samples, (m,) or (m, k), before they are compared: a position that
     drifts by its motion since the last anchor, for example."""
-    _last: dict[tuple[bytes, bool], Evaluation] = field(
-        default_factory=dict, repr=False, init=False
-    )
+    _last: dict[Any, Evaluation] = field(default_factory=dict, repr=False, init=False)
 
     def __post_init__(self) -> None:
         if isinstance(self.model, OfEquations):
             object.__setattr__(self, "model", OwnModel(self.model))
-        if not self.unknowns:
-            raise InputError("A fit needs at least one parameter.")
-        if not self.experiments:
-            raise InputError("A fit needs at least one experiment.")
-        if not any(weight.any() for run in self.weights for weight in run.values()):
+        for what, there in (("parameter", self.unknowns), ("experiment", self.experiments)):
+            if not there:
+                raise InputError(f"A fit needs at least one {what}.")
+        if not self.samples:
             raise InputError(
                 f"No sample of {', '.join(self.channels) or 'any channel'} counts: all are ignored "
                 "or there are none."
@@ -104,14 +101,11 @@ class Problem(Result):
     @cached_property
     def weights(self) -> tuple[Mapping[str, Array], ...]:
         """For each experiment and fitted channel the (m,) factors on the residuals."""
-        return tuple(
-            {
-                name: np.sqrt(each[name].weight) / self.scales[name]
-                for name in self.channels
-                if name in each.channels
-            }
-            for each in self.experiments
-        )
+        found = []
+        for each in self.experiments:
+            names = [name for name in self.channels if name in each.channels]
+            found.append({n: np.sqrt(each[n].weight) / self.scales[n] for n in names})
+        return tuple(found)
 
     @property
     def samples(self) -> int:
@@ -121,19 +115,14 @@ class Problem(Result):
     def evaluate(self, vector: Array, *, compressed: bool = True) -> Evaluation:
         """Residuals and Jacobian by the vector; compressed, as a triangular factor of a few rows.
 
-        The last ones are kept.
-
-        Raises
-        ------
-        DomainError
-            If the model does not hold there.
+        The last ones are kept. A `DomainError` says that the model does not hold there.
         """
         key = vector.tobytes(), compressed
         if key not in self._last:
             small = compressed and self.compare is None and isinstance(self.model, EquationModel)
-            parts = self._each(lambda k: (self._reduced if small else self._full)(vector, k))
-            parts.append(Evaluation(*self.unknowns.prior_rows(vector)))
-            residuals, jacobians = zip(*parts, strict=True)
+            parts = self._each(partial(self._reduced if small else self._full, vector))
+            priors = Evaluation(*self.unknowns.prior_rows(vector))
+            residuals, jacobians = zip(*parts, priors, strict=True)
             self._last.clear()
             self._last[key] = Evaluation(np.concatenate(residuals), np.vstack(jacobians))
         return self._last[key]
@@ -142,11 +131,12 @@ class Problem(Result):
         """Half the sum of squares alone, which is quicker."""
 
         def squares(number: int) -> float:
-            experiment, total = self.experiments[number], 0.0
-            for name, output in self.outputs(vector, number).items():
-                residual = self._compared(experiment[name], output - experiment[name].values)
-                total += float(np.sum((self.weights[number][name] * residual) ** 2))
-            return total
+            experiment, weights = self.experiments[number], self.weights[number]
+            residuals = (
+                weights[name] * self._compared(experiment[name], y - experiment[name].values)
+                for name, y in self.outputs(vector, number).items()
+            )
+            return sum(float(np.sum(each**2)) for each in residuals)
 
         priors, _ = self.unknowns.prior_rows(vector)
         return 0.5 * (sum(self._each(squares)) + float(priors @ priors))
@@ -155,10 +145,8 @@ class Problem(Result):
         """Simulated samples of the fitted channels of one experiment, offsets included."""
         experiment, values = self.experiments[number], self._values(vector, number)
         outputs = simulated(self.model, self.model_values(vector, number), experiment)
-        return {
-            name: self._output(outputs, experiment, name) + values.get(f"{OFFSET}{name}", 0.0)
-            for name in self.weights[number]
-        }
+        zeros = {name: values.get(f"{OFFSET}{name}", 0.0) for name in self.weights[number]}
+        return {name: part_of(outputs, experiment, name) + zero for name, zero in zeros.items()}
 
     def linearised(self, vector: Array, number: int) -> Mapping[str, Linearised]:
         """Weighted residuals of each channel of one experiment and derivatives by the vector."""
@@ -169,20 +157,17 @@ class Problem(Result):
         chain, made = self.unknowns.chain(vector, names, run), {}
         for name, weight in self.weights[number].items():
             channel, zero = experiment[name], f"{OFFSET}{name}"
-            output = self._output(outputs, experiment, name)
-            shifted = output.values + values.get(zero, 0.0) - channel.values
+            output = part_of(outputs, experiment, name)
+            residual = output.values + values.get(zero, 0.0) - channel.values
             by = output.by @ chain + self.unknowns.chain(vector, [zero], run)
-            made[name] = Linearised(
-                weight * self._compared(channel, shifted),
-                weight[:, None] * self._compared(channel, by),
-            )
+            parts = self._compared(channel, residual), self._compared(channel, by)
+            made[name] = Linearised(weight * parts[0], weight[:, None] * parts[1])
         return made
 
     def model_values(self, vector: Array, number: int) -> dict[str, float]:
         """Values by the model's names for one experiment; a channel's zero is none of them."""
-        zeros = {f"{OFFSET}{name}" for name in self.channels}
-        values = self._values(vector, number)
-        return {name: value for name, value in values.items() if name not in zeros}
+        zeros = [f"{OFFSET}{name}" for name in self.channels]
+        return {k: v for k, v in self._values(vector, number).items() if k not in zeros}
 
     def _values(self, vector: Array, number: int) -> dict[str, float]:
         return {**self.fixed, **self.unknowns.targets(vector, self.experiments[number].name)}
@@ -190,53 +175,45 @@ class Problem(Result):
     def _compared(self, channel: Channel, rows: Array) -> Array:
         return rows if self.compare is None else self.compare(channel, rows)
 
-    @staticmethod
-    def _output(outputs: Mapping[str, Part], experiment: Experiment, name: str) -> Part:
-        if name not in outputs:
-            raise refused_channel(experiment, name, outputs)
-        return outputs[name]
-
     def _full(self, vector: Array, number: int) -> Evaluation:
         values, by = zip(*self.linearised(vector, number).values(), strict=True)
         return Evaluation(np.concatenate(values), np.vstack(by))
 
     def _reduced(self, vector: Array, number: int) -> Evaluation:
         """A triangular factor of [J r] of one experiment, without ever holding J."""
-        assert isinstance(self.model, EquationModel)
-        experiment, (observed, names, asked, moves) = self.experiments[number], self._own[number]
-        values = self._values(vector, number)
+        experiment, (observed, names, zeros, asked, by) = (
+            self.experiments[number],
+            self._own[number],
+        )
+        values, model = self._values(vector, number), cast("EquationModel", self.model)
         offsets = [values.get(f"{OFFSET}{name}", 0.0) for name in self.weights[number]]
-        ready = self.model.ready(values, experiment, observed, asked, offsets)
-        found = triangle(ready.instance, observed, ready.paths, ready.own, moved=ready.moved)
-        chain = self.unknowns.chain(vector, names, experiment.name)
-        return Evaluation(found.factor[:, -1], found.factor[:, :-1] @ moves @ chain)
+        ready = model.ready(values, experiment, Asked(observed, asked, offsets))
+        factor, chain = ready.triangle(observed).factor, partial(self.unknowns.chain, vector)
+        jacobian = factor[:, : len(asked)] @ by @ chain(names, experiment.name)
+        jacobian += factor[:, len(asked) : -1] @ chain(zeros, experiment.name)
+        return Evaluation(factor[:, -1], jacobian)
 
     @cached_property
-    def _own(self) -> list[tuple[ObservedRecord, list[str], list[str], Array]]:
+    def _own(self) -> list[tuple[ObservedRecord, list[str], list[str], list[str], Array]]:
         """Each experiment as the march of a model of equations sees it.
 
-        With the names of its unknowns, free zeros last; the columns that they ask for; and the
-        derivatives of those columns, and of one for each zero, by the names.
+        With the names of its unknowns and of its free zeros; the columns that the former ask for,
+        and the derivatives of these columns by them.
         """
-        from scipy.linalg import block_diag
-
-        assert isinstance(self.model, EquationModel)
-        made = []
-        for number, experiment in enumerate(self.experiments):
-            names = list(self.unknowns.targets(self.start, experiment.name))
-            zeros = [z for name in self.weights[number] if (z := f"{OFFSET}{name}") in names]
-            others = [name for name in names if name not in zeros]
-            observed = self.model.observed(experiment, self.weights[number], zeros)
-            asked, by = self.model.columns(others)
-            made.append((observed, [*others, *zeros], asked, block_diag(by, np.eye(len(zeros)))))
+        model, made = cast("EquationModel", self.model), []
+        for experiment, weights in zip(self.experiments, self.weights, strict=True):
+            targets = self.unknowns.targets(self.start, experiment.name)
+            zeros = [zero for name in weights if (zero := f"{OFFSET}{name}") in targets]
+            names = [name for name in targets if name not in zeros]
+            observed = model.observed(experiment, weights, zeros)
+            made.append((observed, names, zeros, *model.columns(names)))
         return made
 
     def _each(self, work: Callable[[int], Part]) -> list[Part]:
         """What is found for each experiment, in their order."""
         numbers = range(len(self.experiments))
-        if min(self.threads, len(numbers)) == 1:
-            return [work(number) for number in numbers]
-        return list(_pool(self.threads).map(work, numbers))
+        alone = min(self.threads, len(numbers)) == 1
+        return list(map(work, numbers) if alone else _pool(self.threads).map(work, numbers))
 
 
 @lru_cache
@@ -250,12 +227,8 @@ def _pool(threads: int) -> ThreadPoolExecutor:
 def noise_scales(experiments: Sequence[Experiment], channels: Sequence[str]) -> dict[str, float]:
     """What one unit of residual is, by channel.
 
-    A noise that is stated; or the rounding of an encoder; or 1 % of the range in all runs.
-
-    Raises
-    ------
-    InputError
-        If a channel is in no experiment, or never changes.
+    A noise that is stated; or the rounding of an encoder; or 1 % of the range in all runs. A
+    channel that is in no experiment, or never changes, is refused.
     """
     scales = {}
     for name in channels:
@@ -264,15 +237,14 @@ def noise_scales(experiments: Sequence[Experiment], channels: Sequence[str]) -> 
             known = ", ".join(dict.fromkeys(c for each in experiments for c in each.channels))
             raise InputError(f"No experiment has a channel '{name}'; there are {known}.")
         stated = [each.noise for each in having if each.noise is not None]
+        # an ignored spike says nothing of the range
+        ranges = [float(np.ptp(each.values[each.used])) for each in having if each.used.any()]
+        scales[name] = 0.01 * max(ranges, default=0.0)
         if stated:
             scales[name] = float(np.sqrt(np.mean(np.square(stated))))
         elif having[0].encoder is not None:
             # rounding to whole counts leaves an error between -1/2 and 1/2 of one
             scales[name] = abs(having[0].encoder.angle_per_count) / np.sqrt(12.0)
-        else:
-            # an ignored spike says nothing of the range
-            used = [each.values[each.used] for each in having if each.used.any()]
-            scales[name] = 0.01 * max((float(np.ptp(each)) for each in used), default=0.0)
         if scales[name] == 0.0:
             raise InputError(f"The channel '{name}' never changes: nothing can be fitted to it.")
     return scales
@@ -325,8 +297,7 @@ class LinearisedFit(Result):
     @property
     def prior_middle(self) -> Array:
         """(K, K) covariance of the scores of the priors."""
-        middle: Array = (self.prior.T * self.prior_noise) @ self.prior
-        return middle
+        return np.asarray((self.prior.T * self.prior_noise) @ self.prior)
 
     @property
     def samples(self) -> int:
@@ -373,24 +344,21 @@ class LinearisedFit(Result):
 
     @property
     def spare_samples(self) -> int:
-        """Samples more than combinations determined; refused as by `check_spare_samples`."""
-        self.check_spare_samples()
-        return self.samples - self.rank
-
-    def check_spare_samples(self) -> None:
-        """Refuse a fit whose residual tells nothing of the noise.
+        """Samples more than combinations determined.
 
         Raises
         ------
         InputError
-            If there are no more samples than combinations determined.
+            If there are none: then the residual tells nothing of the noise.
         """
-        if self.samples - self.rank < 1:
+        spare = self.samples - self.rank
+        if spare < 1:
+            had, wanted = count(self.samples, "sample"), count(self.rank, "parameter")
             raise InputError(
-                f"{self.samples} sample{'s' if self.samples > 1 else ''} for {self.rank} "
-                f"parameter{'s' if self.rank > 1 else ''} leave nothing to estimate the noise "
-                "from; take more samples or fewer parameters."
+                f"{had} for {wanted} leave nothing to estimate the noise from; take more samples "
+                "or fewer parameters."
             )
+        return spare
 
 
 def triangular_factor(matrix: Array) -> Array:
@@ -401,33 +369,24 @@ def triangular_factor(matrix: Array) -> Array:
 def whitening(
     triangle: Array, free: NDArray[np.bool_], tolerance: float
 ) -> tuple[Array, NDArray[np.bool_]]:
-    """Inverse of a triangular factor on what it determines.
-
-    Parameters
-    ----------
-    triangle : (m, K) array
-        Derivatives, or their triangular factor.
-    free : (K,) array of bool
-        Unknowns that may move; the others are held.
-    tolerance : float
-        Singular values of the column-scaled factor below this part of the largest count as zero.
+    """Inverse of (m, K) derivatives, or of their triangular factor, on what they determine.
 
     Returns
     -------
     (K, rank) array, (K,) array of bool
-        W with W Wᵀ = (JᵀJ)⁻¹ on the free unknowns, and which unknowns are determined.
+        W with W Wᵀ = (JᵀJ)⁻¹ on the unknowns that are `free`, and which unknowns are determined:
+        singular values of the column-scaled factor below `tolerance` of the largest count as zero.
     """
-    count = triangle.shape[1]
-    if triangle.shape[0] > count:
+    if triangle.shape[0] > triangle.shape[1]:
         triangle = triangular_factor(triangle)
     length = np.linalg.norm(triangle, axis=0)
     moving = np.flatnonzero(free & (length > 0.0))
-    determined = np.zeros(count, dtype=np.bool_)
+    determined = np.zeros(free.size, dtype=np.bool_)
     if not moving.size:
-        return np.zeros((count, 0)), determined
+        return np.zeros((free.size, 0)), determined
     _, sizes, rows = np.linalg.svd(triangle[:, moving] / length[moving], full_matrices=True)
     rank = int(np.count_nonzero(sizes > tolerance * sizes[0]))
-    inverse = np.zeros((count, rank))
+    inverse = np.zeros((free.size, rank))
     inverse[moving] = (rows[:rank].T / sizes[:rank]) / length[moving, None]
     # an unknown whose unit vector lies in the row space is determined in spite of null directions
     determined[moving] = np.sum(rows[rank:] ** 2, axis=0) < 1e-8
@@ -439,43 +398,32 @@ def influence(residuals: Array, loss: Loss) -> tuple[Array, Array]:
 
     The losses are SciPy's, of residuals in units of their noise (Huber 1981, chapter 4).
     """
-    z = residuals**2
+    z = 1.0 + residuals**2
     if loss == "soft_l1":
-        return residuals / np.sqrt(1.0 + z), (1.0 + z) ** -1.5
+        return residuals / np.sqrt(z), z**-1.5
     if loss == "cauchy":
-        return residuals / (1.0 + z), (1.0 - z) / (1.0 + z) ** 2
+        return residuals / z, (2.0 - z) / z**2
     return residuals, np.ones_like(residuals)
 
 
 def linearised_fit(problem: Problem, vector: Array, loss: Loss = "linear") -> LinearisedFit:
-    """Residuals and derivatives of every run at a point, ignored samples left out.
+    """Residuals and derivatives of every run at a point (K,), ignored samples left out.
 
-    Parameters
-    ----------
-    problem : Problem
-        What was fitted.
-    vector : (K,) array
-        The solver's vector at the optimum.
-    loss : Loss
-        What of each residual the fit summed.
+    `loss` is what of each residual the fit summed. With a robust one each residual stands as ψ over
+    the mean of ψ', by channel: the covariance of these is that of the estimates (Huber 1981,
+    equation 6.5), whatever their spectrum.
 
     Raises
     ------
     InputError
         If so many residuals lie in the tails of a robust loss that it has no optimum there.
-
-    Notes
-    -----
-    With a robust loss each residual stands as ψ over the mean of ψ', by channel: the covariance of
-    these is that of the estimates (Huber 1981, equation 6.5), whatever their spectrum.
     """
     runs = []
     for number, experiment in enumerate(problem.experiments):
-        weights = problem.weights[number]
         for name, part in problem.linearised(vector, number).items():
-            used = weights[name] > 0.0
+            weight = problem.weights[number][name]
+            used, columns = weight > 0.0, (experiment[name].time, part.values, part.by, weight)
             if used.any():
-                columns = experiment[name].time, part.values, part.by, weights[name]
                 runs.append(LinearisedRun(experiment.name, name, *(each[used] for each in columns)))
     for name in problem.channels if loss != "linear" else ():
         mine = [k for k, run in enumerate(runs) if run.channel == name]
@@ -488,8 +436,8 @@ def linearised_fit(problem: Problem, vector: Array, loss: Loss = "linear") -> Li
             )
         for k, (bounded, _) in zip(mine, parts, strict=True):
             runs[k] = runs[k]._replace(residual=bounded / slope)
-    _, prior = problem.unknowns.prior_rows(vector)
-    worths = [each.worth for each in problem.unknowns if each.prior is not None]
-    tolerance = TOLERANCE if isinstance(problem.model, Differentiable) else BY_DIFFERENCES
-    variables = problem.unknowns.at(vector)
-    return LinearisedFit(tuple(runs), variables, prior, tolerance, np.array(worths))
+    unknowns = problem.unknowns
+    worths = np.array([each.worth for each in unknowns if each.prior is not None])
+    tolerance = TOLERANCE if hasattr(problem.model, "linearise") else BY_DIFFERENCES
+    prior = unknowns.prior_rows(vector)[1]
+    return LinearisedFit(tuple(runs), unknowns.at(vector), prior, tolerance, worths)

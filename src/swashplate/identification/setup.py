@@ -2,42 +2,37 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from importlib import import_module
 from importlib.resources import files
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import (
-    AfterValidator,
-    BaseModel,
-    ConfigDict,
-    Field,
-    PositiveFloat,
-    model_validator,
-)
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, PositiveFloat, model_validator
 
 from swashplate.campaign import ChannelKind
 from swashplate.campaign.experiment import Experiment
-from swashplate.campaign.schema import NotNegative, Weight, Window
+from swashplate.campaign.schema import Finite, NotNegative, Positive, Weight, Window
 from swashplate.documents import parse_toml, read_text, validated
 from swashplate.equations import Model as Equations
 from swashplate.errors import FileError, InputError, ParameterError
-from swashplate.identification.model import OFFSET, START, OwnModel, simulated
+from swashplate.identification.model import OFFSET, OwnModel, simulated
 from swashplate.identification.problem import Problem, noise_scales
 from swashplate.identification.solving import solve
 from swashplate.identification.unknowns import Prior, Unknown, Unknowns
 from swashplate.parameters.definitions import find
 from swashplate.parameters.parameter_set import ParameterSet
+from swashplate.parameters.rules import SIDES
 from swashplate.results import Result, short
+from swashplate.simulation.instance import START
 
 Array = NDArray[np.float64]
 _SETUPS = files("swashplate.identification").joinpath("setups")
-Finite = Annotated[float, Field(allow_inf_nan=False)]
-Positive = Annotated[PositiveFloat, Field(allow_inf_nan=False)]
 Pair = tuple[Finite, Finite]
 StandardUncertainty = (
     Annotated[PositiveFloat, Field(strict=True, allow_inf_nan=False)]
@@ -46,8 +41,6 @@ StandardUncertainty = (
 """A standard uncertainty: in SI units, or as "5 %" of the value."""
 COEFFICIENTS = ("Z19", "Z20", "Z21", "Z22")
 """Of the solenoids: what forces stand for."""
-ORDERS = np.arange(1, 5)
-"""Powers of the effective current that they multiply."""
 
 
 class Entry(BaseModel):
@@ -61,14 +54,12 @@ class Entry(BaseModel):
 
 def rising(pair: tuple[float, float]) -> tuple[float, float]:
     """A pair of bounds; refused, in a ValueError, unless the lower one stands first."""
-    if not pair[0] < pair[1]:
-        low, high = sorted(pair)
-        raise ValueError(
-            f"[{pair[0]:g}, {pair[1]:g}] must rise: write [{low:g}, {high:g}]"
-            if low < high
-            else f"[{pair[0]:g}, {pair[1]:g}] leaves nothing between its ends"
-        )
-    return pair
+    if pair[0] < pair[1]:
+        return pair
+    turned = "leaves nothing between its ends"
+    if pair[0] > pair[1]:
+        turned = f"must rise: write [{pair[1]:g}, {pair[0]:g}]"
+    raise ValueError(f"[{pair[0]:g}, {pair[1]:g}] {turned}")
 
 
 Bounds = Annotated[Pair, AfterValidator(rising)]
@@ -105,22 +96,17 @@ class Forces(Entry):
     )
     relative: Bounds = Field((0.5, 2.0), description="Bounds as factors on the nominal forces.")
 
-    @property
-    def names(self) -> tuple[str, ...]:
-        """Names of the eight forces."""
-        return tuple(f"force_{side}_{k}" for side in ("plus", "minus") for k in ORDERS)
-
-    @property
-    def columns(self) -> tuple[str, ...]:
-        """The parameters that they stand for."""
-        return tuple(f"{symbol}_{side}" for side in ("plus", "minus") for symbol in COEFFICIENTS)
+    names: ClassVar = tuple(f"force_{side}_{k}" for side in SIDES for k in (1, 2, 3, 4))
+    """Names of the eight forces."""
+    columns: ClassVar = tuple(f"{symbol}_{side}" for side in SIDES for symbol in COEFFICIENTS)
+    """The parameters that they stand for."""
 
     @cached_property
     def _inverse(self) -> Array:
         """(8, 8) map from forces to coefficients, of F = Z19 i + Z20 i² + Z21 i³ + Z22 i⁴."""
-        zero = np.zeros((4, 4))
-        plus = np.power.outer(self.plus, ORDERS)
-        minus = np.power.outer(self.minus, ORDERS) * (-1.0) ** (ORDERS + 1)
+        zero, orders = np.zeros((4, 4)), np.arange(1, 5)
+        plus = np.power.outer(self.plus, orders)
+        minus = np.power.outer(self.minus, orders) * (-1.0) ** (orders + 1)
         return np.linalg.inv(np.block([[plus, zero], [zero, minus]]))
 
     def values(self, parameters: ParameterSet) -> dict[str, float]:
@@ -199,19 +185,18 @@ class Stage(Entry):
 
     def beyond(self, unknown: Unknown, side: int) -> str:
         """What to do about an unknown of the machine at its lower (-1) or upper (1) bound."""
-        name, table = unknown.name, "free"
+        name = unknown.name
         if self.part == "model":
             return f"to let it go on, widen '{name}' in free of the model and fit again"
         if self.forces is not None and name in self.forces.names:
-            name, table = "relative", "forces"
+            where = "relative under [stages.forces]"
         else:
             limits = find(name)
             least = limits.lower if limits.least is None else limits.least
             if unknown.high >= limits.upper if side > 0 else unknown.low <= least:
                 return f"the {'greatest' if side > 0 else 'least'} value that it may have"
-            name = name if name in self.free else _symbol(name)
-        where = f"{name} under [stages.{table}] of the stage '{self.name}'"
-        return f"to let it go on, widen {where} and fit again"
+            where = f"{name if name in self.free else _symbol(name)} under [stages.free]"
+        return f"to let it go on, widen {where} of the stage '{self.name}' and fit again"
 
 
 class Setup(Entry):
@@ -255,14 +240,11 @@ class Setup(Entry):
                     f"The stage '{stage.name}' is driven by {stage.current_scale:g} times the "
                     "measured current, so no joint fit through the card can stand for it."
                 )
-            twice = sorted(set(merged["free"]) & set(stage.free))
-            if twice:
+            if twice := sorted(set(merged["free"]) & set(stage.free)):
                 raise ParameterError(f"{twice[0]} is free in two stages; a joint fit needs one.")
-            for key in merged:
-                merged[key] = merged[key] | getattr(stage, key)
+            merged = {key: merged[key] | getattr(stage, key) for key in merged}
         forces = next((each.forces for each in self.stages if each.forces is not None), None)
-        pressures = [each.start_pressure for each in self.stages if each.start_pressure is not None]
-        most = max(pressures, default=None)
+        most = max((each.start_pressure or 0.0 for each in self.stages), default=0.0) or None
         stage = Stage(name="chain", part="chain", forces=forces, start_pressure=most, **merged)
         return self.model_copy(update={"stages": (stage,)})
 
@@ -294,15 +276,18 @@ def load_setup(name: str | Path) -> Setup:
     FileError
         If the file cannot be read.
     """
-    if str(name).lower().endswith(".toml"):
-        return validated(parse_toml(read_text(name), str(name)), Setup, str(name))
-    if name not in setup_names():
+    file = str(name)
+    if file.lower().endswith(".toml"):
+        text = read_text(name)
+    elif file in setup_names():
+        file = f"{name}.toml"
+        text = _SETUPS.joinpath(file).read_text("utf-8")
+    else:
         raise ParameterError(
             f"There is no packaged fit configuration '{name}'; there are "
             f"{', '.join(setup_names())}, or give a .toml file."
         )
-    text = _SETUPS.joinpath(f"{name}.toml").read_text("utf-8")
-    return validated(parse_toml(text, f"{name}.toml"), Setup, f"{name}.toml")
+    return validated(parse_toml(text, file), Setup, file)
 
 
 def setup_text(setup: Setup) -> str:
@@ -330,39 +315,30 @@ BY_ORDER = 10.0
 class ModelSetup(Result):
     """A model of one's own and what is to be found of it, as set and `Setup` of a drive.
 
-    Parameters
-    ----------
-    model : Model
-        Of equations, an `OwnModel` of them with more said, or any object with `simulate`.
-    free : mapping of str to (low, nominal, high), (low, nominal, high, unit) or Unknown
-        What is to be found, by the model's names. A range of positive bounds, the upper one at
-        least ten times the lower one, is searched by its logarithm. ``"start.PATH"`` of a state and
-        ``"offset CHANNEL"``, the zero of a sensor, are free in each run by themselves.
-    name : str
-        For tables and files; the model's by default.
-    channels : tuple of str
-        Those that are fitted; all that the model gives by default.
-    noise : mapping of str to float
-        Standard deviation of a channel, where the campaign does not state it. [unit]
-    fixed : mapping of str to float
-        Values of names that are not free.
-    standard_uncertainty : mapping of str to float or str
-        What values of `fixed` may be off by, one standard deviation, also as ``"5 %"``.
-    numbers : mapping of str to float
-        The model's numbers, nominal or fitted, those of single runs left out; see `nominal`.
-    scales : mapping of str to float
-        What one unit of residual is, by channel: its noise. [unit]
+    An entry of `free` is (low, nominal, high), (low, nominal, high, unit) or an `Unknown`. A range
+    of positive bounds, the upper one at least ten times the lower one, is searched by its
+    logarithm. ``"start.PATH"`` of a state and ``"offset CHANNEL"``, the zero of a sensor, are free
+    in each run by themselves.
     """
 
     model: Any
-    free: Mapping[str, Range | Unknown]
+    """A model of equations, an `OwnModel` of them with more said, or an object with `simulate`."""
+    free: Mapping[str, Any]
+    """What is to be found, by the model's names."""
     name: str = ""
+    """For tables and files; the model's by default."""
     channels: tuple[str, ...] = ()
+    """Those that are fitted; all that the model gives by default."""
     noise: Mapping[str, float] = field(default_factory=dict)
+    """Standard deviation of a channel, where the campaign does not state it. [unit]"""
     fixed: Mapping[str, float] = field(default_factory=dict)
+    """Values of names that are not free."""
     standard_uncertainty: Mapping[str, StandardUncertainty] = field(default_factory=dict)
+    """What values of `fixed` may be off by, one standard deviation, also as ``"5 %"``."""
     numbers: Mapping[str, float] = field(default_factory=dict)
+    """The model's numbers, nominal or fitted, those of single runs left out; see `nominal`."""
     scales: Mapping[str, float] = field(default_factory=dict)
+    """What one unit of residual is, by channel: its noise. [unit]"""
 
     def __post_init__(self) -> None:
         own = OwnModel(self.model) if isinstance(self.model, Equations) else self.model
@@ -372,18 +348,18 @@ class ModelSetup(Result):
                 "simulate(values, experiment)."
             )
         equations = own.model if isinstance(own, OwnModel) else own
-        name = self.name or getattr(equations, "name", None) or type(equations).__name__
+        kind = getattr(equations, "name", None) or type(equations).__name__
+        name = self.name or str(kind).lower()
         if not self.free:
             raise InputError(f"Nothing of {name} is free: name what is to be found.")
-        for each in self.standard_uncertainty:
-            if each not in self.fixed:
-                raise InputError(
-                    f"{each} has a standard uncertainty but no value: name it in fixed, or give "
-                    "it a prior if it is free."
-                )
-        object.__setattr__(self, "model", own)
-        object.__setattr__(self, "name", self.name or str(name).lower())
-        object.__setattr__(self, "free", {k: _unknown(k, each) for k, each in self.free.items()})
+        if unknown := [each for each in self.standard_uncertainty if each not in self.fixed]:
+            raise InputError(
+                f"{unknown[0]} has a standard uncertainty but no value: name it in fixed, or give "
+                "it a prior if it is free."
+            )
+        free = {key: _unknown(key, each) for key, each in self.free.items()}
+        for key, made in {"model": own, "name": name, "free": free}.items():
+            object.__setattr__(self, key, made)
 
     @classmethod
     def from_file(cls, path: str | Path) -> ModelSetup:
@@ -400,9 +376,6 @@ class ModelSetup(Result):
         InputError
             If it lacks one of the names.
         """
-        import sys
-        from importlib import import_module
-
         file = Path(path).resolve()
         if not file.is_file() or file.suffix != ".py" or not file.stem.isidentifier():
             raise FileError(f"{path} is no Python file with a model, such as valve.py.")
@@ -417,25 +390,19 @@ class ModelSetup(Result):
                     f"{path} has no '{name}': it needs model = Model(...) and free = "
                     "{'lag': (0.005, 0.06, 0.5), ...}, lower bound, nominal value and upper bound."
                 )
-        known = ("name", "channels", "noise", "fixed", "standard_uncertainty")
-        more = {key: getattr(module, key) for key in known if hasattr(module, key)}
-        return cls(module.model, module.free, **more)
+        known = ("model", "free", "name", "channels", "noise", "fixed", "standard_uncertainty")
+        return cls(**{key: getattr(module, key) for key in known if hasattr(module, key)})
 
     @property
     def setup(self) -> Setup:
         """The set-up as that of a fit in stages, of which it has one."""
-        free = {}
-        for each in self._unknowns:
-            free[each.name] = Free(bounds=(each.low, each.high), log=each.log, prior=each.prior)
-        return Setup(
-            title=self.name,
-            stages=(Stage(name=self.name, part="model", free=free),),
-            standard_uncertainty=dict(self.standard_uncertainty),
-        )
-
-    @property
-    def _unknowns(self) -> list[Unknown]:
-        return list(self.free.values())  # type: ignore[arg-type]  # made so at the beginning
+        free = {
+            each.name: Free(bounds=(each.low, each.high), log=each.log, prior=each.prior)
+            for each in self.free.values()
+        }
+        stage = Stage(name=self.name, part="model", free=free)
+        uncertain = dict(self.standard_uncertainty)
+        return Setup(title=self.name, stages=(stage,), standard_uncertainty=uncertain)
 
     def nominal(self, experiments: Sequence[Experiment]) -> ModelSetup:
         """The set-up with the numbers before a fit to some runs."""
@@ -444,32 +411,27 @@ class ModelSetup(Result):
         return replace(self, numbers=numbers, scales=problem.scales)
 
     def problem(self, experiments: Sequence[Experiment], *, threads: int = 1) -> Problem:
-        """The problem that it states for some runs.
-
-        Raises
-        ------
-        InputError
-            If no run has a channel that is fitted, or the model gives none.
-        """
-        own = {each.name: self.own(each) for each in experiments}
-        of_runs = {each.name for unknowns in own.values() for each in unknowns}
-        had = tuple(dict.fromkeys(name for each in experiments for name in each.channels))
-        channels = self.channels or self._given(experiments)
-        runs = tuple(
-            self._with_noise(each)
-            for each in experiments
-            if any(name in each.channels for name in channels)
-        )
+        """The problem that it states for some runs, one of which has a channel that is fitted."""
+        channels = tuple(self.channels) or self._given(experiments)
+        runs = [each for each in experiments if any(name in each.channels for name in channels)]
         if not runs:
+            had = dict.fromkeys(name for each in experiments for name in each.channels)
             raise InputError(
                 f"{self.name} is fitted to {', '.join(channels) or 'nothing'}, but the runs have "
                 f"{', '.join(had) or 'no channel'}."
             )
-        machine = [each for each in self._unknowns if each.name not in of_runs]
+        for k, run in enumerate(runs):  # the noise of channels that the campaign does not state
+            noises = {
+                name: replace(channel, noise=channel.noise or self.noise.get(name))
+                for name, channel in run.channels.items()
+            }
+            runs[k] = replace(run, channels=noises)
+        of_runs = {each.name for run in experiments for each in self.own(run)}
+        machine = [each for each in self.free.values() if each.name not in of_runs]
         return Problem(
             self.model,
-            runs,
-            Unknowns((*machine, *(unknown for each in runs for unknown in own[each.name]))),
+            tuple(runs),
+            Unknowns((*machine, *(unknown for each in runs for unknown in self.own(each)))),
             channels,
             noise_scales(runs, channels),
             dict(self.fixed),
@@ -480,15 +442,20 @@ class ModelSetup(Result):
             threads if isinstance(self.model, OwnModel) else 1,
         )
 
+    def _given(self, experiments: Sequence[Experiment]) -> tuple[str, ...]:
+        """Names of the channels that the model gives."""
+        values = {each.name: each.start for each in self.free.values()} | dict(self.fixed)
+        own = self.model.signals_of if isinstance(self.model, OwnModel) else None
+        given = [own(each) if own else simulated(self.model, values, each) for each in experiments]
+        return tuple(dict.fromkeys(name for each in given for name in each))
+
     def own(self, experiment: Experiment) -> tuple[Unknown, ...]:
         """The unknowns of a single run: where its state begins, and the zeros of its sensors."""
         zeros = {f"{OFFSET}{name}" for name in experiment.channels}
-        states = isinstance(self.model, OwnModel)
-        return tuple(
-            replace(each, run=experiment.name)
-            for each in self._unknowns
-            if each.run is None and (each.name in zeros or (states and each.name.startswith(START)))
-        )
+        states = (START,) if isinstance(self.model, OwnModel) else ()
+        free = [each for each in self.free.values() if each.run is None]
+        free = [each for each in free if each.name in zeros or each.name.startswith(states)]
+        return tuple(replace(each, run=experiment.name) for each in free)
 
     def predicted(self, experiment: Experiment) -> Mapping[str, Array]:
         """A run predicted from its input: for each channel (m,) samples at its stamps. [unit]
@@ -501,28 +468,9 @@ class ModelSetup(Result):
         if not own:
             found = simulated(self.model, self.numbers, experiment)
             return {name: found[name] for name in channels}
-        fixed, unknowns = self.numbers, Unknowns(own)
-        problem = Problem(self.model, (experiment,), unknowns, channels, self.scales, fixed)
+        known = channels, self.scales, self.numbers
+        problem = Problem(self.model, (experiment,), Unknowns(own), *known)
         return problem.outputs(solve(problem).vector, 0)
-
-    def _with_noise(self, experiment: Experiment) -> Experiment:
-        """The run with the noise of channels that the campaign does not state."""
-        channels = dict(experiment.channels)
-        for name, channel in channels.items():
-            if channel.noise is None and name in self.noise:
-                channels[name] = replace(channel, noise=self.noise[name])
-        return replace(experiment, channels=channels)
-
-    def _given(self, experiments: Sequence[Experiment]) -> tuple[str, ...]:
-        """Names of the channels that the model gives."""
-        values = {each.name: each.start for each in self._unknowns} | dict(self.fixed)
-        given = (
-            self.model.signals_of(each)
-            if isinstance(self.model, OwnModel)
-            else simulated(self.model, values, each)
-            for each in experiments
-        )
-        return tuple(dict.fromkeys(name for each in given for name in each))
 
 
 def _unknown(name: str, entry: Range | Unknown) -> Unknown:

@@ -18,7 +18,7 @@ from swashplate.executors import Executor, Serial
 from swashplate.identification.problem import Evaluation, Loss, Problem
 from swashplate.identification.unknowns import Vector
 from swashplate.results import Result
-from swashplate.tables import write_text
+from swashplate.tables import made_folder, write_text
 
 Array = NDArray[np.float64]
 Finite = Annotated[float, Field(allow_inf_nan=False)]
@@ -40,8 +40,9 @@ SOME_EFFECT = 0.05
 """Share of its nominal effect at which an unknown counts as having one again."""
 VALUES = 25
 """Within its bounds that are tried for one."""
-UNCHANGED = 2
+UNCHANGED, INTERRUPTED = 2, -1
 _ENDINGS = {
+    INTERRUPTED: "interrupted: the best so far",
     0: "stopped at the largest number of evaluations; allow more with --evaluations",
     1: "the gradient vanished",
     UNCHANGED: "the cost no longer changed",
@@ -88,7 +89,7 @@ class _Memory:
         self.bounds = tuple(np.delete(each, self.places) for each in problem.bounds)
         self.best: tuple[float, Array] | None = None
         self._last: tuple[bytes, Evaluation] | None = None
-        self._scale = 1.0
+        self._refused = 0.0
 
     def whole(self, vector: Array) -> Array:
         """(K,) vector with the fixed numbers in their places."""
@@ -103,22 +104,23 @@ class _Memory:
             return self._last[1]
         self.evaluations += 1
         try:
-            found = self.problem.evaluate(self.whole(vector), compressed=self.compressed)
+            residuals, jacobian = self.problem.evaluate(
+                self.whole(vector), compressed=self.compressed
+            )
         except DomainError:
             if self._last is None:
                 raise  # the start itself: there is nothing to go back to
-            before = self._last[1]
-            evaluation = Evaluation(np.full_like(before.residuals, self._scale), before.jacobian)
+            residuals, jacobian = self._last[1]
+            made = Evaluation(np.full_like(residuals, self._refused), jacobian)
         else:
-            jacobian = np.delete(found.jacobian, self.places, axis=1)
-            evaluation = Evaluation(found.residuals, jacobian)
-            cost = 0.5 * float(found.residuals @ found.residuals)
+            made = Evaluation(residuals, np.delete(jacobian, self.places, axis=1))
+            cost = 0.5 * float(residuals @ residuals)
             if self.best is None:
-                self._scale = float(np.sqrt(REFUSED * (2.0 * cost + 1e-300)))
+                self._refused = float(np.sqrt(REFUSED * (2.0 * cost + 1e-300)))
             if self.best is None or cost < self.best[0]:
                 self.best = (cost, vector.copy())
-        self._last = (key, evaluation)
-        return evaluation
+        self._last = (key, made)
+        return made
 
 
 def solve(
@@ -138,7 +140,7 @@ def solve(
     problem : Problem
         What to minimise.
     start : (K,) array, optional
-        Where to begin instead of at the nominal values.
+        Where to begin instead of at the nominal values; a `DomainError` if the model does not hold.
     fixed : mapping of int to float, optional
         Places and numbers of the vector that stay where they are.
     loss : Loss
@@ -149,11 +151,6 @@ def solve(
         Of the residuals.
     watch : callable, optional
         Told of each iteration. Ctrl-C ends the search with the best point so far.
-
-    Raises
-    ------
-    DomainError
-        If the model does not hold at the start.
     """
     from scipy.optimize import least_squares
 
@@ -168,10 +165,6 @@ def solve(
         iteration += 1
         if watch is not None:
             watch(Progress(iteration, float(intermediate_result.cost), memory.evaluations))
-
-    def ended(vector: Array, cost: float, message: str, ending: int) -> Solution:
-        how = memory.evaluations, ending > 0, ending < 0, message, loss
-        return Solution(memory.whole(vector), float(cost), *how)
 
     lowest, spent, before, returns = np.inf, 0, np.inf, 0
     # an unknown that got its effect back is fixed for a leg, in which the others follow
@@ -212,9 +205,9 @@ def solve(
     except KeyboardInterrupt:
         if memory.best is None:
             raise
-        cost, best = memory.best
-        return ended(best, cost, "interrupted: the best so far", -1)
-    return ended(best, lowest, _ENDINGS[ending], ending)
+        (lowest, best), ending = memory.best, INTERRUPTED
+    how = memory.evaluations, ending > 0, ending == INTERRUPTED, _ENDINGS[ending], loss
+    return Solution(memory.whole(best), lowest, *how)
 
 
 def _returned(memory: _Memory, vector: Array) -> tuple[Array | None, NDArray[np.bool_]]:
@@ -242,8 +235,7 @@ def _returned(memory: _Memory, vector: Array) -> tuple[Array | None, NDArray[np.
         values = np.linspace(low[k], high[k], VALUES)
         far = (values - vector[k]) * (start[k] - vector[k]) < 0.0
         for value in values[np.lexsort((np.abs(values - vector[k]), far))]:
-            trial = point.copy()
-            trial[k] = value
+            trial = np.where(np.arange(point.size) == k, value, point)
             if effects(trial)[k] > SOME_EFFECT * nominal[k]:
                 point, lost[k] = trial, True
                 break
@@ -256,12 +248,8 @@ def _returned(memory: _Memory, vector: Array) -> tuple[Array | None, NDArray[np.
 def sobol_starts(problem: Problem, count: int, seed: int) -> Iterator[Array]:
     """So many points (K,) spread evenly over the bounds; others where the model does not hold.
 
-    The same seed gives the same points, however many are asked for.
-
-    Raises
-    ------
-    InputError
-        If hardly any point can be used.
+    The same seed gives the same points, however many are asked for. If hardly any point can be
+    used, an `InputError` says so.
     """
     from scipy.stats.qmc import Sobol
 
@@ -269,22 +257,19 @@ def sobol_starts(problem: Problem, count: int, seed: int) -> Iterator[Array]:
     sequence = Sobol(low.size, scramble=True, rng=np.random.default_rng(seed))
     found, tried = 0, 0
     while found < count:
-        for point in sequence.random(8):
-            tried += 1
-            vector = low + point * (high - low)
-            try:
-                problem.cost(vector)
-            except DomainError:
-                continue
-            yield vector
-            found += 1
-            if found == count:
-                return
         if tried > TRIES * (found + 1):
             raise InputError(
                 f"Of {tried} starts within the bounds only {found} lie in the model's domain; "
                 "narrow the bounds."
             )
+        tried += 1
+        vector = low + sequence.random(1)[0] * (high - low)
+        try:
+            problem.cost(vector)
+        except DomainError:
+            continue
+        found += 1
+        yield vector
 
 
 class _StartFile(BaseModel):
@@ -312,10 +297,8 @@ def solve_from(
 
     Parameters
     ----------
-    problem : Problem
-        What to minimise.
-    starts : sequence of (K,) arrays
-        Where from.
+    problem, starts : Problem, sequence of (K,) arrays
+        What to minimise, and where from.
     executor : Executor, optional
         Where; here, one after another, by default.
     store : Path, optional
@@ -338,7 +321,7 @@ def solve_from(
     """
     origin = dict(origin or {})
     done = {} if store is None else _stored(store, origin, starts, resume)
-    tasks = [(number, start) for number, start in enumerate(starts) if number not in done]
+    tasks = [task for task in enumerate(starts) if task[0] not in done]
     shared = problem, partial(solve, **settings)  # type: ignore[arg-type]
     try:
         for _, result in (executor or Serial()).run(_solve_one, shared, tasks):
@@ -363,7 +346,7 @@ def _solve_one(
     try:
         solution = solved(problem, start)
     except DomainError as error:
-        solution = Solution(start, np.inf, 1, False, False, str(error))
+        return Solution(start, np.inf, 1, False, False, str(error), number=number)
     if solution.interrupted:
         raise KeyboardInterrupt
     return replace(solution, number=number)
@@ -373,22 +356,17 @@ def _stored(
     store: Path, origin: dict[str, str], starts: Sequence[Array], resume: bool
 ) -> dict[int, Solution]:
     """Results that a folder holds; the folder is made if there is none."""
-    try:
-        store.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise FileError(f"{store} cannot be made: {error.strerror or error}.") from None
-    done = {}
-    for path in sorted(store.glob("start-*.json")):
-        if not resume:
-            raise FileError(
-                f"{store} holds the starts of an earlier fit: resume it, or remove the folder."
-            )
+    done, files = {}, sorted(made_folder(store).glob("start-*.json"))
+    if files and not resume:
+        raise FileError(
+            f"{store} holds the starts of an earlier fit: resume it, or remove the folder."
+        )
+    for path in files:
         try:
             file = read_json(path, _StartFile)
         except SwashplateError as error:
-            raise FileError(
-                f"{str(error).rstrip('.')}: it is no result of a start, remove it."
-            ) from None
+            said = str(error).rstrip(".")
+            raise FileError(f"{said}: it is no result of a start, remove it.") from None
         differing = [name for name, mark in origin.items() if file.origin.get(name) != mark]
         result = file.result
         if not differing and result.number < len(starts):

@@ -10,13 +10,12 @@ from math import inf
 from typing import TYPE_CHECKING
 
 from swashplate.errors import InputError
-from swashplate.identification.drive_model import DriveModel, true_value
+from swashplate.identification.drive_model import START_PRESSURE, DriveModel, true_value
 from swashplate.identification.identifiability import GAUGES
 from swashplate.identification.intervals import LEVEL, Estimate
 from swashplate.identification.setup import ModelSetup
 from swashplate.identification.validation import ignored_windows, pooled, with_speeds
 from swashplate.parameters.definitions import CATALOGUE, COLUMNS
-from swashplate.simulation.instance import START_PRESSURE
 from swashplate.tables import NONE, UNIT, Cell, Column, Table, listed, percent, plain, spread
 from swashplate.units import chosen_unit, display_unit
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -67,29 +68,28 @@ class Unknown:
     often the prior counts, see `intervals.weighed`."""
 
     def __post_init__(self) -> None:
-        if not (isfinite(self.low) and isfinite(self.high) and self.low < self.high):
+        name, low, high = self.name, self.low, self.high
+        if not (isfinite(low) and isfinite(high) and low < high):
             raise ParameterError(
-                f"{self.name} is bounded by {self.low:g} and {self.high:g}; two finite numbers, "
-                "the lower one first, are needed."
+                f"{name} is bounded by {low:g} and {high:g}; two finite numbers, the lower one "
+                "first, are needed."
             )
-        if not self.low <= self.start <= self.high:
+        if not low <= self.start <= high:
             hint = "" if isfinite(self.start) else ", as 'swashplate guess' reads one off the logs"
             raise ParameterError(
-                f"{self.name} begins at {self.start:g}, outside its bounds {self.low:g} and "
-                f"{self.high:g}; give the drive that the fit begins from another value{hint}."
+                f"{name} begins at {self.start:g}, outside its bounds {low:g} and {high:g}; give "
+                f"the drive that the fit begins from another value{hint}."
             )
-        if self.log and self.low <= 0.0:
+        if self.log and low <= 0.0:
             raise ParameterError(
-                f"{self.name} is moved by its logarithm, so its lower bound must be above 0, not "
-                f"{self.low:g}."
+                f"{name} is moved by its logarithm: its lower bound must be above 0, not {low:g}."
             )
         if self.prior is not None and not self.prior.deviation > 0.0:
-            raise ParameterError(f"The prior of {self.name} needs a positive standard deviation.")
+            raise ParameterError(f"The prior of {name} needs a positive standard deviation.")
         if not self.scale:
-            reach = self.high - self.low
             # one that begins at next to nothing, or at 0, is known by its bounds alone
-            size = abs(self.start) if abs(self.start) > 1e-6 * reach else 0.25 * reach
-            object.__setattr__(self, "scale", size)
+            size, reach = abs(self.start), high - low
+            object.__setattr__(self, "scale", size if size > 1e-6 * reach else 0.25 * reach)
 
     @property
     def targets(self) -> tuple[str, ...]:
@@ -105,7 +105,6 @@ class Unknown:
 def bounded(
     name: str,
     nominal: float,
-    *,
     relative: tuple[float, float] | None = None,
     absolute: tuple[float, float] | None = None,
     least: float = -inf,
@@ -114,12 +113,8 @@ def bounded(
     """An unknown with bounds that are multiples of its nominal value, or numbers.
 
     `relative` are factors on the nominal value, in either order, `absolute` the bounds as they are;
-    it never falls below `least`, and begins there at the lowest. `more` are fields of `Unknown`.
-
-    Raises
-    ------
-    ParameterError
-        If `relative` is given for a nominal value of 0, which no factor moves.
+    it never falls below `least`, and begins there at the lowest. `more` are fields of `Unknown`. A
+    nominal value of 0, which no factor moves, is refused in a `ParameterError`.
     """
     if relative is not None and nominal == 0.0:
         raise ParameterError(f"{name} is nominally 0, which no factor moves: give absolute bounds.")
@@ -140,9 +135,9 @@ class Unknowns(Result):
     """(K,) vector of the point; nominal if None. See `at`."""
 
     def __post_init__(self) -> None:
-        taken = [(each.run, target) for each in self.items for target in each.targets]
-        for k, (_, target) in enumerate(taken):
-            if taken[k] in taken[:k]:
+        taken = Counter((each.run, target) for each in self.items for target in each.targets)
+        for (_, target), times in taken.items():
+            if times > 1:
                 raise ParameterError(f"{target} is set by two parameters; let one set it.")
 
     def __getitem__(self, place: int) -> Unknown:
@@ -167,13 +162,7 @@ class Unknowns(Result):
         )
 
     def index(self, name: str) -> int:
-        """Place of an unknown.
-
-        Raises
-        ------
-        InputError
-            If there is none of that name.
-        """
+        """Place of an unknown; an `InputError` if there is none of that name."""
         if name not in self.names:
             raise InputError(f"There is no parameter {name}; there are {', '.join(self.names)}.")
         return self.names.index(name)
@@ -218,14 +207,12 @@ class Unknowns(Result):
         """(K,) -1 where the point is at the lower bound, 1 at the upper, 0 between."""
         low, high = self.bounds
         near = AT_BOUND * (high - low)
-        below, above = self.vector <= low + near, self.vector >= high - near
-        return np.where(below, -1, np.where(above, 1, 0)).astype(np.int8)
+        return np.where(self.vector <= low + near, -1, self.vector >= high - near).astype(np.int8)
 
     @property
     def free(self) -> NDArray[np.bool_]:
         """(K,) unknowns that are not at a bound."""
-        free: NDArray[np.bool_] = self.at_bound == 0
-        return free
+        return np.asarray(self.at_bound == 0)
 
     @property
     def released(self) -> Unknowns:
@@ -252,9 +239,7 @@ class Unknowns(Result):
         """(..., K) values of vectors; a logarithm beyond any float's becomes inf or 0."""
         with np.errstate(over="ignore"):
             powers = np.exp(np.where(self.logarithmic, vector, 0.0))
-        return np.where(
-            self.logarithmic, powers, np.where(self.logarithmic, 0.0, vector) * self.scales
-        )
+        return np.where(self.logarithmic, powers, vector * self.scales)
 
     def to_vector(self, values: Array) -> Array:
         """(..., K) vectors of values, positive where logarithmic."""
@@ -288,18 +273,18 @@ class Unknowns(Result):
         """(len(targets), K) derivatives of the model's numbers by the vector."""
         matrix, places = np.zeros((len(targets), len(self.items))), self._places(run)
         slopes = self._slopes(vector)
-        for row, target in enumerate(targets):
-            if target in places:
-                matrix[row, places[target]] = slopes[places[target]]
+        for row, place in enumerate(map(places.get, targets)):
+            if place is not None:
+                matrix[row, place] = slopes[place]
         return matrix
 
     def with_worths(self, worths: Sequence[float] | None) -> Unknowns:
         """The same with these worths of the priors, in order; without any priors for None."""
+        given, items = iter(worths or ()), self.items
         if worths is None:
-            return replace(self, items=tuple(replace(each, prior=None) for each in self.items))
-        given = iter(worths)
-        items = (replace(each, worth=next(given)) if each.prior else each for each in self.items)
-        return replace(self, items=tuple(items))
+            return replace(self, items=tuple(replace(each, prior=None) for each in items))
+        changed = (replace(each, worth=next(given)) if each.prior else each for each in items)
+        return replace(self, items=tuple(changed))
 
     def prior_rows(self, vector: Array) -> tuple[Array, Array]:
         """Residuals (p,) of the priors and their derivatives (p, K) by the vector."""

@@ -13,7 +13,7 @@ from scipy.fft import irfft, next_fast_len, rfft
 from swashplate.campaign.experiment import Channel, Experiment
 from swashplate.campaign.speed import speed_of
 from swashplate.errors import InputError
-from swashplate.identification.drive_model import SIGNALS, DriveModel, Parameters, measured_current
+from swashplate.identification.drive_model import SIGNALS, DriveModel, Parameters
 from swashplate.identification.noise import LONGEST, Grid, correlation_length, grid_of, pair_sums
 from swashplate.identification.problem import Problem
 from swashplate.identification.setup import ModelSetup
@@ -271,9 +271,7 @@ def predict(
     for each in experiments:
         if not any(channel.kind in SIGNALS for channel in each.channels.values()):
             raise InputError(f"{each.name} has no channel that a drive has.")
-        own = DriveModel(parameters)
-        if each.input.kind == "current":
-            own = DriveModel(parameters, "pump", {each.name: measured_current(each)})
+        own = DriveModel(parameters, "pump" if each.input.kind == "current" else "chain")
         for name, simulated in own.simulate({}, each).items():
             channel = each[name]
             if not channel.used.any():

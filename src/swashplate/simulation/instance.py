@@ -46,17 +46,17 @@ PATHS = {
     "tau": "card.tau",
 }
 """Path in the model of every column such as ``Z16_plus``."""
-START_PRESSURE = "start_pressure"
-"""Column of δP at the first sample, where it is an unknown of the experiment."""
+START = "start."
+"""What the column of a number of the state at the first sample begins with, before its path."""
+PRESSURE = "pump.pressure"
+"""Path of δP; at the first sample the column ``start.pump.pressure``."""
 
 
 def path_of(column: str) -> str:
-    """Path in the model of a column, of the pressure at the start, or of a state at the start."""
-    if column.startswith("start."):
-        return column
+    """Path in the model of a column; a state at the start is its own."""
     if column in OWN:  # of an equation of one's own
         return f"pump.{column}"
-    return "start.pump.pressure" if column == START_PRESSURE else PATHS[column]
+    return column if column.startswith(START) else PATHS[column]
 
 
 class Models(NamedTuple):

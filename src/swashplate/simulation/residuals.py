@@ -20,7 +20,8 @@ from swashplate.parameters.parameter_set import ParameterSet
 from swashplate.results import Result
 from swashplate.simulation.instance import (
     PATHS,
-    START_PRESSURE,
+    PRESSURE,
+    START,
     check_filter_stability,
     instance_of,
     path_of,
@@ -62,8 +63,7 @@ def wanted_columns(columns: tuple[str, ...]) -> tuple[str, ...]:
     """Columns that are asked for, symbols taken apart; refused where one is asked for twice."""
     names: list[str] = []
     for name in columns:
-        at_start = name == START_PRESSURE or name.startswith("start.")
-        for each in [name] if at_start else columns_of([name]):
+        for each in [name] if name.startswith(START) else columns_of([name]):
             if each in names:
                 raise InputError(f"{each} is asked for twice.")
             names.append(each)
@@ -84,8 +84,8 @@ def made_ready(
 ) -> Ready:
     """The drive's model with its numbers, for some columns.
 
-    These are symbols (``"Z16"`` stands for both directions), columns (``"Z16_plus"``) and
-    ``"start_pressure"``, δP at the first sample, whose value is among the starts of `own`. [Pa]
+    These are symbols (``"Z16"`` stands for both directions), columns (``"Z16_plus"``) and states
+    at the first sample whose values are among the starts of `own`, ``"start.pump.pressure"``. [Pa]
     """
     names = wanted_columns(tuple(columns))
     by_voltage = observed.driven_by == "voltage"
@@ -97,12 +97,10 @@ def made_ready(
     asked = frozenset(SWITCHES[name] for name in names if name in SWITCHES) - {"leaky", "loaded"}
     instance = instance_of(_switched_on(parameters, asked), by_voltage)
     start = dict(own.start)
-    if START_PRESSURE in start:
+    if PRESSURE in start:
         first = {name: float(values[0]) for name, values in observed.records.items()}
         started = instance.start(first, observed.record.step, observed.start)
-        start |= start_states(instance, start.pop(START_PRESSURE), started)
-    elif START_PRESSURE in names:
-        raise InputError(f"{START_PRESSURE} is a column, so Own needs a value of it.")
+        start |= start_states(instance, start[PRESSURE], started)
     # whether anything observed can depend on a column: on a driven channel, on the pump
     low, high = observed.extremes if by_voltage else (0.0, 0.0)
     moved = {

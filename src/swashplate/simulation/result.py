@@ -13,10 +13,9 @@ from numpy.typing import NDArray
 from swashplate.equations.marching.use import Run, limits_of, read_only
 from swashplate.errors import InputError
 from swashplate.models.displacement_control import Pump
-from swashplate.results import Tabular, figures
+from swashplate.results import figures
 
 if TYPE_CHECKING:
-    import polars
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
@@ -80,7 +79,7 @@ class Named:
         return cast("Array", result[self._name])
 
 
-class Simulation(Run, Tabular):
+class Simulation(Run):
     """Signals of one simulated record, read-only arrays of the record's length, all SI.
 
     Signs: positive voltage, current, force, opening, angle and speed go together; positive speed
@@ -90,9 +89,7 @@ class Simulation(Run, Tabular):
     kept = KEPT
     later = tuple(name for name in OUTPUTS if name not in (*KEPT, "shaft_position"))
 
-    def __repr__(self) -> str:
-        samples = f"{self.time.size} samples at {self.record.rate:g} Hz"
-        return f"Simulation({self.name!r}, {samples})"
+    limit_names = tuple(str(each.name).lower() for each in Limit)
 
     @cached_property
     def names(self) -> tuple[str, ...]:
@@ -172,22 +169,11 @@ class Simulation(Run, Tabular):
         if fine:
             return super().active(str(limit), fine=True)
         if isinstance(limit, str):
-            names = {str(each.name).lower(): each for each in Limit}
-            if limit.lower() not in names:
-                raise InputError(f"There is no limit '{limit}'; there are {', '.join(names)}.")
-            limit = names[limit.lower()]
+            if limit.lower() not in self.limit_names:
+                known = ", ".join(self.limit_names)
+                raise InputError(f"There is no limit '{limit}'; there are {known}.")
+            limit = Limit[limit.upper()]
         return np.asarray((self.limits & int(limit)) != 0)
-
-    def to_polars(self) -> polars.DataFrame:
-        """Table of time, all signals and a true/false column for each limit.
-
-        With refinements the motor's torque and, if known, its pressure drop follow.
-        """
-        import polars as pl
-
-        columns: dict[str, Any] = {name: self[name] for name in self.names if name not in MOTOR}
-        columns |= {f"limit_{str(each.name).lower()}": self.active(each) for each in Limit}
-        return pl.DataFrame(columns | {name: self[name] for name in self.names if name in MOTOR})
 
     def plot(
         self,

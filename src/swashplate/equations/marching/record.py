@@ -57,6 +57,11 @@ class Record:
         samples = (self.values.size - 1) // self.substeps + 1
         return self.start + np.arange(samples) / self.rate
 
+    @property
+    def points(self) -> Array:
+        """Time of the grid's points, `substeps` a sample. [s]"""
+        return self.start + np.arange(self.values.size) / (self.rate * self.substeps)
+
 
 def on_grid(
     inputs: Mapping[str, ArrayLike],

@@ -7,7 +7,17 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from difflib import get_close_matches
 from functools import cached_property, lru_cache
-from typing import Any, ClassVar, Generic, NamedTuple, Self, TypeVar, Unpack, get_type_hints
+from typing import (
+    TYPE_CHECKING,
+    Any,
+    ClassVar,
+    Generic,
+    NamedTuple,
+    Self,
+    TypeVar,
+    Unpack,
+    get_type_hints,
+)
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -37,6 +47,10 @@ from swashplate.equations.marching.stepping import CompiledStep, Machine
 from swashplate.equations.model import Model, parameter_paths
 from swashplate.equations.syntax import plain
 from swashplate.errors import InputError
+from swashplate.results import Tabular
+
+if TYPE_CHECKING:
+    import polars
 
 Array = NDArray[np.float64]
 S = TypeVar("S")
@@ -79,11 +93,12 @@ def read_only(array: NDArray[T]) -> NDArray[T]:
 
 
 @dataclass(frozen=True, eq=False)
-class Run:
+class Run(Tabular):
     """Signals of a model over its inputs, read by name: ``run["position"]``.
 
     Arrays are read-only, of the inputs' length. Some signals are kept from the first march; for
-    the others it is marched again when one of them is first asked for.
+    the others it is marched again when one of them is first asked for. `to_polars`, `to_pandas` and
+    `to_xarray` give all of them, `write` a file.
     """
 
     instance: Instance = field(repr=False)
@@ -150,8 +165,21 @@ class Run:
         every = ("time", *self.records, *signals_of(model), *model.integrals)
         return tuple(dict.fromkeys(every))
 
+    @property
+    def limit_names(self) -> tuple[str, ...]:
+        """Limits of the model."""
+        return tuple(limits_of(self.instance.model))
+
     def __repr__(self) -> str:
-        return f"{type(self).__name__}({self.name!r}, {self.time.size} samples)"
+        samples = f"{self.time.size} samples at {self.record.rate:g} Hz"
+        return f"{type(self).__name__}({self.name!r}, {samples})"
+
+    def to_polars(self) -> polars.DataFrame:
+        """Table of time, all signals and a true/false column ``limit_NAME`` for each limit, SI."""
+        import polars as pl
+
+        limits = {f"limit_{name}": self.active(name) for name in self.limit_names}
+        return pl.DataFrame({name: self[name] for name in self.names} | limits)
 
     def __getitem__(self, signal: str) -> Array:
         """A signal by its name, SI: ``run["shaft_speed"]``.
