@@ -49,21 +49,29 @@ of which the equation consists, are compared by themselves."""
 # --- equations ------------------------------------------------------------------------------------
 
 
-def equations() -> dict[str, Any]:
+def equations_of(space: dict[str, Any]) -> dict[str, Any]:
+    """Equations that a module defines."""
+    return {
+        name: thing
+        for name, thing in space.items()
+        if is_function(thing)
+        and plain(thing).__module__ == space["__name__"]
+        and inspect.getsource(plain(thing)).startswith("@equation\n")
+    }
+
+
+def packaged() -> dict[str, Any]:
     """All equations of the models and of the engine's library, by module and name."""
     found = {}
     for package in (swashplate.models, swashplate.equations):
         for each in pkgutil.iter_modules(package.__path__, f"{package.__name__}."):
-            module = importlib.import_module(each.name)
-            for name, thing in vars(module).items():
-                if not is_function(thing) or plain(thing).__module__ != each.name:
-                    continue
-                if inspect.getsource(plain(thing)).startswith("@equation\n"):
-                    found[f"{each.name.rpartition('.')[2]}.{name}"] = thing
+            own = equations_of(vars(importlib.import_module(each.name)))
+            stem = each.name.rpartition(".")[2]
+            found |= {f"{stem}.{name}": thing for name, thing in own.items()}
     return found
 
 
-EQUATIONS = equations()
+EQUATIONS = packaged()
 
 
 # --- arguments ------------------------------------------------------------------------------------
