@@ -328,12 +328,6 @@ def test_a_comparison_shows_what_differs(step: Simulation, hoist: Drive) -> None
         figures.plot_comparison({})
 
 
-def test_the_envelope_ends_at_the_swash_stop(made: dict[str, Figure]) -> None:
-    words = [text.get_text() for text in made["envelope"].axes[0].texts]
-    assert "swash stop\n+196.0 deg/s" in words
-    assert "orifice, at rest\n+136.8 deg/s²" in words
-
-
 def test_the_timeline_has_a_row_for_each_limit(
     made: dict[str, Figure], all_limits: Simulation
 ) -> None:
@@ -368,12 +362,6 @@ def test_the_strongest_lever_is_at_the_top(made: dict[str, Figure]) -> None:
         base = ax.lines[-1].get_xdata()[0]
         assert float(number.split()[0]) == pytest.approx(base, abs=0.005)
     assert "no lever moves it" in [text.get_text() for text in still.texts]
-
-
-def test_the_inverse_map_and_its_gap(made: dict[str, Figure]) -> None:
-    words = [text.get_text() for ax in made["map"].axes for text in ax.texts]
-    assert {"148.6 deg/s, 10 V", "cannot be held", "close-up around standstill"} <= set(words)
-    assert labels(made["improvement"])[2:] == ["speed (deg/s)", "error (deg/s)"]
 
 
 def test_lines_of_a_sweep_are_the_response(made: dict[str, Figure], hoist: Drive) -> None:
