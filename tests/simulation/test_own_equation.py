@@ -107,25 +107,6 @@ def test_another_process_finds_the_equation() -> None:
     )
 
 
-@equation
-def straight_map(command: float, share: float, p: Channel) -> float:
-    """A card without jump, whose dead zone lies at zero."""
-    return 0.1 * max(command, 0.0)
-
-
-@pytest.mark.slow
-def test_the_cards_equations_can_be_replaced() -> None:
-    drive = PLAIN.with_equation(steady_current, straight_map).replace(C=0.0)
-    assert drive.steady_current([4.0, -2.0, 0.0]) == pytest.approx([0.4, -0.2, 0.0])
-    run = drive.simulate(np.full(2048, 4.0))
-    assert run.current[-1] == pytest.approx(0.4, rel=1e-9)
-    assert run.shaft_speed[-1] == pytest.approx(drive.steady_speed(4.0), rel=1e-6)
-    slope = np.diff(drive.steady_speed([3.999, 4.001]))[0] / 0.002
-    assert drive.linearize(4.0).gain == pytest.approx(slope, rel=1e-5)
-    batch = drive.simulate_many({"Z10": [12.0, PLAIN["Z10"].value]}, voltage=np.full(2048, 4.0))
-    assert np.array_equal(batch.output[1], run.shaft_speed)
-
-
 CAMPAIGN = """
 [axes.hoist]
 time = { column = "time", unit = "s" }
@@ -182,7 +163,7 @@ def test_what_does_not_fit_is_refused() -> None:
     with pytest.raises(InputError, match="faster is no equation of the drive"):
         PLAIN.with_equation(faster, faster)
     with pytest.raises(InputError, match="steady_current is an equation of the card"):
-        PLAIN.with_equation(steady_current, straight_map, Seal)
+        PLAIN.with_equation(steady_current, proportional, Seal)
     with pytest.raises(InputError, match="must begin with the arguments of spool_balance"):
         PLAIN.with_equation(spool_balance, faster)
     with pytest.raises(InputError, match="has a parameter Z6 already"):
