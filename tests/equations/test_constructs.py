@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Callable
-from math import acos, asin, atan2, cos, exp, floor, hypot, log, pi, sin, sqrt, tan
+from math import acos, asin, atan2, cos, exp, floor, hypot, log, sin, sqrt, tan
 from typing import Any, NamedTuple
 
 import pytest
@@ -16,7 +16,6 @@ from swashplate.equations import (
     interpolate,
     repeated,
     root,
-    soft_threshold,
 )
 from swashplate.errors import EquationError
 
@@ -123,17 +122,6 @@ def difference(
 
 
 @equation
-def reassigned(x: float, y: float) -> float:
-    """A name's second value, of an argument too."""
-    z = x * y
-    x = z + sin(x)
-    z = x * z
-    x += y
-    x *= 2.0
-    return z / x
-
-
-@equation
 def unpacked(x: float, y: float) -> tuple[float, float]:
     a, b = x * y, x + y
     a, b = b, a
@@ -155,7 +143,6 @@ def looped(x: float, s: tuple[float, float, float]) -> float:
 
 
 def test_statements(derivative: Callable[..., float]) -> None:
-    check(reassigned, derivative, ("x", "y"), x=0.7, y=1.3)
     check(unpacked, derivative, ("y", "x"), x=0.7, y=1.3)
     check(looped, derivative, ("x", "s"), x=0.7, s=(1.0, -0.4, 0.3))
     check(looped, derivative, ("x", "s.1"), x=30.0, s=(1.0, -0.4, 0.3))
@@ -165,25 +152,10 @@ def test_statements(derivative: Callable[..., float]) -> None:
 
 
 @equation
-def arithmetic(x: float, y: float) -> float:
-    """Divisions by literals and names, powers, constants of a module."""
-    return -x / 3.0 + x**2 - y**3 / x + y**-1 + x**0 - x**1 * GAIN + pi * y - +x + 2 * y / (x - 5)
-
-
-@equation
 def functions(x: float, y: float) -> tuple[float, float]:
     first = sqrt(x) + exp(-x) * log(y) + sin(x * y) - cos(x) / tan(y) + math.atan(x)
     second = asin(x / 2.0) * acos(y / 3.0) + atan2(y, x) + hypot(x, 2.0 * y) + floor(x) * y
     return first, second
-
-
-@equation
-def decisions(x: float, y: float) -> float:
-    high = x > 1.0 or not y > 0.5
-    both = 0.0 < x < 2.0 and y != 3.0
-    never = x == y
-    a = x * y if high and both else y / x
-    return a if not never else 0.0
 
 
 @equation
@@ -199,10 +171,7 @@ def careful(x: float, y: float) -> float:
 
 
 def test_expressions(derivative: Callable[..., float]) -> None:
-    check(arithmetic, derivative, ("x", "y"), x=0.7, y=1.3)
     check(functions, derivative, ("x", "y"), x=0.7, y=1.3)
-    for x, y in ((0.7, 1.3), (1.7, -1.3), (-0.7, 0.2), (0.1, 0.2)):
-        check(decisions, derivative, ("x", "y"), x=x, y=y)
     for x in (2.0, 1.05, 0.7, 0.3, -1.0):
         check(careful, derivative, ("x", "y"), x=x, y=0.6)
 
@@ -313,15 +282,6 @@ def test_an_option_that_is_tested_has_to_be_known() -> None:
 # --- activity -------------------------------------------------------------------------------------
 
 
-def test_what_does_not_move_costs_nothing() -> None:
-    """Nothing is done for the derivative by the force but what it leads to."""
-    slopes = derive(stepped, "force").source.count("d_")
-    assert 0 < slopes < derive(stepped, ("force", "b")).source.count("d_")
-    derived = derive(looked, "gain", lengths={"s": 2})
-    assert derived.entries == ((0, 0),)
-    assert "d_s" not in derived.source
-
-
 def test_unknown_paths_are_refused() -> None:
     with pytest.raises(EquationError, match=r"no float at b\.size.*b\.mass"):
         derive(stepped, "b.size")
@@ -342,13 +302,7 @@ def _(x: float, y: float) -> tuple[float, float]:
     return 2.0 * abs(x), 1.0
 
 
-@equation
-def bent_twice(x: float, y: float) -> float:
-    return bent(bent(x, y) * y, x)
-
-
-def test_declared_rules(derivative: Callable[..., float]) -> None:
-    check(bent_twice, derivative, ("x", "y"), x=0.7, y=1.3)
+def test_declared_rules() -> None:
     assert derive(bent, ("x", "y")).python(-0.7, 1.3)[1:] == (1.4, 1.0)
 
 
@@ -429,18 +383,6 @@ def test_roots_to_the_last_bits(a: float, low: float, stiffness: float) -> None:
     assert abs(excess(x, a, spring)) <= 4e-15 * scale + 1e-30
 
 
-@equation
-def stuck(x: float, w: float) -> float:
-    return soft_threshold(x * w, w)
-
-
-def test_soft_threshold(derivative: Callable[..., float]) -> None:
-    assert soft_threshold(0.5, 0.7) == 0.0
-    assert soft_threshold(-0.9, 0.7) == pytest.approx(-0.2)
-    for x in (-2.0, -0.5, 0.5, 2.0):
-        check(stuck, derivative, ("x", "w"), x=x, w=0.7)
-
-
 class Swing(NamedTuple):
     angle: float
     rate: float
@@ -467,13 +409,6 @@ def test_repeated_is_a_loop(derivative: Callable[..., float]) -> None:
     assert after(5.0, state, spring, 0.1) == expected.angle * expected.rate + 0.1
     assert after(0.0, state, spring, 0.1) == 0.6 * 0.2 + 0.1
     check(after, derivative, ("state", "s", "h"), count=5.0, state=state, s=spring, h=0.1)
-
-
-def test_derivatives_of_no_repetition_are_those_of_the_state() -> None:
-    derived = derive(after, ("state", "s"))
-    _, *slopes = derived.python(0.0, Swing(0.3, 0.2), Spring(1.5, 0.1), 0.1)
-    values = dict(zip(derived.inputs, slopes, strict=True))
-    assert values == {"state.angle": 0.4, "state.rate": 0.6, "s.stiffness": 0.0, "s.rest": 1.0}
 
 
 def test_what_a_repeated_step_follows_is_structure() -> None:

@@ -13,16 +13,13 @@ from swashplate.equations import (
     Model,
     Tap,
     equation,
-    instance_of,
     join,
+    replaced,
     report,
     sensitivities,
     simulate,
     stepper,
 )
-from swashplate.equations.marching.jacobian import residuals
-from swashplate.equations.marching.observation import Observation, ObservedRecord
-from swashplate.equations.marching.record import Record
 from swashplate.errors import EquationError
 from swashplate.models.drive import pump_drive
 from swashplate.simulation.batch import simulate_many
@@ -203,20 +200,6 @@ def test_derivatives_are_those_of_differences(name: str) -> None:
     assert np.abs(found).max() > 0.0
 
 
-def test_where_the_state_begins_has_a_derivative() -> None:
-    found = sensitivities(
-        valve,
-        P,
-        {"command": COMMAND},
-        RATE,
-        output="position",
-        parameters=["start.position"],
-        given=STROKE,
-        begin={"position": 0.1},
-    )
-    assert found[:, 0] == pytest.approx(np.ones(COMMAND.size))
-
-
 def test_a_library_and_decisions_leave_the_bits_of_many_sets_alone() -> None:
     model = Model("wobbling", Valve, Rod, wobbling)
     changes = {"gain": np.linspace(0.1, 0.9, 21), "lag": np.linspace(0.04, 0.08, 21)}
@@ -240,41 +223,44 @@ def wobbling(state: Rod, command: float, p: Valve, h: float) -> Rod:
     return Rod(opening, state.position + h * p.gain * opening**3 / (p.overlap + 0.5))
 
 
-@equation
-def lagged(state: Rod, command: float, p: Valve, h: float) -> Rod:
-    opening = state.opening + h / p.lag * (command - state.opening)
-    return Rod(opening, state.position + h * p.gain * opening)
-
-
-def test_models_in_series_are_one_after_the_other() -> None:
-    first = Model("first", Valve, Rod, lagged)
-    second = Model("second", Valve, Rod, lagged, taps={"command": Tap("position", width=0)})
-    both = join("both", first, second)
-    alone = simulate(first, P, {"command": COMMAND}, RATE)
-    assert both.external == ("command",)
-    run = simulate(both, both.parameters(P, P), {"command": COMMAND}, RATE)
-    assert run["position"].shape == alone["position"].shape
-
-
 def test_bad_inputs_are_named() -> None:
+    given, good = {"given": STROKE}, {"command": COMMAND}
     with pytest.raises(InputError, match="no input 'voltage'; it has command"):
-        simulate(valve, P, {"voltage": COMMAND}, RATE, given=STROKE)
+        simulate(valve, P, {"voltage": COMMAND}, RATE, **given)
     with pytest.raises(InputError, match="must be a Valve"):
-        simulate(valve, STROKE, {"command": COMMAND}, RATE, given=STROKE)
-    bad = COMMAND.copy()
-    bad[3] = np.nan
+        simulate(valve, STROKE, good, RATE, **given)
     with pytest.raises(InputError, match="command has .* the first nan at sample 3"):
-        simulate(valve, P, {"command": bad}, RATE, given=STROKE)
+        simulate(valve, P, {"command": np.array([0.0, 0.0, 0.0, np.nan])}, RATE, **given)
     with pytest.raises(InputError, match="no parameter 'lead'"):
-        sensitivities(
-            valve,
-            P,
-            {"command": COMMAND},
-            RATE,
-            output="position",
-            parameters=["lead"],
-            given=STROKE,
-        )
+        sensitivities(valve, P, good, RATE, output="position", parameters=["lead"], **given)
+
+
+def test_an_equation_of_a_model_is_replaced() -> None:
+    class Lag(NamedTuple):
+        time: float
+
+    class Out(NamedTuple):
+        out: float
+
+    @equation
+    def kept(time: float, h: float) -> float:
+        return exp(-h / time)
+
+    @equation
+    def follow(state: Out, command: float, p: Lag, h: float) -> Out:
+        a = kept(p.time, h)
+        return Out(a * state.out + (1.0 - a) * command)
+
+    @equation
+    def implicit(time: float, h: float) -> float:
+        return 1.0 / (1.0 + h / time)
+
+    lag = Model("lag", parameters=Lag, state=Out, step=follow)
+    other = replaced(lag, kept, implicit)
+    run = simulate(other, Lag(0.1), {"command": np.ones(5)}, 10.0)
+    np.testing.assert_allclose(run["out"], 1.0 - 0.5 ** np.arange(5), rtol=1e-15)
+    two = join("two", lag)
+    assert replaced(two, kept, implicit).parts[0] is not lag
 
 
 # --- what is refused ------------------------------------------------------------------------------
@@ -314,28 +300,8 @@ def nothing(state: Fill, flow: float) -> Fill:
 
 
 @equation
-def number(state: Fill, flow: float) -> Fill:
-    return state.level + flow
-
-
-@equation
 def row(state: Fill, flow: float) -> Fill:
     return (state.level, flow)
-
-
-@equation
-def stranger(state: Fill, flow: float, p: Outlet) -> Fill:
-    return p
-
-
-@equation
-def hollow(state: Fill, flow: float) -> Fill:
-    return Fill(None)
-
-
-@equation
-def truth(state: Fill, flow: float) -> Fill:
-    return Fill(flow > 0.0)
 
 
 @equation
@@ -391,26 +357,17 @@ def run(step: Any = filled, p: Any = WIDE, flow: Any = None, rate: Any = 1.0, **
 NO_STATE = "must return a Fill of numbers on every way"
 REFUSED = {
     "nothing": ({"step": nothing}, f"Model tank: nothing {NO_STATE}"),
-    "number": ({"step": number}, f"number {NO_STATE}"),
     "row": ({"step": row}, f"row {NO_STATE}"),
-    "stranger": ({"step": stranger}, f"stranger {NO_STATE}"),
-    "hollow": ({"step": hollow}, f"hollow {NO_STATE}"),
-    "truth": ({"step": truth}, f"truth {NO_STATE}"),
-    "no step": ({"step": None}, "step must be an equation, not None"),
     "text": ({"step": "filled"}, "step must be an equation, not 'filled'"),
     "complex state": ({"state": Odd}, "Odd.level is of type complex, but must be a float"),
     "signals": ({"sample": bare}, "bare must return a named tuple, and say so"),
     "margins": ({"domain": two_margins}, "two_margins must return one number, the margin"),
     "rest": ({"rest": no_state}, "no_state must return a Fill, not Outlet"),
-    "p text": ({"p": Outlet("wide")}, "width is 'wide', but must be a real number"),
     "p complex": ({"p": Outlet(1j)}, "width is 1j, but must be a real number"),
-    "p none": ({"p": Outlet(None)}, "width is None"),
     "p list": ({"p": Outlet([1.0])}, r"width is \[1.0\]"),
     "flow complex": ({"flow": np.ones(5) * 1j}, "flow must be a sequence of real numbers"),
-    "flow text": ({"flow": ["a"]}, "flow must be a sequence of real numbers"),
     "flow none": ({"flow": [None]}, "flow must be a sequence of real numbers"),
     "rate": ({"rate": "fast"}, "The rate is 'fast' Hz, but must be a number above 0"),
-    "begin": ({"begin": {"level": np.nan}}, "level begins at nan, but must be a finite number"),
     "no such state": ({"begin": {"depth": 1.0}}, "no state 'depth' to start from; it has level"),
     "hold": ({"taps": {"flow": Tap("flow", hold="cubic")}}, "held as 'cubic'; there are linear"),
     "delay": (
@@ -485,24 +442,6 @@ def test_of_two_models_in_series_both_say_what_may_have_happened() -> None:
     p = both.parameters(Outlet(1.0), Outlet(1.0))
     with pytest.raises(DomainError, match=r"the first runs over .* Or: the second does"):
         simulate(both, p, {"flow": np.ones(5)}, 1.0)
-
-
-@pytest.mark.parametrize(
-    ("signal", "driver", "others", "sentence"),
-    [
-        ("depth", "flow", {}, "tank has no signal 'depth'; it has level"),
-        ("level", "rain", {}, "tank has no input 'rain'; it has flow"),
-        ("level", "flow", {"rain": np.ones(5)}, "tank has no input 'rain'; it has flow"),
-    ],
-)
-def test_an_unknown_signal_or_driver_cannot_be_observed(signal, driver, others, sentence) -> None:
-    record = Record(np.ones(5), 0.0, 1.0, 1)
-    observed = ObservedRecord(
-        record, [Observation(signal, np.arange(5.0), np.ones(5))], driver, "rest", others
-    )
-    tank = instance_of(Model("tank", Outlet, Fill, filled), WIDE)
-    with pytest.raises(InputError, match=sentence):
-        residuals(tank, observed)
 
 
 def test_a_model_goes_to_other_processes_by_its_name() -> None:

@@ -134,12 +134,3 @@ def test_random_equations(
             slope = slopes.get((output, i), 0.0)
             assert slope == pytest.approx(fine, rel=1e-5, abs=1e-5 * scale), derived.source
     assume(compared)
-
-
-@given(bodies(), st.tuples(values, values, values, values))
-@settings(max_examples=6)
-def test_compiled_as_interpreted(body: str, at: tuple[float, ...]) -> None:
-    f = made(body)
-    derived = derive(f, ("x", "p"))
-    arguments = (at[0], at[1], Gains(*at[2:]))
-    assert derived.compiled(*arguments) == pytest.approx(derived.python(*arguments), rel=1e-12)

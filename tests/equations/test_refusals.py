@@ -2,8 +2,6 @@
 
 import linecache
 import math
-import subprocess
-import sys
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -51,7 +49,6 @@ def defined(text: str, file: str = "/somewhere/friction.py") -> Any:
 REFUSED = {
     "while x > 0.0: x = x - 1.0": ("a while loop", "literal number of steps"),
     "for i in range(x): y = i": ("anything but a literal range", "range(4)"),
-    "for i in (1, 2): y = i": ("anything but a literal range", "range(4)"),
     "for i in range(3):\n        if x > 0.0: break": ("break", "use if within the loop"),
     "for i in range(3):\n        if x > 0.0: continue": ("continue", "use if within the loop"),
     "try:\n        y = x\n    except ValueError:\n        y = 1.0": ("try", "with if"),
@@ -61,51 +58,37 @@ REFUSED = {
     "def g(z: float) -> float: return z": ("within an equation", "beside it"),
     "class C: pass": ("a class within", "beside"),
     "import os": ("an import within", "top of the file"),
-    "from os import path": ("an import within", "top of the file"),
     "global z": ("global", "its arguments"),
     "del x": ("del", "alone"),
     "match x:\n        case 1.0: y = 2.0": ("match", "if and elif"),
     "fine(x)": ("does nothing", "leave it out"),
     "t.a = x": ("an assignment to a field", "State(t.a, b)"),
-    "t[0] = x": ("an assignment to an element", "assign to a name"),
     "y: float": ("a declaration", "assign a value"),
     "y = lambda z: z": ("lambda", "an equation of its own"),
     "y = [x, x]": ("a list", "tuple"),
-    "y = {x}": ("a set", "tuple"),
     "y = {1: x}": ("a dictionary", "named tuple"),
     "y = [z for z in t]": ("a comprehension", "write the terms out"),
     "y = 'a'": ("a string", "options"),
-    "y = f'{x}'": ("a string", "options"),
     "y = 1j": ("1j", "real numbers"),
     "y = (z := x)": (":=", "assignment of its own"),
     "y = (*t, x)": ("with *", "write the elements out"),
     "y = x // 2.0": ("//", "floor(a / b)"),
     "y = x % 2.0": ("%", "floor(a / b)"),
-    "y = x @ x": ("@", "products"),
     "y = (x > 0.0) & (x < 1.0)": ("&", "`and`"),
-    "y = (x > 0.0) | (x < 1.0)": ("|", "`or`"),
     "y = x ^ 2": ("^", "**"),
-    "y = ~x": ("~", "`not`"),
     "y = x ** 0.5": ("a power with anything", "sqrt(a)"),
     "y = x ** x": ("a power with anything", "exp(b * log(a))"),
     "y = x in t": ("`in`", "=="),
     "y = x is True": ("`is` with anything but None", "=="),
     "y = t[x]": ("an index that is no whole number", "s[0]"),
-    "y = t[0:1]": ("an index that is no whole number", "s[0]"),
     "y = print(x)": ("a call of print", "outside"),
-    "y = len(t)": ("a call of len", "write the number"),
     "y = sum(t)": ("a call of sum", "terms"),
-    "y = float(x)": ("a call of float", "as a float"),
     "y = round(x)": ("a call of round", "floor(x + 0.5)"),
-    "y = pow(x, 2)": ("a call of pow", "**"),
     "y = sorted(t)": ("a call of sorted", "equations and functions of math"),
     "y = np.sqrt(x)": ("a call of np.sqrt", "sqrt, exp, log"),
-    "y = math.gamma(x)": ("a call of math.gamma", "sqrt, exp, log"),
     "y = x(1.0)": ("a call of the argument x", "by their names"),
-    "y = fine(x)(x)": ("a call of an expression", "by their names"),
     "y = t.count(x)": ("the method count", "made anew"),
     "y = fine(*t)": ("with *", "write the elements out"),
-    "y = fine(**t)": ("with **", "write the arguments out"),
     "return": ("a return of nothing", "return a value"),
 }
 
@@ -117,13 +100,8 @@ def test_refused_at_import(statement: str) -> None:
     )
     with pytest.raises(EquationError) as raised:
         defined(text)
-    what, instead = REFUSED[statement]
-    sentence = str(raised.value)
-    assert what in sentence
-    assert instead in sentence
-    assert "/somewhere/friction.py, line " in sentence
-    assert " in f: " in sentence
-    assert sentence.endswith(".")
+    for words in (*REFUSED[statement], "/somewhere/friction.py, line ", " in f: "):
+        assert words in str(raised.value)
 
 
 @pytest.mark.parametrize(
@@ -143,27 +121,19 @@ def test_refused_heads_and_ends(text: str, what: str) -> None:
 
 DERIVED = {
     "y = fine(x) + missing(x)": ("the unknown name missing", "define or import it"),
-    "y = x + missing": ("the unknown name missing", "define or import it"),
     "y = x + WORDS": ("WORDS, which is tuple", "numbers only"),
     "y = x + t": ("arithmetic with a tuple", "name its elements"),
     "y = t.c": ("the field c, which is unknown", "name a field"),
-    "y = t[5]": ("the element 5", "count from 0"),
     "y = fine(x, x)": ("fine with too many positional arguments", "it takes x"),
-    "y = fine(z=x)": ("missing a required argument: 'x'", "it takes x"),
-    "y = fine(x, z=x)": ("unexpected keyword argument 'z'", "it takes x"),
     "y = math.sqrt(x, x)": ("sqrt of 2 arguments", "give it 1"),
     "y = Two(x).a": ("missing a required argument: 'b'", "it takes a, b"),
     "a, b, c = t": ("an unpacking", "as many values"),
     "if x > 0.0: z = 1.0\n    y = z": ("z without a value on some way", "on every way"),
     "if x > 0.0: z = t\n    else: z = x\n    y = x": ("z of two structures", "same kind"),
-    "if t: y = 2.0": ("a test of a tuple", "compare its elements"),
     "if t > x: y = 2.0": ("a comparison of a tuple", "compare its elements"),
     "y = f(x, t)": ("a call of itself", "literal range"),
     "y = root(x, 0.0, 1.0)": ("root of something else", "name of an @equation"),
-    "y = root(fine, 0.0)": ("root with other arguments", "root(residual, low, high"),
     "y = root(fine, 0.0, 1.0, x)": ("root of fine with other", "the unknown and the rest"),
-    "y = repeated(x, 3.0, t)": ("repeated of something else", "name of an @equation"),
-    "y = repeated(fine, 3.0)": ("repeated with other arguments", "repeated(step, count, state"),
     "y = repeated(fine, 3.0, t)": ("repeated of fine with other arguments", "the rest"),
     "y = repeated(added, 3.0, t)": ("added, which does not return a state", "same named tuple"),
     "y = interpolate(x, t, (1.0,))": ("interpolate with something else", "one length"),
@@ -178,19 +148,8 @@ def test_refused_when_read(statement: str) -> None:
     )
     with pytest.raises(EquationError) as raised:
         derive(f, "x")
-    what, instead = DERIVED[statement]
-    assert what in str(raised.value)
-    assert instead in str(raised.value)
-    assert "/somewhere/friction.py, line " in str(raised.value)
-
-
-def test_refused_argument_types() -> None:
-    f = defined("@equation\ndef f(x: float, n: str) -> float:\n    return x\n")
-    with pytest.raises(EquationError, match=r"n of type <class 'str'>.*named tuples"):
-        derive(f, "x")
-    f = defined("@equation\ndef f(x: float, n: 'Missing') -> float:\n    return x\n")
-    with pytest.raises(EquationError, match=r"types of f are not all known.*Missing"):
-        derive(f, "x")
+    for words in (*DERIVED[statement], "/somewhere/friction.py, line "):
+        assert words in str(raised.value)
 
 
 def test_a_function_without_a_file_is_refused() -> None:
@@ -200,18 +159,6 @@ def test_a_function_without_a_file_is_refused() -> None:
     with pytest.raises(EquationError, match="not a function that can be an equation"):
         equation(math.sqrt)
     assert issubclass(EquationError, SwashplateError)
-
-
-def test_the_prompt_refuses_in_a_sentence() -> None:
-    typed = (
-        "from swashplate.equations import equation\n"
-        "@equation\ndef f(x: float) -> float:\n    return x\n\n"
-    )
-    done = subprocess.run(
-        [sys.executable, "-i", "-q"], input=typed, capture_output=True, text=True, check=False
-    )
-    if sys.version_info < (3, 13):  # later prompts keep what was typed, as notebooks do
-        assert "The source of f cannot be read" in done.stderr
 
 
 def test_a_notebooks_cell_is_a_source() -> None:

@@ -5,9 +5,8 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
-from swashplate import Drive, Limit
+from swashplate import DomainError, Drive, InputError, Limit
 from swashplate.equations import Model, Tap, compiled_step, equation, kernel, simulate
-from swashplate.errors import DomainError, InputError
 
 
 def marched(compiled, machine, records):

@@ -5,46 +5,18 @@ constructs' test show every construct that an equation may use.
 """
 
 import ctypes
-import importlib
-import inspect
-import pkgutil
 from functools import cache
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import pytest
 from tests.equations import test_constructs
+from tests.equations.test_all_equations import EQUATIONS, equations_of
 from tests.export.twins import InC, flagged
 
-import swashplate.equations
-import swashplate.models
 from swashplate.equations import equation
 from swashplate.equations.c_source import Unit
-from swashplate.equations.equation import is_function
-from swashplate.equations.syntax import plain
 from swashplate.errors import EquationError
-
-
-def equations_of(space: dict[str, Any]) -> dict[str, Any]:
-    """Equations that a module defines."""
-    return {
-        name: thing
-        for name, thing in space.items()
-        if is_function(thing)
-        and plain(thing).__module__ == space["__name__"]
-        and inspect.getsource(plain(thing)).startswith("@equation\n")
-    }
-
-
-def packaged() -> dict[str, Any]:
-    """All equations of the models and of the engine's library, by module and name."""
-    found = {}
-    for package in (swashplate.models, swashplate.equations):
-        for each in pkgutil.iter_modules(package.__path__, f"{package.__name__}."):
-            space = vars(importlib.import_module(each.name))
-            stem = each.name.rpartition(".")[2]
-            found |= {f"{stem}.{name}": thing for name, thing in equations_of(space).items()}
-    return found
-
 
 REFUSED = ("rubbing", "rubbed")
 """Constructs of which there are none in C: an option that is a tuple of numbers, or None."""
@@ -111,7 +83,7 @@ def turned(p: Register, x: float) -> Register:
 
 
 SETS = {
-    "packaged": packaged(),
+    "packaged": EQUATIONS,
     "constructs": {name: each for name, each in CONSTRUCTS.items() if name not in REFUSED},
     "own": equations_of(globals()),
 }
@@ -155,3 +127,16 @@ def test_what_has_no_counterpart_in_c_is_refused_by_name(name: str) -> None:
         EquationError, match=r"constructs.py, line \d+: rubbing .*Rubbing\.friction.*None"
     ):
         Unit().add(CONSTRUCTS[name])
+
+
+def test_three_functions_read_as_they_were_reviewed() -> None:
+    """And what they call: golden.c is reviewed when it changes."""
+    unit = Unit("swp_")
+    for name in (
+        "channel.limited_current",
+        "displacement_control.pressure_limits",
+        "displacement_control.solenoid_force",
+    ):
+        unit.add(EQUATIONS[name])
+    made = "\n\n".join([*unit.helpers(), *unit.texts])
+    assert f"{made}\n" == (Path(__file__).parent / "golden.c").read_text("utf-8")

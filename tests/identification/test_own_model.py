@@ -1,6 +1,5 @@
-"""A model of equations in a fit: exact derivatives, what a run begins with, what is refused."""
+"""A model of one's own in a fit: exact derivatives, starts and loads, and all that drives have."""
 
-from collections.abc import Callable
 from dataclasses import replace
 from math import exp
 from pathlib import Path
@@ -8,14 +7,26 @@ from typing import NamedTuple
 
 import numpy as np
 import pytest
+from tests.identification.given import run_of
 
-from swashplate import Channel, DomainError, Experiment, InputError
-from swashplate.campaign.experiment import InputSignal, Source
+from swashplate import Campaign, Channel, DomainError, Experiment, FileError, InputError
 from swashplate.equations import Model, Tap, equation, simulate
-from swashplate.identification import OwnModel, Problem, Unknown, Unknowns, solve
+from swashplate.identification import (
+    Judged,
+    ModelSetup,
+    OwnModel,
+    Problem,
+    Unknown,
+    Unknowns,
+    assess,
+    fit,
+    load_fit,
+    predict,
+    solve,
+    verdict,
+)
 from swashplate.identification.model import linearised
 
-SOURCE = Source(Path("log.csv"), "y")
 RATE = 20.0
 TIME = np.arange(240) / RATE
 COMMAND = np.where(TIME % 4.0 < 2.0, 2.0, -1.0)
@@ -71,12 +82,14 @@ OWN = OwnModel(valve, given=Load())
 def trial(name: str, load: Load = Load(), begin: float = 0.0, **channels: np.ndarray) -> Experiment:  # noqa: B008
     """A run of the true valve."""
     run = simulate(valve, TRUTH, {"command": COMMAND}, RATE, given=load, begin={"position": begin})
-    command = InputSignal("other", "V", TIME, COMMAND, "previous", SOURCE)
-    made = {
-        each: Channel(each, "other", "1", TIME, values, np.ones(TIME.size), SOURCE)
-        for each, values in {"position": run["position"], **channels}.items()
-    }
-    return Experiment(name, "rod", name, "fit", "rest", None, command, made)
+    channels = {"position": run["position"], **channels}
+    return run_of(name, COMMAND, channels, time=TIME, kind="other", hold="previous")
+
+
+def moved(run: Experiment, values: np.ndarray, **more: object) -> Experiment:
+    """A run with another position."""
+    channel = replace(run["position"], values=values, **more)
+    return replace(run, channels={**run.channels, "position": channel})
 
 
 def problem(model: object, *runs: Experiment, free: tuple[Unknown, ...] = FREE, **more) -> Problem:
@@ -85,30 +98,6 @@ def problem(model: object, *runs: Experiment, free: tuple[Unknown, ...] = FREE, 
 
 def found(made: Problem) -> dict[str, float]:
     return made.unknowns.values(solve(made, tolerance=1e-14).vector)
-
-
-def test_a_model_is_fitted_by_the_names_of_its_parameters() -> None:
-    values = found(problem(OWN, trial("a"), trial("b")))
-    assert values == pytest.approx(TRUTH._asdict(), rel=1e-7)
-
-
-def test_a_model_without_givens_stands_for_itself() -> None:
-    class Tank(NamedTuple):
-        gain: float
-
-    class Level(NamedTuple):
-        position: float
-
-    @equation
-    def filled(state: Level, command: float, p: Tank, h: float) -> Level:
-        return Level(state.position + h * p.gain * command)
-
-    tank = Model("tank", Tank, Level, filled)
-    level = simulate(tank, Tank(0.3), {"command": COMMAND}, RATE)["position"]
-    run = trial("a")
-    channel = replace(run["position"], values=level)
-    values = found(problem(tank, replace(run, channels={"position": channel}), free=FREE[1:2]))
-    assert values == pytest.approx({"gain": 0.3}, rel=1e-9)
 
 
 class Differences:
@@ -128,24 +117,20 @@ def test_derivatives_are_exact_and_the_triangle_is_theirs() -> None:
     made = problem(OWN, run)
     full, small = (made.evaluate(made.start, compressed=each) for each in (False, True))
     assert small.jacobian.shape == (4, 3)
-    for each in (full, small):
-        assert each.jacobian.T @ each.residuals == pytest.approx(
-            full.jacobian.T @ full.residuals, rel=1e-9
-        )
+    gradient = full.jacobian.T @ full.residuals
+    assert small.jacobian.T @ small.residuals == pytest.approx(gradient, rel=1e-9)
 
 
 def test_a_run_has_a_load_a_beginning_and_a_zero_of_its_own() -> None:
     loads = {"a": Load(0.2), "b": Load(-0.3, stop=9.0)}
     first, second = trial("a", loads["a"], 0.7), trial("b", loads["b"])
-    moved = replace(second["position"], values=second["position"].values + 0.4)
     free = (
         *FREE,
         Unknown("start.position", 0.0, -2.0, 2.0, run="a"),
         Unknown("offset position", 0.0, -2.0, 2.0, run="b"),
     )
-    model = OwnModel(valve, given=loads)
-    runs = (first, replace(second, channels={"position": moved}))
-    values = found(problem(model, *runs, free=free))
+    runs = (first, moved(second, second["position"].values + 0.4))
+    values = found(problem(OwnModel(valve, given=loads), *runs, free=free))
     own = {"start.position (a)": 0.7, "offset position (b)": 0.4}
     assert values == pytest.approx({**TRUTH._asdict(), **own}, rel=1e-6)
 
@@ -157,16 +142,15 @@ def test_a_run_begins_where_a_channel_does() -> None:
 
 
 @pytest.mark.parametrize("hold", ["previous", "linear"])
-def test_uneven_stamps_are_put_on_a_grid(hold) -> None:
+def test_uneven_stamps_are_put_on_a_grid(hold: str) -> None:
     """What was logged at jittered stamps, marched at a rate of one's own."""
     jitter = np.random.default_rng(3).uniform(-0.02, 0.02, TIME.size)
     time = TIME + np.where(np.arange(TIME.size) % 239 == 0, 0.0, jitter)
-    command = InputSignal("other", "V", time, np.sin(2.0 * time), hold, SOURCE)
-    run = replace(trial("a"), input=command)
+    channels = {"position": np.zeros(time.size)}
+    run = run_of("a", np.sin(2.0 * time), channels, time=time, kind="other", hold=hold)
     fine = np.arange(int(time[-1] * 200.0) + 1) / 200.0
-    level = simulate(valve, TRUTH, {"command": command.at(fine)}, 200.0, given=Load())["position"]
-    position = replace(run["position"], time=time, values=np.interp(time, fine, level))
-    run = replace(run, channels={"position": position})
+    level = simulate(valve, TRUTH, {"command": run.input.at(fine)}, 200.0, given=Load())["position"]
+    run = moved(run, np.interp(time, fine, level))
     values = found(problem(OwnModel(valve, given=Load(), rate=200.0), run))
     assert values == pytest.approx(TRUTH._asdict(), rel=1e-3)
     with pytest.raises(InputError, match=r"a: the stamps of its input are not even, .* rate=100.0"):
@@ -195,32 +179,6 @@ def test_sub_steps_of_a_fit_are_those_of_a_simulation(hold) -> None:
         problem(OwnModel(coarse, substeps=0), run).cost(Unknowns(FREE).start)
 
 
-class Pushed(NamedTuple):
-    gain: float
-
-
-class Cart(NamedTuple):
-    position: float
-
-
-@equation
-def pushed(state: Cart, command: float, wind: float, p: Pushed, h: float) -> Cart:
-    return Cart(state.position + h * p.gain * (command + wind))
-
-
-cart = Model("cart", Pushed, Cart, pushed)
-
-
-def test_a_second_input_is_a_channel() -> None:
-    wind = np.cos(TIME)
-    inputs = {"command": COMMAND, "wind": wind}
-    moved = simulate(cart, Pushed(0.3), inputs, RATE)["position"]
-    run = trial("a", wind=wind)
-    channels = {**run.channels, "position": replace(run["position"], values=moved)}
-    values = found(problem(cart, replace(run, channels=channels), free=FREE[1:2]))
-    assert values == pytest.approx({"gain": 0.3}, rel=1e-9)
-
-
 def windowed(channel: Channel, rows: np.ndarray) -> np.ndarray:
     """Motion since the beginning of each two seconds."""
     windows = channel.time // 2.0
@@ -229,8 +187,7 @@ def windowed(channel: Channel, rows: np.ndarray) -> np.ndarray:
 
 def test_a_position_is_compared_by_its_motion() -> None:
     run = trial("a")
-    slipping = run["position"].values + np.floor(TIME / 2.0)
-    run = replace(run, channels={"position": replace(run["position"], values=slipping)})
+    run = moved(run, run["position"].values + np.floor(TIME / 2.0))
     assert found(problem(OWN, run))["gain"] != pytest.approx(1.5, rel=0.1)
     values = found(problem(OWN, run, compare=windowed))
     assert values == pytest.approx(TRUTH._asdict(), rel=1e-6)
@@ -244,28 +201,16 @@ def test_the_domain_takes_a_step_back_and_ends_in_its_sentence() -> None:
         solve(made, made.unknowns.vector_of({"gain": 6.0}))
 
 
-def renamed(run: Experiment, name: str) -> Experiment:
-    channel = replace(run["position"], name=name)
-    return replace(run, channels={name: channel})
-
-
-REFUSED: dict[str, tuple[Callable[[], Problem], str]] = {
+REFUSED = {
     "unknown parameter": (
         lambda: problem(OWN, trial("a"), free=(*FREE, Unknown("lead", 1.0, 0.0, 2.0))),
-        "valve has no parameter 'lead'; it has lag, gain, delay",
+        "no parameter 'lead'; it has lag",
     ),
     "unknown start": (
         lambda: problem(OWN, trial("a"), free=(*FREE, Unknown("start.speed", 1.0, 0.0, 2.0))),
-        "valve has no state 'speed' to begin at; it has opening, position",
+        "no state 'speed' to begin at",
     ),
-    "no value": (
-        lambda: problem(OWN, trial("a"), free=FREE[:1]),
-        "valve has no value of gain: let it be free, or fix it",
-    ),
-    "no channel": (
-        lambda: Problem(OWN, (renamed(trial("a"), "y"),), Unknowns(FREE), ("y",), {"y": 1.0}),
-        "a has the channels y, of which valve gives none; it gives opening, position",
-    ),
+    "no value": (lambda: problem(OWN, trial("a"), free=FREE[:1]), "no value of gain"),
     "another channel": (
         lambda: Problem(
             OWN,
@@ -274,19 +219,18 @@ REFUSED: dict[str, tuple[Callable[[], Problem], str]] = {
             ("y", "position"),
             {"y": 1, "position": 1},
         ),
-        "a: the model gives no 'y'; it gives position",
+        "gives no 'y'",
     ),
     "unknown driver": (
-        lambda: problem(cart, trial("a"), free=FREE[1:2]),
-        "cart needs the signals command, wind; a has one input, for one of them, and the channels",
+        lambda: Problem(
+            servo, (trial("a", place=TIME),), Unknowns(FREE[:2]), ("place",), {"place": 1.0}
+        ),
+        "needs the signals command, supply; a has one input",
     ),
-    "no given": (
-        lambda: problem(OwnModel(valve), trial("a")),
-        "Model valve: its given must be a Load, not None",
-    ),
+    "no given": (lambda: problem(OwnModel(valve), trial("a")), "its given must be a Load"),
     "no given of a run": (
         lambda: problem(OwnModel(valve, given={"b": Load()}), trial("a")),
-        "valve has no given numbers for a",
+        "no given numbers for a",
     ),
 }
 
@@ -295,3 +239,194 @@ REFUSED: dict[str, tuple[Callable[[], Problem], str]] = {
 def test_what_does_not_fit_the_model_is_refused(make, sentence: str) -> None:
     with pytest.raises(InputError, match=sentence):
         solve(make())
+
+
+# --- fitted, predicted, stored and refused as a drive is ------------------------------------------
+
+GAIN, LAG, COUNT = 1.5, 0.3, 400
+
+
+class Servo(NamedTuple):
+    gain: float
+    lag: float
+
+
+class State(NamedTuple):
+    place: float
+
+
+@equation
+def servo_step(state: State, command: float, supply: float, p: Servo, h: float) -> State:
+    return State(state.place + h / p.lag * (p.gain * command * supply - state.place))
+
+
+servo = Model("servo", parameters=Servo, state=State, step=servo_step)
+RANGES = {
+    "gain": (0.1, 1.0, 10.0, "mm/V"),
+    "lag": (0.05, 0.1, 3.0),
+    "start.place": (-9.0, 0.0, 9.0),
+}
+NOISE = {"place": 0.01}
+
+
+def run(name: str, seed: int, *, begin: float = 0.0, role: str = "fit") -> Experiment:
+    """A test of the servo with two inputs, that begins anywhere."""
+    random = np.random.default_rng(seed)
+    time = np.arange(COUNT) / 50.0
+    command = np.repeat(random.uniform(-1.0, 1.0, COUNT // 20), 20)
+    supply = 1.0 + 0.2 * np.sin(0.9 * time + seed)
+    place, rows = begin, []
+    for u, s in zip(command, supply, strict=True):
+        rows.append(place)
+        place += (GAIN * u * s - place) / (50.0 * LAG)
+    channels = {"place": np.array(rows) + 0.01 * random.standard_normal(COUNT), "supply": supply}
+    return run_of(name, command, channels, time=time, kind="other", hold="previous", role=role)
+
+
+RUNS = (run("one", 1, begin=1.0), run("two", 2, begin=-2.0))
+HELD = (run("three", 3, begin=0.5, role="validate"),)
+
+
+def campaign(*experiments: Experiment) -> Campaign:
+    return Campaign(Path("campaign.toml"), "servo", False, {"servo": None}, experiments)
+
+
+def test_the_truth_is_found_judged_and_predicted() -> None:
+    made = fit(servo, campaign(*RUNS, *HELD), RANGES, noise=NOISE)
+    (stage,) = made.stages
+    assert stage.problem.channels == ("place",)
+    assert [each.name for each in stage.problem.experiments] == ["one", "two"]
+    truth = {"gain": GAIN, "lag": LAG, "start.place (one)": 1.0, "start.place (two)": -2.0}
+    assert stage.values == pytest.approx(truth, abs=0.02)
+    (assessment,) = assess(made.stages)
+    for estimate, value in zip(assessment.uncertainty.estimates, truth.values(), strict=True):
+        assert estimate.lower < value < estimate.upper
+    (quality,) = predict(made.parameters, HELD)
+    assert quality.channel == "place"
+    assert quality.measures.rmse == pytest.approx(0.01, rel=0.1)  # the noise, nothing else
+    assert verdict([assessment], [quality]).headline.startswith("Usable")
+
+
+class Table:
+    """The servo as a program of others, with names that mean something to nobody else."""
+
+    name = "table"
+
+    def simulate(self, values, experiment):
+        place, rows, supply = 0.0, [], experiment["supply"].values
+        for u, s in zip(experiment.input.values, supply, strict=True):
+            rows.append(place)
+            place += (values["offset slope"] * u * s - place) / (50.0 * values["start.lag"])
+        return {"place": np.array(rows)}
+
+
+def test_a_name_that_begins_like_a_sensors_zero_is_the_models() -> None:
+    free = {"offset slope": (0.1, 1.0, 10.0), "start.lag": (0.05, 0.1, 3.0)}
+    made = fit(Table(), [run("one", 1), run("two", 2)], free, noise=NOISE)
+    assert made.stages[0].solution.converged
+    assert made.parameters.numbers == pytest.approx(
+        {"offset slope": GAIN, "start.lag": LAG}, abs=0.01
+    )
+    assert made.stages[0].solution.cost == pytest.approx(COUNT, rel=0.1)  # noise of deviation 1
+
+
+def test_a_fit_comes_back_with_its_model_alone(tmp_path: Path) -> None:
+    tests, path = campaign(*RUNS), tmp_path / "fit.json"
+    made = fit(servo, tests, RANGES, noise=NOISE)
+    Judged(tests, made, RUNS).store(path)
+    with pytest.raises(InputError, match="give that, with --model"):
+        load_fit(path, tests)
+    with pytest.raises(InputError, match="another model, or of other bounds"):
+        load_fit(path, tests, model=ModelSetup(servo, {**RANGES, "lag": (0.1, 0.2, 3.0)}))
+    again = load_fit(path, tests, model=ModelSetup(servo, RANGES, noise=NOISE)).result
+    assert again.parameters.numbers == made.parameters.numbers
+    assert assess(again.stages)[0].uncertainty.estimates == (
+        assess(made.stages)[0].uncertainty.estimates
+    )
+
+
+def test_what_a_range_means() -> None:
+    setup = ModelSetup(OwnModel(servo), RANGES)
+    assert [each.log for each in setup.free.values()] == [True, True, False]
+    assert setup.free["gain"].unit == "mm/V"
+    own = Unknown("lag", 0.1, 0.05, 3.0)
+    assert ModelSetup(servo, {"lag": own}, fixed={"gain": 1.0}).free["lag"] is own
+
+
+def changed(experiment: Experiment, values: np.ndarray, name: str = "") -> Experiment:
+    place = replace(experiment["place"], values=values, noise=0.01)
+    channels = {**experiment.channels, "place": place}
+    return replace(experiment, name=name or experiment.name, channels=channels)
+
+
+def test_data_are_checked_before_the_search() -> None:
+    first, second = RUNS
+    holed = np.where(np.arange(COUNT) == 50, np.nan, first["place"].values)
+    with pytest.raises(InputError, match="one: 'place' is not finite in 1 sample"):
+        fit(servo, [changed(first, holed), second], RANGES, noise=NOISE)
+    twice = fit(servo, [*RUNS, replace(first, name="copy")], RANGES, noise=NOISE)
+    assert "copy has the samples of one" in twice.doubts[0]
+    still = fit(servo, [*RUNS, changed(first, np.zeros(COUNT), "still")], RANGES, noise=NOISE)
+    assert "still: 'place' never changes" in still.doubts[0]
+    idle = [replace(each, input=replace(each.input, values=np.zeros(COUNT))) for each in RUNS]
+    with pytest.raises(InputError, match="servo: no run depends on any of gain"):
+        fit(servo, idle, {"gain": RANGES["gain"]}, noise=NOISE, fixed={"lag": 0.3})
+    assert fit(servo, RUNS, RANGES, noise=NOISE).doubts == ()
+
+
+@pytest.mark.parametrize(
+    ("model", "runs", "free", "sentence"),
+    [
+        ({}, RUNS, RANGES, "A dict is no model"),
+        (servo, RUNS, {}, "Nothing of servo is free"),
+        (servo, RUNS, {"lag": 3}, "lag is free as 3: give lower bound"),
+        (servo, RUNS, {"lagg": (0.1, 0.2, 3.0)}, "no parameter 'lagg'; it has gain, lag"),
+        (servo, [], RANGES, "There is no run to fit"),
+        (servo, [run_of("x", TIME, {"y": TIME}, kind="other")], RANGES, "servo gives none"),
+    ],
+)
+def test_fits_without_sense_are_refused(model, runs, free, sentence: str) -> None:
+    with pytest.raises(InputError, match=sentence):
+        fit(model, runs, free, **({"fixed": {"gain": 1.0, "lag": 1.0}} if "lagg" in free else {}))
+
+
+def test_files_without_a_model_are_refused(tmp_path: Path, monkeypatch) -> None:
+    monkeypatch.syspath_prepend(tmp_path)
+    for name, text, error, sentence in (
+        ("bare", "model = 1\n", InputError, "bare.py has no 'free'"),
+        ("json", "model = free = 1\n", FileError, "another module is called json"),
+        ("none", "", FileError, "no Python file"),
+    ):
+        if text:
+            (tmp_path / f"{name}.py").write_text(text, "utf-8")
+        with pytest.raises(error, match=sentence):
+            ModelSetup.from_file(tmp_path / f"{name}.py")
+
+
+class Slow(NamedTuple):
+    lag: float
+
+
+@equation
+def slow_step(state: State, command: float, supply: float, p: Slow, h: float) -> State:
+    return State(state.place + h / p.lag * (GAIN * command * supply - state.place))
+
+
+def limited(seed: int) -> Experiment:
+    """A test of a servo that has a rate limit in place of a lag."""
+    test, place, rows = run(f"run {seed}", seed), 0.0, []
+    for u, s in zip(test.input.values, test["supply"].values, strict=True):
+        rows.append(place)
+        place += np.clip((GAIN * u * s - place) / 2.5, -0.05, 0.05)
+    measured = np.array(rows) + 1e-3 * np.random.default_rng(seed).normal(size=COUNT)
+    place_channel = replace(test["place"], values=measured)
+    return replace(test, channels={**test.channels, "place": place_channel})
+
+
+def test_what_a_model_leaves_out_is_not_called_an_error_of_the_sensor() -> None:
+    slow = Model("slow", parameters=Slow, state=State, step=slow_step)
+    made = fit(slow, campaign(*map(limited, range(40))), {"lag": (0.01, 0.1, 3.0)})
+    headline = verdict(assess(made.stages), predict(made.parameters, [limited(99)])).headline
+    # the sensor's scale is right, and its noise is not stated
+    assert "scale of place off by" not in headline.split("(")[0]
+    assert "because the residuals show that the model leaves something out" in headline

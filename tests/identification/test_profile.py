@@ -5,52 +5,16 @@ from collections.abc import Callable, Mapping
 import numpy as np
 import pytest
 from scipy.optimize import brentq, least_squares
-from scipy.stats import t as student
 
-from swashplate import Experiment
-from swashplate.errors import DomainError, InputError
+from swashplate import DomainError, Experiment
 from swashplate.identification.intervals import estimates, reach, uncertainty
 from swashplate.identification.problem import Problem, linearised_fit
 from swashplate.identification.profile import checked_ends, profile
 from swashplate.identification.solving import solve
 from swashplate.identification.unknowns import Unknown, Unknowns
 
-RNG = np.random.default_rng(6)
-J = RNG.normal(size=(60, 3)) @ np.array([[1.0, 0.0, 0.0], [0.9, 0.3, 0.0], [0.0, 0.2, 2.0]])
-Y = J @ np.array([1.0, -2.0, 0.5]) + 0.3 * RNG.normal(size=60)
 
-
-def linear(index: int, value: float, start: np.ndarray) -> tuple[float, np.ndarray]:
-    others = [k for k in range(3) if k != index]
-    vector = np.empty(3)
-    vector[index] = value
-    vector[others] = np.linalg.lstsq(J[:, others], Y - value * J[:, index], rcond=None)[0]
-    return 0.5 * float(np.sum((J @ vector - Y) ** 2)), vector
-
-
-OPTIMUM = np.linalg.lstsq(J, Y, rcond=None)[0]
-COST = 0.5 * float(np.sum((J @ OPTIMUM - Y) ** 2))
-
-
-@pytest.mark.parametrize("index", [0, 1, 2])
-@pytest.mark.parametrize("first", [0.05, 1.0, 20.0])
-def test_a_linear_model_has_the_textbooks_interval(index: int, first: float) -> None:
-    noise = 2.0 * COST / 57.0
-    error = np.sqrt(noise * np.linalg.inv(J.T @ J)[index, index])
-    quantile = student.ppf(0.975, 57.0)
-    rise = 0.5 * quantile**2 * noise
-    found = profile(linear, OPTIMUM, COST, index, rise, first * error)
-    reach = quantile * error
-    assert found.endings == ("crossed", "crossed")
-    assert found.lower == pytest.approx(OPTIMUM[index] - reach, abs=2e-3 * reach)
-    assert found.upper == pytest.approx(OPTIMUM[index] + reach, abs=2e-3 * reach)
-    assert found.sentences("Z8") == ()
-    numbers = [point.number for point in found.points]
-    assert numbers == sorted(numbers)
-    assert len(numbers) < 40
-
-
-def nonlinear() -> tuple[np.ndarray, np.ndarray, object]:
+def test_a_nonlinear_model_agrees_with_a_root_search() -> None:
     time = np.linspace(0.0, 3.0, 40)
     measured = 2.0 * np.exp(-1.5 * time) + 0.1 * np.random.default_rng(0).normal(size=40)
 
@@ -62,14 +26,10 @@ def nonlinear() -> tuple[np.ndarray, np.ndarray, object]:
         found = least_squares(residual, np.delete(start, index))
         return float(found.cost), np.insert(found.x, index, value)
 
-    return time, measured, minimise
-
-
-def test_a_nonlinear_model_agrees_with_a_root_search() -> None:
-    time, measured, minimise = nonlinear()
     best = least_squares(lambda v: v[0] * np.exp(-v[1] * time) - measured, [1.0, 1.0])
     limit = 2.0 * best.cost / 38.0
     found = profile(minimise, best.x, best.cost, 1, limit, 0.1)
+    assert found.endings == ("crossed", "crossed")
 
     def over(rate: float) -> float:
         shape = np.exp(-rate * time)
@@ -82,9 +42,9 @@ def test_a_nonlinear_model_agrees_with_a_root_search() -> None:
     assert found.upper - best.x[1] > 1.05 * (best.x[1] - found.lower)
 
 
-def bowl(height: float = 1.0) -> tuple:
+def bowl() -> tuple:
     """One unknown, cost ½ u² beside a noise cost of 1."""
-    return lambda index, value, start: (1.0 + 0.5 * height * value**2, np.array([value]))
+    return lambda index, value, start: (1.0 + 0.5 * value**2, np.array([value]))
 
 
 LIMIT = 0.5
@@ -97,10 +57,7 @@ def test_a_bound_leaves_a_side_open() -> None:
     assert found.lower is None
     assert found.upper == pytest.approx(1.0, rel=2e-3)
     assert found.points[0].number == -0.4
-    assert found.sentences("Z17") == (
-        "Z17 reaches its bound before the cost rises enough on its lower side: no end of the "
-        "interval there.",
-    )
+    assert "Z17 reaches its bound" in found.sentences("Z17")[0]
 
 
 def test_the_domains_edge_ends_a_side() -> None:
@@ -123,9 +80,7 @@ def test_a_better_optimum_stops_it() -> None:
     assert found.better.cost < 1.0
     assert found.better.vector[1] == 7.0
     assert (found.lower, found.upper) == (None, None)
-    (said,) = found.sentences("Z9")
-    assert "met a better optimum" in said
-    assert "against 1: fit again from there" in said
+    assert "met a better optimum" in found.sentences("Z9")[0]
 
 
 def test_a_cost_that_is_lower_by_next_to_nothing_does_not_stop_it() -> None:
@@ -138,20 +93,6 @@ def test_a_cost_that_is_lower_by_next_to_nothing_does_not_stop_it() -> None:
     found = profile(dented, ZERO, 1.0, 0, LIMIT, 1.0)
     assert found.better is None
     assert found.upper == pytest.approx(2.0**0.5, rel=0.02)
-
-
-@pytest.mark.parametrize(
-    ("change", "said"),
-    [
-        ({"step": 0.0}, "must be positive"),
-        ({"rise": 0.0}, "exactly zero"),
-        ({"bounds": (1.0, 2.0)}, "outside the bounds"),
-    ],
-)
-def test_profiles_that_cannot_begin_are_refused(change: dict, said: str) -> None:
-    arguments = {"rise": LIMIT, "step": 1.0, "bounds": (-9.0, 9.0), **change}
-    with pytest.raises(InputError, match=said):
-        profile(bowl(), ZERO, 1.0, 0, **arguments)
 
 
 # --- where the cost does not rise as derivatives say ----------------------------------------------

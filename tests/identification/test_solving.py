@@ -1,22 +1,105 @@
-"""Problems, solvers and starts on a model whose optimum is known."""
+"""Unknowns, problems, solvers and starts on a model whose optimum is known."""
 
 import re
 from collections.abc import Callable
+from dataclasses import dataclass
+from math import log
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from swashplate import Channel, DomainError, Experiment, FileError, InputError, maneuvers
-from swashplate.campaign import rig
-from swashplate.campaign.experiment import InputSignal, Source
+from swashplate import (
+    Campaign,
+    DomainError,
+    Drive,
+    Experiment,
+    FileError,
+    InputError,
+    ParameterError,
+)
 from swashplate.executors import Processes, Serial, Threads
 from swashplate.identification.drive_model import stage_problem
 from swashplate.identification.model import Linearised
-from swashplate.identification.problem import Problem, noise_scales
+from swashplate.identification.problem import Evaluation, Problem, noise_scales
 from swashplate.identification.setup import Free, Stage
 from swashplate.identification.solving import Progress, Solution, sobol_starts, solve, solve_from
-from swashplate.identification.unknowns import Unknown, Unknowns, bounded
+from swashplate.identification.unknowns import Prior, Unknown, Unknowns, bounded
+
+
+def test_values_and_vector_are_inverse() -> None:
+    unknowns = Unknowns(
+        (
+            bounded("a", 4.0, relative=(0.5, 2.0)),
+            bounded("b", 2e-7, relative=(0.1, 10.0), log=True),
+            bounded("c", 0.0, absolute=(-3.0, 5.0)),
+            bounded("d", -6.0, relative=(2.0, 0.5)),
+        )
+    )
+    assert unknowns.start == pytest.approx([1.0, log(2e-7), 0.0, -1.0])
+    low, high = unknowns.bounds
+    assert low == pytest.approx([0.5, log(2e-8), -1.5, -2.0])
+    assert high == pytest.approx([2.0, log(2e-6), 2.5, -0.5])
+    vector = np.array([1.3, log(3e-7), 0.5, -0.7])
+    values = unknowns.values(vector)
+    assert values == pytest.approx({"a": 5.2, "b": 3e-7, "c": 1.0, "d": -4.2})
+    assert unknowns.vector_of(values) == pytest.approx(vector)
+
+
+def test_tied_directions_and_unknowns_of_one_experiment() -> None:
+    unknowns = Unknowns(
+        (
+            bounded("Z16", 2.0, relative=(0.5, 2.0), sets=("Z16_plus", "Z16_minus")),
+            Unknown("offset", 1.0, -9.0, 9.0, run="lift"),
+            Unknown("offset", 3.0, -9.0, 9.0, run="lower"),
+        )
+    )
+    assert unknowns.names == ("Z16", "offset (lift)", "offset (lower)")
+    vector = unknowns.start
+    assert unknowns.targets(vector, "lower") == {"Z16_plus": 2.0, "Z16_minus": 2.0, "offset": 3.0}
+    chain = unknowns.chain(vector, ["Z16_minus", "offset", "Z16_plus"], "lift")
+    np.testing.assert_allclose(chain, [[2.0, 0.0, 0.0], [0.0, 1.0, 0.0], [2.0, 0.0, 0.0]])
+
+
+def test_priors() -> None:
+    unknowns = Unknowns(
+        (
+            bounded("a", 4.0, relative=(0.5, 2.0), prior=Prior(3.0, 0.5)),
+            bounded("b", 2.0, relative=(0.5, 2.0)),
+            bounded("c", 2.0, relative=(0.5, 2.0), log=True, prior=Prior(2.2, 0.1)),
+        )
+    )
+    residuals, rows = unknowns.prior_rows(unknowns.start)
+    assert residuals == pytest.approx([2.0, log(2.0 / 2.2) / 0.1])
+    np.testing.assert_allclose(rows, [[8.0, 0.0, 0.0], [0.0, 0.0, 10.0]])
+
+
+def test_bounds_that_are_reached() -> None:
+    unknowns = Unknowns(
+        (bounded("a", 1.0, absolute=(0.0, 2.0)), bounded("b", 1.0, absolute=(0, 2)))
+    )
+    assert unknowns.at(np.array([0.0, 2.0 - 1e-9])).at_bound.tolist() == [-1, 1]
+    assert unknowns.at(np.array([0.1, 1.9])).at_bound.tolist() == [0, 0]
+
+
+@pytest.mark.parametrize(
+    ("make", "sentence"),
+    [
+        (lambda: bounded("Z2", 0.0, relative=(0.5, 2.0)), "Z2 is nominally 0.*absolute bounds"),
+        (lambda: bounded("a", 5.0, absolute=(0.0, 2.0)), "begins at 5, outside its bounds 0 and 2"),
+        (lambda: bounded("a", 1.0, absolute=(2.0, 0.0)), "lower one first"),
+        (lambda: bounded("a", 1.0, absolute=(0.0, 2.0), log=True), "above 0"),
+        (lambda: bounded("a", 1.0, absolute=(0.0, 2.0), prior=Prior(1.0, 0.0)), "positive"),
+        (
+            lambda: Unknowns((Unknown("a", 1, 0, 2), Unknown("b", 1, 0, 2, sets=("a",)))),
+            "a is set by two parameters",
+        ),
+    ],
+)
+def test_what_is_refused(make, sentence: str) -> None:
+    with pytest.raises(ParameterError, match=sentence):
+        make()
+
 
 GAIN, LAG = 3.0, 0.7
 Make = Callable[..., Experiment]
@@ -66,83 +149,42 @@ def test_the_truth_is_found(problem: Problem) -> None:
     assert [each.iteration for each in seen] == list(range(1, len(seen) + 1))
 
 
-def test_offsets_belong_to_their_run(rise, experiment: Make, measured) -> None:
-    runs = (
-        experiment("a", 1.0, measured(1.0, GAIN, LAG) + 0.4),
-        experiment("b", 2.0, measured(2.0, GAIN, LAG) - 0.9),
-    )
-    free = Unknowns(
-        (*UNKNOWNS, *(Unknown("offset y", 0.0, -5.0, 5.0, run=each.name) for each in runs))
-    )
-    made = Problem(rise, runs, free, ("y",), {"y": 0.1})
-    values = free.values(solve(made, tolerance=1e-14).vector)
-    assert values == pytest.approx(
-        {"gain": GAIN, "lag": LAG, "offset y (a)": 0.4, "offset y (b)": -0.9}, rel=1e-7
-    )
-
-
-class Fragile:
-    """Holds only below a gain of 4."""
-
-    def simulate(self, values, experiment):
-        if values["gain"] > 4.0:
-            raise DomainError("The gain must stay below 4.")
-        return {"y": values["gain"] ** 2 * experiment.input.values}
-
-
-def test_a_step_out_of_the_domain_is_taken_back(experiment: Make) -> None:
-    run = experiment("run", 1.0, np.full(81, 15.9))
-    alone = Unknowns((UNKNOWNS.items[0],))
-    made = Problem(Fragile(), (run,), alone, ("y",), {"y": 0.1})
-    # the first step leads to e^7.45: far out of the domain
-    solution = solve(made)
-    assert alone.values(solution.vector)["gain"] == pytest.approx(np.sqrt(15.9), rel=1e-9)
-    with pytest.raises(DomainError, match="below 4"):
-        solve(made, alone.vector_of({"gain": 5.0}))
-
-
 WRONG = {
-    "nothing": (lambda y: None, "a mapping of channel names to an array of floats.* not None"),
-    "no mapping": (lambda y: y, "a mapping of channel names .*'y'.* not an array of float64"),
-    "complex": (lambda y: {"y": y + 1j}, "real numbers for y, not an array of complex128"),
-    "text": (lambda y: {"y": "fast"}, "real numbers for y, not a str"),
-    "texts": (lambda y: {"y": y.astype(str)}, "real numbers for y, not an array of str"),
-    "none": (lambda y: {"y": None}, "real numbers for y, not None"),
-    "a list": (lambda y: {"y": y.tolist()}, "real numbers for y, not a list"),
-    "objects": (lambda y: {"y": y.astype(object)}, "real numbers for y, not an array of object"),
-    "too few": (lambda y: {"y": y[1:]}, r"shape \(80,\) for y, but must return \(81,\)"),
+    "nothing": (
+        "simulate",
+        lambda y, by: None,
+        "a mapping of channel names to an array.* not None",
+    ),
+    "no mapping": ("simulate", lambda y, by: y, "a mapping of channel names .*'y'.* not an array"),
+    "complex": ("simulate", lambda y, by: {"y": y + 1j}, "real numbers for y, not .* complex128"),
+    "text": ("simulate", lambda y, by: {"y": "fast"}, "real numbers for y, not a str"),
+    "a list": ("simulate", lambda y, by: {"y": y.tolist()}, "real numbers for y, not a list"),
+    "objects": ("simulate", lambda y, by: {"y": y.astype(object)}, "for y, not an array of object"),
+    "too few": ("simulate", lambda y, by: {"y": y[1:]}, r"shape \(80,\) for y, .* \(81,\)"),
+    "values alone": ("linearise", lambda y, by: {"y": y}, "a Linearised for y, not an array"),
+    "complex derivatives": (
+        "linearise",
+        lambda y, by: {"y": Linearised(y, by + 0j)},
+        "real numbers for y",
+    ),
+    "turned": (
+        "linearise",
+        lambda y, by: {"y": Linearised(y, by.T)},
+        r"\(81, 2\): a row .* a column for each",
+    ),
 }
 
 
-@pytest.mark.parametrize(("change", "sentence"), WRONG.values(), ids=WRONG)
-def test_what_a_model_must_return_is_said(rise, experiment: Make, change, sentence: str) -> None:
-    class Wrong:
-        def simulate(self, values, experiment):
-            return change(rise.simulate(values, experiment)["y"])
+@pytest.mark.parametrize(("method", "change", "sentence"), WRONG.values(), ids=WRONG)
+def test_what_a_model_must_return_is_said(
+    rise, experiment: Make, method: str, change, sentence: str
+) -> None:
+    def wrong(self, values, experiment, *names):
+        return change(rise.simulate(values, experiment)["y"], np.zeros((81, 2)))
 
-    made = Problem(Wrong(), (experiment("run", 1.0, np.ones(81)),), UNKNOWNS, ("y",), {"y": 0.1})
-    with pytest.raises(InputError, match=f"run: simulate .*{sentence}"):
-        solve(made)
-
-
-WRONG_LINEARISED = {
-    "nothing": (lambda y, by: None, "a mapping of channel names to a Linearised.* not None"),
-    "values alone": (lambda y, by: {"y": y}, "a Linearised for y, not an array"),
-    "complex": (lambda y, by: {"y": Linearised(y, by + 0j)}, "real numbers for y"),
-    "a list": (lambda y, by: {"y": Linearised(y.tolist(), by)}, "real numbers for y, not a list"),
-    "turned": (lambda y, by: {"y": Linearised(y, by.T)}, r"\(81, 2\): a row .* a column for each"),
-}
-
-
-@pytest.mark.parametrize(("change", "sentence"), WRONG_LINEARISED.values(), ids=WRONG_LINEARISED)
-def test_what_linearise_must_return_is_said(rise, experiment: Make, change, sentence: str) -> None:
-    class Wrong(type(rise)):
-        def linearise(self, values, experiment, names):
-            y = self.simulate(values, experiment)["y"]
-            return change(y, np.ones((y.size, len(names))))
-
-    made = Problem(Wrong(), (experiment("run", 1.0, np.ones(81)),), UNKNOWNS, ("y",), {"y": 0.1})
-    with pytest.raises(InputError, match=f"run: linearise .*{sentence}"):
+    model = type("Wrong", (type(rise),), {method: wrong})()
+    made = Problem(model, (experiment("run", 1.0, np.ones(81)),), UNKNOWNS, ("y",), {"y": 0.1})
+    with pytest.raises(InputError, match=f"run: {method} .*{sentence}"):
         solve(made)
 
 
@@ -184,25 +226,13 @@ def test_starts_are_spread_seeded_and_inside(problem: Problem) -> None:
     assert not np.array_equal(starts[0], next(iter(sobol_starts(problem, 1, seed=6))))
 
 
-def card_problem(tests: rig.VirtualTests) -> Problem:
-    (run,) = tests.runs.values()
-    source = Source(Path(run.stem), "")
-    time, volts, amperes = (run.columns[name] for name in ("time", "voltage", "current"))
-    drive = InputSignal("voltage", "V", time, volts, "linear", source)
-    current = Channel(
-        "current", "rectified_current", "A", time, amperes, np.ones(time.size), source
-    )
-    experiment = Experiment(
-        run.name, "hoist", run.name, "fit", "rest", None, drive, {"current": current}
-    )
-    free = {"J_plus": Free(relative=(0.5, 2.0)), "G1_plus": Free(relative=(0.5, 2.0))}
+def test_threads_and_processes_give_the_same_as_one_after_another(
+    short_campaign: Campaign,
+) -> None:
+    free = {name: Free(relative=(0.5, 2.0)) for name in ("J_plus", "G1_plus")}
     stage = Stage(name="card", part="card", free=free)
-    return stage_problem(stage, tests.nominal.parameters, [experiment], threads=1)
-
-
-def test_threads_and_processes_give_the_same_as_one_after_another() -> None:
-    tests = rig.run("hoist", [maneuvers.step(4.0, stop=2.0, length=3.0)], seed=1)
-    problem = card_problem(tests)
+    nominal = Drive.preset("hoist").parameters
+    problem = stage_problem(stage, nominal, short_campaign.experiments[:1], threads=1)
     starts = list(sobol_starts(problem, 3, seed=2))
     here = solve_from(problem, starts, executor=Serial())
     for executor in (Threads(2), Processes(2)):
@@ -246,30 +276,21 @@ def test_results_of_another_fit_are_not_resumed(problem: Problem, tmp_path: Path
         solve_from(problem, starts, store=tmp_path, origin={"data": "y"}, resume=True)
 
 
+def put(pattern: str, new: str) -> Callable[[str], str]:
+    return lambda text: re.sub(pattern, new, text)
+
+
 POISON = {
     "cut": (lambda text: text[:40], "not JSON"),
-    "empty": (lambda text: "", "not JSON"),
     "nested": (lambda text: "[" * 100_000, "not JSON: recursion limit"),
-    "text for a number": (lambda text: re.sub(r'"cost": [^,]+', '"cost": "low"', text), "cost"),
-    "no number": (lambda text: re.sub(r'"cost": [^,]+', '"cost": NaN', text), "cost"),
-    "text for a vector": (
-        lambda text: re.sub(r'"vector": \[[^]]+\]', '"vector": "abc"', text),
-        "vector",
-    ),
-    "nested vector": (
-        lambda text: re.sub(r'"vector": \[[^]]+\]', '"vector": [[1.0, 2.0]]', text),
-        "vector",
-    ),
-    "wrong length": (
-        lambda text: re.sub(r'"vector": \[[^]]+\]', '"vector": [1.0]', text),
-        "starts differ",
-    ),
-    "other start": (
-        lambda text: re.sub(r'"start": \[[^]]+\]', '"start": [0.0, 1.0]', text),
-        "starts differ",
-    ),
-    "a key more": (lambda text: text.replace('"cost"', '"more": 1, "cost"'), "more"),
     "no object": (lambda text: "[1]", "no result of a start"),
+    "a key more": (put('"cost"', '"more": 1, "cost"'), "more"),
+    "text for a number": (put(r'"cost": [^,]+', '"cost": "low"'), "cost"),
+    "no number": (put(r'"cost": [^,]+', '"cost": NaN'), "cost"),
+    "text for a vector": (put(r'"vector": \[[^]]+\]', '"vector": "abc"'), "vector"),
+    "nested vector": (put(r'"vector": \[[^]]+\]', '"vector": [[1.0, 2.0]]'), "vector"),
+    "wrong length": (put(r'"vector": \[[^]]+\]', '"vector": [1.0]'), "starts differ"),
+    "other start": (put(r'"start": \[[^]]+\]', '"start": [0.0, 1.0]'), "starts differ"),
 }
 
 
@@ -282,3 +303,48 @@ def test_a_damaged_start_is_refused(problem: Problem, tmp_path: Path, poison, se
     with pytest.raises(FileError, match=f"start-00000.json.*{sentence}") as caught:
         solve_from(problem, starts, store=tmp_path, origin={"data": "x"}, resume=True)
     assert len(str(caught.value)) < 500
+
+
+@dataclass(frozen=True)
+class Forbidden:
+    """Four unknowns within ±1 of 0, quadratic about it; the last may not exceed a limit."""
+
+    limit: float
+    start = np.full(4, -0.5)
+    bounds = (np.full(4, -1.0), np.full(4, 1.0))
+
+    def evaluate(self, vector: np.ndarray, *, compressed: bool = True) -> Evaluation:
+        if vector[3] > self.limit:
+            raise DomainError("too much")
+        return Evaluation(vector, np.eye(4))
+
+    def cost(self, vector: np.ndarray) -> float:
+        return 0.5 * float(np.sum(self.evaluate(vector).residuals ** 2))
+
+
+def test_points_outside_the_domain_are_drawn_again() -> None:
+    starts = np.array(list(sobol_starts(Forbidden(0.25), 32, seed=0)))
+    assert starts.shape == (32, 4)
+    assert (starts[:, 3] <= 0.25).all()
+    with pytest.raises(InputError, match="narrow the bounds"):
+        list(sobol_starts(Forbidden(-0.9999), 8, seed=0))
+
+
+@dataclass(frozen=True)
+class Stop:
+    """A speed of 2 that a stop at x cuts off where x is below it; 1.5 was measured."""
+
+    bounds: tuple[np.ndarray, np.ndarray] = (np.array([0.5]), np.array([6.0]))
+    start = np.ones(1)
+
+    def evaluate(self, vector: np.ndarray, *, compressed: bool = True) -> Evaluation:
+        x = float(vector[0])
+        return Evaluation(np.array([min(2.0, x) - 1.5]), np.array([[1.0 if x < 2.0 else 0.0]]))
+
+    def cost(self, vector: np.ndarray) -> float:
+        return 0.5 * float(self.evaluate(vector).residuals[0] ** 2)
+
+
+def test_a_search_that_lost_the_stop_finds_it_again() -> None:
+    (result,) = solve_from(Stop(), [np.full(1, 5.0)])
+    np.testing.assert_allclose(result.vector, [1.5])

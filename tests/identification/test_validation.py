@@ -2,16 +2,14 @@
 
 from collections.abc import Callable
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 from scipy.signal import lfilter
+from tests.identification.given import first_order, run_of
 
-from swashplate import Campaign, Channel, Drive, Experiment, maneuvers
+from swashplate import Campaign, Drive, Experiment, InputError, maneuvers
 from swashplate.campaign import rig
-from swashplate.campaign.experiment import InputSignal, Source
-from swashplate.errors import InputError
 from swashplate.identification.validation import (
     compared,
     ignored_windows,
@@ -51,10 +49,6 @@ def test_a_constant_has_no_fit(level: float, count: int) -> None:
     assert found.rmse == pytest.approx(1.0)
 
 
-def test_the_mean_of_the_measurement_fits_by_zero_per_cent() -> None:
-    assert measures((MEASURED, np.full(4, 3.0), None)).fit_percent == pytest.approx(0.0, abs=1e-12)
-
-
 @pytest.mark.parametrize(
     ("run", "said"),
     [
@@ -77,11 +71,6 @@ WHITE = RNG.normal(size=N)
 COMMAND = np.sin(2.0 * np.pi * 0.5 * TIME) + lfilter([0.05], [1, -0.95], RNG.normal(size=N))
 
 
-def first_order(rho: float, seed: int, n: int = N) -> np.ndarray:
-    noise = np.random.default_rng(seed).normal(size=n + 500)
-    return lfilter([np.sqrt(1.0 - rho**2)], [1.0, -rho], noise)[500:]
-
-
 def test_white_noise_passes() -> None:
     found = residual_test(TIME, WHITE, COMMAND)
     assert found.duration == 0.0
@@ -100,17 +89,10 @@ def test_a_missed_delay_is_found_where_it_is() -> None:
 
 def test_unrelated_slow_signals_are_rarely_called_related() -> None:
     """With the band of white noise nearly every one would be."""
-    related = sum(
-        residual_test(TIME, first_order(0.98, s), first_order(0.98, 500 + s)).follows
-        for s in range(60)
-    )
-    assert related <= 9  # 5 % of 60 is 3, and its deviation 1.7
-    naive = sum(
-        np.abs(residual_test(TIME, first_order(0.98, s), first_order(0.98, 500 + s)).peak[1])
-        > 1.96 / np.sqrt(N)
-        for s in range(10)
-    )
-    assert naive == 10
+    pairs = first_order(0.98, np.random.default_rng(0), (60, 2, N), 500)
+    found = [residual_test(TIME, *pair) for pair in pairs]
+    assert sum(each.follows for each in found) <= 9  # 5 % of 60 is 3, and its deviation 1.7
+    assert sum(abs(each.peak[1]) > 1.96 / np.sqrt(N) for each in found) >= 57
 
 
 def test_lags_across_a_gap_are_true() -> None:
@@ -140,20 +122,6 @@ def test_constants_follow_nothing(residual: np.ndarray, command: np.ndarray) -> 
 
 
 # --- predictions ----------------------------------------------------------------------------------
-
-
-FINE = np.arange(0.0, 10.0, 0.01)
-LOG = Source(Path("log.csv"), "column")
-
-
-def measured_step(name: str, maneuver: str, current: np.ndarray) -> Experiment:
-    """A command of 4 V from 1 s to 6 s, and a current."""
-    voltage = np.where((FINE >= 1.0) & (FINE < 6.0), 4.0, 0.0)
-    drive = InputSignal("voltage", "V", FINE, voltage, "previous", LOG)
-    channel = Channel("current", "rectified_current", "A", FINE, current, np.ones(FINE.size), LOG)
-    return Experiment(
-        name, "hoist", name, "validate", "rest", None, drive, {"current": channel}, maneuver
-    )
 
 
 @pytest.fixture(scope="module")
@@ -200,13 +168,13 @@ def test_a_speed_stands_beside_its_position(campaign: Campaign) -> None:
 
 
 def test_windows_that_do_not_count() -> None:
-    run = measured_step("a", "step", np.ones(FINE.size))
-    weight = np.where((FINE < 0.495) | (FINE > 9.0), 0.0, 1.0)
-    channel = replace(run["current"], weight=weight)
-    first, second = ignored_windows(channel)
+    time = np.arange(0.0, 10.0, 0.01)
+    current = run_of("a", time, {"rectified_current": time}, time=time)["rectified_current"]
+    weight = np.where((time < 0.495) | (time > 9.0), 0.0, 1.0)
+    first, second = ignored_windows(replace(current, weight=weight))
     assert first == pytest.approx((0.0, 0.49))
     assert second == pytest.approx((9.01, 9.99))
-    assert ignored_windows(run["current"]) == ()
+    assert ignored_windows(current) == ()
 
 
 def test_a_run_that_no_drive_simulates_is_refused(experiment: Callable[..., Experiment]) -> None:

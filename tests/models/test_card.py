@@ -36,32 +36,7 @@ def test_share_of_an_interval_above_the_dead_zone() -> None:
     assert single.jump_share(2.0, 1.0, 0.0, 0.3, 1.0) == pytest.approx(0.7)
 
 
-@pytest.mark.interpreted
-def test_the_settled_current_is_a_jump_and_a_cubic(channel: Channel) -> None:
-    p = channel._replace(V_dz=0.5, J=0.3, G1=0.1, G2=0.01, G3=-0.002)
-    assert single.steady_current(2.5, 1.0, p) == pytest.approx(0.3 + 0.2 + 0.04 - 0.016)
-    assert single.steady_current(0.4, 0.25, p) == 0.075
-    assert single.channel_level(0.5, p) == 0.0
-    assert single.channel_level(-3.0, p) == 0.0
-
-
 # --- Kruse's recursion ----------------------------------------------------------------------
-
-
-@pytest.mark.interpreted
-def test_the_recursion_is_the_printed_difference_equation(channel: Channel) -> None:
-    """Eq. 3.6 with ζ = 0.5, ω = 64, h = 1/64 (ωh = 1), C = 2 by hand."""
-    h, p = 1.0 / 64.0, channel._replace(zeta=0.5, omega=64.0, C=2.0)
-    # 2(1 - 0.5) 0.3 + (2·0.5 - 1 - 1) 0.2 - 2 h² sign + 1·0.7
-    plain = 0.3 - 0.2 + 0.7
-    friction = 2.0 / 64.0**2
-    found = single.filtered_current(0.3, 0.2, 0.7, p, h, None)
-    assert found == pytest.approx(plain - friction, rel=1e-15)
-    assert single.filtered_current(0.2, 0.2, 0.7, p, h, None) == pytest.approx(0.7)
-    assert single.coulomb_sign(0.005 * h, h, None) == pytest.approx(0.5)
-    assert single.coulomb_sign(0.005 * h, h, True) == 1.0
-    assert single.coulomb_sign(-0.005 * h, h, True) == -1.0
-    assert single.coulomb_sign(0.0, h, True) == 0.0
 
 
 @pytest.mark.interpreted

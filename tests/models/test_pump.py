@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
-from swashplate.equations.equation import interpreted as plainly
+from swashplate import Drive
 from swashplate.equations.library import (
     TAN_22_5,
     arctangent,
@@ -17,23 +17,10 @@ from swashplate.equations.library import (
     soft_threshold,
 )
 from swashplate.models import displacement_control as control
-from swashplate.models import pump as model
-from swashplate.models.displacement_control import Pump, PumpOptions
-from swashplate.models.pump import PumpInputs
-from swashplate.parameters import definitions
+from swashplate.models.displacement_control import Pump
 
 H = 1.0 / 512.0
 interpreted = pytest.mark.interpreted
-
-
-def options_of(p: Pump) -> PumpOptions:
-    """Options that the values of a pump ask for."""
-    return PumpOptions(**dict.fromkeys(definitions.options_of(p._asdict()), True))
-
-
-def inputs_of(p: Pump, current: float, **others: float) -> PumpInputs:
-    given = {"pump_speed": p.pump_speed, "load_torque": p.load_torque, "supply_pressure": p.Z9}
-    return PumpInputs(current, **{**given, **others})
 
 
 # --- solenoids and spool -------------------------------------------------------------------------
@@ -56,21 +43,6 @@ def test_steep_and_flat_swash_plates_give_the_same_angle(pump: Pump) -> None:
     p = pump._replace(Z13_plus=0.39, Z13_minus=0.39)
     for tangent in np.linspace(-TAN_22_5, TAN_22_5, 101):
         assert control.swash_angle(tangent, p, None) == control.swash_angle(tangent, p, True)
-
-
-@interpreted
-@given(st.floats(-0.6, 0.6), st.floats(-0.6, 0.6))
-def test_spool_solves_the_force_balance(pump: Pump, a: float, s: float) -> None:
-    """Kruse eq. 6.19 at rest: k_f d3² [d1 sin α + x cos α]/√(d1² + x²) = (d1² + x²)/d1 · F ...
-
-    ... where the right-hand side is the moment d1 F once the spool's own tilt is neglected
-    (tan²β ≪ 1, the assumption below eq. 6.57).
-    """
-    spring, d1 = 0.23, 0.008
-    force = a * spring / d1
-    x = control.spool_balance(force, s, pump._replace(Z4=spring**2, Z5=d1, Z18=0.0))
-    moment = spring * (d1 * s + x * sqrt(1 - s * s)) / sqrt(d1**2 + x**2)
-    assert moment == pytest.approx(d1 * force, rel=1e-9, abs=1e-12)
 
 
 @interpreted
@@ -137,41 +109,18 @@ def test_pressure_cannot_be_pumped_beyond_the_supply() -> None:
     assert p == -1e6
 
 
-# --- the pump ------------------------------------------------------------------------------------
+# --- measured inputs ------------------------------------------------------------------------------
 
 
-def test_the_prime_movers_speed_scales_flow_and_speed(pump: Pump) -> None:
-    p = pump._replace(Z12=0.02, load_inertia=5e3, motor_leakage=1e-6)
-    options = options_of(p)
-    k = plainly(model.pump_constants)(p, H, options)
-    state = model.PumpState(4e5)
-    slow = plainly(model.pump_sample)(state, inputs_of(p, 0.6), p, k, H, options)
-    fast = plainly(model.pump_sample)(state, inputs_of(p, 0.6, pump_speed=1.5), p, k, H, options)
-    assert fast.shaft_speed == pytest.approx(1.5 * slow.shaft_speed, rel=1e-14)
-    assert fast.motor_torque == pytest.approx(1.5 * slow.motor_torque, rel=1e-14)
-    assert fast.swash_angle == slow.swash_angle
-
-
-def test_a_load_alone_moves_torque_and_pressure_drop_but_no_speed(pump: Pump) -> None:
-    """With a stiff line and no leakage the flow sets the speed, whatever the load."""
-    p = pump._replace(load_torque=3e4, motor_constant=250.0)
-    options = options_of(p)
-    k = plainly(model.pump_constants)(p, H, options)
-    state = model.PumpState(4e5)
-    loaded = plainly(model.pump_sample)(state, inputs_of(p, 0.6), p, k, H, options)
-    free = plainly(model.pump_sample)(state, inputs_of(p, 0.6, load_torque=0.0), p, k, H, options)
-    assert loaded.shaft_speed == free.shaft_speed
-    assert loaded.motor_torque - free.motor_torque == pytest.approx(3e4)
-    assert loaded.motor_pressure_drop == pytest.approx(250.0 * 3e4)
-
-
-def test_a_weaker_supply_makes_the_pump_slower(pump: Pump) -> None:
-    options = PumpOptions()
-    k = plainly(model.pump_constants)(pump, H, options)
-    rises = []
-    for share in (1.0, 0.5):
-        inputs = inputs_of(pump, 0.7, supply_pressure=share * pump.Z9)
-        state = plainly(model.pump_rest)(pump, k, options, inputs)
-        signals = plainly(model.pump_sample)(state, inputs, pump, k, H, options)
-        rises.append(plainly(model.pump_step)(state, signals, inputs, pump, k, H, options).pressure)
-    assert rises[1] / rises[0] == pytest.approx(sqrt(0.5), rel=1e-3)
+def test_measured_inputs_act_as_they_should(hoist: Drive) -> None:
+    """The prime mover's speed scales the flow; the supply's root the rate; a stiff load neither."""
+    rigid = hoist.replace(motor_constant=250.0)
+    current = np.full(300, 0.6)
+    plain = rigid.simulate_current(current)
+    fast = rigid.simulate_current(current, pump_speed=1.5)
+    np.testing.assert_allclose(fast.shaft_speed, 1.5 * plain.shaft_speed, rtol=1e-14)
+    loaded = rigid.simulate_current(current, load_torque=3e4)
+    np.testing.assert_array_equal(loaded.shaft_speed, plain.shaft_speed)
+    np.testing.assert_allclose(loaded.motor_torque - plain.motor_torque, 3e4)
+    weak = rigid.simulate_current(current, supply_pressure=0.5 * hoist["Z9"].value)
+    assert weak.stroker_pressure[1] / plain.stroker_pressure[1] == pytest.approx(0.5**0.5, rel=1e-3)

@@ -1,6 +1,7 @@
 """Figures of measured tests: pages of a campaign, a close look at an encoder or an ammeter."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 
@@ -18,52 +19,19 @@ SOURCE = Source(Path("run.csv"), "a column")
 TIME = np.arange(513) / 64.0
 
 
-def command(time: np.ndarray = TIME, **entries) -> InputSignal:
-    values = np.where((time >= 1.0) & (time < 6.0), 4.0, 0.0)
-    return InputSignal(
-        **{
-            "kind": "voltage",
-            "unit": "V",
-            "time": time,
-            "values": values,
-            "interpolation": "previous",
-            "source": SOURCE,
-            **entries,
-        }
-    )
+VOLTS = np.where((TIME >= 1.0) & (TIME < 6.0), 4.0, 0.0)
+COMMAND = InputSignal("voltage", "V", TIME, VOLTS, "previous", SOURCE)
 
 
-def channel(kind: str = "shaft_speed", unit: str = "rad/s", **entries) -> Channel:
-    time = entries.pop("time", TIME)
-    return Channel(
-        **{
-            "name": entries.pop("name", "speed"),
-            "kind": kind,
-            "unit": unit,
-            "time": time,
-            "values": np.sin(time),
-            "weight": np.ones(time.size),
-            "source": SOURCE,
-            **entries,
-        }
-    )
+def channel(kind: str = "shaft_speed", unit: str = "rad/s", **more) -> Channel:
+    made = Channel("speed", kind, unit, TIME, np.sin(TIME), np.ones(TIME.size), SOURCE)
+    return replace(made, **more)
 
 
-def experiment(*channels: Channel, **entries) -> Experiment:
-    return Experiment(
-        **{
-            "name": "run1",
-            "axis": "hoist",
-            "run": "run1",
-            "role": "fit",
-            "start": "rest",
-            "start_pressure": None,
-            "input": command(),
-            "channels": {each.name: each for each in channels or (channel(),)},
-            "stated_maneuver": "step +4 V",
-            **entries,
-        }
-    )
+def experiment(*channels: Channel, **more) -> Experiment:
+    named = {each.name: each for each in channels or (channel(),)}
+    made = Experiment("run1", "hoist", "run1", "fit", "rest", None, COMMAND, named, "step +4 V")
+    return replace(made, **more)
 
 
 def line(ax: Axes):
@@ -97,7 +65,7 @@ def test_rows_are_runs_and_columns_signals_in_the_units_people_read() -> None:
         ["ammeter", "rectified current (A)"],
         ["p", "stroker pressure (bar)"],
     ]
-    factors, signals = (1.0, 180.0 / np.pi, 1.0, 1e-5), (command(), speed, current, pressure)
+    factors, signals = (1.0, 180.0 / np.pi, 1.0, 1e-5), (COMMAND, speed, current, pressure)
     for ax, signal, factor in zip(figure.axes, signals, factors, strict=True):
         np.testing.assert_array_equal(line(ax).get_xdata(), signal.time)
         np.testing.assert_allclose(line(ax).get_ydata(), factor * signal.values, rtol=1e-14)
@@ -157,17 +125,9 @@ def encoder(time: np.ndarray = FINE, per_turn: float = 360.0) -> Channel:
     """An encoder on a shaft at 20 deg/s that starts at 0.5 s, a count a degree, read backwards."""
     scale = Encoder(per_turn, 1.0, -1, None)
     counts = -np.floor(20.0 * np.maximum(time - 0.5, 0.0) * per_turn / 360.0 + 0.5)
-    return Channel(
-        name="counts",
-        kind="encoder_counts",
-        unit="rad",
-        time=time,
-        values=counts * scale.angle_per_count,
-        weight=np.ones(time.size),
-        source=SOURCE,
-        encoder=scale,
-        counts=counts,
-    )
+    values, own = counts * scale.angle_per_count, {"encoder": scale, "counts": counts}
+    weight = np.ones(time.size)
+    return Channel("counts", "encoder_counts", "rad", time, values, weight, SOURCE, **own)
 
 
 def position(time: np.ndarray = FINE, noise: float | None = None) -> Channel:

@@ -7,6 +7,7 @@ import re
 import numpy as np
 import pytest
 
+from swashplate import InputError
 from swashplate.crane import (
     Crane,
     Seaway,
@@ -16,7 +17,6 @@ from swashplate.crane import (
     judge,
     sweep,
 )
-from swashplate.errors import InputError
 from swashplate.report import figures
 from swashplate.report.scene import write_judgment, write_scene
 from swashplate.report.scene.scene import COLUMNS

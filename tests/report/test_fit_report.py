@@ -91,16 +91,6 @@ def judged(campaign: Campaign, fitted: Fit) -> Judged:
     return Judged(campaign, fitted, campaign.select(role="fit"), profiles=profiles, notes=NOTES)
 
 
-@pytest.fixture(scope="module")
-def assessments(judged: Judged):
-    return judged.assessments
-
-
-@pytest.fixture(scope="module")
-def validation(judged: Judged):
-    return judged.predicted
-
-
 STARTS = tuple(
     Solution(np.zeros(1), cost, 10, number != 2, False, "done", number=number)
     for number, cost in enumerate((3.0, 3.0, 70.0, float("inf")))
@@ -193,9 +183,9 @@ def number(text: str) -> float:
     return float(found[1]) * 10.0 ** int((found[2] or "0").translate(raised))
 
 
-def test_estimates_and_intervals_are_those_of_the_fit(read: Page, assessments) -> None:
+def test_estimates_and_intervals_are_those_of_the_fit(read: Page, judged: Judged) -> None:
     rows = {row["name"]: row for row in read.rows("parameters")}
-    for assessment in assessments:
+    for assessment in judged.assessments:
         for estimate in assessment.uncertainty.estimates:
             if estimate.name.startswith("offset"):
                 continue
@@ -207,12 +197,6 @@ def test_estimates_and_intervals_are_those_of_the_fit(read: Page, assessments) -
             half = 0.5 * (estimate.upper - estimate.lower)
             for head, end in (("lower 95 %", estimate.lower), ("upper 95 %", estimate.upper)):
                 assert number(row[head]) == pytest.approx(end, abs=0.06 * half)
-
-
-def test_no_interval_at_an_active_bound(read: Page) -> None:
-    row = next(row for row in read.rows("parameters") if row["name"] == "omega")
-    assert (row["lower 95 %"], row["upper 95 %"]) == ("at its upper bound", "")
-    assert re.search(r"omega = [\d.]+ is at its upper bound and has no interval", read.words)
 
 
 def test_fixed_parameters_are_listed_and_free_ones_are_not(read: Page) -> None:
@@ -269,9 +253,7 @@ def unpacked(found: dict) -> np.ndarray:
     [
         (np.sin(np.arange(3000) / 50.0), None),
         (np.random.default_rng(0).standard_cauchy(1000), 0.1),  # some take all four bytes
-        (np.arange(600) / 512.0, 1.0 / 512.0 / 16.0),
         (np.full(300, 7.0), None),
-        (np.array([3.0]), None),
         (np.array([]), None),
     ],
 )
@@ -291,12 +273,12 @@ def test_samples_of_a_run_are_in_the_page(read: Page, fitted: Fit) -> None:
     assert float(np.abs(error).max()) < rms / 16.0
 
 
-def test_every_sample_can_be_had_as_a_table(tmp_path, assessments, validation) -> None:
+def test_every_sample_can_be_had_as_a_table(tmp_path: Path, judged: Judged) -> None:
     path = tmp_path / "samples.parquet"
-    write_samples(shown_runs(assessments, validation), path)
+    write_samples(shown_runs(judged.assessments, judged.predicted), path)
     table = pl.read_parquet(path)
     assert {*table["channel"]} == {"current", "counts", "speed from counts"}
-    held = next(each for each in validation if each.channel == "current")
+    held = next(each for each in judged.predicted if each.channel == "current")
     own = table.filter(role="validate", run=held.experiment.name, channel="current")
     np.testing.assert_allclose(own["measured"], held.experiment["current"].values)
     np.testing.assert_allclose(own["simulated"], held.simulated)
@@ -305,8 +287,8 @@ def test_every_sample_can_be_had_as_a_table(tmp_path, assessments, validation) -
     assert 0.0 < ignored["time"].max() < 0.5
 
 
-def test_a_long_run_costs_few_bytes(validation) -> None:
-    quality = next(each for each in validation if each.channel == "current")
+def test_a_long_run_costs_few_bytes(judged: Judged) -> None:
+    quality = next(each for each in judged.predicted if each.channel == "current")
     channel = quality.experiment[quality.channel]
     many = 40
     time = np.arange(many * channel.time.size) / 512.0
@@ -352,13 +334,15 @@ def test_the_panel_offers_first_what_was_fitted(read: Page) -> None:
     assert {each["symbol"] for each in values if each["main"]} == {"G1", "Z10", "omega"}
 
 
-def test_truth_stands_beside_the_estimates(write, assessments, read: Page) -> None:
+def test_truth_stands_beside_the_estimates(write, judged: Judged, read: Page) -> None:
     truth = Drive.preset("hoist").replace(omega=(75.0, 80.0), G1=(0.051, 0.056)).parameters
     page = write(truth=truth)
     assert "truth" not in read.rows("parameters")[0]
     row = next(row for row in page.rows("parameters") if row["name"] == "G1_plus")
     assert number(row["truth"]) == pytest.approx(0.051, rel=1e-4)
-    estimate = next(each for each in assessments[0].uncertainty.estimates if each.name == "G1_plus")
+    estimate = next(
+        each for each in judged.assessments[0].uncertainty.estimates if each.name == "G1_plus"
+    )
     assert row["holds"] == ("yes" if estimate.lower <= 0.051 <= estimate.upper else "no")
     fixed = {row["name"]: row for row in page.rows("held")}
     assert number(fixed["Z4"]["truth"]) == pytest.approx(truth.numbers["Z4"], rel=1e-4)
@@ -384,10 +368,10 @@ def test_the_first_screen_is_for_the_owner(read: Page, fitted: Fit, validated: P
     assert "Change first:" in read.words
 
 
-def test_each_run_has_a_light_and_links(read: Page, write, campaign, validation) -> None:
+def test_each_run_has_a_light_and_links(read: Page, write, campaign, judged: Judged) -> None:
     rows = read.rows("overview")
     assert [row["role"] for row in rows] == ["fit", "fit", "validate"]
-    assert rows[-1]["run"] == validation[0].experiment.name
+    assert rows[-1]["run"] == judged.predicted[0].experiment.name
     # a run that the drive cannot follow: it went the other way
     *others, last = campaign.experiments
     still = {k: replace(c, values=-c.values) for k, c in last.channels.items()}

@@ -1,4 +1,4 @@
-"""The page and the PDF: whole, self-contained, labelled, the same every time."""
+"""Page and PDF: whole, self-contained, labelled, the same every time, or a sentence."""
 
 import re
 from base64 import b64decode
@@ -11,9 +11,9 @@ from reproduction.content import Cell, Curve, Figure, Panel, Reproduction, Table
 from reproduction.drawing import own_canvas
 from reproduction.page import write_page
 from reproduction.printed import write_pdf
-from reproduction.wording import as_html, as_mathtext, length_of
 
-from swashplate.errors import FileError
+from reproduction import __main__ as command
+from reproduction import build
 
 
 class Page(HTMLParser):
@@ -91,11 +91,6 @@ def test_the_same_bytes_again(small: Reproduction, text: str, tmp_path: Path) ->
     assert sorted(each.name for each in tmp_path.iterdir()) == ["again.html", "one.pdf", "two.pdf"]
 
 
-def test_a_place_that_cannot_be_written(small: Reproduction, tmp_path: Path) -> None:
-    with pytest.raises(FileError, match=r"page\.pdf cannot be written: folder .* does not exist"):
-        write_pdf(small, tmp_path / "no" / "page.pdf")
-
-
 def test_texts_stay_within_their_figure(small: Reproduction) -> None:
     for figure in small.figures:
         canvas = own_canvas(figure)
@@ -134,12 +129,6 @@ def test_foreign_words_are_escaped(tmp_path: Path) -> None:
     assert "V<sub>&lt;</sub>" in text
 
 
-def test_subscripts() -> None:
-    assert as_html("V_{dz} (V)") == "V<sub>dz</sub> (V)"
-    assert as_mathtext("V_{dz} (V)") == r"V$_{\mathrm{dz}}$ (V)"
-    assert length_of("V_{dz}") == 3
-
-
 @pytest.mark.slow
 def test_all_of_it(everything: Reproduction, tmp_path: Path) -> None:
     assert (len(everything.figures), len(everything.tables)) == (46, 15)
@@ -149,3 +138,45 @@ def test_all_of_it(everything: Reproduction, tmp_path: Path) -> None:
     assert {each.removeprefix("#") for each in page.links} <= set(page.ids)
     write_pdf(everything, tmp_path / "page.pdf")
     assert (tmp_path / "page.pdf").stat().st_size > 100_000
+
+
+FEW = ("figure 4.4", "figure 9.1", "table 8.1")
+
+
+@pytest.fixture
+def few(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setattr(build, "ALL", FEW)
+    monkeypatch.chdir(tmp_path)
+
+
+@pytest.mark.usefixtures("few")
+def test_page_and_print_are_written(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    assert command.main(["--out", "sub/thesis", "--seed", "3"]) == 0
+    folder = tmp_path / "sub/thesis"
+    made = sorted(each.name for each in folder.iterdir())
+    assert made == ["reproduction.html", "reproduction.pdf"]
+    page = (folder / "reproduction.html").read_text("utf-8")
+    assert "seed 3" in page
+    assert "figure-9-1" in page
+    assert (folder / "reproduction.pdf").read_bytes().startswith(b"%PDF")
+    said = capsys.readouterr().out
+    assert "2 figures and 1 tables" in said
+    assert all(f"sub/thesis/{name}" in said for name in made)
+
+
+@pytest.mark.usefixtures("few")
+@pytest.mark.parametrize(
+    ("words", "sentence"),
+    [
+        (["--out", "file"], "File exists"),
+        (["--out", "file/below"], "Not a directory"),
+        (["--out", "taken"], "reproduction.html cannot be written: it is a folder"),
+    ],
+)
+def test_what_cannot_be_written_is_said(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, words: list[str], sentence: str
+) -> None:
+    (tmp_path / "file").write_text("")
+    (tmp_path / "taken/reproduction.html").mkdir(parents=True)
+    assert command.main(words) == 2
+    assert sentence in capsys.readouterr().err

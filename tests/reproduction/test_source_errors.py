@@ -1,7 +1,6 @@
 """Kruse's largest per cent errors."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -14,10 +13,8 @@ from reproduction.source_errors import (
     error_tables,
     source_rules,
 )
+from tests.identification.given import run_of
 
-from swashplate import Channel, Experiment
-from swashplate.campaign.experiment import InputSignal, Source
-from swashplate.errors import InputError
 from swashplate.identification.validation import compared
 
 FINE = np.arange(0.0, 10.0, 0.01)
@@ -65,13 +62,6 @@ def test_the_overshoot_counts_if_its_rule_is_off() -> None:
     assert percent(error_table("speed", [step()], rules=rules))["step"] == pytest.approx(30.0)
 
 
-def test_rules_that_left_out_something_are_named() -> None:
-    """A step's speed has no zero crossings of a current, and there is no fast sine."""
-    table = error_table("speed", [step()])
-    assert table.rules == SOURCE_RULES
-    assert [rule.name for rule in table.acted] == ["start transient", "overshoot", "small values"]
-
-
 def test_fast_sines_are_left_out_as_a_whole() -> None:
     table = error_table("speed", [sine(0.1), sine(0.3, simulated=np.zeros(TIME.size))])
     assert percent(table)["sine"] == pytest.approx(10.0)
@@ -80,47 +70,11 @@ def test_fast_sines_are_left_out_as_a_whole() -> None:
     assert [rule.name for rule in alone.acted] == ["fast sines"]
 
 
-def test_nothing_left_is_a_verdict() -> None:
-    table = error_table("speed", [sine(0.3)])
-    assert percent(table) == {"sine": None}
-    assert table.rows[0].samples == 0
-
-
-def test_slew_leaves_out_its_steps() -> None:
-    assert percent(error_table("speed", [step()], source_rules("slew"))) == {"step": None}
-
-
-def test_a_run_at_rest_has_no_per_cent() -> None:
-    still = step(measured=np.zeros(TIME.size))
-    assert percent(error_table("speed", [still], rules=[])) == {"step": None}
-
-
-def test_rows_come_in_the_sources_order() -> None:
-    ramp = step(kind="ramp", name="ramp")
-    assert [row.kind for row in error_table("speed", [sine(), step(), ramp]).rows] == [
-        "ramp",
-        "step",
-        "sine",
-    ]
-
-
 def test_dither_is_averaged_over() -> None:
     dither = 20.0 * np.where(np.arange(TIME.size) % 2, 1.0, -1.0)
     run = step(simulated=1.02 * step().measured + dither)
     assert percent(error_table("speed", [run]))["step"] > 20.0
     assert percent(error_table("speed", [run], average=0.2))["step"] == pytest.approx(2.0, abs=0.01)
-
-
-@pytest.mark.parametrize(
-    ("run", "said"),
-    [
-        (step(measured=np.zeros(3)), "differ in length"),
-        (step(simulated=np.full(TIME.size, np.nan)), "not finite"),
-    ],
-)
-def test_wrong_runs_are_refused(run: ComparedRun, said: str) -> None:
-    with pytest.raises(InputError, match=said):
-        error_table("speed", [run])
 
 
 PULSE = np.where((TIME >= 1.0) & (TIME < 6.0), 1.0, 0.0)
@@ -166,29 +120,24 @@ def test_fast_and_small() -> None:
     np.testing.assert_array_equal(found, PULSE == 0.0)
 
 
-def measured_run(name: str, maneuver: str, current: np.ndarray) -> Experiment:
-    """A command of 4 V from 1 s to 6 s, and a current."""
-    log, voltage = (
-        Source(Path("log.csv"), "column"),
-        np.where((FINE >= 1.0) & (FINE < 6.0), 4.0, 0.0),
-    )
-    drive = InputSignal("voltage", "V", FINE, voltage, "previous", log)
-    channel = Channel("current", "rectified_current", "A", FINE, current, np.ones(FINE.size), log)
-    return Experiment(
-        name, "hoist", name, "validate", "rest", None, drive, {"current": channel}, maneuver
-    )
-
-
 def test_the_table_of_a_channel() -> None:
     current = np.where((FINE >= 1.0) & (FINE < 6.0), 0.5, 0.0)
     # 5 % too large throughout, 40 % within the overshoot's window that is left out
     simulated = current * np.where((FINE >= 1.0) & (FINE < 2.0), 1.4, 1.05)
-    step = measured_run("a", "step +4 V", current)
-    free = measured_run("b", "free", current)
-    (found,) = error_tables(
-        [compared(step, "current", simulated), compared(free, "current", current)]
+    command, channels = (
+        np.where((FINE >= 1.0) & (FINE < 6.0), 4.0, 0.0),
+        {"rectified_current": current},
     )
-    assert (found.channel, found.unjudged, found.average) == ("current", ("b",), 0.1)
+    more = {"time": FINE, "hold": "previous", "role": "validate"}
+    step = run_of("a", command, channels, maneuver="step +4 V", **more)
+    free = run_of("b", command, channels, maneuver="free", **more)
+    (found,) = error_tables(
+        [
+            compared(step, "rectified_current", simulated),
+            compared(free, "rectified_current", current),
+        ]
+    )
+    assert (found.channel, found.unjudged, found.average) == ("rectified_current", ("b",), 0.1)
     (row,) = found.rows
     assert (row.kind, row.run) == ("step", "a")
     assert row.percent == pytest.approx(5.0, rel=1e-6)
@@ -196,5 +145,5 @@ def test_the_table_of_a_channel() -> None:
         *(each.name for each in source_rules("hoist")),
         "steps",
     ]
-    (slew,) = error_tables([compared(step, "current", simulated)], source_rules("slew"))
+    (slew,) = error_tables([compared(step, "rectified_current", simulated)], source_rules("slew"))
     assert slew.rows[0].percent is None

@@ -1,15 +1,27 @@
-"""Residuals of a drive under an observed record, and their derivatives by columns."""
+"""Commands, and residuals of a drive under an observed record with their derivatives."""
 
 from collections.abc import Sequence
 
 import numpy as np
 
-from swashplate import ParameterSet
+from swashplate import ParameterSet, maneuvers
 from swashplate.equations.marching.jacobian import Jacobian, Triangle
 from swashplate.equations.marching.observation import ObservedRecord, Own
 from swashplate.simulation.residuals import made_ready, wanted_columns
 
 NOTHING = Own()
+RATE = 512.0
+
+
+def steps(*levels: float) -> np.ndarray:
+    """Half a second at each level between slow flanks."""
+    t = np.arange(int(0.6 * len(levels) * RATE)) / RATE
+    corners = np.concatenate([[0.6 * k, 0.6 * k + 0.1] for k in range(len(levels))])
+    return np.interp(t, corners, np.repeat([0.0, *levels], 2)[1:-1])
+
+
+SWING = maneuvers.sine(3.0, 0.8, start=0.05, length=3.0, settle=0.4).sample(RATE)
+HARD = steps(9.0, 9.0, 0.0, -9.0, -9.0, 0.0, 3.0)
 
 
 def residuals(parameters: ParameterSet, observed: ObservedRecord, own: Own = NOTHING) -> np.ndarray:

@@ -79,14 +79,6 @@ def test_a_recursion_that_alternates_is_no_filter_of_another_rate() -> None:
         drive.at_every_rate()
 
 
-@pytest.mark.parametrize("rate", [10.0, 33.3, 512.0, 100_000.0])
-def test_no_step_is_longer_than_the_sources(hoist: Drive, rate: float) -> None:
-    run = hoist.simulate(np.linspace(0.0, 5.0, 40), rate)
-    assert run.record.step <= 1.0 / 512.0
-    assert run.time.size == run.shaft_speed.size == 40
-    assert run.time[-1] == pytest.approx(39.0 / rate, rel=1e-12)
-
-
 @pytest.mark.parametrize("rate", [9.99, 100_001.0, float("nan"), 0.0, -512.0])
 def test_rates_out_of_range_are_refused(hoist: Drive, rate: float) -> None:
     with pytest.raises(InputError, match="between 10 and 100000 Hz"):

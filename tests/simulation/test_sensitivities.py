@@ -5,11 +5,10 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 import pytest
+from tests.simulation.experiments import HARD, RATE, SWING
 
 from swashplate import Drive, InputError, Limit, Simulation, maneuvers
-from swashplate.simulation.residuals import ALL_COLUMNS, PUMP_COLUMNS, Sensitivities
-
-RATE = 512.0
+from swashplate.simulation.residuals import ALL_COLUMNS, Sensitivities
 
 
 @dataclass(frozen=True)
@@ -22,30 +21,21 @@ class Scene:
     limit: Limit | None = None
     root: str = "published"
     decay: str = "sampled"
+    rate: float | None = 512.0
     start: str = "rest"
     columns: tuple[str, ...] | None = None
 
     def drive(self) -> Drive:
         drive = Drive.preset(self.preset).replace(**self.changes)
-        options = {"pressure_root": self.root, "card_switch": self.decay}
+        options = {"pressure_root": self.root, "card_switch": self.decay, "rate": self.rate}
         return Drive(replace(drive.parameters, **options))
 
-
-def steps(*levels: float) -> np.ndarray:
-    """Half a second at each level, both signs and back to zero, between slow flanks."""
-    t = np.arange(int(0.6 * len(levels) * RATE)) / RATE
-    corners = np.concatenate([[0.6 * k, 0.6 * k + 0.1] for k in range(len(levels))])
-    values = np.repeat([0.0, *levels], 2)[1:-1]
-    return np.interp(t, corners, values)
-
-
-SWING = maneuvers.sine(3.0, 0.8, start=0.05, length=3.0, settle=0.4).sample(RATE)
-HARD = steps(9.0, 9.0, 0.0, -9.0, -9.0, 0.0, 3.0)
 
 SCENES = {
     "nothing but the dead zone": Scene(0.4 * SWING, limit=Limit.DEAD_ZONE),
     "current rate": Scene(HARD, limit=Limit.CURRENT_RATE),
     "decay from within a step": Scene(HARD, limit=Limit.CURRENT_RATE, decay="split"),
+    "the filter's equation": Scene(HARD, {"C": 3.0}, rate=None),
     "orifice": Scene(2.5 * SWING, limit=Limit.ORIFICE),
     "spool stop": Scene(2.5 * SWING, {"Z14": 1.05e-4}, limit=Limit.SPOOL),
     "swash stop": Scene(HARD, {"Z16": 3e-4}, limit=Limit.SWASH_STOP),
@@ -108,6 +98,7 @@ def differences(scene: Scene, drive: Drive, name: str) -> list[np.ndarray]:
 
 
 COMPILED_LONG = (
+    "the filter's equation",
     "all refinements",
     "all without the line",
     "physical root, leaking",
@@ -186,16 +177,6 @@ def test_columns_are_those_asked_for(hoist: Drive) -> None:
         assert np.array_equal(some.shaft_speed[:, j], everything.shaft_speed[:, k])
         assert np.array_equal(some.shaft_position[:, j], everything.shaft_position[:, k])
         assert np.array_equal(some.current[:, j], everything.current[:, k])
-
-
-@pytest.mark.traced
-def test_pump_alone_has_the_same_columns(hoist: Drive) -> None:
-    whole = hoist.sensitivities(2.0 * SWING, parameters=list(PUMP_COLUMNS))
-    pump = hoist.sensitivities_current(whole.simulation.current)
-    assert pump.names == tuple(PUMP_COLUMNS)
-    assert np.array_equal(pump.shaft_speed, whole.shaft_speed)
-    with pytest.raises(InputError, match="tau belongs to the card"):
-        hoist.sensitivities_current([0.1, 0.2], parameters=["tau"])
 
 
 @pytest.mark.traced

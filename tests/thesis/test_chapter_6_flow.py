@@ -181,11 +181,3 @@ def test_eq_6_36_opening_is_limited_both_ways(hoist: Drive) -> None:
     for x_, expected in ((-3e-4, -1e-4), (-5e-5, -5e-5), (0.0, 0.0), (5e-5, 5e-5), (3e-4, 1e-4)):
         assert orifice_opening(x_, lumped) == expected
         assert valve_opening(x_, physical) == expected
-
-
-def test_erratum_15_eq_6_36_prints_an_empty_branch() -> None:
-    """-x_max > x > x_max holds for no x, so that the printed opening has no middle."""
-    x_max = 1e-4
-    grid = np.linspace(-3e-4, 3e-4, 601)
-    assert not np.any((-x_max > grid) & (grid > x_max))
-    assert np.any((-x_max < grid) & (grid < x_max))

@@ -50,11 +50,6 @@ def test_erratum_17_motor_constant_is_angle_per_volume() -> None:
     )
 
 
-def test_eq_6_42_to_6_46_load_on_the_plate(gap: Callable) -> None:
-    printed = K * (C_i * C_q * K * rate * sp.cos(angle) + C_g)
-    assert gap(drop_of(sp.sin(angle)), printed).largest < 1e-30
-
-
 def test_eq_6_42_to_6_46_as_the_package_has_them(points: Callable) -> None:
     """The same chain for a flow that goes with the angle, which the published Z10 belongs to."""
     derived = sp.lambdify((rate, C_i, C_g, K, C_q), drop_of(angle))

@@ -1,8 +1,4 @@
-"""Tables 4.1-4.4, 7.1-7.4, 8.1-8.3: read from Kruse's text where it is at hand.
-
-`test_parameters` compares the drives with the tables as they were put in order; here the text is
-read itself, signs and misprints included, so that each erratum of the tables shows.
-"""
+"""Tables 4.1-4.4, 7.1-7.4, 8.1-8.3: the packaged sets, and their text where it is at hand."""
 
 import re
 
@@ -130,3 +126,47 @@ def test_erratum_06_signs_of_the_luffs_rate_limits(text: str) -> None:
 def test_table_7_1_gear_ratios(text: str) -> None:
     part = text.split("Table 7.1 Axis Dependent Gear Ratios", 1)[1][:60].split()
     assert part[:8] == ["Axis", "N", "slew", "7", "luff", "120/19", "hoist", "1"]
+
+
+BOTH = ("hoist", "slew", "luff")
+
+
+@pytest.mark.parametrize("name", BOTH)
+def test_sets_equal_the_tables(name: str, source_parameters: dict) -> None:
+    pump = source_parameters["pump_motor"][name]
+    card = source_parameters["control_card"][pump["control_card"]]
+    drive = Drive.preset(name)
+    assert drive.parameters.card == pump["control_card"]
+    facts = {key: value for key, value in {**card, **pump}.items() if key in drive.parameters}
+    assert set(facts) == set(drive.parameters)
+    for symbol, fact in facts.items():
+        parameter = drive[symbol]
+        assert parameter.unit == source_parameters["units"][symbol]
+        assert list(parameter.values) == (fact if isinstance(fact, list) else [fact]), symbol
+        assert parameter.source.startswith("table")
+
+
+@pytest.mark.parametrize(
+    ("name", "symbol", "values"),
+    [
+        # a few cells by hand, for a checkout without the tables
+        ("hoist", "Z1", (4.6441e-07,)),
+        ("hoist", "Z16", (1.1634e-04, 1.5126e-04)),
+        ("hoist", "Z22", (0.0, -54.153)),
+        ("hoist", "lim2", (2.2615, 2.6483)),
+        ("slew", "V_dz", (0.090948, 0.088321)),
+        ("slew", "C", (4.8368, 4.8368)),
+        ("luff", "Z15", (4.5768e08,)),
+        ("luff", "Z13", (0.059489, 0.07282)),
+    ],
+)
+def test_cells(name: str, symbol: str, values: tuple) -> None:
+    assert Drive.preset(name)[symbol].values == values
+
+
+def test_statuses() -> None:
+    assert Drive.preset("hoist")["tau"].status == "assumed"
+    assert Drive.preset("hoist")["Z1"].status == "fitted"
+    assert Drive.preset("luff")["Z1"].status == "approximate"
+    assert Drive.preset("luff")["Z13"].status == "assumed"
+    assert Drive.preset("slew")["Z14"].status == "inactive"

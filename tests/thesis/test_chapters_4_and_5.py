@@ -1,4 +1,4 @@
-"""The card's cost (eq. 4.10) and what its tables mean (errata 5, 32)."""
+"""The card's cost and tables (chapter 4), and solenoids on the bench (chapter 5)."""
 
 import numpy as np
 import pytest
@@ -9,16 +9,18 @@ from swashplate.simulation.batch import SquaredError
 HOIST_MINUS = {"V_dz": 0.097857, "J": 0.2951, "G1": 0.054706, "G2": 0.00042879, "G3": -9.7369e-05}
 
 
-def test_eq_4_10_cost_is_a_sum_of_squares_over_the_tests(hoist: Drive) -> None:
-    """J = Σ J_i, each the squared error of one test: of currents 1 mA and 2 mA off, by hand."""
+@pytest.mark.parametrize(
+    ("output", "fixed"), [("current", {"J_plus": [0.27473]}), ("shaft_speed", {"Z10": [12.396]})]
+)
+def test_eq_4_10_and_7_1_cost_is_a_sum_of_squares_over_the_tests(
+    hoist: Drive, output: str, fixed: dict
+) -> None:
+    """J = Σ J_i, each the squared error of one test: 1 mA (or mrad/s) and 2 mA off, by hand."""
     total = 0.0
     for volts, off in ((4.0, 1e-3), (-6.5, 2e-3)):
         voltage = maneuvers.step(volts).sample(512.0)
-        measured = hoist.simulate(voltage).current + off
-        cost = SquaredError(measured, output="current")
-        batch = hoist.simulate_many({"J_plus": [0.27473]}, voltage=voltage, cost=cost)
-        assert batch.cost is not None
-        total += float(batch.cost[0])
+        cost = SquaredError(hoist.simulate(voltage)[output] + off, output=output)
+        total += float(hoist.simulate_many(fixed, voltage=voltage, cost=cost).cost[0])
     assert total == pytest.approx(5121 * (1e-6 + 4e-6), rel=1e-9)
 
 
@@ -69,3 +71,40 @@ def test_slew_and_luff_have_one_card() -> None:
     assert slew.parameters.card == luff.parameters.card != hoist.parameters.card
     for symbol in ("V_dz", "J", "G1", "zeta", "omega", "C", "lim1", "lim2", "I_t1", "I_t2", "a"):
         assert slew[symbol].values == luff[symbol].values
+
+
+BENCH = {1.0: 0.2537, 4.0: 0.4090, 7.0: 0.5635, 10.0: 0.7185}
+"""Currents at the voltages of the bench, [V] to [A]."""
+
+
+def test_bench_currents_lie_on_a_line() -> None:
+    """0.0516 A/V through all four, to half a milliampere: a card without G2 and G3, as 3.2."""
+    volts, current = np.array(list(BENCH)), np.array(list(BENCH.values()))
+    gain, offset = np.polyfit(volts, current, 1)
+    assert gain == pytest.approx(0.0516, abs=5e-5)
+    assert np.abs(current - offset - gain * volts).max() < 5e-4
+
+
+def test_erratum_28_bench_card_was_set_otherwise() -> None:
+    """Chapter 5 names the slew's card, MDSD-1K-2x/4; its fit gives 0.20 to 0.55 A."""
+    slew = Drive.preset("slew")
+    off = [current - slew.steady_current(volts) for volts, current in BENCH.items()]
+    assert off == pytest.approx([0.049, 0.090, 0.131, 0.173], abs=0.0006)
+    assert 0.0516 / slew["G1"].value.plus == pytest.approx(1.36, abs=0.005)
+
+
+def test_force_is_a_polynomial_of_fourth_order_without_constant(hoist: Drive) -> None:
+    """Five force differences of equal currents vanish; beyond the dead zone force starts at 0."""
+    step = 0.05
+    currents = hoist["Z17"].value + step * np.arange(7)
+    force = hoist.simulate_current(-currents).solenoid_force
+    assert force[0] == 0.0
+    assert np.abs(np.diff(force, 5)).max() < 1e-12
+    assert np.diff(force, 4) == pytest.approx(24.0 * -54.153 * step**4, rel=1e-6)
+
+
+def test_published_force_is_close_to_a_line_upwards(hoist: Drive) -> None:
+    """Chapter 5 finds a first-order polynomial enough on average; so does the hoist's fit."""
+    e = 0.45
+    parts = [hoist[f"Z{18 + n}"].value.plus * e**n for n in (1, 2, 3, 4)]
+    assert sum(parts[1:]) / parts[0] < 0.02

@@ -1,0 +1,124 @@
+"""What is written down rather than measured or fitted: runs, linearised fits, noise, a set-up."""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.signal import lfilter
+
+from swashplate import Channel, Experiment
+from swashplate.campaign.experiment import InputSignal, Source
+from swashplate.executors import Serial
+from swashplate.identification.problem import TOLERANCE, LinearisedFit, LinearisedRun
+from swashplate.identification.setup import Setup
+from swashplate.identification.unknowns import Unknown, Unknowns
+
+UNITS = {
+    "voltage": "V",
+    **dict.fromkeys(("current", "signed_current", "rectified_current", "current_plus"), "A"),
+    "current_minus": "A",
+    "shaft_speed": "rad/s",
+    "position": "rad",
+}
+
+
+def run_of(
+    name: str,
+    values: np.ndarray,
+    channels: Mapping[str, np.ndarray],
+    *,
+    time: np.ndarray | None = None,
+    kind: str = "voltage",
+    hold: str = "linear",
+    noise: float | None = None,
+    weight: float = 1.0,
+    role: str = "fit",
+    start: str = "rest",
+    maneuver: str = "",
+) -> Experiment:
+    """A run without a file, at 512 Hz or given stamps; channels have the names of their kinds."""
+    time = np.arange(values.size) / 512.0 if time is None else time
+    source, made = Source(Path("log.csv"), "column"), {}
+    for key, each in channels.items():
+        own, size = key if key in UNITS and kind != "other" else "other", np.size(each)
+        at, weights = time[:size], np.full(size, weight)
+        unit = UNITS.get(own, "1")
+        made[key] = Channel(key, own, unit, at, each, weights, source, noise=noise)
+    given = InputSignal(kind, UNITS.get(kind, "1"), time, values, hold, source)
+    return Experiment(name, "hoist", name, role, start, None, given, made, maneuver)
+
+
+def unknowns_of(
+    names: Sequence[str],
+    values: ArrayLike,
+    *,
+    scales: ArrayLike | None = None,
+    logarithmic: Sequence[bool] | None = None,
+    at_bound: Sequence[int] | None = None,
+) -> Unknowns:
+    """Unknowns at their estimates: -1 at the lower bound, 1 at the upper one, 0 between."""
+    number = np.asarray(values, dtype=float)
+    size = np.where(number == 0.0, 1.0, np.abs(number)) if scales is None else np.asarray(scales)
+    items = []
+    for k, (name, value, scale) in enumerate(zip(names, number, size, strict=True)):
+        log, side = bool(logarithmic and logarithmic[k]), at_bound[k] if at_bound else 0
+        low, high = (value / 1e9, value * 1e9) if log else (value - scale, value + scale)
+        low, high = (value if side < 0 else low), (value if side > 0 else high)
+        items.append(Unknown(name, float(value), low, high, log=log, scale=float(scale)))
+    return Unknowns(tuple(items))
+
+
+def linear_fit(
+    runs: Sequence[LinearisedRun],
+    variables: Unknowns,
+    *,
+    prior: np.ndarray | None = None,
+    prior_noise: np.ndarray | None = None,
+    tolerance: float = TOLERANCE,
+) -> LinearisedFit:
+    """A fit of some runs, without priors by default."""
+    rows = np.zeros((0, len(variables))) if prior is None else prior
+    noise = np.ones(len(rows)) if prior_noise is None else prior_noise
+    return LinearisedFit(tuple(runs), variables, rows, tolerance, noise)
+
+
+def first_order(
+    rho: float, rng: np.random.Generator, size: tuple[int, ...], warm: int = 1000
+) -> np.ndarray:
+    """Noise of variance 1 with the autocorrelation ρ^|k| along the last axis."""
+    drawn = rng.normal(size=(*size[:-1], size[-1] + warm))
+    return lfilter([np.sqrt(1.0 - rho**2)], [1.0, -rho], drawn)[..., warm:]
+
+
+class Backwards(Serial):
+    """Results in another order than asked for, as from several processes."""
+
+    def run(self, function, shared, items):  # type: ignore[no-untyped-def]
+        yield from reversed(list(super().run(function, shared, items)))
+
+
+TWO_STAGES = Setup.model_validate(
+    {
+        "title": "two stages",
+        "stages": [
+            {
+                "name": "card",
+                "part": "card",
+                "free": {"J": {"relative": (0.5, 2.0)}},
+                "weights": {"rectified_current": [{"from": 1.0, "to": 1.2, "factor": 10.0}]},
+            },
+            {
+                "name": "pump",
+                "part": "pump",
+                "free": {
+                    "Z10": {
+                        "relative": (0.8, 1.25),
+                        "log": True,
+                        "prior": {"mean": 12.8, "deviation": 0.05},
+                    }
+                },
+            },
+        ],
+    }
+)

@@ -1,0 +1,247 @@
+"""Estimates from other noise and from other runs: bootstrap and cross-validation."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from math import ceil
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from tests.identification.given import TWO_STAGES, Backwards, first_order, linear_fit, unknowns_of
+
+from swashplate import Campaign, Channel, Drive, Experiment, InputError
+from swashplate.campaign.experiment import InputSignal, Source
+from swashplate.identification.assessment import Assessment
+from swashplate.identification.fitting import StageFit, fit
+from swashplate.identification.noise import spectral_covariance
+from swashplate.identification.problem import LinearisedFit, LinearisedRun, Problem
+from swashplate.identification.profile import profiles_of
+from swashplate.identification.resampling import (
+    Bootstrap,
+    CrossValidation,
+    Fold,
+    NoiseDraws,
+    bootstraps_of,
+    cross_validate,
+    deal,
+)
+from swashplate.identification.setup import Free, Stage
+from swashplate.identification.solving import solve
+from swashplate.identification.unknowns import Unknown, Unknowns
+from swashplate.identification.validation import predict
+from swashplate.parameters.files import load_preset
+
+N, RUNS = 2048, 4
+TIME = np.arange(N) / 512.0
+DESIGN = np.column_stack([1.0 - np.exp(-TIME / 0.3), np.sin(2.0 * TIME)])
+LINE_TIME = np.linspace(0.0, 4.0, 81)
+
+
+def regression(noise: np.ndarray) -> LinearisedFit:
+    """Two unknowns fitted to noise alone, by linear least squares."""
+    estimate = -np.linalg.solve(RUNS * DESIGN.T @ DESIGN, DESIGN.T @ noise.sum(axis=0))
+    runs = [
+        LinearisedRun(f"run {k}", "speed", TIME, each + DESIGN @ estimate, DESIGN)
+        for k, each in enumerate(noise)
+    ]
+    return linear_fit(runs, unknowns_of("ab", [2.0, 1.0]))
+
+
+def test_estimates_from_draws_scatter_as_the_covariance_says() -> None:
+    made = regression(first_order(0.95, np.random.default_rng(1), (RUNS, N), 400))
+    draws = NoiseDraws(made, seed=1)
+    total = np.array([np.sum(draws.differences(k), axis=0) for k in range(500)])
+    found = np.linalg.solve(RUNS * DESIGN.T @ DESIGN, DESIGN.T @ total.T)
+    # 500 draws tell a deviation to 3 %, and each method knows the noise at the low frequencies of
+    # the derivatives to some 10 %
+    expected = spectral_covariance(made).standard_errors
+    np.testing.assert_allclose(found.std(axis=1), expected, rtol=0.2)
+
+
+def test_quantiles_by_hand() -> None:
+    found = Bootstrap(unknowns_of("a", [1.0]), np.arange(101.0)[:, None], np.ones(1, bool), 0, 0)
+    assert found.intervals()[0] == pytest.approx((2.5, 97.5))
+    unknown = Bootstrap(found.variables, found.vectors, np.zeros(1, bool), 3, 0)
+    assert unknown.intervals() == (None,)
+    assert "3 of 104 refits did not end" in unknown.sentences()[1]
+    few = Bootstrap(found.variables, np.arange(10.0)[:, None], np.ones(1, bool), 0, 0)
+    with pytest.raises(InputError, match="10 draws do not reach the ends"):
+        few.intervals()
+
+
+class Line:
+    """y = slope · t + level."""
+
+    def simulate(
+        self, values: Mapping[str, float], experiment: Experiment
+    ) -> Mapping[str, np.ndarray]:
+        return {"y": values["slope"] * experiment["y"].time + values["level"]}
+
+
+@pytest.fixture
+def assessed(experiment: Callable[..., Experiment]) -> Assessment:
+    """A line fitted to four runs with white noise of 0.1."""
+    rng = np.random.default_rng(7)
+    runs = tuple(
+        experiment(f"run {k}", 1.0, 2.0 * LINE_TIME + 1.0 + 0.1 * rng.normal(size=81))
+        for k in range(4)
+    )
+    unknowns = Unknowns((Unknown("slope", 1.5, 0.0, 4.0), Unknown("level", 0.5, -3.0, 3.0)))
+    problem = Problem(Line(), runs, unknowns, ("y",), {"y": 0.1})
+    stage = Stage(name="line", part="chain", free={"J": Free(relative=(0.5, 2.0))})
+    return Assessment(StageFit(stage, problem, solve(problem), load_preset("neutral")))
+
+
+def textbook() -> np.ndarray:
+    """Standard errors of slope and level from 4 times 81 samples with noise 0.1."""
+    design = np.column_stack([LINE_TIME, np.ones(81)])
+    return 0.1 * np.sqrt(np.diag(np.linalg.inv(4.0 * design.T @ design)))
+
+
+def test_refits_scatter_as_the_textbook_says(assessed: Assessment) -> None:
+    found = bootstraps_of([assessed], 200, seed=3)["line"]
+    assert found.failed == 0
+    # 200 draws tell a standard deviation to 5 %, and the noise itself is known to 4 %
+    np.testing.assert_allclose(found.values.std(axis=0), textbook(), rtol=0.2)
+    np.testing.assert_allclose(
+        found.values.mean(axis=0),
+        list(assessed.stage.values.values()),
+        atol=float(4.0 * textbook().max() / np.sqrt(200.0)),
+    )
+    with pytest.raises(InputError, match="1 draws do not make a distribution"):
+        bootstraps_of([assessed], 1)
+
+
+def test_draws_do_not_depend_on_the_order_in_which_they_are_done(assessed: Assessment) -> None:
+    counts: list[int] = []
+    forwards = bootstraps_of([assessed], 40, seed=3)["line"]
+    backwards = bootstraps_of([assessed], 40, seed=3, executor=Backwards(), watch=counts.append)
+    np.testing.assert_array_equal(forwards.vectors, backwards["line"].vectors)
+    assert counts == list(range(1, 41))
+    other = bootstraps_of([assessed], 40, seed=4)["line"]
+    assert not np.array_equal(forwards.vectors, other.vectors)
+
+
+def test_profiles_of_a_linear_model_are_its_intervals(assessed: Assessment) -> None:
+    found = profiles_of(assessed, executor=Backwards())
+    assert list(found) == ["slope", "level"]
+    variables = assessed.uncertainty.own.variables
+    for k, (name, each) in enumerate(found.items()):
+        estimate = assessed.uncertainty.estimates[k]
+        assert (estimate.name, each.index) == (name, k)
+        ends = variables.to_values(np.array([[each.lower] * 2, [each.upper] * 2]))[:, k]
+        np.testing.assert_allclose(ends, [estimate.lower, estimate.upper], rtol=2e-3)
+
+
+SOURCE = Source(Path("log.csv"), "column")
+
+
+def run_of(number: int, kind: str, low: float, high: float) -> Experiment:
+    time = np.linspace(0.0, 1.0, 11)
+    values = np.concatenate([np.zeros(5), [high, low], np.zeros(4)])
+    drive = InputSignal("voltage", "V", time, values, "previous", SOURCE)
+    channel = Channel("y", "other", "1", time, time, np.ones(11), SOURCE)
+    name = f"run {number}"
+    return Experiment(name, "hoist", name, "fit", "rest", None, drive, {"y": channel}, f"{kind} x")
+
+
+KINDS = st.lists(
+    st.tuples(
+        st.sampled_from(["step", "ramp", "sine", "free"]),
+        st.sampled_from([(0.0, 4.0), (-4.0, 0.0), (-4.0, 4.0)]),
+    ),
+    min_size=2,
+    max_size=20,
+)
+
+
+@given(kinds=KINDS, folds=st.integers(2, 20), seed=st.integers(0, 1000))
+def test_runs_of_a_kind_are_dealt_apart(
+    kinds: list[tuple[str, tuple[float, float]]], folds: int, seed: int
+) -> None:
+    folds = min(folds, len(kinds))
+    runs = [run_of(k, kind, *ends) for k, (kind, ends) in enumerate(kinds)]
+    parts = deal(runs, folds, seed)
+    assert sorted(place for part in parts for place in part) == list(range(len(runs)))
+    sizes = [len(part) for part in parts]
+    assert max(sizes) - min(sizes) <= 1
+    for stratum in set(kinds):
+        alike = [k for k, each in enumerate(kinds) if each == stratum]
+        most = max(sum(place in part for place in alike) for part in parts)
+        assert most <= ceil(len(alike) / folds)
+    assert deal(runs, folds, seed) == parts
+
+
+def test_too_few_runs_or_folds_are_refused() -> None:
+    runs = [run_of(k, "step", 0.0, 4.0) for k in range(3)]
+    with pytest.raises(InputError, match="5 folds need at least as many runs; there are 3"):
+        deal(runs, 5, 0)
+    with pytest.raises(InputError, match="needs at least 2 folds, not 1"):
+        deal(runs, 1, 0)
+
+
+@pytest.fixture(scope="module")
+def found(short_campaign: Campaign) -> CrossValidation:
+    nominal = Drive.preset("hoist").parameters
+    return cross_validate(short_campaign.experiments, nominal, TWO_STAGES, folds=4)
+
+
+def test_each_fold_is_predicted_by_a_fit_to_the_others(
+    short_campaign: Campaign, found: CrossValidation
+) -> None:
+    assert sorted(name for fold in found.folds for name in fold.held) == sorted(
+        each.name for each in short_campaign
+    )
+    fold = found.folds[0]
+    others = [each for each in short_campaign if each.name not in fold.held]
+    alone = fit(Drive.preset("hoist").parameters, others, TWO_STAGES)
+    (held,) = fold.held
+    predicted = {each.channel: each for each in predict(alone.parameters, [short_campaign[held]])}
+    for channel, quality in predicted.items():
+        assert fold.measures[channel] == quality.measures
+    samples = [each.measures["current"].samples for each in found.folds]
+    squares = [each.measures["current"].rmse ** 2 for each in found.folds]
+    pooled = np.average(squares, weights=samples) ** 0.5
+    assert found.measures["current"].rmse == pytest.approx(pooled)
+    assert found.measures["current"].fit_percent > 90.0
+
+
+def test_a_fold_that_loses_an_unknown_says_so(found: CrossValidation) -> None:
+    losing = [fold for fold in found.folds if fold.lost]
+    (fold,) = losing
+    assert fold.lost == ("J_minus",)
+    assert fold.held[0].endswith("-4_V")
+    assert any("loses J_minus, on which no other run depends" in s for s in found.sentences())
+
+
+def test_the_result_does_not_depend_on_where_it_is_computed(
+    short_campaign: Campaign, found: CrossValidation
+) -> None:
+    nominal = Drive.preset("hoist").parameters
+    again = cross_validate(
+        short_campaign.experiments, nominal, TWO_STAGES, folds=4, executor=Backwards()
+    )
+    assert again == found
+
+
+def test_folds_that_are_done_survive_ctrl_c(short_campaign: Campaign) -> None:
+    def stop(fold: Fold, done: int) -> None:
+        raise KeyboardInterrupt
+
+    nominal = Drive.preset("hoist").parameters
+    kept = cross_validate(short_campaign.experiments, nominal, TWO_STAGES, folds=4, watch=stop)
+    assert len(kept.folds) == 1
+    assert kept.planned == 4
+
+
+def test_a_fold_that_cannot_be_fitted_says_why(short_campaign: Campaign) -> None:
+    first, *others = short_campaign.experiments
+    bare = [replace(each, channels={"counts": each["counts"]}) for each in others]
+    nominal = Drive.preset("hoist").parameters
+    found = cross_validate([first, *bare], nominal, TWO_STAGES, folds=4)
+    (failed,) = [fold for fold in found.folds if fold.failure]
+    assert failed.held == (first.name,)
+    assert "The stage 'card' fits" in failed.failure
+    assert any("could not be fitted: The stage 'card'" in s for s in found.sentences())
