@@ -7,31 +7,34 @@ import pytest
 
 from swashplate import Campaign, InputError, ParameterError
 from swashplate.campaign import draft_campaign as draft
-from swashplate.campaign.draft import guess
-from swashplate.logs import Column
 
 
 @pytest.mark.parametrize(
-    ("name", "unit", "role", "kind"),
+    ("header", "kind"),
     [
-        ("time", None, "time", None),
-        ("Time [ms]", "ms", "time", None),
-        ("Joystick voltage", None, "input", "voltage"),
-        ("lever [V]", "V", "input", "voltage"),
-        ("Boom Cmd", None, "input", "other"),
-        ("ammeter [mA]", "mA", "channel", "rectified_current"),
-        ("Current", None, "channel", "rectified_current"),
-        ("encoderCounts", None, "channel", "encoder_counts"),
-        ("winch speed [rpm]", "rpm", "channel", "shaft_speed"),
-        ("EXP_PosFb", None, "channel", "position"),
-        ("swash angle", None, "channel", "swash_angle"),
-        ("drum [deg/s]", "deg/s", "channel", "shaft_speed"),
-        ("oil temperature", "degC", "unknown", None),
+        ("Joystick voltage", "voltage"),
+        ("lever [V]", "voltage"),
+        ("Boom Cmd", "other"),
+        ("ammeter [mA]", "rectified_current"),
+        ("Current", "rectified_current"),
+        ("encoderCounts", "encoder_counts"),
+        ("winch speed [rpm]", "shaft_speed"),
+        ("EXP_PosFb", "position"),
+        ("swash angle", "swash_angle"),
+        ("drum [deg/s]", "shaft_speed"),
+        ("oil temperature [degC]", None),
     ],
 )
-def test_what_a_header_says(name: str, unit: str | None, role: str, kind: str | None) -> None:
-    guessed = guess(Column(name, unit))
-    assert (guessed.role, guessed.kind) == (role, kind)
+def test_what_a_header_says(tmp_path: Path, header: str, kind: str | None) -> None:
+    (tmp_path / "log.csv").write_text(f"Time [ms],{header}\n0,0.5\n1,1.5\n2,1.5\n", "utf-8")
+    text = draft([tmp_path / "log.csv"], tmp_path)
+    assert 'time = { column = "Time [ms]" }' in text
+    tables = tomllib.loads(text)["axes"]["drive"]
+    entries = [tables["input"], *tables["channels"].values()]
+    assert [each["kind"] for each in entries if each["column"] == header] == [kind] * (
+        kind is not None
+    )
+    assert (f"# Columns that are not used: {header}" in text) == (kind is None)
 
 
 def write_logs(folder: Path) -> list[Path]:
