@@ -168,7 +168,7 @@ def test_a_counter_that_rolls_over(edited: Edit) -> None:
         ('unit = "mV"', 'unit = "V", offset = 1e308', "check its unit, scale and offset"),
         ('column = "time", unit = "ms"', "rate = 5e-324", "last inf s by the rate"),
         # they go down to -2040
-        ("gear_ratio = 2.0", "rolls_over_at = 1024", "counter of 1024 readings: give its own size"),
+        ("gear_ratio = 2.0", "rolls_over_at = 1024", "counter of 1024 readings (give its own size"),
     ],
 )
 def test_what_is_wrong_is_one_sentence(edited: Edit, old: str, new: str, sentence: str) -> None:

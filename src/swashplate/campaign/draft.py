@@ -224,7 +224,7 @@ def _guesses(
         kind = given.get(name, "" if each.kind in taken else each.kind)
         each = each._replace(kind=kind, unit=units.get(name, each.unit))
         if kind == "encoder_counts" or not (kind or each.unit):
-            size = max((rolls_over_at(part, counts_per_turn) or 0 for part in values), default=0)
+            size = max((rolls_over_at(part, counts_per_turn) for part in values), default=0)
             each = each._replace(kind="encoder_counts" if size else kind, rolls_over_at=size)
         if kind == "rectified_current" and name not in given and has_sign(values):
             each = each._replace(kind="signed_current")

@@ -71,6 +71,11 @@ class InputSignal(Result):
     dropped: int = 0
     """Samples left out because they were missing."""
 
+    @property
+    def used(self) -> NDArray[np.bool_]:
+        """(n,) whether a sample counts: all do, as those that are ignored are not here."""
+        return np.ones(self.time.size, np.bool_)
+
     def at(self, time: Array) -> Array:
         """The input at other instants [s]; before the first stamp the first sample holds."""
         if self.interpolation == "linear":
