@@ -80,12 +80,7 @@ class Quality(Result):
 def examine(experiment: Experiment, unsigned: Collection[str] = ()) -> tuple[Quality, ...]:
     """Quality of an experiment's input and channels, in that order.
 
-    Parameters
-    ----------
-    experiment : Experiment
-        A run.
-    unsigned : collection of str
-        Channels whose sign says nothing, see `unsigned_currents`.
+    The sign of `unsigned` channels says nothing, see `unsigned_currents`.
     """
     found, drive = list[Quality](), experiment.input
     signals: dict[str, InputSignal | Channel] = {"input": drive, **experiment.channels}
@@ -122,7 +117,7 @@ def examine(experiment: Experiment, unsigned: Collection[str] = ()) -> tuple[Qua
                     f"goes from {low:g} to {high:g} {signal.unit}, beyond its range of "
                     f"{limits[0]:g} to {limits[1]:g}: check unit, scale and offset"
                 )
-            said += _of_spikes(experiment, signal, spikes(signal, drive))
+            said += _of_spikes(experiment, signal)
         ignored, numbers = float(np.mean(~used)), (stamps, low, high, clipped, lost)
         found.append(Quality(name, signal.kind, signal.unit, *numbers, ignored, tuple(said)))
     return tuple(found)
@@ -147,7 +142,7 @@ def _of_channel(experiment: Experiment, channel: Channel, signed: bool) -> Itera
         return
     if np.ptp(values) == 0.0 and np.ptp(drive.values) > 0.0:
         yield "never changes although the input does: is it connected?"
-    yield from _of_spikes(experiment, channel, spikes(channel, drive))
+    yield from _of_spikes(experiment, channel)
     if channel.kind == "rectified_current" and has_sign([values], NEGATIVE):
         yield "turns negative, so it is not rectified: should it be signed_current?"
     motion, at = values, time
@@ -188,15 +183,8 @@ def has_sign(currents: Sequence[Array], share: float = 0.25) -> bool:
 def unsigned_currents(experiments: Iterable[Experiment]) -> dict[tuple[str, str], str]:
     """Currents that are said to have a sign and have none, with a sentence on each.
 
-    Parameters
-    ----------
-    experiments : iterable of Experiment
-        Runs beside each other: of one alone a current that never turns negative may be right.
-
-    Returns
-    -------
-    dict of (str, str) to str
-        By axis and channel.
+    By axis and channel. Give runs beside each other: of one alone a current that never turns
+    negative may be right.
     """
     currents, lowest = dict[tuple[str, str], list[Array]](), dict[tuple[str, str], float]()
     for each in experiments:
@@ -222,21 +210,10 @@ def unsigned_currents(experiments: Iterable[Experiment]) -> dict[tuple[str, str]
 
 
 def spikes(signal: Channel | InputSignal, drive: InputSignal) -> list[tuple[float, float, float]]:
-    """Single samples, up to five in a row, that no motion explains; an encoder's are lost counts.
+    """Single samples that no motion explains: up to five in a row, of the input itself up to two.
 
-    Parameters
-    ----------
-    signal : Channel or InputSignal
-        Where they are looked for: a channel, or the input itself, of which one or two samples in a
-        row may be a spike.
-    drive : InputSignal
-        The run's input.
-
-    Returns
-    -------
-    list of (float, float, float)
-        Instants before and after each spike, half an interval off [s], and its value farthest from
-        what lasts [unit of the signal].
+    For each the instants before and after it, half an interval off [s], and its value farthest from
+    what lasts [unit of the signal]. An encoder has none; its are lost counts.
 
     Notes
     -----
@@ -272,6 +249,19 @@ def spikes(signal: Channel | InputSignal, drive: InputSignal) -> list[tuple[floa
     ]
 
 
+def _of_spikes(experiment: Experiment, signal: Channel | InputSignal) -> Iterator[str]:
+    """A sentence on a signal's spikes, with the line that leaves them out."""
+    found = spikes(signal, experiment.input)
+    windows = [f'{{ from = {a:.6g}, to = {b:.6g}, why = "spike" }}' for a, b, _ in found]
+    more = f" and {len(found) - NAMED} more like these" if len(found) > NAMED else ""
+    place = f"channels.{signal.name}" if isinstance(signal, Channel) else "input"
+    line = f"axes.{experiment.axis}.{place}.ignore = [{', '.join(windows[:NAMED])}]"
+    if found:
+        largest = f"{max((value for _, _, value in found), key=abs):.4g} {signal.unit}"
+        spike = count(len(found), "spike")
+        yield f"{spike}, up to {largest}{more}: leave out with {line} in this run"
+
+
 def spiked(experiments: Sequence[Experiment]) -> dict[tuple[str, str], tuple[str, bool]]:
     """Channels with spikes, by run and name, and the line that leaves them out.
 
@@ -281,35 +271,19 @@ def spiked(experiments: Sequence[Experiment]) -> dict[tuple[str, str], tuple[str
     said, moves = dict[tuple[str, str], tuple[str, float]](), dict[str, float]()
     for each in experiments:
         for name, channel in each.channels.items():
-            kept, found = channel.used, spikes(channel, each.input)
+            kept, far = channel.used, 0.0
             middle = float(np.median(channel.values[kept])) if kept.any() else 0.0
-            far = max((abs(value - middle) for _, _, value in found), default=0.0)
-            for begin, end, _ in found:
+            for begin, end, value in spikes(channel, each.input):
                 kept &= (channel.time < begin) | (channel.time > end)
+                far = max(far, abs(value - middle))
             if kept.any():
                 moves[name] = max(moves.get(name, 0.0), float(np.ptp(channel.values[kept])))
-            for sentence in _of_spikes(each, channel, found):
+            for sentence in _of_spikes(each, channel) if far else ():
                 said[each.name, name] = f"{each.name}: '{name}' has {sentence}", far
     return {
         (run, name): (sentence, far > GROSS * moves.get(name, 0.0))
         for (run, name), (sentence, far) in said.items()
     }
-
-
-def _of_spikes(
-    experiment: Experiment,
-    signal: Channel | InputSignal,
-    found: Sequence[tuple[float, float, float]],
-) -> Iterator[str]:
-    """A sentence on spikes that were found, with the line that leaves them out."""
-    windows = [f'{{ from = {a:.6g}, to = {b:.6g}, why = "spike" }}' for a, b, _ in found]
-    more = f" and {len(found) - NAMED} more like these" if len(found) > NAMED else ""
-    place = f"channels.{signal.name}" if isinstance(signal, Channel) else "input"
-    line = f"axes.{experiment.axis}.{place}.ignore = [{', '.join(windows[:NAMED])}]"
-    if found:
-        largest = f"{max((value for _, _, value in found), key=abs):.4g} {signal.unit}"
-        spike = count(len(found), "spike")
-        yield f"{spike}, up to {largest}{more}: leave out with {line} in this run"
 
 
 # --- the campaign as a whole ----------------------------------------------------------------------

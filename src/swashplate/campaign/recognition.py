@@ -224,9 +224,8 @@ def _stairs(record: _Record) -> _Found | None:
         beside = min(2, (last - first) // 4)
         first, last = first + beside * (first > 0), last - beside * (last < size)
         held = values[first:last]
-        held = held[
-            np.abs(held - np.median(held[: max(HELD, held.size // 10)])) <= record.tolerance
-        ]
+        usual = np.median(held[: max(HELD, held.size // 10)])
+        held = held[np.abs(held - usual) <= record.tolerance]
         if held.size < (HELD if last < size else 1):
             return None
         level, within[first:last] = float(held.mean()), False
@@ -241,8 +240,7 @@ def _stairs(record: _Record) -> _Found | None:
         shown.append(_rounded(level, max(3.0 * error, 0.002 * record.peak)))
     if not shown:
         return None
-    inside = np.where(within, values, model)
-    leaves = record.leaves(inside, 0)
+    leaves = record.leaves(np.where(within, values, model), 0)
     # a level that is left is the last one, which is no rest
     if leaves < size and (leaves < firsts[-1] + HELD or resting):
         return None

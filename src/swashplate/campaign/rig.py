@@ -24,7 +24,7 @@ from math import isfinite, pi
 from pathlib import Path
 from platform import python_version
 from types import MappingProxyType
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -558,7 +558,10 @@ def _contents(tests: VirtualTests) -> tuple[str, str]:
     from tomlkit import dumps
 
     tools, drop = tests.instruments, {"missing": "drop"} if tests.instruments.empty_cells else {}
-    channels = dict[str, dict[str, object]]()
+    given = {"kind": "voltage", "column": "voltage", "unit": "V", "interpolation": "linear", **drop}
+    axis: dict[str, Any] = {"drive": tests.preset or DRIVE_FILE}
+    axis |= {"time": {"column": "time", "unit": "s"}, "start": "rest", "input": given}
+    channels = axis["channels"] = dict[str, dict[str, object]]()
     for kind in tests.channels:
         column = COLUMNS.get(kind, kind)
         entry = channels[column] = {"kind": kind, "column": column, **drop}
@@ -568,23 +571,11 @@ def _contents(tests: VirtualTests) -> tuple[str, str]:
         entry["counts_per_turn"] = tests.counts_per_turn
         if tools.counter_bits:
             entry["rolls_over_at"] = 2**tools.counter_bits
-    given = {"kind": "voltage", "column": "voltage", "unit": "V", "interpolation": "linear", **drop}
-    axis = {
-        "drive": tests.preset or DRIVE_FILE,
-        "time": {"column": "time", "unit": "s"},
-        "start": "rest",
-        "input": given,
-        "channels": channels,
-    }
-    content = {
-        "title": f"Virtual tests, {tests.axis}",
-        "virtual": True,
-        "axes": {tests.axis: axis},
-        "runs": [{"file": f"{each.stem}.csv", "role": each.role} for each in tests.runs.values()],
-    }
+    runs = [{"file": f"{each.stem}.csv", "role": each.role} for each in tests.runs.values()]
+    content = {"title": f"Virtual tests, {tests.axis}", "virtual": True}
     truth = {"virtual": True, "axis": tests.axis, "drive": DRIVE_FILE}
     truth |= {key: getattr(tests, key) for key in ("severity", "seed", "counts_per_turn")}
     truth |= {"runs": list(tests.runs), "instruments": asdict(tools)}
     versions = {each: version(each) for each in ("numpy", "numba")}
     truth["versions"] = {"swashplate": __version__, "python": python_version(), **versions}
-    return dumps(content), dumps(truth)
+    return dumps(content | {"axes": {tests.axis: axis}, "runs": runs}), dumps(truth)
