@@ -191,9 +191,3 @@ def test_the_campaign_file_itself(tmp_path: Path) -> None:
     for special in (tmp_path / "pipe.toml", Path("/dev/zero")):
         with pytest.raises(FileError, match=f"{special.name} is no ordinary file"):
             Campaign.from_toml(special)
-
-
-def test_a_campaign_file_may_begin_with_a_byte_order_mark(campaign_folder: Path) -> None:
-    path = campaign_folder / "campaign.toml"
-    path.write_bytes(b"\xef\xbb\xbf" + path.read_bytes())
-    assert len(Campaign.from_toml(path)) == 2

@@ -1,7 +1,6 @@
 """Every expected number is the maneuver's own: what was put in has to be found again."""
 
 from collections.abc import Callable
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,7 +11,6 @@ from swashplate import maneuvers
 from swashplate.campaign import Recognised, recognise
 from swashplate.maneuvers import Maneuver
 
-SHARED = Path(__file__).parents[3] / "shared"
 CODE = 20.0 / 4096.0
 SOURCE = [
     (axis, name) for axis in ("hoist", "slew", "luff") for name in maneuvers.source_tests(axis)

@@ -199,8 +199,8 @@ def _by_header(column: Column) -> _Guess:
             return short._replace(unit=ending, in_header=False)
         except InputError:
             pass
-    speed = {"unit": unit} if whole.kind == "shaft_speed" else {}
-    return whole._replace(**speed, in_header=column.unit is not None)
+    unit = unit if whole.kind == "shaft_speed" else column.unit
+    return whole._replace(unit=unit, in_header=column.unit is not None)
 
 
 def _guesses(
@@ -319,11 +319,10 @@ def _signal_lines(each: _Guess, parts: Sequence[Array], counts_per_turn: float |
         lines.append(f"unit = {toml_string(each.unit or usual)}    # {why}")
     if empty := sum(int(np.count_nonzero(~np.isfinite(part))) for part in parts):
         lines.append(f'missing = "drop"    # guessed: {empty} cells are empty')
-    first = next((part[np.isfinite(part)][:1].tolist() for part in parts), [])
-    if first != [0.0] and each.kind == "other":
-        lines += [
-            f"offset = {-scale * x:.9g}    # guessed: the first sample is neutral" for x in first
-        ]
+    neutral = next((x for part in parts for x in part[np.isfinite(part)][:1].tolist()), 0.0)
+    if neutral and each.kind == "other":
+        why = "guessed: the first sample is neutral"
+        lines.append(f"offset = {-scale * neutral:.9g}    # {why}")
     return lines
 
 

@@ -290,7 +290,9 @@ def _within(signal: AnySignal, begin: float, end: float) -> AnySignal:
     kept = (signal.time >= begin) & (signal.time < end)
     if kept.all():
         return signal
-    arrays = {key: each[kept] for key, each in vars(signal).items() if isinstance(each, np.ndarray)}
+    arrays: dict[str, Any] = {
+        key: each[kept] for key, each in vars(signal).items() if isinstance(each, np.ndarray)
+    }
     return replace(signal, **arrays)
 
 

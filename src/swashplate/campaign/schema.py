@@ -136,6 +136,9 @@ class Entry(BaseModel):
 
     model_config = ConfigDict(extra="forbid", frozen=True, populate_by_name=True)
 
+    def __repr__(self) -> str:
+        return short(self)
+
 
 class Window(Entry):
     """A part of a run, on the log's clock after `time.offset`."""
@@ -249,9 +252,6 @@ class Input(Signal):
 class Channel(Signal):
     """A signal that was measured."""
 
-    def __repr__(self) -> str:
-        return short(self)
-
     kind: ChannelKind = Field(description="What it measures.")
     counts_per_turn: Positive | None = Field(
         None, description="Counts for one turn of the encoder's shaft, quadrature included."
@@ -286,9 +286,6 @@ class Channel(Signal):
 
 class Axis(Entry):
     """One drive of the machine: its model, its input and what is measured of it."""
-
-    def __repr__(self) -> str:
-        return short(self)
 
     drive: str | None = Field(
         None, description="A packaged drive, or a parameter file beside this one."
