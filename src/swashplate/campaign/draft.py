@@ -62,11 +62,10 @@ class _Guess(NamedTuple):
 
 
 class _Axis(NamedTuple):
-    """Columns of an axis: what may be its input, the first of which is, and its channels."""
+    """Columns of an axis: what may be its input, the first of which is; channels by their names."""
 
     inputs: list[_Guess]
     channels: dict[str, _Guess]
-    """By their names in the file: the kind, and a number from the second on."""
 
 
 def draft_campaign(
@@ -90,12 +89,9 @@ def draft_campaign(
         A packaged drive or a parameter file for all axes; an axis that is called like a packaged
         drive has that one.
     counts_per_turn : float, optional
-        Of all encoders. Without it the entry is left to be filled in, and the file is refused
-        until it is.
-    columns : mapping of str to str, optional
-        What some columns are, by column: ``"time"`` or a kind such as ``"voltage"``.
-    units : mapping of str to str, optional
-        Units of some columns.
+        Of all encoders. Without it the entry stays open, and the file is refused until it is given.
+    columns, units : mapping of str to str, optional
+        What some columns are, ``"time"`` or a kind such as ``"voltage"``, and their units.
 
     Returns
     -------

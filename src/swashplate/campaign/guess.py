@@ -134,11 +134,8 @@ def _errors(runs: Sequence[_Run], numbers: Array) -> Array:
 def guess_drive(experiments: Sequence[Experiment]) -> Guess:
     """First guess from the runs of one axis, by their commands and their speeds or positions.
 
-    Parameters
-    ----------
-    experiments : sequence of Experiment
-        Runs with a voltage as input and a channel of the kind shaft_speed, position or
-        encoder_counts; what is ignored does not count.
+    Runs need a voltage as input and a channel of the kind shaft_speed, position or encoder_counts;
+    what is ignored does not count.
 
     Raises
     ------
@@ -274,12 +271,7 @@ def _searched(runs: Sequence[_Run], speeds: Array, size: Array, scale: float) ->
 def guessed_set(guess: Guess, source: str) -> ParameterSet:
     """The drive "neutral" with the numbers of a guess.
 
-    Parameters
-    ----------
-    guess : Guess
-        What `guess_drive` found.
-    source : str
-        Where they are from, for the parameter file.
+    The source says in the parameter file where they are from.
 
     Notes
     -----

@@ -32,25 +32,13 @@ LOST_SHARE = 0.01
 """Nor are they worth one until they are more than this share."""
 AT_REST = 0.25
 """An input within this share of its largest excursion may be at rest, or in a dead zone."""
-AGAINST = 0.5
-"""Correlation below minus which one signal goes against another."""
 NEGATIVE = 0.05
 """Share of its peak below zero that is noise of a rectified current; a signed one goes to about
 minus its peak."""
 SURE = 6.0
 """Standard deviations that noise does not reach."""
-SPIKE = 8.0
-"""Median absolute deviations from the running median beyond which a sample may be a spike."""
-SPIKE_SHARE = 0.1
-"""A spike is farther than this share of what lasts from it as well, in range or beyond."""
 NEIGHBOURS = 11
 """Samples of the running median: up to five in a row may be a spike."""
-TAPS = 2
-"""Samples in a row that may be a spike of a command; more may be meant."""
-GROSS = 2.0
-"""Distance from the median, over all that a channel moves, from which a spike is gross. [1]"""
-QUIET = 0.3
-"""So long the input stands still before a spike within the range of what lasts. [s]"""
 NAMED = 6
 """Windows, or maneuvers, that a sentence names."""
 
@@ -162,7 +150,7 @@ def turned(driven: Array, motion: Array) -> bool:
     Their correlation is below -0.5.
     """
     size = float(np.linalg.norm(driven) * np.linalg.norm(motion))
-    return float(driven @ motion) < -AGAINST * size
+    return float(driven @ motion) < -0.5 * size
 
 
 # --- currents with and without a sign -------------------------------------------------------------
@@ -219,7 +207,7 @@ def spikes(signal: Channel | InputSignal, drive: InputSignal) -> list[tuple[floa
     -----
     A sample is one where it lies more than 8 median absolute deviations from the running median of
     11 samples, and beyond all values of that median by a tenth of their range; or, of a channel
-    while the input stands still, by a quarter of the range from the median within it.
+    while the input has stood still for 0.3 s, by a quarter of the range from the median within it.
     """
     from scipy.ndimage import median_filter
 
@@ -229,14 +217,14 @@ def spikes(signal: Channel | InputSignal, drive: InputSignal) -> list[tuple[floa
     lasting = median_filter(values, size=NEIGHBOURS, mode="nearest")
     low, high = float(lasting.min()), float(lasting.max())
     off = np.abs(values - lasting)
-    least = SPIKE * float(np.median(off))
-    room, most = max(SPIKE_SHARE * (high - low), least), TAPS
+    least = 8.0 * float(np.median(off))
+    room, most = max(0.1 * (high - low), least), 2
     found = (values > high + room) | (values < low - room)
     if signal is not drive:
         most = NEIGHBOURS // 2
         within = off > max(0.25 * (high - low), least)
         if within.any():
-            grid = np.linspace(-QUIET, 0.0, 7)[:, None] + time
+            grid = np.linspace(-0.3, 0.0, 7)[:, None] + time
             commands = drive.at(grid.ravel()).reshape(grid.shape)
             found |= within & (np.ptp(commands, axis=0) <= 0.02 * np.ptp(drive.values))
     rows = np.flatnonzero(found & (off > least))
@@ -265,8 +253,8 @@ def _of_spikes(experiment: Experiment, signal: Channel | InputSignal) -> Iterato
 def spiked(experiments: Sequence[Experiment]) -> dict[tuple[str, str], tuple[str, bool]]:
     """Channels with spikes, by run and name, and the line that leaves them out.
 
-    Beside the sentence, whether a spike is gross: farther beyond all that lasts than the channel
-    moves in any run, so that squared errors would be the spike's.
+    Beside the sentence, whether a spike is gross: twice as far from the median as the channel moves
+    in any run, so that squared errors would be the spike's.
     """
     said, moves = dict[tuple[str, str], tuple[str, float]](), dict[str, float]()
     for each in experiments:
@@ -281,7 +269,7 @@ def spiked(experiments: Sequence[Experiment]) -> dict[tuple[str, str], tuple[str
             for sentence in _of_spikes(each, channel) if far else ():
                 said[each.name, name] = f"{each.name}: '{name}' has {sentence}", far
     return {
-        (run, name): (sentence, far > GROSS * moves.get(name, 0.0))
+        (run, name): (sentence, far > 2.0 * moves.get(name, 0.0))
         for (run, name), (sentence, far) in said.items()
     }
 

@@ -7,9 +7,8 @@ virtual. Refinements that a fit is to find, or to miss, are parameters of the si
 >>> from swashplate.campaign import rig
 >>> rig.write(rig.run("hoist", seed=1), "virtual-hoist")
 
-Of a campaign of this kind the instruments are known (a 12-bit command, one true-RMS ammeter around
-both leads, a 100 Hz dither that beats in 512 Hz samples, an encoder); the sizes of their errors are
-assumed, as is usual for such instruments.
+The instruments are those of Kruse's campaign (a 12-bit command, one true-RMS ammeter around both
+leads, a 100 Hz dither that beats in 512 Hz samples, an encoder); the sizes of errors are assumed.
 """
 
 from __future__ import annotations
@@ -49,8 +48,6 @@ FARTHEST = 0.4
 """Of the way to the next grid point a sample strays at most, so that the stamps increase. [1]"""
 FULL_CURRENT = 1.2
 """Current at which the card's pulses would be as long as their period: 24 V on 20 Ω. [A]"""
-TRIES = 100
-"""Draws after which no set of parameters within the rules is expected any more."""
 COUNTS_PER_TURN = {"hoist": 400.0 * 120.0 / 19.0, "luff": 635.0 * 4.0, "slew": 81_000.0 * 7.0}
 """Counts in a turn of the output: 2526.3, 2540 and 567,000 in Kruse's tables."""
 HELD_BACK = {
@@ -155,12 +152,11 @@ SEVERITIES: Mapping[Severity, Instruments] = MappingProxyType({
 # fmt: on
 """Instruments by how bad they are.
 
-clean: none. The log holds the model's own numbers at k/512 s, so that a fit can find the parameters
-to as many digits as it likes. realistic: noise of mean zero and nothing systematic (no zero or gain
-error, no lag; jitter as of a clock in hardware, which never lets a sample beside a step pass the
-card's dead zone), so that a fit of the right model is unbiased and its confidence intervals can be
-compared with the truth. harsh: zero and gain errors, jitter that moves steps by a part of a sample,
-gaps and a counter that rolls over.
+clean: the model's own numbers at k/512 s, in which a fit finds the parameters to any digit.
+realistic: noise of mean zero and nothing systematic, so that a fit of the right model is unbiased
+and its confidence intervals can be compared with the truth; jitter as of a clock in hardware never
+lets a sample beside a step pass the card's dead zone. harsh: zero and gain errors, jitter that
+moves steps by a part of a sample, gaps and a counter that rolls over.
 """
 
 
@@ -174,8 +170,8 @@ class VirtualRun:
     """Of its file: axis and maneuver."""
     role: Literal["fit", "validate"]
     columns: Mapping[str, Array]
-    """What was logged, SI: ``"time"`` [s], ``"voltage"`` [V] and the channels; NaN is an empty
-    cell. Arrays of one length; rows that were lost are missing in all of them."""
+    """What was logged (n,), SI: ``"time"`` [s], ``"voltage"`` [V] and the channels; NaN is an empty
+    cell, rows that were lost are missing in all."""
     truth: Simulation
     """What really happened."""
 
@@ -235,8 +231,7 @@ def run(
     instruments : Instruments, optional
         One's own instead.
     truth : Drive, optional
-        What is simulated instead of `drive`, with refinements for example; the decay of its card
-        takes over within a step.
+        What is simulated instead of `drive`, with refinements for example.
     perturb : float
         Multiply every value of what is simulated by a factor drawn by chance, whose logarithm is
         at most this, 0.5 at most, and has half of it as standard deviation. Zeros, infinite limits
@@ -325,7 +320,7 @@ def _perturbed(drive: Drive, spread: float, seed: int) -> Drive:
         if numbers[column] != 0.0 and isfinite(numbers[column])
     ]
     generator = _stream(seed, "parameters")
-    for _ in range(TRIES):
+    for _ in range(100):
         logarithms = 0.5 * spread * generator.standard_normal(len(columns))
         while (far := np.abs(logarithms) > spread).any():
             logarithms[far] = 0.5 * spread * generator.standard_normal(int(far.sum()))
@@ -336,7 +331,7 @@ def _perturbed(drive: Drive, spread: float, seed: int) -> Drive:
         title = f"{drive.parameters.title}; values within ±{100 * spread:g} % by seed {seed}"
         return drawn.renamed(drive.name, title)
     raise InputError(
-        f"No draw of {TRIES} within ±{100 * spread:g} % keeps the rules of {drive.name}'s "
+        f"No draw of 100 within ±{100 * spread:g} % keeps the rules of {drive.name}'s "
         "parameters; take a smaller spread."
     )
 

@@ -1,9 +1,4 @@
-"""Samples and their time stamps, checked; an encoder's counts; one ammeter around both leads.
-
-Counts have their roll-overs taken out, their staircase filled and their jumps found. The ammeter
-reads the sum of magnitudes: compare it with the same of the simulation, because around the zero
-crossings a sign that is put back is a guess. Never differentiate through it.
-"""
+"""Samples and their time stamps, checked; an encoder's counts; one ammeter around both leads."""
 
 from math import ceil, log2
 from typing import NamedTuple
@@ -266,10 +261,8 @@ def signed_by_command(rectified: Array, command: Array, level: float = 0.0) -> A
     A command no larger than `level` has no sign of its own: the last one it had holds, because the
     current is still on its way to zero; before the first it is positive.
 
-    Notes
-    -----
     The true current passes zero smoothly; this one jumps where the command does, by twice the
-    reading. Its derivative, and that of a cost through it, mean nothing there.
+    reading, where its derivative means nothing. Better compare sums of magnitudes.
     """
     signed = np.abs(command) > level
     last = np.maximum.accumulate(np.where(signed, np.arange(command.size), 0))
