@@ -100,20 +100,15 @@ def test_a_log_without_a_command_leaves_a_line_to_fill_in(tmp_path: Path) -> Non
         draft([], tmp_path)
 
 
-def write_wrapping(folder: Path, name: str) -> list[Path]:
-    """A column of whole numbers that go up to 4095 and begin anew, and one that numbers rows."""
-    rows = [f"{k},{k / 100},{4 if k > 20 else 0},{60 * (k - 20) % 4096},on" for k in range(21, 200)]
-    rows = [f"{k},{k / 100},0,{0},on" for k in range(21)] + rows
-    (folder / "log.csv").write_text("\n".join([f"Nr,time,voltage,{name},state", *rows]), "utf-8")
-    return [folder / "log.csv"]
-
-
 @pytest.mark.parametrize("name", ["Drehgeber", "counts"])
 def test_a_counter_that_begins_anew_is_an_encoder_s(tmp_path: Path, name: str) -> None:
-    text = draft(write_wrapping(tmp_path, name), tmp_path, "hoist", 4096.0)
-    counts = tomllib.loads(text)["axes"]["hoist"]["channels"]["encoder_counts"]
-    assert counts["column"] == name
-    assert (counts["counts_per_turn"], counts["rolls_over_at"]) == (4096, 4096)
-    (line,) = [line for line in text.splitlines() if line.startswith("rolls_over_at")]
-    assert "# guessed" in line
+    """A column of whole numbers that go up to 4095 and begin anew, and one that numbers rows."""
+    counts = [60 * max(k - 20, 0) % 4096 for k in range(200)]
+    rows = [f"{k},{k / 100},{4 if k > 20 else 0},{n},on" for k, n in enumerate(counts)]
+    (tmp_path / "log.csv").write_text("\n".join([f"Nr,time,voltage,{name},state", *rows]), "utf-8")
+    text = draft([tmp_path / "log.csv"], tmp_path, "hoist", 4096.0)
+    found = tomllib.loads(text)["axes"]["hoist"]["channels"]["encoder_counts"]
+    assert found["column"] == name
+    assert (found["counts_per_turn"], found["rolls_over_at"]) == (4096, 4096)
+    assert "rolls_over_at = 4096    # guessed" in text
     assert "# Columns that are not used: Nr, state" in text
