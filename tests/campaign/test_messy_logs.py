@@ -101,11 +101,8 @@ MINUTE, SECOND = 2.0 * np.pi / 60.0, 2.0 * np.pi
 @pytest.mark.parametrize(
     ("header", "factor"),
     [
-        *(
-            (f"n_Trommel [{unit}]", MINUTE)
-            for unit in ("1/min", "min^-1", "min⁻¹", "min-1", "U/min", "Upm", "r/min", "rev/min")
-        ),
-        *((f"n [{unit}]", MINUTE) for unit in ("RPM", "tr/min")),
+        *((f"n_Trommel [{unit}]", MINUTE) for unit in ("1/min", "min^-1", "min⁻¹", "min-1", "Upm")),
+        *((f"n [{unit}]", MINUTE) for unit in ("RPM", "tr/min", "U/min", "r/min", "rev/min")),
         *((f"speed [{unit}]", SECOND) for unit in ("Hz", "1/s", "s^-1", "U/s")),
         ("rpm", MINUTE),
     ],

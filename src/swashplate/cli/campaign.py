@@ -40,7 +40,7 @@ if TYPE_CHECKING:
 
 LEGEND = (
     "jitter and longest gap in ms; clip: % of the samples at the ends of the instrument's range;\n"
-    "stuck: longest standstill of a noisy signal in s; lost: jumps that no motion explains"
+    "lost: jumps that no motion explains"
 )
 Severity = Literal["clean", "realistic", "harsh"]
 CAMPAIGN = Path("campaign.toml")
