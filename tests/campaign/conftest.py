@@ -3,7 +3,6 @@
 from collections.abc import Callable
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 CAMPAIGN = """\
@@ -67,9 +66,3 @@ def edited(campaign_folder: Path) -> Callable[..., Path]:
         return campaign_folder / "campaign.toml"
 
     return edit
-
-
-@pytest.fixture
-def degrees() -> Callable[[float], float]:
-    """From degrees to radians."""
-    return np.radians

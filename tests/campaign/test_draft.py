@@ -7,31 +7,35 @@ import pytest
 
 from swashplate import Campaign, InputError, ParameterError
 from swashplate.campaign import draft_campaign as draft
-from swashplate.campaign.draft import guess
-from swashplate.logs import Column
 
 
 @pytest.mark.parametrize(
-    ("name", "unit", "role", "kind"),
+    ("header", "kind"),
     [
-        ("time", None, "time", None),
-        ("Time [ms]", "ms", "time", None),
-        ("Joystick voltage", None, "input", "voltage"),
-        ("lever [V]", "V", "input", "voltage"),
-        ("Boom Cmd", None, "input", "other"),
-        ("ammeter [mA]", "mA", "channel", "rectified_current"),
-        ("Current", None, "channel", "rectified_current"),
-        ("encoderCounts", None, "channel", "encoder_counts"),
-        ("winch speed [rpm]", "rpm", "channel", "shaft_speed"),
-        ("EXP_PosFb", None, "channel", "position"),
-        ("swash angle", None, "channel", "swash_angle"),
-        ("drum [deg/s]", "deg/s", "channel", "shaft_speed"),
-        ("oil temperature", "degC", "unknown", None),
+        ("Joystick voltage", "voltage"),
+        ("lever [V]", "voltage"),
+        ("Boom Cmd", "other"),
+        ("command_V", "voltage"),
+        ("ammeter [mA]", "rectified_current"),
+        ("Current", "rectified_current"),
+        ("encoderCounts", "encoder_counts"),
+        ("winch speed [rpm]", "shaft_speed"),
+        ("EXP_PosFb", "position"),
+        ("swash angle", "swash_angle"),
+        ("drum [deg/s]", "shaft_speed"),
+        ("oil temperature [degC]", None),
     ],
 )
-def test_what_a_header_says(name: str, unit: str | None, role: str, kind: str | None) -> None:
-    guessed = guess(Column(name, unit))
-    assert (guessed.role, guessed.kind) == (role, kind)
+def test_what_a_header_says(tmp_path: Path, header: str, kind: str | None) -> None:
+    (tmp_path / "log.csv").write_text(f"Time [ms],{header}\n0,0.5\n1,1.5\n2,1.5\n", "utf-8")
+    text = draft([tmp_path / "log.csv"], tmp_path)
+    assert 'time = { column = "Time [ms]" }' in text
+    tables = tomllib.loads(text)["axes"]["drive"]
+    entries = [tables["input"], *tables["channels"].values()]
+    assert [each["kind"] for each in entries if each["column"] == header] == [kind] * (
+        kind is not None
+    )
+    assert (f"# Columns that are not used: {header}" in text) == (kind is None)
 
 
 def write_logs(folder: Path) -> list[Path]:
@@ -97,20 +101,15 @@ def test_a_log_without_a_command_leaves_a_line_to_fill_in(tmp_path: Path) -> Non
         draft([], tmp_path)
 
 
-def write_wrapping(folder: Path, name: str) -> list[Path]:
-    """A column of whole numbers that go up to 4095 and begin anew, and one that numbers rows."""
-    rows = [f"{k},{k / 100},{4 if k > 20 else 0},{60 * (k - 20) % 4096},on" for k in range(21, 200)]
-    rows = [f"{k},{k / 100},0,{0},on" for k in range(21)] + rows
-    (folder / "log.csv").write_text("\n".join([f"Nr,time,voltage,{name},state", *rows]), "utf-8")
-    return [folder / "log.csv"]
-
-
 @pytest.mark.parametrize("name", ["Drehgeber", "counts"])
 def test_a_counter_that_begins_anew_is_an_encoder_s(tmp_path: Path, name: str) -> None:
-    text = draft(write_wrapping(tmp_path, name), tmp_path, "hoist", 4096.0)
-    counts = tomllib.loads(text)["axes"]["hoist"]["channels"]["encoder_counts"]
-    assert counts["column"] == name
-    assert (counts["counts_per_turn"], counts["rolls_over_at"]) == (4096, 4096)
-    (line,) = [line for line in text.splitlines() if line.startswith("rolls_over_at")]
-    assert "# guessed" in line
+    """A column of whole numbers that go up to 4095 and begin anew, and one that numbers rows."""
+    counts = [60 * max(k - 20, 0) % 4096 for k in range(200)]
+    rows = [f"{k},{k / 100},{4 if k > 20 else 0},{n},on" for k, n in enumerate(counts)]
+    (tmp_path / "log.csv").write_text("\n".join([f"Nr,time,voltage,{name},state", *rows]), "utf-8")
+    text = draft([tmp_path / "log.csv"], tmp_path, "hoist", 4096.0)
+    found = tomllib.loads(text)["axes"]["hoist"]["channels"]["encoder_counts"]
+    assert found["column"] == name
+    assert (found["counts_per_turn"], found["rolls_over_at"]) == (4096, 4096)
+    assert "rolls_over_at = 4096    # guessed" in text
     assert "# Columns that are not used: Nr, state" in text

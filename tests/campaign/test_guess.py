@@ -1,6 +1,7 @@
 """First guesses: numbers that made the logs are found again, and a fit begins from them."""
 
 import tomllib
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -139,25 +140,15 @@ def test_a_way_that_was_not_tried_is_the_other_s_and_fixed() -> None:
 
 def test_what_tells_nothing_is_refused() -> None:
     (sine, *_) = runs()
-    turned = Channel(
-        "measured", "shaft_speed", "rad/s", TIME, -sine["measured"].values, np.ones(TIME.size),
-        SOURCE,
-    )  # fmt: skip
-    with pytest.raises(InputError, match="against the command: reverse it with sign = -1"):
-        guess_drive([_with(sine, turned)])
-    other = InputSignal("other", "%", TIME, sine.input.values, "previous", SOURCE)
+    speed = sine["measured"]
+    for changes, said in (
+        ({"values": -speed.values}, "against the command: reverse it with sign = -1"),
+        ({"weight": np.zeros(TIME.size)}, "No run measures a motion"),
+    ):
+        with pytest.raises(InputError, match=said):
+            guess_drive([replace(sine, channels={"measured": replace(speed, **changes)})])
     with pytest.raises(InputError, match="needs a command in V"):
-        guess_drive([_with(sine, sine["measured"], other)])
-    ignored = Channel("measured", "shaft_speed", "rad/s", TIME, TIME, np.zeros(TIME.size), SOURCE)
-    with pytest.raises(InputError, match="No run measures a motion"):
-        guess_drive([_with(sine, ignored)])
-
-
-def _with(run: Experiment, channel: Channel, signal: InputSignal | None = None) -> Experiment:
-    return Experiment(
-        run.name, run.axis, run.run, run.role, run.start, None, signal or run.input,
-        {"measured": channel},
-    )  # fmt: skip
+        guess_drive([replace(sine, input=replace(sine.input, kind="other", unit="%"))])
 
 
 DATA = Path(__file__).parents[3] / "shared" / "data" / "eha"

@@ -1,6 +1,5 @@
 """A campaign file and its logs become experiments in SI."""
 
-import os
 from collections.abc import Callable
 from pathlib import Path
 
@@ -45,16 +44,13 @@ def test_selection_and_drive(campaign_folder: Path) -> None:
         tests["up"]["speed"]
 
 
-def test_the_maneuver_is_recognised_or_stated(campaign_folder: Path, edited: Edit) -> None:
+def test_a_maneuver_is_stated_and_a_drive_lies_beside(edited: Edit, campaign_folder: Path) -> None:
     assert Campaign.from_toml(campaign_folder / "campaign.toml")["up"].maneuver == "step +4 V"
-    path = edited('file = "up.csv"', 'file = "up.csv"\nmaneuver = "harbour lift"')
-    assert Campaign.from_toml(path)["up"].maneuver == "harbour lift"
-
-
-def test_a_drive_from_a_file_beside_the_campaign(edited: Edit, campaign_folder: Path) -> None:
     Drive.preset("slew").to_toml(campaign_folder / "mine.toml")
-    path = edited('drive = "hoist"', 'drive = "mine.toml"')
-    assert Campaign.from_toml(path).drive("winch").name == "slew"
+    edited('file = "up.csv"', 'file = "up.csv"\nmaneuver = "harbour lift"')
+    tests = Campaign.from_toml(edited('drive = "hoist"', 'drive = "mine.toml"'))
+    assert tests["up"].maneuver == "harbour lift"
+    assert tests.drive("winch").name == "slew"
 
 
 def test_an_override_holds_for_its_run_alone(edited: Edit) -> None:
@@ -154,21 +150,11 @@ def test_a_counter_that_rolls_over(edited: Edit) -> None:
         ('unit = "ms"', 'unit = "V"', "does not measure the same as s"),
         ("[[runs]]", "[[runs]", "is not TOML"),
         ('role = "validate"', "axes.winch.channels.count.sign = 1", "changes the channel 'count'"),
-        (
-            'title = "Bench"',
-            f"title = {'[' * 600}{']' * 600}",
-            "nests its tables or lists too deeply",
-        ),
-        ('title = "Bench"', f"{'a.' * 20_000}a = 1", "has a key of more than 40 parts"),
-        ('title = "Bench"', f"title = {'9' * 5000}", "has a number with too many digits"),
-        ('unit = "mV"', 'unit = "V**9**9**9**9"', "has the unreadable unit 'V**9**9**9**9'"),
-        ('unit = "mV"', 'unit = "((9**99)*9)**99*V"', "unreadable unit"),
-        ('unit = "mV"', f'unit = "{"*".join(["V"] * 5000)}"', "unreadable unit 'V*V*V*"),
         ('unit = "mV"', 'unit = "V/0"', "unreadable unit 'V/0'"),
         ('unit = "mV"', 'unit = "V", offset = 1e308', "check its unit, scale and offset"),
         ('column = "time", unit = "ms"', "rate = 5e-324", "last inf s by the rate"),
         # they go down to -2040
-        ("gear_ratio = 2.0", "rolls_over_at = 1024", "counter of 1024 readings: give its own size"),
+        ("gear_ratio = 2.0", "rolls_over_at = 1024", "counter of 1024 readings (give its own size"),
     ],
 )
 def test_what_is_wrong_is_one_sentence(edited: Edit, old: str, new: str, sentence: str) -> None:
@@ -187,13 +173,3 @@ def test_the_campaign_file_itself(tmp_path: Path) -> None:
     (tmp_path / "campaign.toml").write_text("title = 'x'\n", "utf-8")
     with pytest.raises(ParameterError, match="the file needs an entry 'axes'"):
         Campaign.from_toml(tmp_path / "campaign.toml")
-    os.mkfifo(tmp_path / "pipe.toml")
-    for special in (tmp_path / "pipe.toml", Path("/dev/zero")):
-        with pytest.raises(FileError, match=f"{special.name} is no ordinary file"):
-            Campaign.from_toml(special)
-
-
-def test_a_campaign_file_may_begin_with_a_byte_order_mark(campaign_folder: Path) -> None:
-    path = campaign_folder / "campaign.toml"
-    path.write_bytes(b"\xef\xbb\xbf" + path.read_bytes())
-    assert len(Campaign.from_toml(path)) == 2

@@ -67,14 +67,8 @@ def test_windows_with_motion_are_runs_of_their_own(long, tmp_path, layout):
         np.testing.assert_allclose(each.input.values, u[rows].round(4), atol=1e-12)
         np.testing.assert_array_equal(each["speed"].values, n[rows])
         assert each.start == "rest"
-    assert (
-        campaign.experiments[0]
-        .notes[0]
-        .endswith(
-            "of 12000; the log has 2 windows with motion; its 12000 rows are read from "
-            "log.csv.parquet, written beside it"
-        )
-    )
+    said = "of 12000; the log has 2 windows with motion; its 12000 rows are read from "
+    assert campaign[0].notes[0].endswith(f"{said}log.csv.parquet, written beside it")
 
 
 def test_the_table_serves_until_the_log_changes(long, tmp_path):
@@ -89,39 +83,29 @@ def test_the_table_serves_until_the_log_changes(long, tmp_path):
     assert pl.read_parquet_schema(beside).names() == ["0", "1", "2"]  # what is asked for
 
 
-def parquet(path: Path, table: dict[str, np.ndarray]) -> None:
-    pl.DataFrame(table).write_parquet(path)
+def written(path: Path, table: dict[str, np.ndarray]) -> None:
+    """The table as a file of its ending: Parquet, HDF5, TDMS in three segments, or MDF."""
+    if path.suffix == ".parquet":
+        pl.DataFrame(table).write_parquet(path)
+    elif path.suffix == ".h5":
+        with h5py.File(path, "w") as file:
+            for name, column in table.items():
+                file[name] = column
+    elif path.suffix == ".tdms":
+        with TdmsWriter(path) as writer:
+            for part in np.array_split(np.arange(ROWS), 3):
+                channels = [ChannelObject("a", name, each[part]) for name, each in table.items()]
+                writer.write_segment(channels)
+    else:
+        with MDF(version="4.10") as mdf:
+            mdf.append([Signal(table[name], table["time"], name=name) for name in ("u", "n")])
+            mdf.save(path, overwrite=True)
 
 
-def hdf5(path: Path, table: dict[str, np.ndarray]) -> None:
-    with h5py.File(path, "w") as file:
-        for name, column in table.items():
-            file[name] = column
-
-
-def tdms(path: Path, table: dict[str, np.ndarray]) -> None:
-    with TdmsWriter(path) as writer:
-        for part in np.array_split(np.arange(ROWS), 3):
-            writer.write_segment([ChannelObject("a", *each) for each in cut(table, part)])
-
-
-def mdf(path: Path, table: dict[str, np.ndarray]) -> None:
-    signals = [Signal(table[name], table["time"], name=name) for name in ("u", "n")]
-    with MDF(version="4.10") as file:
-        file.append(signals)
-        file.save(path, overwrite=True)
-
-
-def cut(table: dict[str, np.ndarray], part: np.ndarray) -> list[tuple[str, np.ndarray]]:
-    return [(name, column[part]) for name, column in table.items()]
-
-
-@pytest.mark.parametrize(
-    ("write", "suffix"), [(parquet, "parquet"), (hdf5, "h5"), (tdms, "tdms"), (mdf, "mf4")]
-)
-def test_a_span_of_a_log_that_can_be_read_in_parts(long, tmp_path, write, suffix):
+@pytest.mark.parametrize("suffix", ["parquet", "h5", "tdms", "mf4"])
+def test_a_span_of_a_log_that_can_be_read_in_parts(long, tmp_path, suffix):
     time, u, n = signals()
-    write(tmp_path / f"log.{suffix}", {"time": time, "u": u, "n": n})
+    written(tmp_path / f"log.{suffix}", {"time": time, "u": u, "n": n})
     toml = TOML.replace("log.csv", f"log.{suffix}") + "span = { from = 50.0 }\n"
     (found,) = long(toml=toml)
     assert found.name == "log from 58 s"

@@ -122,18 +122,15 @@ def test_windows_that_no_run_takes(edited: Edit, old: str, new: str, said: tuple
 # --- what a campaign lacks to be held against a drive ---------------------------------------------
 
 
-def test_no_channel_measures_the_motion(campaign_folder: Path) -> None:
-    path = campaign_folder / "campaign.toml"
-    head, _, rest = path.read_text("utf-8").partition("[axes.winch.channels.counts]")
-    path.write_text(head + rest[rest.index("[[runs]]") :], "utf-8")
-    (said,) = campaign_findings(Campaign.from_toml(path))
-    assert said.startswith("axis 'winch': no channel measures its motion")
-
-
-def test_a_command_beyond_the_card(edited: Edit) -> None:
+def test_no_channel_measures_the_motion_and_a_command_is_beyond_the_card(edited: Edit) -> None:
     """Written as 4 V, -4 V and meant as three times that."""
     path = edited('unit = "mV" }', 'unit = "mV", scale = 3.0 }')
-    (up,), (down,) = (beyond_the_card(each) for each in Campaign.from_toml(path))
+    head, _, rest = path.read_text("utf-8").partition("[axes.winch.channels.counts]")
+    path.write_text(head + rest[rest.index("[[runs]]") :], "utf-8")
+    tests = Campaign.from_toml(path)
+    (said,) = campaign_findings(tests)
+    assert said.startswith("axis 'winch': no channel measures its motion")
+    (up,), (down,) = (beyond_the_card(each) for each in tests)
     assert "up.csv: column 'joystick': the voltage is 12 V at 0.5 s, but the card takes" in up
     assert "the voltage is -12 V" in down
     assert "[axes.winch.input]" in down

@@ -1,7 +1,6 @@
 """Every expected number is the maneuver's own: what was put in has to be found again."""
 
 from collections.abc import Callable
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -9,10 +8,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from swashplate import maneuvers
-from swashplate.campaign import Recognised, recognise
+from swashplate.campaign import recognise
 from swashplate.maneuvers import Maneuver
 
-SHARED = Path(__file__).parents[3] / "shared"
 CODE = 20.0 / 4096.0
 SOURCE = [
     (axis, name) for axis in ("hoist", "slew", "luff") for name in maneuvers.source_tests(axis)
@@ -126,61 +124,48 @@ def test_what_is_no_maneuver_is_free(name: str) -> None:
     assert found.name == "unnamed motion"
 
 
-amplitudes = st.floats(1.0, 10.0)
-signs = st.sampled_from([-1.0, 1.0])
-noises = st.floats(0.0, 0.01)
-rates = st.sampled_from([512.0, 100.0, 50.0])
-
-
-def numbers(found: Recognised) -> list[float]:
-    """Those of its name."""
-    words = found.name.replace(" V/s", "").replace(" Hz", "").replace(" V", "").split()[1:]
-    return [float(word) for word in words]
-
-
-def seen(run: Maneuver, rate: float, noise: float) -> Recognised:
-    time = grid(run.length, rate)
-    return recognise(time, readback(run(time), noise=noise))
-
-
-@given(amplitudes, signs, st.floats(0.05, 2.0), noises, rates)
-@settings(max_examples=20)
-def test_any_sine(
-    amplitude: float, sign: float, frequency: float, noise: float, rate: float
-) -> None:
-    # a longer return would begin with the slope of the sine and rise far above it
-    settle = 0.4 / frequency
-    length = 1.0 + max(1.2 / frequency, 2.0) + settle
-    run = maneuvers.sine(sign * amplitude, frequency, settle=settle, length=length)
-    found = seen(run, rate, noise)
-    assert found.kind == "sine"
-    # fitted to 0.5 % and rounded by 0.4 % more at most
-    assert numbers(found)[0] == pytest.approx(sign * amplitude, rel=9e-3)
-    assert found.frequency == numbers(found)[1] == pytest.approx(frequency, rel=9e-3)
-
-
-@given(amplitudes, signs, noises, rates, st.floats(0.2, 2.0), st.floats(0.5, 5.0))
-@settings(max_examples=25)
-def test_any_step(
-    amplitude: float, sign: float, noise: float, rate: float, start: float, dwell: float
-) -> None:
-    run = maneuvers.step(sign * amplitude, start=start, stop=start + dwell, length=10.0)
-    found = seen(run, rate, noise)
-    assert found.kind == "step"
-    # the converter's step is 0.5 % of 1 V
-    assert numbers(found) == [pytest.approx(sign * amplitude, rel=9e-3)]
-
-
-@given(st.floats(0.3, 20.0), signs, noises, rates, st.floats(1.0, 9.0))
-@settings(max_examples=20)
-def test_any_ramp(slope: float, sign: float, noise: float, rate: float, limit: float) -> None:
-    """From 0.2 s to a third of a minute long; held for longer than its return lasts."""
-    slope = min(slope, 5.0 * limit)
-    length = limit / slope + 8.0
-    found = seen(maneuvers.ramp(sign * slope, limit=limit, length=length), rate, noise)
-    assert found.kind == "ramp"
+@st.composite
+def shapes(draw: st.DrawFn) -> tuple[Maneuver, str, list[float], float]:
+    """A maneuver, its kind, the numbers of its name, and by how much these may be off."""
+    signed = draw(st.floats(1.0, 10.0)) * draw(st.sampled_from([-1.0, 1.0]))
+    kind = draw(st.sampled_from(["sine", "step", "ramp"]))
+    if kind == "step":
+        start, dwell = draw(st.floats(0.2, 2.0)), draw(st.floats(0.5, 5.0))
+        # the converter's step is 0.5 % of 1 V
+        return (
+            maneuvers.step(signed, start=start, stop=start + dwell, length=10.0),
+            kind,
+            [signed],
+            9e-3,
+        )
+    if kind == "sine":
+        frequency = draw(st.floats(0.05, 2.0))
+        # a longer return would begin with the slope of the sine and rise far above it
+        settle = 0.4 / frequency
+        length = 1.0 + max(1.2 / frequency, 2.0) + settle
+        run = maneuvers.sine(signed, frequency, settle=settle, length=length)
+        # fitted to 0.5 % and rounded by 0.4 % more at most
+        return run, kind, [signed, frequency], 9e-3
+    # from 0.2 s to a third of a minute long; held for longer than its return lasts
+    limit = draw(st.floats(1.0, 9.0))
+    slope = float(np.sign(signed)) * min(draw(st.floats(0.3, 20.0)), 5.0 * limit)
+    run = maneuvers.ramp(slope, limit=limit, length=limit / abs(slope) + 8.0)
     # ten samples of a rise of 1 V leave a share of the noise
-    assert numbers(found) == [pytest.approx(sign * slope, rel=0.02)]
+    return run, kind, [slope], 0.02
+
+
+@given(shapes(), st.floats(0.0, 0.01), st.sampled_from([512.0, 100.0, 50.0]))
+@settings(max_examples=60)
+def test_any_sine_step_or_ramp(
+    shape: tuple[Maneuver, str, list[float], float], noise: float, rate: float
+) -> None:
+    run, kind, numbers, within = shape
+    time = grid(run.length, rate)
+    found = recognise(time, readback(run(time), noise=noise))
+    words = found.name.replace(" V/s", "").replace(" Hz", "").replace(" V", "").split()
+    assert words[0] == found.kind == kind
+    assert [float(word) for word in words[1:]] == pytest.approx(numbers, rel=within)
+    assert found.frequency == (float(words[2]) if kind == "sine" else None)
 
 
 @given(

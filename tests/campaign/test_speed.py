@@ -23,16 +23,10 @@ def position(
     time: np.ndarray, values: np.ndarray, encoder: Encoder | None = None, kind: str = "position"
 ) -> Channel:
     """A channel; of an encoder `values` are counts."""
+    angle = values if encoder is None else values * encoder.angle_per_count
+    counts, source = None if encoder is None else values, Source(Path("log.csv"), "x")
     return Channel(
-        "x",
-        kind,
-        "rad",
-        np.asarray(time),
-        values if encoder is None else values * encoder.angle_per_count,
-        np.ones(values.size),
-        Source(Path("log.csv"), "x"),
-        encoder=encoder,
-        counts=None if encoder is None else values,
+        "x", kind, "rad", time, angle, np.ones(values.size), source, encoder=encoder, counts=counts
     )
 
 

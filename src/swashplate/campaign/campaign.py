@@ -68,37 +68,31 @@ class Campaign(Result):
         InputError
             If a column is missing, a unit wrong or a name taken twice.
         """
-        file = read_campaign_file(path)
-        folder = Path(path).parent if logs is None else Path(logs)
-        experiments, ignored = list[Experiment](), list[str]()
-        names = [run.name or Path(run.file).stem for run in file.runs]
-        for number, (name, run) in enumerate(zip(names, file.runs, strict=True), 1):
-            if names.count(name) > 1:
+        file, folder = read_campaign_file(path), Path(path).parent if logs is None else Path(logs)
+        experiments, ignored, names = list[Experiment](), list[str](), set[str]()
+        for number, run in enumerate(file.runs, 1):
+            name = run.name or Path(run.file).stem
+            if name in names:
                 raise InputError(
                     f"{path}: two runs are called '{name}'; give each a name of its own."
                 )
+            names.add(name)
             if run.role == "ignore":
                 ignored.append(name)
                 continue
-            place = f"{path}: run {number} ({run.file})"
             log = open_log(folder / run.file, options=file.format)
+            place = f"{path}: run {number} ({run.file})"
             experiments += read_run(place, name, run, file.axes, log)
         title = file.title or Path(path).resolve().parent.name
         return cls(Path(path), title, file.virtual, file.axes, tuple(experiments), tuple(ignored))
 
     def table(self) -> Table:
         """Its experiments: axis, role, maneuver, length and channels."""
-        columns = (Head("run"), Head("axis"), Head("role"), Head("maneuver"))
-        made = Table(self.title, (*columns, Head("s", ".4g"), Head("channels", wrap=True)))
+        heads = (*map(Head, ("run", "axis", "role", "maneuver")), Head("s", ".4g"))
+        made = Table(self.title, (*heads, Head("channels", wrap=True)))
         for each in self:
-            made.add(
-                each.name,
-                each.axis,
-                each.role,
-                each.maneuver,
-                each.duration,
-                ", ".join(each.channels),
-            )
+            words = each.name, each.axis, each.role, each.maneuver
+            made.add(*words, each.duration, ", ".join(each.channels))
         return made
 
     def plot(self, **how: Any) -> list[Figure]:
@@ -127,16 +121,15 @@ class Campaign(Result):
         """
         if isinstance(name, int):
             return self.experiments[name]
-        for each in self.experiments:
-            if each.name == name:
-                return each
+        by_name = {each.name: each for each in self}
+        if name in by_name:
+            return by_name[name]
         if any(name == run or name.startswith(f"{run} ") for run in self.ignored):
             raise InputError(f"{self.path}: the run '{name}' has the role 'ignore'.")
-        names = [each.name for each in self.experiments]
-        near = get_close_matches(name, names, 1)
+        near = get_close_matches(name, by_name, 1)
         meant = f" (did you mean {near[0]}?)" if near else ""
-        known = ", ".join(names[:LISTED])
-        more = f" and {len(names) - LISTED} more" if len(names) > LISTED else ""
+        known = ", ".join([*by_name][:LISTED])
+        more = f" and {len(by_name) - LISTED} more" if len(by_name) > LISTED else ""
         raise InputError(f"{self.path} has no run '{name}'{meant}; it has {known}{more}.")
 
     def select(
@@ -151,15 +144,11 @@ class Campaign(Result):
         """
         if axis is not None and axis not in self.axes:
             raise InputError(f"{self.path} has no axis '{axis}'; it has {', '.join(self.axes)}.")
-        if role is not None and role not in get_args(schema.Role):
-            raise InputError(
-                f"There is no role '{role}': runs have {', '.join(get_args(schema.Role))}."
-            )
-        return tuple(
-            each
-            for each in self.experiments
-            if axis in (None, each.axis) and role in (None, each.role)
-        )
+        roles = get_args(schema.Role)
+        if role is not None and role not in roles:
+            raise InputError(f"There is no role '{role}': runs have {', '.join(roles)}.")
+        ours = (each for each in self if axis in (None, each.axis))
+        return tuple(each for each in ours if role in (None, each.role))
 
     def drive(self, axis: str) -> Drive:
         """The drive that an axis names.

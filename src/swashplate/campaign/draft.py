@@ -1,35 +1,30 @@
 """First drafts of a campaign file: what each column of some logs may be, and a file that says so.
 
-What is not known for sure is marked "guessed"; what cannot be told stays open in a line "FIXME".
+A column is what the table of kinds, `swashplate.campaign.schema.KINDS`, says of its name and unit,
+and what its numbers show. What is not known for sure is marked "guessed"; what cannot be told stays
+open in a line "FIXME".
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import NamedTuple, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
 from swashplate.campaign.quality import has_sign
 from swashplate.campaign.reading import read_run
-from swashplate.campaign.recognition import recognise
 from swashplate.campaign.samples import rolls_over_at
-from swashplate.campaign.schema import (
-    CHANNEL_KINDS,
-    KINDS,
-    CampaignFile,
-    conversion,
-)
+from swashplate.campaign.schema import KINDS, CampaignFile, InputKind, conversion
 from swashplate.documents import parse_toml, toml_key, toml_string, validated
 from swashplate.errors import FileError, InputError
 from swashplate.logs import Column, Log, open_log
 from swashplate.units import speed_unit, to_si
 
 Array = NDArray[np.float64]
-Values = Mapping[str, Array]
 
 HEADER = """\
 # A draft, made from the headers of the logs: check each line that says "guessed", and fill in each
@@ -41,95 +36,36 @@ UNUSED = "# Columns that are not used"
 NO_ENCODER = "# No column looks like an encoder's counts"
 FIXME = "FIXME"
 """What the lines hold that say what the draft leaves out or open."""
-
 TIME = r"time|zeit|uhrzeit|stamp|timestamp|time stamp|datetime|date time|clock|t|seconds?|exp time"
-COMMAND = r"cmd|command|duty|setpoint|valve|stick|joystick|stellgröße|stellgroesse|sollwert"
-VOLTAGE = r"volts?|voltage|joystick voltage|u|spannung"
-ROD = r"ms|displacement|stroke|cylinder|rod|extension|hub|weg"
-WORDS = {
-    "encoder_counts": r"counts?|encoder|enc|ticks|pulses",
-    "current_plus": r"current (?:plus|positive|a|up)|(?:i|strom) (?:plus|a)",
-    "current_minus": r"current (?:minus|negative|b|down)|(?:i|strom) (?:minus|b)",
-    "rectified_current": r"currents?|amps?|ammeter|strom|i",
-    "stroker_pressure": r"stroker pressure|delta p|dp|servo pressure",
-    "swash_angle": r"swash angle|swash|alpha",
-    "spool_position": r"spool position|spool",
-    "shaft_speed": r"speed|rpm|omega|velocity|drehzahl|n|n \w+",
-    "position": rf"position|pos|angle|pos fb|{ROD}",
-}
-"""Last words of the names of columns by kinds of channel, the first that fits; and their units."""
-UNITS = {
-    **dict.fromkeys(("A", "mA"), "rectified_current"),
-    **dict.fromkeys(("counts", "count"), "encoder_counts"),
-    **dict.fromkeys(("rad/s", "deg/s", "rpm", "m/s", "mm/s"), "shaft_speed"),
-}
+"""Names of columns of time stamps; those of signals are in `KINDS`."""
+ROD = r"(?:.* )?(?:ms|displacement|stroke|cylinder|rod|extension|hub|weg)"
+"""Names of positions that are a rod's and not a shaft's."""
+INPUTS = get_args(InputKind)
+HALVES = {"current_plus", "current_minus"}
 MANY = 4
 """Runs from which on one is held back for validation."""
 
 
-@dataclass(frozen=True)
-class ColumnGuess:
+class _Guess(NamedTuple):
     """What a column may be."""
 
-    column: Column
-    role: str = "unknown"
-    """``"time"``, ``"input"``, ``"channel"`` or ``"unknown"``."""
-    kind: str | None = None
+    name: str
+    kind: str = ""
+    """``"time"``, a kind of input or of channel, or empty."""
     axis: str = ""
     """What stands before the word in its name, such as the "boom" of "Boom Cmd", or empty."""
-    rod: bool = False
-    """Whether its name is that of a rod's displacement and not of a shaft's angle."""
     unit: str | None = None
-    """From the header, or from the end of its name as in ``time_ms``."""
-    rolls_over_at: int | None = None
-    """Counts after which an encoder's counter begins anew, where its numbers show it."""
-    empty: int = 0
-    """Cells without a number, in all logs."""
+    in_header: bool = True
+    """Whether its unit stands in brackets, or in a row of its own, where it is read from again."""
+    rolls_over_at: int = 0
+    """Counts after which an encoder's counter begins anew; 0 if it does not."""
 
 
-def guess(column: Column) -> ColumnGuess:
-    """What a column's name and unit say."""
-    name = re.sub(r"[\[(].*[\])]", "", column.name).strip()
-    stem, _, ending = name.rpartition("_")
-    if column.unit is None and stem:
-        found = _by_name(column, stem)
-        if found.kind == "other" and ending in ("V", "mV"):
-            found = replace(found, kind="voltage")
-        try:
-            if found.role == "time":
-                to_si(1.0, ending, "s", "")
-            elif found.kind is not None:
-                conversion(found.kind, ending, "")
-            if found.role != "unknown":
-                return replace(found, unit=ending)
-        except InputError:
-            pass
-    found = replace(_by_name(column, name), unit=column.unit)
-    unit = found.unit or ("rpm" if re.search(r"rpm|drehzahl", name.lower()) else None)
-    if found.kind == "shaft_speed":
-        return replace(found, unit=unit)
-    if found.role == "unknown" and unit is not None and speed_unit(unit) in UNITS:
-        return replace(found, role="channel", kind=UNITS[speed_unit(unit)])
-    return found
+class _Axis(NamedTuple):
+    """Columns of an axis: what may be its input, the first of which is; channels by their names."""
 
-
-def _by_name(column: Column, name: str) -> ColumnGuess:
-    name = re.sub(r"(?<=[a-z])(?=[A-Z])|[_./\-\s]+", " ", name).strip().lower()
-
-    def before(words: str) -> str | None:
-        match = re.fullmatch(rf"(?:(.*) )?(?:{words})", name)
-        return (match[1] or "") if match else None
-
-    if re.fullmatch(TIME, name):
-        return ColumnGuess(column, "time")
-    if column.unit in ("V", "mV") or before(VOLTAGE) is not None:
-        return ColumnGuess(column, "input", "voltage", before(f"{VOLTAGE}|{COMMAND}") or "")
-    if (axis := before(COMMAND)) is not None:
-        return ColumnGuess(column, "input", "other", axis)
-    for kind, words in WORDS.items():
-        if (axis := before(words)) is not None:
-            return ColumnGuess(column, "channel", kind, axis, before(ROD) is not None)
-    return ColumnGuess(column)
+    inputs: list[_Guess]
+    channels: dict[str, _Guess]
 
 
 def draft_campaign(
@@ -153,12 +89,9 @@ def draft_campaign(
         A packaged drive or a parameter file for all axes; an axis that is called like a packaged
         drive has that one.
     counts_per_turn : float, optional
-        Of all encoders. Without it the entry is left to be filled in, and the file is refused
-        until it is.
-    columns : mapping of str to str, optional
-        What some columns are, by column: ``"time"`` or a kind such as ``"voltage"``.
-    units : mapping of str to str, optional
-        Units of some columns.
+        Of all encoders. Without it the entry stays open, and the file is refused until it is given.
+    columns, units : mapping of str to str, optional
+        What some columns are, ``"time"`` or a kind such as ``"voltage"``, and their units.
 
     Returns
     -------
@@ -174,41 +107,42 @@ def draft_campaign(
     InputError
         If there is no log, or none has a column that is named.
     """
-    given, units = dict(columns or {}), dict(units or {})
+    given, units, folder = dict(columns or {}), dict(units or {}), Path(folder).resolve()
     opened = [open_log(path) for path in logs]
-    met = {column.name: column for log in reversed(opened) for column in reversed(log.columns)}
-    unmet = sorted({*given, *units} - {*met})
+    headers = dict[str, Column]()
+    for column in (column for log in opened for column in log.columns):
+        headers.setdefault(column.name, column)
     why = "" if logs else "A draft needs at least one log"
+    for name in sorted({*given, *units} - {*headers}):
+        why = why or f"No log has a column '{name}'; there are {', '.join(sorted(headers))}"
     for name, what in given.items():
-        if what != "time" and what not in KINDS:
-            why = why or f"'{name}' cannot be a '{what}': it is time, {', '.join(KINDS)}"
-    if unmet and not why:
-        why = f"No log has a column '{unmet[0]}'; there are {', '.join(sorted(met))}"
+        if what not in ("time", *KINDS):
+            why = f"'{name}' cannot be a '{what}': it is time, {', '.join(KINDS)}"
     if why:
         raise InputError(f"{why}.")
-    values = [_numbers(log, [column.name for column in log.columns]) for log in opened]
-    ordered = {name: met[name] for log in opened for name in (each.name for each in log.columns)}
-    guesses = _refined(ordered, values, counts_per_turn, given, units)
-    axes = _by_axis(guesses.values(), Path(drive).stem if drive is not None else "drive")
-    lines = [HEADER, f"title = {toml_string(Path(folder).resolve().name)}", ""]
-    for name, ours in axes.items():
-        lines += _axis(name, ours, guesses, opened[0], values[0], drive, counts_per_turn)
-    used = [each for ours in axes.values() for each in ours]
-    others = (guesses[each.name] for each in opened[0].columns)
-    left = ", ".join(e.column.name for e in others if e.role != "time" and e not in used)
+    numbers = [_numbers(log, [column.name for column in log.columns]) for log in opened]
+    parts = {name: [each[name] for each in numbers if name in each] for name in headers}
+    guesses = _guesses(headers, parts, counts_per_turn, given, units)
+    axes = _axes(guesses, Path(drive).stem if drive is not None else "drive")
+    lines = [HEADER, f"title = {toml_string(folder.name)}", ""]
+    for name, axis in axes.items():
+        lines += _axis_lines(name, axis, guesses, parts, opened[0], drive, counts_per_turn)
+    used = [each for axis in axes.values() for each in (*axis.inputs, *axis.channels.values())]
+    first = {each.name for each in opened[0].columns} - {each.name for each in used}
+    left = ", ".join(e.name for e in guesses if e.name in first and e.kind != "time")
     if left:
         lines += [f"{UNUSED}: {left}", ""]
     if counts_per_turn is not None and all(each.kind != "encoder_counts" for each in used):
         among = f" among {left}" if left else ""
         lines += [f"{NO_ENCODER}{among}; counts_per_turn = {counts_per_turn:.12g} is left out", ""]
-    text = "\n".join(lines)
-    runs = [
-        _run(log, numbers, guesses, axes, Path(folder), text)
-        for log, numbers in zip(opened, values, strict=True)
-    ]
-    _hold_back(runs)
+    text, runs = "\n".join(lines), list[_Run]()
+    for log, read in zip(opened, numbers, strict=True):
+        rows = max((column.size for column in read.values()), default=0)
+        runs.append(_run(log, rows, axes, folder, text))
+    held_back = _held_back([each for each in runs if each.role == '"fit"'])
     for each in runs:
-        lines += _run_lines(each)
+        role = '"validate"' if each is held_back else each.role
+        lines += ["[[runs]]", f"file = {each.file}", f"role = {role}", *each.more, ""]
     return "\n".join(lines).rstrip() + "\n"
 
 
@@ -217,266 +151,239 @@ def _numbers(log: Log, names: list[str]) -> dict[str, Array]:
     try:
         return log.read(names) if names else {}
     except FileError:
-        if len(names) == 1:
-            return {}
         half = len(names) // 2
-        return {**_numbers(log, names[:half]), **_numbers(log, names[half:])}
+        return {**_numbers(log, names[:half]), **_numbers(log, names[half:])} if half else {}
 
 
-def _refined(
-    columns: Mapping[str, Column],
-    logs: Sequence[Values],
+# --- what the columns are -------------------------------------------------------------------------
+
+
+def _words(name: str) -> str:
+    """A name in lower-case words."""
+    return re.sub(r"(?<=[a-z])(?=[A-Z])|[_./\-\s]+", " ", name).strip().lower()
+
+
+def _by_words(column: Column, name: str, unit: str | None) -> _Guess:
+    """What a name and a unit say: the first kind in the table that has either."""
+    words = _words(name)
+    if re.fullmatch(TIME, words):
+        return _Guess(column.name, "time", "", column.unit)
+    matches = {
+        kind: match
+        for kind, each in KINDS.items()
+        if each.words and (match := re.fullmatch(rf"(?:(.*) )?(?:{each.words})", words))
+    }
+    marked = speed_unit(unit or "")
+    kinds = (kind for kind, each in KINDS.items() if kind in matches or marked in each.marks)
+    axis = next((match[1] for match in matches.values()), "")
+    return _Guess(column.name, next(kinds, ""), axis or "", column.unit)
+
+
+def _by_header(column: Column) -> _Guess:
+    """What a column's header says; its unit may be the end of its name."""
+    name = re.sub(r"[\[(].*[\])]", "", column.name).strip()
+    unit = column.unit or ("rpm" if re.search("rpm|drehzahl", name.lower()) else None)
+    whole = _by_words(column, name, unit)
+    stem, _, ending = name.rpartition("_")
+    short = _by_words(column, stem, None)
+    if short.kind == "other" and ending in ("V", "mV"):
+        short = short._replace(kind="voltage")
+    if column.unit is None and short.kind and whole.kind not in HALVES:
+        try:
+            if short.kind == "time":
+                to_si(1.0, ending, "s", "")
+            else:
+                conversion(short.kind, ending, "")
+            return short._replace(unit=ending, in_header=False)
+        except InputError:
+            pass
+    unit = unit if whole.kind == "shaft_speed" else column.unit
+    return whole._replace(unit=unit, in_header=column.unit is not None)
+
+
+def _guesses(
+    headers: Mapping[str, Column],
+    parts: Mapping[str, list[Array]],
     counts_per_turn: float | None,
     given: Mapping[str, str],
     units: Mapping[str, str],
-) -> dict[str, ColumnGuess]:
-    """Guesses by names and units, and by what the numbers of all logs say.
+) -> list[_Guess]:
+    """Guesses by headers, and by the numbers of all logs.
 
     A column that is said to be time or input takes the place of those that were guessed. A current
-    has a sign if it goes to minus its peak in any log; two of them are plus and minus; whole
-    numbers that begin anew at their end are an encoder's, whatever their name.
+    has a sign if it goes to minus its peak in any log; half a current without the other half is a
+    whole one; whole numbers that begin anew at their end are an encoder's, whatever their name.
     """
-    roles = {what: "time" if what == "time" else "channel" for what in ("time", *CHANNEL_KINDS)}
-    roles |= dict.fromkeys(("voltage", "current", "other"), "input")
-    taken = {roles[what] for what in given.values() if what != "other"} - {"channel"}
-    met: dict[str, ColumnGuess] = {}
-    for name, column in columns.items():
-        each = guess(column)
-        if name in given:
-            kind = None if given[name] == "time" else given[name]
-            each = replace(each, role=roles[given[name]], kind=kind)
-        elif each.role in taken:
-            each = replace(each, role="unknown", kind=None)
-        values = [log[name] for log in logs if log.get(name, np.zeros(0)).size]
-        empty = sum(int(np.count_nonzero(~np.isfinite(part))) for part in values)
-        each = replace(each, unit=units.get(name, each.unit), empty=empty)
-        if each.kind == "encoder_counts" or (each.role == "unknown" and each.unit is None):
-            sizes = [rolls_over_at(part, counts_per_turn) or 0 for part in values]
-            if size := max(sizes, default=0):
-                each = replace(each, role="channel", kind="encoder_counts", rolls_over_at=size)
-        if each.kind == "rectified_current" and name not in given and has_sign(values):
-            each = replace(each, kind="signed_current")
-        met[name] = each
-    for name, each in met.items():
-        twin = met.get(name[:-1] + {"A": "B", "a": "b", "1": "2"}.get(name[-1:], "?"))
-        if name[-2:-1] == "_" and twin is not None and "current" in str(each.kind):
-            met[name] = replace(each, kind="current_plus")
-            met[twin.column.name] = replace(
-                twin, role="channel", kind="current_minus", axis=each.axis, unit=each.unit
-            )
-    if not {"current_plus", "current_minus"} <= {each.kind for each in met.values()}:
-        for name, each in met.items():
-            if each.kind in ("current_plus", "current_minus") and name not in given:
-                met[name] = replace(each, kind="rectified_current", axis="")
+    taken = {"time"} & {*given.values()}
+    taken |= {*INPUTS} if {"voltage", "current"} & {*given.values()} else set()
+    met = list[_Guess]()
+    for name, column in headers.items():
+        each, values = _by_header(column), [part for part in parts[name] if part.size]
+        kind = given.get(name, "" if each.kind in taken else each.kind)
+        each = each._replace(kind=kind, unit=units.get(name, each.unit))
+        if kind == "encoder_counts" or not (kind or each.unit):
+            size = max((rolls_over_at(part, counts_per_turn) for part in values), default=0)
+            each = each._replace(kind="encoder_counts" if size else kind, rolls_over_at=size)
+        if kind == "rectified_current" and name not in given and has_sign(values):
+            each = each._replace(kind="signed_current")
+        met.append(each)
+    kinds = {(each.axis, each.kind) for each in met}
+    for n, each in enumerate(met):
+        alone = each.kind in HALVES and any((each.axis, half) not in kinds for half in HALVES)
+        if alone and each.name not in given:
+            met[n] = each._replace(kind="rectified_current")
     return met
 
 
-def _by_axis(guesses: Iterable[ColumnGuess], plain: str) -> dict[str, list[ColumnGuess]]:
+def _axes(guesses: Sequence[_Guess], plain: str) -> dict[str, _Axis]:
     """Inputs and channels under the axis that their names begin with.
 
     An axis needs an input and a channel; columns without a prefix belong to the only axis.
     """
-    useful = [each for each in guesses if each.role in ("input", "channel")]
-    axes = dict.fromkeys(each.axis for each in useful if each.role == "input")
-    named = {axis: [each for each in useful if each.axis == axis] for axis in axes if axis}
-    named = {axis: ours for axis, ours in named.items() if any(e.role == "channel" for e in ours)}
-    return named if len(named) > 1 else {plain: useful}
+    prefixes = dict.fromkeys(each.axis for each in guesses if each.kind in INPUTS and each.axis)
+    axes = {prefix: _axis([e for e in guesses if e.axis == prefix]) for prefix in prefixes}
+    axes = {prefix: axis for prefix, axis in axes.items() if axis.channels}
+    return axes if len(axes) > 1 else {plain: _axis(guesses)}
 
 
-# --- axes -----------------------------------------------------------------------------------------
-
-
-def _axis(
-    name: str,
-    ours: list[ColumnGuess],
-    guesses: Mapping[str, ColumnGuess],
-    log: Log,
-    values: Values,
-    drive: str | None,
-    counts_per_turn: float | None,
-) -> list[str]:
-    from swashplate.parameters.files import preset_names
-
-    own = ['# drive = "hoist"    # a packaged drive or a parameter file, to be fitted']
-    if drive is not None:
-        own = [f"drive = {toml_string(name if name in preset_names() else drive)}"]
-    time = _time(log, guesses)
-    clock = f"{{ rate = 512 }}    # {FIXME}: no column of time found; samples a second"
-    if time is not None:
-        unit = f', unit = "{time.unit or "s"}"' if time.column.unit is None else ""
-        clock = f"{{ column = {toml_string(time.column.name)}{unit} }}"
-    own += [f"time = {clock}", 'start = "rest"    # at the first sample: rest, steady or estimated']
-    names = ", ".join(repr(each.name) for each in log.columns)
-    left_open = f'column = "{FIXME}"    # which of {names}'
-    drives = [each for each in ours if each.role == "input"]
-    given = [f'kind = "voltage"    # {FIXME}: or current, or other', f"{left_open} commands?"]
-    given = _signal(drives[0], values, None) if drives else given
-    given.append('interpolation = "previous"    # guessed: held between samples; or "linear"')
-    given += [f"# another input? '{each.column.name}'" for each in drives[1:]]
-    kind = f'kind = "shaft_speed"    # {FIXME}: or position, encoder_counts ...'
-    channels = {
-        channel: _signal(each, values, counts_per_turn) for channel, each in _channels(ours).items()
-    } or {"measured": [kind, f"{left_open} was measured?"]}
-    table = f"axes.{toml_key(name)}"
-    lines = [f"[{table}]", *own, "", f"[{table}.input]", *given, ""]
-    for channel, entries in channels.items():
-        lines += [f"[{table}.channels.{toml_key(channel)}]", *entries, ""]
-    return lines
-
-
-def _time(log: Log, guesses: Mapping[str, ColumnGuess]) -> ColumnGuess | None:
-    """The column of a log's time stamps."""
-    found = (guesses[column.name] for column in log.columns)
-    return next((each for each in found if each.role == "time"), None)
-
-
-def _channels(ours: Iterable[ColumnGuess]) -> dict[str, ColumnGuess]:
-    """An axis's channels by their names in the file: the kind, and a number from the second on."""
-    named: dict[str, ColumnGuess] = {}
+def _axis(ours: Sequence[_Guess]) -> _Axis:
+    made = _Axis([each for each in ours if each.kind in INPUTS], {})
     for each in ours:
-        if each.role == "channel":
-            number = 1 + sum(each.kind == other.kind for other in named.values())
-            named[str(each.kind) if number == 1 else f"{each.kind}_{number}"] = each
-    return named
-
-
-def _signal(guessed: ColumnGuess, values: Values, counts_per_turn: float | None) -> list[str]:
-    """Entries of an input or a channel."""
-    column, kind, scale = guessed.column, str(guessed.kind), 1.0
-    percent = kind == "other" and guessed.unit == "%"
-    kind = "voltage" if percent else kind
-    lines = [
-        f'kind = "{kind}"    # guessed: {KINDS[kind].meaning}',
-        f"column = {toml_string(column.name)}",
-    ]
-    if percent:
-        scale = 0.1
-        lines += ['unit = "V"', "scale = 0.1    # guessed: 100 % stand for the 10 V of a card"]
-    elif kind == "encoder_counts":
-        left_open = f"# counts_per_turn = 1000    # {FIXME}: for one turn, quadrature included"
-        known = f"counts_per_turn = {counts_per_turn or 0:.12g}"
-        lines += [
-            left_open if counts_per_turn is None else known,
-            "gear_ratio = 1.0    # turns of the encoder for one turn of the shaft",
-        ]
-        if size := guessed.rolls_over_at:
-            lines.append(f"rolls_over_at = {size}    # guessed: begins anew after {size} counts")
-    elif column.unit is None:
-        unit = "mm" if guessed.rod else next(iter(KINDS[kind].units), "1")
-        why = "from its name" if guessed.unit else "guessed: the header gives none"
-        lines.append(f"unit = {toml_string(guessed.unit or unit)}    # {why}")
-    if guessed.empty:
-        lines.append(f'missing = "drop"    # guessed: {guessed.empty} cells are empty')
-    if guessed.role == "input" and guessed.kind == "other":
-        known_values = values.get(column.name, np.zeros(0))
-        neutral = next(iter(known_values[np.isfinite(known_values)].tolist()), 0.0)
-        if neutral:
-            why = "guessed: the first sample is neutral"
-            lines.append(f"offset = {-scale * neutral:.9g}    # {why}")
-    return lines
-
-
-# --- runs -----------------------------------------------------------------------------------------
-
-
-@dataclass
-class _Draft:
-    """A run's entries, and kind and direction, and the size, of its maneuver."""
-
-    file: str
-    more: list[str]
-    role: str
-    why: str
-    seen: str
-    stratum: str
-    peak: float
-
-
-def _run(
-    log: Log,
-    values: Values,
-    guesses: Mapping[str, ColumnGuess],
-    axes: Mapping[str, list[ColumnGuess]],
-    folder: Path,
-    text: str,
-) -> _Draft:
-    """A run; ignored if the file, whose other lines are the text, could not be read with it."""
-    path, root = log.path.resolve(), folder.resolve()
-    file = (path.relative_to(root) if path.is_relative_to(root) else path).as_posix()
-    names = {column.name for column in log.columns}
-    tested, more = list[str](), list[str]()
-    for axis, ours in axes.items():
-        drives, channels = [each for each in ours if each.role == "input"][:1], _channels(ours)
-        missing = [
-            f"axes.{toml_key(axis)}.channels.{key} = false    # no column "
-            f"{toml_string(each.column.name)}"
-            for key, each in channels.items()
-            if each.column.name not in names
-        ]
-        if all(d.column.name in names for d in drives) and len(missing) < max(len(channels), 1):
-            tested.append(axis)
-            more += missing
-    if tested and len(tested) < len(axes):
-        more.insert(0, f"only = [{', '.join(toml_string(axis) for axis in tested)}]")
-    role, why = ("fit", "") if tested else ("ignore", "it has no input")
-    made = _Draft(file, more, role, why, *_seen(values, _time(log, guesses), axes))
-    if tested and f'column = "{FIXME}"' not in text:
-        one = text.replace("# counts_per_turn = 1000", "counts_per_turn = 1000")
-        one = "\n".join([one, *_run_lines(made)])
-        try:
-            read = validated(parse_toml(one, "the draft"), CampaignFile, "the draft")
-            list(read_run("the draft", "run", read.runs[0], read.axes, log))
-        except (FileError, InputError) as error:
-            made.role, made.why = "ignore", f"{FIXME}: {error}"
+        if each.kind not in ("", "time", *INPUTS):
+            number = 1 + sum(each.kind == other.kind for other in made.channels.values())
+            made.channels[each.kind if number == 1 else f"{each.kind}_{number}"] = each
     return made
 
 
-def _run_lines(run: _Draft) -> list[str]:
-    why = f"    # {run.why}" if run.why else ""
-    file = f"file = {toml_string(run.file)}    # {run.seen}"
-    return ["[[runs]]", file, f'role = "{run.role}"{why}', *run.more, ""]
+# --- what the file says ---------------------------------------------------------------------------
 
 
-def _seen(
-    values: Values, clock: ColumnGuess | None, axes: Mapping[str, list[ColumnGuess]]
-) -> tuple[str, str, float]:
-    """Length, rate and maneuvers of a run for a comment; their kind, direction and size."""
-    time = values.get(clock.column.name) if clock is not None else None
-    if clock is None or time is None or time.size < 2:
-        return f"{len(next(iter(values.values()), []))} samples", "", 0.0
-    seen, strata, peak = [f"{time.size} samples"], list[str](), 0.0
+def _axis_lines(
+    name: str,
+    axis: _Axis,
+    guesses: Sequence[_Guess],
+    parts: Mapping[str, list[Array]],
+    log: Log,
+    drive: str | None,
+    counts_per_turn: float | None,
+) -> list[str]:
+    """Tables of an axis; what the first log does not show stays open."""
+    from swashplate.parameters.files import preset_names
+
+    own = '# drive = "hoist"    # a packaged drive or a parameter file, to be fitted'
+    if drive is not None:
+        own = f"drive = {toml_string(name if name in preset_names() else drive)}"
+    clock = f"{{ rate = 512 }}    # {FIXME}: no column of time found; samples a second"
+    for time in [each for each in guesses if each.kind == "time"][:1]:
+        unit = "" if time.in_header else f', unit = "{time.unit or "s"}"'
+        clock = f"{{ column = {toml_string(time.name)}{unit} }}"
+    start = 'start = "rest"    # at the first sample: rest, steady or estimated'
+    which = f'column = "{FIXME}"    # which of {", ".join(repr(each.name) for each in log.columns)}'
+    kind = f'kind = "voltage"    # {FIXME}: or current, or other'
+    tables = {"input": [kind, f"{which} commands?"]}
+    if not axis.channels:
+        kind = f'kind = "shaft_speed"    # {FIXME}: or position, encoder_counts ...'
+        tables["channels.measured"] = [kind, f"{which} was measured?"]
+    signals = [("input", each) for each in axis.inputs[:1]]
+    signals += [(f"channels.{toml_key(key)}", each) for key, each in axis.channels.items()]
+    for table, each in signals:
+        tables[table] = _signal_lines(each, parts[each.name], counts_per_turn)
+    held = 'interpolation = "previous"    # guessed: held between samples; or "linear"'
+    tables["input"] += [held, *(f"# another input? '{each.name}'" for each in axis.inputs[1:])]
+    lines = [f"[axes.{toml_key(name)}]", own, f"time = {clock}", start, ""]
+    for table, entries in tables.items():
+        lines += [f"[axes.{toml_key(name)}.{table}]", *entries, ""]
+    return lines
+
+
+def _signal_lines(each: _Guess, parts: Sequence[Array], counts_per_turn: float | None) -> list[str]:
+    """Entries of an input or a channel."""
+    percent = each.kind in ("other", "voltage") and each.unit == "%"
+    kind, scale = ("voltage", 0.1) if percent else (each.kind, 1.0)
+    known = KINDS[kind]
+    lines = [f'kind = "{kind}"    # guessed: {known.meaning}', f"column = {toml_string(each.name)}"]
+    if percent:
+        lines += ['unit = "V"', "scale = 0.1    # guessed: 100 % stand for the 10 V of a card"]
+    elif kind == "encoder_counts":
+        unknown = f"# counts_per_turn = 1000    # {FIXME}: for one turn, quadrature included"
+        stated = f"counts_per_turn = {counts_per_turn or 0:.12g}"
+        lines.append(unknown if counts_per_turn is None else stated)
+        lines.append("gear_ratio = 1.0    # turns of the encoder for one turn of the shaft")
+        if size := each.rolls_over_at:
+            lines.append(f"rolls_over_at = {size}    # guessed: begins anew after {size} counts")
+    elif not each.in_header:
+        usual = "mm" if re.fullmatch(ROD, _words(each.name)) else (*known.units, "1")[0]
+        why = "from its name" if each.unit else "guessed: the header gives none"
+        lines.append(f"unit = {toml_string(each.unit or usual)}    # {why}")
+    if empty := sum(int(np.count_nonzero(~np.isfinite(part))) for part in parts):
+        lines.append(f'missing = "drop"    # guessed: {empty} cells are empty')
+    neutral = next((x for part in parts for x in part[np.isfinite(part)][:1].tolist()), 0.0)
+    if neutral and each.kind == "other":
+        why = "guessed: the first sample is neutral"
+        lines.append(f"offset = {-scale * neutral:.9g}    # {why}")
+    return lines
+
+
+class _Run(NamedTuple):
+    """Entries of a run, and for each of its axes kind and direction, and size, of its maneuver."""
+
+    file: str
+    role: str
+    more: list[str]
+    stratum: str = ""
+    peak: float = 0.0
+
+
+def _run(log: Log, rows: int, axes: Mapping[str, _Axis], folder: Path, text: str) -> _Run:
+    """A run, of so many rows; ignored if the file could not be read with it.
+
+    The other lines of the file are the text.
+    """
+    path, names = log.path.resolve(), {column.name for column in log.columns}
+    file = (path.relative_to(folder) if path.is_relative_to(folder) else path).as_posix()
+    tested, more = dict[str, _Axis](), list[str]()
+    for name, axis in axes.items():
+        lacking = {key: e.name for key, e in axis.channels.items() if e.name not in names}
+        if all(e.name in names for e in axis.inputs[:1]) and (
+            not axis.channels or len(lacking) < len(axis.channels)
+        ):
+            tested[name] = axis
+            false = f"axes.{toml_key(name)}.channels.{{}} = false    # no column {{}}"
+            more += [false.format(toml_key(k), toml_string(n)) for k, n in lacking.items()]
+    if tested and len(tested) < len(axes):
+        more.insert(0, f"only = [{', '.join(map(toml_string, tested))}]")
+    made = _Run(f"{toml_string(file)}    # {rows} samples", '"fit"', more)
+    if not tested:
+        return made._replace(role='"ignore"    # it has no input')
+    if f'column = "{FIXME}"' in text:
+        return made
+    whole = text.replace("# counts_per_turn = 1000", "counts_per_turn = 1000")
+    whole = "\n".join([whole, "[[runs]]", f"file = {made.file}", *more])
     try:
-        time = to_si(1.0, clock.unit or "s", "s", "") * (time - time[0])
-    except InputError:
-        return seen[0], "", 0.0
-    if not np.all(np.diff(time) > 0.0):
-        return seen[0], "", 0.0
-    seen.append(f"{np.ptp(time):.4g} s at {1.0 / np.median(np.diff(time)):.4g} Hz")
-    for ours in axes.values():
-        drive = next((each for each in ours if each.role == "input"), None)
-        command = None if drive is None else values.get(drive.column.name)
-        if drive is None or command is None or not np.isfinite(command).all():
-            continue
-        unit, size = drive.unit or "V", 1.0
-        if drive.kind == "voltage":
-            unit, size, _ = conversion("voltage", unit, drive.column.name)
-        found = recognise(time, size * command, unit=unit)
-        seen += [found.name] * (drive.kind == "voltage")
-        away = command - command[0]
+        read = validated(parse_toml(whole, "the draft"), CampaignFile, "the draft")
+        experiments = list(read_run("the draft", "run", read.runs[0], read.axes, log))
+    except (FileError, InputError) as error:
+        return made._replace(role=f'"ignore"    # {FIXME}: {error}')
+    time = experiments[0].input.time
+    file = f"{made.file}, {np.ptp(time):.4g} s at {1.0 / np.median(np.diff(time)):.4g} Hz"
+    stratum, peak, seen = "", 0.0, set[str]()
+    for each in (each for each in experiments if each.axis not in seen):
+        seen.add(each.axis)
+        file += f", {each.maneuver}" if each.input.kind == "voltage" else ""
+        away = each.input.values - each.input.values[0]
         low, high = -float(away.min()), float(away.max())
         both = min(low, high) > 0.25 * max(low, high)
-        strata.append(f"{found.kind} {'both' if both else 'up' if high > low else 'down'}")
+        kind = each.recognised.kind if each.recognised else ""
+        stratum += f"{kind} {'both' if both else 'up' if high > low else 'down'}, "
         peak = max(peak, low, high)
-    return ", ".join(seen), ", ".join(strata), peak
+    return made._replace(file=file, stratum=stratum, peak=peak)
 
 
-def _hold_back(runs: list[_Draft]) -> None:
-    """Hold one run back for validation, of which the others have kind, direction and size."""
-    fitted = [each for each in runs if each.role == "fit"]
-    largest: dict[str, _Draft] = {}
+def _held_back(fitted: Sequence[_Run]) -> _Run | None:
+    """The run to validate with: the others have its kind, its direction and more than its size."""
+    largest = dict[str, _Run]()
     for each in fitted:
         if each.peak > largest.setdefault(each.stratum, each).peak:
             largest[each.stratum] = each
     others = [each for each in fitted if each is not largest[each.stratum]]
-    if len(fitted) >= MANY and others:
-        others[-1].role = "validate"
+    return others[-1] if others and len(fitted) >= MANY else None

@@ -71,6 +71,11 @@ class InputSignal(Result):
     dropped: int = 0
     """Samples left out because they were missing."""
 
+    @property
+    def used(self) -> NDArray[np.bool_]:
+        """(n,) whether a sample counts: all do, as those that are ignored are not here."""
+        return np.ones(self.time.size, np.bool_)
+
     def at(self, time: Array) -> Array:
         """The input at other instants [s]; before the first stamp the first sample holds."""
         if self.interpolation == "linear":
@@ -169,9 +174,9 @@ class Experiment(Tabular):
         for name, each in self._signals():
             weight = each.weight if isinstance(each, Channel) else [None] * each.time.size
             frame = pl.DataFrame({"time": each.time, "value": each.values})
-            words = pl.lit(name).alias("signal"), pl.lit(each.unit).alias("unit")
-            frame = frame.select(words[0], "time", "value", words[1])
-            frames.append(frame.with_columns(pl.Series("weight", weight, pl.Float64)))
+            signal, unit = pl.lit(name).alias("signal"), pl.lit(each.unit).alias("unit")
+            weights = pl.Series("weight", weight, pl.Float64)
+            frames.append(frame.select(signal, "time", "value", unit, weights))
         return pl.concat(frames)
 
     def table(self) -> Table:

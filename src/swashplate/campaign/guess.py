@@ -33,24 +33,18 @@ STEP = 0.005
 """Step of the march. [s]"""
 WINDOW = 0.05
 """Time over which mean speeds are compared, or two samples where these are farther apart. [s]"""
-LAGS = (0.02, 0.06, 0.2, 0.6)
-DELAYS = (0.0, 0.04, 0.12, 0.3)
-DEAD_ZONES = (0.02, 0.1, 0.25)
-"""Where the search begins; dead zones as shares of the largest command each way. [s], [s], [1]"""
 SHORTEST = 0.005
 """Lag below which it is none. [s]"""
-LONGEST_DELAY = 1.0
-"""[s]"""
 FEWEST = 40
 """Mean speeds that tell anything."""
-SEEN = 1.02
-"""A limit without which the squared error grows by less than this is not seen in the logs. [1]"""
-NEXT_TO_NOTHING = 1e-4
-"""Nor is one by less than this share of all that moves. [1]"""
+SEEN, NEXT_TO_NOTHING = 1.02, 1e-4
+"""A limit is not seen in the logs where the squared error without it is less than this much larger,
+nor by less than this share of all that moves. [1]"""
 ONE_WAY = 0.05
 """A way that gets less than this share of the command of the other is not exercised. [1]"""
-ANGLE = 0.2
-"""Angle of the swash plate at the greatest speed that was seen, at most. [rad]"""
+ANGLE, FAR_STOP = 0.2, 0.39
+"""Angle of the swash plate at the greatest speed that was seen, at most, and that of a stop that
+was not seen. [rad]"""
 STEEPEST = 30.0
 """Volts that a radian takes at least, so that at 10 V and at the upper bounds of all gains the
 solenoids do not overpower the feedback spring. [V/rad]"""
@@ -61,8 +55,14 @@ EDGE = 0.01
 small change of a dead zone, as marches go in steps. [1]"""
 NONE = 30.0
 """Logarithm of a limit, over the greatest speed, that is none. [1]"""
-FAR_STOP = 0.39
-"""Stop of the swash plate where none was seen. [rad]"""
+LAGS, DELAYS, DEAD_ZONES = (0.02, 0.06, 0.2, 0.6), (0.0, 0.04, 0.12, 0.3), (0.02, 0.1, 0.25)
+"""Where the search begins; dead zones as shares of the largest command each way. [s], [s], [1]"""
+LOWEST = np.array([0.0, 0.0, -5.0, -5.0, log(0.002), 0.0, -1.5, -1.5, -2.0, -2.0, 0.0, 0.0])
+HIGHEST = np.array([0.95, 0.95, 7.0, 7.0, log(5.0), 1.0, 1.5, 1.5, 6.0, 6.0, 0.5, 0.5])
+TYPICAL = np.array([0.05, 0.05, 0.2, 0.2, 0.3, 0.02, 0.1, 0.1, 0.5, 0.5, 0.02, 0.02])
+"""Of what is searched for: dead zones over the largest command, logarithms of gains and of the lag,
+the delay [s], logarithms of top speeds and accelerations over the greatest speed, and jumps over
+it."""
 
 
 class Guess(NamedTuple):
@@ -135,26 +135,26 @@ class _Run(NamedTuple):
     speeds: Array
     """(m,)"""
 
-    def errors(self, numbers: Array) -> Array:
-        """Simulated less measured mean speeds; numbers (12,) end with lag and delay [s]."""
-        position = np.empty(self.time.size)
-        position[0] = self.start
-        share = float(1.0 - np.exp(-STEP / max(numbers[10], 1e-4)))
-        command = np.interp(self.time - numbers[11], self.time, self.command)
-        edge = EDGE * float(np.abs(self.command).max()) or 1.0
+
+def _errors(runs: Sequence[_Run], numbers: Array) -> Array:
+    """Simulated less measured mean speeds of all runs; numbers (12,) end with lag and delay [s]."""
+    share, errors = float(1.0 - np.exp(-STEP / max(numbers[10], 1e-4))), list[Array]()
+    for run in runs:
+        position = np.empty(run.time.size)
+        position[0] = run.start
+        command = np.interp(run.time - numbers[11], run.time, run.command)
+        edge = EDGE * float(np.abs(run.command).max()) or 1.0
         march_guess(command, STEP, numbers, share, edge, position)
-        there, back = (np.interp(each, self.time, position) for each in (self.ends, self.begins))
-        return np.asarray((there - back) / (self.ends - self.begins) - self.speeds)
+        there, back = (np.interp(each, run.time, position) for each in (run.ends, run.begins))
+        errors.append((there - back) / (run.ends - run.begins) - run.speeds)
+    return np.concatenate(errors)
 
 
 def guess_drive(experiments: Sequence[Experiment]) -> Guess:
     """First guess from the runs of one axis, by their commands and their speeds or positions.
 
-    Parameters
-    ----------
-    experiments : sequence of Experiment
-        Runs with a voltage as input and a channel of the kind shaft_speed, position or
-        encoder_counts; what is ignored does not count.
+    Runs need a voltage as input and a channel of the kind shaft_speed, position or encoder_counts;
+    what is ignored does not count.
 
     Raises
     ------
@@ -166,8 +166,8 @@ def guess_drive(experiments: Sequence[Experiment]) -> Guess:
     kinds: tuple[ChannelKind, ...] = ("shaft_speed", "encoder_counts", "position")
     for each in experiments:
         # the channel that tells how it moves: a speed before a position
-        channels = (channel for kind in kinds for channel in each.of_kind(kind))
-        channel = next((one for one in channels if np.count_nonzero(one.used) > 8), None)
+        moving = (one for kind in kinds for one in each.of_kind(kind) if one.used.sum() > 8)
+        channel = next(moving, None)
         if channel is None:
             continue
         if each.input.kind != "voltage":
@@ -188,24 +188,25 @@ def guess_drive(experiments: Sequence[Experiment]) -> Guess:
             "kind shaft_speed, position or encoder_counts that is not ignored."
         )
     commands = np.concatenate([run.command for run in runs])
-    size = np.array([max(float(commands.max()), 0.0), max(-float(commands.min()), 0.0)])
+    size = np.maximum([commands.max(), -commands.min()], 0.0)
     size[size < ONE_WAY * size.max()] = 0.0
     scale = float(np.quantile(np.abs(speeds), 0.99))
     if not size.max() > 0.0 or scale == 0.0:
         raise InputError("The command or the speed never leaves rest: there is nothing to guess.")
     found = _searched(runs, speeds, size, scale)
-    errors = np.concatenate([run.errors(found) for run in runs])
+    rms = float(np.sqrt(np.mean(_errors(runs, found) ** 2)))
     # numbers of a way that was not tried are the other's
     pairs = found[:10].reshape(5, 2)
     pairs[:, size == 0.0] = pairs[:, size > 0.0][:, :1]
-    dead, gain, top, pull, jump = ((float(plus), float(minus)) for plus, minus in pairs)
+    numbers = [(plus, minus) for plus, minus in [*pairs.tolist(), size.tolist()]]
+    dead_zone, gain, top_speed, acceleration, jump, command = numbers
     return Guess(
-        *(experiments[0].axis, unit, dead, gain, jump, top, pull),
+        *(experiments[0].axis, unit, dead_zone, gain, jump, top_speed, acceleration),
         lag=float(found[10]),
         delay=float(found[11]),
-        command=(float(size[0]), float(size[1])),
+        command=command,
         speed=scale,
-        fit_percent=100.0 * (1.0 - float(np.sqrt(np.mean(errors**2)) / np.std(speeds))),
+        fit_percent=100.0 * (1.0 - rms / float(np.std(speeds))),
     )
 
 
@@ -229,22 +230,11 @@ def _run(experiment: Experiment, channel: Channel) -> _Run:
     return _Run(grid, drive.at(grid), start, edges[:-1][whole], edges[1:][whole], speeds)
 
 
-LOWEST = np.array([0.0, 0.0, -5.0, -5.0, log(0.002), 0.0, -1.5, -1.5, -2.0, -2.0, 0.0, 0.0])
-HIGHEST = np.array([0.95, 0.95, 7.0, 7.0, log(5.0), LONGEST_DELAY, 1.5, 1.5, 6.0, 6.0, 0.5, 0.5])
-TYPICAL = np.array([0.05, 0.05, 0.2, 0.2, 0.3, 0.02, 0.1, 0.1, 0.5, 0.5, 0.02, 0.02])
-"""Of what is searched for: dead zones over the largest command, logarithms of gains and of the lag,
-the delay [s], logarithms of top speeds and accelerations over the greatest speed, and jumps over
-it."""
-
-
 def _searched(runs: Sequence[_Run], speeds: Array, size: Array, scale: float) -> Array:
     """Numbers (12,) of least squares: a grid first, on which gains are linear, then all at once."""
     from scipy.optimize import least_squares
 
     tried, steepness = size > 0.0, scale / size.max()
-
-    def errors(numbers: Array) -> Array:
-        return np.concatenate([run.errors(numbers) for run in runs])
 
     def numbers_of(vector: Array) -> Array:
         """From what is searched for, with or without limits and jumps."""
@@ -258,27 +248,22 @@ def _searched(runs: Sequence[_Run], speeds: Array, size: Array, scale: float) ->
         found = []
         for start in starts:
             low, high, typical = (each[: start.size] for each in (LOWEST, HIGHEST, TYPICAL))
-            found.append(
-                least_squares(
-                    lambda vector: errors(numbers_of(vector)) / scale,
-                    np.clip(start, low + 1e-6, high - 1e-6),
-                    bounds=(low, high),
-                    loss="soft_l1",
-                    f_scale=0.05,
-                    x_scale=typical,
-                    diff_step=1e-3,
-                    max_nfev=60,
-                )
+            solution = least_squares(
+                lambda vector: _errors(runs, numbers_of(vector)) / scale,
+                np.clip(start, low + 1e-6, high - 1e-6),
+                bounds=(low, high),
+                x_scale=typical,
+                **{"loss": "soft_l1", "f_scale": 0.05, "diff_step": 1e-3, "max_nfev": 60},
             )
-        chosen = min(found, key=lambda each: float(each.cost))
-        return float(chosen.cost), chosen.x
+            found.append((float(solution.cost), solution.x))
+        return min(found, key=lambda each: each[0])
 
     candidates: list[tuple[float, Array, Array]] = []
     for lag, delay, share in product(LAGS, DELAYS, DEAD_ZONES):
         numbers = np.array([*(share * size), 0.0, 0.0, *[inf] * 4, 0.0, 0.0, lag, delay])
-        at_rest = errors(numbers)
-        design = [errors(numbers + np.eye(12)[2 + way]) - at_rest for way in np.flatnonzero(tried)]
-        gain, left = np.zeros(2), np.transpose(design)
+        at_rest, unit = _errors(runs, numbers), np.eye(12)
+        ways = [_errors(runs, numbers + unit[2 + way]) for way in np.flatnonzero(tried)]
+        gain, left = np.zeros(2), np.transpose([each - at_rest for each in ways])
         gain[tried] = np.linalg.lstsq(left, speeds, rcond=None)[0]
         cost = float(np.sum((left @ gain[tried] - speeds) ** 2))
         steep = np.log(np.maximum(gain, 1e-3 * steepness) / steepness)
@@ -303,9 +288,8 @@ def _searched(runs: Sequence[_Run], speeds: Array, size: Array, scale: float) ->
         cost, whole = smaller, jumping
     # a limit or a jump that makes no difference was not met
     for index in range(6, 12):
-        without = whole.copy()
-        without[index] = NONE if index < 10 else 0.0
-        rough = errors(numbers_of(without)) / (0.05 * scale)
+        without = np.where(np.arange(12) == index, NONE if index < 10 else 0.0, whole)
+        rough = _errors(runs, numbers_of(without)) / (0.05 * scale)
         loss = 0.05**2 * float(np.sum(np.sqrt(1.0 + rough**2) - 1.0))
         if loss < SEEN * cost + NEXT_TO_NOTHING * float(np.sum((speeds / scale) ** 2)):
             whole = without
@@ -315,12 +299,7 @@ def _searched(runs: Sequence[_Run], speeds: Array, size: Array, scale: float) ->
 def guessed_set(guess: Guess, source: str) -> ParameterSet:
     """The drive "neutral" with the numbers of a guess.
 
-    Parameters
-    ----------
-    guess : Guess
-        What `guess_drive` found.
-    source : str
-        Where they are from, for the parameter file.
+    The source says in the parameter file where they are from.
 
     Notes
     -----
@@ -333,11 +312,10 @@ def guessed_set(guess: Guess, source: str) -> ParameterSet:
     n = base.numbers
     per_angle = max(guess.speed / ANGLE, STEEPEST * max(guess.gain))
     per_ampere = per_angle * n["Z5"] * n["Z19_plus"] / (sqrt(n["Z4"]) * n["Z3"])
-    lag = max(guess.lag, SHORTEST)
     flow = n["Z1"] * sqrt(0.5 * n["Z9"])
-    speed_of_flow = 1.0 / (lag * flow * n["Z3"] * n["Z5"])
+    speed_of_flow = 1.0 / (max(guess.lag, SHORTEST) * flow * n["Z3"] * n["Z5"])
+    pulls = [pull / (per_angle * flow * speed_of_flow) for pull in guess.acceleration]
     stops = [min(top / per_angle, FAR_STOP) for top in guess.top_speed]
-    orifices = [pull / (per_angle * flow * speed_of_flow) for pull in guess.acceleration]
     changed: dict[str, float | tuple[float, float]] = {
         "V_dz": guess.dead_zone,
         "J": (guess.jump[0] / per_ampere, guess.jump[1] / per_ampere),
@@ -346,7 +324,7 @@ def guessed_set(guess: Guess, source: str) -> ParameterSet:
         "Z8": speed_of_flow,
         "Z10": per_angle,
         "Z13": (stops[0], stops[1]),
-        "Z16": (orifices[0], orifices[1]),
+        "Z16": (pulls[0], pulls[1]),
     }
     made = base.replace(changed)
     said = {
@@ -359,20 +337,23 @@ def guessed_set(guess: Guess, source: str) -> ParameterSet:
     return replace(made, name=guess.axis, title=title, parameters=said)
 
 
+CONFIGURATION = """\
+# Read off the logs of the axis '{0}' by `swashplate guess`: what they show is
+# free, within bounds about the first guess; what they do not show stays fixed.
+title = "{0}, guessed"
+
+[[stages]]
+name = "drive"
+part = "chain"
+channels = ["shaft_speed", "position", "encoder_counts"]
+
+[stages.free]
+"""
+
+
 def fit_configuration(guess: Guess, start: ParameterSet | Drive) -> str:
     """Text of a fit configuration that frees what was guessed, with bounds about it."""
-    lines = [
-        f"# Read off the logs of the axis '{guess.axis}' by `swashplate guess`: what they show is",
-        "# free, within bounds about the first guess; what they do not show stays fixed.",
-        f'title = "{guess.axis}, guessed"',
-        "",
-        "[[stages]]",
-        'name = "drive"',
-        'part = "chain"',
-        'channels = ["shaft_speed", "position", "encoder_counts"]',
-        "",
-        "[stages.free]",
-    ]
+    lines = list[str]()
     for side, way in (("plus", 0), ("minus", 1)):
         if not guess.command[way]:
             lines.append(f"# no run goes {side}: its numbers are those of the other way, fixed")
@@ -391,14 +372,15 @@ def fit_configuration(guess: Guess, start: ParameterSet | Drive) -> str:
             lines.append(f"Z13_{side} = {{ relative = [0.7, 1.4], log = true }}    # top speed")
         if isfinite(guess.acceleration[way]):
             lines.append(f"Z16_{side} = {{ relative = [0.3, 3.0], log = true }}    # acceleration")
+    longest = max(2.0 * guess.delay, guess.delay + 0.1)
     lines += [
         "Z8 = { relative = [0.2, 5.0], log = true }    # lag"
         if guess.lag > SHORTEST
         # the acceleration is that of Z8 times Z16: without a lag nothing tells them apart
         else "# the lag is too short to be seen: Z8 stays fixed",
-        f"tau = {{ bounds = [0.0, {max(2.0 * guess.delay, guess.delay + 0.1):.4g}] }}    # delay",
+        f"tau = {{ bounds = [0.0, {longest:.4g}] }}    # delay",
     ]
-    return "\n".join(lines) + "\n"
+    return CONFIGURATION.format(guess.axis) + "\n".join(lines) + "\n"
 
 
 def guess_table(found: Guess) -> Table:

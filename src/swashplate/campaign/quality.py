@@ -1,14 +1,14 @@
 """What measured signals are like, and what someone should look into before a fit.
 
-Rate, jitter, gaps, range, clipping, spikes and lost samples of each run; of a campaign,
-windows that no run takes and currents that have no sign. What is ignored counts for nothing.
+Rate, jitter, gaps, range, clipping, spikes and lost samples of each run; of a campaign, windows
+that no run takes and currents that have no sign. What is ignored counts for nothing.
 """
 
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from math import isnan
+from math import isnan, nan
 from pathlib import Path
 
 import numpy as np
@@ -17,15 +17,11 @@ from numpy.typing import NDArray
 from swashplate.campaign import schema
 from swashplate.campaign.campaign import Campaign, read_campaign_file
 from swashplate.campaign.experiment import Channel, Experiment, InputSignal
-from swashplate.campaign.samples import (
-    StampStatistics,
-    find_lost_counts,
-    stamp_statistics,
-)
+from swashplate.campaign.samples import StampStatistics, find_lost_counts, stamp_statistics
 from swashplate.campaign.schema import applying, inside
 from swashplate.parameters.rules import FULL_VOLTAGE
 from swashplate.results import Result
-from swashplate.tables import Column, Table
+from swashplate.tables import Column, Table, count
 from swashplate.units import display_unit
 
 Array = NDArray[np.float64]
@@ -36,25 +32,13 @@ LOST_SHARE = 0.01
 """Nor are they worth one until they are more than this share."""
 AT_REST = 0.25
 """An input within this share of its largest excursion may be at rest, or in a dead zone."""
-AGAINST = 0.5
-"""Correlation below minus which one signal goes against another."""
 NEGATIVE = 0.05
 """Share of its peak below zero that is noise of a rectified current; a signed one goes to about
 minus its peak."""
 SURE = 6.0
 """Standard deviations that noise does not reach."""
-SPIKE = 8.0
-"""Median absolute deviations from the running median beyond which a sample may be a spike."""
-SPIKE_SHARE = 0.1
-"""A spike is farther than this share of what lasts from it as well, in range or beyond."""
 NEIGHBOURS = 11
 """Samples of the running median: up to five in a row may be a spike."""
-TAPS = 2
-"""Samples in a row that may be a spike of a command; more may be meant."""
-GROSS = 2.0
-"""Distance from the median, over all that a channel moves, from which a spike is gross. [1]"""
-QUIET = 0.3
-"""So long the input stands still before a spike within the range of what lasts. [s]"""
 NAMED = 6
 """Windows, or maneuvers, that a sentence names."""
 
@@ -63,7 +47,6 @@ NAMED = 6
 class Quality(Result):
     """What one signal of one experiment is like; of a channel what is not ignored."""
 
-    experiment: str
     signal: str
     """``"input"`` or the channel's name."""
     kind: str
@@ -76,8 +59,6 @@ class Quality(Result):
     """Share of the samples at the ends of the instrument's range; NaN where no range is known."""
     lost_counts: int | None
     """Jumps that no motion explains, None where it is not an encoder."""
-    dropped: int
-    """Samples left out because they were missing."""
     ignored: float
     """Share of the samples whose weight is 0."""
     findings: tuple[str, ...]
@@ -87,74 +68,54 @@ class Quality(Result):
 def examine(experiment: Experiment, unsigned: Collection[str] = ()) -> tuple[Quality, ...]:
     """Quality of an experiment's input and channels, in that order.
 
-    Parameters
-    ----------
-    experiment : Experiment
-        A run.
-    unsigned : collection of str
-        Channels whose sign says nothing, see `unsigned_currents`.
+    The sign of `unsigned` channels says nothing, see `unsigned_currents`.
     """
-    drive, found = experiment.input, list[Quality]()
+    found, drive = list[Quality](), experiment.input
     signals: dict[str, InputSignal | Channel] = {"input": drive, **experiment.channels}
     for name, signal in signals.items():
-        stamps, lost, limits = stamp_statistics(signal.time), None, signal.limits
-        used, findings = np.ones(signal.time.size, np.bool_), list[str]()
-        # the input's stamps are reported once, with the input
-        if signal is drive or not np.array_equal(signal.time, drive.time):
-            findings += _of_stamps(stamps)
-        if isinstance(signal, Channel):
-            used = signal.used
-            if signal.dropped:
-                many = _counted(signal.dropped, "missing sample is", "missing samples are")
-                findings.append(f"{many} left out")
-        elif limits is None and drive.kind == "voltage":
-            limits = (-FULL_VOLTAGE, FULL_VOLTAGE)
+        stamps, used, limits = stamp_statistics(signal.time), signal.used, signal.limits
+        if signal is drive and drive.kind == "voltage":
+            limits = limits or (-FULL_VOLTAGE, FULL_VOLTAGE)
         values = signal.values[used] if used.any() else signal.values
-        low, high, clipped = float(values.min()), float(values.max()), float("nan")
+        low, high, clipped, lost = float(values.min()), float(values.max()), nan, None
         if limits is not None and used.any():
             clipped = float(np.mean((values <= limits[0]) | (values >= limits[1])))
+        said = list[str]()
+        # the input's stamps are reported once, with the input
+        if signal is drive or not np.array_equal(signal.time, drive.time):
+            said += _of_stamps(stamps)
+        if signal.dropped:
+            said.append(
+                f"{count(signal.dropped, 'missing sample is', 'missing samples are')} left out"
+            )
         if isinstance(signal, Channel):
             if clipped > 0.0:
-                findings.append(
-                    f"{100.0 * clipped:.2g} % of the samples are at the end of its range"
-                )
+                said.append(f"{100.0 * clipped:.2g} % of the samples are at the end of its range")
+            said += _of_channel(experiment, signal, name not in unsigned)
             if signal.counts is not None:
-                rows = signal.time[used], signal.counts[used]
-                lost = int(find_lost_counts(*rows).size) if used.sum() >= 8 else 0
-            findings += _of_channel(experiment, signal, name not in unsigned)
-            if lost:
-                times = "once" if lost == 1 else f"{lost} times"
-                findings.append(f"jumps {times} as no motion does: lost or doubled counts")
+                lost = int(find_lost_counts(signal.time[used], signal.counts[used]).size)
+                if lost:
+                    times = "once" if lost == 1 else f"{lost} times"
+                    said.append(f"jumps {times} as no motion does: lost or doubled counts")
         else:
             if low == high:
-                findings.append("the input never changes: nothing can be identified from this run")
+                said.append("the input never changes: nothing can be identified from this run")
             if limits is not None and (low < limits[0] or high > limits[1]):
-                findings.append(
-                    f"goes from {low:g} to {high:g} {drive.unit}, beyond its range of "
+                said.append(
+                    f"goes from {low:g} to {high:g} {signal.unit}, beyond its range of "
                     f"{limits[0]:g} to {limits[1]:g}: check unit, scale and offset"
                 )
-            findings += _of_spikes(experiment, drive)
-        found.append(
-            Quality(
-                *(experiment.name, name, signal.kind, signal.unit, stamps, low, high, clipped),
-                lost_counts=lost,
-                dropped=signal.dropped,
-                ignored=float(np.mean(~used)),
-                findings=tuple(findings),
-            )
-        )
+            said += _of_spikes(experiment, signal)
+        ignored, numbers = float(np.mean(~used)), (stamps, low, high, clipped, lost)
+        found.append(Quality(name, signal.kind, signal.unit, *numbers, ignored, tuple(said)))
     return tuple(found)
-
-
-def _counted(number: int, one: str, several: str) -> str:
-    return f"{number} {one if number == 1 else several}"
 
 
 def _of_stamps(stamps: StampStatistics) -> Iterator[str]:
     if stamps.longest > LONG_GAP * stamps.period or stamps.missing > LOST_SHARE * stamps.rows:
         yield (
-            f"{_counted(stamps.gaps.size, 'gap', 'gaps')}, the longest {stamps.longest:.3g} s; "
-            f"{_counted(stamps.missing, 'sample is', 'samples are')} missing at the median rate"
+            f"{count(stamps.gaps.size, 'gap')}, the longest {stamps.longest:.3g} s; "
+            f"{count(stamps.missing, 'sample is', 'samples are')} missing at the median rate"
         )
     if stamps.jitter > 0.2 * stamps.period:
         yield (
@@ -176,13 +137,11 @@ def _of_channel(experiment: Experiment, channel: Channel, signed: bool) -> Itera
     if channel.is_position:
         motion, at = np.diff(values) / np.diff(time), 0.5 * (time[1:] + time[:-1])
     directed = ("signed_current", "shaft_speed", "swash_angle", "spool_position")
-    driven = drive.at(at) - drive.values[0]
     directional = signed and (channel.is_position or channel.kind in directed)
-    if directional and turned(driven, motion):
+    if directional and turned(drive.at(at) - drive.values[0], motion):
         yield "moves against the input: should its sign be -1?"
     if outside := int(np.count_nonzero((time < drive.time[0]) | (time > drive.time[-1]))):
-        lie = _counted(outside, "sample lies", "samples lie")
-        yield f"{lie} before or after the input's record"
+        yield f"{count(outside, 'sample lies', 'samples lie')} before or after the input's record"
 
 
 def turned(driven: Array, motion: Array) -> bool:
@@ -191,7 +150,7 @@ def turned(driven: Array, motion: Array) -> bool:
     Their correlation is below -0.5.
     """
     size = float(np.linalg.norm(driven) * np.linalg.norm(motion))
-    return float(driven @ motion) < -AGAINST * size
+    return float(driven @ motion) < -0.5 * size
 
 
 # --- currents with and without a sign -------------------------------------------------------------
@@ -212,33 +171,26 @@ def has_sign(currents: Sequence[Array], share: float = 0.25) -> bool:
 def unsigned_currents(experiments: Iterable[Experiment]) -> dict[tuple[str, str], str]:
     """Currents that are said to have a sign and have none, with a sentence on each.
 
-    Parameters
-    ----------
-    experiments : iterable of Experiment
-        Runs beside each other: of one alone a current that never turns negative may be right.
-
-    Returns
-    -------
-    dict of (str, str) to str
-        By axis and channel.
+    By axis and channel. Give runs beside each other: of one alone a current that never turns
+    negative may be right.
     """
-    met: dict[tuple[str, str], list[tuple[Array, float]]] = {}
+    currents, lowest = dict[tuple[str, str], list[Array]](), dict[tuple[str, str], float]()
     for each in experiments:
         # a log that is cut out of a motion begins away from rest
         rest = each.input.values[0] if each.input.kind == "other" else 0.0
         driven = each.input.values - rest
         down = float(driven.min() / np.abs(driven).max()) if np.any(driven) else 0.0
-        for channel in each.of_kind("signed_current"):
-            if channel.used.any():
-                of_runs = met.setdefault((each.axis, channel.name), [])
-                of_runs.append((channel.values[channel.used], down))
+        for channel in (each for each in each.of_kind("signed_current") if each.used.any()):
+            key = each.axis, channel.name
+            currents.setdefault(key, []).append(channel.values[channel.used])
+            lowest[key] = min(lowest.get(key, 0.0), down)
     return {
         (axis, name): (
             f"'{name}' of the axis '{axis}' never turns negative although the input does: it is "
             f'rectified; write kind = "rectified_current" in [axes.{axis}.channels.{name}]'
         )
-        for (axis, name), runs in met.items()
-        if min(down for _, down in runs) < -AT_REST and not has_sign([values for values, _ in runs])
+        for (axis, name), values in currents.items()
+        if lowest[axis, name] < -AT_REST and not has_sign(values)
     }
 
 
@@ -246,104 +198,80 @@ def unsigned_currents(experiments: Iterable[Experiment]) -> dict[tuple[str, str]
 
 
 def spikes(signal: Channel | InputSignal, drive: InputSignal) -> list[tuple[float, float, float]]:
-    """Single samples, up to five in a row, that no motion explains; an encoder's are lost counts.
+    """Single samples that no motion explains: up to five in a row, of the input itself up to two.
 
-    Parameters
-    ----------
-    signal : Channel or InputSignal
-        Where they are looked for: a channel, or the input itself, of which one or two samples in a
-        row may be a spike.
-    drive : InputSignal
-        The run's input.
-
-    Returns
-    -------
-    list of (float, float, float)
-        Instants before and after each spike, half an interval off [s], and its value farthest from
-        what lasts [unit of the signal].
+    For each the instants before and after it, half an interval off [s], and its value farthest from
+    what lasts [unit of the signal]. An encoder has none; its are lost counts.
 
     Notes
     -----
     A sample is one where it lies more than 8 median absolute deviations from the running median of
     11 samples, and beyond all values of that median by a tenth of their range; or, of a channel
-    while the input stands still, by a quarter of the range from the median within it.
+    while the input has stood still for 0.3 s, by a quarter of the range from the median within it.
     """
     from scipy.ndimage import median_filter
 
-    used = signal.used if isinstance(signal, Channel) else np.ones(signal.time.size, np.bool_)
-    time, values = signal.time[used], signal.values[used]
+    time, values = signal.time[signal.used], signal.values[signal.used]
     if signal.kind in ("encoder_counts", "other") or time.size < 4 * NEIGHBOURS:
         return []
     lasting = median_filter(values, size=NEIGHBOURS, mode="nearest")
     low, high = float(lasting.min()), float(lasting.max())
     off = np.abs(values - lasting)
-    least = SPIKE * float(np.median(off))
-    room, most = max(SPIKE_SHARE * (high - low), least), TAPS
+    least = 8.0 * float(np.median(off))
+    room, most = max(0.1 * (high - low), least), 2
     found = (values > high + room) | (values < low - room)
     if signal is not drive:
         most = NEIGHBOURS // 2
         within = off > max(0.25 * (high - low), least)
         if within.any():
-            grid = np.linspace(-QUIET, 0.0, 7)[:, None] + time
+            grid = np.linspace(-0.3, 0.0, 7)[:, None] + time
             commands = drive.at(grid.ravel()).reshape(grid.shape)
             found |= within & (np.ptp(commands, axis=0) <= 0.02 * np.ptp(drive.values))
     rows = np.flatnonzero(found & (off > least))
     half = 0.5 * float(np.median(np.diff(time)))
     groups = np.split(rows, np.flatnonzero(np.diff(rows) > NEIGHBOURS // 2) + 1)
     return [
-        (
-            float(time[group[0]] - half),
-            float(time[group[-1]] + half),
-            float(values[group[np.argmax(off[group])]]),
-        )
-        for group in groups
-        if group.size and group[-1] - group[0] < most
+        (float(time[g[0]]) - half, float(time[g[-1]]) + half, float(values[g[off[g].argmax()]]))
+        for g in groups
+        if g.size and g[-1] - g[0] < most
     ]
+
+
+def _of_spikes(experiment: Experiment, signal: Channel | InputSignal) -> Iterator[str]:
+    """A sentence on a signal's spikes, with the line that leaves them out."""
+    found = spikes(signal, experiment.input)
+    windows = [f'{{ from = {a:.6g}, to = {b:.6g}, why = "spike" }}' for a, b, _ in found]
+    more = f" and {len(found) - NAMED} more like these" if len(found) > NAMED else ""
+    place = f"channels.{signal.name}" if isinstance(signal, Channel) else "input"
+    line = f"axes.{experiment.axis}.{place}.ignore = [{', '.join(windows[:NAMED])}]"
+    if found:
+        largest = f"{max((value for _, _, value in found), key=abs):.4g} {signal.unit}"
+        spike = count(len(found), "spike")
+        yield f"{spike}, up to {largest}{more}: leave out with {line} in this run"
 
 
 def spiked(experiments: Sequence[Experiment]) -> dict[tuple[str, str], tuple[str, bool]]:
     """Channels with spikes, by run and name, and the line that leaves them out.
 
-    Beside the sentence, whether a spike is gross: farther beyond all that lasts than the channel
-    moves in any run, so that squared errors would be the spike's.
+    Beside the sentence, whether a spike is gross: twice as far from the median as the channel moves
+    in any run, so that squared errors would be the spike's.
     """
     said, moves = dict[tuple[str, str], tuple[str, float]](), dict[str, float]()
     for each in experiments:
         for name, channel in each.channels.items():
-            kept, found = channel.used, spikes(channel, each.input)
-            values = channel.values[kept]
-            for begin, end, _ in found:
+            kept, far = channel.used, 0.0
+            middle = float(np.median(channel.values[kept])) if kept.any() else 0.0
+            for begin, end, value in spikes(channel, each.input):
                 kept &= (channel.time < begin) | (channel.time > end)
+                far = max(far, abs(value - middle))
             if kept.any():
                 moves[name] = max(moves.get(name, 0.0), float(np.ptp(channel.values[kept])))
-            for sentence in _of_spikes(each, channel, found):
-                far = float(np.abs(values - np.median(values)).max())
+            for sentence in _of_spikes(each, channel) if far else ():
                 said[each.name, name] = f"{each.name}: '{name}' has {sentence}", far
     return {
-        (run, name): (sentence, far > GROSS * moves.get(name, 0.0))
+        (run, name): (sentence, far > 2.0 * moves.get(name, 0.0))
         for (run, name), (sentence, far) in said.items()
     }
-
-
-def _of_spikes(
-    experiment: Experiment,
-    signal: Channel | InputSignal,
-    found: Sequence[tuple[float, float, float]] | None = None,
-) -> Iterator[str]:
-    found = spikes(signal, experiment.input) if found is None else found
-    if not found:
-        return
-    windows = ", ".join(
-        f'{{ from = {begin:.6g}, to = {end:.6g}, why = "spike" }}'
-        for begin, end, _ in found[:NAMED]
-    )
-    more = "" if len(found) <= NAMED else f" and {len(found) - NAMED} more like these"
-    largest = max((value for _, _, value in found), key=abs)
-    place = f"channels.{signal.name}" if isinstance(signal, Channel) else "input"
-    yield (
-        f"{_counted(len(found), 'spike', 'spikes')}, up to {largest:.4g} {signal.unit}{more}: "
-        f"leave out with axes.{experiment.axis}.{place}.ignore = [{windows}] in this run"
-    )
 
 
 # --- the campaign as a whole ----------------------------------------------------------------------
@@ -366,16 +294,14 @@ def campaign_findings(campaign: Campaign) -> tuple[str, ...]:
             found += _unused(f"{of}.ignore", channel.ignore, runs, key)
             found += _unused(f"{of}.weights", channel.weights, runs, key)
     for number, run in enumerate(file.runs, 1):
-        if run.role != "ignore":
-            ours = [each for each in campaign if each.run == (run.name or Path(run.file).stem)]
-            for key in ("ignore", "weights"):
-                found += _unused(f"run {number} ({run.file}): {key}", getattr(run, key), ours)
-    axes = dict.fromkeys(each.axis for each in campaign)
+        ours = [each for each in campaign if each.run == (run.name or Path(run.file).stem)]
+        for key in ("ignore", "weights") if run.role != "ignore" else ():
+            found += _unused(f"run {number} ({run.file}): {key}", getattr(run, key), ours)
     moving = {e.axis for e in campaign if e.of_kind("shaft_speed", "position", "encoder_counts")}
     found += [
         f"axis '{axis}': no channel measures its motion; a fit of the pump needs one of the kind "
         "shaft_speed, position or encoder_counts"
-        for axis in axes
+        for axis in dict.fromkeys(each.axis for each in campaign)
         if axis not in moving
     ]
     return (*found, *unsigned_currents(campaign).values())
@@ -403,10 +329,9 @@ def _unused(
 ) -> Iterator[str]:
     """Windows that leave out or weigh no sample of any run: a misspelt maneuver, another clock."""
     for window in windows:
-        held = [each for each in runs if applying((window,), each.maneuver)]
-        signals = (each.channels.items() for each in held)
-        times = [one.time for of in signals for name, one in of if channel in (None, name)]
-        if not held:
+        met = [each for each in runs if applying((window,), each.maneuver)]
+        times = [c.time for each in met for n, c in each.channels.items() if channel in (None, n)]
+        if not met:
             names = list(dict.fromkeys(f"'{each.maneuver}'" for each in runs))
             more = [f"{len(names) - NAMED} others"] if len(names) > NAMED else []
             yield (
@@ -417,36 +342,28 @@ def _unused(
             first, last = (
                 "its end" if each is None else f"{each:g} s" for each in (window.start, window.stop)
             )
-            of = f"any of {len(held)} runs"
-            if len(held) == 1:
-                time = next(iter(held[0].channels.values())).time
-                of = f"{held[0].name}, which goes from {time[0]:.4g} to {time[-1]:.4g} s"
+            of = f"any of {len(met)} runs"
+            if len(met) == 1:
+                time = met[0].input.time
+                of = f"{met[0].name}, which goes from {time[0]:.4g} to {time[-1]:.4g} s"
             yield f"{where}: the window from {first} to {last} holds no sample of {of}"
 
 
 def quality_table(experiment: Experiment, qualities: Sequence[Quality]) -> Table:
     """The signals of one experiment: rate, jitter, gaps, range, clipping and lost counts."""
-    stamps = qualities[0].stamps
     made = Table(
         f"{experiment.name}: {experiment.maneuver}, to {experiment.role}, "
-        f"{experiment.duration:.4g} s, {stamps.rows} samples",
+        f"{experiment.duration:.4g} s, {qualities[0].stamps.rows} samples",
         (
-            Column("run", of="p"),
-            Column("signal", wrap=True),
-            Column("kind", of="p"),
-            Column("samples", ",d", of="p"),
-            Column("Hz", ".4g"),
-            Column("jitter", "s", of="t"),
-            Column("gap", "s"),
-            Column("range"),
-            Column("clip", "s"),
-            Column("lost", "d"),
+            *(Column("run", of="p"), Column("signal", wrap=True), Column("kind", of="p")),
+            *(Column("samples", ",d", of="p"), Column("Hz", ".4g"), Column("jitter", "s", of="t")),
+            *(Column("gap", "s"), Column("range"), Column("clip", "s"), Column("lost", "d")),
             Column("ignored", "s", of="p"),
         ),
     )
     for each in qualities:
-        stamps = each.stamps
-        clipped = "" if isnan(each.clipped) else f"{100.0 * each.clipped:.2g}"
+        stamps, shown = each.stamps, display_unit(each.unit, max(abs(each.low), abs(each.high)))
+        low, high = shown.factor * each.low, shown.factor * each.high
         made.add(
             experiment.name,
             each.signal,
@@ -455,16 +372,10 @@ def quality_table(experiment: Experiment, qualities: Sequence[Quality]) -> Table
             stamps.rate,
             f"{round(1e3 * stamps.jitter, 4):.3g}",
             f"{round(1e3 * stamps.longest, 4):.3g}" if stamps.gaps.size else "-",
-            _range(each),
-            clipped,
+            f"{low:z.4g} to {high:z.4g} {shown.name}".rstrip(),
+            "" if isnan(each.clipped) else f"{100.0 * each.clipped:.2g}",
             each.lost_counts,
             f"{100.0 * each.ignored:.3g} %",
             look=bool(each.findings),
         )
     return made
-
-
-def _range(quality: Quality) -> str:
-    shown = display_unit(quality.unit, max(abs(quality.low), abs(quality.high)))
-    low, high = shown.factor * quality.low, shown.factor * quality.high
-    return f"{low:z.4g} to {high:z.4g} {shown.name}".rstrip()

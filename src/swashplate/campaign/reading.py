@@ -24,6 +24,7 @@ from swashplate.logs import LONG, Column, Log, check_duration, check_stamps, in_
 from swashplate.units import to_si
 
 Array = NDArray[np.float64]
+Axes = Mapping[str, schema.Axis]
 AnySignal = TypeVar("AnySignal", InputSignal, Channel)
 
 SINCE_1970 = 1e8
@@ -32,9 +33,7 @@ LARGEST = 1e30
 """No signal of a machine has so much of any SI unit."""
 
 
-def read_run(
-    place: str, name: str, run: schema.Run, axes: Mapping[str, schema.Axis], log: Log
-) -> Iterator[Experiment]:
+def read_run(place: str, name: str, run: schema.Run, axes: Axes, log: Log) -> Iterator[Experiment]:
     """Experiments of a run: one for each axis that it tests, window of a long log, and split.
 
     Parameters
@@ -54,41 +53,29 @@ def read_run(
         columns = _Columns(part, tested)
         for key, axis in tested.items():
             full = f"{name} {key}" if len(axes) > 1 else name
-            for each in _experiments(full, name, key, run, axis, columns):
-                if cut:
-                    begins = f"{full} from {each.input.time[0]:.6g} s"
-                    each = replace(each, name=begins, notes=(cut, *each.notes))
-                if resumes:
-                    each = replace(each, start="estimated", start_pressure=None)
-                yield each
+            yield from _experiments(full, name, key, run, axis, columns, cut, resumes)
 
 
-def _axes_of(
-    place: str, run: schema.Run, axes: Mapping[str, schema.Axis]
-) -> dict[str, schema.Axis]:
+def _axes_of(place: str, run: schema.Run, axes: Axes) -> dict[str, schema.Axis]:
     """The axes that a run tests, with what differs in it."""
     for name in (*run.only, *run.axes):
         if name not in axes:
             raise InputError(
                 f"{place} names the axis '{name}', but the axes are {', '.join(axes)}."
             )
-    tested = {}
-    for name in run.only or axes:
-        axis, origin = axes[name], f"{place}: axes.{name}"
-        changes = dict(run.axes.get(name, {}))
-        given = changes.get("channels")
+    tested = {name: axes[name] for name in run.only or axes}
+    for name, changes in ((name, run.axes[name]) for name in tested if run.axes.get(name)):
+        axis, origin, given = axes[name], f"{place}: axes.{name}", changes.get("channels")
         for key, change in given.items() if isinstance(given, Mapping) else ():
             if key not in axis.channels and not (isinstance(change, Mapping) and "kind" in change):
                 raise InputError(
                     f"{origin} changes the channel '{key}', but the axis has "
                     f"{', '.join(axis.channels)}; a new channel needs its kind and column."
                 )
-        if changes:
-            content = _merged(axis.model_dump(by_alias=True, exclude_unset=True), changes)
-            if not content["channels"]:
-                raise InputError(f'{origin} has no channel left; say role = "ignore" instead.')
-            axis = validated(content, schema.Axis, origin)
-        tested[name] = axis
+        content = _merged(axis.model_dump(by_alias=True, exclude_unset=True), changes)
+        if not content["channels"]:
+            raise InputError(f'{origin} has no channel left; say role = "ignore" instead.')
+        tested[name] = validated(content, schema.Axis, origin)
     return tested
 
 
@@ -114,12 +101,32 @@ def _merged(content: dict[str, Any], changes: Mapping[str, Any]) -> dict[str, An
 # --- signals in SI --------------------------------------------------------------------------------
 
 
+def _signals(axis: schema.Axis) -> dict[str, schema.Input | schema.Channel]:
+    """An axis's signals, by how sentences call them."""
+    return {"the input": axis.input} | {f"channel '{n}'": c for n, c in axis.channels.items()}
+
+
+def _found(log: Log, axes: Axes, only: schema.Signal | None = None) -> dict[str, Column]:
+    """Columns that some axes need, or one of their signals, by the names they are wanted by."""
+    found = dict[str, Column]()
+    for axis in axes.values():
+        for what, signal in _signals(axis).items():
+            if only not in (None, signal):
+                continue
+            clocks = [clock.column for clock in (signal.time, axis.time) if clock is not None]
+            wanted = [(signal.column, what), *((name, f"the time of {what}") for name in clocks)]
+            for name, why in wanted:
+                try:
+                    found |= {name: log.find(name)} if name is not None else {}
+                except InputError as error:
+                    raise InputError(f"For {why}: {error}") from None
+    return found
+
+
 class _Columns:
     """The columns of a log that some axes need, read together, or those of one signal."""
 
-    def __init__(
-        self, log: Log, axes: Mapping[str, schema.Axis], only: schema.Signal | None = None
-    ) -> None:
+    def __init__(self, log: Log, axes: Axes, only: schema.Signal | None = None) -> None:
         self.log, self.found = log, _found(log, axes, only)
         self.values = log.read(list(self.found))
         first = replace(log, first=0, last=1).read(list(self.found)) if log.first else self.values
@@ -134,9 +141,8 @@ class _Columns:
             return self._stamps[clock, size]
         with np.errstate(over="ignore"):
             if clock.column is None:
-                rate = clock.rate or 1.0
+                rate, source = clock.rate or 1.0, "the rate"
                 time = clock.offset + (self.log.first + np.arange(size)) / rate
-                source = "the rate"
             else:
                 numbers, factor = self.values[clock.column], self._second(clock)
                 source = f"column '{self.found[clock.column].name}'"
@@ -161,27 +167,27 @@ class _Columns:
         """What a signal is made of, in SI, and the size of its unit; empty where all is missing."""
         log, column, numbers = self.log, self.found[signal.column], self.values[signal.column]
         said = f"{log.path}: column '{column.name}' ({what})"
-        time = self.stamps(signal, axis)
+        time, is_input = self.stamps(signal, axis), isinstance(signal, schema.Input)
         if time.size != numbers.size:
             raise FileError(f"{said} has {numbers.size} samples, but its time {time.size}.")
         kept = np.ones(numbers.size, np.bool_) if run.span is None else inside(run.span, time)
-        for window in signal.ignore if isinstance(signal, schema.Input) else ():
+        for window in signal.ignore if is_input else ():
             kept &= ~inside(window, time)
         missing = kept & ~np.isfinite(numbers)
-        if missing.any() and signal.missing == "refuse":
-            rows = np.flatnonzero(missing) + 1 + log.first
+        rows = np.flatnonzero(missing) + 1 + log.first
+        if rows.size and signal.missing == "refuse":
             others = f" and {rows.size - 1} others" if rows.size > 1 else ""
             raise FileError(
                 f"{said} has no finite number in data row {rows[0]}{others}; mend the log, or say "
                 "missing = 'drop' to leave such samples out."
             )
-        if isinstance(signal, schema.Channel) and missing.any() and missing.sum() == kept.sum():
+        if not is_input and rows.size and rows.size == kept.sum():
             return {}, 1.0
         kept &= ~missing
         if (left := np.count_nonzero(kept)) < 2:
             raise FileError(f"{said} has {left} samples that can be used, but needs two at least.")
-        first = schema.KINDS[signal.kind].units[:1] or ("1",)
-        unit = signal.unit or unit_of(column, signal.column, first[0])
+        usual = (*schema.KINDS[signal.kind].units, "1")[0]
+        unit = signal.unit or unit_of(column, signal.column, usual)
         si, factor, zero = conversion(signal.kind, unit, said)
         # an encoder's sign belongs to the scale of its counts, see `Encoder`
         sign = 1 if signal.kind == "encoder_counts" else signal.sign
@@ -192,50 +198,37 @@ class _Columns:
             raise InputError(
                 f"{said} reaches {largest:.3g} {si}; check its unit, scale and offset."
             )
-        low, high = signal.limits or (0.0, 0.0)
         return {
             "kind": signal.kind,
             "unit": si,
             "time": time if kept.all() else np.ascontiguousarray(time[kept]),
             "values": values,
             "source": Source(log.path, column.name),
-            "limits": signal.limits and (factor * low + zero, factor * high + zero),
-            "dropped": int(np.count_nonzero(missing)),
+            "limits": signal.limits and tuple(factor * end + zero for end in signal.limits),
+            "dropped": rows.size,
         }, factor
-
-
-def _found(
-    log: Log, axes: Mapping[str, schema.Axis], only: schema.Signal | None = None
-) -> dict[str, Column]:
-    """Columns that some axes need, or one of their signals, by the names they are wanted by."""
-    found = dict[str, Column]()
-    for axis in axes.values():
-        signals: dict[str, schema.Signal] = {"the input": axis.input}
-        signals |= {f"channel '{name}'": channel for name, channel in axis.channels.items()}
-        for what, signal in signals.items():
-            if only is not None and signal is not only:
-                continue
-            clocks = [clock for clock in (signal.time, axis.time) if clock is not None]
-            stamps = ((clock.column, f"the time of {what}") for clock in clocks)
-            for name, why in ((signal.column, what), *stamps):
-                try:
-                    found |= {name: log.find(name)} if name is not None else {}
-                except InputError as error:
-                    raise InputError(f"For {why}: {error}") from None
-    return found
 
 
 # --- experiments ----------------------------------------------------------------------------------
 
 
 def _experiments(
-    name: str, run_name: str, key: str, run: schema.Run, axis: schema.Axis, columns: _Columns
+    name: str,
+    run_name: str,
+    key: str,
+    run: schema.Run,
+    axis: schema.Axis,
+    columns: _Columns,
+    window: str,
+    resumes: bool,
 ) -> Iterator[Experiment]:
-    """One experiment, or several where a counter's position across a gap is not known."""
-    log, signals, cuts = columns.log, dict[str, Channel](), dict[float, str]()
+    """One experiment, or several where a counter's position across a gap is not known.
+
+    Of a window of a long log, with a note on it; one that resumes begins in the midst of a motion.
+    """
     parts, _ = columns.samples("the input", axis.input, axis, run)
     drive = InputSignal(**parts, interpolation=axis.input.interpolation)
-    notes = list[str]()
+    notes, signals, cuts = [window] if window else [], dict[str, Channel](), dict[float, str]()
     for channel, entry in axis.channels.items():
         parts, factor = columns.samples(f"channel '{channel}'", entry, axis, run)
         if not parts:
@@ -247,9 +240,8 @@ def _experiments(
         if entry.counts_per_turn is not None:
             encoder = Encoder(entry.counts_per_turn, entry.gear_ratio, entry.sign, size)
             counts = values
-        weight = np.ones(time.size)
         signals[channel] = Channel(
-            channel, **parts, weight=weight, noise=noise, encoder=encoder, counts=counts
+            channel, **parts, weight=values, noise=noise, encoder=encoder, counts=counts
         )
         for row in ambiguous_gaps(time, values, size) if size is not None else ():
             cuts[float(time[row])] = (
@@ -258,7 +250,7 @@ def _experiments(
             )
     if not signals:
         raise InputError(
-            f"{log.path}: its channels have 0 samples that can be used; leave the run out "
+            f"{columns.log.path}: its channels have 0 samples that can be used; leave the run out "
             'with role = "ignore".'
         )
     unit = {"voltage": "V", "current": "A"}.get(drive.kind, drive.unit)
@@ -268,19 +260,19 @@ def _experiments(
         kept = {each: read for each, read in kept.items() if read.time.size > 1}
         if given.time.size < 2 or not kept:
             continue
-        said = list(notes) if part == 0 else []
+        said = list(notes) if part == 0 else [window] * bool(window)
         if np.isfinite(end):
             said.append(f"split at {end:.4g} s, from where it is a run of its own: {cuts[end]}")
         recognised = recognise(given.time, given.values, unit=unit)
         maneuver = run.maneuver or recognised.name
         ignored = applying((*axis.ignore, *run.ignore), maneuver)
         yield Experiment(
-            f"{name} from {given.time[0]:.6g} s" if part else name,
+            f"{name} from {given.time[0]:.6g} s" if part or window else name,
             key,
             run_name,
             run.role,
-            "estimated" if part else run.start or axis.start,
-            None if part else run.start_pressure,
+            "estimated" if part or resumes else run.start or axis.start,
+            None if part or resumes else run.start_pressure,
             given,
             {
                 each: _finished(axis.channels[each], read, given, maneuver, ignored, run)
@@ -315,11 +307,11 @@ def _finished(
     """A channel whose counts are unwrapped, with the product of all factors that apply."""
     encoder, counts, values = read.encoder, read.counts, read.values
     if encoder is not None and counts is not None:
-        if encoder.rolls_over_at is not None:
-            try:
-                counts = unwrap_counts(counts, encoder.rolls_over_at)
-            except InputError as error:
-                raise InputError(f"{read.source}: {error}") from None
+        try:
+            size = encoder.rolls_over_at
+            counts = counts if size is None else unwrap_counts(counts, size)
+        except InputError as error:
+            raise InputError(f"{read.source}: {error}") from None
         values = counts * encoder.angle_per_count
     weight = np.full(read.time.shape, run.weight * entry.weight)
     if entry.weight_by_input:
@@ -349,9 +341,7 @@ PIECE = 60_000
 """A longer motion is cut into pieces of so many rows, of which the later ones begin in motion."""
 
 
-def _windows(
-    axes: Mapping[str, schema.Axis], log: Log, span: schema.Window | None
-) -> Iterator[tuple[Log, str, bool]]:
+def _windows(axes: Axes, log: Log, span: schema.Window | None) -> Iterator[tuple[Log, str, bool]]:
     """The log itself or, of one of more rows than `LONG`, its windows in which an input moves.
 
     Within the span of the run, if it has one. The log is looked through once, block after block,

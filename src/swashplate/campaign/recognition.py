@@ -18,11 +18,11 @@ from swashplate.campaign.samples import increasing, signal
 from swashplate.maneuvers.pieces import row
 
 Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
 Kind = Literal["rest", "step", "stairs", "ramp", "sine", "unnamed"]
 
 UNNAMED = "unnamed motion"
 """What a record is called that is none of the maneuvers: a joystick, a chirp, several in a row."""
-
 SURE = 6.0
 """Standard deviations that noise exceeds by chance less than once in a hundred million samples."""
 SMALLEST_VOLTS = 0.1
@@ -31,22 +31,8 @@ LARGEST_ZERO = 0.5
 """Reading at rest beyond which it is no zero error of an instrument. [V]"""
 SHORTEST = 16
 """Samples below which nothing is told apart."""
-JUMP_SAMPLES, JUMP_SECONDS = 3, 0.03
-"""A jump takes so many samples or seconds at most, whichever is more."""
-SMALLEST_JUMP = 0.05
-"""Smallest jump, as a share of the largest level. [1]"""
-MOST_JUMPS = 200
-"""A record with more jumps is not looked at as stairs."""
 HELD = 5
 """Samples for which a level is held at least, or that a rise has between 10 % and 80 % of it."""
-SHORTEST_HOLD = 0.25
-"""For so long a ramp stays at its limit; a shorter stay is the crest of its return. [s]"""
-BAND = 0.3
-"""A sine's crossing is a change between +BAND and -BAND of the peak. [1]"""
-EVEN = 0.15
-"""How much half a period may differ from the median half period. [1]"""
-COARSEST = 6.0
-"""Samples in a period of a sine, at least."""
 
 
 class Recognised(NamedTuple):
@@ -65,6 +51,41 @@ class Recognised(NamedTuple):
     def kind(self) -> Kind:
         """The first word of its name."""
         return cast("Kind", self.name.split()[0])
+
+
+class _Record(NamedTuple):
+    """A record about its rest."""
+
+    time: Array
+    values: Array
+    unit: str
+    noise: float
+    """Standard deviation from sample to sample. [unit]"""
+    tolerance: float
+    """Deviation of a single sample that noise does not explain. [unit]"""
+    peak: float
+    jump: int
+    """Samples that a jump may take."""
+
+    def leaves(self, model: Array, first: int) -> int:
+        """The first sample from `first` on that is off a model, or the end of the record."""
+        off = np.abs(self.values[first:] - model[first:]) > self.tolerance
+        return first + (int(off.argmax()) if off.any() else off.size)
+
+
+class _Found(NamedTuple):
+    """A maneuver that a record may be."""
+
+    name: str
+    model: Array
+    """Its curve, up to the sample at which the return to rest begins. [unit]"""
+    leaves: int
+    """That sample."""
+    began: float
+    """[s]"""
+    jumps: Mask | None = None
+    """Samples within jumps, where nothing is known."""
+    frequency: float | None = None
 
 
 def recognise(time: ArrayLike, voltage: ArrayLike, *, unit: str = "V") -> Recognised:
@@ -99,29 +120,27 @@ def recognise(time: ArrayLike, voltage: ArrayLike, *, unit: str = "V") -> Recogn
     """
     stamps = increasing(time) if np.size(time) > 1 else row("time", time)
     values = signal("input", voltage, stamps.size)
-    noise = _noise(stamps, values)
+    noise, volts = _noise(stamps, values), unit == "V"
     # at rest: the mean of what the record begins with, as long as it stays there
     zero, count = float(np.median(values[:3])), 3
     for _ in range(2):
         away = np.abs(values - zero) > SURE * noise + 1e-12 * abs(zero)
         # the second half may hold the beginning of a slow ramp
-        count = max(_first(away, 0) // 2, 3)
+        count = max((int(away.argmax()) if away.any() else away.size) // 2, 3)
         zero = float(values[:count].mean())
-    peak = float(np.abs(values - zero).max())
-    smallest = SMALLEST_VOLTS if unit == "V" else 0.0
-    if unit == "V" and abs(zero) > LARGEST_ZERO:
+    peak, smallest = float(np.abs(values - zero).max()), SMALLEST_VOLTS if volts else 0.0
+    if volts and abs(zero) > LARGEST_ZERO:
         return Recognised(UNNAMED)
     # more noise than that may well be what is commanded
     if peak <= max(smallest, min(SURE * noise, SURE * smallest), 1e-12 * abs(zero)):
         return Recognised("rest")
     if stamps.size >= SHORTEST:
-        error, noise = noise / count**0.5, min(noise, 0.05 * peak)
-        spacing = float(np.median(np.diff(stamps)))
-        jump = max(JUMP_SAMPLES, round(JUMP_SECONDS / spacing))
+        noise = min(noise, 0.05 * peak)
+        jump = max(3, round(0.03 / float(np.median(np.diff(stamps)))))
         tolerance = max(SURE * noise, 0.01 * peak)
-        record = _Record(stamps, values - zero, error, noise, tolerance, peak, spacing, jump)
+        record = _Record(stamps, values - zero, unit, noise, tolerance, peak, jump)
         for find in (_stairs, _ramp, _sine):
-            found = find(record, unit)
+            found = find(record)
             if found is not None and _fits(record, found):
                 return Recognised(found.name, found.frequency)
     return Recognised(UNNAMED)
@@ -147,54 +166,15 @@ def _noise(time: Array, values: Array) -> float:
     """
     if values.size < 3:
         return 0.0
-    middle = np.unique(np.linspace(1, values.size - 2, 50_000).astype(np.intp))
-    before, after = time[middle] - time[middle - 1], time[middle + 1] - time[middle]
-    share = before / (before + after)
-    line = values[middle - 1] + share * (values[middle + 1] - values[middle - 1])
-    deviation = (values[middle] - line) / np.sqrt(1.0 + share**2 + (1.0 - share) ** 2)
-    changes = np.abs(values[middle] - values[middle - 1])
+    at = np.unique(np.linspace(1, values.size - 2, 50_000).astype(np.intp))
+    share = (time[at] - time[at - 1]) / (time[at + 1] - time[at - 1])
+    line = values[at - 1] + share * (values[at + 1] - values[at - 1])
+    deviation = (values[at] - line) / np.sqrt(1.0 + share**2 + (1.0 - share) ** 2)
+    changes = np.abs(values[at] - values[at - 1])
     smallest = float(np.min(changes, where=changes > 0.0, initial=np.inf))
     # of a command without noise the smallest change is no converter's step, but a part of it
     quantum = min(0.3 * smallest, 0.002 * float(np.ptp(values)))
     return max(float(np.median(np.abs(deviation))) / 0.6745, quantum)
-
-
-class _Record(NamedTuple):
-    """A record about its rest."""
-
-    time: Array
-    values: Array
-    rest_error: float
-    """Standard error of the rest that was taken off. [unit]"""
-    noise: float
-    """Standard deviation from sample to sample. [unit]"""
-    tolerance: float
-    """Deviation of a single sample that noise does not explain. [unit]"""
-    peak: float
-    spacing: float
-    """Median distance of the stamps. [s]"""
-    jump: int
-    """Samples that a jump may take."""
-
-
-class _Found(NamedTuple):
-    """A maneuver that a record may be."""
-
-    name: str
-    model: Array
-    """Its curve, up to the sample at which the return to rest begins. [unit]"""
-    leaves: int
-    """That sample."""
-    began: float
-    """[s]"""
-    jumps: NDArray[np.bool_] | None = None
-    """Samples within jumps, where nothing is known."""
-    frequency: float | None = None
-
-
-def _first(mask: NDArray[np.bool_], start: int) -> int:
-    """Index of the first true element of a mask that begins at `start`, or of its end."""
-    return start + (int(mask.argmax()) if mask.any() else mask.size)
 
 
 def _fits(record: _Record, found: _Found) -> bool:
@@ -222,60 +202,55 @@ def _fits(record: _Record, found: _Found) -> bool:
     squares = (values - found.model)[kept] ** 2
     # one percent of the peak, and noise with a margin for its estimate
     quality = float(np.hypot(0.01 * record.peak, 1.5 * record.noise))
-    edges = np.linspace(0, squares.size, max(min(50, squares.size // 8), 1), endpoint=False)
-    starts = edges.astype(np.intp)
-    means = np.add.reduceat(squares, starts) / np.diff(starts, append=squares.size)
-    return bool(squares.mean() <= quality**2 and means.max() <= (3.0 * quality) ** 2)
+    parts = np.array_split(squares, max(min(50, squares.size // 8), 1))
+    worst = max(float(part.mean()) for part in parts)
+    return bool(squares.mean() <= quality**2 and worst <= (3.0 * quality) ** 2)
 
 
-def _stairs(record: _Record, unit: str) -> _Found | None:
-    """Levels that are held, with jumps between them."""
-    values, size = record.values, record.values.size
-    least = max(2.0 * record.tolerance, SMALLEST_JUMP * record.peak)
+def _stairs(record: _Record) -> _Found | None:
+    """Levels that are held, with jumps of 5 % of the largest or more between them."""
+    values, size, shown = record.values, record.values.size, list[float]()
+    least = max(2.0 * record.tolerance, 0.05 * record.peak)
     jumps = np.flatnonzero(np.abs(np.diff(values)) > least)
     groups = np.split(jumps, np.flatnonzero(np.diff(jumps) > HELD) + 1)
-    if not jumps.size or len(groups) > MOST_JUMPS:
+    # with so many jumps it is no stairs
+    if not jumps.size or len(groups) > 200 or any(np.ptp(g) >= record.jump for g in groups):
         return None
-    if any(group[-1] - group[0] >= record.jump for group in groups):
-        return None
+    model, within, began = np.zeros(size), np.ones(size, np.bool_), 0.0
     firsts = [0, *(int(group[-1]) + 1 for group in groups)]
     lasts = [*(int(group[0]) + 1 for group in groups), size]
-    model, within, leaves, began = np.zeros(size), np.ones(size, np.bool_), size, 0.0
-    shown = list[float]()
     for first, last in zip(firsts, lasts, strict=True):
-        final, beside = last == size, min(2, (last - first) // 4)
         # without the samples beside its jumps, which may be taken while they last
-        first, last = first + beside * (first > 0), last - beside * (not final)
-        sure = np.median(values[first : first + max(HELD, (last - first) // 10)])
-        ends = _first(np.abs(values[first:last] - sure) > record.tolerance, first)
-        height = float(values[first:ends].mean()) if ends > first else 0.0
-        resting = abs(height) <= record.tolerance
-        if ends - first < (1 if final and ends == last else HELD):
+        beside = min(2, (last - first) // 4)
+        first, last = first + beside * (first > 0), last - beside * (last < size)
+        held = values[first:last]
+        usual = np.median(held[: max(HELD, held.size // 10)])
+        held = held[np.abs(held - usual) <= record.tolerance]
+        if held.size < (HELD if last < size else 1):
             return None
-        if ends < last and (resting or not final):
-            return None
-        within[first:last] = False
-        if final and resting:
-            leaves = first
-        elif ends < last:
-            leaves = ends
+        level, within[first:last] = float(held.mean()), False
+        resting = abs(level) <= record.tolerance
         if resting and not shown:
             # of the jump to the first level it is known when it is complete
             within[max(last - record.jump, 0) : last] = True
             continue
         began = began if shown else float(record.time[first])
-        model[first:ends] = 0.0 if final and resting else height
-        error = float(np.hypot(record.noise / (ends - first) ** 0.5, record.rest_error))
-        shown.append(_rounded(height, max(3.0 * error, 0.002 * record.peak)))
+        model[first:last] = 0.0 if resting else level
+        error = record.noise * (1.0 / held.size + 2.0 / firsts[1]) ** 0.5
+        shown.append(_rounded(level, max(3.0 * error, 0.002 * record.peak)))
     if not shown:
         return None
-    name = f"stairs {'/'.join(f'{height:g}' for height in shown)} {unit}"
-    if len(shown) == 1 or (len(shown) == 2 and leaves < size and shown[1] == 0.0):
-        name = f"step {shown[0]:+g} {unit}"
-    return _Found(name, model, leaves, began, within)
+    leaves = record.leaves(np.where(within, values, model), 0)
+    # a level that is left is the last one, which is no rest
+    if leaves < size and (leaves < firsts[-1] + HELD or resting):
+        return None
+    name = f"stairs {'/'.join(f'{height:g}' for height in shown)} {record.unit}"
+    if len(shown) == 1 or (len(shown) == 2 and resting and not shown[1]):
+        name = f"step {shown[0]:+g} {record.unit}"
+    return _Found(name, model, min(leaves, firsts[-1] + beside if resting else size), began, within)
 
 
-def _ramp(record: _Record, unit: str) -> _Found | None:
+def _ramp(record: _Record) -> _Found | None:
     """A straight rise from rest, perhaps to a level that is held."""
     time, values = record.time, record.values
     rising = values * np.sign(values[np.abs(values).argmax()])
@@ -284,56 +259,54 @@ def _ramp(record: _Record, unit: str) -> _Found | None:
         return None
     leaves = high
     for _ in range(2):  # once more with all that lies on the first line
-        middle = time[low:leaves].mean()
+        middle = float(time[low:leaves].mean())
         since = time[low:leaves] - middle
-        spread = float((since**2).sum())
-        slope = float((since @ values[low:leaves]) / spread)
-        start = float(middle - values[low:leaves].mean() / slope) if slope else np.inf
-        if not time[0] - record.spacing <= start < time[low]:
+        slope, height = map(float, np.polyfit(since, values[low:leaves], 1))
+        start = middle - height / slope if slope else np.inf
+        if not 2.0 * time[0] - time[1] <= start < time[low]:
             return None
         line = slope * np.maximum(time - start, 0.0)
-        leaves = _first(np.abs(values[low:] - line[low:]) > record.tolerance, low)
+        leaves = record.leaves(line, low)
         if leaves < high:
             return None
     near = values[leaves + 2 : leaves + 2 + HELD]
     level = float(np.median(near)) if near.size == HELD else 0.0
     if abs(level) > 0.5 * record.peak:
-        stops = _first(np.abs(values[leaves + 2 :] - level) > record.tolerance, leaves + 2)
-        if time[stops - 1] - time[leaves] >= SHORTEST_HOLD:
+        stops = record.leaves(np.full(values.size, level), leaves + 2)
+        # a shorter stay at the limit is the crest of its return
+        if time[stops - 1] - time[leaves] >= 0.25:
             limit = abs(float(values[leaves + 2 : stops].mean()))
             line, leaves = np.clip(line, -limit, limit), stops
-    error = record.noise / spread**0.5
+    error = record.noise / float(np.linalg.norm(since))
     shown = _rounded(slope, max(3.0 * error, 0.002 * abs(slope)))
-    return _Found(f"ramp {shown:+g} {unit}/s", line, leaves, start)
+    return _Found(f"ramp {shown:+g} {record.unit}/s", line, leaves, start)
 
 
-def _sine(record: _Record, unit: str) -> _Found | None:
-    """One frequency, at least a whole period of it."""
+def _sine(record: _Record) -> _Found | None:
+    """One frequency, at least a whole period of it in six samples or more."""
     from scipy.optimize import curve_fit
 
     time, values = record.time, record.values
-    beyond = np.flatnonzero(np.abs(values) > BAND * record.peak)
+    # a crossing is a change between 30 % of the peak and as much of the other sign
+    beyond = np.flatnonzero(np.abs(values) > 0.3 * record.peak)
     changes = np.flatnonzero(np.diff(np.signbit(values[beyond])))
     if changes.size < 2:
         return None
     crossings = 0.5 * (time[beyond[changes]] + time[beyond[changes + 1]])
-    halves = np.diff(crossings)
-    half = float(np.median(halves))
-    regular = _first(np.abs(halves - half) > EVEN * half, 0)
-    if regular < max(halves.size - 1, 1) or 2.0 * half < COARSEST * record.spacing:
-        return None
+    uneven = np.abs(np.diff(crossings) / np.median(np.diff(crossings)) - 1.0) > 0.15
+    regular = int(uneven.argmax()) if uneven.any() else uneven.size
     # the last may be a part of the return
     even = crossings[: min(regular + 1, max(crossings.size - 1, 2))]
-    half, crossing = np.polyfit(np.arange(even.size), even, 1)
-    amplitude = record.peak * np.sign(values[beyond[changes[0] + 1]])
-    first = _first(np.abs(values) > record.tolerance, 0)
-    certain = leaves = int(np.searchsorted(time, even[-1]))
-    if certain - first < COARSEST:
+    first, certain = record.leaves(np.zeros(time.size), 0), int(np.searchsorted(time, even[-1]))
+    if regular < max(uneven.size - 1, 1) or certain - first < 6:
         return None
+    half, crossing = np.polyfit(np.arange(even.size), even, 1)
+    leaves = certain
 
     def tone(t: Array, a: float, crossing: float, mean: float, omega: float) -> Array:
         return np.asarray(mean + a * np.sin(omega * (t - crossing)))
 
+    amplitude = record.peak * np.sign(values[beyond[changes[0] + 1]])
     numbers = np.array([amplitude, crossing, 0.0, np.pi / half])
     for again in (True, False):  # once more with all that lies on the first tone
         # a crossing in the middle hardly correlates with the frequency
@@ -345,7 +318,7 @@ def _sine(record: _Record, unit: str) -> _Found | None:
             return None
         model = tone(time, *numbers)
         if again:
-            leaves = _first(np.abs(values - model)[first:] > record.tolerance, first)
+            leaves = record.leaves(model, first)
             if leaves < certain:
                 return None
     amplitude, crossing, mean, omega = map(float, numbers)
@@ -357,10 +330,9 @@ def _sine(record: _Record, unit: str) -> _Found | None:
     whole = float(time[min(leaves, time.size - 1)]) - start > 0.99 * 2.0 * np.pi / omega
     if not whole or (first and abs(mean) > max(0.02 * size, record.noise)):
         return None
-    hertz = omega / (2.0 * np.pi)
-    error = float(np.sqrt(covariance[3, 3])) / (2.0 * np.pi)
+    hertz, error = omega / (2.0 * np.pi), float(np.sqrt(covariance[3, 3])) / (2.0 * np.pi)
     frequency = _rounded(hertz, max(3.0 * error, 0.001 * hertz))
     rises = amplitude * float(np.cos(omega * (start - crossing)))
     shown = _rounded(size if rises > -1e-9 * size else -size, 0.002 * size)
-    name = f"sine {shown:g} {unit} {frequency:g} Hz"
+    name = f"sine {shown:g} {record.unit} {frequency:g} Hz"
     return _Found(name, model, leaves, start, frequency=frequency)

@@ -1,32 +1,29 @@
 """A virtual test rig: a drive with known parameters, seen through the instruments of a campaign.
 
-`run` simulates the tests and reads them with `Instruments`, of one of the `SEVERITIES` or of one's
-own; `write` makes of them the files that a campaign leaves: logs, a campaign.toml and, apart, the
-truth. Refinements that a fit is to find, or to miss, are parameters of the drive that is simulated.
-Everything that is written says that it is virtual.
+`run` simulates tests and reads them with `Instruments`; `write` makes of them what a campaign
+leaves: logs, campaign.toml and, apart, the truth. Everything that is written says that it is
+virtual. Refinements that a fit is to find, or to miss, are parameters of the simulated drive.
 
 >>> from swashplate.campaign import rig
->>> tests = rig.run("hoist", seed=1)
->>> rig.write(tests, "virtual-hoist")
+>>> rig.write(rig.run("hoist", seed=1), "virtual-hoist")
 
-What a test campaign of this kind had is known in words: a 12-bit command, one true-RMS ammeter
-around both leads, a 100 Hz dither that beats in 512 Hz samples, an encoder. The sizes of the errors
-are assumed, as is usual for such instruments.
+The instruments are those of Kruse's campaign (a 12-bit command, one true-RMS ammeter around both
+leads, a 100 Hz dither that beats in 512 Hz samples, an encoder); the sizes of errors are assumed.
 """
 
 from __future__ import annotations
 
 import re
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import asdict, dataclass, fields, replace
+from dataclasses import asdict, dataclass, replace
 from functools import partial
 from hashlib import blake2b
 from importlib.metadata import version
-from math import inf, isfinite, pi
+from math import isfinite, pi
 from pathlib import Path
 from platform import python_version
 from types import MappingProxyType
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -51,8 +48,6 @@ FARTHEST = 0.4
 """Of the way to the next grid point a sample strays at most, so that the stamps increase. [1]"""
 FULL_CURRENT = 1.2
 """Current at which the card's pulses would be as long as their period: 24 V on 20 Ω. [A]"""
-TRIES = 100
-"""Draws after which no set of parameters within the rules is expected any more."""
 COUNTS_PER_TURN = {"hoist": 400.0 * 120.0 / 19.0, "luff": 635.0 * 4.0, "slew": 81_000.0 * 7.0}
 """Counts in a turn of the output: 2526.3, 2540 and 567,000 in Kruse's tables."""
 HELD_BACK = {
@@ -128,64 +123,40 @@ class Instruments:
     """Most cells of a column that are empty one after another. [1]"""
 
     def __post_init__(self) -> None:
-        for each in fields(self):
-            name, value = each.name, getattr(self, each.name)
-            low, high, what = 0.0, inf, "0 or more" if value < 0.0 else "finite"
-            if name in ("voltage_offset", "current_gain_error", "current_zero"):
-                low = -inf
-            elif name in ("lost_rows", "empty_cells"):
-                high, what = 1.0, "a share, at most 1"
-            elif name in ("dither_frequency", "longest_loss", "longest_gap") and value <= 0.0:
-                low, what = 1e-300, "positive"
-            if not (isfinite(value) and low <= value <= high):
+        special = dict.fromkeys(("voltage_offset", "current_gain_error", "current_zero"), "finite")
+        special |= dict.fromkeys(("dither_frequency", "longest_loss", "longest_gap"), "positive")
+        special |= dict.fromkeys(("lost_rows", "empty_cells"), "a share, at most 1")
+        for name, value in asdict(self).items():
+            what = special.get(name, "0 or more") if isfinite(value) else "finite"
+            right = {"finite": isfinite(value), "positive": value > 0.0, "0 or more": value >= 0.0}
+            if not right.get(what, 0.0 <= value <= 1.0):
                 raise InputError(f"{name} must be {what}, not {value:g}.")
 
 
-SEVERITIES: Mapping[Severity, Instruments] = MappingProxyType(
-    {
-        "clean": Instruments(),
-        "realistic": Instruments(
-            command_bits=12,
-            voltage_bits=12,
-            voltage_noise=0.0008,
-            current_noise=0.002,
-            current_resolution=0.0005,
-            dither=0.015,
-            encoder_step=1,
-            transducer_noise=0.002,
-            jitter=2e-6,
-            stamp_resolution=1e-6,
-            lost_rows=0.0005,
-        ),
-        "harsh": Instruments(
-            voltage_bits=12,
-            voltage_noise=0.01,
-            voltage_offset=0.02,
-            current_noise=0.005,
-            current_resolution=0.0005,
-            current_gain_error=0.01,
-            current_zero=0.004,
-            dither=0.03,
-            encoder_step=1,
-            counter_bits=16,
-            transducer_noise=0.01,
-            jitter=200e-6,
-            stamp_resolution=1e-6,
-            lost_rows=0.01,
-            longest_loss=20,
-            empty_cells=0.002,
-            longest_gap=10,
-        ),
-    }
-)
+# fmt: off
+SEVERITIES: Mapping[Severity, Instruments] = MappingProxyType({
+    "clean": Instruments(),
+    "realistic": Instruments(
+        command_bits=12, voltage_bits=12, voltage_noise=0.0008,
+        current_noise=0.002, current_resolution=0.0005, dither=0.015,
+        encoder_step=1, transducer_noise=0.002,
+        jitter=2e-6, stamp_resolution=1e-6, lost_rows=0.0005),
+    "harsh": Instruments(
+        voltage_bits=12, voltage_noise=0.01, voltage_offset=0.02,
+        current_noise=0.005, current_resolution=0.0005,
+        current_gain_error=0.01, current_zero=0.004, dither=0.03,
+        encoder_step=1, counter_bits=16, transducer_noise=0.01,
+        jitter=200e-6, stamp_resolution=1e-6, lost_rows=0.01, longest_loss=20,
+        empty_cells=0.002, longest_gap=10),
+})
+# fmt: on
 """Instruments by how bad they are.
 
-clean: none. The log holds the model's own numbers at k/512 s, so that a fit can find the parameters
-to as many digits as it likes. realistic: noise of mean zero and nothing systematic (no zero or gain
-error, no lag; jitter as of a clock in hardware, which never lets a sample beside a step pass the
-card's dead zone), so that a fit of the right model is unbiased and its confidence intervals can be
-compared with the truth. harsh: zero and gain errors, jitter that moves steps by a part of a sample,
-gaps and a counter that rolls over.
+clean: the model's own numbers at k/512 s, in which a fit finds the parameters to any digit.
+realistic: noise of mean zero and nothing systematic, so that a fit of the right model is unbiased
+and its confidence intervals can be compared with the truth; jitter as of a clock in hardware never
+lets a sample beside a step pass the card's dead zone. harsh: zero and gain errors, jitter that
+moves steps by a part of a sample, gaps and a counter that rolls over.
 """
 
 
@@ -199,8 +170,8 @@ class VirtualRun:
     """Of its file: axis and maneuver."""
     role: Literal["fit", "validate"]
     columns: Mapping[str, Array]
-    """What was logged, SI: ``"time"`` [s], ``"voltage"`` [V] and the channels; NaN is an empty
-    cell. Arrays of one length; rows that were lost are missing in all of them."""
+    """What was logged (n,), SI: ``"time"`` [s], ``"voltage"`` [V] and the channels; NaN is an empty
+    cell, rows that were lost are missing in all."""
     truth: Simulation
     """What really happened."""
 
@@ -260,8 +231,7 @@ def run(
     instruments : Instruments, optional
         One's own instead.
     truth : Drive, optional
-        What is simulated instead of `drive`, with refinements for example; the decay of its card
-        takes over within a step.
+        What is simulated instead of `drive`, with refinements for example.
     perturb : float
         Multiply every value of what is simulated by a factor drawn by chance, whose logarithm is
         at most this, 0.5 at most, and has half of it as standard deviation. Zeros, infinite limits
@@ -289,11 +259,10 @@ def run(
         cannot be simulated at 512 Hz; or if no draw of `perturb` keeps the rules of a parameter
         set.
     """
+    preset = drive if isinstance(drive, str) else None
     nominal = Drive.preset(drive) if isinstance(drive, str) else drive
     seed, axis, kinds = whole("seed", seed), axis or nominal.name, tuple(channels)
-    simulated = truth if truth is not None else nominal
-    if perturb:
-        simulated = _perturbed(simulated, perturb, seed)
+    simulated = _perturbed(truth or nominal, perturb, seed) if perturb else truth or nominal
     # a real card's decay does not wait for the next sample of a log (docs/decisions/0008)
     simulated = Drive(replace(simulated.parameters, card_switch="split"))
     listed = source_tests(axis) if maneuvers is None else maneuvers
@@ -301,33 +270,31 @@ def run(
     held_back = HELD_BACK[axis] if validate is None and maneuvers is None else validate or ()
     # as files' names: hoist_step_+4_V, hoist_ramp_+1_V-s
     stems = [re.sub(r"[^\w.+-]+", "_", f"{axis} {name}".replace("/", "-")) for name in tests]
+    files = {stem.lower() for stem in stems}
     possible = [kind for kind in CHANNEL_KINDS if kind != "other"]
-    unknown = [kind for kind in kinds if kind not in possible]
-    missing = [name for name in held_back if name not in tests]
+    unknown = next((kind for kind in kinds if kind not in possible), None)
+    missing = next((name for name in held_back if name not in tests), None)
     turn = COUNTS_PER_TURN.get(axis, 1.0)
     if counts_per_turn is not None:
         turn = positive("counts_per_turn", counts_per_turn)
-    why = ""
-    if severity not in SEVERITIES:
-        why = f"severity is {severity!r}; it is one of {', '.join(SEVERITIES)}"
-    elif len(tests) < len(listed):
-        why = "Two maneuvers have the same name; give them in a mapping by name"
-    elif not tests:
-        why = "A campaign needs at least one maneuver"
-    elif unknown:
-        why = f"There is no channel {unknown[0]!r}; there are {', '.join(possible)}"
-    elif not kinds or len(set(kinds)) < len(kinds):
-        why = "channels must be one or more kinds, each once"
-    elif counts_per_turn is None and axis not in COUNTS_PER_TURN and "encoder_counts" in kinds:
-        why = f"The encoder of '{axis}' is not known: give counts_per_turn, or as axis one of "
-        why += ", ".join(COUNTS_PER_TURN)
-    elif missing:
-        why = f"There is no run '{missing[0]}' to validate; there are {', '.join(tests)}"
-    elif len({stem.lower() for stem in stems}) < len(stems):
-        why = "Two maneuvers would have the same file; give them other names"
-    if why:
-        raise InputError(f"{why}.")
-    tools, runs = SEVERITIES[severity] if instruments is None else instruments, {}
+    unknown_encoder = counts_per_turn is None and axis not in COUNTS_PER_TURN
+    why = {
+        f"severity is {severity!r}; it is one of {', '.join(SEVERITIES)}": severity
+        not in SEVERITIES,
+        "Two maneuvers have the same name; give them in a mapping by name": len(tests)
+        < len(listed),
+        "A campaign needs at least one maneuver": not tests,
+        f"There is no channel {unknown!r}; there are {', '.join(possible)}": unknown is not None,
+        "channels must be one or more kinds, each once": not 0 < len(kinds) == len(set(kinds)),
+        f"The encoder of '{axis}' is not known: give counts_per_turn, or as axis one of "
+        + ", ".join(COUNTS_PER_TURN): unknown_encoder and "encoder_counts" in kinds,
+        f"There is no run {missing!r} to validate; there are {', '.join(tests)}": missing
+        is not None,
+        "Two maneuvers would have the same file; give them other names": len(files) < len(tests),
+    }
+    for sentence in (sentence for sentence, wrong in why.items() if wrong):
+        raise InputError(f"{sentence}.")
+    tools, runs = instruments or SEVERITIES[severity], {}
     for stem, (name, maneuver) in zip(stems, tests.items(), strict=True):
         command = maneuver.sample(SOURCE_RATE)
         if (largest := float(np.abs(command).max())) > FULL_SCALE:
@@ -337,7 +304,6 @@ def run(
         role: Literal["fit", "validate"] = "validate" if name in held_back else "fit"
         runs[name] = VirtualRun(name, stem, role, columns, happened)
     called = severity if tools == SEVERITIES[severity] else "custom"
-    preset = drive if isinstance(drive, str) else None
     return VirtualTests(axis, nominal, preset, simulated, tools, called, seed, kinds, turn, runs)
 
 
@@ -345,28 +311,27 @@ def _perturbed(drive: Drive, spread: float, seed: int) -> Drive:
     """A drive whose every value is multiplied by chance, within a spread of the logarithm."""
     if not 0.0 < spread <= 0.5:
         raise InputError(f"perturb must be above 0 and at most 0.5, not {spread:g}.")
-    parameters = drive.parameters
+    numbers = drive.parameters.numbers
     columns = [
         column
-        for parameter in parameters.values()
+        for parameter in drive.parameters.values()
         if parameter.status != "inactive"
         for column in parameter.definition.columns
-        if parameters.numbers[column] != 0.0 and np.isfinite(parameters.numbers[column])
+        if numbers[column] != 0.0 and isfinite(numbers[column])
     ]
     generator = _stream(seed, "parameters")
-    for _ in range(TRIES):
+    for _ in range(100):
         logarithms = 0.5 * spread * generator.standard_normal(len(columns))
         while (far := np.abs(logarithms) > spread).any():
             logarithms[far] = 0.5 * spread * generator.standard_normal(int(far.sum()))
-        factors = np.exp(logarithms).tolist()
         try:
-            drawn = drive.scale(**dict(zip(columns, factors, strict=True)))
+            drawn = drive.scale(**dict(zip(columns, np.exp(logarithms).tolist(), strict=True)))
         except ParameterError:
             continue
-        title = f"{parameters.title}; values within ±{100 * spread:g} % by seed {seed}"
+        title = f"{drive.parameters.title}; values within ±{100 * spread:g} % by seed {seed}"
         return drawn.renamed(drive.name, title)
     raise InputError(
-        f"No draw of {TRIES} within ±{100 * spread:g} % keeps the rules of {drive.name}'s "
+        f"No draw of 100 within ±{100 * spread:g} % keeps the rules of {drive.name}'s "
         "parameters; take a smaller spread."
     )
 
@@ -380,9 +345,8 @@ def _stream(seed: int, *names: str) -> Generator:
     So a run is the same whatever runs before it, and an instrument that is switched off takes no
     numbers from the others.
     """
-    words = [
-        int.from_bytes(blake2b(name.encode(), digest_size=8).digest(), "little") for name in names
-    ]
+    digests = (blake2b(name.encode(), digest_size=8).digest() for name in names)
+    words = [int.from_bytes(digest, "little") for digest in digests]
     return np.random.default_rng(np.random.SeedSequence([seed, *words]))
 
 
@@ -401,27 +365,26 @@ def _logged(
     bound = FARTHEST * (grid[1] - grid[0] if grid.size > 1 else 0.0)
     instants = np.clip(grid + np.clip(strayed, -bound, bound), grid[0], grid[-1])
 
-    def at_instants(signal: Array | None) -> Array:
+    def sampled(signal: str) -> Array:
         # the drive is marched on the grid: what lies between is not known better than by lines
-        assert signal is not None
-        return signal if not tools.jitter else np.interp(instants, grid, signal)
+        values: Array = getattr(truth, signal)
+        if signal == "shaft_position" and tools.backlash:
+            values = _play(values, tools.backlash)
+        return values if not tools.jitter else np.interp(instants, grid, values)
 
     def read(kind: ChannelKind | Literal["voltage"]) -> Array:
         chance = _stream(seed, name, kind)
         if kind == "rectified_current":
-            both = at_instants(truth.current_positive), at_instants(truth.current_negative)
+            both = sampled("current_positive"), sampled("current_negative")
             return _ammeter(instants, both, tools, chance)
-        signal: Array = getattr(truth, "voltage" if kind == "voltage" else SIGNALS[kind])
-        if kind in ("position", "encoder_counts") and tools.backlash:
-            signal = _play(signal, tools.backlash)
-        signal = at_instants(signal)
-        if kind == "voltage":
-            noise = tools.voltage_noise * chance.standard_normal(grid.size)
-            return _converted(signal + tools.voltage_offset + noise, tools.voltage_bits)
+        values = sampled("voltage" if kind == "voltage" else SIGNALS[kind])
         if kind == "encoder_counts":
-            return _counter(signal * (counts_per_turn / (2.0 * pi)), tools, chance)
-        noise = tools.transducer_noise * np.abs(signal).max() * chance.standard_normal(grid.size)
-        return np.asarray(signal + noise)
+            return _counter(values * (counts_per_turn / (2.0 * pi)), tools, chance)
+        noise = chance.standard_normal(grid.size)
+        if kind == "voltage":
+            values = values + tools.voltage_offset + tools.voltage_noise * noise
+            return _converted(values, tools.voltage_bits)
+        return np.asarray(values + tools.transducer_noise * np.abs(values).max() * noise)
 
     def lost(share: float, longest: int, *names: str) -> NDArray[np.bool_]:
         """In runs of 1 to `longest`, together about a share of all."""
@@ -433,10 +396,9 @@ def _logged(
         return mask
 
     columns = {"voltage": read("voltage"), **{COLUMNS.get(k, k): read(k) for k in kinds}}
-    if tools.empty_cells:
-        for column, values in columns.items():
-            gaps = lost(tools.empty_cells, tools.longest_gap, "empty", column)
-            columns[column] = np.where(gaps, np.nan, values)
+    for column, values in columns.items() if tools.empty_cells else ():
+        gaps = lost(tools.empty_cells, tools.longest_gap, "empty", column)
+        columns[column] = np.where(gaps, np.nan, values)
     kept = ~lost(tools.lost_rows, tools.longest_loss, "rows")
     if not kept.any():
         raise InputError(f"{name}: lost_rows leaves no row; take a smaller share.")
@@ -551,44 +513,50 @@ def write(tests: VirtualTests, folder: str | Path, *, overwrite: bool = False) -
         (place / "truth").mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise FileError(f"{place} cannot be written: {error.strerror or error}.") from None
+    refinements = f"refinements {', '.join(tests.drive.parameters.refinements) or 'none'}"
+    note = f"# virtual: simulated by swashplate {__version__}, no measurement; axis {tests.axis}, "
+    ends = f"instruments {tests.severity}, {refinements}, seed {tests.seed}\n"
     for each in tests.runs.values():
-        write_whole(place / f"{each.stem}.csv", partial(_write_log, tests, each))
+        log = partial(_write_log, each.columns, f"{note}{each.name}, {ends}")
+        write_whole(place / f"{each.stem}.csv", log)
     if tests.preset is None:
         tests.nominal.to_toml(place / DRIVE_FILE)
     tests.drive.to_toml(place / "truth" / DRIVE_FILE)
-    texts, campaign = _texts(tests), place / "campaign.toml"
-    write_text(texts[1], place / "truth" / "truth.toml")
-    write_text(texts[0], campaign)
-    return campaign
+    campaign, truth = _contents(tests)
+    header = (
+        f"# Virtual tests, simulated by swashplate {__version__}: nothing here was measured.\n"
+        f"# Instruments: {tests.severity}; {refinements}; seed {tests.seed}.\n"
+        "# What was simulated stands in truth/truth.toml: open it only after the fit.\n"
+    )
+    write_text(f"# The truth behind the virtual tests.\n{truth}", place / "truth" / "truth.toml")
+    write_text(header + campaign, place / "campaign.toml")
+    return place / "campaign.toml"
 
 
-def _write_log(tests: VirtualTests, run: VirtualRun, path: Path) -> None:
+def _write_log(columns: Mapping[str, Array], note: str, path: Path) -> None:
     """A CSV: an empty cell for NaN, whole numbers for an encoder that counts them."""
     import polars as pl
 
-    table = pl.DataFrame(dict(run.columns), nan_to_null=True)
-    counts = run.columns.get("counts")
+    table, counts = pl.DataFrame(dict(columns), nan_to_null=True), columns.get("counts")
     if counts is not None and np.array_equal(counts, np.rint(counts), equal_nan=True):
         table = table.with_columns(pl.col("counts").cast(pl.Int64))
     with path.open("wb") as file:
-        note = (
-            f"# virtual: simulated by swashplate {__version__}, no measurement; axis {tests.axis}, "
-            f"{run.name}, instruments {tests.severity}, {_refinements(tests)}, "
-            f"seed {tests.seed}\n"
-        )
         file.write(note.encode())
         table.write_csv(file)
 
 
-def _texts(tests: VirtualTests) -> tuple[str, str]:
-    """Text of the campaign file, and of the truth: instruments, seed and versions.
+def _contents(tests: VirtualTests) -> tuple[str, str]:
+    """TOML of the campaign file, and of the truth: instruments, seed and versions.
 
     The input is joined by straight lines, because that is what was simulated between two samples.
     """
     from tomlkit import dumps
 
     tools, drop = tests.instruments, {"missing": "drop"} if tests.instruments.empty_cells else {}
-    channels = dict[str, dict[str, object]]()
+    given = {"kind": "voltage", "column": "voltage", "unit": "V", "interpolation": "linear", **drop}
+    axis: dict[str, Any] = {"drive": tests.preset or DRIVE_FILE}
+    axis |= {"time": {"column": "time", "unit": "s"}, "start": "rest", "input": given}
+    channels = axis["channels"] = dict[str, dict[str, object]]()
     for kind in tests.channels:
         column = COLUMNS.get(kind, kind)
         entry = channels[column] = {"kind": kind, "column": column, **drop}
@@ -598,39 +566,11 @@ def _texts(tests: VirtualTests) -> tuple[str, str]:
         entry["counts_per_turn"] = tests.counts_per_turn
         if tools.counter_bits:
             entry["rolls_over_at"] = 2**tools.counter_bits
-    given = {"kind": "voltage", "column": "voltage", "unit": "V", "interpolation": "linear", **drop}
-    axis = {
-        "drive": tests.preset or DRIVE_FILE,
-        "time": {"column": "time", "unit": "s"},
-        "start": "rest",
-        "input": given,
-        "channels": channels,
-    }
-    content = {
-        "title": f"Virtual tests, {tests.axis}",
-        "virtual": True,
-        "axes": {tests.axis: axis},
-        "runs": [{"file": f"{each.stem}.csv", "role": each.role} for each in tests.runs.values()],
-    }
-    truth = {
-        "virtual": True,
-        "axis": tests.axis,
-        "drive": DRIVE_FILE,
-        "severity": tests.severity,
-        "seed": tests.seed,
-        "counts_per_turn": tests.counts_per_turn,
-        "runs": list(tests.runs),
-        "instruments": asdict(tools),
-        "versions": {"swashplate": __version__, "python": python_version()}
-        | {each: version(each) for each in ("numpy", "numba")},
-    }
-    header = (
-        f"# Virtual tests, simulated by swashplate {__version__}: nothing here was measured.\n"
-        f"# Instruments: {tests.severity}; {_refinements(tests)}; seed {tests.seed}.\n"
-        "# What was simulated stands in truth/truth.toml: open it only after the fit.\n"
-    )
-    return header + dumps(content), "# The truth behind the virtual tests.\n" + dumps(truth)
-
-
-def _refinements(tests: VirtualTests) -> str:
-    return f"refinements {', '.join(tests.drive.parameters.refinements) or 'none'}"
+    runs = [{"file": f"{each.stem}.csv", "role": each.role} for each in tests.runs.values()]
+    content = {"title": f"Virtual tests, {tests.axis}", "virtual": True}
+    truth = {"virtual": True, "axis": tests.axis, "drive": DRIVE_FILE}
+    truth |= {key: getattr(tests, key) for key in ("severity", "seed", "counts_per_turn")}
+    truth |= {"runs": list(tests.runs), "instruments": asdict(tools)}
+    versions = {each: version(each) for each in ("numpy", "numba")}
+    truth["versions"] = {"swashplate": __version__, "python": python_version(), **versions}
+    return dumps(content | {"axes": {tests.axis: axis}, "runs": runs}), dumps(truth)

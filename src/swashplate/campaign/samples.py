@@ -1,9 +1,4 @@
-"""Samples and their time stamps, checked; an encoder's counts; one ammeter around both leads.
-
-Counts have their roll-overs taken out, their staircase filled and their jumps found. The ammeter
-reads the sum of magnitudes: compare it with the same of the simulation, because around the zero
-crossings a sign that is put back is a guess. Never differentiate through it.
-"""
+"""Samples and their time stamps, checked; an encoder's counts; one ammeter around both leads."""
 
 from math import ceil, log2
 from typing import NamedTuple
@@ -95,27 +90,16 @@ def stamp_statistics(stamps: Array) -> StampStatistics:
 
 
 def signal(name: str, values: ArrayLike, rows: int) -> Array:
-    """Samples of a signal, one for each of so many stamps, all finite; an array is not copied.
+    """Samples of a signal, one for each of so many stamps, all finite.
 
     Raises
     ------
     InputError
-        If the shape is another or a value is not finite; the sentence names its row.
+        If there are more or fewer, or a value is not finite; the sentence names its row.
     """
-    try:
-        numbers = np.ascontiguousarray(values, dtype=np.float64)
-    except (TypeError, ValueError):
-        raise InputError(f"{name} must be numbers, not {values!r}.") from None
-    if numbers.shape != (rows,):
-        raise InputError(
-            f"{name} must be one signal with one row for each of the {rows} stamps, not of the "
-            f"shape {numbers.shape}."
-        )
-    wrong = np.flatnonzero(~np.isfinite(numbers))
-    if wrong.size:
-        raise InputError(
-            f"{name} must be finite, but row {wrong[0]} (the first is 0) is {numbers[wrong[0]]}."
-        )
+    numbers = row(name, values)
+    if numbers.size != rows:
+        raise InputError(f"{name} must have one row for each of the {rows} stamps.")
     return numbers
 
 
@@ -159,30 +143,20 @@ def unwrap_counts(counts: ArrayLike, modulus: int) -> Array:
     readings, size = row("counts", counts), whole("modulus", modulus)
     if not 2 <= size <= WIDEST:
         raise InputError(f"A counter must have from 2 to 2^53 readings, not {size}.")
-    signed = readings.min() < 0.0
+    signed = "signed " if readings.min() < 0.0 else ""
     low, high = (-(size // 2), (size - 1) // 2) if signed else (0, size - 1)
     short = _shortest(np.diff(readings), size)
-    broken = np.flatnonzero(np.floor(readings) != readings)
-    outside = np.flatnonzero((readings < low) | (readings > high))
-    ambiguous = np.flatnonzero(short == -0.5 * size) + 1
-    if broken.size:
-        raise InputError(
-            f"counts must be whole numbers, but row {broken[0]} (the first is 0) is "
-            f"{readings[broken[0]]}."
-        )
-    if outside.size:
-        raise InputError(
-            f"counts hold {readings[outside[0]]:.0f} in row {outside[0]} (the first is 0), outside "
-            f"the {low} to {high} of a {'signed ' if signed else ''}counter of {size} readings: "
-            "give its own size, in a campaign file rolls_over_at."
-        )
-    if ambiguous.size:
-        at = int(ambiguous[0])
-        raise InputError(
-            f"counts go from {readings[at - 1]:.0f} to {readings[at]:.0f} at row {at} (the first "
-            f"is 0), half the range of a counter of {size}, which may be up or down; cut the "
-            "record there."
-        )
+    wrong = {
+        "counts must be whole numbers": np.floor(readings) != readings,
+        f"counts must be from {low} to {high}, as of a {signed}counter of {size} readings (give "
+        "its own size, in a campaign file rolls_over_at)": (readings < low) | (readings > high),
+        f"counts must not step by half the range of a counter of {size}, which may be up or down "
+        "(cut the record there)": np.concatenate([[False], short == -0.5 * size]),
+    }
+    for sentence, rows in wrong.items():
+        if rows.any():
+            at = int(rows.argmax())
+            raise InputError(f"{sentence}, but row {at} (the first is 0) is {readings[at]:g}.")
     return np.asarray(readings[0] + np.concatenate([[0.0], np.cumsum(short)]))
 
 
@@ -218,19 +192,10 @@ def _lasting(steps: Array, intervals: Array) -> float:
 def interpolate_counts(time: ArrayLike, counts: ArrayLike) -> Array:
     """Fill the samples that share a count: Kruse's smoothing of an encoder's staircase.
 
-    Parameters
-    ----------
-    time : array_like, shape (n,)
-        Increasing stamps, even or not. [s]
-    counts : array_like, shape (n,)
-        Position without roll-overs, either direction. [count]
-
-    Returns
-    -------
-    array, shape (n,)
-        Position on straight lines from each row at which the count changed to the next such row.
-        The first row counts as one: a step of a whole count within one sample would be a spike of
-        speed. From the last change on the count is held. [count]
+    Positions (n,) without roll-overs [count] at increasing stamps (n,) [s] become positions on
+    straight lines from each row at which the count changed to the next such row. The first row
+    counts as one: a step of a whole count within one sample would be a spike of speed. From the
+    last change on the count is held. [count]
 
     Notes
     -----
@@ -245,32 +210,33 @@ def interpolate_counts(time: ArrayLike, counts: ArrayLike) -> Array:
 
 
 def find_lost_counts(time: Array, counts: Array) -> Rows:
-    """Rows at which the count changed faster than the shaft can turn.
+    """Rows at which the count (n,) changed faster than the shaft can turn. Stamps (n,) in s.
 
-    Of six or more stamps [s] and positions without roll-overs [count]: faster than 1.5 times the
-    greatest speed that lasts (the median over five neighbouring intervals, which isolated jumps do
-    not reach), one count of rounding granted. A loss that is no larger than the motion within a
-    sample is not seen.
+    Faster than 1.5 times the greatest speed that lasts (the median over five neighbouring
+    intervals, which isolated jumps do not reach), one count of rounding granted. A loss that is no
+    larger than the motion within a sample is not seen, nor any in fewer than eight samples.
     """
+    if counts.size < 8:
+        return np.zeros(0, dtype=np.intp)
     steps, intervals = np.diff(counts), np.diff(time)
     limit = MARGIN * _lasting(steps, intervals)
     return np.flatnonzero(np.abs(steps) > limit * intervals + 1.0) + 1
 
 
-def rolls_over_at(values: Array, counts_per_turn: float | None = None) -> int | None:
-    """Counts after which a counter begins anew, None where the numbers are not such a counter's.
+def rolls_over_at(values: Array, counts_per_turn: float | None = None) -> int:
+    """Counts after which a counter begins anew, 0 where the numbers are not such a counter's.
 
     The numbers are whole and many, and some steps go over more than half of their range, which
     become as small as the others when they are taken the other way round. Numbers that only go up
     by the same step each time count the samples. The counts of a turn are a likely size.
     """
     if values.size < 2 or not np.isfinite(values).all() or np.any(values != np.floor(values)):
-        return None
+        return 0
     low, high, steps = float(values.min()), float(values.max()), np.diff(values)
     span = high + 1.0 if low >= 0.0 else 2.0 * max(-low, high + 1.0)
     over = np.abs(steps) > 0.5 * span
     if np.unique(values).size < FEWEST or not over.any() or over.all():
-        return None
+        return 0
     usual, turn = steps[~over], float(counts_per_turn or 0.0)
     ordinary = float(np.quantile(np.abs(usual), ORDINARY))
     # the steps beside a roll-over are as large as the one across it, taken the other way round
@@ -283,49 +249,21 @@ def rolls_over_at(values: Array, counts_per_turn: float | None = None) -> int | 
     # across a gap any step may be; the counter's size is known to what the largest reading leaves
     small = np.mean(np.abs(across[best]) <= 2.0 * ordinary + (best - span)) >= 0.5
     level = np.ptp(np.concatenate([usual, across[best]])) == 0.0
-    return None if level or not small or ordinary >= 0.25 * best else best
+    return best if small and not level and ordinary < 0.25 * best else 0
 
 
 # --- the ammeter ----------------------------------------------------------------------------------
 
 
-def signed_by_command(rectified: ArrayLike, command: ArrayLike, *, level: float = 0.0) -> Array:
-    """Rectified current with the sign of the command.
+def signed_by_command(rectified: Array, command: Array, level: float = 0.0) -> Array:
+    """Rectified current (n,) with the sign of the command (n,), or of any signal that has it. [A]
 
-    Parameters
-    ----------
-    rectified : array_like, shape (n,)
-        Reading of the ammeter, not negative. [A]
-    command : array_like, shape (n,)
-        Voltage, or any signal with the current's sign. [V]
-    level : float
-        A command no larger than this has no sign of its own. [V]
+    A command no larger than `level` has no sign of its own: the last one it had holds, because the
+    current is still on its way to zero; before the first it is positive.
 
-    Returns
-    -------
-    array, shape (n,)
-        Current, positive where the command is. While the command has no sign the last one it had
-        holds, because the current is still on its way to zero; before the first it is positive. [A]
-
-    Raises
-    ------
-    InputError
-        If a number is not finite, the lengths differ, or a reading is negative: it would have its
-        sign already.
-
-    Notes
-    -----
     The true current passes zero smoothly; this one jumps where the command does, by twice the
-    reading. Its derivative, and that of a cost through it, mean nothing there.
+    reading, where its derivative means nothing. Better compare sums of magnitudes.
     """
-    numbers = row("command", command)
-    readings = signal("rectified", rectified, numbers.size)
-    negative = np.flatnonzero(readings < 0.0)
-    if negative.size:
-        raise InputError(
-            f"rectified must not be negative, but row {negative[0]} (the first is 0) is "
-            f"{readings[negative[0]]} A."
-        )
-    signed = np.abs(numbers) > level
-    last = np.maximum.accumulate(np.where(signed, np.arange(numbers.size), 0))
-    return np.where(signed[last] & (numbers[last] < 0.0), -readings, readings)
+    signed = np.abs(command) > level
+    last = np.maximum.accumulate(np.where(signed, np.arange(command.size), 0))
+    return np.where(signed[last] & (command[last] < 0.0), -rectified, rectified)

@@ -29,53 +29,63 @@ ChannelKind = Literal[
     "spool_position",
     "other",
 ]
+CHANNEL_KINDS: tuple[ChannelKind, ...] = get_args(ChannelKind)
 
 
 class Kind(NamedTuple):
-    """What a kind of signal is."""
+    """What a kind of signal is, and what shows that a column of a log is of it."""
 
     units: tuple[str, ...]
     """SI units that it may have; the first is meant where none is given. None: as written."""
+    signal: str
+    """Simulated signal that it is compared with; none of an input or of anything else."""
     meaning: str
     """In words, with its sign convention."""
-    signal: str = ""
-    """Simulated signal that it is compared with; none of an input or of anything else."""
+    words: str = ""
+    """How names of such columns end: a regular expression on lower-case words."""
+    marks: tuple[str, ...] = ()
+    """Units in a header that say it, whatever the name."""
 
 
-KINDS: dict[str, Kind] = {
-    "voltage": Kind(("V",), "the card's command, positive towards positive speed"),
-    "current": Kind(("A",), "signed current that drives the pump without a card"),
-    "signed_current": Kind(
-        ("A",), "positive solenoid's current less the negative one's", "current"
-    ),
-    "rectified_current": Kind(("A",), "|I+| + |I-|, one ammeter around both leads", "current_sum"),
-    "current_plus": Kind(
-        ("A",), "current of the positive solenoid, a magnitude", "current_positive"
-    ),
-    "current_minus": Kind(
-        ("A",), "current of the negative solenoid, a magnitude", "current_negative"
-    ),
-    "shaft_speed": Kind(
-        ("rad/s", "m/s"), "speed of the shaft, or of a cylinder's rod", "shaft_speed"
-    ),
-    "position": Kind(("rad", "m"), "integral of the speed from a free zero", "shaft_position"),
-    "encoder_counts": Kind(
-        ("rad",), "counts of an encoder; an angle from a free zero", "shaft_position"
-    ),
-    "stroker_pressure": Kind(
-        ("Pa",), "stroking pressure about its equilibrium", "stroker_pressure"
-    ),
-    "swash_angle": Kind(
-        ("rad",), "angle of the swash plate, positive with the speed", "swash_angle"
-    ),
-    "spool_position": Kind(
-        ("m",), "displacement of the spool, positive with the force", "spool_position"
-    ),
-    "other": Kind((), "anything else, kept in the unit that it is written in"),
+# fmt: off
+KINDS: Mapping[str, Kind] = {
+    "voltage": Kind(("V",), "", "the card's command, positive towards positive speed",
+        "volts?|voltage|u|spannung", ("V", "mV")),
+    "current": Kind(("A",), "", "signed current that drives the pump without a card"),
+    # by its name an input: channels are of this kind where somebody says so
+    "other": Kind((), "", "anything else, kept in the unit that it is written in",
+        "cmd|command|duty|setpoint|valve|stick|joystick|stellgröße|stellgroesse|sollwert"),
+    "encoder_counts": Kind(("rad",), "shaft_position",
+        "counts of an encoder; an angle from a free zero",
+        "counts?|encoder|enc|ticks|pulses", ("counts", "count")),
+    "current_plus": Kind(("A",), "current_positive",
+        "current of the positive solenoid, a magnitude",
+        "(?:current|strom|i) (?:plus|positive|a|1|up)"),
+    "current_minus": Kind(("A",), "current_negative",
+        "current of the negative solenoid, a magnitude",
+        "(?:current|strom|i) (?:minus|negative|b|2|down)"),
+    "signed_current": Kind(("A",), "current",
+        "positive solenoid's current less the negative one's"),
+    "rectified_current": Kind(("A",), "current_sum", "|I+| + |I-|, one ammeter around both leads",
+        "currents?|amps?|ammeter|strom|i", ("A", "mA")),
+    "stroker_pressure": Kind(("Pa",), "stroker_pressure",
+        "stroking pressure about its equilibrium", "stroker pressure|delta p|dp|servo pressure"),
+    "swash_angle": Kind(("rad",), "swash_angle",
+        "angle of the swash plate, positive with the speed", "swash angle|swash|alpha"),
+    "spool_position": Kind(("m",), "spool_position",
+        "displacement of the spool, positive with the force", "spool position|spool"),
+    "shaft_speed": Kind(("rad/s", "m/s"), "shaft_speed",
+        "speed of the shaft, or of a cylinder's rod",
+        r"speed|rpm|omega|velocity|drehzahl|n|n \w+", ("rad/s", "deg/s", "rpm", "m/s", "mm/s")),
+    "position": Kind(("rad", "m"), "shaft_position", "integral of the speed from a free zero",
+        "position|pos|angle|pos fb|ms|displacement|stroke|cylinder|rod|extension|hub|weg"),
 }
-"""Every kind of input and channel, by its name in a campaign file."""
+# fmt: on
+"""Every kind of input and channel, by its name in a campaign file.
 
-CHANNEL_KINDS: tuple[ChannelKind, ...] = get_args(ChannelKind)
+`init` writes the first that a column's name or unit shows, so that names of two words stand before
+those of one.
+"""
 SIGNALS: Mapping[ChannelKind, str] = {
     kind: KINDS[kind].signal for kind in CHANNEL_KINDS if KINDS[kind].signal
 }
@@ -105,13 +115,12 @@ def conversion(kind: str, unit: str | None, what: str) -> tuple[str, float, floa
         return (units[0] if units else unit or "1"), 1.0, 0.0
     if kind == "shaft_speed":
         unit = speed_unit(unit)
-    for si in (*units[1:], units[0]):
+    for si in units[1:]:
         try:
             return si, *scaling(unit, si, what)
         except InputError:
-            if si == units[0]:
-                raise
-    raise AssertionError
+            continue
+    return units[0], *scaling(unit, units[0], what)
 
 
 Role = Literal["fit", "validate", "ignore"]
@@ -126,6 +135,9 @@ class Entry(BaseModel):
     """A table of the file; a key that it does not know is refused."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, populate_by_name=True)
+
+    def __repr__(self) -> str:
+        return short(self)
 
 
 class Window(Entry):
@@ -240,9 +252,6 @@ class Input(Signal):
 class Channel(Signal):
     """A signal that was measured."""
 
-    def __repr__(self) -> str:
-        return short(self)
-
     kind: ChannelKind = Field(description="What it measures.")
     counts_per_turn: Positive | None = Field(
         None, description="Counts for one turn of the encoder's shaft, quadrature included."
@@ -277,9 +286,6 @@ class Channel(Signal):
 
 class Axis(Entry):
     """One drive of the machine: its model, its input and what is measured of it."""
-
-    def __repr__(self) -> str:
-        return short(self)
 
     drive: str | None = Field(
         None, description="A packaged drive, or a parameter file beside this one."

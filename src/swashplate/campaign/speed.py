@@ -6,7 +6,7 @@ over an interval is its mean speed, the difference of two positions over the tim
 
 from __future__ import annotations
 
-from typing import Literal, NamedTuple
+from typing import Literal, NamedTuple, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -51,25 +51,22 @@ def speed_of(channel: Channel, method: Method = "exact") -> Speed:
     InputError
         If the channel measures something else, or there is no such method.
     """
+    time, values, encoder = channel.time, channel.values, channel.encoder
     if channel.kind == "shaft_speed":
-        return Speed(channel.time, channel.values, 0.0)
-    if not channel.is_position:
+        return Speed(time, values, 0.0)
+    if not channel.is_position or method not in get_args(Method):
         raise InputError(
             f"{channel.source} is a {channel.kind}: only positions, encoders and speeds have a "
-            "speed."
+            "speed, by the method exact or difference."
         )
-    time, encoder = channel.time, channel.encoder
     if method == "difference":
         half = 0.5 * float(np.median(np.diff(time)))
-        return Speed(time[1:], np.diff(channel.values) / np.diff(time), half)
-    if method != "exact":
-        raise InputError(f"There is no method '{method}'; there are exact and difference.")
-    angle = channel.values
+        return Speed(time[1:], np.diff(values) / np.diff(time), half)
     if encoder is not None and channel.counts is not None:
         # on a grid where the stamps are even, so that their rounding stays out of the speed
         even, _ = stamps_of(time)
-        angle = interpolate_counts(even, channel.counts) * encoder.angle_per_count
-    return Speed(time, speed_from_angle(time, angle), 1.0 / LOW_PASS + 1.0 / DIFFERENTIATOR)
+        values = interpolate_counts(even, channel.counts) * encoder.angle_per_count
+    return Speed(time, speed_from_angle(time, values), 1.0 / LOW_PASS + 1.0 / DIFFERENTIATOR)
 
 
 def speed_from_angle(time: ArrayLike, angle: ArrayLike) -> Array:
@@ -93,21 +90,18 @@ def speed_from_angle(time: ArrayLike, angle: ArrayLike) -> Array:
     position = signal("angle", angle, stamps.size)
     intervals = np.diff(stamps) if period is None else np.full(stamps.size - 1, period)
     first, second = np.exp(-LOW_PASS * intervals), np.exp(-DIFFERENTIATOR * intervals)
-    # what the first low pass has at the start of an interval leaves in the second at its end
-    from_state = DIFFERENTIATOR / (DIFFERENTIATOR - LOW_PASS) * (first - second)
-    filtered = np.empty(position.size)
-    march_low_passes(np.diff(position) / intervals, first, second, from_state, filtered)
+    filtered = np.zeros(position.size)
+    march_low_passes(np.diff(position) / intervals, first, second, filtered)
     return filtered
 
 
 @kernel
-def march_low_passes(
-    drive: Array, first: Array, second: Array, from_state: Array, filtered: Array
-) -> None:
-    """March the two low passes from rest, over intervals (n - 1,) with what they keep of each."""
+def march_low_passes(speeds: Array, first: Array, second: Array, filtered: Array) -> None:
+    """March the low passes from rest by mean speeds; (n - 1,) of what intervals leave of each."""
     state = 0.0
-    filtered[0] = 0.0
-    for n in range(drive.size):
-        fresh = 1.0 - second[n] - from_state[n]
-        filtered[n + 1] = second[n] * filtered[n] + from_state[n] * state + fresh * drive[n]
-        state = first[n] * state + (1.0 - first[n]) * drive[n]
+    for n in range(speeds.size):
+        # what the first low pass has at the start of an interval leaves in the second at its end
+        left = DIFFERENTIATOR / (DIFFERENTIATOR - LOW_PASS) * (first[n] - second[n])
+        fresh = 1.0 - second[n] - left
+        filtered[n + 1] = second[n] * filtered[n] + left * state + fresh * speeds[n]
+        state = first[n] * state + (1.0 - first[n]) * speeds[n]

@@ -18,7 +18,7 @@ from swashplate.tables import FIGURE, TABLE, Column, Table, count, ended, joined
 
 LEGEND = (
     "jitter and longest gap in ms; clip: % of the samples at the ends of the instrument's range;\n"
-    "stuck: longest standstill of a noisy signal in s; lost: jumps that no motion explains"
+    "lost: jumps that no motion explains"
 )
 INFORMATION = (
     "Under 'runs', one letter a run: # gives 20 % or more of the information, + gives less, . "

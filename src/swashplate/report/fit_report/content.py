@@ -175,14 +175,14 @@ def _shared(
     axes = {run.experiment.axis for run in runs}
     examined = {each: examine(each) for each in campaign if each.axis in axes}
     found = [
-        (each.experiment, ended(f"{each.experiment}, {each.signal}: {words}"))
-        for qualities in examined.values()
+        (run.name, ended(f"{run.name}, {each.signal}: {words}"))
+        for run, qualities in examined.items()
         for each in qualities
         for words in each.findings
     ]
     findings: dict[str, list[int]] = {}
-    for number, (run, _) in enumerate(found, start=1):
-        findings.setdefault(run, []).append(number)
+    for number, (name, _) in enumerate(found, start=1):
+        findings.setdefault(name, []).append(number)
     words = f"Drive {drive.name}"
     if isinstance(drive, ModelSetup):
         words = f"Model {drive.name}"
