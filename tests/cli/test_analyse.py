@@ -75,6 +75,7 @@ def test_bands(done, tmp_path, monkeypatch):
     assert float(before) == pytest.approx(3.8, abs=1.2)
     assert float(after) == pytest.approx(1.5 * float(before), abs=0.02)
     assert cells(text, "speed limit, positive")[:4] == final[:4]  # 9 V reaches the stop
+    assert "half of the interval that holds 95 % of the drives" in text
     assert "Band of 50 drives, changed: at most" in text
     assert (tmp_path / "w.svg").exists()
 
