@@ -45,7 +45,6 @@ def test_what_to_change_first(done, number):
     assert number(text, "orifice") == pytest.approx(69.5)
     assert "spool stop" not in rows  # it does nothing here
     assert "Change first: in-line orifice: larger bore (Z16)." in text
-    assert "falls by 96.6 %" in " ".join(text.split())
 
 
 def test_figure_9_1(done, number, tmp_path):
@@ -76,6 +75,7 @@ def test_bands(done, tmp_path, monkeypatch):
     assert float(before) == pytest.approx(3.8, abs=1.2)
     assert float(after) == pytest.approx(1.5 * float(before), abs=0.02)
     assert cells(text, "speed limit, positive")[:4] == final[:4]  # 9 V reaches the stop
+    assert "half of the interval that holds 95 % of the drives" in text
     assert "Band of 50 drives, changed: at most" in text
     assert (tmp_path / "w.svg").exists()
 
@@ -208,9 +208,6 @@ def test_numbers_are_those_of_the_functions(done, tmp_path):
     done("compare", "hoist", "slew", "--rate", "100", "--out", "both.csv")
     expected = slew.simulate(maneuvers.step(9.0).sample(100.0), 100.0)
     np.testing.assert_array_equal(pl.read_csv("both.csv")["shaft_speed slew"], expected.shaft_speed)
-    done("limits", "slew", "--out", "slew.parquet")
-    table = pl.read_parquet("slew.parquet").filter(pl.col("quantity") == "speed_limit")
-    assert np.degrees(table["plus"][0]) == pytest.approx(4.242, abs=5e-4)
     done("compensate", "luff", "--out", "luff.toml", "--points", "21")
     plus = tomllib.loads((tmp_path / "luff.toml").read_text("utf-8"))["plus"]
     assert len(plus["speed"]) == 21

@@ -61,15 +61,6 @@ def test_a_wrong_sign_and_a_long_name(done: Words, logs: list[str], tmp_path: Pa
     assert [lines[k].split()[0] + lines[k + 1].strip() for k in rows] == [name] * 2
 
 
-def test_a_close_look(done: Words, refused: Words, logs: list[str]) -> None:
-    done("campaign", "init", *logs, *COUNTS, "--drive", "hoist")
-    look = ("campaign", "plot", "--run", "lift", "--channel")
-    said = done(*look, "encoder_counts", "--to", "0.5", "--out", "counts.svg")
-    assert "Figure: counts.svg" in said
-    assert "go together" in refused("campaign", "plot", "--run", "lift")
-    assert "no channel 'speed'" in refused(*look, "speed")
-
-
 TACHO = """
 [axes.hoist]
 drive = "hoist"
@@ -93,6 +84,8 @@ def test_a_tacho_beside_the_drive_before_any_fit(
         done(*look, "--out", "look.svg")
         drawn = (tmp_path / "look.svg").read_text("utf-8")
         assert ("measured less simulated" in drawn) == bool(drive)
+    assert "go together" in refused("campaign", "plot", "--run", "log")
+    assert "no channel 'speed'" in refused(*look[:5], "speed")
     (tmp_path / "campaign.toml").write_text(TACHO.replace('"V"', '"mV"'), "utf-8")
     said = refused("fit", "campaign.toml", "--setup", "hoist", "--out", "fit")
     assert 'if the log is in V, write unit = "V": it then reaches 4 V' in said

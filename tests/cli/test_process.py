@@ -91,16 +91,6 @@ def test_a_folder_that_is_gone(tmp_path):
     assert done.stderr == "Error: The current folder does not exist any more; go to another.\n"
 
 
-def test_an_error_is_one_sentence_and_no_traceback(tmp_path):
-    done = swashplate("simulate", "hoist", "step:11", "--out", "run.csv", cwd=tmp_path)
-    assert done.returncode == 2
-    assert done.stdout == ""
-    assert done.stderr == (
-        "Error: The voltage is 11 V at 1 s, but the card takes ±10 V; check its unit, or clip it.\n"
-    )
-    assert list(tmp_path.iterdir()) == []
-
-
 def test_a_broken_pipe_is_silent(tmp_path):
     reading, writing = os.pipe()
     os.close(reading)

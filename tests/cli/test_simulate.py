@@ -150,15 +150,12 @@ def test_two_axes(done, number):
     assert number(text, "response time", 1) == pytest.approx(lag, abs=3e-3)
 
 
-def test_axes_lists_drives_and_cards(done):
+def test_drives_and_parameters_are_listed_in_80_columns(done):
     text = done("axes")
     for name in preset_names():
         assert f"\n{name} " in text
     assert "rexroth_mdsd_1k_2x_4" in text
     assert max(map(len, text.splitlines())) <= 80
-
-
-def test_show_lists_every_parameter_in_80_columns(done):
     text = done("show", "slew")
     first_words = [line.split()[0] for line in text.splitlines() if line.strip()]
     assert set(CATALOGUE) <= set(first_words)

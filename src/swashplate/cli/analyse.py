@@ -155,9 +155,9 @@ def whatif(
     bands, said = dict[str, monte_carlo.Bands](), list[str]()
     if uncertainty is not None:
         with working("Drawing drives"):
-            before = monte_carlo.stored_draws(uncertainty, drive=choice.chosen, campaign=campaign)
-            drawn = {AS_IS: before, CHANGED: before.pulled(moved)}
-            said.append(f"± is half of the interval that holds {LEVEL:.0%} of the drives.")
+            draws = monte_carlo.stored_draws(uncertainty, drive=choice.chosen, campaign=campaign)
+            drawn = {AS_IS: draws, CHANGED: draws.pulled(moved)}
+            said.append(f"± is half of the interval that holds {100.0 * LEVEL:g} % of the drives.")
             for which, each in drawn.items():
                 band = monte_carlo.bands(each, trial, result.outcomes, level=LEVEL)
                 bands[which], (width, when) = band, band.widest
@@ -165,13 +165,14 @@ def whatif(
                     f"Band of {band.draws} drives, {which}: at most "
                     f"{quantity(width, 'rad/s', spec='.3g')} wide, at {when:.3g} s."
                 )
-            said += before.sentences()
+            said += draws.sentences()
     files.write(out, "Changed drive", result.after.drive.to_toml)
-    title, factor = f"{choice.title}, {name}", ", ".join(f"{k} x {v:g}" for k, v in moved.items())
-    files.draw(plot, "plot_whatif", result, bands=bands, title=f"{title}: {factor}")
+    title = f"{choice.title}, {name}"
+    changes = ", ".join(f"{name} x {factor:g}" for name, factor in moved.items())
+    files.draw(plot, "plot_whatif", result, bands=bands, title=f"{title}: {changes}")
     note(title)
-    before_it, after = result.before.drive.parameters, result.after.drive.parameters
-    for line in words.changes_between(before_it, after):
+    before, after = (each.drive.parameters for each in (result.before, result.after))
+    for line in words.changes_between(before, after):
         note(line)
     show(result.table(bands))
     bullets(result.sentences(), said)

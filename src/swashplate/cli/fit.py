@@ -62,9 +62,10 @@ class Clock:
     @contextmanager
     def part(self, name: str) -> Iterator[None]:
         """Count what is done to a part."""
+        begun = perf_counter()
         from swashplate.equations.code import generating_time
 
-        begun, before = perf_counter(), generating_time()
+        before = generating_time()
         yield
         kernels = generating_time() - before
         self.parts["start and kernels"] += kernels

@@ -172,7 +172,7 @@ UNITLESS = {"axes", "doctor", "init", "schema"}
 
 
 def command(
-    app: typer.Typer, name: str, examples: str = "", panel: str | None = None
+    app: typer.Typer, name: str, panel: str | None = None
 ) -> Callable[[Callable[..., None]], Callable[..., None]]:
     """Register a command: its groups spread, --force and units added.
 
@@ -193,12 +193,10 @@ def command(
         shared = [inspect.cleandoc(each.__doc__ or "").partition("Options:\n")[2] for each in kinds]
         found = _ENTRY.finditer("\n".join([SHARED, *shared, entries]))
         said = {each[1]: each for each in found}
-        flat = []
+        flat = list[inspect.Parameter]()
         for each in given:
-            if each.name in groups:
-                flat += _spread(groups[each.name])
-            else:
-                flat.append(each.replace(annotation=hints[each.name]))
+            own = [each.replace(annotation=hints[each.name])]
+            flat += _spread(groups[each.name]) if each.name in groups else own
         flat += _spread(Replacing) if WRITTEN & {each.name for each in given} else []
         flat += _spread(ShownUnits) if name not in UNITLESS else []
         flat = [_described(each, said) for each in flat]
@@ -216,9 +214,7 @@ def command(
         # Typer reads the options off the signature, which functions have without declaring it
         run.__signature__ = inspect.Signature(flat)  # type: ignore[attr-defined]
         run.__annotations__ = {each.name: each.annotation for each in flat}
-        app.command(name, epilog=f"Examples:{shown}" if head else examples, rich_help_panel=panel)(
-            run
-        )
+        app.command(name, epilog=f"Examples:{shown}" * bool(head), rich_help_panel=panel)(run)
         return function
 
     return register
@@ -243,10 +239,9 @@ def _spread(group: Any) -> list[inspect.Parameter]:
     """A group's fields as parameters; what must be given is an argument."""
     hints, made = get_type_hints(group, include_extras=True), []
     for each in fields(group):
-        must = each.default is MISSING
+        must, hint = each.default is MISSING, hints[each.name]
         kind = inspect.Parameter.POSITIONAL_OR_KEYWORD if must else inspect.Parameter.KEYWORD_ONLY
         default = inspect.Parameter.empty if must else each.default
-        hint = hints[each.name]
         if each.init:
             made.append(inspect.Parameter(each.name, kind, default=default, annotation=hint))
     return made

@@ -7,7 +7,6 @@ Its source is found and checked here, without types and without running anything
 
 import ast
 import builtins
-import inspect
 import linecache
 import math
 import os
@@ -177,8 +176,10 @@ class Parsed:
     @property
     def defaults(self) -> dict[str, Any]:
         """Values of arguments that need not be given."""
-        taken = inspect.signature(self.function).parameters.values()
-        return {each.name: each.default for each in taken if each.default is not each.empty}
+        given, taken = self.function.__defaults__ or (), self.node.args
+        last = [*taken.posonlyargs, *taken.args][-len(given) :] if given else []
+        by_name = self.function.__kwdefaults__ or {}
+        return {e.arg: value for e, value in zip(last, given, strict=True)} | by_name
 
     @property
     def local(self) -> set[str]:
