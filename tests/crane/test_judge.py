@@ -247,9 +247,9 @@ def test_what_makes_no_study_is_said(crane):
         with pytest.raises(InputError, match=message):
             judge(crane, MEANT, **{"seeds": [0], **how})
 
-    refuse("at least one seed", seeds=[])
+    refuse("needs a controller, a set of drives and a seed", seeds=[])
     refuse("no drives 'fast'; there are ideal, identified, volts", drives=("fast",))
-    refuse("one controller and one set of drives", drives=())
+    refuse("needs a controller, a set of drives and a seed", drives=())
     refuse("empty list of cranes", drives={"drawn": []})
     refuse("counts from 40 s on, but a run is 30 s long", length=30.0)
     refuse("allowed is 2, but is a share", allowed=2.0)
