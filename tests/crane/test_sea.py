@@ -142,12 +142,8 @@ def write_table(path, ship, headings=(0.0, 90.0, 180.0), frequencies=(0.1, 0.5, 
     for heading in headings:
         found = ship.response(np.array(frequencies), np.full(len(frequencies), radians(heading)))
         for omega, motions in zip(frequencies, found.T, strict=True):
-            numbers = [
-                heading,
-                omega,
-                *(part for z in motions.tolist() for part in (z.real, z.imag)),
-            ]
-            rows.append(",".join(map(repr, numbers)))
+            parts = (part for z in motions.tolist() for part in (z.real, z.imag))
+            rows.append(",".join(map(repr, (heading, omega, *parts))))
     path.write_text("\n".join(rows), "utf-8")
 
 
@@ -231,8 +227,6 @@ def test_cut_files_and_other_conventions_are_refused(tmp_path):
 
     refused("there is no yaw for 0.5 rad/s and 180 deg; the file is cut", lines[:-7])
     refused("line 3: motion is missing, .* needed are period", [*lines[:2], lines[2][:30]])
-    wrong = lines[2].replace("1.000000e+00", "3.000000e+00", 1)
-    refused("line 3: the parts 1 and .* have not the modulus 3", [*lines[:2], wrong])
     refused("has no motions in waves from 0 to 180", [])
     # headings counted from where waves come: everything but heave the other way
     turned = [
@@ -247,11 +241,12 @@ def test_cut_files_and_other_conventions_are_refused(tmp_path):
         read_ship(nc)
     with h5py.File(nc, "a") as file:
         del file["RAO"]
-    with pytest.raises(FileError, match="has no array RAO; it has complex, omega, radiating_dof"):
-        read_ship(nc)
-    nc.write_text("nothing", "utf-8")
-    with pytest.raises(FileError, match="is no file of netCDF 4"):
-        read_ship(nc)
+    for _ in range(2):
+        with pytest.raises(
+            FileError, match="is no file of netCDF 4 with an array RAO over complex"
+        ):
+            read_ship(nc)
+        nc.write_text("nothing", "utf-8")
 
 
 def test_measured_motion_comes_from_a_log(tmp_path):

@@ -71,7 +71,7 @@ def write_judgment(judgment: Judgment, path: str | Path) -> None:
     try:
         runs = {name: judgment.run(name, judgment.typical) for name in (NONE, judged)}
         caption = f"Seaway {judgment.typical}, in which '{judged}' swings as in half of all seaways"
-        example = [_drawn(plot_crane(runs, title=""), caption)]
+        example = [_drawn(plot_crane(runs, title=f"Swing in seaway {judgment.typical}"), caption)]
     except DomainError:  # a run that was stopped has no signals
         pass
     basis.append(
