@@ -370,8 +370,8 @@ def control_of(words: str) -> Control | None:
         "clip": (control.Clip, 1),
         "loop": (control.PositionLoop, 1),
     }
-    kinds |= {f"{each}-tip": (partial(control.TipShaper, each), 0) for each in control.IMPULSES}
-    kinds |= {f"{each}-joint": (partial(control.JointShaper, each), 0) for each in control.IMPULSES}
+    for where, shaper in (("tip", control.TipShaper), ("joint", control.JointShaper)):
+        kinds |= {f"{shape}-{where}": (partial(shaper, shape), 0) for shape in control.IMPULSES}
     made: Control | None = None
     for word in filter(None, words.split("+")):
         name, _, text = word.partition("=")
@@ -389,7 +389,7 @@ def control_of(words: str) -> Control | None:
 
 def _axis(axis: str, what: str) -> str:
     if axis not in AXES:
-        raise InputError(f"{what} of the {axis}: the axes are {', '.join(AXES)}.")
+        raise InputError(f"'{what}' of the '{axis}': the axes are hoist, slew and luff.")
     return axis
 
 
@@ -426,8 +426,9 @@ def _pages() -> Any:
     return scene
 
 
-for _name, _run in {
-    "show": show_crane, "run": run, "judge": judge, "follow": follow, "sweep": sweep,
-    "sectors": sectors,
-}.items():  # fmt: skip
-    command(app, _name)(_run)
+command(app, "show")(show_crane)
+command(app, "run")(run)
+command(app, "judge")(judge)
+command(app, "follow")(follow)
+command(app, "sweep")(sweep)
+command(app, "sectors")(sectors)

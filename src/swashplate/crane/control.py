@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 Impulses = tuple[float, float, float]
 Shaping = Literal["zv", "zvd", "ei"]
-IMPULSES: dict[str, Impulses] = {
+IMPULSES: dict[Shaping, Impulses] = {
     "zv": (0.5, 0.5, 0.0),
     "zvd": (0.25, 0.5, 0.25),
     "ei": (0.2625, 0.475, 0.2625),

@@ -108,12 +108,13 @@ class CraneStepper:
     """
 
     def __init__(self, crane: Crane, **setup: Unpack[Setup]) -> None:
-        control = setup.pop("control", None)
-        self._crane, self.actuation = crane, setup.get("actuation", "inverse")
+        how: dict[str, Any] = dict(setup)
+        control = how.pop("control", None)
+        self._crane, self.actuation = crane, how.get("actuation", "inverse")
         if self.actuation == "direct" and control is not None:
             raise InputError("With direct actuation the voltages are given: leave control out.")
         settings, law = settings_of(control)
-        self.fixed = fixed = _fixed(crane, settings, **setup)
+        self.fixed = fixed = _fixed(crane, settings, **how)
         given = ("voltage", "load_torque") if fixed.loaded else ("voltage",)
         compiled = [_compiled(getattr(crane, axis), given) for axis in AXES]
         self._steps = [step for step, _ in compiled]

@@ -104,7 +104,7 @@ class Study(Result):
         start: float = 40.0,
         executor: Executor | None = None,
         progress: Callable[[int, int], None] | None = None,
-        **setup: Unpack[Setup],
+        **setup: Any,
     ) -> Study:
         """A study; these are the keywords of `judge` and `sweep`.
 
@@ -150,9 +150,8 @@ class Study(Result):
                 f"Swing counts from {start:g} s on, but a run is {stick.length:g} s long: begin "
                 "earlier or take a longer one."
             )
-        own: Setup = {"slew_deg": 90.0, "boom_deg": 45.0, "rope_m": 27.0, **setup}
-        own |= {"control": None, "actuation": "inverse"}
-        none = Case((crane,), own, stick)
+        own: Any = {"slew_deg": 90.0, "boom_deg": 45.0, "rope_m": 27.0, **setup}
+        none = Case((crane,), own | {"control": None, "actuation": "inverse"}, stick)
         cases = {NONE: none}
         for law, stages in laws.items():
             for name, given in sets.items():
