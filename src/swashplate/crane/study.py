@@ -144,6 +144,8 @@ class Study(Result):
         sets = drives if isinstance(drives, Mapping) else {each: each for each in drives}
         if not (laws and sets and seeds):
             raise InputError("A study needs a controller, a set of drives and a seed at least.")
+        if "actuation" in setup:
+            raise InputError("A study takes its drives by name, drives=('ideal',), not actuation.")
         stick = stick or Stick.rest(length)
         if not 0.0 <= start < stick.length:
             raise InputError(
