@@ -247,6 +247,7 @@ class CraneStepper:
 def _fixed(
     crane: Crane,
     settings: Any,
+    *,
     actuation: Actuation = "inverse",
     slew_deg: float = 0.0,
     boom_deg: float = 45.0,
