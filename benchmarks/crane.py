@@ -33,9 +33,8 @@ def crane_rows() -> Iterator[Row]:
     yield row("crane: open loop, three drives, 60 s", plain, OPEN)
     closed = alone(lambda: crane.simulate(stick, sea=ship, control=MEANT, **how), 9)
     yield row("crane: closed loop in a seaway, 60 s", closed, CLOSED)
-    study = Study.of(crane, MEANT, {"seeds": range(1000)})
-    case = study.cases()["identified"]
-    many = alone(lambda: study.outcomes([case]), 1)
+    study = Study.of(crane, MEANT, seeds=range(1000))
+    many = alone(lambda: study.outcomes([study.cases["identified"]]), 1)
     yield row("crane: 1,000 seaways of 120 s, closed loop, all cores", many, THOUSAND)
     judged = alone(lambda: judge(crane, MEANT, seeds=range(200), remedies=False), 1)
     yield row("crane: judgment, 200 seaways, 2 sets of drives, all cores", judged, JUDGED)

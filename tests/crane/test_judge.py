@@ -8,15 +8,7 @@ import pytest
 from swashplate import Campaign, Drive
 from swashplate.analysis.monte_carlo import Draws, stored_draws
 from swashplate.campaign import rig
-from swashplate.crane import (
-    Crane,
-    Seaway,
-    Stick,
-    control,
-    follow,
-    judge,
-    sweep,
-)
+from swashplate.crane import Crane, Stick, control, follow, judge, sweep
 from swashplate.crane.judgment import mean_of
 from swashplate.crane.result import PUMPS
 from swashplate.errors import InputError
@@ -54,16 +46,14 @@ def test_numbers_are_those_of_whole_runs(judged):
             assert judged.values[3, 2, 3 + 5 * k + i] == pytest.approx(share, abs=1e-12)
 
 
-@pytest.mark.parametrize("executor", [Serial(), Threads(1), Threads(3)], ids=["one", "1", "3"])
+@pytest.mark.parametrize(
+    "executor",
+    [Serial(), Threads(3), pytest.param(Processes(2), marks=pytest.mark.slow)],
+    ids=["one", "threads", "processes"],
+)
 def test_numbers_do_not_depend_on_who_runs_them(crane, judged, executor):
     again = judge(crane, MEANT, seeds=[3, 5], remedies=False, executor=executor, **SHORT)
     np.testing.assert_array_equal(again.values, judged.values[[3, 5]])
-
-
-@pytest.mark.slow
-def test_processes_give_the_same_numbers(crane, judged):
-    again = judge(crane, MEANT, seeds=range(4), remedies=False, executor=Processes(2), **SHORT)
-    np.testing.assert_array_equal(again.values, judged.values[:4])
 
 
 def test_verdict_and_what_would_do(crane, judged):
@@ -126,17 +116,6 @@ def test_axes_follow_what_speed_and_acceleration_allow(crane):
     # the hull that rolls at 13 s asks for this much along the boom, of the same model
     asked = [found.seas[each].amplitude[2] for each in ("ss3", "ss3-swell", "ss4")]
     np.testing.assert_allclose(asked, [0.75, 1.65, 2.1], rtol=0.06)
-
-
-def test_demand_is_that_of_simulated_motion(crane):
-    sea = Seaway("ss3", seed=2)
-    motion = sea.motion(2000 * 8 + 1, 8.0)
-    g = crane.geometry  # boom abeam, up by 45 degrees
-    along = motion[:, 1] - motion[:, 3] * (g.axis.z + g.boom * np.sqrt(0.5))
-    along = along + motion[:, 5] * g.axis.x
-    asked = follow(crane, [7.5], seas=("ss3",)).seas["ss3"]
-    # 270 waves: a standard deviation is good to about 10 %
-    assert 2.0 * along.std() == pytest.approx(asked.amplitude[2], rel=0.2)
 
 
 def test_boom_along_the_ship_is_calm_where_the_slew_does_the_work(crane):
@@ -247,9 +226,9 @@ def test_what_makes_no_study_is_said(crane):
         with pytest.raises(InputError, match=message):
             judge(crane, MEANT, **{"seeds": [0], **how})
 
-    refuse("at least one seed", seeds=[])
+    refuse("needs a controller, a set of drives and a seed", seeds=[])
     refuse("no drives 'fast'; there are ideal, identified, volts", drives=("fast",))
-    refuse("one controller and one set of drives", drives=())
+    refuse("needs a controller, a set of drives and a seed", drives=())
     refuse("empty list of cranes", drives={"drawn": []})
     refuse("counts from 40 s on, but a run is 30 s long", length=30.0)
     refuse("allowed is 2, but is a share", allowed=2.0)

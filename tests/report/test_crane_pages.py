@@ -131,7 +131,18 @@ def test_figure_over_the_stick_shows_swing_and_where_the_slew_ends(crane, assert
     assert (swing.get_ylabel(), ends.get_ylabel()) == ("residual swing (deg)", "slew reached (deg)")
 
 
-def test_figure_of_runs_has_a_panel_for_the_sea(crane, runs):
+def test_figure_of_runs_shows_them_by_name_what_moves_and_the_sea(crane, runs):
     calm = {name: crane.simulate(Stick.rest(20.0), slew_deg=90) for name in runs}
-    labels = [ax.get_ylabel() for ax in figures.plot_crane(calm, sea=runs).axes]
+    figure = figures.plot_crane(calm, sea=runs)
+    labels = [ax.get_ylabel() for ax in figure.axes]
     assert labels == ["swing (deg)", "in sea (deg)", "limits"]
+    names = [each.get_text() for each in figure.axes[0].get_legend().get_texts()]
+    assert names == list(runs)
+    stick = Stick.trapezoid(slew=0.5, luff=0.5, duration=9.0, length=12.0)
+    figure = crane.simulate(stick).plot()
+    labels = [ax.get_ylabel() for ax in figure.axes]
+    assert labels == ["swing (deg)", "slew (deg)", "boom (deg)", "limits"]
+    texts = [each.get_text() for ax in figure.axes for each in ax.texts]
+    assert any("12 of 13 quantities of the crane are assumed" in each for each in texts)
+    with pytest.raises(InputError, match="shows 1 to 6 runs of a crane, not 0"):
+        figures.plot_crane({})

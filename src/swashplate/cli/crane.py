@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -13,14 +14,15 @@ from swashplate.cli.options import FigureFile, TableFile, command
 from swashplate.cli.terminal import Outputs, long_work, note, say, show, side, working
 from swashplate.cli.words import drive_of, pairs_of
 from swashplate.errors import InputError
-from swashplate.tables import FIGURE, TABLE, Form
+from swashplate.tables import FIGURE, TABLE, Form, Table
 
 if TYPE_CHECKING:
-    from swashplate.crane import Crane, Judgment, Seaway
+    from swashplate.crane import Crane, Seaway
     from swashplate.crane.control import Control
 
 PAGE = Form("a page", (".html",))
-START = ("slew_deg", "boom_deg", "rope_m")
+VERDICT = Form("a verdict", (".html", ".csv", ".parquet"))
+START, AXES = ("slew_deg", "boom_deg", "rope_m"), ("hoist", "slew", "luff")
 
 app = typer.Typer(
     help="Whole cranes: boom, rope and load behind three drives, on a ship.",
@@ -53,19 +55,13 @@ class Placed:
 
         own = self.crane.endswith(".toml")
         made = Crane.from_toml(self.crane) if own else Crane.preset(self.crane)
-        pairs = pairs_of("--drive", self.drive or (), "luff=mine.toml")
-        for axis, name in pairs:
-            _check_axis(axis, f"--drive {axis}={name}")
-        return made.with_drive(**{axis: drive_of(name) for axis, name in pairs})
+        pairs = pairs_of("--drive", self.drive, "luff=mine.toml")
+        return made.with_drive(**{_axis(axis, name): drive_of(name) for axis, name in pairs})
 
     @property
     def pose(self) -> dict[str, Any]:
         """Where a run begins, as far as it is given."""
-        made = _numbers("--at", self.at, "rope_m=25")
-        strange = [each for each in made if each not in START]
-        if strange:
-            raise InputError(f"--at has no {strange[0]}; it has {', '.join(START)}.")
-        return made
+        return _numbers("--at", self.at, "rope_m=25", START)
 
     def seaway(self, text: str | None) -> Seaway | None:
         """The seaway of words such as ``ss3,90,1``, for the ship."""
@@ -78,9 +74,8 @@ class Placed:
         name, *rest = text.split(",")
         if len(rest) > 2:
             raise InputError(f"--sea {text} has too many parts: write --sea ss3,90,1.")
-        numbers = [_number(f"--sea {text}", each) for each in rest]
-        seed = int(numbers[1]) if len(numbers) > 1 else 0
-        waves = Seaway(name, numbers[0] if numbers else 90.0, seed)
+        heading, seed = [*(_number(f"--sea {text}", each) for each in rest), 90.0, 0.0][:2]
+        waves = Seaway(name, heading, int(seed) if len(rest) > 1 else 0)
         if self.ship is None:
             return waves
         path, _, unit = self.ship.partition(",")
@@ -112,6 +107,9 @@ class Studied(Placed):
 
     def asked(self) -> tuple[Control, dict[str, Any]]:
         """The controller, and keywords of a study."""
+        from swashplate.analysis.monte_carlo import stored_draws
+        from swashplate.analysis.whatif import find_lever, pulled
+
         law = control_of(self.control)
         if law is None:
             raise InputError("--control is empty: there is nothing to judge.")
@@ -120,39 +118,29 @@ class Studied(Placed):
             how["sea"] = self.seaway(self.sea)
         if self.seeds is not None:
             how["seeds"] = range(self.seeds)
-        if self.drives is not None or self.scale:
-            how["drives"] = self._sets()
-        return law, how
-
-    def _sets(self) -> dict[str, Any]:
-        """Sets of drives by name, as `Crane.judge` takes them."""
-        from swashplate.analysis.whatif import find_lever, pulled
-
-        names = map(str.strip, (self.drives or "ideal,identified").split(","))
-        made: dict[str, Any] = {
-            name: self._drawn() if name == "drawn" else name for name in names if name
-        }
+        if self.drives is None and not self.scale:
+            return law, how
+        words = filter(None, map(str.strip, (self.drives or "ideal,identified").split(",")))
+        sets: dict[str, Any] = {name: name for name in words}
+        if "drawn" in sets:
+            pairs = pairs_of("--drive", self.drive, "luff=fitted")
+            draws = {axis: stored_draws(place) for axis, place in pairs if Path(place).is_dir()}
+            if not draws:
+                raise InputError("--drives drawn needs the folder of a fit: --drive luff=FOLDER.")
+            sets["drawn"] = self.chosen.drawn(**draws)
         crane, changed = self.chosen, []
         for name, text in pairs_of("--scale", self.scale, "luff.orifice=1.5"):
             axis, _, lever = name.partition(".")
             if not lever:
                 raise InputError(f"--scale {name}={text}: write the axis first, luff.orifice=1.5.")
-            _check_axis(axis, f"--scale {name}={text}")
             find_lever(lever)
             factor = _number(f"--scale {name}={text}", text)
-            crane = crane.with_drive(**{axis: pulled(getattr(crane, axis), {lever: factor})})
+            drive = getattr(crane, _axis(axis, lever))
+            crane = crane.with_drive(**{axis: pulled(drive, {lever: factor})})
             changed.append(f"{axis} {lever} ×{factor:g}")
-        return {**made, ", ".join(changed): crane} if changed else made
-
-    def _drawn(self) -> tuple[Crane, ...]:
-        """Cranes drawn from the errors of the fits whose folders were given."""
-        from swashplate.analysis.monte_carlo import stored_draws
-
-        pairs = pairs_of("--drive", self.drive, "luff=fitted")
-        folders = {axis: place for axis, place in pairs if Path(place).is_dir()}
-        if not folders:
-            raise InputError("--drives drawn needs the folder of a fit: --drive luff=FOLDER.")
-        return self.chosen.drawn(**{axis: stored_draws(place) for axis, place in folders.items()})
+        if changed:
+            sets[", ".join(changed)] = crane
+        return law, how | {"drives": sets}
 
 
 def show_crane(crane: str, *, toml: bool = False) -> None:
@@ -175,7 +163,7 @@ def show_crane(crane: str, *, toml: bool = False) -> None:
         return
     chosen = Placed(crane).chosen
     show(chosen.table())
-    for axis in ("hoist", "slew", "luff"):
+    for axis in AXES:
         note(f"{axis}: {getattr(chosen, axis).parameters.title}")
 
 
@@ -226,7 +214,9 @@ def run(
           --variant inverse --variant inverse:feedback=0.2+ship+clip
     """
     files = Outputs((out, TABLE), (plot, FIGURE), (scene, PAGE))
-    variants = variant or ["inverse"]
+    runs, first = {}, ""
+    if out is not None and len(variant or ()) > 1:
+        raise InputError("--out writes one run's signals: take one --variant.")
     with working("Simulating"):
         from swashplate.crane import Stick, run_tables
 
@@ -235,20 +225,15 @@ def run(
         stick = Stick.trapezoid(
             hoist=hoist, slew=slew, luff=luff, until=targets, duration=duration, length=length
         )
-        runs = {}
-        for word in variants:
-            actuation, _, law = word.partition(":")
+        for first in variant or ["inverse"]:
+            actuation, _, law = first.partition(":")
             how: dict[str, Any] = {"actuation": actuation, "control": control_of(law)}
-            runs[word] = crane.simulate(stick, sea=seaway, brake=brake, **how, **placed.pose)
+            runs[first] = crane.simulate(stick, sea=seaway, brake=brake, **how, **placed.pose)
         tables = run_tables(runs)
-    if out is not None and len(runs) > 1:
-        raise InputError(f"--out writes one run's signals, but there are {len(runs)} variants.")
-    files.write(out, "All signals, in SI", runs[variants[0]].write)
+    files.write(out, "All signals, in SI", runs[first].write)
     files.draw(plot, "plot_crane", runs)
     files.write(scene, "Scene", lambda path: _pages().write_scene(runs, path))
-    note(crane.title)
-    show(*tables)
-    files.say()
+    _end(files, crane, tables)
 
 
 def judge(
@@ -277,26 +262,20 @@ def judge(
       swashplate crane judge tg3637 --scale luff.orifice=3 --out judge.html
       swashplate crane judge tg3637 --drive luff=fitted --drives identified,drawn
     """
-    files = Outputs((out, Form("a verdict", (".html", ".csv", ".parquet"))), (plot, FIGURE))
+    files = Outputs((out, VERDICT), (plot, FIGURE))
     law, how = study.asked()
     if dask is not None:
         from swashplate.executors import Dask
 
         how["executor"] = Dask(dask)
     with long_work("Seaways") as shown:
-        found: Judgment = study.chosen.judge(
-            law, allowed=allowed / 100.0, remedies=remedies, **how,
-            progress=lambda done, of: shown(f"{done} of {of} seaways", done / of),
-        )  # fmt: skip
+        how["progress"] = lambda done, of: shown(f"{done} of {of} seaways", done / of)
+        found = study.chosen.judge(law, allowed=allowed / 100.0, remedies=remedies, **how)
     page = out is not None and out.suffix.lower() == ".html"
     write = (lambda path: _pages().write_judgment(found, path)) if page else found.write
     files.write(out, "Verdict", write)
     files.draw(plot, "plot_judgment", found)
-    note(study.chosen.title)
-    show(*found.tables())
-    for sentence in found.sentences()[1:]:
-        say(sentence)
-    files.say()
+    _end(files, study.chosen, found.tables(), *found.sentences()[1:])
     if not found.passed:
         side.print(f"Fails: {found.verdict()}")
         raise typer.Exit(1)
@@ -326,9 +305,7 @@ def follow(
         found = placed.chosen.follow(seaway=seaway, **names, **placed.pose)
     files.write(out, "Amplitudes, in SI", found.tables()[0].write)
     files.draw(plot, "plot_follow", found)
-    note(placed.chosen.title)
-    show(*found.tables())
-    files.say()
+    _end(files, placed.chosen, found.tables())
 
 
 def sweep(
@@ -362,14 +339,11 @@ def sweep(
     if points is not None:
         how["points"] = [_number(f"--points {points}", each) for each in points.split(",")]
     with long_work("Seaways") as shown:
-        found = study.chosen.sweep(
-            over, law, **how, progress=lambda done, of: shown(f"{done} of {of} seaways", done / of)
-        )
+        how["progress"] = lambda done, of: shown(f"{done} of {of} seaways", done / of)
+        found = study.chosen.sweep(over, law, **how)
     files.write(out, "Swing, in SI", found.tables()[0].write)
     files.draw(plot, "plot_sweep", found)
-    note(study.chosen.title)
-    show(*found.tables())
-    files.say()
+    _end(files, study.chosen, found.tables())
 
 
 def sectors(
@@ -396,32 +370,36 @@ def control_of(words: str) -> Control | None:
         "clip": (control.Clip, 1),
         "loop": (control.PositionLoop, 1),
     }
-    shapers: dict[str, Any] = {"joint": control.JointShaper, "tip": control.TipShaper}
+    for where, shaper in (("tip", control.TipShaper), ("joint", control.JointShaper)):
+        kinds |= {f"{shape}-{where}": (partial(shaper, shape), 0) for shape in control.IMPULSES}
     made: Control | None = None
     for word in filter(None, words.split("+")):
         name, _, text = word.partition("=")
         numbers = [_number(f"The control '{word}'", each) for each in text.split("/") if text]
-        shape, _, place = name.partition("-")
-        if place in shapers and not numbers:
-            stage = shapers[place](shape)
-        elif name in kinds and len(numbers) <= kinds[name][1]:
-            stage = kinds[name][0](*numbers)
-        else:
+        kind, most = kinds.get(name, (None, 0))
+        if kind is None or len(numbers) > most:
             raise InputError(
                 f"There is no control '{word}'; there are zv-joint, zv-tip (zvd, ei), "
                 "feedback=0.2/0.25, ship, clip=0.25 and loop=0.7."
             )
+        stage = kind(*numbers)
         made = stage if made is None else made | stage
     return made
 
 
-def _check_axis(axis: str, words: str) -> None:
-    if axis not in ("hoist", "slew", "luff"):
-        raise InputError(f"{words}: the axes are hoist, slew and luff.")
+def _axis(axis: str, what: str) -> str:
+    if axis not in AXES:
+        raise InputError(f"'{what}' of the '{axis}': the axes are hoist, slew and luff.")
+    return axis
 
 
-def _numbers(what: str, given: list[str] | None, example: str) -> dict[str, float]:
+def _numbers(
+    what: str, given: list[str] | None, example: str, known: Sequence[str] = ()
+) -> dict[str, Any]:
     pairs = pairs_of(what, given, example)
+    strange = [name for name, _ in pairs if known and name not in known]
+    if strange:
+        raise InputError(f"{what} has no {strange[0]}; it has {', '.join(known)}.")
     return {name: _number(f"{what} {name}={text}", text) for name, text in pairs}
 
 
@@ -430,6 +408,15 @@ def _number(what: str, text: str) -> float:
         return float(text)
     except ValueError:
         raise InputError(f"{what}: '{text}' is no number.") from None
+
+
+def _end(files: Outputs, crane: Crane, tables: Iterable[Table], *said: str) -> None:
+    """Print title, tables and sentences, and what was written."""
+    note(crane.title)
+    show(*tables)
+    for sentence in said:
+        say(sentence)
+    files.say()
 
 
 def _pages() -> Any:

@@ -18,10 +18,8 @@ from .sea import Spectrum as Spectrum
 from .sea import ship_motion as ship_motion
 from .stepper import CraneStepper as CraneStepper
 from .stepper import Setup as Setup
-from .stepper import Start as Start
 from .stick import Stick as Stick
 from .study import Study as Study
-from .study import StudySetup as StudySetup
 from .study import Sweep as Sweep
 from .study import sweep as sweep
 from .transfer_functions import Hull as Hull

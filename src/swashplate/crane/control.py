@@ -8,8 +8,7 @@ linear crane is for controllers that are designed outside the package.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-from importlib import import_module
+from dataclasses import dataclass
 from math import cos, inf, radians, sin
 from typing import TYPE_CHECKING, Any, ClassVar, Literal, NamedTuple
 
@@ -18,9 +17,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from swashplate.crane.kinematics import Boom, boom_rate, reach_rate
 from swashplate.crane.rope import GRAVITY
+from swashplate.crane.stick import AXES
 from swashplate.equations import Model
 from swashplate.errors import InputError
-from swashplate.results import Result
+from swashplate.linear import LinearModel
 
 if TYPE_CHECKING:
     from swashplate.crane.crane import Crane
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 Impulses = tuple[float, float, float]
 Shaping = Literal["zv", "zvd", "ei"]
-IMPULSES: dict[str, Impulses] = {
+IMPULSES: dict[Shaping, Impulses] = {
     "zv": (0.5, 0.5, 0.0),
     "zvd": (0.25, 0.5, 0.25),
     "ei": (0.2625, 0.475, 0.2625),
@@ -70,36 +70,35 @@ class Control:
     """One stage of control, or several; see the module's text."""
 
     kind: ClassVar[str] = ""
+    sets: ClassVar[tuple[str, ...]] = ()
+    """Fields of `Settings` that its own fields are."""
+
+    def __post_init__(self) -> None:
+        for name, value in vars(self).items():
+            most = 1.0 if name == "delay" else inf
+            if isinstance(value, int | float) and not (0.0 < value < inf and value <= most):
+                limit = "" if most == inf else f" and at most {most:g}"
+                raise InputError(
+                    f"The {name} of {self.kind} is {value:g}, but must be above 0{limit}."
+                )
+
+    def __or__(self, other: Control) -> Chain:
+        return Chain((*self.stages, *other.stages))
 
     @property
     def stages(self) -> tuple[Control, ...]:
         """Single stages."""
         return (self,)
 
-    def __or__(self, other: Control) -> Chain:
-        return Chain((*self.stages, *other.stages))
-
-    def _settings(self) -> dict[str, Any]:
-        """Fields of `Settings` that a stage sets."""
-        return {}
-
-    def _check(self, name: str, most: float = inf) -> None:
-        """Refuse a number of a stage that is not above 0, or too large."""
-        value = getattr(self, name)
-        if not (0.0 < value < inf and value <= most):
-            limit = "" if most == inf else f" and at most {most:g}"
-            raise InputError(f"The {name} of {self.kind} is {value:g}, but must be above 0{limit}.")
+    @property
+    def settings(self) -> dict[str, Any]:
+        """Fields of `Settings` that it sets."""
+        return dict(zip(self.sets, vars(self).values(), strict=False))
 
 
 @dataclass(frozen=True, repr=False)
 class Chain(Control):
-    """Several stages, each kind at most once.
-
-    Raises
-    ------
-    InputError
-        If two of them do the same.
-    """
+    """Several stages, each kind at most once; an `InputError` if two of them do the same."""
 
     parts: tuple[Control, ...]
 
@@ -119,36 +118,34 @@ class Chain(Control):
 
 
 @dataclass(frozen=True)
-class _Shaper(Control):
-    shape: Shaping = "zv"
-    kind: ClassVar[str] = "shaper"
-    shaped: ClassVar[str] = "tip"
-    """Field of `Settings`."""
-
-    def __post_init__(self) -> None:
-        if self.shape not in IMPULSES:
-            raise InputError(f"A shaper is 'zv', 'zvd' or 'ei', not '{self.shape}'.")
-
-    def _settings(self) -> dict[str, Any]:
-        return {self.shaped: IMPULSES[self.shape]}
-
-
-class JointShaper(_Shaper):
+class JointShaper(Control):
     """Shaper of the stick's commands, each impulse half a period of the present rope later.
 
     It keeps the way of each joint only while the rope keeps its length, and calm only while the
     joints move the tip along a line.
     """
 
-    shaped: ClassVar[str] = "joint"
+    shape: Shaping = "zv"
+    kind, sets = "shaper", ("joint",)
+
+    def __post_init__(self) -> None:
+        if self.shape not in IMPULSES:
+            raise InputError(f"A shaper is 'zv', 'zvd' or 'ei', not '{self.shape}'.")
+
+    @property
+    def settings(self) -> dict[str, Any]:
+        """Its impulses."""
+        return {self.sets[0]: IMPULSES[self.shape]}
 
 
-class TipShaper(_Shaper):
+class TipShaper(JointShaper):
     """Shaper of the path that the operator's commands give the tip in the deck's plane.
 
     Swing is linear in that path, so what cancels in it cancels in the swing, in a turn as well; and
     the path ends where the operator's ends, whatever the rope does.
     """
+
+    sets = ("tip",)
 
 
 @dataclass(frozen=True)
@@ -165,23 +162,18 @@ class DelayedFeedback(Control):
 
     gain: float = 0.2
     delay: float = 0.25
-    kind: ClassVar[str] = "delayed feedback"
-
-    def __post_init__(self) -> None:
-        self._check("gain")
-        self._check("delay", 1.0)
-
-    def _settings(self) -> dict[str, Any]:
-        return {"feedback": self.gain, "delay": self.delay}
+    kind, sets = "delayed feedback", ("feedback", "delay")
 
 
 @dataclass(frozen=True)
 class ShipCompensation(Control):
     """Compensation of the ship's motion: the wanted tip keeps its place over the sea."""
 
-    kind: ClassVar[str] = "ship compensation"
+    kind = "ship compensation"
 
-    def _settings(self) -> dict[str, Any]:
+    @property
+    def settings(self) -> dict[str, Any]:
+        """That it acts."""
         return {"ship": True}
 
 
@@ -194,7 +186,7 @@ class Clip(Control):
 
     Attributes
     ----------
-    size : float or "auto"
+    size : float
         Along the boom [m]; by default the largest sine of the load's frequency ω₀ that luff and
         slew can follow, min(v/ω₀, a/ω₀²) with their limits of speed v and acceleration a, times
         `share`.
@@ -204,14 +196,11 @@ class Clip(Control):
 
     size: float | Literal["auto"] = "auto"
     share: float = 0.8
-    kind: ClassVar[str] = "a clip"
+    kind = "a clip"
 
-    def __post_init__(self) -> None:
-        self._check("share")
-        if self.size != "auto":
-            self._check("size")
-
-    def _settings(self) -> dict[str, Any]:
+    @property
+    def settings(self) -> dict[str, Any]:
+        """Its size, 0 for one that follows from the limits, and share."""
         return {"clip": 0.0 if self.size == "auto" else float(self.size), "share": self.share}
 
 
@@ -226,13 +215,7 @@ class PositionLoop(Control):
     """
 
     gain: float = 0.7
-    kind: ClassVar[str] = "position loop"
-
-    def __post_init__(self) -> None:
-        self._check("gain")
-
-    def _settings(self) -> dict[str, Any]:
-        return {"gain": self.gain}
+    kind, sets = "position loop", ("gain",)
 
 
 @dataclass(frozen=True)
@@ -249,7 +232,7 @@ class Law(Control):
 
     model: Model
     values: Any = ()
-    kind: ClassVar[str] = "law"
+    kind = "law"
 
     def __post_init__(self) -> None:
         strange = [each for each in self.model.external if each not in SEEN]
@@ -272,12 +255,11 @@ def settings_of(control: Control | None) -> tuple[Settings, Law | None]:
         return Settings(), None
     if not isinstance(control, Control):
         raise InputError(f"{control!r} is no control of a crane; see swashplate.crane.control.")
-    made: dict[str, Any] = {}
+    made: dict[str, Any] = {"path": any("joint" not in each.sets for each in control.stages)}
     for each in control.stages:
-        made |= each._settings()
-    path = not all(isinstance(each, JointShaper) for each in control.stages)
+        made |= each.settings
     laws = [each for each in control.stages if isinstance(each, Law)]
-    return Settings(**made, path=path), laws[0] if laws else None
+    return Settings(**made), laws[0] if laws else None
 
 
 def feedback_damping(gain: ArrayLike, delay: ArrayLike) -> Array:
@@ -325,53 +307,28 @@ def feedback_damping(gain: ArrayLike, delay: ArrayLike) -> Array:
 
 # --- the linear crane -----------------------------------------------------------------------------
 
-INPUTS = ("hoist", "slew", "luff")
-"""Speeds of the shafts. [rad/s]"""
 STATES = ("offset_out", "speed_out", "offset_across", "speed_across", "rope", "slew", "boom")
-"""Load less tip, outwards along the boom and across it to starboard [m]; the load's speed that way
-[m/s]; rope [m]; slew and boom [rad]; the last three from where they are."""
 OUTPUTS = ("swing_out", "swing_across", "rope", "slew", "boom")
-"""Angles of the rope outwards and to starboard [rad]; the rest as the states."""
 
 
-@dataclass(frozen=True, eq=False)
-class LinearCrane(Result):
-    """A crane about a load that hangs at rest: ẋ = A x + B u, y = C x. Made by `Crane.linearize`.
+def linearize(crane: Crane, boom_deg: float, rope_m: float) -> LinearModel:
+    """Linear crane about a load that hangs at rest; the slew changes nothing in the boom's axes.
 
-    States, inputs and outputs are `STATES`, `INPUTS` and `OUTPUTS` of `swashplate.crane.control`.
+    Inputs are the shafts' speeds, hoist, slew, luff. [rad/s] States are load less tip, outwards
+    along the boom and across it to starboard [m], and the load's speed that way [m/s]; rope [m],
+    slew and boom [rad] from where they are. Outputs are angles of the rope outwards and to
+    starboard [rad], rope, slew, boom.
+
+    Raises
+    ------
+    InputError
+        For a boom or rope beyond the crane's limits.
+
+    Notes
+    -----
     Both axes of the swing are pendulums, apart from each other: d' = v - p', v' = -g/L d with p'
     the speed of the tip, -∂ρ/∂θ of the luff and ρ of the slew.
     """
-
-    name: str
-    A: Array = field(repr=False)
-    """(7, 7)"""
-    B: Array = field(repr=False)
-    """(7, 3)"""
-    C: Array = field(repr=False)
-    """(5, 7)"""
-
-    def to_control(self) -> Any:
-        """The model as python-control's StateSpace with named signals.
-
-        Raises
-        ------
-        InputError
-            If python-control is not installed.
-        """
-        try:
-            control = import_module("control")
-        except ImportError:
-            raise InputError(
-                "python-control is not installed: pip install swashplate[control]; A, B and C need "
-                "nothing more."
-            ) from None
-        named = {"inputs": list(INPUTS), "outputs": list(OUTPUTS), "name": self.name}
-        return control.ss(self.A, self.B, self.C, np.zeros((5, 3)), states=list(STATES), **named)
-
-
-def linearize(crane: Crane, boom_deg: float, rope_m: float) -> LinearCrane:
-    """Linear crane at a boom and rope, see `Crane.linearize`."""
     crane.home(0.0, boom_deg, rope_m)
     g, boom = crane.geometry, Boom(cos(radians(boom_deg)), sin(radians(boom_deg)))
     A, B, C = np.zeros((7, 7)), np.zeros((7, 3)), np.zeros((5, 7))
@@ -380,4 +337,5 @@ def linearize(crane: Crane, boom_deg: float, rope_m: float) -> LinearCrane:
     B[0, 2], B[2, 1] = reach_rate(boom, g), -(g.foot + g.boom * boom.cos)
     B[4], B[5, 1], B[6, 2] = (-g.hoist, 0.0, g.coupling * g.luff), 1.0, boom_rate(boom, g)
     C[2:, 4:] = np.eye(3)
-    return LinearCrane(f"{crane.name}_{boom_deg:g}_{rope_m:g}", A, B, C)
+    name = f"{crane.name}_{boom_deg:g}_{rope_m:g}"
+    return LinearModel(A, B, C, np.zeros((5, 3)), STATES, AXES, OUTPUTS, 0.0, None, name, ())

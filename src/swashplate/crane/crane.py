@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 from pydantic import BaseModel, ConfigDict, Field, FiniteFloat
 
 from swashplate.analysis.compensation import InverseMap, inverse_map
-from swashplate.crane.control import Control, LinearCrane, linearize
+from swashplate.crane.control import Control, linearize
 from swashplate.crane.kinematics import Boom, Geometry, Home, Vector, luff_rope
 from swashplate.crane.result import CraneRun
 from swashplate.crane.sea import Seaway, motion_of
@@ -31,15 +31,14 @@ if TYPE_CHECKING:
     from swashplate.crane.following import Followable
     from swashplate.crane.judgment import Judgment
     from swashplate.crane.study import Sweep
+    from swashplate.linear import LinearModel
 
 
 class Fitted(Protocol):
     """What a fit returns, as far as a crane takes it."""
 
     @property
-    def drive(self) -> Drive:
-        """The drive that was found."""
-        ...
+    def drive(self) -> Drive: ...  # noqa: D102
 
 
 DriveLike = Drive | Fitted | str | Path
@@ -106,12 +105,12 @@ class Crane:
     luff: Drive
 
     def __post_init__(self) -> None:
-        _check(self.name, self._si)
+        _ = self._si
 
     @classmethod
     def preset(cls, name: str) -> Crane:
         """A packaged crane, ``"tg3637"``."""
-        return _read(preset_text(name), f"crane {name}", None)
+        return _read(preset_text(name), f"crane {name}", Path())
 
     @classmethod
     def from_toml(cls, path: str | Path) -> Crane:
@@ -144,7 +143,16 @@ class Crane:
         FileError, ParameterError
             If there is no such file, or it is no drive's.
         """
-        made: dict[str, Any] = {_axis(axis): _drive_of(each) for axis, each in drives.items()}
+        made: dict[str, Any] = {}
+        for axis, given in drives.items():
+            if axis not in AXES:
+                raise InputError(f"A crane has no drive '{axis}': it has {', '.join(AXES)}.")
+            if isinstance(given, str | Path):
+                place = Path(given) / "drive.toml" if Path(given).is_dir() else Path(given)
+                own = place.suffix == ".toml"
+                made[axis] = Drive.from_toml(place) if own else Drive.preset(str(given))
+            else:
+                made[axis] = given if isinstance(given, Drive) else given.drive
         return replace(self, **made)
 
     def drawn(self, **draws: Draws) -> tuple[Crane, ...]:
@@ -188,18 +196,35 @@ class Crane:
 
     @cached_property
     def _si(self) -> dict[str, tuple[float, ...]]:
-        """Quantities in SI."""
-        found = {}
-        for name, (unit, count, _) in GEOMETRY.items():
-            entry = self.quantities[name]
+        """Quantities in SI; lengths that make no crane are refused."""
+        made, name = {}, self.name
+        for each, (unit, count, rule) in GEOMETRY.items():
+            entry = self.quantities[each]
             values = entry.value if isinstance(entry.value, list) else [entry.value]
             if len(values) != count:
-                raise ParameterError(
-                    f"{self.name}: {name} has {len(values)} numbers, but needs {count}."
-                )
-            what = f"{self.name}: {name}"
-            found[name] = tuple(to_si(each, entry.unit, unit, what) for each in values)
-        return found
+                found = len(values)
+                raise ParameterError(f"{name}: {each} has {found} numbers, but needs {count}.")
+            made[each] = tuple(to_si(v, entry.unit, unit, f"{name}: {each}") for v in values)
+            value = made[each][0]
+            if (rule and not value >= 0.0) or (rule == "above 0" and value == 0.0):
+                raise ParameterError(f"{name}: {each} is {value:g}, but must be {rule}.")
+        low, high = map(degrees, made["boom_limits"])
+        (angle,), (short, long) = map(degrees, made["tower_sheave_angle"]), made["rope_limits"]
+        if not 0.0 <= low < high < 90.0:
+            raise ParameterError(
+                f"{name}: boom_limits are {low:g} and {high:g} deg, but must rise within 0 to 90 "
+                "deg."
+            )
+        if not high < angle < low + 180.0:
+            raise ParameterError(
+                f"{name}: tower_sheave_angle is {angle:g} deg, but the luff rope only lifts a boom "
+                f"up to {high:g} deg from a sheave above that and below {low + 180.0:g} deg."
+            )
+        if not 0.0 < short < long:
+            raise ParameterError(
+                f"{name}: rope_limits are {short:g} and {long:g} m, but must rise from above 0."
+            )
+        return made
 
     @cached_property
     def geometry(self) -> Geometry:
@@ -285,7 +310,7 @@ class Crane:
         DomainError
             If boom or rope meet a limit, or a drive leaves its domain.
         """
-        stepper = CraneStepper(self, setup)
+        stepper = CraneStepper(self, **setup)
         fixed = stepper.fixed
         commands, end = stick.sample(self, fixed.home, RATE)
         ship = motion_of(sea, len(commands), RATE)
@@ -309,16 +334,10 @@ class Crane:
         Parameters are those of `simulate`; with ``actuation="direct"`` the commands are the drives'
         voltages. [V]
         """
-        return CraneStepper(self, setup)
+        return CraneStepper(self, **setup)
 
-    def linearize(self, boom_deg: float = 45.0, rope_m: float = 20.0) -> LinearCrane:
-        """The linear crane at a boom and rope; the slew changes nothing in the boom's own axes.
-
-        Raises
-        ------
-        InputError
-            For a boom or rope beyond the crane's limits.
-        """
+    def linearize(self, boom_deg: float = 45.0, rope_m: float = 20.0) -> LinearModel:
+        """The linear crane about a load at rest, see `swashplate.crane.control.linearize`."""
         return linearize(self, boom_deg, rope_m)
 
     def judge(self, control: Control | Mapping[str, Control | None], **how: Any) -> Judgment:
@@ -358,24 +377,6 @@ class Crane:
         return made
 
 
-def _axis(name: str) -> str:
-    if name not in AXES:
-        raise InputError(f"A crane has no drive '{name}': the axes are hoist, slew and luff.")
-    return name
-
-
-def _drive_of(given: DriveLike) -> Drive:
-    """A drive as it may be given to a crane."""
-    if isinstance(given, Drive):
-        return given
-    if not isinstance(given, str | Path):
-        return given.drive
-    place = Path(given)
-    if place.is_dir():
-        return Drive.from_toml(place / "drive.toml")
-    return Drive.from_toml(place) if place.suffix == ".toml" else Drive.preset(str(given))
-
-
 @lru_cache(maxsize=512)
 def _inverse(drive: Drive) -> InverseMap:
     return inverse_map(drive)
@@ -383,52 +384,25 @@ def _inverse(drive: Drive) -> InverseMap:
 
 def preset_text(name: str) -> str:
     """The file of a packaged crane."""
-    found = {each.name.removesuffix(".toml"): each for each in _SETS.iterdir()}
+    sets = files("swashplate.crane") / "sets"
+    found = {each.name.removesuffix(".toml"): each for each in sets.iterdir()}
     if name not in found:
         raise ParameterError(f"There is no packaged crane '{name}'; there is {', '.join(found)}.")
     return found[name].read_text("utf-8")
 
 
-_SETS = files("swashplate.crane") / "sets"
-
-
-def _read(text: str, origin: str, folder: Path | None) -> Crane:
+def _read(text: str, origin: str, folder: Path) -> Crane:
+    """A crane of a file's text; names of drives that end in .toml are files in its folder."""
     content = validated(parse_toml(text, origin), CraneFile, origin)
-    drives: dict[str, Any] = {}
-    for axis, word in content.drives.items():
-        own = folder is not None and word.endswith(".toml")
-        drives[axis] = Drive.from_toml(folder / word) if own and folder else Drive.preset(word)
     lacks = [name for name in GEOMETRY if name not in content.geometry]
     strange = [name for name in content.geometry if name not in GEOMETRY]
     if lacks or strange:
         extra = f", and knows no '{strange[0]}'" if strange else ""
         need = f"needs an entry '{lacks[0]}'" if lacks else f"has {len(GEOMETRY)} quantities"
         raise ParameterError(f"{origin}: geometry {need}{extra}.")
+    drives: dict[str, Any] = {
+        axis: Drive.from_toml(folder / word) if word.endswith(".toml") else Drive.preset(word)
+        for axis, word in content.drives.items()
+    }
     quantities = {name: content.geometry[name] for name in GEOMETRY}
     return Crane(content.name, content.title, quantities, **drives)
-
-
-def _check(name: str, si: Mapping[str, tuple[float, ...]]) -> None:
-    """Refuse lengths that make no crane."""
-    for each, (_, _, rule) in GEOMETRY.items():
-        value = si[each][0]
-        if (rule and not value >= 0.0) or (rule == "above 0" and value == 0.0):
-            raise ParameterError(f"{name}: {each} is {value:g}, but must be {rule}.")
-    low, high = si["boom_limits"]
-    angle = si["tower_sheave_angle"][0]
-    if not 0.0 <= low < high < radians(90.0):
-        raise ParameterError(
-            f"{name}: boom_limits are {degrees(low):g} and {degrees(high):g} deg, but must rise "
-            "within 0 to 90 deg."
-        )
-    if not high < angle < low + radians(180.0):
-        raise ParameterError(
-            f"{name}: tower_sheave_angle is {degrees(angle):g} deg, but the luff rope only lifts a "
-            f"boom up to {degrees(high):g} deg from a sheave above that and below "
-            f"{degrees(low) + 180.0:g} deg."
-        )
-    short, long = si["rope_limits"]
-    if not 0.0 < short < long:
-        raise ParameterError(
-            f"{name}: rope_limits are {short:g} and {long:g} m, but must rise from above 0."
-        )

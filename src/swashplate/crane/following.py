@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from swashplate.crane.crane import Crane
 from swashplate.crane.kinematics import boom_at, reach_rate, tip_of
-from swashplate.crane.loop import half_clip
+from swashplate.crane.loop import largest_sine
 from swashplate.crane.sea import BAND, SEA_STATES, Seaway
 from swashplate.crane.stick import AXES
 from swashplate.errors import InputError
@@ -95,29 +95,23 @@ def follow(
     rates = (g.hoist, g.foot + g.boom * boom.cos, float(reach_rate(boom, g)))
     amplitude = np.zeros((times.size, 3))
     for i, (axis, rate) in enumerate(zip(AXES, rates, strict=True)):
-        inverse = crane.inverse(axis)
-        low, high = inverse.limits
+        (low, high), inverse = crane.inverse(axis).limits, crane.inverse(axis)
         speed, acceleration = rate * min(high, -low), rate * min(inverse.acceleration)
-        for n, omega in enumerate(2.0 * pi / times):
-            amplitude[n, i] = half_clip(0.0, speed, acceleration, 1.0, omega)
-    tip, base = tip_of(home.slew, boom, g), seaway or Seaway()
-    asked = {name: _demand(tip, home.slew, replace(base, sea=name)) for name in seas}
+        amplitude[:, i] = [largest_sine(speed, acceleration, w) for w in 2.0 * pi / times]
+    # motion of the tip, linear in the ship's: up, across the boom, along it
+    base, omega = seaway or Seaway(), np.linspace(*BAND, 1000)
+    heading = np.full(omega.size, radians(base.heading_deg))
+    motion = base.ship.response(omega, heading, base.speed)
+    arm = np.array(tip_of(home.slew, boom, g))[:, None]
+    forward, port, up = motion[:3] + np.cross(motion[3:], arm, axis=0)
+    c, s = cos(home.slew), sin(home.slew)
+    powers = np.abs([up, s * forward + c * port, c * forward - s * port]) ** 2
+    asked = {}
+    for name in seas:
+        spectra = replace(base, sea=name).spectrum.density(omega) * powers
+        zeroth = np.trapezoid(spectra, omega, axis=1)
+        second = np.trapezoid(spectra[2] * omega**2, omega)
+        height, across, along = (2.0 * np.sqrt(zeroth)).tolist()
+        period = 2.0 * pi * float(np.sqrt(zeroth[2] / second))
+        asked[name] = Demand(period, (height, across, along))
     return Followable(times, amplitude, asked, crane, boom_deg)
-
-
-def _demand(tip: tuple[float, float, float], slew: float, seaway: Seaway) -> Demand:
-    """What a seaway asks of a tip in the ship's frame [m] that shall stand still over the sea.
-
-    Linear in the motions.
-    """
-    omega = np.linspace(*BAND, 1000)
-    heading = np.full(omega.size, radians(seaway.heading_deg))
-    motion = seaway.ship.response(omega, heading, seaway.speed)
-    forward, port, up = motion[:3] + np.cross(motion[3:], np.array(tip)[:, None], axis=0)
-    c, s = cos(slew), sin(slew)
-    density = seaway.spectrum.density(omega)
-    spectra = density * np.abs([up, s * forward + c * port, c * forward - s * port]) ** 2
-    zeroth = np.trapezoid(spectra, omega, axis=1)
-    second = np.trapezoid(spectra[2] * omega**2, omega)
-    height, across, along = (2.0 * np.sqrt(zeroth)).tolist()
-    return Demand(2.0 * pi * float(np.sqrt(zeroth[2] / second)), (height, across, along))

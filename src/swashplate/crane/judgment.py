@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import reduce
 from math import pi, sqrt
 from operator import or_
-from typing import TYPE_CHECKING, Any, NamedTuple, Unpack
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,7 +18,7 @@ from swashplate.crane.result import PUMPS, CraneRun, limit_table
 from swashplate.crane.rope import GRAVITY
 from swashplate.crane.stepper import RATE
 from swashplate.crane.stick import AXES
-from swashplate.crane.study import COUNTED, NONE, Case, Laws, Study, StudySetup, with_orifice
+from swashplate.crane.study import COUNTED, NONE, Case, Laws, Study, with_orifice
 from swashplate.errors import InputError
 from swashplate.results import Tabular
 from swashplate.simulation.result import Limit
@@ -34,7 +33,6 @@ FACTORS = (1.25, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0)
 """Factors on the luff's orifice that are tried, the smallest first."""
 SHARES = (0.8, 0.6, 0.4)
 """Shares of what the luff can follow at which control is clipped on trial, the largest first."""
-START = ("slew_deg", "boom_deg", "rope_m")
 BLOCK = 20
 """Seaways of a trial after which it is given up if it has failed already."""
 LEVEL = 0.95
@@ -88,9 +86,7 @@ class Judgment(Tabular):
     """Variants of control and drives in the same seaways, and what follows."""
 
     study: Study
-    """Crane, seaways, stick, and from when on swing counts."""
-    cases: Mapping[str, Case]
-    """By name, the crane without control first."""
+    """Crane, variants, seaways, and from when on swing counts."""
     values: Array
     """(n, m, 18) of seaways and cases, `study.COUNTED`."""
     allowed: float
@@ -107,7 +103,7 @@ class Judgment(Tabular):
     @property
     def names(self) -> tuple[str, ...]:
         """Variants, the crane without control first."""
-        return tuple(self.cases)
+        return tuple(self.study.cases)
 
     @property
     def judged(self) -> str:
@@ -122,7 +118,7 @@ class Judgment(Tabular):
         InputError
             If there is no such variant.
         """
-        if name not in self.cases:
+        if name not in self.names:
             raise InputError(f"There is no variant '{name}'; there are {', '.join(self.names)}.")
         return np.asarray(self.values[:, self.names.index(name), COUNTED.index(what)])
 
@@ -165,7 +161,7 @@ class Judgment(Tabular):
 
     def _cause(self) -> str:
         """The limit that acts for the longest time."""
-        if self.cases[self.judged].actuation == "ideal":
+        if not self.study.cases[self.judged].driven:
             return ""
         names = {Limit.ORIFICE: "acceleration limit", Limit.SWASH_STOP: "speed limit"}
         shares = [(self.acting(self.judged, a, each), a, each) for a in AXES for each in names]
@@ -184,11 +180,12 @@ class Judgment(Tabular):
         DomainError
             If the run was stopped.
         """
-        if seed not in self.study.seeds or name not in self.cases or self.study.sea is None:
+        study = self.study
+        if seed not in study.seeds or name not in self.names or study.sea is None:
             raise InputError(f"There is no seaway {seed} of a variant '{name}' in this judgment.")
-        case = self.cases[name]
-        motion = replace(self.study.sea, seed=seed).motion(round(case.stick.length * RATE) + 1)
-        return case.run(self.study.seeds.index(seed), motion)
+        case = study.cases[name]
+        motion = replace(study.sea, seed=seed).motion(round(case.stick.length * RATE) + 1)
+        return case.run(study.seeds.index(seed), motion)
 
     @property
     def typical(self) -> int:
@@ -220,10 +217,10 @@ class Judgment(Tabular):
         for i, other in enumerate(self.names):
             for name in self.names[i + 1 :]:
                 paired.add(name, other, *self.difference(name, other))
-        real = [each for each in self.names[1:] if self.cases[each].actuation != "ideal"]
         acting = [
             (name, axis, [self.acting(name, axis, each) for each in PUMPS])
-            for name in real
+            for name in self.names[1:]
+            if self.study.cases[name].driven
             for axis in AXES
         ]
         made = [swings, paired, limit_table(acting)]
@@ -251,8 +248,9 @@ class Judgment(Tabular):
     def sentences(self) -> tuple[str, ...]:
         """The verdict, and what it rests on."""
         study, assumed = self.study, self.study.crane.assumed
+        length = study.cases[NONE].stick.length
         rests = (
-            f"Swing counts from {study.start:g} s to {study.stick.length:g} s of each seaway. "
+            f"Swing counts from {study.start:g} s to {length:g} s of each seaway. "
             f"Control fails if it is worse than none in more than {100.0 * self.allowed:.0f} % of "
             "them."
         )
@@ -271,7 +269,7 @@ def judge(
     *,
     allowed: float = 0.05,
     remedies: bool = True,
-    **setup: Unpack[StudySetup],
+    **study: Any,
 ) -> Judgment:
     """Judge control on several sets of drives over seeded seaways, by default 200.
 
@@ -285,9 +283,9 @@ def judge(
     remedies : bool
         Whether to look for a larger orifice of the luff and for a clip that would do on the crane's
         own drives, if control fails.
-    **setup
-        Seaways, drives, stick, where each run begins: see `StudySetup`. The verdict is on the last
-        of the drives.
+    **study
+        Seaways, drives, stick, where each run begins: see `Study.of`. The verdict is on the last of
+        the drives.
 
     Raises
     ------
@@ -296,27 +294,31 @@ def judge(
     """
     if not 0.0 <= allowed < 1.0:
         raise InputError(f"allowed is {allowed:g}, but is a share of seaways: 0 to below 1.")
-    study = Study.of(crane, control, {"seeds": range(200), **setup})
-    cases = study.cases()
-    made = Judgment(study, cases, study.outcomes(list(cases.values())), allowed)
-    case = cases[made.judged]
-    if made.passed or not remedies or case.actuation == "ideal" or case.control is None:
+    asked = Study.of(crane, control, **{"seeds": range(200), **study})
+    made = Judgment(asked, asked.outcomes(list(asked.cases.values())), allowed)
+    case = asked.cases[made.judged]
+    law = case.setup["control"]
+    if made.passed or not remedies or not case.driven or law is None:
         return made
     # factors are of the crane as it is built, whatever was judged
     cranes = (crane,) if len(case.cranes) == 1 else case.cranes
-    stages = [each for each in case.control.stages if not isinstance(each, Clip | PositionLoop)]
-    where: dict[str, Any] = {key: dict(study.where)[key] for key in START}
-    period = 2.0 * pi * sqrt(where["rope_m"] / GRAVITY)
-    reach = follow(cranes[0], [period], seas=(), **where).amplitude[0, 2]
+    stages = [each for each in law.stages if not isinstance(each, Clip | PositionLoop)]
+    pose: dict[str, Any] = {name: case.setup[name] for name in ("slew_deg", "boom_deg", "rope_m")}
+    period = 2.0 * pi * sqrt(pose["rope_m"] / GRAVITY)
+    reach = float(follow(cranes[0], [period], seas=(), **pose).amplitude[0, 2])
     larger = [
-        (f"luff orifice ×{x:g}", x, case._replace(cranes=tuple(with_orifice(c, x) for c in cranes)))
-        for x in FACTORS
+        (f"luff orifice ×{x:g}", x, case._replace(cranes=with_orifice(cranes, x))) for x in FACTORS
     ]
-    clipped = []
-    for share in SHARES:
-        law = reduce(or_, [*stages, Clip(share=share), LOOP])
-        named = f"a clip of {share * reach:.2g} m"
-        clipped.append((named, share * reach, case._replace(cranes=cranes, control=law)))
+    clipped = [
+        (
+            f"a clip of {share * reach:.2g} m",
+            share * reach,
+            case.moved(control=reduce(or_, [*stages, Clip(share=share), LOOP]))._replace(
+                cranes=cranes
+            ),
+        )
+        for share in SHARES
+    ]
     found: list[Remedy] = []
     tried: list[str] = []
     for trials in (larger, clipped):
@@ -324,7 +326,7 @@ def judge(
             values = _trial(made, trial)
             if values is not None:
                 worse = float(_worse(values, made.counted(NONE)).mean())
-                found.append(Remedy(what, float(size), worse, mean_of(values)))
+                found.append(Remedy(what, size, worse, mean_of(values)))
                 break
             tried.append(what)
     return replace(made, remedies=tuple(found), tried=tuple(tried))

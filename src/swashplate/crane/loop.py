@@ -70,6 +70,9 @@ ROWS = (
 """What the loop leaves of each sample, SI; the torques are those that the drives have taken."""
 FINE, TOO_FAST, BOOM_OUT, ROPE_OUT = range(4)
 """How a pass ended."""
+ANGLE, SPEED, OPERATOR, WISH, AIM, TORQUE = range(6)
+"""Shafts' angles and speeds; angles to which the stick alone would have brought them, and its
+wanted speeds; angles that control wants; torques of the rope. [rad], [rad/s], [N m]"""
 BRAKE_WAITS, BRAKE_TAKES = 0.3, 0.2
 """Time at rest before the hoist's brake falls in, and time in which it stops the drum. [s]"""
 
@@ -129,18 +132,10 @@ class State(NamedTuple):
     """What one sample passes to the next, delayed signals and the drives' states apart."""
 
     sample: int
-    shafts: Shafts
-    speeds: Shafts
-    operator: Shafts
-    """Where the stick's commands alone would have the shafts."""
-    wish: Shafts
-    """Speeds that it wants. [rad/s]"""
-    aim: Shafts
-    """Where control wants the shafts."""
+    axes: Array
+    """(6, 3) of hoist, slew and luff: `ANGLE`, `SPEED`, `OPERATOR`, `WISH`, `AIM`, `TORQUE`."""
     tip: Vector
     hung: Hung
-    torques: Shafts
-    """Of the rope on the shafts, of the last sample. [N m]"""
     still: float
     """Time for which the hoist's command has been within the dead zone. [s]"""
     brake: float
@@ -211,20 +206,9 @@ def voltage_for(wanted: float, inverse: Inverse, actuation: int) -> float:
 
 
 @equation
-def half_clip(size: float, speed: float, acceleration: float, share: float, omega: float) -> float:
-    """Largest offset that control may add along one axis. [m]
-
-    A size that is given [m], or `share` of the largest sine at ω [rad/s] that a speed [m/s] and an
-    acceleration [m/s²] allow, min(v/ω, a/ω²).
-    """
-    return size if size > 0.0 else share * min(speed / omega, acceleration / (omega * omega))
-
-
-@inlined
-def reachable(inverse: Inverse, rate: float, size: float, share: float, omega: float) -> float:
-    """Largest offset along an axis whose shaft moves the tip at a rate [m/rad]; see `half_clip`."""
-    speed = rate * min(inverse.high, -inverse.low)
-    return half_clip(size, speed, rate * inverse.acceleration, share, omega)
+def largest_sine(speed: float, acceleration: float, omega: float) -> float:
+    """Largest sine at ω [rad/s] that a speed and an acceleration allow, min(v/ω, a/ω²). [m]"""
+    return min(speed / omega, acceleration / (omega * omega))
 
 
 @inlined
@@ -238,21 +222,28 @@ def clipped_offset(
     reach = sqrt(e_x * e_x + e_y * e_y)
     e_x, e_y = e_x / reach, e_y / reach
     rate, (_, slew, luff), (x, y) = reach_rate(boom, g), fixed.inverses, offset
-    along = reachable(luff, rate, settings.clip, settings.share, omega)
-    across = reachable(slew, reach, 0.0, settings.share, omega)
+    speed, turning = rate * min(luff.high, -luff.low), reach * min(slew.high, -slew.low)
+    along = settings.share * largest_sine(speed, rate * luff.acceleration, omega)
+    along = settings.clip if settings.clip > 0.0 else along
+    across = settings.share * largest_sine(turning, reach * slew.acceleration, omega)
     out = min(max(x * e_x + y * e_y, -along), along)
     turn = min(max(y * e_x - x * e_y, -across), across)
     return out * e_x - turn * e_y, out * e_y + turn * e_x
 
 
 @inlined
-def advanced(shafts: Shafts, old: Shafts, new: Shafts, h: float) -> Shafts:
-    """Angles one step later, by the trapezoidal rule."""
-    return Shafts(
-        shafts.hoist + 0.5 * h * (old.hoist + new.hoist),
-        shafts.slew + 0.5 * h * (old.slew + new.slew),
-        shafts.luff + 0.5 * h * (old.luff + new.luff),
-    )
+def advance(axes: Array, angle: int, speed: int, new: Array, h: float, moves: bool) -> None:
+    """Angles of the shafts one step later, by the trapezoidal rule, and the speeds behind it."""
+    for i in range(3):
+        if moves:
+            axes[angle, i] += 0.5 * h * (axes[speed, i] + new[i])
+        axes[speed, i] = new[i]
+
+
+@inlined
+def shafts_of(axes: Array, row: int) -> Shafts:
+    """A row of `State.axes`."""
+    return Shafts(axes[row, 0], axes[row, 1], axes[row, 2])
 
 
 @inlined
@@ -294,14 +285,11 @@ def loop_of(hoist: Any, slew: Any, luff: Any, law: Any) -> Callable[..., tuple[S
         g, home, loaded = fixed.geometry, fixed.home, fixed.loaded
         moving = ship.shape[1] > 1
         last = memory.shape[1] - 1
-        seen = np.zeros(13)
-        sample, shafts, speeds = state.sample, state.shafts, state.speeds
-        operator, wish, aim = state.operator, state.wish, state.aim
-        tip, hung, torques = state.tip, state.hung, state.torques
-        still, brake = state.still, state.brake
+        sample, axes, tip, hung, still, brake = state
+        shafts = shafts_of(axes, ANGLE)
         boom, rope = boom_at(shafts.luff, g, home), rope_length(shafts, g, home)
-        in_ship = tip_of(home.slew + shafts.slew, boom, g)
-        volts, omega, limits = np.zeros(3), np.zeros(3), np.zeros(3)
+        wanted, volts, omega, limits = np.zeros(3), np.zeros(3), np.zeros(3), np.zeros(3)
+        seen = np.zeros(13)
         r = Rotation(1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
         shift = Vector(0.0, 0.0, 0.0)
         ended = FINE
@@ -313,23 +301,16 @@ def loop_of(hoist: Any, slew: Any, luff: Any, law: Any) -> Callable[..., tuple[S
             # the stick's commands
             for i in range(3):
                 memory[i, sample & last] = stick[m, i]
-            u = stick[m, 0], stick[m, 1], stick[m, 2]
-            if settings.joint[1] > 0.0:
-                u = (
-                    shaped(memory, 0, sample, half, settings.joint),
-                    shaped(memory, 1, sample, half, settings.joint),
-                    shaped(memory, 2, sample, half, settings.joint),
-                )
-            wanted = Shafts(
-                limited(u[0], inverses[0]), limited(u[1], inverses[1]), limited(u[2], inverses[2])
-            )
+                u = stick[m, i]
+                if settings.joint[1] > 0.0:
+                    u = shaped(memory, i, sample, half, settings.joint)
+                wanted[i] = limited(u, inverses[i])
             if settings.path:
-                if sample > 0:
-                    operator = advanced(operator, wish, wanted, h)
-                wish = wanted
-                lead = tip_of(home.slew + operator.slew, boom_at(operator.luff, g, home), g)
-                memory[3, sample & last] = lead.x
-                memory[4, sample & last] = lead.y
+                advance(axes, OPERATOR, WISH, wanted, h, sample > 0)
+                lead = boom_at(axes[OPERATOR, 2], g, home)
+                ahead = tip_of(home.slew + axes[OPERATOR, 1], lead, g)
+                memory[3, sample & last] = ahead.x
+                memory[4, sample & last] = ahead.y
                 path_x = shaped(memory, 3, sample, half, settings.tip)
                 path_y = shaped(memory, 4, sample, half, settings.tip)
                 # offsets: the direction of the rope, the ship, a law of one's own
@@ -364,37 +345,28 @@ def loop_of(hoist: Any, slew: Any, luff: Any, law: Any) -> Callable[..., tuple[S
                     y += laws.outputs[1]
                 if settings.clip > 0.0 or settings.share > 0.0:
                     x, y = clipped_offset((x, y), (path_x, path_y), boom, rope, fixed)
-                path_x += x
-                path_y += y
-                target = shafts_for(path_x, path_y, aim, g, home)
-                if sample == 0:
-                    aim = target
-                wanted = Shafts(
-                    wanted.hoist,
-                    (target.slew - aim.slew) / h + settings.gain * (target.slew - shafts.slew),
-                    (target.luff - aim.luff) / h + settings.gain * (target.luff - shafts.luff),
-                )
-                aim = target
+                target = shafts_for(path_x + x, path_y + y, shafts_of(axes, AIM), g, home)
+                for i, aim in ((1, target.slew), (2, target.luff)):
+                    behind = settings.gain * (aim - axes[ANGLE, i])
+                    wanted[i] = (aim - axes[AIM, i]) / h * (sample > 0) + behind
+                    axes[AIM, i] = aim
             # actuation
             if actuation == MARCHED:
                 for i in range(3):
                     volts[i], omega[i], limits[i] = given[i, m], given[3 + i, m], given[6 + i, m]
             elif actuation == IDEAL:
-                omega[0] = min(max(wanted.hoist, inverses[0].low), inverses[0].high)
-                omega[1] = min(max(wanted.slew, inverses[1].low), inverses[1].high)
-                omega[2] = min(max(wanted.luff, inverses[2].low), inverses[2].high)
+                for i in range(3):
+                    omega[i] = min(max(wanted[i], inverses[i].low), inverses[i].high)
             else:
-                if actuation == DIRECT:
-                    volts[0], volts[1], volts[2] = stick[m, 0], stick[m, 1], stick[m, 2]
-                else:
-                    volts[0] = voltage_for(wanted.hoist, inverses[0], actuation)
-                    volts[1] = voltage_for(wanted.slew, inverses[1], actuation)
-                    volts[2] = voltage_for(wanted.luff, inverses[2], actuation)
                 a, b, c = plant.drives
+                for i in range(3):
+                    volts[i] = stick[m, i]
+                    if actuation != DIRECT:
+                        volts[i] = voltage_for(wanted[i], inverses[i], actuation)
                 a.inputs[0], b.inputs[0], c.inputs[0] = volts[0], volts[1], volts[2]
                 if loaded:
-                    felt = torques.hoist, torques.slew, torques.luff
-                    a.inputs[1], b.inputs[1], c.inputs[1] = felt
+                    a.inputs[1], b.inputs[1] = axes[TORQUE, 0], axes[TORQUE, 1]
+                    c.inputs[1] = axes[TORQUE, 2]
                 margins[0] = min(margins[0], hoist(a))
                 margins[1] = min(margins[1], slew(b))
                 margins[2] = min(margins[2], luff(c))
@@ -407,13 +379,9 @@ def loop_of(hoist: Any, slew: Any, luff: Any, law: Any) -> Callable[..., tuple[S
                 brake = min(max(brake + falls, 0.0), 1.0)
                 omega[0] = omega[0] * (1.0 - brake)
             # kinematics and rope
-            turning = Shafts(omega[0], omega[1], omega[2])
-            if sample > 0:
-                shafts = advanced(shafts, speeds, turning, h)
-            speeds = turning
-            boom = boom_at(shafts.luff, g, home)
-            shorter = rope
-            rope = rope_length(shafts, g, home)
+            advance(axes, ANGLE, SPEED, omega, h, sample > 0)
+            shafts, shorter = shafts_of(axes, ANGLE), rope
+            boom, rope = boom_at(shafts.luff, g, home), rope_length(shafts, g, home)
             shorter -= rope
             in_ship = tip_of(home.slew + shafts.slew, boom, g)
             following = to_inertial(r, in_ship, shift) if moving else in_ship
@@ -442,24 +410,21 @@ def loop_of(hoist: Any, slew: Any, luff: Any, law: Any) -> Callable[..., tuple[S
             tip = following
             for i in range(3):
                 out[m, i], out[m, 3 + i], out[m, 6 + i] = volts[i], omega[i], limits[i]
-            out[m, 9], out[m, 10], out[m, 11] = shafts.hoist, shafts.slew, shafts.luff
+                out[m, 9 + i], out[m, 25 + i] = axes[ANGLE, i], axes[TORQUE, i]
             out[m, 12], out[m, 13], out[m, 14] = tip.x, tip.y, tip.z
             out[m, 15], out[m, 16], out[m, 17] = hung.load.x, hung.load.y, hung.load.z
             out[m, 18], out[m, 19], out[m, 20] = hung.hook.x, hung.hook.y, hung.hook.z
             out[m, 21], out[m, 22] = hung.pull, rope
             out[m, 23], out[m, 24] = boom.cos, boom.sin
-            out[m, 25], out[m, 26], out[m, 27] = torques.hoist, torques.slew, torques.luff
             if loaded:
                 tension = fixed.mass * hung.pull
                 along = moved(hung.hook, -1.0, tip)
                 force = moved(Vector(0.0, 0.0, 0.0), tension / size(along), along)
                 if moving:
                     force = to_ship(r, force)
-                torques = shaft_torques(force, home.slew + shafts.slew, boom, tension, g)
+                felt = shaft_torques(force, home.slew + shafts.slew, boom, tension, g)
+                axes[TORQUE, 0], axes[TORQUE, 1], axes[TORQUE, 2] = felt
             sample += 1
-        end = State(
-            sample, shafts, speeds, operator, wish, aim, tip, hung, torques, still, brake
-        )  # fmt: skip
-        return end, ended
+        return State(sample, axes, tip, hung, still, brake), ended
 
     return loop

@@ -38,7 +38,10 @@ PUMPS = (Limit.DEAD_ZONE, Limit.ORIFICE, Limit.SPOOL, Limit.SWASH_STOP, Limit.RE
 
 @dataclass(frozen=True, eq=False)
 class CraneRun(Tabular):
-    """Signals of one run at 512 Hz; positions are inertial, z up, in m."""
+    """Signals of one run at 512 Hz, each by its name in `rows`, SI: ``run["pull"]``.
+
+    Positions are inertial, z up, in m.
+    """
 
     crane: Crane = field(repr=False)
     stick: Array
@@ -153,30 +156,24 @@ class CraneRun(Tabular):
         return np.degrees(np.arctan2(np.hypot(d[:, 0], d[:, 1]), -d[:, 2]))
 
     @property
-    def settling_starts(self) -> float:
-        """When residual swing counts: the stick's end, the shaper's last impulse, and 4 s. [s]"""
-        return self.stick_end + self.halves * pi * sqrt(self.rope[-1] / GRAVITY) + CALMS
-
-    @property
     def settling(self) -> slice:
-        """Samples of the 25 s from `settling_starts` on.
+        """Samples in which residual swing counts.
 
-        Raises
-        ------
-        InputError
-            If the run ends before.
+        25 s from 4 s after the stick's end and the shaper's last impulse; an `InputError` if the
+        run ends before.
         """
-        first = round(self.settling_starts * RATE)
+        starts = self.stick_end + self.halves * pi * sqrt(self.rope[-1] / GRAVITY) + CALMS
+        first = round(starts * RATE)
         if first >= len(self.out):
             raise InputError(
                 f"The run is {self.time[-1]:g} s long, but its residual swing counts from "
-                f"{self.settling_starts:.4g} s on: take a longer stick."
+                f"{starts:.4g} s on: take a longer stick."
             )
         return slice(first, first + round(WATCHED * RATE))
 
     @property
     def residual_deg(self) -> float:
-        """Largest swing for 25 s from `settling_starts` on, refused as `settling`. [deg]"""
+        """Largest swing in `settling`, refused as that. [deg]"""
         return float(self.swing_deg[self.settling].max())
 
     def rms_deg(self, start: float = 0.0) -> float:
@@ -188,18 +185,11 @@ class CraneRun(Tabular):
     @property
     def settled_at(self) -> float:
         """Last time at which the swing is above 1 degree; 0 if it never is. [s]"""
-        above = np.flatnonzero(self.swing_deg > SETTLED)
-        return float(self.time[above[-1]]) if above.size else 0.0
+        return float(self.time[self.swing_deg > SETTLED].max(initial=0.0))
 
     def active(self, axis: str, limit: Limit) -> NDArray[np.bool_]:
-        """(n,) samples at which a limit of `PUMPS` of a drive acts; ideal drives have none.
-
-        Raises
-        ------
-        InputError
-            If there is no such axis.
-        """
-        bits = self.out[:, ROWS.index("limits_hoist") + _place(axis)].astype(np.int64)
+        """(n,) samples at which a limit of `PUMPS` acts on the drive of an axis."""
+        bits = self.out[:, ROWS.index(f"limits_{axis}")].astype(np.int64)
         return (bits >> PUMPS.index(limit)) & 1 > 0
 
     def limits(self, axis: str) -> dict[str, float]:
@@ -214,12 +204,11 @@ class CraneRun(Tabular):
         InputError
             For ideal drives, which have none.
         """
-        place = _place(axis)
         if self.actuation == "ideal":
             raise InputError("Ideal drives have neither voltages nor limits other than of speed.")
-        torque = self.load_torque[:, place] if self.loaded else None
+        torque = self[f"torque_{axis}"] if self.loaded else None
         drive = getattr(self.crane, axis)
-        made: Simulation = drive.simulate(self.voltage[:, place], RATE, load_torque=torque)
+        made: Simulation = drive.simulate(self[f"voltage_{axis}"], RATE, load_torque=torque)
         return made
 
     def tables(self) -> list[Table]:
@@ -237,12 +226,6 @@ class CraneRun(Tabular):
         return pl.DataFrame(columns)
 
 
-def _place(axis: str) -> int:
-    if axis not in AXES:
-        raise InputError(f"There is no axis '{axis}'; there are {', '.join(AXES)}.")
-    return AXES.index(axis)
-
-
 def run_tables(runs: Mapping[str, CraneRun]) -> list[Table]:
     """Swing and end of runs, a row for each by its name; what limits their drives.
 
@@ -258,14 +241,17 @@ def run_tables(runs: Mapping[str, CraneRun]) -> list[Table]:
         Column("rope", ".2f", "m"),
         Column("slack", ".1%", of="pf"),
     )
-    made = Table("", columns, "Swing, and where slew, boom and rope end")
+    made, shares = Table("", columns, "Swing, and where slew, boom and rope end"), []
     for name, run in runs.items():
-        late = run.settling_starts > run.time[-1]
-        swing = (np.nan if late else run.residual_deg, run.rms_deg(), run.swing_deg.max())
+        try:
+            residual = run.residual_deg
+        except InputError:  # too short
+            residual = np.nan
+        swing = (residual, run.rms_deg(), run.swing_deg.max())
         angles = np.radians([*swing, run.slew_deg[-1], run.boom_deg[-1]])
         made.add(name, *angles.tolist(), float(run.rope[-1]), float(run.slack.mean()))
-    real = [(name, run) for name, run in runs.items() if run.actuation != "ideal"]
-    shares = [(name, axis, run.limits(axis).values()) for name, run in real for axis in AXES]
+        if run.actuation != "ideal":
+            shares += [(name, axis, run.limits(axis).values()) for axis in AXES]
     return [made, limit_table(shares)] if shares else [made]
 
 

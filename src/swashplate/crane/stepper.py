@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from functools import lru_cache
 from math import degrees, inf, isfinite, pi, sin, sqrt
-from typing import TYPE_CHECKING, Any, Literal, TypedDict, get_args
+from typing import TYPE_CHECKING, Any, Literal, TypedDict, Unpack, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -14,6 +14,7 @@ from swashplate.analysis.compensation import InverseMap
 from swashplate.crane.control import GIVES, SEEN, Control, settings_of
 from swashplate.crane.kinematics import Shafts, Vector, boom_at, rope_length, shaft_torques, tip_of
 from swashplate.crane.loop import (
+    ANGLE,
     DIRECT,
     FINE,
     INVERSE,
@@ -21,6 +22,7 @@ from swashplate.crane.loop import (
     ROPE_OUT,
     ROWS,
     TOO_FAST,
+    TORQUE,
     VOLTS,
     Fixed,
     Inverse,
@@ -43,9 +45,8 @@ if TYPE_CHECKING:
     from swashplate.crane.crane import Crane
 
 Array = NDArray[np.float64]
-Actuation = Literal["ideal", "volts", "inverse"]
+Actuation = Literal["ideal", "volts", "inverse", "direct"]
 """In the order of `loop.IDEAL` and the others."""
-ACTUATIONS = (*get_args(Actuation), "direct")
 RATE = 512.0
 """Samples a second of the loop: the packaged drives' own. [Hz]"""
 OUTPUTS = ("shaft_speed", "limits")
@@ -55,17 +56,23 @@ QUICKEST = 0.4
 would swing against each other from sample to sample."""
 
 
-class Start(TypedDict, total=False):
-    """Where a run begins and what hangs on the crane: keywords of runs and studies.
+class Setup(TypedDict, total=False):
+    """How a run is set up: keywords of `Crane.simulate` and `Crane.stepper`.
 
     Attributes
     ----------
+    control : Control, optional
+        Controller, of `swashplate.crane.control`; by default the stick's commands as they are.
+    actuation : {"inverse", "volts", "ideal", "direct"}
+        What makes speeds of wanted speeds: the real drives behind their inverse maps or behind
+        10 V for full speed, or drives that follow at once within their limits of speed. A stepper
+        also takes voltages, with "direct".
     slew_deg, boom_deg, rope_m : float
         Slew from forward to starboard, boom's elevation, rope below the tip; by default 0, 45
-        and 20.
+        and 20, in studies 90, 45 and 27.
     load : float, optional
         Its mass, by default the safe load. [kg]
-    suspension : Suspension, optional
+    suspension : Suspension
         Elastic rope, hook with slings; by default a point on a rigid rope.
     loaded : bool
         Whether the rope loads the drives: its tension is a torque on each shaft, by virtual work,
@@ -81,6 +88,8 @@ class Start(TypedDict, total=False):
         default.
     """
 
+    control: Control | None
+    actuation: Actuation
     slew_deg: float
     boom_deg: float
     rope_m: float
@@ -92,52 +101,20 @@ class Start(TypedDict, total=False):
     brake: bool
 
 
-class Setup(Start, total=False):
-    """How a run is set up: keywords of `Crane.simulate` and `Crane.stepper`, with those of `Start`.
-
-    Attributes
-    ----------
-    control : Control, optional
-        Controller, of `swashplate.crane.control`; by default the stick's commands as they are.
-    actuation : {"inverse", "volts", "ideal", "direct"}
-        What makes speeds of wanted speeds: the real drives behind their inverse maps or behind
-        10 V for full speed, or drives that follow at once within their limits of speed. A stepper
-        also takes voltages, with "direct".
-    """
-
-    control: Control | None
-    actuation: Actuation | Literal["direct"]
-
-
-DEFAULTS: Setup = {
-    "control": None,
-    "actuation": "inverse",
-    "slew_deg": 0.0,
-    "boom_deg": 45.0,
-    "rope_m": 20.0,
-    "load": None,
-    "suspension": Suspension(),
-    "loaded": False,
-    "drag_area": 0.0,
-    "wind": (0.0, 0.0),
-    "brake": True,
-}
-
-
 class CraneStepper:
     """A crane that takes commands and gives signals, the same numbers as `Crane.simulate`.
 
     Made by `Crane.stepper`.
     """
 
-    def __init__(self, crane: Crane, setup: Setup) -> None:
-        strange = [each for each in setup if each not in DEFAULTS]
-        if strange:
-            raise InputError(f"A run has no {strange[0]}; its setup has {', '.join(DEFAULTS)}.")
-        how = DEFAULTS | setup
-        self._crane, self.actuation = crane, how["actuation"]
-        settings, law = settings_of(how["control"])
-        self.fixed = fixed = _fixed(crane, how, settings)
+    def __init__(self, crane: Crane, **setup: Unpack[Setup]) -> None:
+        how: dict[str, Any] = dict(setup)
+        control = how.pop("control", None)
+        self._crane, self.actuation = crane, how.get("actuation", "inverse")
+        if self.actuation == "direct" and control is not None:
+            raise InputError("With direct actuation the voltages are given: leave control out.")
+        settings, law = settings_of(control)
+        self.fixed = fixed = _fixed(crane, settings, **how)
         given = ("voltage", "load_torque") if fixed.loaded else ("voltage",)
         compiled = [_compiled(getattr(crane, axis), given) for axis in AXES]
         self._steps = [step for step, _ in compiled]
@@ -149,18 +126,16 @@ class CraneStepper:
             own = self._steps[3].machine()
             picks = np.array([SEEN.index(each) for each in seen], dtype=np.int64)
         # in open loop nothing acts back on the drives
-        self._open = how["control"] is None and not fixed.loaded
-        self._open &= fixed.actuation in (VOLTS, INVERSE)
+        self._open = control is None and not fixed.loaded and fixed.actuation in (VOLTS, INVERSE)
         one, two, three, *last = (each.step for each in self._steps)
         self._loop = loop_of(one, two, three, last[0] if last else None)
         g, home = fixed.geometry, fixed.home
-        zero, boom = Shafts(0.0, 0.0, 0.0), boom_at(0.0, g, home)
-        tip, torques = tip_of(home.slew, boom, g), zero
+        axes, boom = np.zeros((6, 3)), boom_at(0.0, g, home)
+        tip = tip_of(home.slew, boom, g)
         if fixed.loaded:
             weight = fixed.mass * GRAVITY
-            torques = shaft_torques(Vector(0.0, 0.0, -weight), home.slew, boom, weight, g)
-        hung = Hung(tip, tip, tip, tip, 0.0, 0.0)
-        self._state = State(0, zero, zero, zero, zero, zero, tip, hung, torques, 0.0, 0.0)
+            axes[TORQUE] = shaft_torques(Vector(0.0, 0.0, -weight), home.slew, boom, weight, g)
+        self._state = State(0, axes, tip, Hung(tip, tip, tip, tip, 0.0, 0.0), 0.0, 0.0)
         longest = 2.0 * pi * sqrt(fixed.ropes[1] / GRAVITY) * RATE + 4.0
         memory = np.zeros((7, 1 << int(longest).bit_length()))
         memory[3:5] = [[tip.x], [tip.y]]
@@ -223,87 +198,92 @@ class CraneStepper:
             As `Crane.simulate`.
         """
         out = np.empty((len(commands), len(ROWS)))
-        self._pass(self.fixed, commands, ship, out)
-        for step, machine, worst in zip(
-            self._steps,
-            (*self._plant.drives, self._plant.law),
-            self._plant.margins.tolist(),
-            strict=False,
-        ):
+        self._state, ended = self._loop(
+            1.0 / RATE, self.fixed, self._state, self._plant, commands, ship, out
+        )
+        if ended != FINE:
+            raise self._stopped(ended)
+        machines, margins = (*self._plant.drives, self._plant.law), self._plant.margins.tolist()
+        for step, machine, worst in zip(self._steps, machines, margins, strict=False):
             step.check(machine, worst, "command")
         return out
 
     def run(self, commands: Array, ship: Array) -> Array:
         """A whole run from the start, as `take`; the stepper itself is then of no more use."""
-        if not self._open:
-            return self.take(commands, ship)
-        out = np.empty((len(commands), len(ROWS)))
-        given, h = np.empty((9, len(commands))), 1.0 / RATE
-        for i, axis in enumerate(AXES):
-            stick = np.ascontiguousarray(commands[:, i])
-            volts = open_voltages(stick, self.fixed.inverses[i], self.fixed.actuation)
-            instance = instance_of(getattr(self._crane, axis).parameters, by_voltage=True)
-            begun = instance.start({"voltage": 0.0}, h, "rest")
-            wanted = stored_of(instance.model, OUTPUTS)
-            made = marched(instance, {"voltage": volts}, h, begun, wanted, "command")
-            given[i], given[3 + i], given[6 + i] = volts, *made
-        self._plant = self._plant._replace(marched=given)
-        self._pass(self.fixed._replace(actuation=MARCHED), commands, ship, out)
-        return out
+        if self._open:  # the drives by themselves, which is quicker
+            given, h = np.empty((9, len(commands))), 1.0 / RATE
+            for i, axis in enumerate(AXES):
+                stick = np.ascontiguousarray(commands[:, i])
+                volts = open_voltages(stick, self.fixed.inverses[i], self.fixed.actuation)
+                instance = instance_of(getattr(self._crane, axis).parameters, by_voltage=True)
+                begun = instance.start({"voltage": 0.0}, h, "rest")
+                wanted = stored_of(instance.model, OUTPUTS)
+                made = marched(instance, {"voltage": volts}, h, begun, wanted, "command")
+                given[i], given[3 + i], given[6 + i] = volts, *made
+            self._plant = self._plant._replace(marched=given)
+            self.fixed = self.fixed._replace(actuation=MARCHED)
+        return self.take(commands, ship)
 
-    def _pass(self, fixed: Fixed, commands: Array, ship: Array, out: Array) -> None:
-        """Run the loop; refuse what stops it."""
-        self._state, ended = self._loop(
-            1.0 / RATE, fixed, self._state, self._plant, commands, ship, out
-        )
-        if ended == FINE:
-            return
+    def _stopped(self, ended: int) -> Exception:
+        """What has stopped the loop, as the error to raise."""
         name, time = self._crane.name, self._state.sample / RATE
-        rope = float(rope_length(self._state.shafts, fixed.geometry, fixed.home))
+        shafts = Shafts(*self._state.axes[ANGLE])
+        rope = float(rope_length(shafts, self.fixed.geometry, self.fixed.home))
         if ended == TOO_FAST:
-            raise InputError(too_fast(rope, time, RATE))
+            return InputError(too_fast(rope, time, RATE))
         if ended == ROPE_OUT:
             low, high = self._crane.rope_limits
-            raise DomainError(
+            return DomainError(
                 f"{name}: at {time:.2f} s the rope is {rope:.2f} m long, but can be {low:g} to "
                 f"{high:g} m; hoist or lower less, or start elsewhere."
             )
         low, high = map(degrees, self._crane.boom_limits)
-        raise DomainError(
+        return DomainError(
             f"{name}: at {time:.2f} s the boom meets the limits of its travel, {low:g} to "
             f"{high:g} deg; luff less, or start elsewhere."
         )
 
 
-def _fixed(crane: Crane, how: Setup, settings: Any) -> Fixed:
-    """What stays as it is during a run; refuses a setup that cannot be."""
-    actuation, area, suspension = how["actuation"], how["drag_area"], how["suspension"]
-    if actuation not in ACTUATIONS:
-        raise InputError(f"actuation is '{actuation}'; it is {', '.join(ACTUATIONS[:-1])}.")
-    if actuation == "direct" and how["control"] is not None:
-        raise InputError("With direct actuation the voltages are given: leave control out.")
-    if not (isfinite(area) and area >= 0.0):
-        raise InputError(f"drag_area is {area:g} m², but must be at least 0.")
-    load = crane.safe_load if how["load"] is None else how["load"]
-    drag = AIR * area / (2.0 * load) if load > 0.0 else 0.0  # which the suspension refuses
-    wind = (*how["wind"], 0.0)
-    if how["loaded"]:
+def _fixed(
+    crane: Crane,
+    settings: Any,
+    *,
+    actuation: Actuation = "inverse",
+    slew_deg: float = 0.0,
+    boom_deg: float = 45.0,
+    rope_m: float = 20.0,
+    load: float | None = None,
+    suspension: Suspension = Suspension(),  # noqa: B008  immutable
+    loaded: bool = False,
+    drag_area: float = 0.0,
+    wind: tuple[float, float] = (0.0, 0.0),
+    brake: bool = True,
+) -> Fixed:
+    """What stays as it is during a run, of a `Setup`; refuses one that cannot be."""
+    kinds = get_args(Actuation)
+    if actuation not in kinds:
+        raise InputError(f"actuation is '{actuation}'; it is {', '.join(kinds[:-1])}.")
+    if not (isfinite(drag_area) and drag_area >= 0.0):
+        raise InputError(f"drag_area is {drag_area:g} m², but must be at least 0.")
+    load = crane.safe_load if load is None else load
+    drag = AIR * drag_area / (2.0 * load) if load > 0.0 else 0.0  # which the suspension refuses
+    if loaded:
         _check_loaded(crane, actuation, load + suspension.hook, suspension)
     below, above = _edges(crane.hoist)
     low, high = crane.boom_limits
     hoist, slew, luff = (_inverse(crane.inverse(axis)) for axis in AXES)
     return Fixed(
         crane.geometry,
-        crane.home(how["slew_deg"], how["boom_deg"], how["rope_m"]),
+        crane.home(slew_deg, boom_deg, rope_m),
         settings,
-        ACTUATIONS.index(actuation),
-        bool(how["brake"]),
+        kinds.index(actuation),
+        bool(brake),
         (below or -FULL_VOLTAGE, above or FULL_VOLTAGE),
         (sin(low), sin(high)),
         crane.rope_limits,
         load + suspension.hook,
-        suspension.hanging(load, crane.rope_limits[0], RATE, drag, wind),
-        bool(how["loaded"]),
+        suspension.hanging(load, crane.rope_limits[0], RATE, drag, (*wind, 0.0)),
+        bool(loaded),
         (hoist, slew, luff),
     )
 

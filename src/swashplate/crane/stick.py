@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from math import cos, isfinite, radians, sin
+from math import cos, inf, radians, sin
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -95,7 +95,7 @@ class Stick(Result):
                     f"The {axis} needs until={{'{target}': ...}} or a duration, so that the stick "
                     "returns."
                 )
-        if not (start >= 0.0 and ramp > 0.0 and isfinite(length) and length > 0.0):
+        if not (start >= 0.0 and ramp > 0.0 and 0.0 < length < inf):
             raise InputError(
                 f"A stick starts at 0 s or later, with ramps and a length above 0 s, not "
                 f"{start:g}, {ramp:g} and {length:g} s."
@@ -151,9 +151,26 @@ class Stick(Result):
             made = np.stack([np.interp(time, grid, each) for each in self.samples.T], axis=1)
             busy = np.flatnonzero(np.any(self.samples != 0.0, axis=1))
             return made, float(grid[busy[-1]]) if busy.size else 0.0
-        made, end = np.zeros((time.size, 3)), 0.0
+        made, end, g = np.zeros((time.size, 3)), 0.0, crane.geometry
         for axis, part in self.parts.items():
-            lasts = self._lasts(crane, home, axis, part)
+            # time from zero to zero that brings an ideal drive to its target
+            name, lasts = TARGETS[axis], self.duration or 0.0
+            if name in self.until:
+                target = self.until[name]
+                boom = Boom(cos(radians(target)), sin(radians(target)))
+                way = (
+                    (home.rope - target) / g.hoist,
+                    radians(target) - home.slew,
+                    (home.luff_rope - luff_rope(boom, g)) / g.luff,
+                )[AXES.index(axis)]
+                low, high = crane.inverse(axis).limits
+                speed = part * high if part > 0.0 else -part * low
+                if way * speed <= 0.0:
+                    raise InputError(
+                        f"The {axis} leads away from {name} = {target:g}, or is there already: "
+                        "change the sign of its command or the target."
+                    )
+                lasts = way / speed + self.ramp
             if lasts < 2.0 * self.ramp:
                 raise InputError(
                     f"The {axis} moves for {lasts:.3g} s, less than its two ramps of "
@@ -168,26 +185,3 @@ class Stick(Result):
             made[:, AXES.index(axis)] = np.interp(time, corners, [0.0, part, part, 0.0])
             end = max(end, self.start + lasts)
         return made, end
-
-    def _lasts(self, crane: Crane, home: Home, axis: str, part: float) -> float:
-        """Time from zero to zero that brings an ideal drive to the target of its axis. [s]"""
-        name = TARGETS[axis]
-        if name not in self.until:
-            assert self.duration is not None
-            return self.duration
-        target, g = self.until[name], crane.geometry
-        if axis == "slew":
-            way = radians(target) - home.slew
-        elif axis == "hoist":
-            way = (home.rope - target) / g.hoist
-        else:
-            boom = Boom(cos(radians(target)), sin(radians(target)))
-            way = (home.luff_rope - float(luff_rope(boom, g))) / g.luff
-        low, high = crane.inverse(axis).limits
-        speed = part * high if part > 0.0 else -part * low
-        if way * speed <= 0.0:
-            raise InputError(
-                f"The {axis} leads away from {name} = {target:g}, or is there already: change the "
-                "sign of its command or the target."
-            )
-        return way / speed + self.ramp

@@ -20,7 +20,7 @@ from swashplate.crane.crane import Crane
 from swashplate.crane.loop import ROWS
 from swashplate.crane.result import PUMPS, CraneRun
 from swashplate.crane.sea import Seaway, Spectrum
-from swashplate.crane.stepper import RATE, Actuation, Setup, Start
+from swashplate.crane.stepper import RATE, Actuation, Setup
 from swashplate.crane.stick import AXES, Stick
 from swashplate.equations import kernel
 from swashplate.errors import DomainError, InputError
@@ -50,135 +50,128 @@ NONE = "no control"
 # --- many runs ------------------------------------------------------------------------------------
 
 
-class StudySetup(Start, total=False):
-    """How a study is set up: keywords of `judge` and `sweep`.
-
-    Those of `Start` say where each run begins; by default the load hangs abeam, boom at 45 deg,
-    rope 27 m.
-
-    Attributes
-    ----------
-    sea : str, Spectrum or Seaway
-        Sea state, by default "ss3"; a seaway gives heading, ship and spreading as well.
-    seeds : sequence of int
-        A seaway for each.
-    drives : sequence of str, or mapping of str to str, Crane or sequence of Crane
-        ``"ideal"``, which follow at once within their limits of speed; ``"identified"``, the
-        crane's own; ``"volts"``, these without their inverse maps; by name also other cranes, or
-        several of which each seaway takes the next, see `Crane.drawn`. By default the first two.
-    stick : Stick, optional
-        What the operator does; by default nothing, the crane keeps its load in place.
-    length : float
-        Of each run if there is no stick, 120 s. [s]
-    start : float
-        From when on swing counts, 40 s. [s]
-    executor : Executor, optional
-        Of `swashplate.executors`; threads by default. The numbers do not depend on it.
-    progress : callable, optional
-        Called with seaways done and their number.
-    """
-
-    sea: str | Spectrum | Seaway
-    seeds: Sequence[int]
-    drives: Drives
-    stick: Stick | None
-    length: float
-    start: float
-    executor: Executor | None
-    progress: Callable[[int, int], None] | None
-
-
 class Case(NamedTuple):
     """A crane with its control, as it goes through every seaway."""
 
     cranes: tuple[Crane, ...]
     """One, or cranes of which each seaway takes the next."""
-    control: Control | None
-    actuation: Actuation
-    where: Start
-    """Where it begins, load, brake."""
+    setup: Setup
     stick: Stick
     height: float = 1.0
     """Factor on the height of the waves."""
 
+    @property
+    def driven(self) -> bool:
+        """Whether it has drives that have limits, not ideal ones."""
+        return self.setup["actuation"] != IDEAL
+
     def run(self, number: int, motion: Array | None) -> CraneRun:
         """Its run in a seaway by the seaway's number, in that motion of the ship."""
-        how: Setup = {"control": self.control, "actuation": self.actuation, **self.where}
         sea = motion if motion is None or self.height == 1.0 else self.height * motion
-        return self.cranes[number % len(self.cranes)].simulate(self.stick, sea=sea, **how)
+        return self.cranes[number % len(self.cranes)].simulate(self.stick, sea=sea, **self.setup)
+
+    def moved(self, **setup: Unpack[Setup]) -> Case:
+        """The case set up in another way."""
+        return self._replace(setup=self.setup | setup)
 
 
 @dataclass(frozen=True, eq=False)
 class Study(Result):
-    """A study as it is asked for: controllers, drives, seaways, stick, where each run begins."""
+    """A study as it is asked for: variants of control and drives in seaways."""
 
     crane: Crane
-    laws: Mapping[str, Control | None]
-    drives: Mapping[str, str | Crane | Sequence[Crane]]
+    cases: Mapping[str, Case]
+    """By name: no control, then each controller on each set of drives."""
     sea: Seaway | None
     """None for a calm sea, in which the residual swing counts."""
     seeds: tuple[int, ...]
-    stick: Stick
     start: float
-    where: Start
+    """From when on swing counts. [s]"""
     executor: Executor
     progress: Callable[[int, int], None] | None
 
     @classmethod
-    def of(cls, crane: Crane, control: Laws, setup: StudySetup) -> Study:
-        """A study from keywords of a user.
+    def of(
+        cls,
+        crane: Crane,
+        control: Laws,
+        *,
+        seeds: Sequence[int],
+        sea: str | Spectrum | Seaway = "ss3",
+        drives: Drives = (IDEAL, BUILT),
+        stick: Stick | None = None,
+        length: float = 120.0,
+        start: float = 40.0,
+        executor: Executor | None = None,
+        progress: Callable[[int, int], None] | None = None,
+        **setup: Any,
+    ) -> Study:
+        """A study; these are the keywords of `judge` and `sweep`.
+
+        Parameters
+        ----------
+        crane : Crane
+        control : Control or mapping of str to Control or None
+            One controller, or several by name.
+        seeds : sequence of int
+            A seaway for each.
+        sea : str, Spectrum or Seaway
+            Sea state; a seaway gives heading, ship and spreading as well.
+        drives : sequence of str, or mapping of str to str, Crane or sequence of Crane
+            ``"ideal"``, which follow at once within their limits of speed; ``"identified"``, the
+            crane's own; ``"volts"``, these without their inverse maps; by name also other cranes,
+            or several of which each seaway takes the next, see `Crane.drawn`.
+        stick : Stick, optional
+            What the operator does; by default nothing, the crane keeps its load in place.
+        length : float
+            Of each run if there is no stick. [s]
+        start : float
+            From when on swing counts. [s]
+        executor : Executor, optional
+            Of `swashplate.executors`; threads by default. The numbers do not depend on it.
+        progress : callable, optional
+            Called with seaways done and their number.
+        **setup
+            Where each run begins, what hangs on it: see `Setup`, whose control and actuation follow
+            from controllers and drives. By default the load hangs abeam on 27 m of rope.
 
         Raises
         ------
         InputError
-            For unknown keywords, seeds, drives or a start that make no study.
+            For seeds, drives or a start that make no study.
         """
-        strange = [each for each in setup if each not in StudySetup.__annotations__]
-        if strange:
-            known = ", ".join(StudySetup.__annotations__)
-            raise InputError(f"A study has no {strange[0]}; it has {known}.")
-        own: dict[str, Any] = {"slew_deg": 90.0, "boom_deg": 45.0, "rope_m": 27.0} | dict(setup)
-        laws = dict(control) if isinstance(control, Mapping) else {"": control}
-        drives = own.pop("drives", (IDEAL, BUILT))
-        sets = dict(drives) if isinstance(drives, Mapping) else {each: each for each in drives}
-        if not laws or not sets:
-            raise InputError("A study needs at least one controller and one set of drives.")
-        for name, given in sets.items():
-            if isinstance(given, str) and given not in ACTUATED:
-                words = ", ".join(ACTUATED)
-                raise InputError(f"There are no drives '{given}'; there are {words}, or cranes.")
-            if not given:
-                raise InputError(f"The drives '{name}' are an empty list of cranes.")
-        seeds = tuple(own.pop("seeds"))
-        if not seeds:
-            raise InputError("A study of seaways needs at least one seed.")
-        sea = own.pop("sea", "ss3")
-        seaway = sea if isinstance(sea, Seaway) else Seaway(sea)
-        length, start = own.pop("length", 120.0), own.pop("start", 40.0)
-        stick = own.pop("stick", None) or Stick.rest(length)
+        laws = control if isinstance(control, Mapping) else {"": control}
+        sets = drives if isinstance(drives, Mapping) else {each: each for each in drives}
+        if not (laws and sets and seeds):
+            raise InputError("A study needs a controller, a set of drives and a seed at least.")
+        if "actuation" in setup:
+            raise InputError("A study takes its drives by name, drives=('ideal',), not actuation.")
+        stick = stick or Stick.rest(length)
         if not 0.0 <= start < stick.length:
             raise InputError(
                 f"Swing counts from {start:g} s on, but a run is {stick.length:g} s long: begin "
                 "earlier or take a longer one."
             )
-        executor, progress = own.pop("executor", None) or Threads(), own.pop("progress", None)
-        where: Any = own
-        return cls(crane, laws, sets, seaway, seeds, stick, start, where, executor, progress)
-
-    def cases(self) -> dict[str, Case]:
-        """Cases by name: no control, then each controller on each set of drives."""
-        made = {NONE: Case((self.crane,), None, "inverse", self.where, self.stick)}
-        for law, stages in self.laws.items():
-            for name, given in self.drives.items():
-                cranes: tuple[Crane, ...] = (self.crane,)
-                actuation: Actuation = "inverse"
+        own: Any = {"slew_deg": 90.0, "boom_deg": 45.0, "rope_m": 27.0, **setup}
+        none = Case((crane,), own | {"control": None, "actuation": "inverse"}, stick)
+        cases = {NONE: none}
+        for law, stages in laws.items():
+            for name, given in sets.items():
                 if isinstance(given, str):
-                    actuation = ACTUATED[given]
+                    if given not in ACTUATED:
+                        words = ", ".join(ACTUATED)
+                        raise InputError(
+                            f"There are no drives '{given}'; there are {words}, or cranes."
+                        )
+                    case = none.moved(control=stages, actuation=ACTUATED[given])
+                elif not given:
+                    raise InputError(f"The drives '{name}' are an empty list of cranes.")
                 else:
                     cranes = (given,) if isinstance(given, Crane) else tuple(given)
-                case = Case(cranes, stages, actuation, self.where, self.stick)
-                made[f"{law}, {name}" if law else name] = case
-        return made
+                    case = none.moved(control=stages)._replace(cranes=cranes)
+                cases[f"{law}, {name}" if law else name] = case
+        seaway = sea if isinstance(sea, Seaway) else Seaway(sea)
+        return cls(crane, cases, seaway, tuple(seeds), start, executor or Threads(), progress)
 
     def outcomes(self, cases: Sequence[Case], numbers: range | None = None) -> Array:
         """Swing and limits of all cases in the seaways, or in some of them by their numbers.
@@ -195,9 +188,8 @@ class Study(Result):
             If a case cannot begin as it is asked to.
         """
         for case in cases:  # said here, once, and not by a worker
-            how: Setup = {"control": case.control, "actuation": case.actuation, **case.where}
-            stepper = case.cranes[0].stepper(**how)
-            case.stick.sample(case.cranes[0], stepper.fixed.home, RATE)
+            home = case.cranes[0].stepper(**case.setup).fixed.home
+            case.stick.sample(case.cranes[0], home, RATE)
         chosen = range(len(self.seeds)) if numbers is None else numbers
         made = np.full((len(chosen), len(cases), len(COUNTED)), np.nan)
         items = [(n, self.seeds[n]) for n in chosen]
@@ -260,8 +252,8 @@ class Swept(NamedTuple):
     """A quantity that a sweep goes over."""
 
     points: tuple[float, ...]
-    setup: StudySetup
-    """Of a study unless the user says otherwise."""
+    study: Mapping[str, Any]
+    """Keywords of a study unless the user says otherwise."""
     unit: str
     """In which points are given and shown."""
     fixed: tuple[str, ...] = ()
@@ -270,13 +262,12 @@ class Swept(NamedTuple):
 
 TURN, PERIOD = 45.0, 7.5
 """Slew of a sweep over the stick [deg]; peak period of a sweep over the waves' height [s]."""
-TENTHS = tuple(k / 10.0 for k in range(1, 11))
 SWEPT: Mapping[str, Swept] = {
     "bearing": Swept(tuple(range(0, 360, 15)), {"seeds": range(4)}, "deg", ("slew_deg",)),
     "height": Swept((0.1, 0.2, 0.3, 0.45, 0.6, 0.9, 1.2), {"seeds": range(40)}, "m"),
     "orifice": Swept((0.5, 0.75, 1.0, 1.25, 1.5, 2.0, 3.0, 5.0), {"seeds": range(20)}, ""),
     "stick": Swept(
-        TENTHS,
+        tuple(k / 10.0 for k in range(1, 11)),
         {"seeds": (0,), "slew_deg": 0.0, "rope_m": 20.0, "drives": (IDEAL, "volts", BUILT)},
         "",
         ("seeds", "sea", "stick", "start", "length"),
@@ -333,7 +324,7 @@ def sweep(
     control: Laws,
     *,
     points: ArrayLike | None = None,
-    **setup: Unpack[StudySetup],
+    **study: Any,
 ) -> Sweep:
     """Swing over a quantity, in the same seaways at every point.
 
@@ -350,8 +341,8 @@ def sweep(
         One controller, or several by name.
     points : (n,) array_like, optional
         Of the quantity.
-    **setup
-        Seaways, drives, where each run begins: see `StudySetup`.
+    **study
+        Seaways, drives, where each run begins: see `Study.of`.
 
     Raises
     ------
@@ -361,48 +352,48 @@ def sweep(
     if over not in SWEPT:
         raise InputError(f"There is no sweep over '{over}'; there are {', '.join(SWEPT)}.")
     swept = SWEPT[over]
-    taken = [each for each in setup if each in swept.fixed]
+    taken = [each for each in study if each in swept.fixed]
     if taken:
         raise InputError(f"A sweep over the {over} sets {taken[0]} itself: leave it out.")
     grid = np.atleast_1d(np.asarray(swept.points if points is None else points, dtype=np.float64))
     if not (grid.size and np.isfinite(grid).all() and (over == "bearing" or (grid > 0.0).all())):
         above = "" if over == "bearing" else " above 0"
         raise InputError(f"Points of the {over} must be one or more finite numbers{above}.")
-    study = Study.of(crane, control, {**swept.setup, **setup})
+    asked = Study.of(crane, control, **{**swept.study, **study})
     if over == "stick":
-        study = replace(study, sea=None)
-    elif over == "height" and study.sea is not None:
-        study = replace(study, sea=replace(study.sea, sea=Spectrum(1.0, PERIOD)))
-    found = study.cases()
-    variants = {name: case for name, case in found.items() if name == NONE or case != found[NONE]}
+        asked = replace(asked, sea=None)
+    elif over == "height" and asked.sea is not None:
+        asked = replace(asked, sea=replace(asked.sea, sea=Spectrum(1.0, PERIOD)))
+    none = asked.cases[NONE]
+    variants = {name: case for name, case in asked.cases.items() if name == NONE or case != none}
     cases = [_at(over, float(x), case) for x in grid for case in variants.values()]
     # what does not depend on the point is simulated once
     single = [case for k, case in enumerate(cases) if case not in cases[:k]]
-    every = study.outcomes(single)[:, [single.index(each) for each in cases], :3]
+    every = asked.outcomes(single)[:, [single.index(each) for each in cases], :3]
     values = every.reshape(-1, grid.size, len(variants), 3)
     if over == "bearing":
         grid = np.radians(grid)
-    return Sweep(over, grid, tuple(variants), values, crane, study.sea)
+    return Sweep(over, grid, tuple(variants), values, crane, asked.sea)
 
 
 def _at(over: str, x: float, case: Case) -> Case:
     """A case at a point of a sweep; no control and ideal drives do not know the orifice."""
     if over == "bearing":
-        return case._replace(where={**case.where, "slew_deg": x})
+        return case.moved(slew_deg=x)
     if over == "height":
         return case._replace(height=x)
     if over == "orifice":
-        if case.control is None or case.actuation == "ideal":
+        if case.setup["control"] is None or not case.driven:
             return case
-        return case._replace(cranes=tuple(with_orifice(each, x) for each in case.cranes))
+        return case._replace(cranes=with_orifice(case.cranes, x))
     full = min(map(abs, case.cranes[0].inverse("slew").limits))
     length = float(np.ceil(np.radians(TURN) / (x * full) + 60.0))
-    until = {"slew_deg": case.where["slew_deg"] + TURN}
+    until = {"slew_deg": case.setup["slew_deg"] + TURN}
     return case._replace(stick=Stick.trapezoid(slew=x, until=until, length=length))
 
 
-def with_orifice(crane: Crane, factor: float) -> Crane:
-    """The crane with another in-line orifice of its luff drive; the same one for a factor of 1."""
-    return (
-        crane if factor == 1.0 else crane.with_drive(luff=pulled(crane.luff, {"orifice": factor}))
-    )
+def with_orifice(cranes: tuple[Crane, ...], factor: float) -> tuple[Crane, ...]:
+    """Cranes with another in-line orifice of their luff drives; the same ones for a factor of 1."""
+    if factor == 1.0:
+        return cranes
+    return tuple(each.with_drive(luff=pulled(each.luff, {"orifice": factor})) for each in cranes)

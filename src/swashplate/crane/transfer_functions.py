@@ -221,17 +221,15 @@ def read_ship(path: str | Path, length: float | None = None) -> TransferFunction
         raise InputError(
             f"{path}: a .4 of WAMIT, and no other file, needs the length ULEN of its run."
         )
-    if length is not None:
-        if not (isfinite(length) and length > 0.0):
-            raise InputError(f"WAMIT's length ULEN is {length:g} m, but must be above 0.")
-        return _gathered(path, _wamit(path, length))
-    readers = {".re1": _veres, ".nc": _capytaine, ".csv": _csv}
+    if length is not None and not (isfinite(length) and length > 0.0):
+        raise InputError(f"WAMIT's length ULEN is {length:g} m, but must be above 0.")
+    readers = {".re1": _veres, ".4": _wamit, ".nc": _capytaine, ".csv": _csv}
     if kind not in readers:
         raise InputError(
             f"{path}: transfer functions are read from .re1 of VERES, .4 of WAMIT, .nc of "
             "Capytaine, and .csv."
         )
-    return _gathered(path, readers[kind](path))
+    return _gathered(path, readers[kind](path), length or 1.0)
 
 
 def _numbers(path: str | Path, line: int, words: Sequence[str | None], wanted: str) -> list[float]:
@@ -277,27 +275,16 @@ def _veres(path: str | Path) -> Iterator[Amplitude]:
                     yield speed, heading, omega, int(motion) - 1, value
 
 
-def _wamit(path: str | Path, length: float) -> Iterator[Amplitude]:
+def _wamit(path: str | Path) -> Iterator[Amplitude]:
     wanted = "period, heading, motion, modulus, phase, real part, imaginary part"
     for row, line in enumerate(read_text(path).splitlines(), 1):
         words = line.split()
         if row == 1 and words and not words[0][-1].isdigit():
             continue  # names of columns
-        period, heading, motion, size, _, real, imaginary = _numbers(path, row, words, wanted)
-        value = complex(real, imaginary)
-        if abs(abs(value) - size) > 1e-3 * size + 1e-5:
-            raise FileError(
-                f"{path}, line {row}: the parts {real:g} and {imaginary:g} of motion {motion:g} "
-                f"have not the modulus {size:g}: these are no motions of one ship as WAMIT writes "
-                "them."
-            )
-        if not period > 0.0:
-            raise FileError(
-                f"{path}, line {row}: the period is {period:g} s; leave out the limits of zero and "
-                "infinite frequency."
-            )
-        value /= length if motion > 3 else 1.0
-        yield 0.0, heading, 2.0 * pi / period, int(motion) - 1, value
+        period, heading, motion, _, _, real, imaginary = _numbers(path, row, words, wanted)
+        # the limits of zero and infinite frequency have periods below 0, or 0
+        omega = 2.0 * pi / period if period > 0.0 else 0.0
+        yield 0.0, heading, omega, int(motion) - 1, complex(real, imaginary)
 
 
 def _csv(path: str | Path) -> Iterator[Amplitude]:
@@ -314,46 +301,38 @@ def _capytaine(path: str | Path) -> Iterator[Amplitude]:
     """Capytaine counts by e^{-iωt}."""
     from h5py import File
 
+    wanted = ("complex", "wave_direction", "omega", "radiating_dof")
     try:
         with File(path, "r") as file:
-            name = next((each for each in ("RAO", "rao") if each in file), "RAO")
-            if name not in file:
-                raise FileError(f"{path} has no array RAO; it has {', '.join(file) or 'none'}.")
-            scales = [each[0] for each in file[name].dims]
-            dimensions = [each.name.rpartition("/")[2] for each in scales]
-            table = file[name][...]
-            labels = [each.asstr()[...] if each.dtype.kind == "O" else each[...] for each in scales]
-    except (OSError, ValueError, TypeError, IndexError, RuntimeError) as error:
+            scales = [each[0] for each in file["RAO"].dims]
+            names = [each.name.rpartition("/")[2] for each in scales]
+            names = ["radiating_dof" if each.endswith("_dof") else each for each in names]
+            order = [names.index(each) for each in wanted]
+            table = np.transpose(file["RAO"][...], order)
+            labels = [scales[i] for i in order]
+            parts, directions, omega, freedom = (
+                [str(word) for word in each.asstr()[...]] if each.dtype.kind == "O" else each[...]
+                for each in labels
+            )
+        made = table[parts.index("re")] - 1j * table[parts.index("im")]
+    except (OSError, KeyError, ValueError, TypeError, IndexError, RuntimeError) as error:
         raise FileError(
-            f"{path} is no file of netCDF 4 with an array RAO whose dimensions have coordinates: "
-            f"{error}."
+            f"{path} is no file of netCDF 4 with an array RAO over {', '.join(wanted)}, with their "
+            f"coordinates and the parts re and im: {error}."
         ) from None
-    wanted = ("complex", "wave_direction", "omega", "radiating_dof")
-    named = ["radiating_dof" if each.endswith("_dof") else each for each in dimensions]
-    if sorted(named) != sorted(wanted):
-        raise FileError(
-            f"{path}: RAO has the dimensions {', '.join(dimensions)}, but needs {', '.join(wanted)}"
-            " with their coordinates."
-        )
-    order = [named.index(each) for each in wanted]
-    parts, directions, omega, freedom = (labels[i] for i in order)
-    names = [str(each).lower() for each in freedom]
-    parts = [str(each) for each in parts]
-    if sorted(parts) != ["im", "re"] or not set(MOTIONS) <= set(names):
-        raise FileError(
-            f"{path}: RAO has the motions {', '.join(names)} and the parts {', '.join(parts)}, but "
-            f"needs {', '.join(MOTIONS)}, re and im."
-        )
-    table = np.transpose(table, order)
-    made = table[parts.index("re")] - 1j * table[parts.index("im")]
     for (m, f, i), value in np.ndenumerate(made):
-        if names[i] in MOTIONS:
-            heading = float(np.degrees(directions[m]))
-            yield 0.0, heading, float(omega[f]), MOTIONS.index(names[i]), complex(value)
+        if freedom[i].lower() in MOTIONS:
+            heading, motion = float(np.degrees(directions[m])), MOTIONS.index(freedom[i].lower())
+            yield 0.0, heading, float(omega[f]), motion, complex(value)
 
 
-def _gathered(path: str | Path, amplitudes: Iterable[Amplitude]) -> TransferFunctions:
-    """A table of all amplitudes, each grid rising, headings from 0 to 180 degrees."""
+def _gathered(
+    path: str | Path, amplitudes: Iterable[Amplitude], length: float
+) -> TransferFunctions:
+    """A table of all amplitudes, each grid rising, headings from 0 to 180 degrees.
+
+    Rotations are in rad for so much of the wave. [m]
+    """
     turned = [(v, heading % 360.0, w, i, z) for v, heading, w, i, z in amplitudes]
     found = [each for each in turned if each[1] <= 180.0 + 1e-9]
     if not found:
@@ -366,7 +345,7 @@ def _gathered(path: str | Path, amplitudes: Iterable[Amplitude]) -> TransferFunc
     if motion.min() < 0 or motion.max() > 5:
         raise FileError(f"{path} has a motion {motion.max() + 1} of a ship; there are 1 to 6.")
     values = np.full((speeds.size, headings.size, omega.size, 6), np.nan, dtype=np.complex128)
-    values[v, m, f, motion] = amplitude
+    values[v, m, f, motion] = amplitude / np.where(motion > 2, length, 1.0)
     gaps = np.argwhere(~np.isfinite(values))
     if gaps.size:
         _, i, j, lacks = gaps[0]
@@ -375,7 +354,9 @@ def _gathered(path: str | Path, amplitudes: Iterable[Amplitude]) -> TransferFunc
             "the file is cut."
         )
     if len(found) > values.size or omega[0] <= 0.0:
-        raise FileError(f"{path}: frequencies must be above 0, and each wave be there once.")
+        raise FileError(
+            f"{path}: frequencies must be above 0 and finite, and each wave be there once."
+        )
     if headings.size > 1 and (headings[0] > 1e-6 or headings[-1] < 180.0 - 1e-6):
         raise FileError(f"{path}: headings must reach from 0 to 180 deg.")
     return TransferFunctions(str(path), speeds, np.radians(headings), omega, values)

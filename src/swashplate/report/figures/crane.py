@@ -261,7 +261,7 @@ def _polar(result: Sweep, title: str, looks: dict[str, style.Stroke], *said: str
     shown = [each for each in (0.1, 0.3, 1.0, 3.0, 10.0, 30.0) if each <= 1.3 * np.nanmax(mean)]
     ax.set_ylim(0.0, np.log10(1.3 * np.nanmax(mean)) - floor)
     ax.set_yticks(np.log10(shown) - floor, [f"{each:g}°" for each in shown])
-    ax.set_rlabel_position(22.5)
+    ax.set_rlabel_position(52.5)  # lines cross it straight on
     names = {0: "bow", 90: "starboard", 180: "stern", 270: "port"}
     angles = range(0, 360, 30)
     ax.set_xticks(np.radians(angles), [names.get(each, f"{each}°") for each in angles])
@@ -316,7 +316,7 @@ def plot_judgment(result: Judgment, *, title: str = "") -> Figure:
         share = result.worse(name) if name in result.names[1:] else 0.0
         color = style.VERMILION if share > result.allowed else style.BLUE
         spread = row + random.uniform(-0.25, 0.25, known.size)
-        ax.plot(known, spread, "o", color=color, ms=2.6, alpha=0.35, mew=0.0)
+        ax.plot(known, spread, "o", color=color, ms=3.2, alpha=0.45, mew=0.0)
         mean = mean_of(known)
         ax.plot(
             [mean.low, mean.high], [row, row], color=style.INK, linewidth=3.0, solid_capstyle="butt"

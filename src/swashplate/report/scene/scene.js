@@ -57,6 +57,15 @@
       if (fill) { pen.closePath(); pen.fillStyle = fill; pen.fill(); }
       pen.strokeStyle = color; pen.lineWidth = wide; pen.stroke();
     };
+    // of a convex body only the sides towards the eye, counted anticlockwise from above
+    const solid = (top, low, line, color, cover) => {
+      top.forEach((_, n) => {
+        const m = (n + 1) % top.length, side = [top[n], top[m], low[m], low[n]];
+        const [[ux, uy], [vx, vy], [wx, wy]] = side.map(seen);
+        if ((vx - ux) * (wy - uy) > (vy - uy) * (wx - ux)) path(side, line, 0.8, color);
+      });
+      path(top, line, 1, cover);
+    };
     const slewed = (reach, z) => to([ax + reach * out[0], ay + reach * out[1], z]);
     pen.lineJoin = pen.lineCap = "round";
     // the sea at rest, 20 m between lines
@@ -66,9 +75,8 @@
     }
     // hull: sides, then deck
     const plan = [[HULL.astern, -HULL.half], [HULL.ahead - 30, -HULL.half], [HULL.ahead, 0], [HULL.ahead - 30, HULL.half], [HULL.astern, HULL.half]];
-    const deck = plan.map(([x, y]) => to([x, y, HULL.deck])), keel = plan.map(([x, y]) => to([x, y, HULL.keel]));
-    plan.forEach((_, n) => { const m = (n + 1) % plan.length; path([deck[n], deck[m], keel[m], keel[n]], "#7f8a93", 0.8, "#aab4bc"); });
-    path(deck, "#7f8a93", 1, "#d5dade");
+    const [deck, keel] = [HULL.deck, HULL.keel].map((z) => plan.map(([x, y]) => to([x, y, z])));
+    solid(deck, keel, "#7f8a93", "#aab4bc", "#d5dade");
     // pedestal and tower, boom as two chords, ropes
     const tip = [r[0], r[1], r[2]], load = [r[3], r[4], r[5]], foot = slewed(data.foot, az);
     const sheave = slewed(data.foot + data.sheave[0], az + data.sheave[1]);
@@ -87,10 +95,8 @@
     path(trail, COLORS[shown], 1.5);
     pen.setLineDash([4, 4]); path([tip, [tip[0], tip[1], tip[2] - r[8]]], "#888", 1); pen.setLineDash([]);
     path([tip, load], r[7] > 0 ? "#111" : "#c00", 1.6);
-    const box = (x, y, z) => [load[0] + 3 * x, load[1] + 1.2 * y, load[2] - 1.5 + 1.2 * z];
-    const corner = [[-1, -1], [1, -1], [1, 1], [-1, 1]];
-    corner.forEach(([x, y], n) => { const [u, v] = corner[(n + 1) % 4]; path([box(x, y, -1), box(u, v, -1), box(u, v, 1), box(x, y, 1)], "#333", 1, COLORS[shown]); });
-    path(corner.map(([x, y]) => box(x, y, 1)), "#333", 1, COLORS[shown]);
+    const [roof, floor] = [-0.3, -2.7].map((z) => [[-3, -1.2], [3, -1.2], [3, 1.2], [-3, 1.2]].map(([x, y]) => [load[0] + x, load[1] + y, load[2] + z]));
+    solid(roof, floor, "#333", COLORS[shown], COLORS[shown]);
   }
 
   function drawChart() {

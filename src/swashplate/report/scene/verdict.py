@@ -51,8 +51,8 @@ def write_judgment(judgment: Judgment, path: str | Path) -> None:
         If the file cannot be written.
     """
     study, judged = judgment.study, judgment.judged
-    crane, where = study.crane, judgment.cases[NONE].where
-    pose = {key: value for key, value in where.items() if key in ("slew_deg", "boom_deg", "rope_m")}
+    crane, setup = study.crane, study.cases[NONE].setup
+    pose = {name: setup[name] for name in ("slew_deg", "boom_deg", "rope_m")}
     swings, differences, limits, *remedies = judgment.tables()
     verdict, *rests = judgment.sentences()
     look: Light = "good" if judgment.passed else "bad"
@@ -71,18 +71,17 @@ def write_judgment(judgment: Judgment, path: str | Path) -> None:
     try:
         runs = {name: judgment.run(name, judgment.typical) for name in (NONE, judged)}
         caption = f"Seaway {judgment.typical}, in which '{judged}' swings as in half of all seaways"
-        example = [_drawn(plot_crane(runs, title=""), caption)]
+        example = [_drawn(plot_crane(runs, title=f"Swing in seaway {judgment.typical}"), caption)]
     except DomainError:  # a run that was stopped has no signals
         pass
     basis.append(
         f"Boom at {pose['slew_deg']:g}° from the bow to starboard and {pose['boom_deg']:g}° up, "
         f"rope {pose['rope_m']:g} m."
     )
-    for name, case in judgment.cases.items():
+    for name, case in study.cases.items():
         if name != NONE:
-            ideal = case.actuation == "ideal"
-            drives = "ideal drives" if ideal else count(len(case.cranes), "crane")
-            basis.append(f"{name}: {case.control!r}, {drives}.")
+            drives = count(len(case.cranes), "crane") if case.driven else "ideal drives"
+            basis.append(f"{name}: {case.setup['control']!r}, {drives}.")
     basis += [f"{axis}: {getattr(crane, axis).parameters.title}." for axis in ("slew", "luff")]
     geometry = Block("details", [Block("table", crane.table())], "Geometry, with its sources")
     sections = [
