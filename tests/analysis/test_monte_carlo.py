@@ -50,21 +50,24 @@ def test_a_covariance_made_by_hand_becomes_that_of_the_drives(hoist):
         (
             Unknown("Z10", numbers["Z10"], 6.0, 24.0),
             Unknown("Z16_plus", numbers["Z16_plus"], 1e-5, 1e-3, log=True),
+            Unknown("Z18", 2.1667e-5, 0.0, 1e-4),
         )
     )
-    covariance = np.array([[1e-4, 1e-4], [1e-4, 4e-4]])
-    drawn = drives([assessment(hoist, unknowns, covariance)], 2000, seed=2)
+    covariance = np.array([[1e-4, 1e-4, 0.0], [1e-4, 4e-4, 0.0], [0.0, 0.0, 0.0]])
+    given = [assessment(hoist, unknowns, covariance, [True, True, False])]
+    drawn = drives(given, 1000, seed=2)
     columns = drawn.columns
     vectors = np.array(
         [columns["Z10"] / numbers["Z10"], np.log(columns["Z16_plus"] / numbers["Z16_plus"])]
     )
-    # 2000 draws are good to about 4 √(2/2000) of a variance
-    np.testing.assert_allclose(np.cov(vectors), covariance, rtol=0.13)
+    # 1000 draws are good to about 4 √(2/1000) of a variance
+    np.testing.assert_allclose(np.cov(vectors), covariance[:2, :2], rtol=0.18)
     assert (columns["Z16_minus"] == numbers["Z16_minus"]).all()
-    assert (drawn.redrawn, drawn.fixed, drawn.sentences()) == (0, (), ())
-    again, other = (
-        drives([assessment(hoist, unknowns, covariance)], 5, seed=seed) for seed in (2, 3)
-    )
+    # what is not determined stays as fitted
+    assert (drawn.redrawn, drawn.fixed) == (0, ("Z18",))
+    assert (columns["Z18"] == 2.1667e-5).all()
+    assert "Not drawn, as fitted in all drives: Z18" in drawn.sentences()[0]
+    again, other = (drives(given, 5, seed=seed) for seed in (2, 3))
     np.testing.assert_array_equal(again.columns["Z10"], columns["Z10"][:5])
     assert (other.columns["Z10"] != columns["Z10"][:5]).all()
 
@@ -76,19 +79,6 @@ def test_draws_outside_the_bounds_are_drawn_again(hoist):
     assert drawn.columns["Z10"].min() >= 12.396 * 0.98
     assert drawn.redrawn / (300 + drawn.redrawn) == pytest.approx(0.159, abs=0.06)
     assert f"{drawn.redrawn} draws lay outside" in drawn.sentences()[-1]
-
-
-def test_what_is_not_determined_stays_as_fitted(hoist):
-    unknowns = Unknowns((Unknown("Z10", 12.396, 6.0, 24.0), Unknown("Z18", 2.1667e-5, 0.0, 1e-4)))
-    covariance = np.array([[1e-4, 0.0], [0.0, 0.0]])
-    drawn = drives([assessment(hoist, unknowns, covariance, [True, False])], 3)
-    assert drawn.fixed == ("Z18",)
-    assert (drawn.columns["Z18"] == 2.1667e-5).all()
-    assert "Not drawn, as fitted in all drives: Z18" in drawn.sentences()[0]
-
-
-def test_errors_that_leave_nothing(hoist):
-    unknowns = Unknowns((Unknown("Z10", 12.396, 12.3, 12.5),))
     with pytest.raises(InputError, match="the errors are too large for a Monte Carlo"):
         drives([assessment(hoist, unknowns, np.array([[1e10]]))], 10)
 
