@@ -3,10 +3,9 @@
 from math import sqrt
 
 import numpy as np
-import polars as pl
 import pytest
 
-from swashplate import Drive, FileError
+from swashplate import Drive
 from swashplate.analysis import Envelope, acceleration_curve, envelope, speed_limits
 
 
@@ -107,15 +106,3 @@ def test_other_drives(hoist: Drive) -> None:
         assert abs(way.dead_zone) == 10.0
         assert way.gain is way.saturation_voltage is way.starting_rise is None
         assert way.top_speed == dead.creep
-
-
-def test_table(found, tmp_path) -> None:
-    found["luff"].write(tmp_path / "luff.csv")
-    table = pl.read_csv(tmp_path / "luff.csv")
-    row = table.row(by_predicate=pl.col("quantity") == "acceleration", named=True)
-    assert row["unit"] == "rad/s^2"
-    assert np.degrees(row["minus"]) == pytest.approx(-88.9, abs=0.05)
-    row = table.row(by_predicate=pl.col("quantity") == "saturation_voltage", named=True)
-    assert row["plus"] is None
-    with pytest.raises(FileError, match=".csv or .parquet"):
-        found["luff"].write(tmp_path / "luff.txt")

@@ -50,13 +50,6 @@ def test_a_single_limit_has_all_of_the_error(limit: str, changes: dict[str, floa
     assert found.error == pytest.approx(rms(expected), rel=1e-9)
 
 
-def test_no_limit_at_all() -> None:
-    found = limit_shares(Drive.preset("neutral"), SINE)
-    assert found.error == 0.0
-    assert found.first is None
-    assert all(share.error_share == 0.0 for share in found.shares)
-
-
 @pytest.mark.parametrize(
     ("name", "command", "limit"),
     [
@@ -64,12 +57,13 @@ def test_no_limit_at_all() -> None:
         ("hoist", "step:9", "orifice"),
         ("hoist", "sine:1,0.3", "dead zone"),
         ("luff", "sine:9,0.1", "orifice"),
+        ("neutral", "sine:9,0.1", None),
     ],
 )
-def test_what_to_change_first(name: str, command: str, limit: str) -> None:
+def test_what_to_change_first(name: str, command: str, limit: str | None) -> None:
     found = limit_shares(Drive.preset(name), maneuvers.parse(command).sample())
-    assert found.first is not None
-    assert found.first.limit == limit
+    assert (found.first and found.first.limit) == limit
+    assert (found.error == 0.0) == (limit is None)
     errors = [share.error for share in found.shares]
     assert errors == sorted(errors)
 

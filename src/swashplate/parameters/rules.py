@@ -214,10 +214,6 @@ def _static(n: Values, size: int) -> tuple[Array, Array]:
         static_extremes(channels, pumps, VOLTAGES, lowest, moment)
     return lowest, moment
 
-    lowest, moment = np.empty((size, 2)), np.empty((size, 2))
-    static_extremes(channels, pumps, VOLTAGES, lowest, moment)
-    return lowest, moment
-
 
 @inlined
 def _extremes(channel: Channel, pump: Pump, side: int, voltages: Array) -> tuple[float, float]:
