@@ -99,20 +99,23 @@ def test_names_of_records(record: tuple, unit: str, name: str) -> None:
     assert (found.name, found.kind) == (name, name.split()[0])
 
 
+def drawn(length: float, curve: Callable[[np.ndarray], np.ndarray]) -> Maneuver:
+    return Maneuver("drawn", length, ((0.0, curve),))
+
+
+WAVE = np.arange(0.0, 21.0, 2.5), [0, 5, 0, -5, 0, 5, 0, -5, 0]
 FREE = {
     "chirp": maneuvers.chirp(5.0, 0.05, 1.0),
     "narrow chirp": maneuvers.chirp(5.0, 0.1, 0.11),
     "multisine": maneuvers.multisine(5.0, (0.1, 2.0, 8)),
     "step and sine": maneuvers.step(4.0) + maneuvers.sine(4.0, 0.1),
-    "sine on a step": maneuvers.superpose(
-        maneuvers.sine(2.0, 0.2, settle=None), maneuvers.step(3.0, stop=30.0, length=30.0)
+    "sine on a step": drawn(
+        30.0, lambda t: np.where(t >= 1.0, 3.0 + 2.0 * np.sin(0.4 * np.pi * (t - 1.0)), 0.0)
     ),
-    "triangle": maneuvers.recorded([0, 5, 10], [0, 5, 0], interpolation="linear"),
-    "triangle wave": maneuvers.recorded(
-        np.arange(0, 21, 2.5), [0, 5, 0, -5, 0, 5, 0, -5, 0], interpolation="linear"
-    ),
+    "triangle": drawn(10.0, lambda t: np.interp(t, [0, 5, 10], [0, 5, 0])),
+    "triangle wave": drawn(20.0, lambda t: np.interp(t, *WAVE)),
     "less than a period": maneuvers.sine(4.0, 0.1, length=12.5),
-    "away from rest": maneuvers.recorded([0, 5], [3, 3], interpolation="linear"),
+    "away from rest": drawn(5.0, lambda t: np.full_like(t, 3.0)),
     "two ramps": maneuvers.ramp(1.0, length=8.0) + maneuvers.ramp(-1.0, length=8.0),
 }
 

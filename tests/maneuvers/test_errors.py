@@ -5,8 +5,6 @@ import pytest
 from swashplate import maneuvers
 from swashplate.errors import InputError
 
-LINEAR = {"interpolation": "linear"}
-
 
 @pytest.mark.parametrize(
     ("make", "message"),
@@ -43,14 +41,6 @@ LINEAR = {"interpolation": "linear"}
         (lambda: maneuvers.multisine(1, (0.0, 0.2, 3)), "low must be positive"),
         (lambda: maneuvers.multisine(1, (0.1, 0.2, 50)), "50 frequencies from 0.1 to 0.2 Hz"),
         (lambda: maneuvers.multisine(1, (1e-3, 0.2, 3)), "cannot be told apart in 56.5 s"),
-        (lambda: maneuvers.recorded([0, 1], [0, 1], interpolation="cubic"), "'previous' or 'lin"),
-        (lambda: maneuvers.recorded([0, 1], [0], **LINEAR), "at least two, not 2 and 1"),
-        (lambda: maneuvers.recorded([0], [0], **LINEAR), "at least two, not 1 and 1"),
-        (lambda: maneuvers.recorded([0, 2, 2], [0, 1, 2], **LINEAR), "row 2 .* 2.0 s after 2.0 s"),
-        (lambda: maneuvers.recorded([0, 2, 1], [0, 1, 2], **LINEAR), "row 2 .* 1.0 s after 2.0 s"),
-        (lambda: maneuvers.recorded([0, math.nan], [0, 1], **LINEAR), "time .* row 1 .* is nan"),
-        (lambda: maneuvers.recorded([0, 1], [math.inf, 1], **LINEAR), "voltage .* row 0 .* is inf"),
-        (lambda: maneuvers.superpose(), "at least one maneuver"),
         (lambda: maneuvers.rest(1) * math.nan, "factor must be finite"),
         (lambda: "twice" * maneuvers.rest(1), "factor must be a number"),
         (lambda: maneuvers.rest(1.3).sample(), "rest 1.3 s lasts 1.3 s, at 512 Hz 665.6 samples"),

@@ -1,4 +1,4 @@
-"""Maneuvers as objects: sampled, scaled, joined, added, returned, within their amplitude."""
+"""Maneuvers as objects: sampled, scaled, joined, returned, within their amplitude."""
 
 import math
 import pickle
@@ -19,18 +19,9 @@ SMOOTH = {
     "sine": maneuvers.sine(6.5, 0.3, length=20.0),
     "chirp": maneuvers.chirp(4.0, 0.05, 0.5),
     "multisine": maneuvers.multisine(5.0, [0.1, 0.37, 1.1]),
-    "superposed": maneuvers.superpose(maneuvers.ramp(1.0), maneuvers.sine(2.0, 0.5)),
     "scaled": -0.3 * maneuvers.sine(6.5, 0.3, length=20.0),
     "later": maneuvers.rest(3.0) + maneuvers.chirp(4.0, 0.05, 0.5),
 }
-
-
-@pytest.mark.parametrize("m", SMOOTH.values(), ids=SMOOTH.keys())
-def test_slope_is_the_derivative(m):
-    # An irrational offset keeps the differences off the kinks.
-    t, h = np.linspace(0.0, m.length, 500)[1:-1] + math.pi / 1000, 1e-4
-    differences = (m(t - 2 * h) - 8 * m(t - h) + 8 * m(t + h) - m(t + 2 * h)) / (12 * h)
-    np.testing.assert_allclose(m.slope(t), differences, atol=1e-9)
 
 
 def test_a_jump_is_not_missed_where_durations_round():
@@ -51,12 +42,11 @@ def test_jumps_are_right_continuous():
 
 
 @given(volts, volts, st.floats(0.05, 2.0))
-def test_a_factor_scales_voltage_and_slope(factor, amplitude, frequency):
+def test_a_factor_scales_the_voltage(factor, amplitude, frequency):
     t = np.linspace(0.0, 30.0, 100)
     m = maneuvers.sine(amplitude, frequency)
     scaled, other = factor * m, m * factor
     np.testing.assert_array_equal(scaled(t), factor * m(t))
-    np.testing.assert_array_equal(scaled.slope(t), factor * m.slope(t))
     np.testing.assert_array_equal(scaled(t), other(t))
     np.testing.assert_array_equal((-m)(t), -(m(t)))
     assert scaled.length == m.length
@@ -70,7 +60,6 @@ def test_what_cannot_be_joined_is_a_type_error():
 def test_voltage_is_zero_outside_and_has_the_shape_of_the_times():
     m = maneuvers.stairs([5.0], dwell=1.0, start=0.0, settle=0)
     assert m([[-1.0, -1e-12], [1.0, 1.001]]).tolist() == [[0.0, 0.0], [5.0, 0.0]]
-    assert m.slope([-1.0, 2.0]).tolist() == [0.0, 0.0]
     assert isinstance(m(0.5), float)
     assert m([]).shape == (0,)
     assert math.isnan(m(math.nan))
@@ -85,12 +74,10 @@ def test_voltage_is_zero_outside_and_has_the_shape_of_the_times():
         (maneuvers.stairs([2, 4, 0]), "stairs 2/4/0 V"),
         (maneuvers.chirp(4.0, 0.05, 0.5), "chirp 4 V 0.05 to 0.5 Hz"),
         (maneuvers.multisine(5, [0.1, 2], seed=3), "multisine 5 V 0.1 to 2 Hz seed 3"),
-        (maneuvers.recorded([0, 1], [0, 1], interpolation="linear"), "recorded 2 rows"),
         (maneuvers.rest(1.0) + maneuvers.step(2.0), "rest 1 s + step 2 V"),
         (0.5 * maneuvers.step(9.0), "0.5 * (step 9 V)"),
         (np.float64(0.5) * maneuvers.step(9.0), "0.5 * (step 9 V)"),
         (-maneuvers.step(9.0), "-(step 9 V)"),
-        (maneuvers.superpose(maneuvers.step(1), maneuvers.ramp(1)), "step 1 V with ramp 1 V/s"),
         (replace(maneuvers.step(9.0), name="mine"), "mine"),
     ],
 )
@@ -121,9 +108,8 @@ RETURNING = {
 def test_return_continues_voltage_and_slope_and_ends_at_rest(m, end):
     assert m(end - 1e-8) == pytest.approx(m(end), abs=1e-6)
     assert rise(m, end, -1) == pytest.approx(rise(m, end, +1), abs=1e-7)
-    assert m.slope(end) == pytest.approx(rise(m, end, +1), abs=1e-7)
     assert m(m.length) == 0.0
-    assert m.slope(m.length) == 0.0
+    assert rise(m, m.length, -1) == pytest.approx(0.0, abs=1e-7)
 
 
 def test_return_of_a_fast_command_stays_within_its_amplitude():
@@ -131,12 +117,13 @@ def test_return_of_a_fast_command_stays_within_its_amplitude():
     before, end = m(57.5 - 1e-9), 57.5
     assert m(end) == pytest.approx(before, abs=1e-6)
     # steeper than the return may start, which then just reaches the amplitude, at one instant
-    assert abs(rise(m, end, -1)) > abs(m.slope(end)) > 0.0
-    assert m.slope(end) * rise(m, end, -1) > 0.0
+    before, after = rise(m, end, -1), rise(m, end, +1)
+    assert abs(before) > abs(after) > 0.0
+    assert before * after > 0.0
     back = m(np.linspace(end, m.length, 100_001))
     assert np.abs(back).max() == pytest.approx(4.0, rel=1e-8)
     assert (np.abs(back) == np.abs(back).max()).sum() < 10
-    assert (m(m.length), m.slope(m.length)) == (0.0, 0.0)
+    assert m(m.length) == 0.0
 
 
 def test_return_is_the_cubic_of_its_end_conditions():
@@ -145,7 +132,6 @@ def test_return_is_the_cubic_of_its_end_conditions():
     c, d = np.linalg.solve([[4.0, 8.0], [4.0, 12.0]], [-10.0, -2.0])
     t = np.linspace(0.0, 2.0, 21)
     np.testing.assert_allclose(m(3.0 + t), 6 + 2 * t + c * t**2 + d * t**3, atol=1e-13)
-    np.testing.assert_allclose(m.slope(3.0 + t), 2 + 2 * c * t + 3 * d * t**2, atol=1e-13)
 
 
 @given(volts, st.floats(0.01, 3.0), st.floats(0.1, 20.0), st.floats(0.1, 20.0))
@@ -153,7 +139,7 @@ def test_any_return_ends_exactly_at_rest(amplitude, frequency, active, settle):
     length = 1.0 + active + settle
     m = maneuvers.sine(amplitude, frequency, settle=settle, length=length)
     assert m.length == length
-    assert (m(length), m.slope(length)) == (0.0, 0.0)
+    assert m(length) == 0.0
 
 
 @pytest.mark.parametrize(("before", "settle"), [(0.1, 0.2), (0.4, 0.7), (0.2, 7.9), (5.9, 6.2)])
@@ -164,7 +150,7 @@ def test_lengths_are_exact_where_the_return_is_longer_than_what_precedes_it(befo
     sine = maneuvers.sine(3.0, 0.2, start=0.0, settle=settle, length=before + settle)
     for m in (hold, sine):
         assert m.length == before + settle
-        assert (m(m.length), m.slope(m.length)) == (0.0, 0.0)
+        assert m(m.length) == 0.0
         assert m.sample(10.0).size == round(10 * (before + settle)) + 1
         assert m.sample(10.0)[-1] == 0.0
 
@@ -179,14 +165,6 @@ def windows(draw):
     start, settle = draw(st.floats(0.0, 2.0)), draw(st.none() | st.floats(0.0, 5.0))
     length = start + (settle or 0.0) + draw(seconds)
     return {"start": start, "settle": settle, "length": length}
-
-
-@st.composite
-def records(draw):
-    values = draw(st.lists(volts, min_size=2, max_size=6))
-    gaps = draw(st.lists(seconds, min_size=len(values), max_size=len(values)))
-    how = draw(st.sampled_from(["previous", "linear"]))
-    return maneuvers.recorded(np.cumsum(gaps), values, interpolation=how)
 
 
 def of_one_kind():
@@ -223,16 +201,12 @@ def of_one_kind():
             seconds,
             st.floats(0.0, 5.0),
         ),
-        records().map(lambda m: (m, m.amplitude)),
     )
 
 
 def together(parts):
     return st.one_of(
         st.tuples(parts, parts).map(lambda p: (p[0][0] + p[1][0], max(p[0][1], p[1][1]))),
-        st.tuples(parts, parts).map(
-            lambda p: (maneuvers.superpose(p[0][0], p[1][0]), p[0][1] + p[1][1])
-        ),
         st.tuples(parts, st.floats(-2.0, 2.0)).map(lambda p: (p[1] * p[0][0], abs(p[1]) * p[0][1])),
     )
 

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from swashplate.campaign.samples import increasing, signal
-from swashplate.maneuvers.pieces import row
+from swashplate.maneuvers import row
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]

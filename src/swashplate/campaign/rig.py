@@ -33,8 +33,7 @@ from swashplate.campaign.schema import CHANNEL_KINDS, KINDS, SIGNALS, ChannelKin
 from swashplate.drive import Drive
 from swashplate.equations.marching.record import SOURCE_RATE
 from swashplate.errors import FileError, InputError, ParameterError
-from swashplate.maneuvers import Maneuver, source_tests
-from swashplate.maneuvers.pieces import positive, whole
+from swashplate.maneuvers import Maneuver, positive, source_tests, whole
 from swashplate.simulation.result import Simulation
 from swashplate.tables import write_text, write_whole
 

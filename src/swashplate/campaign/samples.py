@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from swashplate.errors import InputError
-from swashplate.maneuvers.pieces import row, whole
+from swashplate.maneuvers import row, whole
 
 Array = NDArray[np.float64]
 Rows = NDArray[np.intp]

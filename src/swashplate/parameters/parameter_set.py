@@ -6,6 +6,8 @@ from itertools import groupby
 from types import MappingProxyType
 from typing import Any, Literal, NamedTuple, Protocol, Self
 
+import numpy as np
+
 from swashplate.equations.replacement import Replacement
 from swashplate.errors import ParameterError
 from swashplate.parameters.definitions import (
@@ -14,12 +16,13 @@ from swashplate.parameters.definitions import (
     REFINEMENTS,
     SWITCHES,
     Definition,
+    columns_of,
     declare,
     find,
     options_of,
     unknown_parameter,
 )
-from swashplate.parameters.rules import check_options, check_rules
+from swashplate.parameters.rules import broken_rules, check_options, refuse
 from swashplate.results import Result
 from swashplate.tables import UNIT, Column, Table
 
@@ -169,7 +172,7 @@ class ParameterSet(Entries):
                         f"{self.name}: {column} ({each.name}) is {value:g} {each.unit}, outside "
                         f"its bounds {low:g} to {high:g}."
                     )
-        check_rules(self.name, self.numbers)
+        refuse(self.name, broken_rules({name: np.array([v]) for name, v in self.numbers.items()}))
         check_options(self.name, self.options, self.numbers)
 
     def __repr__(self) -> str:
@@ -263,14 +266,12 @@ class ParameterSet(Entries):
         """Copy with values multiplied by factors; names as in `replace`."""
         changes: dict[str, Change] = {}
         for name, factor in factors.items():
-            old = self[find(name).symbol]
-            if name == old.symbol and isinstance(old.value, Pair):
-                plus, minus = factor if isinstance(factor, tuple) else (factor, factor)
-                changes[name] = Pair(old.value.plus * plus, old.value.minus * minus)
-            elif isinstance(factor, tuple):
-                raise ParameterError(f"{name} has one value, so it takes one factor, not two.")
-            else:
-                changes[name] = old.numbers[name] * factor
+            numbers, columns = self[find(name).symbol].numbers, columns_of([name])
+            each = factor if isinstance(factor, tuple) else (factor,) * len(columns)
+            if len(each) != len(columns):
+                takes = "one value, so it takes one factor" if len(columns) == 1 else "two values"
+                raise ParameterError(f"{name} has {takes}, not {len(each)}.")
+            changes |= {k: numbers[k] * times for k, times in zip(columns, each, strict=True)}
         return self.replace(changes)
 
 

@@ -90,24 +90,6 @@ OF_A_SIDE: tuple[Rule, ...] = (
 )
 
 
-def check_rules(owner: str, numbers: Mapping[str, float]) -> None:
-    """Check what the parameters of one set must satisfy, alone and together.
-
-    Parameters
-    ----------
-    owner : str
-        Name of the set, for the sentence.
-    numbers : mapping
-        Every value by column, e.g. ``Z13_plus``.
-
-    Raises
-    ------
-    ParameterError
-        For the first broken rule, naming parameter, value and rule.
-    """
-    refuse(owner, broken_rules({name: np.array([value]) for name, value in numbers.items()}))
-
-
 def refuse(owner: str, rules: Iterator[Broken]) -> None:
     """Raise the sentence of the first rule that the first set breaks, as a `ParameterError`."""
     for mask, sentence in rules:
@@ -212,10 +194,6 @@ def _static(n: Values, size: int) -> tuple[Array, Array]:
             lowest[0, k], moment[0, k] = interpreted(_extremes)(channel, pump, k, volts)
     else:
         static_extremes(channels, pumps, VOLTAGES, lowest, moment)
-    return lowest, moment
-
-    lowest, moment = np.empty((size, 2)), np.empty((size, 2))
-    static_extremes(channels, pumps, VOLTAGES, lowest, moment)
     return lowest, moment
 
 
