@@ -293,12 +293,14 @@ def _sine(record: _Record) -> _Found | None:
     if changes.size < 2:
         return None
     crossings = 0.5 * (time[beyond[changes]] + time[beyond[changes + 1]])
-    uneven = np.abs(np.diff(crossings) / np.median(np.diff(crossings)) - 1.0) > 0.15
+    half = float(np.median(np.diff(crossings)))
+    uneven = np.abs(np.diff(crossings) / half - 1.0) > 0.15
     regular = int(uneven.argmax()) if uneven.any() else uneven.size
     # the last may be a part of the return
     even = crossings[: min(regular + 1, max(crossings.size - 1, 2))]
     first, certain = record.leaves(np.zeros(time.size), 0), int(np.searchsorted(time, even[-1]))
-    if regular < max(uneven.size - 1, 1) or certain - first < 6:
+    fewest = 6.0 * float(np.median(np.diff(time)))
+    if regular < max(uneven.size - 1, 1) or 2.0 * half < fewest or certain - first < 6:
         return None
     half, crossing = np.polyfit(np.arange(even.size), even, 1)
     leaves = certain
