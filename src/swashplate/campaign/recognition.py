@@ -303,6 +303,10 @@ def _sine(record: _Record) -> _Found | None:
     if regular < max(uneven.size - 1, 1) or 2.0 * half < fewest or certain - first < 6:
         return None
     half, crossing = np.polyfit(np.arange(even.size), even, 1)
+    # a crossing in the middle hardly correlates with the frequency
+    crossing += (
+        2.0 * half * round((0.5 * (time[first] + time[certain - 1]) - crossing) / half / 2.0)
+    )
     leaves = certain
 
     def tone(t: Array, a: float, crossing: float, mean: float, omega: float) -> Array:
@@ -311,9 +315,6 @@ def _sine(record: _Record) -> _Found | None:
     amplitude = record.peak * np.sign(values[beyond[changes[0] + 1]])
     numbers = np.array([amplitude, crossing, 0.0, np.pi / half])
     for again in (True, False):  # once more with all that lies on the first tone
-        # a crossing in the middle hardly correlates with the frequency
-        turn = 2.0 * np.pi / numbers[3]
-        numbers[1] += turn * round((0.5 * (time[first] + time[leaves - 1]) - numbers[1]) / turn)
         try:
             numbers, covariance = curve_fit(tone, time[first:leaves], values[first:leaves], numbers)
         except RuntimeError:
