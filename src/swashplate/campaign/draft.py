@@ -364,10 +364,11 @@ def _run(log: Log, rows: int, axes: Mapping[str, _Axis], folder: Path, text: str
         experiments = list(read_run("the draft", "run", read.runs[0], read.axes, log))
     except (FileError, InputError) as error:
         return made._replace(role=f'"ignore"    # {FIXME}: {error}')
-    time = experiments[0].input.time
-    file = f"{made.file}, {np.ptp(time):.4g} s at {1.0 / np.median(np.diff(time)):.4g} Hz"
-    stratum, peak, seen = "", 0.0, set[str]()
+    file, stratum, peak, seen = made.file, "", 0.0, set[str]()
     for each in (each for each in experiments if each.axis not in seen):
+        if not seen:
+            rate = 1.0 / float(np.median(np.diff(each.input.time)))
+            file += f", {each.duration:.4g} s at {rate:.4g} Hz"
         seen.add(each.axis)
         file += f", {each.maneuver}" if each.input.kind == "voltage" else ""
         away = each.input.values - each.input.values[0]

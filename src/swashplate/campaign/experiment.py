@@ -73,7 +73,7 @@ class InputSignal(Result):
 
     @property
     def used(self) -> NDArray[np.bool_]:
-        """(n,) whether a sample counts: all do, as those that are ignored are not here."""
+        """(n,) whether a sample counts: all, because what is ignored is not read."""
         return np.ones(self.time.size, np.bool_)
 
     def at(self, time: Array) -> Array:

@@ -124,16 +124,14 @@ def march_guess(
 
 
 class _Run(NamedTuple):
-    """A run on the march's grid, and the mean speeds in its windows."""
+    """A run on the march's grid (n,), and mean speeds (m,) in windows between edges (m,) [s]."""
 
     time: Array
     command: Array
     start: float
     begins: Array
     ends: Array
-    """(m,) edges of the windows. [s]"""
     speeds: Array
-    """(m,)"""
 
 
 def _errors(runs: Sequence[_Run], numbers: Array) -> Array:

@@ -106,13 +106,11 @@ def _signals(axis: schema.Axis) -> dict[str, schema.Input | schema.Channel]:
     return {"the input": axis.input} | {f"channel '{n}'": c for n, c in axis.channels.items()}
 
 
-def _found(log: Log, axes: Axes, only: schema.Signal | None = None) -> dict[str, Column]:
-    """Columns that some axes need, or one of their signals, by the names they are wanted by."""
+def _found(log: Log, axes: Axes) -> dict[str, Column]:
+    """Columns that some axes need, by the names that they are wanted by."""
     found = dict[str, Column]()
     for axis in axes.values():
         for what, signal in _signals(axis).items():
-            if only not in (None, signal):
-                continue
             clocks = [clock.column for clock in (signal.time, axis.time) if clock is not None]
             wanted = [(signal.column, what), *((name, f"the time of {what}") for name in clocks)]
             for name, why in wanted:
@@ -124,10 +122,10 @@ def _found(log: Log, axes: Axes, only: schema.Signal | None = None) -> dict[str,
 
 
 class _Columns:
-    """The columns of a log that some axes need, read together, or those of one signal."""
+    """The columns of a log that some axes need, read together."""
 
-    def __init__(self, log: Log, axes: Axes, only: schema.Signal | None = None) -> None:
-        self.log, self.found = log, _found(log, axes, only)
+    def __init__(self, log: Log, axes: Axes) -> None:
+        self.log, self.found = log, _found(log, axes)
         self.values = log.read(list(self.found))
         first = replace(log, first=0, last=1).read(list(self.found)) if log.first else self.values
         self._begins = {name: values[:1] for name, values in first.items()}
@@ -358,10 +356,11 @@ def _windows(axes: Axes, log: Log, span: schema.Window | None) -> Iterator[tuple
     moving, period = np.zeros(-(-rows // GRAIN), dtype=np.bool_), np.inf
     for key, axis in axes.items():
         extremes, step = np.empty((moving.size, 2)), BLOCK // GRAIN * GRAIN
+        alone = {key: axis.model_copy(update={"channels": {}})}
         for begin in range(0, rows, step):
             # with the row before, so that stamps are compared across blocks
             part = replace(log, first=max(begin - 1, 0), last=min(begin + step, rows))
-            block = _Columns(part, {key: axis}, axis.input)
+            block = _Columns(part, alone)
             time, values = block.stamps(axis.input, axis), block.values[axis.input.column]
             period = min(period, float(np.median(np.diff(time[:BLOCK]))))
             time, values = (each[int(begin > 0) :] for each in (time, values))

@@ -293,14 +293,20 @@ def _sine(record: _Record) -> _Found | None:
     if changes.size < 2:
         return None
     crossings = 0.5 * (time[beyond[changes]] + time[beyond[changes + 1]])
-    uneven = np.abs(np.diff(crossings) / np.median(np.diff(crossings)) - 1.0) > 0.15
+    half = float(np.median(np.diff(crossings)))
+    uneven = np.abs(np.diff(crossings) / half - 1.0) > 0.15
     regular = int(uneven.argmax()) if uneven.any() else uneven.size
     # the last may be a part of the return
     even = crossings[: min(regular + 1, max(crossings.size - 1, 2))]
     first, certain = record.leaves(np.zeros(time.size), 0), int(np.searchsorted(time, even[-1]))
-    if regular < max(uneven.size - 1, 1) or certain - first < 6:
+    fewest = 6.0 * float(np.median(np.diff(time)))
+    if regular < max(uneven.size - 1, 1) or 2.0 * half < fewest or certain - first < 6:
         return None
     half, crossing = np.polyfit(np.arange(even.size), even, 1)
+    # a crossing in the middle hardly correlates with the frequency
+    crossing += (
+        2.0 * half * round((0.5 * (time[first] + time[certain - 1]) - crossing) / half / 2.0)
+    )
     leaves = certain
 
     def tone(t: Array, a: float, crossing: float, mean: float, omega: float) -> Array:
@@ -309,9 +315,6 @@ def _sine(record: _Record) -> _Found | None:
     amplitude = record.peak * np.sign(values[beyond[changes[0] + 1]])
     numbers = np.array([amplitude, crossing, 0.0, np.pi / half])
     for again in (True, False):  # once more with all that lies on the first tone
-        # a crossing in the middle hardly correlates with the frequency
-        turn = 2.0 * np.pi / numbers[3]
-        numbers[1] += turn * round((0.5 * (time[first] + time[leaves - 1]) - numbers[1]) / turn)
         try:
             numbers, covariance = curve_fit(tone, time[first:leaves], values[first:leaves], numbers)
         except RuntimeError:

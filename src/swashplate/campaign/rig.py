@@ -43,8 +43,6 @@ Severity = Literal["clean", "realistic", "harsh"]
 
 FULL_SCALE = 10.0
 """Range of the command's converters, either way. [V]"""
-FARTHEST = 0.4
-"""Of the way to the next grid point a sample strays at most, so that the stamps increase. [1]"""
 FULL_CURRENT = 1.2
 """Current at which the card's pulses would be as long as their period: 24 V on 20 Ω. [A]"""
 COUNTS_PER_TURN = {"hoist": 400.0 * 120.0 / 19.0, "luff": 635.0 * 4.0, "slew": 81_000.0 * 7.0}
@@ -361,7 +359,7 @@ def _logged(
     grid = truth.time
     # the stamps are those of the instants sampled, which stay in order however large the jitter is
     strayed = tools.jitter * _stream(seed, name, "time").standard_normal(grid.size)
-    bound = FARTHEST * (grid[1] - grid[0] if grid.size > 1 else 0.0)
+    bound = 0.4 * (grid[1] - grid[0] if grid.size > 1 else 0.0)
     instants = np.clip(grid + np.clip(strayed, -bound, bound), grid[0], grid[-1])
 
     def sampled(signal: str) -> Array:

@@ -105,18 +105,10 @@ def signal(name: str, values: ArrayLike, rows: int) -> Array:
 
 # --- an encoder's counts --------------------------------------------------------------------------
 
-WIDEST = 2**53
-"""Most readings of a counter that a float64 holds to the count."""
 SUSTAINED = 5
 """A speed lasts if the median of this many neighbouring intervals has it."""
 MARGIN = 1.5
 """A jump is this much faster than anything that lasts."""
-FEWEST = 32
-"""Readings that a counter shows at least; fewer may be those of a switch."""
-ORDINARY = 0.998
-"""Share of the steps that are no larger than those about a roll-over; others lead across gaps."""
-NEAR = 1.05
-"""The counts of a turn are the size where they are at most this much more than the range."""
 
 
 def unwrap_counts(counts: ArrayLike, modulus: int) -> Array:
@@ -141,7 +133,7 @@ def unwrap_counts(counts: ArrayLike, modulus: int) -> Array:
         modulus, so that neither way round is the shorter.
     """
     readings, size = row("counts", counts), whole("modulus", modulus)
-    if not 2 <= size <= WIDEST:
+    if not 2 <= size <= 2**53:  # to which a float64 counts
         raise InputError(f"A counter must have from 2 to 2^53 readings, not {size}.")
     signed = "signed " if readings.min() < 0.0 else ""
     low, high = (-(size // 2), (size - 1) // 2) if signed else (0, size - 1)
@@ -235,14 +227,16 @@ def rolls_over_at(values: Array, counts_per_turn: float | None = None) -> int:
     low, high, steps = float(values.min()), float(values.max()), np.diff(values)
     span = high + 1.0 if low >= 0.0 else 2.0 * max(-low, high + 1.0)
     over = np.abs(steps) > 0.5 * span
-    if np.unique(values).size < FEWEST or not over.any() or over.all():
+    # fewer numbers may be those of a switch
+    if np.unique(values).size < 32 or not over.any() or over.all():
         return 0
     usual, turn = steps[~over], float(counts_per_turn or 0.0)
-    ordinary = float(np.quantile(np.abs(usual), ORDINARY))
+    # larger ones lead across gaps
+    ordinary = float(np.quantile(np.abs(usual), 0.998))
     # the steps beside a roll-over are as large as the one across it, taken the other way round
     beside = np.interp(np.flatnonzero(over), np.flatnonzero(~over), usual)
     sizes = {1 << ceil(log2(span)), 100 * ceil(span / 100.0)}
-    if turn.is_integer() and span <= turn <= NEAR * span:
+    if turn.is_integer() and span <= turn <= 1.05 * span:
         sizes = {int(turn)}
     across = {size: steps[over] - size * np.round(steps[over] / size) for size in sorted(sizes)}
     best = min(across, key=lambda size: float(np.median(np.abs(across[size] - beside))))
