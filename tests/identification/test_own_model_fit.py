@@ -14,6 +14,7 @@ from swashplate.identification import (
     Judged,
     ModelSetup,
     OwnModel,
+    Search,
     Unknown,
     assess,
     fit,
@@ -138,6 +139,14 @@ def test_a_fit_comes_back_with_its_model_alone(tmp_path: Path) -> None:
     assert assess(again.stages)[0].uncertainty.estimates == (
         assess(found.stages)[0].uncertainty.estimates
     )
+
+
+def test_starts_of_other_steps_are_not_resumed(tmp_path: Path) -> None:
+    search = Search(1, store=tmp_path, resume=True)
+    found = fit(OwnModel(servo), RUNS, FREE, noise=NOISE, search=search)
+    assert len(found.stages[0].starts) == 2
+    with pytest.raises(FileError, match="nominal values differ"):
+        fit(OwnModel(servo, substeps=2), RUNS, FREE, noise=NOISE, search=search)
 
 
 def test_what_a_range_means() -> None:

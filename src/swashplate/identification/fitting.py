@@ -36,7 +36,7 @@ from swashplate.identification.drive_model import (
 )
 from swashplate.identification.faults import measurement_error
 from swashplate.identification.intervals import weighed
-from swashplate.identification.model import EquationModel, Model
+from swashplate.identification.model import EquationModel, Model, OwnModel
 from swashplate.identification.problem import Loss, Problem
 from swashplate.identification.setup import ModelSetup, Range, Setup, Stage
 from swashplate.identification.solving import Progress, Solution, sobol_starts, solve, solve_from
@@ -344,7 +344,8 @@ def smooth(parameters: P) -> P:
 
 def _origin(stage: Stage, problem: Problem, limits: Mapping[str, float]) -> dict[str, str]:
     """Fingerprints of all that the result of a start depends on."""
-    known: object = (problem.start.tolist(), sorted(problem.fixed.items()))
+    own = repr(problem.model) if isinstance(problem.model, OwnModel) else ""
+    known: object = (own, problem.start.tolist(), sorted(problem.fixed.items()))
     if isinstance(problem.model, DriveModel):
         drive = problem.model.parameters
         forms = drive.pressure_root, drive.coulomb_sign, drive.rate, sorted(drive.options)
