@@ -78,7 +78,7 @@ class Search:
     resume: bool = False
     """Take what is in the store instead of computing it again."""
     watch: Callable[[str, Solution, int], None] | None = None
-    """Told the stage, each result and how many there are by now."""
+    """Called with the stage, each result and how many there are by now."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -208,7 +208,7 @@ def fit(
         residuals are five times as large as their known measurement error; `Search(0)` tries none.
         Ctrl-C during them ends the whole fit, with the best start of that stage as its last result.
     watch : callable, optional
-        Told the stage's name and each of its iterations.
+        Called with the stage's name and each of its iterations.
 
     Raises
     ------
@@ -244,9 +244,9 @@ def fit(
 
     def solved(stage: Stage, problem: Problem) -> Solved:
         refuse_unsound(check_rank(f"Stage {stage.name}", problem))
-        told = None if watch is None else partial(watch, stage.name)
+        seen = None if watch is None else partial(watch, stage.name)
         limits: dict[str, Any] = {"tolerance": tolerance, "max_evaluations": max_evaluations}
-        return _solved(stage, problem, partial(solve, loss=loss, watch=told, **limits), search)
+        return _solved(stage, problem, partial(solve, loss=loss, watch=seen, **limits), search)
 
     return Fit(free, nominal, staged(free, nominal, runs, solved, threads=threads), doubts)
 
