@@ -16,6 +16,7 @@ from swashplate.identification import (
     ModelSetup,
     OwnModel,
     Problem,
+    Search,
     Unknown,
     Unknowns,
     assess,
@@ -343,6 +344,14 @@ def test_a_fit_comes_back_with_its_model_alone(tmp_path: Path) -> None:
     assert assess(again.stages)[0].uncertainty.estimates == (
         assess(made.stages)[0].uncertainty.estimates
     )
+
+
+def test_starts_of_other_steps_are_not_resumed(tmp_path: Path) -> None:
+    search = Search(1, store=tmp_path, resume=True)
+    made = fit(OwnModel(servo), RUNS, RANGES, noise=NOISE, search=search)
+    assert len(made.stages[0].starts) == 2
+    with pytest.raises(FileError, match="nominal values differ"):
+        fit(OwnModel(servo, substeps=2), RUNS, RANGES, noise=NOISE, search=search)
 
 
 def test_what_a_range_means() -> None:

@@ -451,7 +451,7 @@ def _of_a_run(
     measured = any(channel.kind in CURRENTS for channel in own.values())
     if estimated and measured and stage.part != "pump" and experiment.input.kind == "voltage":
         first = float(measured_current(experiment).values[0])
-        if first != 0.0:  # else neither channel can be told driven
+        if first != 0.0:  # else neither channel is the driven one
             name, full = START_CURRENTS[first < 0.0], np.copysign(FULL_VOLTAGE, first)
             most = 2.0 * abs(Drive(parameters).steady_current(float(full)))
             yield Unknown(name, min(abs(first), 0.9 * most), 0.0, most, "A", run=run)

@@ -36,7 +36,7 @@ from swashplate.identification.drive_model import (
 )
 from swashplate.identification.faults import measurement_error
 from swashplate.identification.intervals import weighed
-from swashplate.identification.model import EquationModel, Model
+from swashplate.identification.model import EquationModel, Model, OwnModel
 from swashplate.identification.problem import Loss, Problem
 from swashplate.identification.setup import ModelSetup, Range, Setup, Stage
 from swashplate.identification.solving import Progress, Solution, sobol_starts, solve, solve_from
@@ -78,7 +78,7 @@ class Search:
     resume: bool = False
     """Take what is in the store instead of computing it again."""
     watch: Callable[[str, Solution, int], None] | None = None
-    """Told the stage, each result and how many there are by now."""
+    """Called with the stage, each result and how many there are by now."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -208,7 +208,7 @@ def fit(
         residuals are five times as large as their known measurement error; `Search(0)` tries none.
         Ctrl-C during them ends the whole fit, with the best start of that stage as its last result.
     watch : callable, optional
-        Told the stage's name and each of its iterations.
+        Called with the stage's name and each of its iterations.
 
     Raises
     ------
@@ -244,9 +244,9 @@ def fit(
 
     def solved(stage: Stage, problem: Problem) -> Solved:
         refuse_unsound(check_rank(f"Stage {stage.name}", problem))
-        told = None if watch is None else partial(watch, stage.name)
+        seen = None if watch is None else partial(watch, stage.name)
         limits: dict[str, Any] = {"tolerance": tolerance, "max_evaluations": max_evaluations}
-        return _solved(stage, problem, partial(solve, loss=loss, watch=told, **limits), search)
+        return _solved(stage, problem, partial(solve, loss=loss, watch=seen, **limits), search)
 
     return Fit(free, nominal, staged(free, nominal, runs, solved, threads=threads), doubts)
 
@@ -344,7 +344,8 @@ def smooth(parameters: P) -> P:
 
 def _origin(stage: Stage, problem: Problem, limits: Mapping[str, float]) -> dict[str, str]:
     """Fingerprints of all that the result of a start depends on."""
-    known: object = (problem.start.tolist(), sorted(problem.fixed.items()))
+    own = repr(problem.model) if isinstance(problem.model, OwnModel) else ""
+    known: object = (own, problem.start.tolist(), sorted(problem.fixed.items()))
     if isinstance(problem.model, DriveModel):
         drive = problem.model.parameters
         forms = drive.pressure_root, drive.coulomb_sign, drive.rate, sorted(drive.options)

@@ -255,8 +255,8 @@ def noise_scales(experiments: Sequence[Experiment], channels: Sequence[str]) -> 
 TOLERANCE = 1e-10
 """Singular values below this part of the largest count as zero.
 
-With exact derivatives a gauge of the hoist set-up lies at 1e-15 and the faintest direction that the
-tests do tell at 2e-5. Derivatives by central differences are good to about 1e-9: those take
+With exact derivatives a gauge of the hoist set-up lies at 1e-15 and the weakest direction that the
+tests determine at 2e-5. Derivatives by central differences are good to about 1e-9: those take
 `BY_DIFFERENCES`.
 """
 BY_DIFFERENCES = 1e-6
@@ -328,7 +328,7 @@ class LinearisedFit(Result):
     def whitening(self) -> Array:
         """(K, rank) matrix W with W Wᵀ the inverse of JᵀJ on what the runs determine.
 
-        The columns of J W are orthonormal. Rows of unknowns at a bound are 0: they are held there.
+        The columns of J W are orthonormal. Rows of unknowns at a bound are 0: they are fixed there.
         """
         return self._decomposed[0]
 

@@ -150,7 +150,7 @@ def solve(
     max_evaluations : int
         Of the residuals.
     watch : callable, optional
-        Told of each iteration. Ctrl-C ends the search with the best point so far.
+        Called at each iteration. Ctrl-C ends the search with the best point so far.
     """
     from scipy.optimize import least_squares
 
@@ -309,7 +309,7 @@ def solve_from(
     resume : bool
         Take what `store` holds instead of computing it again.
     watch : callable, optional
-        Told of each result and how many there are by now. Ctrl-C ends the search; what was done
+        Called with each result and how many there are by now. Ctrl-C ends it; what was done
         is returned, fewer results than starts, if there is anything.
     **settings :
         `tolerance` and `max_evaluations`, as of `solve`.
