@@ -215,7 +215,8 @@ def test_starts_at_any_time(made, hoist):
 
 
 @pytest.mark.slow
-def test_loses_no_sample_in_an_hour_of_times_that_are_summed_up(made, hoist):
+@pytest.mark.parametrize("fmi", ["3.0"])
+def test_loses_no_sample_in_an_hour_of_times_that_are_summed_up(made, hoist, fmi):
     master = made(hoist).begin()
     set_voltage, step = master.set, master.fmu.doStep
     time, interval, late = 0.0, 1e-3, 0.0
