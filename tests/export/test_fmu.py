@@ -292,6 +292,26 @@ def test_state_of_another_size_version_or_drive_is_refused(made, hoist):
     master.state = kept
 
 
+def test_parameter_can_change_while_it_runs(made, hoist):
+    voltage = command(800)
+    master = made(hoist).begin(voltage=voltage[0])
+    before = master.played(voltage[:400])
+    master.set(Z16_plus=2e-4)
+    assert master.get("Z16_plus") == [2e-4]
+    after = master.played(voltage[400:], start=400 * H)
+    # the state of one stepper goes on in that of the changed drive
+    stepper = hoist.stepper()
+    for volts in voltage[:401]:
+        sample = stepper.step(volts)
+    changed = hoist.replace(Z16_plus=2e-4).stepper()
+    changed.state = stepper.state
+    samples = [sample, *(changed.step(volts) for volts in voltage[401:])]
+    expected = np.array([[getattr(each, name) for name in OUTPUTS] for each in samples])
+    assert np.array_equal(before, stepped(hoist, voltage[:400]))
+    assert np.array_equal(after, expected)
+    assert not np.array_equal(after, stepped(hoist, voltage)[400:])
+
+
 def test_reset_gives_the_start_values_back(made, hoist):
     voltage = command(200)
     master = made(hoist).begin(voltage=voltage[0])
