@@ -70,18 +70,6 @@ def test_limits_of_the_pump_are_bits():
     assert np.any(acting[1])
 
 
-def test_copied_machines_go_on_apart():
-    compiled = Drive.preset("luff").compiled_step()
-    machine = compiled.machine()
-    records = VOLTAGE[:, None]
-    whole = marched(compiled, compiled.machine(), records)
-    marched(compiled, machine, records[:300])
-    other = machine.copied()
-    np.testing.assert_array_equal(marched(compiled, machine, records[300:]), whole[300:])
-    marched(compiled, machine, 0.0 * records)
-    np.testing.assert_array_equal(marched(compiled, other, records[300:]), whole[300:])
-
-
 class Lag(NamedTuple):
     time: float
     delay: float
@@ -111,16 +99,12 @@ def test_what_no_step_has_is_refused():
     hoist = Drive.preset("hoist")
     with pytest.raises(InputError, match="shaft_position is the integral of shaft_speed, and not"):
         hoist.compiled_step(("shaft_position",))
-    with pytest.raises(InputError, match="has no signal 'noise'; it has current"):
-        hoist.compiled_step(("noise",))
     with pytest.raises(InputError, match="hoist has no input 'wind'; it has voltage, "):
         hoist.compiled_step(inputs=("voltage", "wind"))
     with pytest.raises(InputError, match="hoist: card needs the signal 'voltage'"):
         hoist.compiled_step(inputs=("load_torque",))
     with pytest.raises(InputError, match=r"is unstable at a step of 1/20 s"):
         hoist.compiled_step(rate=20.0)
-    with pytest.raises(InputError, match="The rate is 0 Hz, but must be a number above 0"):
-        compiled_step(lag, Lag(0.3, 0.0), ("command",), ("level",), 0)
     compiled = compiled_step(lag, Lag(0.001, 0.0), ("command",), ("level",), 100.0)
     with pytest.raises(DomainError, match="lag: lag's level is .* at the end of the record"):
         marched(compiled, compiled.machine(), np.ones((700, 1)))

@@ -14,7 +14,7 @@ from swashplate.equations.syntax import plain
 from swashplate.models import card, pump
 from swashplate.models import displacement_control as control
 from swashplate.models.channel import CardOptions
-from swashplate.models.displacement_control import Pump, PumpOptions
+from swashplate.models.displacement_control import PumpOptions
 
 OPTIONS: dict[str, Any] = dict.fromkeys(("literal", "split", "steep", "symmetric"))
 CASES = [
@@ -105,17 +105,3 @@ def test_functions_of_one_name_are_kept_apart() -> None:
     for run in (derived.python, derived.compiled):
         assert run(2.0) == (24.0, 24.0)
     assert closure_hash(double) != closure_hash(triple)
-
-
-def test_exact_zeros_follow_the_options() -> None:
-    fields = set(Pump._fields)
-
-    def seen(**on: bool) -> set[str]:
-        derived = derive(pump.pump_sample, "p", options={"options": PumpOptions(**on)})
-        return {derived.inputs[i].removeprefix("p.") for _, i in derived.entries} & fields
-
-    off = seen()
-    ripple = {"cam_ripple", "cam_ripple_per_torque", "cam_cycles", "cam_phase"}
-    assert seen(ripple=True) - off == ripple
-    assert seen(hysteresis=True) - off == {"solenoid_hysteresis"}
-    assert not off & {*ripple, "solenoid_hysteresis", "spool_presliding", "line_stiffness"}

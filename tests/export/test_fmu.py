@@ -215,7 +215,8 @@ def test_starts_at_any_time(made, hoist):
 
 
 @pytest.mark.slow
-def test_loses_no_sample_in_an_hour_of_times_that_are_summed_up(made, hoist):
+@pytest.mark.parametrize("fmi", ["3.0"])
+def test_loses_no_sample_in_an_hour_of_times_that_are_summed_up(made, hoist, fmi):
     master = made(hoist).begin()
     set_voltage, step = master.set, master.fmu.doStep
     time, interval, late = 0.0, 1e-3, 0.0
@@ -289,6 +290,26 @@ def test_state_of_another_size_version_or_drive_is_refused(made, hoist):
     assert any("another set of numbers" in each for each in master.said)
     assert any("header or size" in each for each in master.said)
     master.state = kept
+
+
+def test_parameter_can_change_while_it_runs(made, hoist):
+    voltage = command(800)
+    master = made(hoist).begin(voltage=voltage[0])
+    before = master.played(voltage[:400])
+    master.set(Z16_plus=2e-4)
+    assert master.get("Z16_plus") == [2e-4]
+    after = master.played(voltage[400:], start=400 * H)
+    # the state of one stepper goes on in that of the changed drive
+    stepper = hoist.stepper()
+    for volts in voltage[:401]:
+        sample = stepper.step(volts)
+    changed = hoist.replace(Z16_plus=2e-4).stepper()
+    changed.state = stepper.state
+    samples = [sample, *(changed.step(volts) for volts in voltage[401:])]
+    expected = np.array([[getattr(each, name) for name in OUTPUTS] for each in samples])
+    assert np.array_equal(before, stepped(hoist, voltage[:400]))
+    assert np.array_equal(after, expected)
+    assert not np.array_equal(after, stepped(hoist, voltage)[400:])
 
 
 def test_reset_gives_the_start_values_back(made, hoist):

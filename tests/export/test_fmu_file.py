@@ -320,6 +320,18 @@ def test_universal_library_says_where_its_parts_are():
 
 @pytest.mark.slow
 @pytest.mark.skipif(find_spec("ziglang") is None, reason="ziglang is not installed")
+def test_clang_finds_nothing_to_warn_of(tmp_path):
+    """Of the model, and of both standards' functions around it; gcc is asked by other tests."""
+    libraries.written(libraries.sources().texts, tmp_path)
+    flags = ("-std=c99", "-O2", "-Wall", "-Wextra", "-Wconversion", "-pedantic", "-Werror", "-c")
+    for name in ("swashplate_drive.c", "fmi.c", "fmi2.c", "fmi3.c"):
+        words = [sys.executable, "-m", "ziglang", "cc", *flags, "-isystem", HEADERS, name]
+        done = subprocess.run(words, cwd=tmp_path, capture_output=True, text=True, check=False)
+        assert done.returncode == 0, done.stderr
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(find_spec("ziglang") is None, reason="ziglang is not installed")
 @pytest.mark.parametrize("name", ["linux64", "aarch64-linux"])
 def test_building_again_gives_equal_bytes(name):
     platform = libraries.PLATFORMS[name]

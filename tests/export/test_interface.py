@@ -71,17 +71,20 @@ def test_a_step_that_the_filter_does_not_bear_is_said(hoist: Drive, in_c: Any) -
         values_of(hoist, 0.01)
 
 
-def test_a_domain_that_is_left_is_said_and_a_reset_heals(hoist: Drive, in_c: Any) -> None:
+def test_a_domain_that_is_left_is_said_and_a_reset_heals_and_keeps_values(
+    hoist: Drive, in_c: Any
+) -> None:
     model = in_c(hoist)
     force = model.number("", "Z19_plus")
     was = model.get(force)
     assert model.set(force, 1e4 * was) == OK
     assert DOMAIN in [model.step(10.0) for _ in range(300)]
     assert model.settle(10.0) in (OK, DOMAIN)
-    assert model.set(force, was) == OK
+    assert model.set(force, was) == model.set(model.number("", "Z16_plus"), 5e-5) == OK
     assert model.reset() == OK
+    fresh = in_c(hoist.replace(Z16_plus=5e-5))
     assert (
-        model.run(COMMAND, NAMES)["shaft_speed"] == in_c(hoist).run(COMMAND, NAMES)["shaft_speed"]
+        model.run(COMMAND, NAMES)["shaft_speed"] == fresh.run(COMMAND, NAMES)["shaft_speed"]
     ).all()
 
 

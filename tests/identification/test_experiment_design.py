@@ -33,23 +33,6 @@ def diagonal(*errors: float) -> np.ndarray:
     return np.diag([0.0 if np.isinf(each) else 1.0 / each for each in errors])
 
 
-def test_what_was_unknown_comes_first() -> None:
-    present = diagonal(0.1, np.inf)
-    found = advise(
-        present,
-        [
-            Candidate("more of the same", diagonal(0.001, np.inf)),
-            Candidate("new", diagonal(9, 0.5)),
-        ],
-        AB,
-    )
-    assert [each.candidate for each in found] == ["new", "more of the same"]
-    assert found[0].newly_determined == ("b",)
-    assert found[0].ranks == 1
-    assert found[0].before[1] == np.inf
-    assert found[0].after[1] == pytest.approx(0.5)
-
-
 def test_a_candidate_that_mixes_known_and_unknown_tells_of_the_unknown_alone() -> None:
     """It measures a + b: b becomes known as well as a, a no better than before."""
     (found,) = advise(diagonal(0.1, np.inf), [Candidate("sum", np.array([[1e3, 1e3]]))], AB)

@@ -1,15 +1,20 @@
-"""Intervals in the unknowns' own units, and what leaves an unknown without one."""
+"""Intervals in the unknowns' own units, what leaves an unknown without one, and profiles."""
 
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.optimize import brentq, least_squares
 from tests.identification.given import linear_fit, unknowns_of
 
-from swashplate.errors import InputError
-from swashplate.identification.intervals import estimates, uncertainty
+from swashplate import DomainError, Experiment, InputError
+from swashplate.identification.intervals import estimates, reach, uncertainty
 from swashplate.identification.noise import Covariance
-from swashplate.identification.problem import LinearisedRun
+from swashplate.identification.problem import LinearisedRun, Problem, linearised_fit
+from swashplate.identification.profile import checked_ends, profile
+from swashplate.identification.solving import solve
+from swashplate.identification.unknowns import Unknown, Unknowns
 
 
 def covariance(freedom: float = np.inf, **more: object) -> Covariance:
@@ -100,3 +105,134 @@ def test_an_estimate_at_its_bound_is_released_in_its_partners_intervals() -> Non
     assert one.upper is not None
     # conditioned on the bound it would be far narrower
     assert half([1, 0]) > 10.0 * (one.upper - one.lower)
+
+
+def test_a_nonlinear_model_agrees_with_a_root_search() -> None:
+    time = np.linspace(0.0, 3.0, 40)
+    measured = 2.0 * np.exp(-1.5 * time) + 0.1 * np.random.default_rng(0).normal(size=40)
+
+    def minimise(index: int, value: float, start: np.ndarray) -> tuple[float, np.ndarray]:
+        def residual(free: np.ndarray) -> np.ndarray:
+            gain, rate = np.insert(free, index, value)
+            return gain * np.exp(-rate * time) - measured
+
+        found = least_squares(residual, np.delete(start, index))
+        return float(found.cost), np.insert(found.x, index, value)
+
+    best = least_squares(lambda v: v[0] * np.exp(-v[1] * time) - measured, [1.0, 1.0])
+    limit = 2.0 * best.cost / 38.0
+    found = profile(minimise, best.x, best.cost, 1, limit, 0.1)
+    assert found.endings == ("crossed", "crossed")
+
+    def over(rate: float) -> float:
+        shape = np.exp(-rate * time)
+        gain = shape @ measured / (shape @ shape)
+        return 0.5 * float(np.sum((gain * shape - measured) ** 2)) - best.cost - limit
+
+    assert found.lower == pytest.approx(brentq(over, 0.5, best.x[1]), rel=1e-3)
+    assert found.upper == pytest.approx(brentq(over, best.x[1], 4.0), rel=1e-3)
+    # the interval is not symmetric
+    assert found.upper - best.x[1] > 1.05 * (best.x[1] - found.lower)
+
+
+def bowl() -> tuple:
+    """One unknown, cost ½ u² beside a noise cost of 1."""
+    return lambda index, value, start: (1.0 + 0.5 * value**2, np.array([value]))
+
+
+LIMIT = 0.5
+ZERO = np.zeros(1)
+
+
+def test_a_bound_leaves_a_side_open() -> None:
+    found = profile(bowl(), ZERO, 1.0, 0, LIMIT, 1.0, (-0.4, np.inf))
+    assert found.endings == ("bound", "crossed")
+    assert found.lower is None
+    assert found.upper == pytest.approx(1.0, rel=2e-3)
+    assert found.points[0].number == -0.4
+    assert "Z17 reaches its bound" in found.sentences("Z17")[0]
+
+
+def test_the_domains_edge_ends_a_side() -> None:
+    def edged(index: int, value: float, start: np.ndarray) -> tuple[float, np.ndarray]:
+        if value > 0.5:
+            raise DomainError("|sin φ| reaches 1.")
+        return 1.0 + 0.5 * value**2, np.array([value])
+
+    found = profile(edged, ZERO, 1.0, 0, LIMIT, 1.0)
+    assert found.endings == ("crossed", "domain")
+    assert found.points[-1].number == pytest.approx(0.5, abs=0.05)
+
+
+def test_a_better_optimum_stops_it() -> None:
+    def two(index: int, value: float, start: np.ndarray) -> tuple[float, np.ndarray]:
+        return 1.0 + min(0.5 * value**2, 0.5 * (value - 0.8) ** 2 - 0.3), np.array([value, 7.0])
+
+    found = profile(two, np.zeros(2), 1.0, 0, LIMIT, 1.0)
+    assert found.better is not None
+    assert found.better.cost < 1.0
+    assert found.better.vector[1] == 7.0
+    assert (found.lower, found.upper) == (None, None)
+    assert "met a better optimum" in found.sentences("Z9")[0]
+
+
+def test_a_cost_that_is_lower_by_next_to_nothing_does_not_stop_it() -> None:
+    """Less than 2 % of the rise at an interval's end: it moves that end by less than 1 %."""
+
+    def dented(index: int, value: float, start: np.ndarray) -> tuple[float, np.ndarray]:
+        dent = 0.015 if abs(value - 0.35) < 0.2 else 0.0
+        return 1.0 + max(0.5 * value**2 - 5.0 * dent, -dent) * LIMIT, np.array([value])
+
+    found = profile(dented, ZERO, 1.0, 0, LIMIT, 1.0)
+    assert found.better is None
+    assert found.upper == pytest.approx(2.0**0.5, rel=0.02)
+
+
+# --- where the cost does not rise as derivatives say ----------------------------------------------
+
+
+TIME = np.linspace(0.0, 4.0, 81)
+
+
+class Limited:
+    """y = min(gain · t, stop): the stop is told only where it is reached."""
+
+    def simulate(
+        self, values: Mapping[str, float], experiment: Experiment
+    ) -> Mapping[str, np.ndarray]:
+        return {"y": np.minimum(values["gain"] * experiment["y"].time, values["stop"])}
+
+
+def limited_problem(experiment: Callable[..., Experiment], y: np.ndarray) -> Problem:
+    unknowns = Unknowns((Unknown("gain", 1.0, 0.1, 3.0), Unknown("stop", 3.0, 0.5, 20.0)))
+    return Problem(Limited(), (experiment("run", 1.0, y),), unknowns, ("y",), {"y": 0.1})
+
+
+def test_a_stop_that_is_reached_has_both_ends(experiment: Callable[..., Experiment]) -> None:
+    noise = 0.1 * np.random.default_rng(1).normal(size=TIME.size)
+    found = limited_problem(experiment, np.minimum(TIME, 2.5) + noise)
+    best = solve(found).vector
+    linearised = linearised_fit(found, best)
+    assert not [*checked_ends(found, best, linearised, reach(uncertainty(linearised).own))]
+
+
+def test_a_stop_that_is_just_touched_has_no_upper_end(
+    experiment: Callable[..., Experiment],
+) -> None:
+    """The truth never reaches it; the last sample happens to lie low, so that the fit touches."""
+    noise = 0.02 * np.random.default_rng(2).normal(size=TIME.size)
+    noise[-2:] = -0.012  # less than one standard deviation
+    found = limited_problem(experiment, TIME + noise)
+    best = solve(found, found.unknowns.vector_of({"stop": 3.9})).vector
+    values = found.unknowns.values(best)
+    assert 3.9 < values["stop"] < 4.0
+    linearised = linearised_fit(found, best)
+    told = uncertainty(linearised)
+    ends = checked_ends(found, best, linearised, reach(told.own))
+    assert [(end.number, end.upper, end.distance) for end in ends] == [(1, True, np.inf)]
+    gain, stop = estimates(told.own, ends={(1, True): np.inf})
+    assert gain.status == "estimated"
+    assert stop.status == "no upper end"
+    assert stop.upper is None
+    assert stop.lower is not None
+    assert stop.lower < values["stop"]

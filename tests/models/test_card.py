@@ -39,17 +39,6 @@ def test_share_of_an_interval_above_the_dead_zone() -> None:
 # --- Kruse's recursion ----------------------------------------------------------------------
 
 
-@pytest.mark.interpreted
-@pytest.mark.parametrize(("zeta", "rate"), [(0.4, 100.0), (0.05, 100.0), (3.0, 100.0), (1.0, 30.0)])
-def test_the_largest_step_is_that_of_the_recursions_roots(
-    channel: Channel, zeta: float, rate: float
-) -> None:
-    p, h = channel._replace(zeta=zeta, omega=40.0), 1.0 / rate
-    w = p.omega * h
-    roots = np.roots([1.0, -2.0 * (1.0 - zeta * w), 1.0 - 2.0 * zeta * w + w * w])
-    assert (w < step_limit(zeta, exact=False)) == bool((np.abs(roots) < 1.0).all())
-
-
 # --- the filter's differential equation ----------------------------------------------------------
 
 
@@ -200,13 +189,3 @@ def test_switches_from_within_a_step(
     p = channel._replace(**LIMITS)
     found = single.limited_current(target, previous, steady, p, 0.9, 0.01, True)
     assert found == pytest.approx(output)
-
-
-@pytest.mark.interpreted
-def test_limits_can_be_off(channel: Channel) -> None:
-    p = channel._replace(lim1=inf, lim2=inf, I_t1=inf, I_t2=0.0, a=inf)
-    decay = single.channel_constants(p, 0.01, single.CardOptions()).decay
-    assert decay == 0.0
-    assert single.limited_current(1.3, 0.2, 1.0, p, decay, 0.01, None) == 1.3
-    assert single.limited_current(0.1, 0.9, 0.0, p, decay, 0.01, None) == 0.1
-    assert single.limited_current(-0.1, 0.9, 0.0, p, decay, 0.01, None) == 0.0

@@ -1,24 +1,17 @@
 """The refinements against what they are to be: friction, hysteresis, ripple, damping, line."""
 
-from math import atan, cos, pi
-
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from scipy.integrate import quad, solve_ivp
+from scipy.integrate import solve_ivp
 
 from swashplate.models.refinements import (
-    accelerating_leakage,
     damping_factor,
     held_back,
     line_step,
-    load_leakage,
     magnetising_current,
     plate_follows,
     plate_pressure_rate,
-    rippled_angle,
-    static_leakage,
-    stiff_line_torque,
 )
 
 pytestmark = pytest.mark.interpreted
@@ -70,13 +63,6 @@ def test_a_closed_loop_takes_energy(path: list[float]) -> None:
 # --- ripple ---------------------------------------------------------------------------------------
 
 
-@given(st.floats(0.0, 0.9), st.floats(-pi, pi))
-def test_two_turns_take_the_oil_of_two_turns(depth: float, phase: float) -> None:
-    """Time of eleven cycles at a constant flow: the integral of dθ over the speed."""
-    time, _ = quad(lambda q: 1.0 / rippled_angle(1.0, q, depth, 5.5, phase), 0.0, 4.0 * pi)
-    assert time == pytest.approx(4.0 * pi, rel=1e-9)
-
-
 # --- damping --------------------------------------------------------------------------------------
 
 PRESSURES = st.floats(-5e6, 5e6)
@@ -106,20 +92,6 @@ def test_it_solves_the_plates_equation() -> None:
 
 
 # --- leakage --------------------------------------------------------------------------------------
-
-
-def lumps(K: float, torque: float, J: float, Z10: float) -> tuple[float, float]:
-    return static_leakage(K, torque), accelerating_leakage(K, J, Z10)
-
-
-@given(st.floats(-1.0, 1.0), st.floats(-2.0, 2.0), st.floats(-5e4, 5e4))
-def test_the_leakage_goes_with_the_torque(tangent: float, rate: float, torque: float) -> None:
-    K, J, Z10 = 1e-6, 5e3, 12.0
-    Z11, Z12 = lumps(K, torque, J, Z10)
-    lost = Z11 + load_leakage(tangent, rate, Z12)
-    assert lost == pytest.approx(K * stiff_line_torque(tangent, rate, torque, J, Z10), abs=1e-15)
-    expected = K * (torque + J * Z10 * cos(atan(tangent)) * rate)
-    assert lost == pytest.approx(expected, rel=1e-12, abs=1e-15)
 
 
 # --- line -----------------------------------------------------------------------------------------

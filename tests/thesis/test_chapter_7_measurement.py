@@ -5,7 +5,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 import sympy as sp
-from reproduction.speed_path import path_delay, simulated_speed, speed_of_angle
+from reproduction.speed_path import path_delay, speed_of_angle
 
 from swashplate import Drive, maneuvers
 from swashplate.campaign import (
@@ -104,16 +104,6 @@ def test_erratum_33_simulated_speed_comes_half_a_sample_late() -> None:
         assert float(sp.arg(sp.N(ratio.subs(numbers), 30))) == pytest.approx(
             2 * np.pi * hertz * H / 2.0, rel=1e-9
         )
-
-
-@pytest.mark.parametrize(("aligned", "half_samples"), [(True, 0.0), (False, 1.0)])
-def test_erratum_33_a_mean_of_two_samples_aligns_both(aligned: bool, half_samples: float) -> None:
-    """On a ramp of speed a delay is a constant difference: 100 rad/s² times it."""
-    time = np.arange(4096) * H
-    measured = speed_of_angle(50.0 * time**2, H)
-    simulated = simulated_speed(100.0 * time, H, aligned=aligned)
-    late = (measured[-1] - simulated[-1]) / 100.0
-    assert late == pytest.approx(half_samples * 0.5 * H, abs=1e-12)
 
 
 def test_erratum_27_what_a_speed_below_its_limit_does_not_show() -> None:
