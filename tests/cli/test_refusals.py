@@ -42,7 +42,7 @@ REFUSED = {
     "simulate hoist step:9 --set Z1=1/2": "Z1 has one value, not a plus and a minus one",
     "simulate hoist step:9 --set Z19=100": "the solenoid would overpower the feedback spring",
     "simulate hoist step:9 --scale Z16=1.5mm": "--scale cannot read 'Z16=1.5mm'; write it as",
-    "simulate hoist step:9 --scale Z1=1/2": "takes one factor, not two",
+    "simulate hoist step:9 --scale Z1=1/2": "takes one factor, not 2",
     "size hoist --speed-deg-s 250 --out no/a.toml": "folder no does not",
     "compensate hoist --out a.xlsx": "written as .toml, .csv or .parquet",
     "excitation none.toml --out no/a.csv": "folder no does not exist",
