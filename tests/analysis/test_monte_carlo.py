@@ -121,6 +121,7 @@ def fit_and_folder(tmp_path_factory: pytest.TempPathFactory) -> tuple[Fit, Path]
     return result, place
 
 
+@pytest.mark.slow
 def test_a_stored_fit_gives_drives_of_its_quoted_errors(fit_and_folder):
     result, fitted = fit_and_folder
     drawn = stored_draws(fitted, draws=400, seed=1)
@@ -153,6 +154,7 @@ def test_a_stored_fit_gives_drives_of_its_quoted_errors(fit_and_folder):
     assert np.abs((joint / spread)[0]).max() > 0.25  # more than 400 draws would show by chance
 
 
+@pytest.mark.slow
 def test_the_campaign_may_have_moved(fit_and_folder, tmp_path):
     fitted = fit_and_folder[1]
     text = (fitted / "fit.json").read_text("utf-8")
