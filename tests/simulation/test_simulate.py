@@ -99,6 +99,7 @@ REFINED = {"line_stiffness": 1e3, "motor_leakage": 1e-3, "load_inertia": 1.0}
 
 
 @pytest.mark.traced
+@pytest.mark.filterwarnings("ignore::RuntimeWarning")  # of NumPy, without the JIT
 @pytest.mark.parametrize(
     "refinements",
     [{}, pytest.param(REFINED, marks=pytest.mark.slow)],

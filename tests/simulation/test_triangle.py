@@ -111,6 +111,7 @@ def test_columns_of_any_size_leave_numbers(size: float) -> None:
     np.testing.assert_allclose(products, expected, rtol=0.0, atol=1e-10)
 
 
+@pytest.mark.filterwarnings("ignore::RuntimeWarning")  # of NumPy, without the JIT
 def test_derivatives_that_overflow_end_in_a_sentence(hoist: Drive) -> None:
     current = np.full(64, 0.4)
     stamps = np.arange(64) / 512.0
