@@ -22,10 +22,6 @@ MEANT = control.DelayedFeedback(0.2, 0.2) | control.ShipCompensation() | control
 SHORT = {"length": 70.0, "start": 40.0}
 
 
-# each other process would have to compile the loop
-pytestmark = pytest.mark.xdist_group("judge")
-
-
 @pytest.fixture(scope="module")
 def crane():
     return Crane.preset("tg3637")
