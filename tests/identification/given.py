@@ -94,7 +94,7 @@ def first_order(
 class Backwards(Serial):
     """Results in another order than asked for, as from several processes."""
 
-    def run(self, function, shared, items):  # type: ignore[no-untyped-def]
+    def run(self, function, shared, items):
         yield from reversed(list(super().run(function, shared, items)))
 
 

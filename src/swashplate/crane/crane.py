@@ -38,7 +38,9 @@ class Fitted(Protocol):
     """What a fit returns, as far as a crane takes it."""
 
     @property
-    def drive(self) -> Drive: ...  # noqa: D102
+    def drive(self) -> Drive:
+        """The drive that was fitted."""
+        ...
 
 
 DriveLike = Drive | Fitted | str | Path
