@@ -34,7 +34,9 @@ STEP = 0.005
 WINDOW = 0.05
 """Time over which mean speeds are compared, or two samples where these are farther apart. [s]"""
 SHORTEST = 0.005
-"""Lag below which it is none. [s]"""
+"""Lag that a drive has at least. [s]"""
+TOLD = 0.01
+"""Lag that mean speeds tell from a delay: a fifth of their window, two steps of the march. [s]"""
 FEWEST = 40
 """Mean speeds that tell anything."""
 SEEN, NEXT_TO_NOTHING = 1.02, 1e-4
@@ -373,7 +375,7 @@ def fit_configuration(guess: Guess, start: ParameterSet | Drive) -> str:
     longest = max(2.0 * guess.delay, guess.delay + 0.1)
     lines += [
         "Z8 = { relative = [0.2, 5.0], log = true }    # lag"
-        if guess.lag > SHORTEST
+        if guess.lag > TOLD
         # the acceleration is that of Z8 times Z16: without a lag nothing tells them apart
         else "# the lag is too short to be seen: Z8 stays fixed",
         f"tau = {{ bounds = [0.0, {longest:.4g}] }}    # delay",
