@@ -37,11 +37,11 @@ demo: $(STAMP) ## identify a virtual hoist from its tests, with a report, into d
 
 test: lint ## lint, then the quick tests
 	@echo; echo "== Tests"
-	@$(BIN)/pytest -n 2 --dist loadgroup --durations=40 -m "not slow"
+	@$(BIN)/pytest -n 2 --dist loadfile --durations=40 -m "not slow"
 
 test-slow: $(STAMP) ## the slow tests: pages, examples, reproduction, searches, without the JIT
 	@echo "== Slow tests"
-	@$(BIN)/pytest -n 2 --dist loadgroup --durations=40 -m slow
+	@$(BIN)/pytest -n 2 --durations=40 -m slow
 	@echo; echo "== Tests marked 'interpreted', without the JIT"
 	@NUMBA_DISABLE_JIT=1 $(BIN)/pytest -n 2 -m interpreted
 
@@ -79,7 +79,7 @@ calibration: $(STAMP) ## how often intervals hold the truth, over 400 virtual ca
 
 coverage: $(STAMP) ## which lines of src no test reaches; the kernels interpreted (ten minutes)
 	@$(BIN)/coverage erase
-	@$(BIN)/coverage run -m pytest -n 2 --dist loadgroup
+	@$(BIN)/coverage run -m pytest -n 2
 	@NUMBA_DISABLE_JIT=1 $(BIN)/coverage run -m pytest -n 2 -m 'interpreted or traced'
 	@$(BIN)/coverage combine -q
 	@$(BIN)/coverage report

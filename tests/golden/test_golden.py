@@ -58,7 +58,6 @@ def kept(values: Array) -> Array:
     return np.vstack([values[::EACH], np.sum(values * values, axis=0)])
 
 
-@pytest.mark.xdist_group("golden")  # each other process would have to load every kernel
 @pytest.mark.parametrize("name", CASES)
 def test_case(name: str) -> None:
     with np.load(FILE) as stored:

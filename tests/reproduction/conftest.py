@@ -4,13 +4,6 @@ from reproduction.catalogue import ERROR_TABLES
 from reproduction.content import Reproduction
 
 
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Tests of the whole share a worker, so that it is computed once."""
-    for item in items:
-        if "everything" in getattr(item, "fixturenames", ()):
-            item.add_marker(pytest.mark.xdist_group("reproduction"))
-
-
 @pytest.fixture(scope="session")
 def everything() -> Reproduction:
     """All figures and tables, of the default seed."""
