@@ -157,7 +157,8 @@ def value_at(value: Any, path: str) -> Any:
 
 def numbers_of(value: Any) -> list[float]:
     """All floats of a nested named tuple, in the order of `floats_of`."""
-    return [float(value_at(value, path)) for path in floats_of(type(value))]
+    nested = (numbers_of(each) if isinstance(each, tuple) else (float(each),) for each in value)
+    return [number for numbers in nested for number in numbers]
 
 
 def made(kind: Any, numbers: Mapping[str, float], prefix: str = "") -> Any:

@@ -32,6 +32,8 @@ from swashplate.tables import count
 if TYPE_CHECKING:
     from concurrent.futures import ThreadPoolExecutor
 
+    from swashplate.simulation.residuals import Ready
+
 Array = NDArray[np.float64]
 Part = TypeVar("Part")
 Loss = Literal["linear", "soft_l1", "cauchy"]
@@ -119,7 +121,7 @@ class Problem(Result):
         """
         key = vector.tobytes(), compressed
         if key not in self._last:
-            small = compressed and self.compare is None and isinstance(self.model, EquationModel)
+            small = compressed and self._marched
             parts = self._each(partial(self._reduced if small else self._full, vector))
             priors = Evaluation(*self.unknowns.prior_rows(vector))
             residuals, jacobians = zip(*parts, priors, strict=True)
@@ -129,17 +131,22 @@ class Problem(Result):
 
     def cost(self, vector: Array) -> float:
         """Half the sum of squares alone, which is quicker."""
-
-        def squares(number: int) -> float:
-            experiment, weights = self.experiments[number], self.weights[number]
-            residuals = (
-                weights[name] * self._compared(experiment[name], y - experiment[name].values)
-                for name, y in self.outputs(vector, number).items()
-            )
-            return sum(float(np.sum(each**2)) for each in residuals)
-
         priors, _ = self.unknowns.prior_rows(vector)
-        return 0.5 * (sum(self._each(squares)) + float(priors @ priors))
+        return 0.5 * (sum(self._each(partial(self._squares, vector))) + float(priors @ priors))
+
+    def _squares(self, vector: Array, number: int) -> float:
+        if self._marched:
+            ready, observed = self._ready(vector, number)
+            residuals = ready.residuals(observed)
+            if np.isfinite(total := float(residuals @ residuals)):
+                return total
+        # by channel, which also says what is not finite
+        experiment, weights = self.experiments[number], self.weights[number]
+        compared = (
+            weights[name] * self._compared(experiment[name], y - experiment[name].values)
+            for name, y in self.outputs(vector, number).items()
+        )
+        return sum(float(np.sum(each**2)) for each in compared)
 
     def outputs(self, vector: Array, number: int) -> Mapping[str, Array]:
         """Simulated samples of the fitted channels of one experiment, offsets included."""
@@ -181,17 +188,24 @@ class Problem(Result):
 
     def _reduced(self, vector: Array, number: int) -> Evaluation:
         """A triangular factor of [J r] of one experiment, without ever holding J."""
-        experiment, (observed, names, zeros, asked, by) = (
-            self.experiments[number],
-            self._own[number],
-        )
-        values, model = self._values(vector, number), cast("EquationModel", self.model)
-        offsets = [values.get(f"{OFFSET}{name}", 0.0) for name in self.weights[number]]
-        ready = model.ready(values, experiment, Asked(observed, asked, offsets))
+        ready, observed = self._ready(vector, number)
+        experiment, (_, names, zeros, asked, by) = self.experiments[number], self._own[number]
         factor, chain = ready.triangle(observed).factor, partial(self.unknowns.chain, vector)
         jacobian = factor[:, : len(asked)] @ by @ chain(names, experiment.name)
         jacobian += factor[:, len(asked) : -1] @ chain(zeros, experiment.name)
         return Evaluation(factor[:, -1], jacobian)
+
+    @property
+    def _marched(self) -> bool:
+        """Whether the march itself makes the residuals."""
+        return self.compare is None and isinstance(self.model, EquationModel)
+
+    def _ready(self, vector: Array, number: int) -> tuple[Ready, ObservedRecord]:
+        """The model with the numbers of one experiment, and this as the march sees it."""
+        experiment, (observed, _, _, asked, _) = self.experiments[number], self._own[number]
+        values, model = self._values(vector, number), cast("EquationModel", self.model)
+        offsets = [values.get(f"{OFFSET}{name}", 0.0) for name in self.weights[number]]
+        return model.ready(values, experiment, Asked(observed, asked, offsets)), observed
 
     @cached_property
     def _own(self) -> list[tuple[ObservedRecord, list[str], list[str], list[str], Array]]:

@@ -5,6 +5,7 @@ by the same lines as a single one.
 """
 
 from collections.abc import Callable, Iterator, Mapping
+from itertools import count
 from math import inf, isfinite
 from typing import Any
 
@@ -37,6 +38,8 @@ FULL_VOLTAGE = 10.0  # Largest command, either way. [V]
 SIDES = ("plus", "minus")  # Endings of what has two directions.
 VOLTAGES = np.linspace(0.0, FULL_VOLTAGE, 101)
 """Commands at which the static rules are checked. [V]"""
+FEW, _alone = 20, count()
+"""Sets checked one by one from which on machine code pays, and how many there were."""
 N_CHANNEL, N_PUMP = len(Channel._fields), len(Pump._fields)
 
 OF_REFINEMENTS: tuple[Rule, ...] = (
@@ -186,8 +189,8 @@ def _static(n: Values, size: int) -> tuple[Array, Array]:
     channels = np.moveaxis(np.array(sides), -1, 0)
     pumps = np.column_stack([n[name] for name in Pump._fields])
     lowest, moment = np.empty((size, 2)), np.empty((size, 2))
-    if size == 1:
-        # commands that read a set and simulate nothing need not wait for machine code
+    if size == 1 and next(_alone) < FEW:
+        # commands that read a few sets and simulate nothing need not wait for machine code
         pump, volts = Pump(*pumps[0].tolist()), VOLTAGES.tolist()
         for k in range(2):
             channel = Channel(*channels[0, k].tolist())
