@@ -325,7 +325,7 @@ class Page {
         const words = ({ rmse, fit }) => `RMSE ${digits(rmse * each.factor, 3)} ${each.unit}, fit ${fit.toFixed(2)} %`;
         const row = document.createElement("p");
         row.append(Object.assign(document.createElement("b"), { textContent: each.name }), ` ${words(now.errors[k])}`);
-        row.append(Object.assign(document.createElement("span"), { textContent: ` ${data.before}: ${words(this.before[number].errors[k])}` }));
+        row.append(Object.assign(document.createElement("span"), { textContent: ` · ${data.before}: ${words(this.before[number].errors[k])}` }));
         return [row];
       }),
     );
