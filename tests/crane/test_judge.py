@@ -56,6 +56,13 @@ def test_numbers_do_not_depend_on_who_runs_them(crane, judged, executor):
     np.testing.assert_array_equal(again.values, judged.values[[3, 5]])
 
 
+def test_control_that_changes_nothing_does_not_pass(crane):
+    idle = control.TipShaper("zv")  # there is no stick to shape
+    found = judge(crane, idle, seeds=range(3), drives=("ideal",), remedies=False, **SHORT)
+    assert not found.passed
+    assert "changes nothing that could be told from chance" in found.verdict()
+
+
 def test_verdict_and_what_would_do(crane, judged):
     assert not judged.passed
     assert judged.names == ("no control", "ideal", "identified")

@@ -176,6 +176,20 @@ lagging = Model("lagging", Gains, Filtered, follow, sample=offset)
 """A law of one's own: the tip follows the load behind a lag, which damps as a delay does."""
 
 
+@equation
+def along_the_swing(state: Filtered, p: Gains) -> Offset:
+    size = sqrt(state.x * state.x + state.y * state.y)
+    return Offset(p.gain * state.x / size, p.gain * state.y / size)
+
+
+def test_a_law_without_a_number_stops_the_run(crane):
+    # the load hangs straight at first: 0/0
+    divides = Model("divides", Gains, Filtered, follow, sample=along_the_swing)
+    law = control.Law(divides, Gains(0.1, 1.0))
+    with pytest.raises(DomainError, match="at 0.00 s the control law gives an offset .* no finite"):
+        crane.simulate(Stick.rest(0.1), control=law)
+
+
 @pytest.mark.slow
 def test_law_of_ones_own_damps_in_the_same_loop(crane, slewed):
     law = control.Law(lagging, Gains(0.2, 2.0))

@@ -222,7 +222,7 @@ def test_cut_files_and_other_conventions_are_refused(tmp_path):
 
     refused("there is no yaw for 0.5 rad/s and 180 deg; the file is cut", lines[:-7])
     refused("line 3: motion is missing, .* needed are period", [*lines[:2], lines[2][:30]])
-    refused("has no motions in waves from 0 to 180", [])
+    refused("has no motions in waves", [])
     # headings counted from where waves come: everything but heave the other way
     turned = [
         line[:14] + f" {(180.0 - float(line.split()[1])) % 360.0:13.6e}" + line[28:]
@@ -242,6 +242,59 @@ def test_cut_files_and_other_conventions_are_refused(tmp_path):
         ):
             read_ship(nc)
         nc.write_text("nothing", "utf-8")
+
+
+def test_waves_from_the_other_side_follow_by_symmetry(tmp_path):
+    path, lines = tmp_path / "ship.4", wamit_lines()
+
+    def written(angle):
+        turned = [line[:14] + f" {angle(line):13.6e}" + line[28:] for line in lines]
+        kept = [each for each in turned if float(each.split()[1]) != 90.0]
+        path.write_text("\n".join(kept), "utf-8")
+        return read_ship(path, 80.0)
+
+    # the 270 deg of the file stand for its 90 deg, and 360 deg for 0
+    for whole in (0.0, 360.0):
+        ship = written(lambda line: float(line.split()[1]) or whole)  # noqa: B023
+        found, wanted, _ = long_wave(ship, 90.0, 0.2)
+        np.testing.assert_allclose(found[:5], wanted, atol=3e-6)
+
+
+def test_rotations_in_degrees_and_single_headings_are_refused(tmp_path):
+    path, names = tmp_path / "ship.csv", [f"{m}_{p}" for m in MOTIONS for p in ("re", "im")]
+
+    def ship(headings, factor):
+        rows = [",".join(["heading_deg", "omega", *names])]
+        for heading in headings:
+            for omega in OMEGAS:
+                values = small_body(radians(heading), omega) * [1, 1, 1, factor, factor, factor]
+                parts = [x for z in values.tolist() for x in (complex(z).real, complex(z).imag)]
+                rows.append(",".join(map(str, [heading, omega, *parts])))
+        path.write_text("\n".join(rows), "utf-8")
+        return read_ship(path)
+
+    with pytest.raises(InputError, match="of 0.1 rad/s, pitch is .* must be in rad"):
+        ship((0.0, 90.0, 180.0), 180.0 / pi)
+    with pytest.raises(FileError, match="up to 180 deg apart, but must be within 90 deg"):
+        ship((0.0, 180.0), 1.0)
+    beam = ship((90.0,), 1.0)
+    assert beam.response(np.array([0.2]), np.array([pi / 2.0]))[2] == pytest.approx(1.0)
+    with pytest.raises(InputError, match="has waves of 90 deg only"):
+        beam.response(np.array([0.2]), np.array([0.0]))
+
+
+def test_a_hole_in_a_log_of_motions_is_refused(tmp_path):
+    path, time = tmp_path / "ship.csv", np.arange(0.0, 40.0, 0.1)
+    kept = time[(time < 10.0) | (time > 30.0)]
+    rows = [f"{t:.1f};{0.5 * sin(0.7 * t):.9f}" for t in kept]
+    path.write_text("\n".join(["time [s];heave [m]", *rows]), "utf-8")
+    with pytest.raises(InputError, match="has no heave from 9.9 to 30.1 s"):
+        ship_motion(path, {"heave": "heave"})
+
+
+def test_a_negative_seed_is_refused():
+    with pytest.raises(InputError, match="The seed of a seaway is -1"):
+        Seaway("ss3", seed=-1)
 
 
 def test_measured_motion_comes_from_a_log(tmp_path):

@@ -235,6 +235,16 @@ def test_bad_inputs_are_named() -> None:
         sensitivities(valve, P, good, RATE, output="position", parameters=["lead"], **given)
 
 
+def test_names_and_numbers_that_mean_nothing_are_refused() -> None:
+    made = stepper(stopped, P, ["command"], given=SHORT, rate=100.0)
+    for wrong in ((), (1.0, 2.0), ("a",), (None,), (np.zeros(2),)):
+        with pytest.raises(InputError, match="A step takes command: 1 numbers|The command is"):
+            made.step(*wrong)
+    way: Any = {"comand": "previous"}
+    with pytest.raises(InputError, match="interpolation names 'comand', but the inputs"):
+        simulate(stopped, P, {"command": COMMAND}, rate=100.0, given=SHORT, interpolation=way)
+
+
 def test_an_equation_of_a_model_is_replaced() -> None:
     class Lag(NamedTuple):
         time: float

@@ -13,6 +13,9 @@ SLACK = 1e-9
 """Part of its range by which a state passes a limit before it counts: more than rounding."""
 TOLERANCES = np.array([1e-9, 1e-7, 1.0, 1e-9, 1e-7])  # m, m/s, Pa, rad, rad/s for 1e-6.
 
+ROUNDING = 1e-7
+"""Time within which two events are one. [s]"""
+
 
 def solved(full: FullOrderDrive, run: Simulation, tolerance: float = 1e-8) -> np.ndarray:
     """(n, 5) states over the current of a run, a straight line between its samples.
@@ -83,8 +86,10 @@ def solved(full: FullOrderDrive, run: Simulation, tolerance: float = 1e-8) -> np
             found[time.size - later.size :][: len(made.t)] = made.y.T
         if made.status == 0:
             break
-        # what has let go is not held again by rounding
-        let_go = np.array([bool(each.size) for each in made.t_events]) & (holds != 0)
+        # what has let go is not held again by rounding, neither at once nor at the next event there
+        moved = max(float(each[0]) for each in made.t_events if each.size) - now
+        released = np.array([bool(each.size) for each in made.t_events]) & (holds != 0)
+        let_go = released | (let_go & (moved < ROUNDING))
         events += 1
         assert events < 1000, f"the limits chatter at {now:g} s"
         now = max(float(each[0]) for each in made.t_events if each.size)

@@ -10,6 +10,7 @@ import pytest
 from swashplate import Campaign, Drive
 from swashplate.campaign import rig
 from swashplate.campaign.experiment import Experiment
+from swashplate.identification import faults
 from swashplate.identification.assessment import Assessment, assess
 from swashplate.identification.faults import clipped_channels
 from swashplate.identification.fitting import fit
@@ -138,6 +139,14 @@ def test_a_clipped_ammeter_is_found_with_the_limits_to_state(tmp_path: Path) -> 
     assert len(said) == 1
     assert "'current' stands at exactly 0.2 A" in said[0]
     assert ", 0.2] in its channel" in said[0]
+
+
+@pytest.mark.parametrize("rate", [50.0, 100.0, 512.0])
+def test_a_lag_keeps_a_full_command_within_its_range(rate: float) -> None:
+    time = np.arange(int(20.0 * rate)) / rate
+    for full in (10.0, -10.0):
+        command = np.where(time > 1.0, full, 0.0)
+        assert np.abs(faults._lagged(time, command)).max() <= 10.0
 
 
 @pytest.mark.slow

@@ -405,6 +405,9 @@ def test_files_without_a_model_are_refused(tmp_path: Path, monkeypatch) -> None:
         ("bare", "model = 1\n", InputError, "bare.py has no 'free'"),
         ("json", "model = free = 1\n", FileError, "another module is called json"),
         ("none", "", FileError, "no Python file"),
+        ("half", "model = 1\nfree = (\n", FileError, "half.py, line 2: SyntaxError"),
+        ("fails", "import math\nmath.sqrt(-1)\n", FileError, "fails.py, line 2: ValueError"),
+        ("listed", "model = 1\nfree = ['lag']\n", InputError, "free is .'lag'., but must be a map"),
     ):
         if text:
             (tmp_path / f"{name}.py").write_text(text, "utf-8")

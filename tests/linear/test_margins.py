@@ -59,6 +59,12 @@ def test_a_first_order_lag(hoist: Drive) -> None:
     assert model.margins(0.5 / model.gain) == (0.0, inf, inf, inf)
 
 
+def test_a_gain_of_the_wrong_sign_has_its_margin_at_rest(hoist: Drive) -> None:
+    # -g/(1 + s τ) begins on the negative axis: 1 + K G is 0 at K g = 1
+    model = hoist.linearize(current=0.45)
+    assert model.margins(-0.5 / model.gain).gain_margin == pytest.approx(2.0)
+
+
 @pytest.mark.parametrize("delay", [0.0, 0.05, 0.4])
 def test_an_integrator_with_delay(delay: float) -> None:
     # L = K/(jω) e^(-jω delay): crossover ω = K, phase margin π/2 - K delay; edge at K delay = π/2

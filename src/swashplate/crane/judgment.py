@@ -136,8 +136,14 @@ class Judgment(Tabular):
 
     @property
     def passed(self) -> bool:
-        """Whether the judged variant is worse than none in no more seaways than allowed."""
-        return self.worse(self.judged) <= self.allowed
+        """Whether the judged variant swings less than none, and more in no more than allowed."""
+        return self.worse(self.judged) <= self.allowed and self._gains
+
+    @property
+    def _gains(self) -> bool:
+        """Whether the mean swing is less than without control, beyond chance."""
+        found = self.difference(self.judged)
+        return found.value < 0.0 and not found.high >= 0.0
 
     def verdict(self) -> str:
         """What the judged variant amounts to, and what would do if it fails."""
@@ -148,6 +154,12 @@ class Judgment(Tabular):
             return (
                 f"With the drives '{self.judged}' the controller brings the swing from {none:.2f} "
                 f"to {own:.2f} deg RMS and makes it worse than none in {share} of {seaways}."
+            )
+        alike = np.allclose(self.counted(self.judged), self.counted(NONE), rtol=1e-3)
+        if alike or self.worse(self.judged) <= self.allowed:
+            return (
+                f"With the drives '{self.judged}' the controller changes nothing that could be "
+                f"told from chance: {none:.2f} deg RMS without it, {own:.2f} with it, in {seaways}."
             )
         said = (
             f"The controller makes swing worse than none in {share} of {seaways} ({none:.2f} deg "
@@ -293,7 +305,9 @@ def judge(
         For seeds, drives or a start that make no study, or a pose beyond the crane's limits.
     """
     if not 0.0 <= allowed < 1.0:
-        raise InputError(f"allowed is {allowed:g}, but is a share of seaways: 0 to below 1.")
+        raise InputError(
+            f"allowed is {allowed:g}, but is a share of seaways: 0 to below 1, or below 100 %."
+        )
     asked = Study.of(crane, control, **{"seeds": range(200), **study})
     made = Judgment(asked, asked.outcomes(list(asked.cases.values())), allowed)
     case = asked.cases[made.judged]

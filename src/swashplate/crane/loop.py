@@ -68,7 +68,7 @@ ROWS = (
     *("torque_hoist", "torque_slew", "torque_luff"),
 )
 """What the loop leaves of each sample, SI; the torques are those that the drives have taken."""
-FINE, TOO_FAST, BOOM_OUT, ROPE_OUT = range(4)
+FINE, TOO_FAST, BOOM_OUT, ROPE_OUT, NO_NUMBER = range(5)
 """How a pass ended."""
 ANGLE, SPEED, OPERATOR, WISH, AIM, TORQUE = range(6)
 """Shafts' angles and speeds; angles to which the stick alone would have brought them, and its
@@ -340,7 +340,12 @@ def loop_of(hoist: Any, slew: Any, luff: Any, law: Any) -> Callable[..., tuple[S
                             seen[7 + i] = ship[m, i]
                     for i in range(picks.size):
                         laws.inputs[i] = seen[picks[i]]
-                    margins[3] = min(margins[3], advance_law(laws))
+                    margin = advance_law(laws)
+                    # what is no number would pass through every limit as one
+                    if not abs(laws.outputs[0]) + abs(laws.outputs[1]) < inf:
+                        ended = NO_NUMBER
+                        break
+                    margins[3] = min(margins[3], margin)
                     x += laws.outputs[0]
                     y += laws.outputs[1]
                 if settings.clip > 0.0 or settings.share > 0.0:

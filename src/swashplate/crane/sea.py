@@ -23,6 +23,8 @@ Array = NDArray[np.float64]
 
 BAND = (0.25, 2.5)
 """Frequencies of the components, 25 s to 2.5 s. [rad/s]"""
+LONGEST_HOLE = 1.0
+"""Time without a sample in a log of motions that is a hole, where samples are closer. [s]"""
 COARSE = 8.0
 """Rate at which motion and two derivatives are summed up before they are joined smoothly. [Hz]"""
 LEAST_ENERGY = 0.5
@@ -138,6 +140,8 @@ class Seaway(Result):
             raise InputError(f"There is no sea '{self.sea}'; there are {', '.join(SEA_STATES)}.")
         if not (isfinite(self.heading_deg) and isfinite(self.speed) and self.components >= 2):
             raise InputError("A seaway has a finite heading and speed and two or more components.")
+        if self.seed < 0 or self.seed != int(self.seed):
+            raise InputError(f"The seed of a seaway is {self.seed:g}, but must be 0, 1, 2, ...")
 
     @property
     def spectrum(self) -> Spectrum:
@@ -256,6 +260,13 @@ def ship_motion(
         time, values = read_series(path, column, unit, time_column=time_column, options=options)
         if time.size < 4:
             raise InputError(f"{path} has {time.size} samples of {column}, but needs four.")
+        apart = np.diff(time)
+        hole = int(np.argmax(apart))
+        if apart[hole] > max(LONGEST_HOLE, 5.0 * float(np.median(apart))):
+            raise InputError(
+                f"{path} has no {column} from {time[hole]:g} to {time[hole + 1]:g} s: cut the log "
+                "to a part without holes."
+            )
         if not len(made):
             made = np.zeros((int((time[-1] - time[0]) * rate + 1e-6) + 1, 6))
         grid = time[0] + np.arange(len(made)) / rate

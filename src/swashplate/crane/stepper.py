@@ -19,6 +19,7 @@ from swashplate.crane.loop import (
     FINE,
     INVERSE,
     MARCHED,
+    NO_NUMBER,
     ROPE_OUT,
     ROWS,
     TOO_FAST,
@@ -229,6 +230,11 @@ class CraneStepper:
         name, time = self._crane.name, self._state.sample / RATE
         shafts = Shafts(*self._state.axes[ANGLE])
         rope = float(rope_length(shafts, self.fixed.geometry, self.fixed.home))
+        if ended == NO_NUMBER:
+            return DomainError(
+                f"{name}: at {time:.2f} s the control law gives an offset of the tip that is no "
+                "finite number; look for a division by zero or a root of what is negative in it."
+            )
         if ended == TOO_FAST:
             return InputError(too_fast(rope, time, RATE))
         if ended == ROPE_OUT:

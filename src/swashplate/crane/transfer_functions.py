@@ -33,6 +33,10 @@ LONG_WAVES = ((0, 0.0, -1j, 0.2), (1, 90.0, -1j, 0.2), (4, 0.0, 1j, 0.0))
 phase, and what it must exceed to be seen."""
 HEAVES = 0.3
 """Largest distance of heave from 1 in the longest wave of a file, which the wave's crest lifts."""
+STEEPEST = 2.0
+"""Largest pitch in the longest following wave of a file, over the wave's slope."""
+WIDEST, ASIDE = 90.0, 5.0
+"""Largest angle between headings of a file; angle to its only one that is taken for it. [deg]"""
 LONGEST = 0.4
 """A file whose lowest frequency is above that has no long wave. [rad/s]"""
 
@@ -143,6 +147,15 @@ class TransferFunctions(Result):
                         f"what it is: axes, headings or phases are counted otherwise; {wrong}"
                     )
 
+        slope = self.frequencies[0] ** 2 / GRAVITY
+        pitch = float(np.abs(longest[self.headings < 1e-4, 4]).max(initial=0.0))
+        if pitch > STEEPEST * slope:
+            raise InputError(
+                f"{self.name}: in the longest wave, of {self.frequencies[0]:g} rad/s, pitch is "
+                f"{pitch:.3g} for each metre, but the wave's slope is {slope:.3g} rad: rotations "
+                "must be in rad for each metre of wave, frequencies in rad/s."
+            )
+
     def response(self, omega: Array, heading: Array, speed: float = 0.0) -> Complex:
         """Complex amplitudes of the six motions for each metre of wave.
 
@@ -161,7 +174,7 @@ class TransferFunctions(Result):
         Raises
         ------
         InputError
-            For a speed that the table does not reach.
+            For a speed that the table does not reach, or another heading than its only one.
         """
         low, high = self.speeds[0], self.speeds[-1]
         if not low <= speed <= high:
@@ -171,6 +184,12 @@ class TransferFunctions(Result):
             )
         made = np.zeros((6, omega.size), dtype=np.complex128)
         folded = np.arccos(np.clip(np.cos(heading), -1.0, 1.0))
+        aside = np.degrees(np.abs(folded - self.headings[0]).max(initial=0.0))
+        if self.headings.size == 1 and aside > ASIDE:
+            raise InputError(
+                f"{self.name} has waves of {np.degrees(self.headings[0]):g} deg only, but others "
+                "are asked for."
+            )
         for v, weight_v in _weights(self.speeds, np.array([speed])):
             for m, weight_m in _weights(self.headings, folded):
                 for f, weight_f in _weights(self.frequencies, omega):
@@ -194,6 +213,10 @@ Amplitude = tuple[float, float, float, int, complex]
 `MOTIONS`, [m/m] or [rad/m] by e^{+iωt}."""
 
 
+Wave = tuple[float, float, float, int]
+"""Speed, heading, frequency and motion of an amplitude."""
+
+
 def read_ship(path: str | Path, length: float | None = None) -> TransferFunctions:
     """Motion transfer functions of a file by its ending: ``.re1``, ``.4``, ``.nc`` or ``.csv``.
 
@@ -204,7 +227,7 @@ def read_ship(path: str | Path, length: float | None = None) -> TransferFunction
         array ``RAO`` that ``capytaine.post_pro.rao`` gives, stored by ``separate_complex_values``;
         or ``.csv``, a table in this module's convention with columns ``heading_deg``, ``omega``
         [rad/s], ``surge_re``, ``surge_im`` and so on [m/m], [rad/m], and where it likes ``speed``
-        [m/s]. Waves from beyond 180 deg, which follow by symmetry, are left out.
+        [m/s]. Waves from beyond 180 deg are taken as those from the other side, by symmetry.
     length : float, optional
         WAMIT's ULEN, by which rotations of a ``.4`` are made dimensionless. [m]
 
@@ -333,10 +356,23 @@ def _gathered(
 
     Rotations are in rad for so much of the wave. [m]
     """
-    turned = [(v, heading % 360.0, w, i, z) for v, heading, w, i, z in amplitudes]
-    found = [each for each in turned if each[1] <= 180.0 + 1e-9]
+    waves, mirrored = dict[Wave, complex](), dict[Wave, complex]()
+    for sailed, heading, frequency, number, value in amplitudes:
+        angle = round(heading, 9) % 360.0
+        if angle > 180.0:  # the other side, which follows by symmetry, where this one lacks it
+            sign = complex(MIRRORED[number]) if 0 <= number <= 5 else 1.0
+            mirrored[sailed, 360.0 - angle, frequency, number] = sign * value
+            continue
+        wave = sailed, angle, frequency, number
+        if abs(waves.get(wave, value) - value) > 1e-3 * max(abs(value), 1e-3):
+            raise FileError(
+                f"{path}: motion {number + 1} in waves of {frequency:g} rad/s and {angle:g} deg is "
+                "there twice, with other values."
+            )
+        waves[wave] = value
+    found = [(*wave, value) for wave, value in (mirrored | waves).items()]
     if not found:
-        raise FileError(f"{path} has no motions in waves from 0 to 180 deg.")
+        raise FileError(f"{path} has no motions in waves.")
     columns = [np.array(column) for column in zip(*found, strict=True)]
     (speeds, v), (headings, m), (omega, f) = (
         np.unique(column, return_inverse=True) for column in columns[:3]
@@ -353,10 +389,13 @@ def _gathered(
             f"{path}: there is no {MOTIONS[lacks]} for {omega[j]:g} rad/s and {headings[i]:g} deg; "
             "the file is cut."
         )
-    if len(found) > values.size or omega[0] <= 0.0:
-        raise FileError(
-            f"{path}: frequencies must be above 0 and finite, and each wave be there once."
-        )
+    if omega[0] <= 0.0:
+        raise FileError(f"{path}: frequencies must be above 0 and finite.")
     if headings.size > 1 and (headings[0] > 1e-6 or headings[-1] < 180.0 - 1e-6):
         raise FileError(f"{path}: headings must reach from 0 to 180 deg.")
+    if headings.size > 1 and np.diff(headings).max() > WIDEST:
+        raise FileError(
+            f"{path}: its headings are up to {np.diff(headings).max():g} deg apart, but must be "
+            f"within {WIDEST:g} deg, as motions are straight between them."
+        )
     return TransferFunctions(str(path), speeds, np.radians(headings), omega, values)

@@ -238,7 +238,7 @@ def c(
         "type": exported.type,
         "p": exported.prefix,
         "P": exported.prefix.upper(),
-        "output": exported.names[-1 if not isinstance(what, Drive) else _SPEED],
+        "output": c_name(exported.names[-1 if not isinstance(what, Drive) else _SPEED]),
         "commands": "".join(", 9.0" if s == "voltage" else ", 1.0" for s in exported.signals),
         "step": literal(step),
     }

@@ -269,8 +269,9 @@ def _lagged(time: Array, values: Array) -> Array:
     """(m,) values behind a first-order lag of `LAG`, at rest before."""
     kept = np.exp(-np.diff(time) / LAG)
     bands = np.vstack([np.ones(time.size), np.append(-kept, 0.0)])
-    made: Array = solve_banded((1, 0), bands, np.append(values[:1], (1.0 - kept) * values[1:]))
-    return made
+    made = solve_banded((1, 0), bands, np.append(values[:1], (1.0 - kept) * values[1:]))
+    # a full command stays one, whatever the last digit
+    return np.asarray(np.clip(made, values.min(), values.max()))
 
 
 def clipped_channels(experiments: Sequence[Experiment]) -> tuple[str, ...]:

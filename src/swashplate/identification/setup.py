@@ -9,6 +9,7 @@ from functools import cached_property
 from importlib import import_module
 from importlib.resources import files
 from pathlib import Path
+from traceback import extract_tb
 from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
@@ -357,6 +358,8 @@ class ModelSetup(Result):
                 f"{unknown[0]} has a standard uncertainty but no value: name it in fixed, or give "
                 "it a prior if it is free."
             )
+        if both := [each for each in self.free if each in self.fixed]:
+            raise InputError(f"{both[0]} of {name} is free and fixed: name it in one of them.")
         free = {key: _unknown(key, each) for key, each in self.free.items()}
         for key, made in {"model": own, "name": name, "free": free}.items():
             object.__setattr__(self, key, made)
@@ -381,7 +384,14 @@ class ModelSetup(Result):
             raise FileError(f"{path} is no Python file with a model, such as valve.py.")
         if str(file.parent) not in sys.path:
             sys.path.insert(0, str(file.parent))
-        module = import_module(file.stem)
+        try:
+            module = import_module(file.stem)
+        except Exception as error:
+            sys.modules.pop(file.stem, None)
+            own = [e.lineno for e in extract_tb(error.__traceback__) if e.filename == str(file)]
+            line = getattr(error, "lineno", None) or (own[-1] if own else None)
+            where = f"{path}, line {line}" if line else f"{path}"
+            raise FileError(f"{where}: {type(error).__name__}: {error}.") from None
         if module.__file__ is None or Path(module.__file__).resolve() != file:
             raise FileError(f"{path}: another module is called {file.stem}; rename the file.")
         for name in ("model", "free"):
@@ -390,6 +400,11 @@ class ModelSetup(Result):
                     f"{path} has no '{name}': it needs model = Model(...) and free = "
                     "{'lag': (0.005, 0.06, 0.5), ...}, lower bound, nominal value and upper bound."
                 )
+        if not isinstance(module.free, Mapping):
+            raise InputError(
+                f"{path}: free is {module.free!r}, but must be a mapping of names to lower bound, "
+                "nominal value and upper bound."
+            )
         known = ("model", "free", "name", "channels", "noise", "fixed", "standard_uncertainty")
         return cls(**{key: getattr(module, key) for key in known if hasattr(module, key)})
 

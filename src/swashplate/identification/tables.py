@@ -245,7 +245,7 @@ def runs_tables(qualities: Sequence[RunQuality]) -> list[Table]:
                 Column("role", of="pf"),
                 Column("channel", of="pf"),
                 Column("start", key="initial_state"),
-                Column("ignored"),
+                Column("ignored", wrap=True),
                 Column("samples", ",d", "1", of="pf"),
                 Column("RMSE", ".3g", key="rmse"),
                 UNIT,

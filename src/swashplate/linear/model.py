@@ -334,6 +334,8 @@ def loop_margins(loop: Response, delay: float, fastest: float, name: str) -> Loo
     sizes = [abs(loop(np.array([frequency]))[0]) for frequency in turns]
     if values[-1].real < 0.0 and abs(values[-1].imag) <= 1e-9 * abs(values[-1]):
         sizes.append(abs(values[-1]))  # half the rate of a sampled model
+    if values[0].real < 0.0 and not integrates:
+        sizes.append(abs(values[0]))  # a gain of the wrong sign
     gain_margin = float(1.0 / max(sizes)) if sizes else inf
     return LoopMargins(crossover, phase, delay_margin, gain_margin)
 

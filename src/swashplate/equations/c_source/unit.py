@@ -50,7 +50,7 @@ class Unit:
     functions: dict[Any, str] = field(default_factory=dict)
     """Names in C, by function and what it is made for."""
     texts: list[str] = field(default_factory=list)
-    under_way: list[Any] = field(default_factory=list)
+    under_way: dict[Any, str] = field(default_factory=dict)
     wider: dict[Any, Any] = field(default_factory=dict)
     """Class of named tuples that stands for another wherever equations name that one: parameters
     with those of an equation of one's own among them."""
@@ -75,14 +75,14 @@ class Unit:
         if whole_key in self.under_way:
             source.refuse(None, "a call of itself", "write a loop over a literal range")
         stem = "_of_".join([source.name, *(plain(each).__name__ for each in calls.values())])
-        name = self.free(c_name(stem), source.function, {*self.functions.values(), *self.reserved})
-        self.under_way.append(whole_key)
+        known = {*self.functions.values(), *self.under_way.values(), *self.reserved}
+        name = self.under_way[whole_key] = self.free(c_name(stem), source.function, known)
         try:
             text = Function(self, source, name, kinds, calls).text()
         except UnknownKindError as error:
             where = f"{source.file}, line {source.node.lineno}: {source.name}"
             raise EquationError(f"{where} cannot be written in C: {error}") from None
-        self.under_way.pop()
+        del self.under_way[whole_key]
         self.functions[whole_key] = name
         self.texts.append(text)
         return name

@@ -166,6 +166,11 @@ def checked_sampling(
     if substeps is not None and (substeps < 1 or substeps != int(substeps)):
         raise InputError(f"substeps is {substeps!r}, but must be a whole number, at least 1.")
     if isinstance(interpolation, Mapping):
+        names = tuple(names)
+        for strange in interpolation.keys() - set(names):
+            raise InputError(
+                f"interpolation names '{strange}', but the inputs are {', '.join(names)}."
+            )
         found = {name: interpolation.get(name) for name in names}
     else:
         found = dict.fromkeys(names, interpolation)

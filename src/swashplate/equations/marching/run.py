@@ -277,10 +277,17 @@ def instance_of(
         kinds = {"parameters": part.parameters, "options": part.options, "given": part.given}
         for (what, kind), number in zip(kinds.items(), own, strict=True):
             if kind is None:
+                if number is not None and len(model.parts) == 1 and what != "options":
+                    raise InputError(f"Model {part.name} has no {what}, but is passed {number!r}.")
                 continue
             if not isinstance(number, kind):
                 raise InputError(
                     f"Model {part.name}: its {what} must be a {kind.__name__}, not {number!r}."
+                )
+            if what == "options" and any(each not in (None, True, False) for each in number):
+                raise InputError(
+                    f"Model {part.name}: its options are None or False (off) or True (on), not "
+                    f"{number!r}."
                 )
             for path in () if what == "options" else floats_of(kind):
                 value = value_at(number, path)
@@ -288,6 +295,8 @@ def instance_of(
                     raise InputError(
                         f"Model {part.name}: {path} is {value!r}, but must be a real number."
                     )
+        if own.options is not None:  # off is None, so that code is made for one form of it
+            own = own._replace(options=type(own.options)(*(each or None for each in own.options)))
         parts.append(own)
     return Instance(model, tuple(parts), name or model.name)
 

@@ -487,10 +487,19 @@ class Stepper(Generic[S]):
             If the model leaves its domain, or a number grows beyond all bounds.
         """
         bound = self._bound
+        if len(inputs) != len(self.inputs):
+            raise InputError(
+                f"A step takes {', '.join(self.inputs)}: {len(self.inputs)} numbers, not "
+                f"{len(inputs)}."
+            )
         for name, value in zip(self.inputs, inputs, strict=True):
-            if not -bound <= value <= bound:
+            try:
+                within = bool(-bound <= value <= bound)
+            except (TypeError, ValueError):
+                within = False
+            if not within:
                 raise InputError(
-                    f"The {name} is {value:g}, but must be a finite number within ±{bound:g}."
+                    f"The {name} is {value!r}, but must be a finite number within ±{bound:g}."
                 )
         machine, totals, values, begun = self._state
         values[1] = inputs
