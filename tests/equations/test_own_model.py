@@ -240,8 +240,8 @@ def test_names_and_numbers_that_mean_nothing_are_refused() -> None:
     for wrong in ((), (1.0, 2.0), ("a",), (None,), (np.zeros(2),)):
         with pytest.raises(InputError, match="A step takes command: 1 numbers|The command is"):
             made.step(*wrong)
-    way: Any = {"comand": "previous"}
-    with pytest.raises(InputError, match="interpolation names 'comand', but the inputs"):
+    way: Any = {"order": "previous"}
+    with pytest.raises(InputError, match="interpolation names 'order', but the inputs"):
         simulate(stopped, P, {"command": COMMAND}, rate=100.0, given=SHORT, interpolation=way)
 
 
