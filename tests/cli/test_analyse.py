@@ -52,8 +52,8 @@ def test_figure_9_1(done, number, tmp_path):
     text = done("whatif", "hoist", *both, "--plot", "w.png", "--out", "larger.toml")
     assert "hoist, sine 9 V 0.1 Hz" in text
     assert "Z10 (swash plate angle to shaft speed): 12.396 -> 18.594 1/s" in text
-    limits = [number(text, "speed limit, positive", k) for k in range(2)]
-    limits.append(number(text, "speed limit, negative", 1))
+    limits = [number(text, "top speed, positive", k) for k in range(2)]
+    limits.append(number(text, "top speed, negative", 1))
     assert limits == pytest.approx([196.0, 294.0, -277.5], abs=0.05)
     assert "+50.0 %" in text
     assert (tmp_path / "w.png").read_bytes().startswith(b"\x89PNG")
@@ -74,7 +74,7 @@ def test_bands(done, tmp_path, monkeypatch):
     # one per cent of 196 deg/s, about twice that each way
     assert float(before) == pytest.approx(3.8, abs=1.2)
     assert float(after) == pytest.approx(1.5 * float(before), abs=0.02)
-    assert cells(text, "speed limit, positive")[:4] == final[:4]  # 9 V reaches the stop
+    assert cells(text, "top speed, positive")[:4] == final[:4]  # 9 V reaches the stop
     assert "half of the interval that holds 95 % of the drives" in text
     assert "Band of 50 drives, changed: at most" in text
     assert (tmp_path / "w.svg").exists()

@@ -223,7 +223,7 @@ class WhatIf(Result):
 
         With the `bands` of both, of the same outcomes, each number has half of its interval.
         """
-        rows = [(f"speed at full voltage, {way}", "rad/s") for way in ("positive", "negative")]
+        rows = [(f"top speed, {way}", "rad/s") for way in ("positive", "negative")]
         rows += [(each.words, each.unit) for each in self.outcomes]
         values = [
             np.array([*each.speed_limits, *each.values]) for each in (self.before, self.after)
