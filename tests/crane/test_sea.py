@@ -247,16 +247,16 @@ def test_cut_files_and_other_conventions_are_refused(tmp_path):
 def test_waves_from_the_other_side_follow_by_symmetry(tmp_path):
     path, lines = tmp_path / "ship.4", wamit_lines()
 
-    def written(angle):
-        turned = [line[:14] + f" {angle(line):13.6e}" + line[28:] for line in lines]
-        kept = [each for each in turned if float(each.split()[1]) != 90.0]
+    def written(first):
+        angles = [float(line.split()[1]) or first for line in lines]
+        pairs = zip(lines, angles, strict=True)
+        kept = [f"{line[:14]} {at:13.6e}{line[28:]}" for line, at in pairs if at != 90.0]
         path.write_text("\n".join(kept), "utf-8")
         return read_ship(path, 80.0)
 
     # the 270 deg of the file stand for its 90 deg, and 360 deg for 0
-    for whole in (0.0, 360.0):
-        ship = written(lambda line: float(line.split()[1]) or whole)  # noqa: B023
-        found, wanted, _ = long_wave(ship, 90.0, 0.2)
+    for first in (0.0, 360.0):
+        found, wanted, _ = long_wave(written(first), 90.0, 0.2)
         np.testing.assert_allclose(found[:5], wanted, atol=3e-6)
 
 

@@ -114,8 +114,8 @@ class TransferFunctions(Result):
     Raises
     ------
     InputError
-        If the longest wave does not lift the ship by about its height, or carries it to another
-        side than the water: another convention.
+        If the longest wave does not lift the ship by about its height, carries it to another side
+        than the water, or pitches it by far more than the wave's slope: another convention.
     """
 
     name: str

@@ -386,7 +386,7 @@ class ModelSetup(Result):
             sys.path.insert(0, str(file.parent))
         try:
             module = import_module(file.stem)
-        except Exception as error:
+        except Exception as error:  # the user's own code, which can raise anything
             sys.modules.pop(file.stem, None)
             own = [e.lineno for e in extract_tb(error.__traceback__) if e.filename == str(file)]
             line = getattr(error, "lineno", None) or (own[-1] if own else None)
