@@ -245,6 +245,37 @@ def test_names_and_numbers_that_mean_nothing_are_refused() -> None:
         simulate(stopped, P, {"command": COMMAND}, rate=100.0, given=SHORT, interpolation=way)
 
 
+class Gain(NamedTuple):
+    gain: float
+
+
+class Ways(NamedTuple):
+    twice: bool | None = None
+
+
+class Lone(NamedTuple):
+    place: float = 0.0
+
+
+@equation
+def counted(state: Lone, command: float, options: Ways, p: Gain) -> Lone:
+    step = p.gain * command
+    if options.twice:
+        step = 2.0 * step
+    return Lone(state.place + step)
+
+
+def test_an_option_that_is_false_is_off() -> None:
+    made = Model("counter", Gain, Lone, counted, options=Ways)
+    for options, end in ((Ways(True), 6.0), (Ways(False), 3.0), (Ways(), 3.0)):
+        run = simulate(made, Gain(1.0), {"command": np.ones(4)}, rate=1.0, options=options)
+        assert run["place"][-1] == end
+    with pytest.raises(InputError, match="None or False .off. or True"):
+        simulate(made, Gain(1.0), {"command": np.ones(4)}, rate=1.0, options=Ways(2))
+    with pytest.raises(InputError, match="counter has no given, but is passed"):
+        simulate(made, Gain(1.0), {"command": np.ones(4)}, rate=1.0, given=Ways())
+
+
 def test_an_equation_of_a_model_is_replaced() -> None:
     class Lag(NamedTuple):
         time: float
