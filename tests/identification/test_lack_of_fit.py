@@ -34,15 +34,15 @@ def fitted(
     folder: Path,
     drive: Drive | None = None,
     logs: Logs | None = None,
-    each: bool = False,
+    each: tuple[float, ...] = (0.0,) * 5,
 ) -> tuple[list[Assessment], Verdict]:
-    """A slew campaign of five tests, changed, and its judgement."""
+    """A slew campaign of five tests, each with a machine that much faster, and its judgement."""
     nominal = Drive.preset("slew")
     runs = {}
-    for place, (name, maneuver) in enumerate(TESTS.items()):
+    for faster, (name, maneuver) in zip(each, TESTS.items(), strict=True):
         truth = drive if drive is not None else nominal
-        if each:
-            truth = truth.scale(Z10=1.0 + 0.08 * (place / 4.0 - 0.5))
+        if faster:
+            truth = truth.scale(Z10=1.0 + faster)
         made = rig.run(nominal, {name: maneuver}, truth=truth, validate=[name] * (name == "middle"))
         columns = {key: values.copy() for key, values in made.runs[name].columns.items()}
         if logs is not None:
@@ -120,12 +120,19 @@ def test_a_load_is_named(tmp_path: Path) -> None:
 
 
 def test_a_drift_is_named_and_rules_out_the_use(tmp_path: Path) -> None:
-    assessments, found = fitted(tmp_path, each=True)
+    assessments, found = fitted(tmp_path, each=(-0.04, -0.02, 0.0, 0.02, 0.04))
     assert found.grade == "Not usable"
     assert {MISFIT, DRIFT} <= failed(found)
     # 8 % over five runs, of which the fourth of five is held out
     assert lack_of_fit(assessments).causes[0].name.startswith(DRIFT)
     assert lack_of_fit(assessments).causes[0].size == pytest.approx(6.0, abs=2.0)
+
+
+def test_runs_that_differ_in_no_order_are_no_drift(tmp_path: Path) -> None:
+    assessments, found = fitted(tmp_path, each=(-0.04, 0.04, -0.03, 0.0, 0.04))
+    assert MISFIT in failed(found)
+    assert DRIFT not in failed(found)
+    assert not any(each.name.startswith(DRIFT) for each in lack_of_fit(assessments).causes)
 
 
 def test_a_clipped_ammeter_is_found_with_the_limits_to_state(tmp_path: Path) -> None:

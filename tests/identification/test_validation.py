@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -14,10 +15,13 @@ from swashplate.identification.validation import (
     compared,
     ignored_windows,
     measures,
+    part_of_range,
+    pooled,
     predict,
     residual_test,
     with_speeds,
 )
+from swashplate.identification.verdict import verdict
 
 MEASURED = np.array([0.0, 2.0, 4.0, 6.0])
 SIMULATED = np.array([1.0, 2.0, 4.0, 5.0])
@@ -165,6 +169,40 @@ def test_a_speed_stands_beside_its_position(campaign: Campaign) -> None:
     # a constant has no speed
     assert qualities[1].measures.rmse == pytest.approx(0.0, abs=1e-9)
     assert qualities[1].experiment["speed from counts"].unit == "rad/s"
+
+
+@pytest.mark.parametrize("noise", [1e-3, 1e-2])
+def test_noise_of_a_position_is_no_error_of_the_speed_predicted(noise: float) -> None:
+    """1 % of error in the gain beside noise that, differentiated, is up to a quarter of the range.
+
+    Expected values: (1 - 0.99) of a speed of π cos(π t), behind filters that leave 0.997 of it.
+    """
+    time = np.arange(4096) / 512.0
+    place = np.sin(np.pi * time)
+    noisy = place + noise * np.random.default_rng(3).normal(size=time.size)
+    run = run_of("a", time, {"position": noisy}, time=time)
+    qualities = with_speeds([compared(run, "position", 0.99 * place)])
+    error = 0.01 * np.pi / np.sqrt(2.0)
+    found = pooled(qualities, without_noise=True)["speed from position"]
+    shown = pooled(qualities)["speed from position"]
+    # the noise's mean square over 8 s, 480 independent values, is known to within 6 %
+    scatter = 2.0 * (0.06 * (shown.rmse**2 - error**2)) ** 0.5
+    assert found.rmse == pytest.approx(error, rel=0.02, abs=scatter)
+    assert found.rmse < 0.7 * shown.rmse or noise < 2e-3
+    assert found.spread == pytest.approx(np.pi / np.sqrt(2.0), rel=0.02)
+    perfect = verdict((), [compared(run, "position", place)])
+    assert perfect.usable, perfect.headline
+    assert not verdict((), [compared(run, "position", 0.4 * place)]).usable
+
+
+def test_rounding_to_counts_is_no_error_of_the_speed_predicted(tmp_path: Path) -> None:
+    """The drive that was simulated predicts an encoder of 60 counts a turn as well as one can."""
+    hoist, rounded = Drive.preset("hoist"), replace(rig.SEVERITIES["clean"], encoder_step=1)
+    made = rig.run(hoist, [maneuvers.step(6.0)], instruments=rounded, counts_per_turn=60.0)
+    runs = Campaign.from_toml(rig.write(made, tmp_path / "tests")).select(axis="hoist")
+    (seen,) = (q for q in with_speeds(predict(hoist, runs)) if q.channel == "speed from counts")
+    assert seen.measures.rmse > 0.02 * np.ptp(seen.simulated)
+    assert part_of_range([seen], seen.channel) < 0.01
 
 
 def test_windows_that_do_not_count() -> None:

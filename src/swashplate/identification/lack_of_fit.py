@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import inf, isfinite, sqrt
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -13,7 +13,14 @@ from numpy.typing import NDArray
 from swashplate.campaign.experiment import Channel, Experiment
 from swashplate.identification import faults
 from swashplate.identification.drive_model import DriveModel
-from swashplate.identification.faults import FIXED, SAME_DIRECTION, Fault, Kind, measurement_error
+from swashplate.identification.faults import (
+    DRIFT,
+    FIXED,
+    SAME_DIRECTION,
+    Fault,
+    Kind,
+    measurement_error,
+)
 from swashplate.identification.intervals import follows_card, source_of
 from swashplate.identification.model import Model, linearised
 from swashplate.identification.problem import TOLERANCE, triangular_factor
@@ -102,6 +109,8 @@ class _Block(NamedTuple):
     """One channel of one run of a stage, in units of its noise."""
 
     run: str
+    place: float
+    """Of the run among those of the stage, from -1/2 to 1/2."""
     channel: Channel
     residual: Array
     """(n,)"""
@@ -121,13 +130,25 @@ class _Block(NamedTuple):
         made[:, [*(places[key] for key in moving), -1]] = factor
         return made
 
-    def against_known(self, places: Mapping[Key, int], shift: Array) -> Iterator[ChannelFit]:
-        """The residuals, estimates shifted by (K,), over the known error; none if it is unknown."""
+    def left(self, places: Mapping[Key, int], shift: Array) -> Array:
+        """(n,) residuals, estimates shifted by (K,)."""
+        moved = [shift[places[k]] * each for k, each in self.columns.items() if not k[0]]
+        return self.residual - sum(moved, np.zeros(1))
+
+    def against_known(self, left: Array) -> Iterator[ChannelFit]:
+        """What is left (n,) over the known measurement error; none if it is unknown."""
         if error := measurement_error(self.channel):
-            moved = [shift[places[k]] * each for k, each in self.columns.items() if not k[0]]
-            left = (self.residual - sum(moved, np.zeros(1))) / self.weight
-            ratio = float(np.sqrt(np.mean(left**2))) / error
+            ratio = float(np.sqrt(np.mean((left / self.weight) ** 2))) / error
             yield ChannelFit(self.run, self.channel.name, ratio, left.size)
+
+    def own_scale(self, left: Array) -> tuple[float, float, float]:
+        """Its place, error of its scale in this run alone by what is left (n,), and its weight."""
+        scale = self.columns[FAULT, faults.SCALE.words.format(self.channel.name)]
+        if self.channel.is_position:
+            # a position has a free zero
+            scale = scale - self.weight * (self.weight @ scale) / (self.weight @ self.weight)
+        weight = float(scale @ scale)
+        return self.place, float(scale @ left) / weight if weight > 0.0 else 0.0, weight
 
 
 def lack_of_fit(assessments: Sequence[Assessment]) -> LackOfFit:
@@ -194,13 +215,42 @@ def lack_of_fit(assessments: Sequence[Assessment]) -> LackOfFit:
             )
         )
     shift = inverse @ residual
+    rest = [block.left(places, shift) for block in blocks]
+    steady = {
+        DRIFT.words.format(name): _in_order(
+            [b.own_scale(r) for b, r in zip(blocks, rest, strict=True) if b.channel.name == name]
+        )
+        for name in dict.fromkeys(block.channel.name for block in blocks)
+    }
+    found = [
+        replace(each, share=each.share * steady[each.name]) if each.kind is DRIFT else each
+        for each in found
+    ]
     runs = {run.name: run for each in assessments for run in each.stage.problem.experiments}
     return LackOfFit(
-        tuple(fit for block in blocks for fit in block.against_known(places, shift)),
+        tuple(f for b, r in zip(blocks, rest, strict=True) for f in b.against_known(r)),
         (*sorted(found, key=lambda each: -each.share), *_late_commands(assessments)),
         _units(columns[:, :known], constants, found),
         faults.clipped_channels(list(runs.values())),
     )
+
+
+def _in_order(scales: Sequence[tuple[float, float, float]]) -> float:
+    """Part of the differences between the scales of runs that is a straight line over their order.
+
+    `scales` has each run's place, its own scale and its weight. Freed of what a line explains by
+    chance (adjusted R², Draper and Smith 1998, section 5.1): a machine that differs between
+    maneuvers differs between runs too, in whatever order they stand.
+    """
+    place, own, weight = np.array([each for each in scales if each[2] > 0.0]).reshape(-1, 3).T
+    if own.size < 3:
+        return 1.0
+    own, about = own - np.average(own, weights=weight), place - np.average(place, weights=weight)
+    total, length = float(weight @ own**2), float(weight @ about**2)
+    if not (total > 0.0 and length > 0.0):
+        return 1.0
+    line = float(weight @ (own * about)) ** 2 / length
+    return float(max(1.0 - (1.0 - line / total) * (own.size - 1) / (own.size - 2), 0.0))
 
 
 def _blocks(assessment: Assessment, assessments: Sequence[Assessment]) -> Iterator[_Block]:
@@ -252,6 +302,7 @@ def _blocks(assessment: Assessment, assessments: Sequence[Assessment]) -> Iterat
             kinds = {key: kind for key, (kind, _) in effects.items()}
             yield _Block(
                 experiment.run,
+                place,
                 experiment[name],
                 run.residual / scale,
                 weight,

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scipy.fft import irfft, next_fast_len, rfft
 
 from swashplate.campaign.experiment import Channel, Experiment
-from swashplate.campaign.speed import speed_of
+from swashplate.campaign.speed import DIFFERENTIATOR, speed_from_angle, speed_of
 from swashplate.errors import InputError
 from swashplate.identification.drive_model import SIGNALS, DriveModel, Parameters
 from swashplate.identification.noise import LONGEST, Grid, correlation_length, grid_of, pair_sums
@@ -206,6 +206,9 @@ class RunQuality(Result):
     measures: Measures
     test: ResidualTest | None
     """None where there are too few samples."""
+    noise: float = 0.0
+    """Of a speed made from a position: standard deviation that the position's noise has in it.
+    [unit of the channel]"""
 
     @property
     def residual(self) -> Array:
@@ -287,7 +290,8 @@ def with_speeds(qualities: Iterable[RunQuality]) -> tuple[RunQuality, ...]:
     """The qualities, each of a position followed by that of its speed.
 
     Measured and simulated positions go through the same filters (`speed_of`, ``"exact"``), so that
-    both carry the same phase. A position whose stamps no filter takes has no speed.
+    both carry the same phase. A position whose stamps no filter takes has no speed. What its
+    noise is behind them is stated as the speed's, beside measures that contain it.
     """
     made: list[RunQuality] = []
     for each in qualities:
@@ -302,24 +306,64 @@ def with_speeds(qualities: Iterable[RunQuality]) -> tuple[RunQuality, ...]:
         except InputError:
             continue
         name, unit = f"speed from {channel.name}", f"{channel.unit}/s"
-        speed = replace(unread, name=name, kind="shaft_speed", unit=unit, values=found)
+        noise = _noise_of_speed(each, same)
+        speed = replace(unread, name=name, kind="shaft_speed", unit=unit, values=found, noise=noise)
         run = replace(each.experiment, channels={**each.experiment.channels, name: speed})
         # the residuals of a filtered signal are coloured by the filter: there is no test of them
-        made.append(RunQuality(run, name, same, measures((found, same, speed.weight)), None))
+        made.append(RunQuality(run, name, same, measures((found, same, speed.weight)), None, noise))
     return tuple(made)
 
 
-def pooled(qualities: Iterable[RunQuality]) -> dict[str, Measures]:
-    """Measures over all runs of each channel, by its name."""
+def _noise_of_speed(quality: RunQuality, speed: Array) -> float:
+    """Standard deviation that the noise of a position has behind the filters of `speed_of`.
+
+    Of an encoder that of rounding what is simulated, whose speed is given, to whole counts. Of
+    another position that of white noise, told from third differences of the residuals: they leave
+    nothing of what is smooth, such as a model's error, and spikes count little in their median.
+    """
+    channel = quality.experiment[quality.channel]
+    if channel.encoder is not None:
+        counts = np.round(quality.simulated / channel.encoder.angle_per_count)
+        rounded = speed_of(replace(channel, counts=counts), "exact").speed - speed
+        return float(np.sqrt(np.mean(rounded[channel.used] ** 2)))
+    left = quality.residual[channel.used]
+    if left.size < FEWEST:
+        return 0.0
+    # 20 = 1 + 9 + 9 + 1, and the median of a normal magnitude is 0.6745 standard deviations
+    white = float(np.median(np.abs(np.diff(left, 3)))) / (0.6745 * 20.0**0.5)
+    pulse = np.zeros(channel.time.size)
+    # away from both ends: the filters keep nothing for longer than 0.2 s
+    pulse[pulse.size // 2] = 1.0
+    return float(white * np.linalg.norm(speed_from_angle(channel.time, pulse)))
+
+
+def pooled(qualities: Iterable[RunQuality], *, without_noise: bool = False) -> dict[str, Measures]:
+    """Measures over all runs of each channel, by its name.
+
+    Without noise, what a position's noise is in a speed made from it counts neither as error nor as
+    movement; of the error at least what the noise's own scatter over so long a time leaves open
+    remains.
+    """
     channels: dict[str, list[RunQuality]] = {}
     for each in qualities:
         channels.setdefault(each.channel, []).append(each)
-    return {
-        name: measures(
-            *((q.experiment[name].values, q.simulated, q.experiment[name].weight) for q in alike)
+    made = {}
+    for name, alike in channels.items():
+        signals = [q.experiment[name] for q in alike]
+        found = measures(
+            *((s.values, q.simulated, s.weight) for s, q in zip(signals, alike, strict=True))
         )
-        for name, alike in channels.items()
-    }
+        if without_noise and any(each.noise for each in alike):
+            sizes = [float(np.count_nonzero(each.used)) for each in signals]
+            square = float(np.average([each.noise**2 for each in alike], weights=sizes))
+            # the filters pass noise of up to 30 Hz or so: twice as many independent values a second
+            steps = [float(np.median(np.diff(each.time))) for each in signals]
+            values = min(float(np.dot(sizes, steps)) * DIFFERENTIATOR / np.pi, found.samples)
+            least = min(square * (2.0 / values) ** 0.5, found.rmse**2)
+            rmse, spread = max(found.rmse**2 - square, least), max(found.spread**2 - square, 0.0)
+            found = found._replace(rmse=rmse**0.5, spread=spread**0.5)
+        made[name] = found
+    return made
 
 
 def range_of(qualities: Sequence[RunQuality]) -> float:
@@ -331,11 +375,11 @@ def range_of(qualities: Sequence[RunQuality]) -> float:
 def part_of_range(qualities: Sequence[RunQuality], channel: str) -> float | None:
     """RMSE of a channel over the range that was measured of it, all runs together.
 
-    None where nothing moved.
+    The noise of a speed that was made from a position left out. None where nothing moved.
     """
     alike = [each for each in qualities if each.channel == channel]
     reach = range_of(alike)
-    return pooled(alike)[channel].rmse / reach if reach > 0.0 else None
+    return pooled(alike, without_noise=True)[channel].rmse / reach if reach > 0.0 else None
 
 
 def percent(part: float) -> str:

@@ -151,7 +151,7 @@ class _Side(NamedTuple):
         named = {each.channel for each in found}
         kept = [each for each in found if f"speed from {each.channel}" not in named]
         kept.sort(key=lambda each: each.experiment[each.channel].kind != "shaft_speed")
-        measures = pooled(kept)
+        measures = pooled(kept, without_noise=True)
         return cls(which, kept, measures, {name: part_of_range(kept, name) for name in measures})
 
     @property
@@ -161,8 +161,9 @@ class _Side(NamedTuple):
         for name, part in self.parts.items():
             alike = [each for each in self.qualities if each.channel == name]
             if part is not None:
-                largest = max(each.measures.rmse for each in alike) / range_of(alike)
-                worst = f" (worst run {percent(largest)})" if len(alike) > 1 else ""
+                reach = range_of(alike)
+                largest = max(pooled([each], without_noise=True)[name].rmse for each in alike)
+                worst = f" (worst run {percent(largest / reach)})" if len(alike) > 1 else ""
                 said.append(f"{name} to {percent(part)}{'' if said else ' of its range'}{worst}")
         return listed(said) or "channels that never move"
 
@@ -455,8 +456,10 @@ def _fits(misfit: LackOfFit, side: _Side, assessments: Sequence[Assessment]) -> 
             why = "a counter that does not follow looks like a stop of the machine"
             state, failure = ("seen", f"{channel} {words}") if lost else ("not seen", "")
             yield Criterion(each.name, state, "none", why, failure)
-        elif each.instrumental and each.visible:
-            yield _of_instrument(each, wrong, known=bool(misfit.ratios))
+        elif each.instrumental and each.visible and misfit.ratios:
+            yield _of_instrument(each, wrong)
+    if not misfit.ratios:
+        yield _unexplained(wrong)
     if misfit.clipped:
         why = "values beyond it were not measured, and bias the fit"
         failure = misfit.clipped[0].rstrip(".")
@@ -485,24 +488,35 @@ def _drift(fault: Fault) -> Criterion:
     )
 
 
-def _of_instrument(fault: Fault, wrong: Sequence[Fault], *, known: bool) -> Criterion:
-    """That an instrument's error is small; of several that seem wrong the likeliest one is.
-
-    Where no measurement error is known, only what explains the residuals is taken for the cause.
-    """
+def _of_instrument(fault: Fault, wrong: Sequence[Fault]) -> Criterion:
+    """That an instrument's error is small; of several that seem wrong the likeliest one is."""
     limit, size = fault.kind.plausible / 3.0, f"{fault.size:+.2g} {fault.kind.unit}"
     first = fault in wrong[:1]
     value = size if first or abs(fault.size) <= limit else "not seen"
-    failure = f"{fault.words} off by {size}"
-    if not (known or fault.explains):
-        part = f"{100.0 * fault.share:.2g} % of their squares look like {fault.name} off by {size}"
-        failure = f"the residuals show that the model leaves something out ({part})"
     return Criterion(
         fault.name,
         f"see {wrong[0].name}" if fault in wrong[1:] else value,
         f"{limit:.2g} {fault.kind.unit}",
         "a larger error would be visible in these logs",
-        failure if first else "",
+        f"{fault.words} off by {size}" if first else "",
+        "values",
+    )
+
+
+def _unexplained(wrong: Sequence[Fault]) -> Criterion:
+    """That nothing stands out of residuals whose measurement error is not known.
+
+    What does is what the model leaves out, not an instrument: the sizes mean nothing, as the noise
+    that they would be told from is that of the residuals themselves.
+    """
+    part = f"{100.0 * wrong[0].share:.2g} % of squares" if wrong else "none"
+    failure = f"the residuals show that the model leaves something out ({part} change as "
+    return Criterion(
+        "pattern in residuals",
+        part,
+        "none",
+        "noise follows no signal",
+        f"{failure}by an error in the {wrong[0].name})" if wrong else "",
         "values",
     )
 

@@ -150,7 +150,7 @@ def run_error(run: ShownRun, runs: Sequence[ShownRun]) -> float:
     own = run.judged.quality
     judged = [each.judged.quality for each in runs if each.role == run.role]
     reach = range_of([each for each in judged if each.channel == own.channel])
-    return own.measures.rmse / reach if reach > 0.0 else np.inf
+    return pooled([own], without_noise=True)[own.channel].rmse / reach if reach > 0.0 else np.inf
 
 
 def run_lights(runs: Sequence[ShownRun], findings: dict[str, list[int]]) -> list[tuple[Light, str]]:
