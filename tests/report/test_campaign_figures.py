@@ -186,3 +186,4 @@ def test_positions_in_metres_are_of_a_rod() -> None:
     assert motion_of([experiment(position()), experiment()]) == "rod"
     assert motion_of([experiment(encoder()), experiment(position())]) == "shaft"
     assert motion_of([experiment()]) == "shaft"
+    assert motion_of([experiment(channel(unit="m/s"))]) == "rod"

@@ -362,6 +362,8 @@ def test_the_first_screen_is_for_the_owner(read: Page, fitted: Fit, validated: P
         dead = drive.parameters.numbers["Z17"]
         assert abs(float(inside)) <= dead < abs(float(outside))
     assert "±" in rows["Dead zone, up to"]["positive"]
+    # Z11 and Z18, which make a drive creep, were not fitted
+    assert rows["Creep at 0 V"]["positive"] == "0 (fixed)"
     # a drive alone has no intervals
     assert "±" not in Page(validated.read_text("utf-8")).rows("numbers")[0]["positive"]
     assert "The held-out run" in read.words

@@ -241,10 +241,14 @@ class Judged(Result):
 
 
 def motion_of(runs: Iterable[Experiment]) -> Motion:
-    """What the drive of some runs moves: a rod where all positions were measured in m."""
+    """What the drive of some runs moves: a rod where all positions were measured in m.
+
+    Where none was, a rod if all speeds are in m/s.
+    """
     channels = [each for run in runs for each in run.channels.values()]
     units = {each.unit for each in channels if each.is_position}
-    return "rod" if units == {"m"} else "shaft"
+    units = units or {each.unit for each in channels if each.kind == "shaft_speed"}
+    return "rod" if units and units <= {"m", "m/s"} else "shaft"
 
 
 def _interval_words(assessments: Sequence[Assessment], found: ParameterSet) -> dict[str, list[str]]:

@@ -123,7 +123,10 @@ def numbers_table(drive: Drive, assessments: Sequence[Assessment]) -> tuple[Tabl
 def _with_interval(value: float, half: float) -> Cell:
     if not np.isfinite(value):
         return Cell(None, NONE)
-    if not (np.isfinite(half) and half > 0.0):
+    if half <= 1e-9 * abs(value):
+        # it follows from what the fit left at its nominal value alone
+        return Cell(value, f"{value:.4g} (fixed)")
+    if not np.isfinite(half):
         return Cell(value, f"{value:.4g}")
     # as many digits as the interval gives sense to, and no more than an engineer would write down
     decimals = 1 - floor(log10(half))
@@ -218,7 +221,7 @@ def summary_section(
             said = [f"This drive has none: {error}"]
         words = (
             "With 95 % intervals of the fit, rounded up, which do not cover what the model leaves "
-            "out."
+            "out. Fixed: follows from parameters that were not fitted."
         )
         numbers.append(text(" ".join([words, *said] if assessments else said), "remark"))
         limits.append(Block("heading", "What limits it", "h3"))
