@@ -30,6 +30,7 @@ from swashplate.report.fit_report.runs import (
     shown_runs,
     write_samples,
 )
+from swashplate.report.fit_report.summary import numbers_table
 
 HOSTILE = "</script><img src=x onerror=alert(1)>"
 SETUP = Setup.model_validate(
@@ -348,6 +349,16 @@ def test_truth_stands_beside_the_estimates(write, judged: Judged, read: Page) ->
     assert number(fixed["Z4"]["truth"]) == pytest.approx(truth.numbers["Z4"], rel=1e-4)
 
 
+def test_a_number_of_fixed_parameters_alone_says_so(fitted: Fit) -> None:
+    still = fitted.drive.replace(Z11=0.0, Z18=0.0)
+    stage = replace(fitted.stages[-1], parameters=still.parameters)
+    first, last = fitted.assessments
+    table, _ = numbers_table(still, [first, replace(last, stage=stage)])
+    rows = {line.strip().split("  ")[0]: line for line in str(table).splitlines()}
+    assert "0 (fixed)" in rows["Creep at 0 V"]
+    assert "±" in rows["Top speed at ±10 V"]
+
+
 def test_the_first_screen_is_for_the_owner(read: Page, fitted: Fit, validated: Path) -> None:
     rows = {row["quantity"]: row for row in read.rows("numbers")}
     drive = fitted.drive
@@ -362,8 +373,8 @@ def test_the_first_screen_is_for_the_owner(read: Page, fitted: Fit, validated: P
         dead = drive.parameters.numbers["Z17"]
         assert abs(float(inside)) <= dead < abs(float(outside))
     assert "±" in rows["Dead zone, up to"]["positive"]
-    # Z11 and Z18, which make a drive creep, were not fitted
-    assert rows["Creep at 0 V"]["positive"] == "0 (fixed)"
+    # the hoist creeps, and Z10 was fitted
+    assert "±" in rows["Creep at 0 V"]["positive"]
     # a drive alone has no intervals
     assert "±" not in Page(validated.read_text("utf-8")).rows("numbers")[0]["positive"]
     assert "The held-out run" in read.words
