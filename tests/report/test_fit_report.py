@@ -349,11 +349,10 @@ def test_truth_stands_beside_the_estimates(write, judged: Judged, read: Page) ->
     assert number(fixed["Z4"]["truth"]) == pytest.approx(truth.numbers["Z4"], rel=1e-4)
 
 
-def test_a_number_of_fixed_parameters_alone_says_so(fitted: Fit) -> None:
-    still = fitted.drive.replace(Z11=0.0, Z18=0.0)
-    stage = replace(fitted.stages[-1], parameters=still.parameters)
-    first, last = fitted.assessments
-    table, _ = numbers_table(still, [first, replace(last, stage=stage)])
+def test_a_number_of_fixed_parameters_alone_says_so(campaign: Campaign) -> None:
+    still = Drive.preset("hoist").replace(Z11=0.0, Z18=0.0)
+    found = fit(still, campaign.select(role="fit"), SETUP)
+    table, _ = numbers_table(found.drive, found.assessments)
     rows = {line.strip().split("  ")[0]: line for line in str(table).splitlines()}
     assert "0 (fixed)" in rows["Creep at 0 V"]
     assert "±" in rows["Top speed at ±10 V"]
