@@ -86,6 +86,16 @@ def test_the_units_of_the_estimates_are_found_by_computation(sound) -> None:
     assert any(words.startswith("The estimates are in units of") for words in sound[1].assumed)
 
 
+@pytest.mark.slow
+def test_an_estimate_at_its_bound_is_a_unit_like_a_fixed_one(tmp_path: Path) -> None:
+    # Z8 could make up for a sixth of the supply pressure, and may go down to a half
+    assessments, found = fitted(tmp_path, Drive.preset("slew").scale(Z9=0.15))
+    assert "Z8" in assessments[-1].identifiability.at_bounds
+    assert {"Z8", "Z9"} <= set(lack_of_fit(assessments).units)
+    assert found.grade == "Not usable"
+    assert "Z8 by -" in found.headline
+
+
 def test_late_stamps_of_the_command_are_the_fixed_delay(sound) -> None:
     fault = lack_of_fit(sound[0]).fault("time stamps of the command")
     assert fault is not None

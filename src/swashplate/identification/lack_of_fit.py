@@ -314,9 +314,18 @@ def _blocks(assessment: Assessment, assessments: Sequence[Assessment]) -> Iterat
 def _constants(
     numbers: Mapping[str, float], part: str, assessments: Sequence[Assessment]
 ) -> list[str]:
-    """Columns of the drive that no stage estimates and that are not zero or infinite."""
+    """Columns of the drive that no stage estimates and that are not zero or infinite.
+
+    An estimate at a bound is as fixed as these: it stays there whatever else moves.
+    """
     problems = [each.stage.problem for each in assessments]
-    taken = {t for each in problems for unknown in each.unknowns for t in unknown.targets}
+    taken = {
+        target
+        for each in assessments
+        for k, unknown in enumerate(each.stage.problem.unknowns)
+        if each.linearised.variables.free[k]
+        for target in unknown.targets
+    }
     if any(isinstance(p.model, DriveModel) and p.model.forces is not None for p in problems):
         taken |= set(columns_of(["Z19", "Z20", "Z21", "Z22"]))
     blocks = {"card": ("control_card",), "pump": ("pump_motor",)}
