@@ -166,6 +166,25 @@ def test_a_lag_keeps_a_full_command_within_its_range(rate: float) -> None:
         assert np.abs(faults._lagged(time, command)).max() <= 10.0
 
 
+@pytest.mark.parametrize(
+    ("kind", "size", "near"),
+    [
+        (faults.SCALE, 20.0, True),
+        (faults.SCALE, 93.0, False),
+        (faults.LATE, -40.0, True),
+        (faults.LATE, 400.0, False),
+        (faults.LOSS, 600.0, True),
+        (faults.LOSS, -1240.0, False),
+        (faults.SLOW, -5.0, False),
+        (faults.FIXED, 93.0, True),
+        (faults.FIXED, 125.0, False),
+    ],
+)
+def test_one_step_says_how_large_a_fault_is_or_nothing(kind, size: float, near: bool) -> None:
+    fault = faults.Fault(kind, kind.words.format("counts"), size, 0.5, 0.8, 1e-3, ())
+    assert fault.near is near
+
+
 @pytest.mark.slow
 def test_a_counter_that_does_not_follow_is_no_stop_of_the_machine(tmp_path: Path) -> None:
     def lose(columns: dict[str, np.ndarray]) -> None:

@@ -12,6 +12,7 @@ from tests.identification.given import first_order, run_of
 from swashplate import Campaign, Drive, Experiment, InputError, maneuvers
 from swashplate.campaign import rig
 from swashplate.identification.validation import (
+    beyond_noise,
     compared,
     ignored_windows,
     measures,
@@ -203,6 +204,28 @@ def test_rounding_to_counts_is_no_error_of_the_speed_predicted(tmp_path: Path) -
     (seen,) = (q for q in with_speeds(predict(hoist, runs)) if q.channel == "speed from counts")
     assert seen.measures.rmse > 0.02 * np.ptp(seen.simulated)
     assert part_of_range([seen], seen.channel) < 0.01
+
+
+@pytest.mark.parametrize(("noise", "error"), [(0.02, 0.0), (0.02, 0.01), (0.0, 0.01), (0.2, 0.0)])
+def test_what_a_model_leaves_out_is_told_from_white_noise(noise: float, error: float) -> None:
+    """A tacho of ±1 under a slow sine, and a model that has a hundredth of its gain too much."""
+    time = np.arange(5120) / 512.0
+    speed = np.sin(time)
+    tacho = speed + noise * np.random.default_rng(5).normal(size=time.size)
+    run = run_of("a", time, {"shaft_speed": tacho}, time=time)
+    found = beyond_noise([compared(run, "shaft_speed", (1.0 + error) * speed)], "shaft_speed")
+    left = error * np.sqrt(np.mean(speed**2)) / np.ptp(tacho)
+    # two standard errors of the noise's mean square are left out
+    scatter = noise * (2.0 * np.sqrt(2.0 / 5120)) ** 0.5 / np.ptp(tacho)
+    assert found == pytest.approx(left, rel=0.01, abs=1.2 * scatter)
+    assert error or not found
+
+
+def test_a_rounded_tacho_has_its_rounding_as_noise() -> None:
+    time = np.arange(5120) / 512.0
+    rounded = np.round(np.sin(time), 1)
+    run = run_of("a", time, {"shaft_speed": rounded}, time=time)
+    assert beyond_noise([compared(run, "shaft_speed", np.sin(time))], "shaft_speed") < 0.003
 
 
 def test_windows_that_do_not_count() -> None:

@@ -318,31 +318,39 @@ def _noise_of_speed(quality: RunQuality, speed: Array) -> float:
     """Standard deviation that the noise of a position has behind the filters of `speed_of`.
 
     Of an encoder that of rounding what is simulated, whose speed is given, to whole counts. Of
-    another position that of white noise, told from third differences of the residuals: they leave
-    nothing of what is smooth, such as a model's error, and spikes count little in their median.
+    another position that of its white noise.
     """
     channel = quality.experiment[quality.channel]
     if channel.encoder is not None:
         counts = np.round(quality.simulated / channel.encoder.angle_per_count)
         rounded = speed_of(replace(channel, counts=counts), "exact").speed - speed
         return float(np.sqrt(np.mean(rounded[channel.used] ** 2)))
-    left = quality.residual[channel.used]
-    if left.size < FEWEST:
-        return 0.0
-    # 20 = 1 + 9 + 9 + 1, and the median of a normal magnitude is 0.6745 standard deviations
-    white = float(np.median(np.abs(np.diff(left, 3)))) / (0.6745 * 20.0**0.5)
     pulse = np.zeros(channel.time.size)
     # away from both ends: the filters keep nothing for longer than 0.2 s
     pulse[pulse.size // 2] = 1.0
-    return float(white * np.linalg.norm(speed_from_angle(channel.time, pulse)))
+    return float(_white_noise(quality) * np.linalg.norm(speed_from_angle(channel.time, pulse)))
+
+
+def _white_noise(quality: RunQuality) -> float:
+    """Standard deviation of a channel's white noise and rounding.
+
+    Of noise from third differences of the residuals: they leave nothing of what is smooth, such as
+    a model's error, and spikes count little in their median.
+    """
+    channel = quality.experiment[quality.channel]
+    left, levels = quality.residual[channel.used], np.unique(channel.values[channel.used])
+    if left.size < FEWEST or levels.size < 2:
+        return 0.0
+    # 20 = 1 + 9 + 9 + 1, and the median of a normal magnitude is 0.6745 standard deviations
+    white = np.median(np.abs(np.diff(left, 3))) / (0.6745 * np.sqrt(20.0))
+    return float(max(white, np.diff(levels).min() / np.sqrt(12.0)))
 
 
 def pooled(qualities: Iterable[RunQuality], *, without_noise: bool = False) -> dict[str, Measures]:
     """Measures over all runs of each channel, by its name.
 
     Without noise, what a position's noise is in a speed made from it counts neither as error nor as
-    movement; of the error at least what the noise's own scatter over so long a time leaves open
-    remains.
+    movement; of the error at least what the noise's own scatter leaves open remains.
     """
     channels: dict[str, list[RunQuality]] = {}
     for each in qualities:
@@ -354,16 +362,42 @@ def pooled(qualities: Iterable[RunQuality], *, without_noise: bool = False) -> d
             *((s.values, q.simulated, s.weight) for s, q in zip(signals, alike, strict=True))
         )
         if without_noise and any(each.noise for each in alike):
-            sizes = [float(np.count_nonzero(each.used)) for each in signals]
-            square = float(np.average([each.noise**2 for each in alike], weights=sizes))
-            # the filters pass noise of up to 30 Hz or so: twice as many independent values a second
-            steps = [float(np.median(np.diff(each.time))) for each in signals]
-            values = min(float(np.dot(sizes, steps)) * DIFFERENTIATOR / np.pi, found.samples)
-            least = min(square * (2.0 / values) ** 0.5, found.rmse**2)
-            rmse, spread = max(found.rmse**2 - square, least), max(found.spread**2 - square, 0.0)
+            square, scatter = _noise_square(alike)
+            rmse = max(found.rmse**2 - square, min(scatter, found.rmse**2))
+            spread = max(found.spread**2 - square, 0.0)
             found = found._replace(rmse=rmse**0.5, spread=spread**0.5)
         made[name] = found
     return made
+
+
+def _noise_square(alike: Sequence[RunQuality]) -> tuple[float, float]:
+    """Mean square of the noise of a channel over some runs, and that one's standard error."""
+    square = samples = values = 0.0
+    for each in alike:
+        channel = each.experiment[each.channel]
+        count = float(np.count_nonzero(channel.used))
+        samples += count
+        if each.noise:
+            # the filters pass noise of up to 30 Hz or so: twice as many independent values a second
+            bandwidth = float(np.median(np.diff(channel.time))) * DIFFERENTIATOR / np.pi
+            values += min(bandwidth, 1.0) * count
+            square += count * each.noise**2
+        else:
+            values += count
+            square += count * _white_noise(each) ** 2
+    mean = square / samples
+    return mean, mean * float(np.sqrt(2.0 / values))
+
+
+def beyond_noise(qualities: Sequence[RunQuality], channel: str) -> float:
+    """RMSE of a channel beyond its white noise, over the range that was measured of it. [1]
+
+    What the noise's scatter may be, within two standard errors, is no error.
+    """
+    alike = [each for each in qualities if each.channel == channel]
+    square, scatter = _noise_square(alike)
+    reach, left = range_of(alike), pooled(alike)[channel].rmse ** 2 - square - 2.0 * scatter
+    return float(np.sqrt(max(left, 0.0))) / reach if reach > 0.0 else 0.0
 
 
 def range_of(qualities: Sequence[RunQuality]) -> float:
