@@ -209,7 +209,8 @@ class Judgment(Tabular):
         swings = Table(
             f"Swing in {count(len(self.study.seeds), 'seaway')}, means with 95 % intervals",
             (
-                *(Column("variant"), *interval, Column("largest", ".2f", "rad", none="–")),
+                *(Column("variant", wrap=True), *interval),
+                Column("largest", ".2f", "rad", none="–"),
                 *(Column("worse than none", ".0%", none="–"), Column("stopped", "d")),
             ),
             "largest: median over the seaways of the largest swing",
@@ -222,7 +223,7 @@ class Judgment(Tabular):
             look = worse is not None and worse > self.allowed
             swings.add(name, *numbers, int(np.isnan(rms).sum()), look=look)
         spec = [Column(each, "+.2f", "rad", none="–") for each in ("difference", "from", "to")]
-        heads = (Column("variant"), Column("less"), *spec)
+        heads = (Column("variant", wrap=True), Column("less", wrap=True), *spec)
         paired = Table("Differences of RMS swing within each seaway", heads)
         for i, other in enumerate(self.names):
             for name in self.names[i + 1 :]:
