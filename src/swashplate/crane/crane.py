@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 from pydantic import BaseModel, ConfigDict, Field, FiniteFloat
 
 from swashplate.analysis.compensation import InverseMap, inverse_map
-from swashplate.crane.control import Control, linearize
+from swashplate.crane.control import linearize
 from swashplate.crane.kinematics import Boom, Geometry, Home, Vector, luff_rope
 from swashplate.crane.loop import DIRECT, IDEAL
 from swashplate.crane.result import CraneRun
@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from swashplate.analysis.monte_carlo import Draws
     from swashplate.crane.following import Followable
     from swashplate.crane.judgment import Judgment
-    from swashplate.crane.study import Sweep
+    from swashplate.crane.study import Laws, Sweep
     from swashplate.linear import LinearModel
 
 
@@ -351,21 +351,19 @@ class Crane:
         """The linear crane about a load at rest, see `swashplate.crane.control.linearize`."""
         return linearize(self, boom_deg, rope_m)
 
-    def judge(self, control: Control | Mapping[str, Control | None], **how: Any) -> Judgment:
+    def judge(self, control: Laws, **how: Any) -> Judgment:
         """Judgment of control over many seaways; see `swashplate.crane.judge`."""
         from swashplate.crane.judgment import judge
 
         return judge(self, control, **how)
 
-    def sweep(
-        self, over: str, control: Control | Mapping[str, Control | None], **how: Any
-    ) -> Sweep:
+    def sweep(self, over: str, control: Laws, **how: Any) -> Sweep:
         """Swing over a quantity; see `swashplate.crane.sweep`."""
         from swashplate.crane.study import sweep
 
         return sweep(self, over, control, **how)
 
-    def sectors(self, control: Control | Mapping[str, Control | None], **how: Any) -> Sweep:
+    def sectors(self, control: Laws, **how: Any) -> Sweep:
         """Swing over the bearing of the boom: `sweep` over ``"bearing"``."""
         return self.sweep("bearing", control, **how)
 

@@ -35,7 +35,6 @@ SHARES = (0.8, 0.6, 0.4)
 """Shares of what the luff can follow at which control is clipped on trial, the largest first."""
 BLOCK = 20
 """Seaways of a trial after which it is given up if it has failed already."""
-LEVEL = 0.95
 LOOP = PositionLoop()
 """What a clip is tried with: a stiffer loop brings back what the clip takes."""
 
@@ -63,7 +62,7 @@ def mean_of(values: Array) -> Estimate:
     mean = float(known.mean()) if known.size else np.nan
     if known.size < 2:
         return Estimate(mean, np.nan, np.nan)
-    t = float(stdtrit(known.size - 1, 0.5 + 0.5 * LEVEL))
+    t = float(stdtrit(known.size - 1, 0.975))
     half = t * float(known.std(ddof=1)) / sqrt(known.size)
     return Estimate(mean, mean - half, mean + half)
 

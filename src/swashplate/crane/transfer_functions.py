@@ -219,10 +219,6 @@ Amplitude = tuple[float, float, float, int, complex]
 `MOTIONS`, [m/m] or [rad/m] by e^{+iωt}."""
 
 
-Wave = tuple[float, float, float, int]
-"""Speed, heading, frequency and motion of an amplitude."""
-
-
 def read_ship(path: str | Path, length: float | None = None) -> TransferFunctions:
     """Motion transfer functions of a file by its ending: ``.re1``, ``.4``, ``.nc`` or ``.csv``.
 
@@ -362,7 +358,8 @@ def _gathered(
 
     Rotations are in rad for so much of the wave. [m]
     """
-    waves, mirrored = dict[Wave, complex](), dict[Wave, complex]()
+    waves: dict[tuple[float, float, float, int], complex] = {}
+    mirrored = waves.copy()
     for sailed, heading, frequency, number, value in amplitudes:
         angle = round(heading, 9) % 360.0
         if angle > 180.0:  # the other side, which follows by symmetry, where this one lacks it
