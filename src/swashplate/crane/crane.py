@@ -20,7 +20,7 @@ from swashplate.crane.loop import DIRECT, IDEAL
 from swashplate.crane.result import CraneRun
 from swashplate.crane.sea import Seaway, motion_of
 from swashplate.crane.stepper import RATE, CraneStepper, Setup
-from swashplate.crane.stick import AXES, Stick
+from swashplate.crane.stick import AXES, Array, Stick
 from swashplate.documents import parse_toml, read_text, validated
 from swashplate.drive import Drive
 from swashplate.errors import InputError, ParameterError
@@ -309,21 +309,8 @@ class Crane:
         DomainError
             If boom or rope meet a limit, or a drive leaves its domain.
         """
-        stepper = CraneStepper(self, **setup)
+        stepper, commands, end = begun(self, stick, setup)
         fixed = stepper.fixed
-        if fixed.actuation == DIRECT:
-            raise InputError(
-                "With direct actuation commands are voltages, but a stick gives parts of the full "
-                "speed: take Crane.stepper, or actuation='volts'."
-            )
-        if not isinstance(stick, Stick):
-            raise InputError(f"The stick is {stick!r}, but must be a Stick, as Stick.rest(60).")
-        commands, end = stick.sample(self, fixed.home, RATE)
-        if fixed.actuation == IDEAL and commands[0].any():
-            raise InputError(
-                "Ideal drives follow at once, and the crane starts at rest: a recorded stick must "
-                "begin at zero, so put a row of zeros before it."
-            )
         ship = motion_of(sea, len(commands), RATE)
         impulses = (*fixed.settings.joint[1:], *fixed.settings.tip[1:])
         return CraneRun(
@@ -389,6 +376,25 @@ class Crane:
 @lru_cache(maxsize=512)
 def _inverse(drive: Drive) -> InverseMap:
     return inverse_map(drive)
+
+
+def begun(crane: Crane, stick: Stick, setup: Setup) -> tuple[CraneStepper, Array, float]:
+    """A run at its start: stepper, commands, and when the last one ends; as `simulate` refuses."""
+    stepper = CraneStepper(crane, **setup)
+    if stepper.fixed.actuation == DIRECT:
+        raise InputError(
+            "With direct actuation commands are voltages, but a stick gives parts of the full "
+            "speed: take Crane.stepper, or actuation='volts'."
+        )
+    if not isinstance(stick, Stick):
+        raise InputError(f"The stick is {stick!r}, but must be a Stick, as Stick.rest(60).")
+    commands, end = stick.sample(crane, stepper.fixed.home, RATE)
+    if stepper.fixed.actuation == IDEAL and commands[0].any():
+        raise InputError(
+            "Ideal drives follow at once, and the crane starts at rest: a recorded stick must "
+            "begin at zero, so put a row of zeros before it."
+        )
+    return stepper, commands, end
 
 
 def preset_text(name: str) -> str:

@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from swashplate.analysis.whatif import pulled
 from swashplate.crane.control import Control
-from swashplate.crane.crane import Crane
+from swashplate.crane.crane import Crane, begun
 from swashplate.crane.loop import ROWS
 from swashplate.crane.result import PUMPS, CraneRun
 from swashplate.crane.sea import Seaway, Spectrum
@@ -191,8 +191,7 @@ class Study(Result):
             If a case cannot begin as it is asked to.
         """
         for case in cases:  # said here, once, and not by a worker
-            home = case.cranes[0].stepper(**case.setup).fixed.home
-            case.stick.sample(case.cranes[0], home, RATE)
+            begun(case.cranes[0], case.stick, case.setup)
         chosen = range(len(self.seeds)) if numbers is None else numbers
         made = np.full((len(chosen), len(cases), len(COUNTED)), np.nan)
         items = [(n, self.seeds[n]) for n in chosen]
