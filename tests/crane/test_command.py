@@ -99,10 +99,16 @@ def test_follow_and_sectors_print_their_tables(tmp_path):
         ("run tg --slew 1", "There is no packaged crane 'tg'; there is tg3637."),
         ("run tg3637 --variant fast", "actuation is 'fast'; it is ideal, volts, inverse."),
         ("run tg3637 --variant ideal:magic", "There is no control 'magic'; there are zv-joint"),
-        ("run tg3637 --sea ss3,90,1,2", "--sea ss3,90,1,2 has too many parts"),
+        ("run tg3637 --sea ss3,90,1,2", "--sea ss3,90,1,2 is too much: write one sea, --sea ss3"),
+        ("run tg3637 --sea ss3,90,1.5", "The seed of a seaway is 1.5, but must be 0, 1, 2"),
+        ("judge tg3637 --sea ss3,90,1", "is too much: write one sea, --sea ss3,90."),
+        ("judge tg3637 --sea ss3 --sea ss2", "--sea ss3 --sea ss2 is too much: write one sea"),
+        ("run tg3637 --variant direct", "With direct actuation commands are voltages"),
+        ("run tg3637 --drive luff=none", "or the result or folder of a fit, but there is no such"),
         ("run tg3637 --ship hull.re1", "--ship hull.re1 needs a --sea to move in."),
         ("run tg3637 --at rope=3", "--at has no rope; it has slew_deg, boom_deg, rope_m."),
-        ("run tg3637 --drive boom=hoist", "the axes are hoist, slew and luff."),
+        ("run tg3637 --drive boom=hoist", "A crane has no drive 'boom': it has hoist, slew, luff."),
+        ("judge tg3637 --scale boom.orifice=2", "the axes are hoist, slew, luff."),
         ("run tg3637 --slew 1 --until 45", "has no equals sign"),
         ("run tg3637 --variant volts --variant ideal --out a.csv", "--out writes one run's"),
     ],
@@ -127,6 +133,26 @@ def test_wrong_words_end_in_one_sentence(words, sentence):
 def test_impossible_geometry_is_refused(change, sentence):
     with pytest.raises(ParameterError, match=sentence):
         Crane.preset("tg3637").with_geometry(**change)
+
+
+def test_a_cranes_file_takes_the_folder_of_a_fit_beside_it(tmp_path):
+    (tmp_path / "fitted").mkdir()
+    wide = Crane.preset("tg3637").luff.scale(Z16=2.0)
+    wide.to_toml(tmp_path / "fitted" / "drive.toml")
+    path, text = tmp_path / "mine.toml", said("show", "tg3637", "--toml").stdout
+    for word in ("fitted", "fitted/drive.toml"):
+        path.write_text(text.replace('luff = "luff"', f'luff = "{word}"'), "utf-8")
+        made = Crane.from_toml(path)
+        assert made.luff.parameters.numbers == wide.parameters.numbers
+        assert made.hoist.name == "hoist"
+
+
+@pytest.mark.slow
+def test_long_names_of_variants_stand_whole_on_a_narrow_terminal():
+    words = [*JUDGE[:2], "--no-remedies", "--scale", "luff.orifice=3", "--scale", "hoist.orifice=2"]
+    shown = CliRunner().invoke(app, ["crane", *words, "--seeds", "1"], env={"COLUMNS": "80"})
+    # in a row of the swings, three of the differences and three of the limits, and in the verdict
+    assert shown.stdout.count("×2") + shown.stderr.count("×2") >= 7
 
 
 def test_files_are_refused_by_their_entry(tmp_path):

@@ -240,6 +240,12 @@ def test_what_makes_no_study_is_said(crane):
     refuse("counts from 40 s on, but a run is 30 s long", length=30.0)
     refuse("allowed is 2, but is a share", allowed=2.0)
     refuse("boom of tg3637 stands at 85 deg", boom_deg=85.0)
+    moving = Stick.record(np.full((51_200, 3), [0.0, 0.1, 0.0]))
+    refuse("Ideal drives follow at once, .* put a row of zeros before it", stick=moving)
+    refuse("seeds is 3, but must be a sequence, as range", seeds=3)
+    refuse("A sea is a name, as 'ss3', or a Spectrum, not of type ndarray", sea=np.zeros((9, 6)))
+    refuse("A study has no 'see'; it has seeds, sea, drives, .*, slew_deg", see="ss3")
+    refuse("A study has no 'actuation'; it has seeds", actuation="direct")
     with pytest.raises(InputError, match="Periods to follow must be above 0 s"):
         follow(crane, [0.0])
     with pytest.raises(InputError, match="Points of the height must be one or more finite"):

@@ -361,8 +361,39 @@ def test_what_a_crane_cannot_do_is_said(crane, slewed):
         crane.simulate(Stick.trapezoid(slew=1.0, until={"slew_deg": 45.0}, length=5.0))
     with refuse("The slew leads away from slew_deg = -45"):
         crane.simulate(Stick.trapezoid(slew=1.0, until={"slew_deg": -45.0}))
-    with refuse("actuation is 'hydraulic'; it is ideal, volts, inverse"):
-        crane.simulate(slewed, actuation="hydraulic")
+    moving = Stick.record(np.full((600, 3), [0.0, 0.5, 0.0]))
+    assert crane.simulate(moving).slew_deg[0] == 0.0
+    with refuse("Ideal drives follow at once, .* put a row of zeros before it"):
+        crane.simulate(moving, actuation="ideal")
+    with refuse("The stick is 3, but must be a Stick"):
+        crane.simulate(3)
+    with refuse(r"A sea is a Seaway, as Seaway\('ss3'\), or the ship's motion in rows"):
+        crane.simulate(slewed, sea="ss3")
+
+
+@pytest.mark.parametrize(
+    ("setup", "message"),
+    [
+        ({"actuation": "hydraulic"}, "actuation is 'hydraulic'; it is ideal, volts, inverse"),
+        ({"actuation": "direct"}, "With direct actuation commands are voltages, .* Crane.stepper"),
+        (
+            {"winds": 3.0},
+            "A crane's run has no 'winds'; it has control, .*, drag_area, wind, brake",
+        ),
+        ({"wind": 3.0}, "wind is 3.0, but must be two speeds, forward and to port"),
+        ({"wind": (1.0, 2.0, 0.0)}, r"wind is \(1.0, 2.0, 0.0\), but must be two speeds"),
+        ({"wind": (float("nan"), 0.0)}, r"wind is \(nan, 0.0\), but must be two speeds"),
+        ({"suspension": 6e7}, "suspension is 60000000.0, but must be a Suspension"),
+        ({"rope_m": "20"}, "rope_m is '20', but must be a number"),
+        ({"drag_area": None}, "drag_area is None, but must be a number"),
+    ],
+)
+def test_setups_that_are_none_are_refused(crane, slewed, setup, message):
+    with refuse(message):
+        crane.simulate(slewed, **setup)
+
+
+def test_residual_swing_needs_a_run_that_is_long_enough(crane):
     short = crane.simulate(Stick.trapezoid(slew=1.0, until={"slew_deg": 45.0}, length=15.0))
     with refuse("15 s long, but its residual swing counts from 16.11 s on"):
         _ = short.residual_deg

@@ -353,9 +353,31 @@ def test_tables_that_lack_something_or_mean_something_else_are_refused(tmp_path)
         read_ship(path)
 
 
+def test_files_that_lack_much_of_the_sea_or_roll_against_it_are_refused(tmp_path):
+    hull, path = Hull(203.8, 23.2, 9.75), tmp_path / "ship.csv"
+    write_table(path, hull, frequencies=(0.1, 0.5, 1.4))
+    ship = read_ship(path)
+    # Bretschneider's energy above ω is 1 - exp(-1.25 (ω_p/ω)⁴): 14.8 % with a peak at 7.5 s, of
+    # which 1.6 % beyond 2.5 rad/s are in no seaway; below 0.7 rad/s there are 7.7 %
+    with pytest.raises(InputError, match="waves of 0.1 to 1.4 rad/s, but 13 % .* of ss3 lies"):
+        Seaway("ss3", ship=ship)
+    assert Seaway("ss3-swell", ship=ship).motion(10).shape == (10, 6)
+    write_table(path, hull, frequencies=(0.7, 1.0, 2.5))
+    with pytest.raises(InputError, match="waves of 0.7 to 2.5 rad/s, but 8 % .* of ss3 lies"):
+        Seaway("ss3", ship=read_ship(path))
+    write_table(path, hull, frequencies=(0.1, 0.5, 2.5))
+    cells = [row.split(",") for row in path.read_text("utf-8").splitlines()]
+    for row in cells[1:]:
+        row[8:10] = [repr(-float(part)) for part in row[8:10]]
+    path.write_text("\n".join(map(",".join, cells)), "utf-8")
+    with pytest.raises(InputError, match="wave of 90 deg roll is .* must go with the water"):
+        read_ship(path)
+
+
 @pytest.mark.parametrize(
     ("make", "message"),
     [
+        (lambda: Seaway("ss3", seed=1.5), "The seed of a seaway is 1.5, but must be 0, 1, 2"),
         (lambda: Spectrum(0.0, 7.5), "height of a sea is 0, but must be above 0"),
         (lambda: Spectrum(1.0, 60.0), "has little energy between waves of 2.51 and 25.1 s"),
         (lambda: Seaway("ss9"), "There is no sea 'ss9'; there are ss2, ss3"),

@@ -12,7 +12,7 @@ import typer
 
 from swashplate.cli.options import FigureFile, TableFile, command
 from swashplate.cli.terminal import Outputs, long_work, note, say, show, side, working
-from swashplate.cli.words import drive_of, pairs_of
+from swashplate.cli.words import pairs_of
 from swashplate.errors import InputError
 from swashplate.tables import FIGURE, TABLE, Form, Table
 
@@ -55,27 +55,28 @@ class Placed:
 
         own = self.crane.endswith(".toml")
         made = Crane.from_toml(self.crane) if own else Crane.preset(self.crane)
-        pairs = pairs_of("--drive", self.drive, "luff=mine.toml")
-        return made.with_drive(**{_axis(axis, name): drive_of(name) for axis, name in pairs})
+        return made.with_drive(**dict(pairs_of("--drive", self.drive, "luff=mine.toml")))
 
     @property
     def pose(self) -> dict[str, Any]:
         """Where a run begins, as far as it is given."""
         return _numbers("--at", self.at, "rope_m=25", START)
 
-    def seaway(self, text: str | None) -> Seaway | None:
-        """The seaway of words such as ``ss3,90,1``, for the ship."""
+    def seaway(self, given: list[str] | None, example: str) -> Seaway | None:
+        """The seaway of words written as an example such as ``ss3,90,1``, for the ship."""
         from swashplate.crane import Seaway, read_ship
 
-        if text is None:
+        if not given:
             if self.ship is not None:
                 raise InputError(f"--ship {self.ship} needs a --sea to move in.")
             return None
+        text = " --sea ".join(given)
         name, *rest = text.split(",")
-        if len(rest) > 2:
-            raise InputError(f"--sea {text} has too many parts: write --sea ss3,90,1.")
-        heading, seed = [*(_number(f"--sea {text}", each) for each in rest), 90.0, 0.0][:2]
-        waves = Seaway(name, heading, int(seed) if len(rest) > 1 else 0)
+        if len(given) > 1 or len(rest) > example.count(","):
+            raise InputError(f"--sea {text} is too much: write one sea, --sea {example}.")
+        heading, *seeds = [_number(f"--sea {text}", each) for each in rest] or [90.0]
+        seed: Any = next((int(each) if each.is_integer() else each for each in seeds), 0)
+        waves = Seaway(name, heading, seed)
         if self.ship is None:
             return waves
         path, _, unit = self.ship.partition(",")
@@ -90,7 +91,8 @@ class Studied(Placed):
     Options:
       control CONTROL: Control, as of 'run' behind the colon; by default as it is designed for
           ideal drives.
-      sea SEA[,HEADING]: A sea and its heading, 90 abeam: ss2, ss3, ss3-swell, ss4.
+      sea SEA[,HEADING]: A sea and its heading, 90 abeam: ss2, ss3, ss3-swell, ss4; by default
+          ss3,90.
       seeds N: Number of seaways; judge takes 200 by default.
       drives NAMES: ideal: follow at once; identified: the crane's own; volts: these, 10 V for full
           speed; drawn: from the errors of the fits given with --drive; by default
@@ -100,7 +102,7 @@ class Studied(Placed):
     """
 
     control: str = "feedback=0.2/0.2+ship+loop=1.5"
-    sea: str = "ss3,90"
+    sea: list[str] | None = None
     seeds: int | None = None
     drives: str | None = None
     scale: list[str] | None = None
@@ -114,8 +116,8 @@ class Studied(Placed):
         if law is None:
             raise InputError("--control is empty: there is nothing to judge.")
         how: dict[str, Any] = dict(self.pose)
-        if self.sea != Studied.sea or self.ship is not None:
-            how["sea"] = self.seaway(self.sea)
+        if self.sea or self.ship is not None:
+            how["sea"] = self.seaway(self.sea or ["ss3"], "ss3,90")
         if self.seeds is not None:
             how["seeds"] = range(self.seeds)
         if self.drives is None and not self.scale:
@@ -135,7 +137,9 @@ class Studied(Placed):
                 raise InputError(f"--scale {name}={text}: write the axis first, luff.orifice=1.5.")
             find_lever(lever)
             factor = _number(f"--scale {name}={text}", text)
-            drive = getattr(crane, _axis(axis, lever))
+            if axis not in AXES:
+                raise InputError(f"--scale {name}={text}: the axes are {', '.join(AXES)}.")
+            drive = getattr(crane, axis)
             crane = crane.with_drive(**{axis: pulled(drive, {lever: factor})})
             changed.append(f"{axis} {lever} ×{factor:g}")
         if changed:
@@ -176,7 +180,7 @@ def run(
     until: list[str] | None = None,
     duration: float | None = None,
     length: float = 60.0,
-    sea: str | None = None,
+    sea: list[str] | None = None,
     variant: list[str] | None = None,
     brake: bool = True,
     out: TableFile = None,
@@ -220,7 +224,7 @@ def run(
     with working("Simulating"):
         from swashplate.crane import Stick, run_tables
 
-        crane, seaway = placed.chosen, placed.seaway(sea)
+        crane, seaway = placed.chosen, placed.seaway(sea, "ss3,90,1")
         targets = _numbers("--until", until, "slew_deg=45")
         stick = Stick.trapezoid(
             hoist=hoist, slew=slew, luff=luff, until=targets, duration=duration, length=length
@@ -285,7 +289,7 @@ def judge(
 def follow(
     placed: Placed,
     *,
-    sea: str | None = None,
+    sea: list[str] | None = None,
     out: TableFile = None,
     plot: FigureFile = None,
 ) -> None:
@@ -300,8 +304,8 @@ def follow(
     """
     files = Outputs((out, TABLE), (plot, FIGURE))
     with working("Simulating"):
-        names: dict[str, Any] = {} if sea is None else {"seas": (sea.split(",")[0],)}
-        seaway = placed.seaway(sea or "ss3")
+        seaway = placed.seaway(sea or ["ss3"], "ss3,90")
+        names: dict[str, Any] = {"seas": (sea[0].split(",")[0],)} if sea else {}
         found = placed.chosen.follow(seaway=seaway, **names, **placed.pose)
     files.write(out, "Amplitudes, in SI", found.tables()[0].write)
     files.draw(plot, "plot_follow", found)
@@ -385,12 +389,6 @@ def control_of(words: str) -> Control | None:
         stage = kind(*numbers)
         made = stage if made is None else made | stage
     return made
-
-
-def _axis(axis: str, what: str) -> str:
-    if axis not in AXES:
-        raise InputError(f"'{what}' of the '{axis}': the axes are hoist, slew and luff.")
-    return axis
 
 
 def _numbers(

@@ -14,15 +14,17 @@ from numpy.typing import ArrayLike
 from pydantic import BaseModel, ConfigDict, Field, FiniteFloat
 
 from swashplate.analysis.compensation import InverseMap, inverse_map
-from swashplate.crane.control import Control, linearize
+from swashplate.crane.control import linearize
 from swashplate.crane.kinematics import Boom, Geometry, Home, Vector, luff_rope
+from swashplate.crane.loop import DIRECT, IDEAL
 from swashplate.crane.result import CraneRun
 from swashplate.crane.sea import Seaway, motion_of
 from swashplate.crane.stepper import RATE, CraneStepper, Setup
-from swashplate.crane.stick import AXES, Stick
+from swashplate.crane.stick import AXES, Array, Stick
 from swashplate.documents import parse_toml, read_text, validated
 from swashplate.drive import Drive
 from swashplate.errors import InputError, ParameterError
+from swashplate.parameters.files import preset_names
 from swashplate.tables import Column, Table
 from swashplate.units import to_si
 
@@ -30,7 +32,7 @@ if TYPE_CHECKING:
     from swashplate.analysis.monte_carlo import Draws
     from swashplate.crane.following import Followable
     from swashplate.crane.judgment import Judgment
-    from swashplate.crane.study import Sweep
+    from swashplate.crane.study import Laws, Sweep
     from swashplate.linear import LinearModel
 
 
@@ -76,7 +78,7 @@ GEOMETRY: Mapping[str, tuple[str, int, Literal["above 0", "at least 0", ""]]] = 
 
 
 class CraneFile(BaseModel):
-    """A crane's file; drives are names of packaged ones or files beside it."""
+    """A crane's file; drives are packaged names, or files and folders of fits beside it."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
@@ -145,16 +147,10 @@ class Crane:
         FileError, ParameterError
             If there is no such file, or it is no drive's.
         """
-        made: dict[str, Any] = {}
-        for axis, given in drives.items():
-            if axis not in AXES:
-                raise InputError(f"A crane has no drive '{axis}': it has {', '.join(AXES)}.")
-            if isinstance(given, str | Path):
-                place = Path(given) / "drive.toml" if Path(given).is_dir() else Path(given)
-                own = place.suffix == ".toml"
-                made[axis] = Drive.from_toml(place) if own else Drive.preset(str(given))
-            else:
-                made[axis] = given if isinstance(given, Drive) else given.drive
+        strange = [axis for axis in drives if axis not in AXES]
+        if strange:
+            raise InputError(f"A crane has no drive '{strange[0]}': it has {', '.join(AXES)}.")
+        made: dict[str, Any] = {axis: _drive(each, Path()) for axis, each in drives.items()}
         return replace(self, **made)
 
     def drawn(self, **draws: Draws) -> tuple[Crane, ...]:
@@ -307,14 +303,14 @@ class Crane:
         Raises
         ------
         InputError
-            For a start beyond the crane's limits, a stick longer than the ship's motion or one that
-            does not return, and a tip too fast for the rope.
+            For a start beyond the crane's limits, a stick longer than the ship's motion, one that
+            does not return, or that begins at full speed on ideal drives, direct actuation, and a
+            tip too fast for the rope.
         DomainError
             If boom or rope meet a limit, or a drive leaves its domain.
         """
-        stepper = CraneStepper(self, **setup)
+        stepper, commands, end = begun(self, stick, setup)
         fixed = stepper.fixed
-        commands, end = stick.sample(self, fixed.home, RATE)
         ship = motion_of(sea, len(commands), RATE)
         impulses = (*fixed.settings.joint[1:], *fixed.settings.tip[1:])
         return CraneRun(
@@ -342,21 +338,19 @@ class Crane:
         """The linear crane about a load at rest, see `swashplate.crane.control.linearize`."""
         return linearize(self, boom_deg, rope_m)
 
-    def judge(self, control: Control | Mapping[str, Control | None], **how: Any) -> Judgment:
+    def judge(self, control: Laws, **how: Any) -> Judgment:
         """Judgment of control over many seaways; see `swashplate.crane.judge`."""
         from swashplate.crane.judgment import judge
 
         return judge(self, control, **how)
 
-    def sweep(
-        self, over: str, control: Control | Mapping[str, Control | None], **how: Any
-    ) -> Sweep:
+    def sweep(self, over: str, control: Laws, **how: Any) -> Sweep:
         """Swing over a quantity; see `swashplate.crane.sweep`."""
         from swashplate.crane.study import sweep
 
         return sweep(self, over, control, **how)
 
-    def sectors(self, control: Control | Mapping[str, Control | None], **how: Any) -> Sweep:
+    def sectors(self, control: Laws, **how: Any) -> Sweep:
         """Swing over the bearing of the boom: `sweep` over ``"bearing"``."""
         return self.sweep("bearing", control, **how)
 
@@ -384,6 +378,25 @@ def _inverse(drive: Drive) -> InverseMap:
     return inverse_map(drive)
 
 
+def begun(crane: Crane, stick: Stick, setup: Setup) -> tuple[CraneStepper, Array, float]:
+    """A run at its start: stepper, commands, and when the last one ends; as `simulate` refuses."""
+    stepper = CraneStepper(crane, **setup)
+    if stepper.fixed.actuation == DIRECT:
+        raise InputError(
+            "With direct actuation commands are voltages, but a stick gives parts of the full "
+            "speed: take Crane.stepper, or actuation='volts'."
+        )
+    if not isinstance(stick, Stick):
+        raise InputError(f"The stick is {stick!r}, but must be a Stick, as Stick.rest(60).")
+    commands, end = stick.sample(crane, stepper.fixed.home, RATE)
+    if stepper.fixed.actuation == IDEAL and commands[0].any():
+        raise InputError(
+            "Ideal drives follow at once, and the crane starts at rest: a recorded stick must "
+            "begin at zero, so put a row of zeros before it."
+        )
+    return stepper, commands, end
+
+
 def preset_text(name: str) -> str:
     """The file of a packaged crane."""
     sets = files("swashplate.crane") / "sets"
@@ -393,8 +406,26 @@ def preset_text(name: str) -> str:
     return found[name].read_text("utf-8")
 
 
+def _drive(given: DriveLike, folder: Path) -> Drive:
+    """A drive as it is given; places are looked for in a folder, packaged names go first."""
+    if not isinstance(given, str | Path):
+        made = getattr(given, "drive", given)
+        if isinstance(made, Drive):
+            return made
+    elif str(given) in preset_names():
+        return Drive.preset(str(given))
+    elif (place := folder / given).is_dir():
+        return Drive.from_toml(place / "drive.toml")
+    elif place.suffix == ".toml":
+        return Drive.from_toml(place)
+    raise ParameterError(
+        f"A crane's drive is a packaged one, {', '.join(preset_names())}, a .toml file, or the "
+        f"result or folder of a fit, but there is no such '{given}'."
+    )
+
+
 def _read(text: str, origin: str, folder: Path) -> Crane:
-    """A crane of a file's text; names of drives that end in .toml are files in its folder."""
+    """A crane of a file's text, its drives beside it."""
     content = validated(parse_toml(text, origin), CraneFile, origin)
     lacks = [name for name in GEOMETRY if name not in content.geometry]
     strange = [name for name in content.geometry if name not in GEOMETRY]
@@ -402,9 +433,6 @@ def _read(text: str, origin: str, folder: Path) -> Crane:
         extra = f", and knows no '{strange[0]}'" if strange else ""
         need = f"needs an entry '{lacks[0]}'" if lacks else f"has {len(GEOMETRY)} quantities"
         raise ParameterError(f"{origin}: geometry {need}{extra}.")
-    drives: dict[str, Any] = {
-        axis: Drive.from_toml(folder / word) if word.endswith(".toml") else Drive.preset(word)
-        for axis, word in content.drives.items()
-    }
+    drives: dict[str, Any] = {axis: _drive(each, folder) for axis, each in content.drives.items()}
     quantities = {name: content.geometry[name] for name in GEOMETRY}
     return Crane(content.name, content.title, quantities, **drives)

@@ -35,7 +35,6 @@ SHARES = (0.8, 0.6, 0.4)
 """Shares of what the luff can follow at which control is clipped on trial, the largest first."""
 BLOCK = 20
 """Seaways of a trial after which it is given up if it has failed already."""
-LEVEL = 0.95
 LOOP = PositionLoop()
 """What a clip is tried with: a stiffer loop brings back what the clip takes."""
 
@@ -63,7 +62,7 @@ def mean_of(values: Array) -> Estimate:
     mean = float(known.mean()) if known.size else np.nan
     if known.size < 2:
         return Estimate(mean, np.nan, np.nan)
-    t = float(stdtrit(known.size - 1, 0.5 + 0.5 * LEVEL))
+    t = float(stdtrit(known.size - 1, 0.975))
     half = t * float(known.std(ddof=1)) / sqrt(known.size)
     return Estimate(mean, mean - half, mean + half)
 
@@ -209,7 +208,8 @@ class Judgment(Tabular):
         swings = Table(
             f"Swing in {count(len(self.study.seeds), 'seaway')}, means with 95 % intervals",
             (
-                *(Column("variant"), *interval, Column("largest", ".2f", "rad", none="–")),
+                *(Column("variant", wrap=True), *interval),
+                Column("largest", ".2f", "rad", none="–"),
                 *(Column("worse than none", ".0%", none="–"), Column("stopped", "d")),
             ),
             "largest: median over the seaways of the largest swing",
@@ -222,7 +222,7 @@ class Judgment(Tabular):
             look = worse is not None and worse > self.allowed
             swings.add(name, *numbers, int(np.isnan(rms).sum()), look=look)
         spec = [Column(each, "+.2f", "rad", none="–") for each in ("difference", "from", "to")]
-        heads = (Column("variant"), Column("less"), *spec)
+        heads = (Column("variant", wrap=True), Column("less", wrap=True), *spec)
         paired = Table("Differences of RMS swing within each seaway", heads)
         for i, other in enumerate(self.names):
             for name in self.names[i + 1 :]:

@@ -232,7 +232,7 @@ def run_tables(runs: Mapping[str, CraneRun]) -> list[Table]:
     The residual swing is empty where a run is too short for it; ideal drives have no limits.
     """
     columns = (
-        Column("run"),
+        Column("run", wrap=True),
         Column("residual", ".2f", "rad", none="–", key="residual_swing"),
         Column("rms", ".2f", "rad", key="rms_swing"),
         Column("largest", ".2f", "rad", of="pf", key="largest_swing"),
@@ -258,7 +258,8 @@ def run_tables(runs: Mapping[str, CraneRun]) -> list[Table]:
 def limit_table(rows: Iterable[tuple[str, str, Iterable[float]]]) -> Table:
     """Share of time for which limits act: of a name and an axis, in the order of `PUMPS`."""
     heads = [str(each.name).lower().replace("_", " ") for each in PUMPS]
-    columns = (Column("variant"), Column("axis"), *(Column(h, ".1%", none="–") for h in heads))
+    numbers = [Column(each, ".1%", none="–") for each in heads]
+    columns = (Column("variant", wrap=True), Column("axis"), *numbers)
     made = Table("Share of time for which limits act", columns)
     for name, axis, shares in rows:
         made.add(name, axis, *shares)

@@ -27,8 +27,9 @@ LONGEST_HOLE = 1.0
 """Time without a sample in a log of motions that is a hole, where samples are closer. [s]"""
 COARSE = 8.0
 """Rate at which motion and two derivatives are summed up before they are joined smoothly. [Hz]"""
-LEAST_ENERGY = 0.5
-"""Part of a spectrum's energy that must lie within the band."""
+LEAST_ENERGY, MOST_LOST = 0.5, 0.05
+"""Part of a spectrum's energy that must lie within the band; largest part of a sea's that may lie
+beyond a file's frequencies, where the motions of its ends are taken."""
 
 
 @dataclass(frozen=True)
@@ -125,6 +126,12 @@ class Seaway(Result):
         Directions spread by cos² around the heading, instead of long crests.
     components : int
         Number of regular waves.
+
+    Raises
+    ------
+    InputError
+        For values without sense, and a file of transfer functions beyond whose frequencies more
+        than 5 % of the sea's energy lies.
     """
 
     sea: str | Spectrum = "ss3"
@@ -136,12 +143,25 @@ class Seaway(Result):
     components: int = 200
 
     def __post_init__(self) -> None:
+        if not isinstance(self.sea, str | Spectrum):
+            kind = type(self.sea).__name__
+            raise InputError(f"A sea is a name, as 'ss3', or a Spectrum, not of type {kind}.")
         if isinstance(self.sea, str) and self.sea not in SEA_STATES:
             raise InputError(f"There is no sea '{self.sea}'; there are {', '.join(SEA_STATES)}.")
         if not (isfinite(self.heading_deg) and isfinite(self.speed) and self.components >= 2):
             raise InputError("A seaway has a finite heading and speed and two or more components.")
-        if self.seed < 0 or self.seed != int(self.seed):
-            raise InputError(f"The seed of a seaway is {self.seed:g}, but must be 0, 1, 2, ...")
+        if not str(self.seed).isdigit():
+            raise InputError(f"The seed of a seaway is {self.seed}, but must be 0, 1, 2, ...")
+        if isinstance(self.ship, TransferFunctions):
+            omega = np.linspace(*BAND, 2001)
+            density, (low, high) = self.spectrum.density(omega), self.ship.frequencies[[0, -1]]
+            lost = float(density[(omega < low) | (omega > high)].sum() / density.sum())
+            if lost > MOST_LOST:
+                raise InputError(
+                    f"{self.ship.name} has waves of {low:.3g} to {high:.3g} rad/s, but "
+                    f"{100.0 * lost:.0f} % of the energy of {self.sea} lies beyond, more than "
+                    f"{100.0 * MOST_LOST:.0f} %: take a file that reaches further, or another sea."
+                )
 
     @property
     def spectrum(self) -> Spectrum:
@@ -286,11 +306,14 @@ def motion_of(sea: Seaway | ArrayLike | None, count: int, rate: float) -> Array:
         return np.zeros((count, 1))
     if isinstance(sea, Seaway):
         return sea.motion(count, rate)
-    made = np.ascontiguousarray(sea, dtype=np.float64)
+    try:
+        made = np.ascontiguousarray(sea, dtype=np.float64)
+    except (TypeError, ValueError):
+        made = np.zeros(0)
     if made.ndim != 2 or made.shape[1] != 6 or not np.isfinite(made).all():
         raise InputError(
-            "The ship's motion has rows of six finite numbers: surge, sway, heave [m], roll, "
-            "pitch, yaw [rad]."
+            "A sea is a Seaway, as Seaway('ss3'), or the ship's motion in rows of six finite "
+            "numbers: surge, sway, heave [m], roll, pitch, yaw [rad]."
         )
     if len(made) < count:
         raise InputError(

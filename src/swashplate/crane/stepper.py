@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from functools import lru_cache
 from math import degrees, inf, isfinite, pi, sin, sqrt
+from numbers import Real
 from typing import TYPE_CHECKING, Any, Literal, TypedDict, Unpack, get_args
 
 import numpy as np
@@ -102,6 +104,13 @@ class Setup(TypedDict, total=False):
     brake: bool
 
 
+def check_names(what: str, given: Iterable[str], known: Iterable[str]) -> None:
+    """Refuse keywords that are not known."""
+    strange = [each for each in given if each not in known]
+    if strange:
+        raise InputError(f"{what} has no '{strange[0]}'; it has {', '.join(known)}.")
+
+
 class CraneStepper:
     """A crane that takes commands and gives signals, the same numbers as `Crane.simulate`.
 
@@ -110,6 +119,7 @@ class CraneStepper:
 
     def __init__(self, crane: Crane, **setup: Unpack[Setup]) -> None:
         how: dict[str, Any] = dict(setup)
+        check_names("A crane's run", how, Setup.__annotations__)
         control = how.pop("control", None)
         self._crane, self.actuation = crane, how.get("actuation", "inverse")
         if self.actuation == "direct" and control is not None:
@@ -269,9 +279,18 @@ def _fixed(
     kinds = get_args(Actuation)
     if actuation not in kinds:
         raise InputError(f"actuation is '{actuation}'; it is {', '.join(kinds[:-1])}.")
+    load = crane.safe_load if load is None else load
+    numbers = {"slew_deg": slew_deg, "boom_deg": boom_deg, "rope_m": rope_m, "load": load}
+    for name, value in (numbers | {"drag_area": drag_area}).items():
+        if not isinstance(value, Real):
+            raise InputError(f"{name} is {value!r}, but must be a number.")
     if not (isfinite(drag_area) and drag_area >= 0.0):
         raise InputError(f"drag_area is {drag_area:g} m², but must be at least 0.")
-    load = crane.safe_load if load is None else load
+    if not isinstance(suspension, Suspension):
+        raise InputError(f"suspension is {suspension!r}, but must be a Suspension.")
+    pair = np.array(wind, dtype=object)
+    if pair.shape != (2,) or not all(isinstance(v, Real) and isfinite(v) for v in pair):
+        raise InputError(f"wind is {wind!r}, but must be two speeds, forward and to port, in m/s.")
     drag = AIR * drag_area / (2.0 * load) if load > 0.0 else 0.0  # which the suspension refuses
     if loaded:
         _check_loaded(crane, actuation, load + suspension.hook, suspension)

@@ -16,11 +16,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from swashplate.analysis.whatif import pulled
 from swashplate.crane.control import Control
-from swashplate.crane.crane import Crane
+from swashplate.crane.crane import Crane, begun
 from swashplate.crane.loop import ROWS
 from swashplate.crane.result import PUMPS, CraneRun
 from swashplate.crane.sea import Seaway, Spectrum
-from swashplate.crane.stepper import RATE, Actuation, Setup
+from swashplate.crane.stepper import RATE, Actuation, Setup, check_names
 from swashplate.crane.stick import AXES, Stick
 from swashplate.equations import kernel
 from swashplate.errors import DomainError, InputError
@@ -142,10 +142,13 @@ class Study(Result):
         """
         laws = control if isinstance(control, Mapping) else {"": control}
         sets = drives if isinstance(drives, Mapping) else {each: each for each in drives}
+        if isinstance(seeds, int):
+            raise InputError(f"seeds is {seeds}, but must be a sequence, as range({seeds}).")
         if not (laws and sets and seeds):
             raise InputError("A study needs a controller, a set of drives and a seed at least.")
-        if "actuation" in setup:
-            raise InputError("A study takes its drives by name, drives=('ideal',), not actuation.")
+        poses = [each for each in Setup.__annotations__ if each not in ("control", "actuation")]
+        words = ("seeds", "sea", "drives", "stick", "length", "start", *poses)
+        check_names("A study", setup, words)
         stick = stick or Stick.rest(length)
         if not 0.0 <= start < stick.length:
             raise InputError(
@@ -159,9 +162,9 @@ class Study(Result):
             for name, given in sets.items():
                 if isinstance(given, str):
                     if given not in ACTUATED:
-                        words = ", ".join(ACTUATED)
                         raise InputError(
-                            f"There are no drives '{given}'; there are {words}, or cranes."
+                            f"There are no drives '{given}'; there are {', '.join(ACTUATED)}, or "
+                            "cranes."
                         )
                     case = none.moved(control=stages, actuation=ACTUATED[given])
                 elif not given:
@@ -188,8 +191,7 @@ class Study(Result):
             If a case cannot begin as it is asked to.
         """
         for case in cases:  # said here, once, and not by a worker
-            home = case.cranes[0].stepper(**case.setup).fixed.home
-            case.stick.sample(case.cranes[0], home, RATE)
+            begun(case.cranes[0], case.stick, case.setup)
         chosen = range(len(self.seeds)) if numbers is None else numbers
         made = np.full((len(chosen), len(cases), len(COUNTED)), np.nan)
         items = [(n, self.seeds[n]) for n in chosen]

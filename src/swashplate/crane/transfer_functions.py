@@ -28,17 +28,21 @@ Complex = NDArray[np.complex128]
 MOTIONS = ("surge", "sway", "heave", "roll", "pitch", "yaw")
 MIRRORED = np.array([1.0, -1.0, 1.0, -1.0, 1.0, -1.0])
 """Signs of the motions where waves come from the other side."""
-LONG_WAVES = ((0, 0.0, -1j, 0.2), (1, 90.0, -1j, 0.2), (4, 0.0, 1j, 0.0))
+LONGEST, ROLLS = 0.4, 0.2
+"""A file whose lowest frequency is above the first has no long wave; above the second a ship may be
+beyond its roll period, where it rolls against the slope. [rad/s]"""
+LONG_WAVES = (
+    *((0, 0.0, -1j, 0.2, LONGEST), (1, 90.0, -1j, 0.2, LONGEST)),
+    *((3, 90.0, -1j, 0.0, ROLLS), (4, 0.0, 1j, 0.0, LONGEST)),
+)
 """Motions that go with the water in the longest wave of a file: which, heading [deg], the water's
-phase, and what it must exceed to be seen."""
+phase, what it must exceed to be seen, and the frequency below which the wave is long. [rad/s]"""
 HEAVES = 0.3
 """Largest distance of heave from 1 in the longest wave of a file, which the wave's crest lifts."""
 STEEPEST = 2.0
 """Largest pitch in the longest following wave of a file, over the wave's slope."""
 WIDEST, ASIDE = 90.0, 5.0
 """Largest angle between headings of a file; angle to its only one that is taken for it. [deg]"""
-LONGEST = 0.4
-"""A file whose lowest frequency is above that has no long wave. [rad/s]"""
 
 
 # --- closed form ----------------------------------------------------------------------------------
@@ -114,8 +118,9 @@ class TransferFunctions(Result):
     Raises
     ------
     InputError
-        If the longest wave does not lift the ship by about its height, carries it to another side
-        than the water, or pitches it by far more than the wave's slope: another convention.
+        If the longest wave, below 0.4 rad/s, does not lift the ship by about its height, carries it
+        to another side than the water, pitches it by far more than the wave's slope or, below 0.2
+        rad/s, rolls it against that: another convention.
     """
 
     name: str
@@ -138,8 +143,9 @@ class TransferFunctions(Result):
                 f"{self.name}: in the longest wave heave is {complex(heave[0]):.2f} for each "
                 f"metre, but must be near 1 + 0i, as with the phase to the crest and z up: {wrong}"
             )
-        for motion, angle, water, seen in LONG_WAVES:
-            for found in longest[np.abs(np.degrees(self.headings) - angle) < 1e-4, motion].tolist():
+        for motion, angle, water, seen, below in LONG_WAVES:
+            there = np.abs(np.degrees(self.headings) - angle) < 1e-4
+            for found in longest[there & (self.frequencies[0] < below), motion].tolist():
                 if (found * np.conj(water)).real < 0.0 and abs(found) > seen:
                     raise InputError(
                         f"{self.name}: in the longest wave of {angle:g} deg {MOTIONS[motion]} is "
@@ -211,10 +217,6 @@ def _weights(grid: Array, at: Array) -> Iterator[tuple[NDArray[np.int64], Array]
 Amplitude = tuple[float, float, float, int, complex]
 """Of one motion in one wave: speed [m/s], heading from x to y [deg], frequency [rad/s], place in
 `MOTIONS`, [m/m] or [rad/m] by e^{+iωt}."""
-
-
-Wave = tuple[float, float, float, int]
-"""Speed, heading, frequency and motion of an amplitude."""
 
 
 def read_ship(path: str | Path, length: float | None = None) -> TransferFunctions:
@@ -356,7 +358,8 @@ def _gathered(
 
     Rotations are in rad for so much of the wave. [m]
     """
-    waves, mirrored = dict[Wave, complex](), dict[Wave, complex]()
+    waves: dict[tuple[float, float, float, int], complex] = {}
+    mirrored = waves.copy()
     for sailed, heading, frequency, number, value in amplitudes:
         angle = round(heading, 9) % 360.0
         if angle > 180.0:  # the other side, which follows by symmetry, where this one lacks it

@@ -66,7 +66,8 @@ def write_judgment(judgment: Judgment, path: str | Path) -> None:
     limiting, example, basis = [], [], []
     if limits.rows:
         periods = np.linspace(4.0, 14.0, 21)
-        followable = plot_follow(crane.follow(periods, seaway=study.sea, **pose))
+        seas = [study.sea.sea] if study.sea and isinstance(study.sea.sea, str) else []
+        followable = plot_follow(crane.follow(periods, seas=seas, seaway=study.sea, **pose))
         limiting = [text(LIMITS_IN_WORDS), _drawn(followable, FOLLOWED), *_tables(limits)]
     try:
         runs = {name: judgment.run(name, judgment.typical) for name in (NONE, judged)}
