@@ -79,9 +79,10 @@ def test_a_campaign_becomes_a_drive(
     assert len([row for row in rows if "offset" not in row]) == 6
     # the folder knows what was free: no packaged configuration bears the drive's name
     Drive(parameters).renamed("winch").to_toml(tmp_path / "fitted" / "drive.toml")
-    advice = done("advise", "fitted", "--maneuver", "step:4", "--tests", "1")
-    assert "Z16_plus" in advice
-    assert "Z13" not in advice
+    for named in (("fitted",), (CAMPAIGN, "--drive", "fitted/drive.toml")):
+        advice = done("advise", *named, "--maneuver", "step:4", "--tests", "1")
+        assert "Z16_plus" in advice
+        assert "Z13" not in advice
     assert "fitted/drive.toml exists already" in refused(*words)
 
 

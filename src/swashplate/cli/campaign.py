@@ -387,7 +387,8 @@ def advise(
 
     Options:
       word CAMPAIGN.toml|AXIS|SET.toml: Tests made so far; or only a drive, for a fresh plan.
-      drive SET.toml: The fitted drive: noise is then that of its residuals.
+      drive SET.toml: The fitted drive: noise is then that of its residuals, and
+        free is what the setup.toml beside it estimates.
       maneuver MANEUVER: A test to judge instead of the usual ones. May be repeated.
       top: Tests to list.
       tests: Tests in the plan.
@@ -404,15 +405,20 @@ def advise(
     from swashplate.identification.setup import load_setup
 
     files = Outputs((out, TABLE))
+    tested = words.file_kind(Path(word)) == "campaign"
+    fitted = words.drive_file(drive or word) if drive or not tested else None
     with working("Judging tests"):
-        if words.file_kind(Path(word)) == "campaign":
+        # what a fit estimated stands beside the drive that it found
+        if fitted is not None and (fitted.parent / words.CONFIGURATION).is_file():
+            setup = setup or str(fitted.parent / words.CONFIGURATION)
+        if tested:
             _, runs, plan, start = words.fit_of(Path(word), axis, setup, drive)
             bench = design.bench(smooth(start), plan, runs, fitted=drive is not None)
         else:
             if axis is not None:
                 raise InputError("--axis belongs to a campaign; a drive is one axis.")
-            start, own = words.parameters_of(drive or word), Path(word) / words.CONFIGURATION
-            plan = load_setup(setup or (str(own) if own.is_file() else start.name))
+            start = words.parameters_of(drive or word)
+            plan = load_setup(setup or start.name)
             bench = design.bench(smooth(start), plan)
         machine = Drive(bench.parameters)
         named = [words.maneuver_of(each, machine) for each in maneuver or ()]
