@@ -167,3 +167,5 @@ def test_every_end_of_an_interval_is_whole(monkeypatch, capsys) -> None:
     shown = re.findall(r"(?<![\w.])\d[\d.]*(?:e[+-]\d+)?(?!\w)", text)
     assert {float(each) for each in shown} >= set(values)
     assert text.count("Z8  ") > 1
+    # no name is cut, however long
+    assert re.search(r"an_offset_of_a_run_with_a_long .*\n_name +\n", text)

@@ -76,7 +76,9 @@ def init(
     if file is not None:  # a drive as a campaign file names it
         place, root = file.resolve(), target.parent.resolve()
         drive = (place.relative_to(root) if place.is_relative_to(root) else place).as_posix()
-    kinds = {name: kind for kind, name in words.pairs_of("--column", column, "voltage=u")}
+    kinds = {
+        name: kind for kind, name in words.pairs_of("--column", column, "voltage=u", often=True)
+    }
     units = dict(words.pairs_of("--unit", unit, "u=mV"))
     with working("Reading"):
         text = draft_campaign(

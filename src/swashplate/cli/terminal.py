@@ -66,7 +66,7 @@ def _blocks(table: Table, line: int) -> Iterator[rich.table.Table]:
             made.add_column(
                 heads[k],
                 justify="right" if columns[k].spec else "left",
-                no_wrap=not columns[k].wrap,
+                no_wrap=bool(columns[k].spec) or not (columns[k].wrap or broken),
                 width=broken[k] if broken else None,
                 min_width=least[k] if columns[k].spec else None,
                 # a name that is too long goes on in the next line

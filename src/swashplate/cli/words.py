@@ -287,11 +287,18 @@ def ranges_of(words: Sequence[str], usual: Range) -> dict[str, Range]:
     return assigned("--lever", whole, "pump or pump=0.8/1.5", _factors(find_lever, 2))
 
 
-def pairs_of(option: str, given: Sequence[str] | None, example: str) -> list[tuple[str, str]]:
-    """What stands before and behind the equals sign of each."""
+def pairs_of(
+    option: str, given: Sequence[str] | None, example: str, *, often: bool = False
+) -> list[tuple[str, str]]:
+    """What stands before and behind the equals sign of each; the first is given once, or often."""
+    seen = set[str]()
     for each in given or ():
-        if "=" not in each:
+        name, equals, _ = each.partition("=")
+        if not equals:
             raise InputError(f"{option} {each} has no equals sign: write {option} {example}.")
+        if name in seen and not often:
+            raise InputError(f"{option} {name}=... is given twice; give it once.")
+        seen.add(name)
     return [(each.partition("=")[0], each.partition("=")[2]) for each in given or ()]
 
 
