@@ -395,8 +395,8 @@ def _run(
     whole = whole.replace(NO_TIME, NO_TIME.lstrip("# "))
     whole = "\n".join([whole, "[[runs]]", f"file = {made.file}", *more])
     try:
-        file = validated(parse_toml(whole, "the draft"), CampaignFile, "the draft")
-        experiments = list(read_run("the draft", "run", file.runs[0], file.axes, log))
+        content = validated(parse_toml(whole, "the draft"), CampaignFile, "the draft")
+        experiments = list(read_run("the draft", "run", content.runs[0], content.axes, log))
     except (FileError, InputError) as error:
         return made._replace(role=f'"ignore"    # {FIXME}: {error}')
     said, stratum, peak, seen = made.file, "", 0.0, set[str]()

@@ -104,7 +104,7 @@ def signal(name: str, values: ArrayLike, rows: int) -> Array:
     return numbers
 
 
-# --- an encoder's counts, and angles that begin anew -----------------------------------------------
+# --- an encoder's counts, and angles that begin anew ----------------------------------------------
 
 SUSTAINED = 5
 """A speed lasts if the median of this many neighbouring intervals has it."""
@@ -156,7 +156,7 @@ def unwrap_counts(counts: ArrayLike, modulus: int) -> Array:
 
 
 def unwrap_position(position: Array, size: float) -> Array:
-    """Position (n,) of a sensor that begins anew after `size`, in one unit: each step the short way.
+    """Position (n,) of a sensor that begins anew after `size`, by the short way at each step.
 
     A single sample about halfway between two near ones, taken while the sensor went back, does not
     turn the shaft; it stays what it is, half a turn off.

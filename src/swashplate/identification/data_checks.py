@@ -95,8 +95,8 @@ def check_model(experiments: Sequence[Experiment], setup: ModelSetup) -> list[Fi
     still while their input moves, and a run that is there twice.
     """
     wrapped, seen = wrapped_positions(experiments), dict[bytes, str]()
-    names = setup.channels or tuple(name for _, name in wrapped)
-    found = [refusal(None, n, f"{said}.") for (_, n), said in wrapped.items() if n in names]
+    fitted = setup.channels or tuple(name for _, name in wrapped)
+    found = [refusal(None, n, f"{said}.") for (_, n), said in wrapped.items() if n in fitted]
     for each in experiments:
         found += _samples(each, setup.channels or tuple(each.channels))
     if _refused(found):
