@@ -181,7 +181,7 @@ def _by_words(column: Column, name: str, unit: str | None) -> _Guess:
 
 
 def _by_header(column: Column, kind: str | None) -> _Guess:
-    """What a column's header says, of a kind if one is given; its unit may be the end of its name."""
+    """What a header says, of a kind if one is given; the unit may be the end of its name."""
     name = re.sub(r"[\[(].*[\])]", "", column.name).strip()
     unit = column.unit or ("rpm" if re.search("rpm|drehzahl", name.lower()) else None)
     whole = _by_words(column, name, unit)

@@ -309,8 +309,9 @@ def clipped_channels(experiments: Sequence[Experiment]) -> tuple[str, ...]:
             if moved > (0.1 + 2.0 * coarse) * reach:
                 said.append(
                     f"'{name}' stands at exactly {end:.6g} {runs[0][name].unit} at inputs that "
-                    f"differ by {moved:.3g} {runs[0].input.unit}: it is clipped there. Set limits = "
-                    f"[{low:.6g}, {high:.6g}] in its channel, and such samples are ignored."
+                    f"differ by {moved:.3g} {runs[0].input.unit}: it is clipped there. "
+                    f"Set limits = [{low:.6g}, {high:.6g}] in its channel, and such samples are "
+                    "ignored."
                 )
     return tuple(said)
 
