@@ -119,23 +119,6 @@ def test_windows_that_no_run_takes(edited: Edit, old: str, new: str, said: tuple
     assert campaign_findings(Campaign.from_toml(edited(old, new))) == said
 
 
-# --- what an encoder of few counts shows ----------------------------------------------------------
-
-
-@pytest.mark.parametrize(("counts", "coarse"), [(60, True), (1000, False)])
-def test_an_encoder_of_few_counts(campaign_folder: Path, counts: int, coarse: bool) -> None:
-    """The step of +4 V to fit turns it by two turns."""
-    turned = np.floor(counts * np.linspace(0.0, 2.0, 50))
-    path = rewrite(
-        campaign_folder / "campaign.toml",
-        lambda t: np.column_stack([t[:, :3], np.concatenate([np.zeros(51), -turned])]),
-    )
-    said = campaign_findings(Campaign.from_toml(path))
-    assert len(said) == coarse
-    if coarse:
-        assert said[0].startswith("'counts' of the axis 'winch' passes 120 counts in the middle")
-
-
 # --- what a campaign lacks to be held against a drive ---------------------------------------------
 
 

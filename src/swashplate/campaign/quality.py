@@ -47,8 +47,6 @@ AT_FIRST, SLOW = 0.1, 0.1
 than so many seconds tell nothing of it. [s]"""
 NEIGHBOURS = 11
 """Samples of the running median: up to five in a row may be a spike."""
-FEW_COUNTS = 500.0
-"""Counts of an encoder in a run below which its rounding shows in the residuals."""
 NAMED = 6
 """Windows, or maneuvers, that a sentence names."""
 
@@ -263,27 +261,6 @@ def wrapped_positions(experiments: Iterable[Experiment]) -> dict[tuple[str, str]
     return said
 
 
-def coarse_encoders(experiments: Iterable[Experiment]) -> list[str]:
-    """Sentences on encoders that pass few counts in the middle one of some runs.
-
-    What a fit leaves of their staircase is no noise: a count stays wrong the same way until the
-    next.
-    """
-    passed = dict[tuple[str, str], list[float]]()
-    for each in experiments:
-        for name, channel in each.channels.items():
-            if channel.counts is not None and channel.used.any():
-                path = float(np.abs(np.diff(channel.counts[channel.used])).sum())
-                passed.setdefault((each.axis, name), []).append(path)
-    return [
-        f"'{name}' of the axis '{axis}' passes {middle:.0f} counts in the middle one of its runs: "
-        "their rounding makes the residuals then, not noise, and confidence intervals come out "
-        "too narrow; take an encoder of more counts a turn, or turn it further"
-        for (axis, name), counts in passed.items()
-        if (middle := float(np.median(counts))) < FEW_COUNTS
-    ]
-
-
 # --- spikes ---------------------------------------------------------------------------------------
 
 
@@ -397,7 +374,6 @@ def campaign_findings(campaign: Campaign) -> tuple[str, ...]:
         for axis in dict.fromkeys(each.axis for each in campaign)
         if axis not in moving
     ]
-    found += coarse_encoders(campaign.select(role="fit"))
     return (*found, *unsigned_currents(campaign).values(), *wrapped_positions(campaign).values())
 
 
