@@ -9,6 +9,7 @@ import pytest
 
 from swashplate import Campaign, Channel, Drive, Experiment, InputError
 from swashplate.campaign import (
+    Encoder,
     InputSignal,
     Source,
     fit_configuration,
@@ -101,6 +102,23 @@ def test_a_jump_at_the_edge_of_the_dead_zone_is_found() -> None:
     none = guess_drive(runs())
     assert none.jump == (0.0, 0.0)
     assert "J_plus" not in fit_configuration(none, guessed_set(none, "x"))
+
+
+@pytest.mark.parametrize("pulses", [60.0, 240.0])
+def test_an_encoder_of_few_pulses_shows_no_jump(pulses: float) -> None:
+    made = []
+    for each in runs("position", lag=0.05):
+        speed = machine(each.input.values, lag=0.05)
+        position = np.concatenate([[0.0], np.cumsum(0.5 * (speed[1:] + speed[:-1])) / RATE])
+        encoder = Encoder(pulses, 1.0, 1, None)
+        counts = np.floor(position / encoder.angle_per_count + 0.3)
+        read = {"counts": counts, "values": counts * encoder.angle_per_count, "encoder": encoder}
+        channel = replace(each["measured"], kind="encoder_counts", **read)
+        made.append(replace(each, channels={"measured": channel}))
+    found = guess_drive(made)
+    assert found.jump == (0.0, 0.0)
+    assert found.gain == pytest.approx(GAIN, rel=0.08)
+    assert found.dead_zone == pytest.approx(DEAD, abs=0.3)
 
 
 def test_a_lag_that_is_not_seen_stays_fixed() -> None:

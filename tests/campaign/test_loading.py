@@ -155,6 +155,13 @@ def test_a_counter_that_rolls_over(edited: Edit) -> None:
         ('column = "time", unit = "ms"', "rate = 5e-324", "last inf s by the rate"),
         # they go down to -2040
         ("gear_ratio = 2.0", "rolls_over_at = 1024", "counter of 1024 readings (give its own size"),
+        ("gear_ratio = 2.0", "rolls_over_at = 10.5", "a whole number of counts"),
+        ('unit = "mA"', 'unit = "mA"\nrolls_over_at = 9', "encoder_counts and positions alone"),
+        (
+            'kind = "rectified_current"\ncolumn = "ammeter"\nunit = "mA"',
+            'kind = "position"\ncolumn = "ammeter"\nunit = "deg"\nrolls_over_at = 360',
+            "up.csv: column 'ammeter': the readings reach over 1.111 times rolls_over_at",
+        ),
     ],
 )
 def test_what_is_wrong_is_one_sentence(edited: Edit, old: str, new: str, sentence: str) -> None:

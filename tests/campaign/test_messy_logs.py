@@ -3,12 +3,17 @@
 import tomllib
 from pathlib import Path
 
+import h5py
 import numpy as np
 import pytest
 
-from swashplate import Campaign, Drive, FileError, InputError
+from swashplate import Campaign, Drive, FileError, InputError, ParameterError
 from swashplate.campaign import campaign_findings, draft_campaign, examine, unsigned_currents
-from swashplate.identification.data_checks import beside_the_drives
+from swashplate.identification.data_checks import (
+    beside_the_drives,
+    check_runs,
+    refuse_unsound,
+)
 
 RATE = 200.0
 TIME = np.arange(int(8.0 * RATE)) / RATE
@@ -246,6 +251,122 @@ def test_a_run_is_split_where_its_counter_may_have_gone_round(tmp_path: Path, ag
         assert turns[-50:].mean() == pytest.approx(true[-50:].mean(), rel=2e-3)
 
 
+# --- an angle that begins anew --------------------------------------------------------------------
+
+SPEED = 4.0 * lagged(BOTH)
+"""Of a shaft that turns by about seven turns to and fro. [rad/s]"""
+TURNED = 350.0 + np.degrees(np.cumsum(SPEED)) / RATE
+
+
+@pytest.mark.parametrize(("noise", "begin"), [(0.0, 0.0), (0.3, 0.0), (0.3, -180.0)])
+def test_an_angle_that_begins_anew(tmp_path: Path, noise: float, begin: float) -> None:
+    true = TURNED + np.random.default_rng(0).normal(0.0, noise, TIME.size)
+    angle = (true - begin) % 360.0 + begin
+    log = write(tmp_path, "log.csv", time=TIME, voltage=BOTH, **{"angle [deg]": angle})
+    tests = drafted(tmp_path, log)
+    assert "rolls_over_at = 360    # guessed" in tests.path.read_text("utf-8")
+    assert findings(tests) == []
+    moved = np.degrees(tests["log"]["position"].values)
+    assert moved - moved[0] == pytest.approx(true - true[0], abs=1e-6)
+    tests = edit(tests, "rolls_over_at = 360", "#")
+    (said,) = findings(tests)
+    assert "jumps by about a whole turn" in said
+    assert said.endswith("write rolls_over_at = 360 in [axes.drive.channels.position]")
+    with pytest.raises(InputError, match="rolls_over_at = 360 in"):
+        refuse_unsound(check_runs(tests.experiments, Drive.preset("hoist").parameters))
+
+
+def test_an_angle_without_a_unit_is_in_degrees_and_a_motion_of_half_a_turn_in_none(
+    tmp_path: Path,
+) -> None:
+    log = write(tmp_path, "log.csv", time=TIME, voltage=BOTH, angle=TURNED % 360.0)
+    assert 'unit = "deg"    # guessed' in draft_campaign([log], tmp_path)
+    log = write(tmp_path, "log.csv", time=TIME, voltage=BOTH, angle=np.radians(0.1 * TURNED))
+    text = draft_campaign([log], tmp_path)
+    assert 'unit = "rad"    # guessed' in text
+    assert "rolls_over_at" not in text
+
+
+def test_a_sample_read_while_the_angle_went_back_turns_no_shaft(tmp_path: Path) -> None:
+    angle = TURNED % 360.0
+    (row, *_) = np.flatnonzero(np.diff(angle) < -180.0)
+    angle[row] = 180.0
+    log = write(tmp_path, "log.csv", time=TIME, voltage=BOTH, **{"angle [deg]": angle})
+    tests = drafted(tmp_path, log)
+    moved = np.degrees(tests["log"]["position"].values)
+    kept = np.arange(TIME.size) != row
+    assert (moved - moved[0])[kept] == pytest.approx((TURNED - TURNED[0])[kept], abs=1e-6)
+    tests = mended(tests, f"1 spike, up to {np.radians(moved[row]):.4g} rad")
+    assert findings(tests) == []
+
+
+def test_a_run_is_split_where_an_angle_may_have_gone_round(tmp_path: Path) -> None:
+    kept = (TIME < 2.0) | (TIME > 2.9)
+    columns = {"time": TIME, "voltage": BOTH, "angle [deg]": TURNED % 360.0}
+    log = write(tmp_path, "log.csv", **{name: each[kept] for name, each in columns.items()})
+    first, second = drafted(tmp_path, log)
+    assert "the position 'position', which begins anew after 360, may have" in first.notes[0]
+    assert (first.start, second.start) == ("rest", "estimated")
+
+
+# --- runs that begin in motion --------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("what", ["speed", "counts"])
+@pytest.mark.parametrize("begin", [0.0, 1.0, 2.0])
+def test_a_run_that_begins_in_motion(tmp_path: Path, what: str, begin: float) -> None:
+    """Cut out at rest, at the step, and a second after it."""
+    random = np.random.default_rng(5)
+    values = lagged(BOTH) + random.normal(0.0, 0.05, TIME.size)
+    values = np.floor(200.0 * np.cumsum(lagged(BOTH)) / RATE) if what == "counts" else values
+    kept = begin < TIME
+    columns = {"time": TIME, "voltage": BOTH, what: values}
+    log = write(tmp_path, "log.csv", **{name: each[kept] for name, each in columns.items()})
+    tests = drafted(tmp_path, log, counts_per_turn=1000.0)
+    assert tests["log"].start == ("estimated" if begin == 2.0 else "rest")
+    assert findings(tests) == []
+    if begin == 2.0:
+        (said,) = findings(edit(tests, "axes.drive.start", "#"))
+        assert 'write axes.drive.start = "estimated" in this run' in said
+
+
+# --- files whose groups have their own time -------------------------------------------------------
+
+
+@pytest.mark.parametrize("suffix", [".h5", ".mf4", ".tdms"])
+def test_each_group_has_its_own_clock(tmp_path: Path, suffix: str) -> None:
+    log, late, speed = tmp_path / f"log{suffix}", TIME[::2] + 1e-3, lagged(BOTH)[::2]
+    groups = {"cmd": (TIME, "voltage", BOTH, "V"), "meas": (late, "speed", speed, "rad/s")}
+    if suffix == ".h5":
+        with h5py.File(log, "w") as file:
+            for group, (time, name, values, unit) in groups.items():
+                file[f"{group}/time"], file[f"{group}/{name}"] = time, values
+                file[f"{group}/{name}"].attrs["unit"] = unit
+    elif suffix == ".mf4":
+        asammdf = pytest.importorskip("asammdf")
+        mdf = asammdf.MDF(version="4.10")
+        for group, (time, name, values, unit) in groups.items():
+            mdf.append(asammdf.Signal(values, time, unit, name), acq_name=group)
+        mdf.save(log)
+        mdf.close()
+    else:
+        nptdms = pytest.importorskip("nptdms")
+        with nptdms.TdmsWriter(log) as file:
+            for group, (time, name, values, unit) in groups.items():
+                given = {"unit_string": unit}
+                pair = [nptdms.ChannelObject(group, "time", time)]
+                file.write_segment([*pair, nptdms.ChannelObject(group, name, values, given)])
+    tests = drafted(tmp_path, log, drive="hoist")
+    run = tests["log"]
+    assert run.input.time == pytest.approx(TIME)
+    assert run["shaft_speed"].time == pytest.approx(late)
+    assert run["shaft_speed"].values == pytest.approx(speed)
+    assert findings(tests) == []
+    if suffix == ".h5":  # as the handbook names it
+        tests = edit(tests, '"/meas/speed"', '"meas/speed"')
+        assert tests["log"]["shaft_speed"].values == pytest.approx(speed)
+
+
 # --- B3: runs that lack a channel -----------------------------------------------------------------
 
 
@@ -265,6 +386,24 @@ def test_a_run_without_a_channel(tmp_path: Path) -> None:
     assert list(tests["empty"].channels) == ["shaft_speed"]
     assert "'rectified_current' has no sample here" in tests["empty"].notes[0]
     assert tests.ignored == ("no_input",)
+
+
+def test_an_axis_whose_only_channel_is_empty_in_a_run(tmp_path: Path) -> None:
+    columns = {"time": TIME}
+    for axis in ("Boom", "Stick"):
+        columns |= {f"{axis} voltage": BOTH, f"{axis} speed": lagged(BOTH)}
+    empty = {**columns, "Stick speed": [""] * TIME.size}
+    logs = [write(tmp_path, "a.csv", **columns), write(tmp_path, "b.csv", **empty)]
+    tests = drafted(tmp_path, *logs)
+    assert [each.name for each in tests] == ["a boom", "a stick", "b boom"]
+    only = 'only = ["boom"]'
+    assert only in tests.path.read_text("utf-8")
+    with pytest.raises(InputError, match=r"axis 'stick' have 0 samples.* with only = \["):
+        edit(tests, only, "")
+    with pytest.raises(
+        FileError, match=r"'shaft_speed' of the axis 'stick'.* with only = \[\"boom"
+    ):
+        edit(tests, 'missing = "drop"', "# missing")
 
 
 def test_an_ignored_run_is_not_opened(tmp_path: Path) -> None:
@@ -318,6 +457,39 @@ def test_headers(tmp_path: Path, columns: dict, speed: np.ndarray) -> None:
     assert run.input.values == pytest.approx(BOTH)
     assert list(run.channels) == ["shaft_speed"]
     assert run["shaft_speed"].values == pytest.approx(speed)
+
+
+@pytest.mark.parametrize(
+    ("name", "kind", "unit"),
+    [
+        ("Kanal_mV", "voltage", "mV"),
+        ("Geber_deg", "position", "deg"),
+        ("Druck_bar", "stroker_pressure", "bar"),
+        ("Kanal_2", "swash_angle", "rad"),
+        ("Kanal_links", "other", "1"),
+    ],
+)
+def test_the_unit_at_the_end_of_a_name_that_is_given(
+    tmp_path: Path, name: str, kind: str, unit: str
+) -> None:
+    log = write(tmp_path, "log.csv", time=TIME, n=BOTH, **{name: 0.001 * BOTH})
+    text = draft_campaign([log], tmp_path, columns={name: kind})
+    axis = tomllib.loads(text)["axes"]["drive"]
+    entries = [axis["input"], *axis["channels"].values()]
+    (found,) = [each for each in entries if each["column"] == name]
+    assert (found["kind"], found["unit"]) == (kind, unit)
+
+
+def test_a_log_without_a_clock_leaves_its_rate_open(tmp_path: Path) -> None:
+    log = write(tmp_path, "log.csv", voltage=BOTH, speed=lagged(BOTH))
+    with pytest.raises(ParameterError, match="needs an entry 'time'"):
+        drafted(tmp_path, log)
+    path = tmp_path / "campaign.toml"
+    text = path.read_text("utf-8")
+    assert "# time = { rate = 512 }    # FIXME" in text
+    assert "Hz" not in text
+    path.write_text(text.replace("# time = { rate = 512 }", "time = { rate = 200 }"), "utf-8")
+    assert Campaign.from_toml(path)["log"].input.time == pytest.approx(TIME)
 
 
 def test_two_clamps_are_plus_and_minus(tmp_path: Path) -> None:

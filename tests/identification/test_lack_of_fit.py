@@ -283,3 +283,20 @@ def test_a_rounded_channel_that_lags_is_not_clipped(experiment, rounding: float)
     cut = replace(cut, input=replace(cut.input, values=3.0 * np.sin(time)))
     (said,) = clipped_channels([cut])
     assert "'y' stands at exactly 1.5 1" in said
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.02])
+@pytest.mark.parametrize("cut", [True, False])
+def test_a_channel_that_is_clipped_at_several_steps(experiment, noise: float, cut: bool) -> None:
+    """Read in hundredths; cut at 1, or of a machine that stands at its stop there itself."""
+    time, random, runs = np.linspace(0.0, 4.0, 81), np.random.default_rng(2), []
+    for level in (0.5, 2.0, 4.0):
+        rise = np.minimum(level * (1.0 - np.exp(-time / 0.2)), np.inf if cut else 1.0)
+        read = np.round(rise + random.normal(0.0, noise, 81), 2)
+        runs.append(experiment(f"step {level}", level, np.minimum(read, 1.0) if cut else read))
+        command = np.where(time > 0.0, level, 0.0)
+        runs[-1] = replace(runs[-1], input=replace(runs[-1].input, values=command))
+    found = clipped_channels(runs)
+    assert len(found) == (cut and noise > 0.0)
+    if found:
+        assert "'y' stands at exactly 1 1 at inputs that differ by 2 1" in found[0]

@@ -20,6 +20,7 @@ from .quality import quality_table as quality_table
 from .quality import spiked as spiked
 from .quality import turned as turned
 from .quality import unsigned_currents as unsigned_currents
+from .quality import wrapped_positions as wrapped_positions
 from .recognition import Recognised as Recognised
 from .recognition import recognise as recognise
 from .samples import find_lost_counts as find_lost_counts

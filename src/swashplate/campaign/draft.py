@@ -9,15 +9,16 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
+from math import pi
 from pathlib import Path
 from typing import NamedTuple, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
-from swashplate.campaign.quality import has_sign
+from swashplate.campaign.quality import ESTIMATED, has_sign, moves_at_first
 from swashplate.campaign.reading import read_run
-from swashplate.campaign.samples import rolls_over_at
+from swashplate.campaign.samples import rolls_over_at, turns_over
 from swashplate.campaign.schema import KINDS, CampaignFile, InputKind, conversion
 from swashplate.documents import parse_toml, toml_key, toml_string, validated
 from swashplate.errors import FileError, InputError
@@ -33,6 +34,7 @@ HEADER = """\
 # all logs and says what is wrong with them.
 """
 UNUSED = "# Columns that are not used"
+NO_TIME = "# time = { rate = 512 }"
 NO_ENCODER = "# No column looks like an encoder's counts"
 FIXME = "FIXME"
 """What the lines hold that say what the draft leaves out or open."""
@@ -57,8 +59,8 @@ class _Guess(NamedTuple):
     unit: str | None = None
     in_header: bool = True
     """Whether its unit stands in brackets, or in a row of its own, where it is read from again."""
-    rolls_over_at: int = 0
-    """Counts after which an encoder's counter begins anew; 0 if it does not."""
+    rolls_over_at: float = 0.0
+    """Reading after which an encoder's counter or an angle begins anew; 0 if it does not."""
 
 
 class _Axis(NamedTuple):
@@ -137,8 +139,7 @@ def draft_campaign(
         lines += [f"{NO_ENCODER}{among}; counts_per_turn = {counts_per_turn:.12g} is left out", ""]
     text, runs = "\n".join(lines), list[_Run]()
     for log, read in zip(opened, numbers, strict=True):
-        rows = max((column.size for column in read.values()), default=0)
-        runs.append(_run(log, rows, axes, folder, text))
+        runs.append(_run(log, read, axes, folder, text))
     held_back = _held_back([each for each in runs if each.role == '"fit"'])
     for each in runs:
         role = '"validate"' if each is held_back else each.role
@@ -166,7 +167,7 @@ def _words(name: str) -> str:
 def _by_words(column: Column, name: str, unit: str | None) -> _Guess:
     """What a name and a unit say: the first kind in the table that has either."""
     words = _words(name)
-    if re.fullmatch(TIME, words):
+    if re.fullmatch(TIME, _words(name.rpartition("/")[2])):
         return _Guess(column.name, "time", "", column.unit)
     matches = {
         kind: match
@@ -179,8 +180,8 @@ def _by_words(column: Column, name: str, unit: str | None) -> _Guess:
     return _Guess(column.name, next(kinds, ""), axis or "", column.unit)
 
 
-def _by_header(column: Column) -> _Guess:
-    """What a column's header says; its unit may be the end of its name."""
+def _by_header(column: Column, kind: str | None) -> _Guess:
+    """What a header says, of a kind if one is given; the unit may be the end of its name."""
     name = re.sub(r"[\[(].*[\])]", "", column.name).strip()
     unit = column.unit or ("rpm" if re.search("rpm|drehzahl", name.lower()) else None)
     whole = _by_words(column, name, unit)
@@ -188,7 +189,10 @@ def _by_header(column: Column) -> _Guess:
     short = _by_words(column, stem, None)
     if short.kind == "other" and ending in ("V", "mV"):
         short = short._replace(kind="voltage")
-    if column.unit is None and short.kind and whole.kind not in HALVES:
+    if kind is not None:
+        whole, short = (each._replace(kind=kind) for each in (whole, short))
+    measured = short.kind == "time" or (short.kind in KINDS and KINDS[short.kind].units)
+    if column.unit is None and measured and whole.kind not in HALVES:
         try:
             if short.kind == "time":
                 to_si(1.0, ending, "s", "")
@@ -218,12 +222,15 @@ def _guesses(
     taken |= {*INPUTS} if {"voltage", "current"} & {*given.values()} else set()
     met = list[_Guess]()
     for name, column in headers.items():
-        each, values = _by_header(column), [part for part in parts[name] if part.size]
+        values = [part for part in parts[name] if part.size]
+        each = _by_header(column, given.get(name))
         kind = given.get(name, "" if each.kind in taken else each.kind)
         each = each._replace(kind=kind, unit=units.get(name, each.unit))
         if kind == "encoder_counts" or not (kind or each.unit):
             size = max((rolls_over_at(part, counts_per_turn) for part in values), default=0)
             each = each._replace(kind="encoder_counts" if size else kind, rolls_over_at=size)
+        if kind == "position":
+            each = each._replace(rolls_over_at=_turn(values, each.unit or "deg"))
         if kind == "rectified_current" and name not in given and has_sign(values):
             each = each._replace(kind="signed_current")
         met.append(each)
@@ -233,6 +240,15 @@ def _guesses(
         if alone and each.name not in given:
             met[n] = each._replace(kind="rectified_current")
     return met
+
+
+def _turn(values: Sequence[Array], unit: str) -> float:
+    """A whole turn in a unit if positions jump by it, 0 if not or if the unit is no angle's."""
+    try:
+        turn = to_si(2.0 * pi, "rad", unit, "")
+    except InputError:
+        return 0.0
+    return turn if any(turns_over(part, turn) for part in values) else 0.0
 
 
 def _axes(guesses: Sequence[_Guess], plain: str) -> dict[str, _Axis]:
@@ -273,10 +289,9 @@ def _axis_lines(
     own = '# drive = "hoist"    # a packaged drive or a parameter file, to be fitted'
     if drive is not None:
         own = f"drive = {toml_string(name if name in preset_names() else drive)}"
-    clock = f"{{ rate = 512 }}    # {FIXME}: no column of time found; samples a second"
-    for time in [each for each in guesses if each.kind == "time"][:1]:
-        unit = "" if time.in_header else f', unit = "{time.unit or "s"}"'
-        clock = f"{{ column = {toml_string(time.name)}{unit} }}"
+    clock = f"{NO_TIME}    # {FIXME}: no column of time found; samples a second"
+    clocks = {each.name: _clock(each, guesses) for each in guesses}
+    main = next((clocks[each.name] for each in (*axis.inputs, *guesses)), "") or clock
     start = 'start = "rest"    # at the first sample: rest, steady or estimated'
     which = f'column = "{FIXME}"    # which of {", ".join(repr(each.name) for each in log.columns)}'
     kind = f'kind = "voltage"    # {FIXME}: or current, or other'
@@ -288,12 +303,26 @@ def _axis_lines(
     signals += [(f"channels.{toml_key(key)}", each) for key, each in axis.channels.items()]
     for table, each in signals:
         tables[table] = _signal_lines(each, parts[each.name], counts_per_turn)
+        tables[table] += [clocks[each.name]] * (clocks[each.name] not in ("", main))
     held = 'interpolation = "previous"    # guessed: held between samples; or "linear"'
     tables["input"] += [held, *(f"# another input? '{each.name}'" for each in axis.inputs[1:])]
-    lines = [f"[axes.{toml_key(name)}]", own, f"time = {clock}", start, ""]
+    lines = [f"[axes.{toml_key(name)}]", own, main, start, ""]
     for table, entries in tables.items():
         lines += [f"[axes.{toml_key(name)}.{table}]", *entries, ""]
     return lines
+
+
+def _clock(signal: _Guess, guesses: Sequence[_Guess]) -> str:
+    """A signal's line of time: the first column of time in its group of the file, or of all."""
+
+    def beside(each: _Guess) -> bool:
+        return each.name.rpartition("/")[0] == signal.name.rpartition("/")[0]
+
+    times = sorted((each for each in guesses if each.kind == "time"), key=beside, reverse=True)
+    for time in times[:1]:
+        unit = "" if time.in_header else f', unit = "{time.unit or "s"}"'
+        return f"time = {{ column = {toml_string(time.name)}{unit} }}"
+    return ""
 
 
 def _signal_lines(each: _Guess, parts: Sequence[Array], counts_per_turn: float | None) -> list[str]:
@@ -309,12 +338,13 @@ def _signal_lines(each: _Guess, parts: Sequence[Array], counts_per_turn: float |
         stated = f"counts_per_turn = {counts_per_turn or 0:.12g}"
         lines.append(unknown if counts_per_turn is None else stated)
         lines.append("gear_ratio = 1.0    # turns of the encoder for one turn of the shaft")
-        if size := each.rolls_over_at:
-            lines.append(f"rolls_over_at = {size}    # guessed: begins anew after {size} counts")
     elif not each.in_header:
         usual = "mm" if re.fullmatch(ROD, _words(each.name)) else (*known.units, "1")[0]
+        usual = "deg" if each.rolls_over_at else usual
         why = "from its name" if each.unit else "guessed: the header gives none"
         lines.append(f"unit = {toml_string(each.unit or usual)}    # {why}")
+    if size := each.rolls_over_at:
+        lines.append(f"rolls_over_at = {size:.9g}    # guessed: begins anew there")
     if empty := sum(int(np.count_nonzero(~np.isfinite(part))) for part in parts):
         lines.append(f'missing = "drop"    # guessed: {empty} cells are empty')
     neutral = next((x for part in parts for x in part[np.isfinite(part)][:1].tolist()), 0.0)
@@ -334,18 +364,22 @@ class _Run(NamedTuple):
     peak: float = 0.0
 
 
-def _run(log: Log, rows: int, axes: Mapping[str, _Axis], folder: Path, text: str) -> _Run:
-    """A run, of so many rows; ignored if the file could not be read with it.
+def _run(
+    log: Log, read: Mapping[str, Array], axes: Mapping[str, _Axis], folder: Path, text: str
+) -> _Run:
+    """A run of a log that was read; ignored if the file could not be read with it.
 
     The other lines of the file are the text.
     """
     path, names = log.path.resolve(), {column.name for column in log.columns}
+    rows = max((column.size for column in read.values()), default=0)
+    empty = {name for name, values in read.items() if not np.isfinite(values).any()}
     file = (path.relative_to(folder) if path.is_relative_to(folder) else path).as_posix()
     tested, more = dict[str, _Axis](), list[str]()
     for name, axis in axes.items():
         lacking = {key: e.name for key, e in axis.channels.items() if e.name not in names}
         if all(e.name in names for e in axis.inputs[:1]) and (
-            not axis.channels or len(lacking) < len(axis.channels)
+            not axis.channels or any(e.name in names - empty for e in axis.channels.values())
         ):
             tested[name] = axis
             false = f"axes.{toml_key(name)}.channels.{{}} = false    # no column {{}}"
@@ -358,26 +392,29 @@ def _run(log: Log, rows: int, axes: Mapping[str, _Axis], folder: Path, text: str
     if f'column = "{FIXME}"' in text:
         return made
     whole = text.replace("# counts_per_turn = 1000", "counts_per_turn = 1000")
+    whole = whole.replace(NO_TIME, NO_TIME.lstrip("# "))
     whole = "\n".join([whole, "[[runs]]", f"file = {made.file}", *more])
     try:
-        read = validated(parse_toml(whole, "the draft"), CampaignFile, "the draft")
-        experiments = list(read_run("the draft", "run", read.runs[0], read.axes, log))
+        content = validated(parse_toml(whole, "the draft"), CampaignFile, "the draft")
+        experiments = list(read_run("the draft", "run", content.runs[0], content.axes, log))
     except (FileError, InputError) as error:
         return made._replace(role=f'"ignore"    # {FIXME}: {error}')
-    file, stratum, peak, seen = made.file, "", 0.0, set[str]()
+    said, stratum, peak, seen = made.file, "", 0.0, set[str]()
     for each in (each for each in experiments if each.axis not in seen):
-        if not seen:
+        if not seen and NO_TIME not in text:
             rate = 1.0 / float(np.median(np.diff(each.input.time)))
-            file += f", {each.duration:.4g} s at {rate:.4g} Hz"
+            said += f", {each.duration:.4g} s at {rate:.4g} Hz"
         seen.add(each.axis)
-        file += f", {each.maneuver}" if each.input.kind == "voltage" else ""
+        said += f", {each.maneuver}" if each.input.kind == "voltage" else ""
+        if moves_at_first(each):
+            more.append(f"axes.{toml_key(each.axis)}.{ESTIMATED}    # guessed: it begins in motion")
         away = each.input.values - each.input.values[0]
         low, high = -float(away.min()), float(away.max())
         both = min(low, high) > 0.25 * max(low, high)
         kind = each.recognised.kind if each.recognised else ""
         stratum += f"{kind} {'both' if both else 'up' if high > low else 'down'}, "
         peak = max(peak, low, high)
-    return made._replace(file=file, stratum=stratum, peak=peak)
+    return made._replace(file=said, stratum=stratum, peak=peak)
 
 
 def _held_back(fitted: Sequence[_Run]) -> _Run | None:

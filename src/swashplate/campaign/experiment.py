@@ -108,6 +108,10 @@ class Channel(Result):
     encoder: Encoder | None = None
     counts: Array | None = None
     """(m,) counts of an encoder, unwrapped; before the sign."""
+    stated: float = 1.0
+    """Size of the unit in which the campaign file states it, in `unit`."""
+    rolls_over_at: float | None = None
+    """Reading after which a position begins anew, in `unit`; it is unwrapped."""
 
     @property
     def used(self) -> NDArray[np.bool_]:

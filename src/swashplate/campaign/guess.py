@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from swashplate.campaign.experiment import Channel, Experiment
 from swashplate.campaign.quality import spiked
+from swashplate.campaign.samples import interpolate_counts
 from swashplate.campaign.schema import ChannelKind
 from swashplate.drive import Drive
 from swashplate.equations.cache import kernel
@@ -37,6 +38,8 @@ SHORTEST = 0.005
 """Lag that a drive has at least. [s]"""
 TOLD = 0.01
 """Lag that mean speeds tell from a delay: a fifth of their window, two steps of the march. [s]"""
+FEW = 10.0
+"""Counts in a window at the greatest speed below which an encoder's edges are joined by lines."""
 FEWEST = 40
 """Mean speeds that tell anything."""
 SEEN, NEXT_TO_NOTHING = 1.02, 1e-4
@@ -134,6 +137,8 @@ class _Run(NamedTuple):
     begins: Array
     ends: Array
     speeds: Array
+    coarse: float
+    """Mean speed of one count in a window; 0 of a channel that is no encoder. [unit]"""
 
 
 def _errors(runs: Sequence[_Run], numbers: Array) -> Array:
@@ -213,12 +218,18 @@ def guess_drive(experiments: Sequence[Experiment]) -> Guess:
 def _run(experiment: Experiment, channel: Channel) -> _Run:
     drive, used = experiment.input, channel.used
     time, values = channel.time[used], channel.values[used]
+    interval = float(np.median(np.diff(time)))
+    width, coarse = max(WINDOW, 2.0 * interval), 0.0
+    if channel.encoder is not None:
+        count, rows = abs(channel.encoder.angle_per_count), round(width / interval)
+        coarse = count / width
+        # a slow staircase shows a count in a window or none, whatever the speed between
+        if np.abs(values[rows:] - values[:-rows]).max(initial=0.0) < FEW * count:
+            values = interpolate_counts(time, values)
     travelled = values - values[0]
     if not channel.is_position:
         steps = 0.5 * (values[1:] + values[:-1]) * np.diff(time)
         travelled = np.concatenate([[0.0], np.cumsum(steps)])
-    interval = float(np.median(np.diff(time)))
-    width = max(WINDOW, 2.0 * interval)
     edges = np.arange(max(time[0], drive.time[0]), min(time[-1], drive.time[-1]), width)
     # a window across ignored samples or a gap tells of no speed
     whole = np.ones(max(edges.size - 1, 0), dtype=np.bool_)
@@ -227,7 +238,7 @@ def _run(experiment: Experiment, channel: Channel) -> _Run:
     speeds = np.diff(np.interp(edges, time, travelled))[whole] / width
     grid = np.arange(drive.time[0], drive.time[-1] + STEP, STEP)
     start = 0.0 if experiment.start == "rest" or not speeds.size else float(speeds[0])
-    return _Run(grid, drive.at(grid), start, edges[:-1][whole], edges[1:][whole], speeds)
+    return _Run(grid, drive.at(grid), start, edges[:-1][whole], edges[1:][whole], speeds, coarse)
 
 
 def _searched(runs: Sequence[_Run], speeds: Array, size: Array, scale: float) -> Array:
@@ -284,7 +295,8 @@ def _searched(runs: Sequence[_Run], speeds: Array, size: Array, scale: float) ->
         np.concatenate([whole[:2] + jump * back, whole[2:], jump * tried]) for jump in JUMPS
     )
     whole = np.append(whole, [0.0, 0.0])
-    if SEEN * smaller < cost:
+    coarse = max(run.coarse for run in runs)
+    if SEEN * smaller < cost and numbers_of(jumping)[8:10].max() > coarse:
         cost, whole = smaller, jumping
     # a limit or a jump that makes no difference was not met
     for index in range(6, 12):

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from math import isnan, nan
+from math import ceil, isnan, nan, pi
 from pathlib import Path
 
 import numpy as np
@@ -17,7 +17,12 @@ from numpy.typing import NDArray
 from swashplate.campaign import schema
 from swashplate.campaign.campaign import Campaign, read_campaign_file
 from swashplate.campaign.experiment import Channel, Experiment, InputSignal
-from swashplate.campaign.samples import StampStatistics, find_lost_counts, stamp_statistics
+from swashplate.campaign.samples import (
+    StampStatistics,
+    find_lost_counts,
+    stamp_statistics,
+    turns_over,
+)
 from swashplate.campaign.schema import applying, inside
 from swashplate.parameters.rules import FULL_VOLTAGE
 from swashplate.results import Result
@@ -37,6 +42,9 @@ NEGATIVE = 0.05
 minus its peak."""
 SURE = 6.0
 """Standard deviations that noise does not reach."""
+AT_FIRST, SLOW = 0.1, 0.1
+"""Share of the greatest speed from which a run begins in motion; intervals of a position longer
+than so many seconds tell nothing of it. [s]"""
 NEIGHBOURS = 11
 """Samples of the running median: up to five in a row may be a spike."""
 NAMED = 6
@@ -71,6 +79,7 @@ def examine(experiment: Experiment, unsigned: Collection[str] = ()) -> tuple[Qua
     The sign of `unsigned` channels says nothing, see `unsigned_currents`.
     """
     found, drive = list[Quality](), experiment.input
+    moving = moves_at_first(experiment)
     signals: dict[str, InputSignal | Channel] = {"input": drive, **experiment.channels}
     for name, signal in signals.items():
         stamps, used, limits = stamp_statistics(signal.time), signal.used, signal.limits
@@ -81,6 +90,11 @@ def examine(experiment: Experiment, unsigned: Collection[str] = ()) -> tuple[Qua
         if limits is not None and used.any():
             clipped = float(np.mean((values <= limits[0]) | (values >= limits[1])))
         said = list[str]()
+        if name in moving:
+            said.append(
+                f"moves at the first sample, where the run is said to be at rest: write "
+                f"axes.{experiment.axis}.{ESTIMATED} in this run"
+            )
         # the input's stamps are reported once, with the input
         if signal is drive or not np.array_equal(signal.time, drive.time):
             said += _of_stamps(stamps)
@@ -153,6 +167,40 @@ def turned(driven: Array, motion: Array) -> bool:
     return float(driven @ motion) < -0.5 * size
 
 
+ESTIMATED = 'start = "estimated"'
+"""What the entry of a run says that begins in motion."""
+
+
+def moves_at_first(experiment: Experiment) -> tuple[str, ...]:
+    """Channels that move from the first sample on in a run that is said to begin at rest.
+
+    At a tenth of the greatest speed or more, and above noise, over three intervals, which are long
+    enough for ten steps of the reading at that speed, and not from zero, as a step at the first
+    sample does. At a command of 0 a reading is an instrument's zero error.
+    """
+    found, drive = list[str](), experiment.input
+    still = abs(drive.values[0]) <= 0.02 * np.abs(drive.values).max() and drive.kind != "other"
+    moving = experiment.of_kind("shaft_speed", "position", "encoder_counts")
+    for channel in moving if experiment.start == "rest" and not still else ():
+        time, motion = channel.time[channel.used], channel.values[channel.used]
+        if time.size < 4 * NEIGHBOURS or np.ptp(motion) == 0.0:
+            continue
+        if channel.is_position:
+            coarse, apart = float(np.diff(np.unique(motion)).min()), np.median(np.diff(time))
+            fastest = float(np.quantile(np.abs(np.diff(motion)), 0.998))
+            stride = max(ceil(10.0 * coarse / fastest), 1) if fastest else time.size
+            if stride * apart > SLOW:
+                continue
+            motion = np.diff(motion[::stride]) / np.diff(time[::stride])
+        speeds = motion[:6] * np.sign(motion[0])
+        noise = np.median(np.abs(np.diff(motion)))
+        least = max(AT_FIRST * float(np.quantile(np.abs(motion), 0.998)), 3.0 * noise)
+        grows = np.median(speeds[3:]) > 2.0 * speeds[0]
+        if speeds.size == 6 and speeds[:3].min() > least and not grows:
+            found.append(channel.name)
+    return tuple(found)
+
+
 # --- currents with and without a sign -------------------------------------------------------------
 
 
@@ -194,6 +242,25 @@ def unsigned_currents(experiments: Iterable[Experiment]) -> dict[tuple[str, str]
     }
 
 
+def wrapped_positions(experiments: Iterable[Experiment]) -> dict[tuple[str, str], str]:
+    """Positions that jump by a turn where their angle begins anew, with the line that mends it.
+
+    By axis and channel.
+    """
+    said = dict[tuple[str, str], str]()
+    for each in experiments:
+        for name, channel in each.channels.items():
+            turn = 2.0 * pi
+            angle = channel.kind == "position" and channel.unit == "rad"
+            if angle and turns_over(channel.values[channel.used], turn):
+                size, where = f"{turn / channel.stated:.9g}", f"axes.{each.axis}.channels.{name}"
+                said[each.axis, name] = (
+                    f"'{name}' of the axis '{each.axis}' jumps by about a whole turn, as an angle "
+                    f"that begins anew does; write rolls_over_at = {size} in [{where}]"
+                )
+    return said
+
+
 # --- spikes ---------------------------------------------------------------------------------------
 
 
@@ -208,6 +275,7 @@ def spikes(signal: Channel | InputSignal, drive: InputSignal) -> list[tuple[floa
     A sample is one where it lies more than 8 median absolute deviations from the running median of
     11 samples, and beyond all values of that median by a tenth of their range; or, of a channel
     while the input has stood still for 0.3 s, by a quarter of the range from the median within it.
+    Of a position that begins anew a quarter of a turn is enough: it is read while it goes back.
     """
     from scipy.ndimage import median_filter
 
@@ -227,6 +295,8 @@ def spikes(signal: Channel | InputSignal, drive: InputSignal) -> list[tuple[floa
             grid = np.linspace(-0.3, 0.0, 7)[:, None] + time
             commands = drive.at(grid.ravel()).reshape(grid.shape)
             found |= within & (np.ptp(commands, axis=0) <= 0.02 * np.ptp(drive.values))
+        if isinstance(signal, Channel) and signal.rolls_over_at is not None:
+            found |= off > 0.25 * signal.rolls_over_at
     rows = np.flatnonzero(found & (off > least))
     half = 0.5 * float(np.median(np.diff(time)))
     groups = np.split(rows, np.flatnonzero(np.diff(rows) > NEIGHBOURS // 2) + 1)
@@ -304,7 +374,7 @@ def campaign_findings(campaign: Campaign) -> tuple[str, ...]:
         for axis in dict.fromkeys(each.axis for each in campaign)
         if axis not in moving
     ]
-    return (*found, *unsigned_currents(campaign).values())
+    return (*found, *unsigned_currents(campaign).values(), *wrapped_positions(campaign).values())
 
 
 def beyond_the_card(experiment: Experiment) -> tuple[str, ...]:

@@ -16,9 +16,9 @@ from numpy.typing import NDArray
 from swashplate.campaign import schema
 from swashplate.campaign.experiment import Channel, Encoder, Experiment, InputSignal, Source
 from swashplate.campaign.recognition import recognise
-from swashplate.campaign.samples import ambiguous_gaps, unwrap_counts
+from swashplate.campaign.samples import ambiguous_gaps, unwrap_counts, unwrap_position
 from swashplate.campaign.schema import applying, conversion, ends, inside
-from swashplate.documents import validated
+from swashplate.documents import toml_string, validated
 from swashplate.errors import FileError, InputError
 from swashplate.logs import LONG, Column, Log, check_duration, check_stamps, in_parts, unit_of
 from swashplate.units import to_si
@@ -53,7 +53,9 @@ def read_run(place: str, name: str, run: schema.Run, axes: Axes, log: Log) -> It
         columns = _Columns(part, tested)
         for key, axis in tested.items():
             full = f"{name} {key}" if len(axes) > 1 else name
-            yield from _experiments(full, name, key, run, axis, columns, cut, resumes)
+            others = ", ".join(toml_string(each) for each in tested if each != key)
+            without = f"only = [{others}]" if others else 'role = "ignore"'
+            yield from _experiments(full, name, key, run, axis, columns, cut, resumes, without)
 
 
 def _axes_of(place: str, run: schema.Run, axes: Axes) -> dict[str, schema.Axis]:
@@ -173,14 +175,14 @@ class _Columns:
             kept &= ~inside(window, time)
         missing = kept & ~np.isfinite(numbers)
         rows = np.flatnonzero(missing) + 1 + log.first
+        if not is_input and rows.size and rows.size == kept.sum():
+            return {}, 1.0
         if rows.size and signal.missing == "refuse":
             others = f" and {rows.size - 1} others" if rows.size > 1 else ""
             raise FileError(
                 f"{said} has no finite number in data row {rows[0]}{others}; mend the log, or say "
                 "missing = 'drop' to leave such samples out."
             )
-        if not is_input and rows.size and rows.size == kept.sum():
-            return {}, 1.0
         kept &= ~missing
         if (left := np.count_nonzero(kept)) < 2:
             raise FileError(f"{said} has {left} samples that can be used, but needs two at least.")
@@ -219,37 +221,50 @@ def _experiments(
     columns: _Columns,
     window: str,
     resumes: bool,
+    without: str,
 ) -> Iterator[Experiment]:
     """One experiment, or several where a counter's position across a gap is not known.
 
     Of a window of a long log, with a note on it; one that resumes begins in the midst of a motion.
+    `without` is the entry by which the run leaves the axis out.
     """
     parts, _ = columns.samples("the input", axis.input, axis, run)
     drive = InputSignal(**parts, interpolation=axis.input.interpolation)
     notes, signals, cuts = [window] if window else [], dict[str, Channel](), dict[float, str]()
     for channel, entry in axis.channels.items():
         parts, factor = columns.samples(f"channel '{channel}'", entry, axis, run)
+        if not parts and entry.missing == "refuse":
+            left = f"axes.{key}.channels.{channel} = false" if len(axis.channels) > 1 else without
+            raise FileError(
+                f"{columns.log.path}: column '{entry.column}' (channel '{channel}' of the axis "
+                f"'{key}') has no number at all; leave it out with {left} in this run."
+            )
         if not parts:
             notes.append(f"'{channel}' has no sample here and is left out of this run")
             continue
         time, values, size = parts["time"], parts["values"], entry.rolls_over_at
+        what = "counter" if entry.kind == "encoder_counts" else "position"
         noise = None if entry.noise is None else factor * entry.noise
         counts = encoder = None
         if entry.counts_per_turn is not None:
-            encoder = Encoder(entry.counts_per_turn, entry.gear_ratio, entry.sign, size)
+            modulus = None if size is None else int(size)
+            encoder = Encoder(entry.counts_per_turn, entry.gear_ratio, entry.sign, modulus)
             counts = values
         signals[channel] = Channel(
-            channel, **parts, weight=values, noise=noise, encoder=encoder, counts=counts
+            channel,
+            **{**parts, "weight": values, "noise": noise, "encoder": encoder, "counts": counts},
+            stated=factor,
+            rolls_over_at=None if size is None or encoder is not None else factor * size,
         )
-        for row in ambiguous_gaps(time, values, size) if size is not None else ():
+        for row in ambiguous_gaps(time, values, factor * size) if size is not None else ():
             cuts[float(time[row])] = (
-                f"within the gap of {time[row] - time[row - 1]:.3g} s the counter '{channel}', "
-                f"which begins anew after {size}, may have gone round once more or less"
+                f"within the gap of {time[row] - time[row - 1]:.3g} s the {what} '{channel}', "
+                f"which begins anew after {size:.12g}, may have gone round once more or less"
             )
     if not signals:
         raise InputError(
-            f"{columns.log.path}: its channels have 0 samples that can be used; leave the run out "
-            'with role = "ignore".'
+            f"{columns.log.path}: the channels of the axis '{key}' have 0 samples that can be "
+            f"used; leave it out with {without} in this run."
         )
     unit = {"voltage": "V", "current": "A"}.get(drive.kind, drive.unit)
     for part, (begin, end) in enumerate(pairwise([-np.inf, *sorted(cuts), np.inf])):
@@ -304,13 +319,15 @@ def _finished(
 ) -> Channel:
     """A channel whose counts are unwrapped, with the product of all factors that apply."""
     encoder, counts, values = read.encoder, read.counts, read.values
-    if encoder is not None and counts is not None:
-        try:
+    try:
+        if encoder is not None and counts is not None:
             size = encoder.rolls_over_at
             counts = counts if size is None else unwrap_counts(counts, size)
-        except InputError as error:
-            raise InputError(f"{read.source}: {error}") from None
-        values = counts * encoder.angle_per_count
+            values = counts * encoder.angle_per_count
+        elif read.rolls_over_at is not None:
+            values = unwrap_position(values, read.rolls_over_at)
+    except InputError as error:
+        raise InputError(f"{read.source}: {error}") from None
     weight = np.full(read.time.shape, run.weight * entry.weight)
     if entry.weight_by_input:
         levels, factors = np.transpose(entry.weight_by_input)

@@ -1,5 +1,6 @@
 """Samples and their time stamps, checked; an encoder's counts; one ammeter around both leads."""
 
+from collections.abc import Collection
 from math import ceil, log2
 from typing import NamedTuple
 
@@ -103,12 +104,14 @@ def signal(name: str, values: ArrayLike, rows: int) -> Array:
     return numbers
 
 
-# --- an encoder's counts --------------------------------------------------------------------------
+# --- an encoder's counts, and angles that begin anew ----------------------------------------------
 
 SUSTAINED = 5
 """A speed lasts if the median of this many neighbouring intervals has it."""
 MARGIN = 1.5
 """A jump is this much faster than anything that lasts."""
+BEYOND = 1.05
+"""Readings of an angle reach over no more than this many turns: noise takes them beyond one."""
 
 
 def unwrap_counts(counts: ArrayLike, modulus: int) -> Array:
@@ -152,12 +155,36 @@ def unwrap_counts(counts: ArrayLike, modulus: int) -> Array:
     return np.asarray(readings[0] + np.concatenate([[0.0], np.cumsum(short)]))
 
 
-def _shortest(steps: Array, modulus: int) -> Array:
+def unwrap_position(position: Array, size: float) -> Array:
+    """Position (n,) of a sensor that begins anew after `size`, by the short way at each step.
+
+    A single sample about halfway between two near ones, taken while the sensor went back, does not
+    turn the shaft; it stays what it is, half a turn off.
+
+    Raises
+    ------
+    InputError
+        If the readings reach further than `size` and noise do.
+    """
+    if (reach := float(np.ptp(position))) > BEYOND * size:
+        raise InputError(
+            f"the readings reach over {reach / size:.4g} times rolls_over_at, but a position that "
+            "begins anew stays within it; give its own size, or leave rolls_over_at out."
+        )
+    steps = _shortest(np.diff(position), size)
+    far = np.concatenate([[False], np.abs(steps) > 0.25 * size, [False]])
+    past = _shortest(position[2:] - position[:-2], size)
+    lone = far[1:-2] & far[2:-1] & ~far[:-3] & ~far[3:] & (np.abs(past) < 0.25 * size)
+    steps[1:][lone] = (past - steps[:-1])[lone]
+    return np.asarray(position[0] + np.concatenate([[0.0], np.cumsum(steps)]))
+
+
+def _shortest(steps: Array, modulus: float) -> Array:
     """Steps of a counter by the shorter way round, down where both are as long. [count]"""
     return np.asarray(steps - modulus * np.floor(steps / modulus + 0.5))
 
 
-def ambiguous_gaps(time: Array, readings: Array, modulus: int) -> Rows:
+def ambiguous_gaps(time: Array, readings: Array, modulus: float) -> Rows:
     """Rows after a gap so long that a counter of `modulus` may have gone round in it unseen.
 
     A shaft that goes on at 1.5 times its greatest lasting speed passes half the counter within the
@@ -165,7 +192,7 @@ def ambiguous_gaps(time: Array, readings: Array, modulus: int) -> Rows:
     """
     intervals = np.diff(time)
     gaps = np.flatnonzero(intervals > GAP * np.median(intervals))
-    if not gaps.size or readings.size < 2 * SUSTAINED or np.any(readings != np.floor(readings)):
+    if not gaps.size or readings.size < 2 * SUSTAINED:
         return np.zeros(0, dtype=np.intp)
     # across a gap the shortest way round says nothing of the speed
     usual = np.delete(np.arange(intervals.size), gaps)
@@ -224,24 +251,39 @@ def rolls_over_at(values: Array, counts_per_turn: float | None = None) -> int:
     """
     if values.size < 2 or not np.isfinite(values).all() or np.any(values != np.floor(values)):
         return 0
-    low, high, steps = float(values.min()), float(values.max()), np.diff(values)
+    low, high, turn = float(values.min()), float(values.max()), float(counts_per_turn or 0.0)
     span = high + 1.0 if low >= 0.0 else 2.0 * max(-low, high + 1.0)
+    sizes = {1 << ceil(log2(span)), 100 * ceil(span / 100.0)}
+    if turn.is_integer() and span <= turn <= BEYOND * span:
+        sizes = {int(turn)}
+    return int(_begins_anew(values, span, sizes))
+
+
+def turns_over(position: Array, turn: float) -> bool:
+    """Whether a position (n,) of one unit jumps by about a `turn`, where its angle begins anew."""
+    values = position[np.isfinite(position)]
+    reach = float(np.ptp(values)) if values.size else 0.0
+    within = 0.5 * turn < reach < BEYOND * turn
+    return within and bool(_begins_anew(values, reach, {turn}))
+
+
+def _begins_anew(values: Array, span: float, sizes: Collection[float]) -> float:
+    """Which of some sizes steps over half of the span are short with, the other way round; or 0."""
+    steps = np.diff(values)
     over = np.abs(steps) > 0.5 * span
     # fewer numbers may be those of a switch
     if np.unique(values).size < 32 or not over.any() or over.all():
         return 0
-    usual, turn = steps[~over], float(counts_per_turn or 0.0)
+    usual = steps[~over]
     # larger ones lead across gaps
     ordinary = float(np.quantile(np.abs(usual), 0.998))
     # the steps beside a roll-over are as large as the one across it, taken the other way round
     beside = np.interp(np.flatnonzero(over), np.flatnonzero(~over), usual)
-    sizes = {1 << ceil(log2(span)), 100 * ceil(span / 100.0)}
-    if turn.is_integer() and span <= turn <= 1.05 * span:
-        sizes = {int(turn)}
     across = {size: steps[over] - size * np.round(steps[over] / size) for size in sorted(sizes)}
     best = min(across, key=lambda size: float(np.median(np.abs(across[size] - beside))))
     # across a gap any step may be; the counter's size is known to what the largest reading leaves
-    small = np.mean(np.abs(across[best]) <= 2.0 * ordinary + (best - span)) >= 0.5
+    room = 2.0 * ordinary + max(best - span, 0.0)
+    small = np.mean(np.abs(across[best]) <= room) >= 0.5
     level = np.ptp(np.concatenate([usual, across[best]])) == 0.0
     return best if small and not level and ordinary < 0.25 * best else 0
 

@@ -8,7 +8,7 @@ from typing import Annotated, Any, Literal, NamedTuple, TypeVar, get_args
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict, Field, PositiveFloat, PositiveInt, model_validator
+from pydantic import BaseModel, ConfigDict, Field, PositiveFloat, model_validator
 
 from swashplate.errors import InputError
 from swashplate.logs import TextOptions
@@ -259,8 +259,10 @@ class Channel(Signal):
     gear_ratio: Positive = Field(
         1.0, description="Turns of the encoder for one turn of the axis's shaft."
     )
-    rolls_over_at: PositiveInt | None = Field(
-        None, description="Counts after which the counter begins anew: 65536 for 16 bits."
+    rolls_over_at: Positive | None = Field(
+        None,
+        description="Counts after which the counter begins anew, 65536 for 16 bits; of a position "
+        "the reading in `unit`, 360 for deg.",
     )
     noise: Positive | None = Field(
         None, description="Standard deviation of its noise in `unit`: the weight among channels."
@@ -276,8 +278,12 @@ class Channel(Signal):
     def _encoder(self) -> Channel:
         if self.kind == "encoder_counts" and self.counts_per_turn is None:
             raise ValueError("encoder_counts need counts_per_turn, quadrature included")
-        if self.kind != "encoder_counts" and (self.counts_per_turn or self.rolls_over_at):
-            raise ValueError("counts_per_turn and rolls_over_at belong to encoder_counts alone")
+        if self.kind != "encoder_counts" and self.counts_per_turn:
+            raise ValueError("counts_per_turn belongs to encoder_counts alone")
+        if self.kind not in ("encoder_counts", "position") and self.rolls_over_at:
+            raise ValueError("rolls_over_at belongs to encoder_counts and positions alone")
+        if self.kind == "encoder_counts" and not (self.rolls_over_at or 1.0).is_integer():
+            raise ValueError("rolls_over_at of encoder_counts is a whole number of counts")
         levels = [level for level, _ in self.weight_by_input]
         if levels != sorted(set(levels)):
             raise ValueError("the inputs of weight_by_input must increase")

@@ -13,7 +13,13 @@ from numpy.typing import NDArray
 
 from swashplate.campaign.campaign import Campaign
 from swashplate.campaign.experiment import Channel, Experiment
-from swashplate.campaign.quality import beyond_the_card, spiked, turned, unsigned_currents
+from swashplate.campaign.quality import (
+    beyond_the_card,
+    spiked,
+    turned,
+    unsigned_currents,
+    wrapped_positions,
+)
 from swashplate.errors import InputError
 from swashplate.identification.drive_model import SIGNALS, simulated_run
 from swashplate.identification.model import EquationModel
@@ -66,8 +72,8 @@ def check_runs(experiments: Sequence[Experiment], nominal: ParameterSet) -> list
     everything that is wrong is always listed at once. Runs or a drive that cannot be simulated are
     refused in an `InputError` or a `DomainError`.
     """
-    unsigned = unsigned_currents(experiments).items()
-    found = [refusal(None, name, f"{said}.") for (_, name), said in unsigned]
+    unsigned = {**unsigned_currents(experiments), **wrapped_positions(experiments)}
+    found = [refusal(None, name, f"{said}.") for (_, name), said in unsigned.items()]
     for each in experiments:
         found += _samples(each, [n for n, c in each.channels.items() if c.kind in SIGNALS])
     if not _refused(found):
@@ -85,10 +91,12 @@ def check_runs(experiments: Sequence[Experiment], nominal: ParameterSet) -> list
 def check_model(experiments: Sequence[Experiment], setup: ModelSetup) -> list[Finding]:
     """What stands in the way of a fit of a model of one's own, as `check_runs` of a drive.
 
-    Whatever the model: samples that are no numbers, sensors that stand still while their input
-    moves, and a run that is there twice.
+    Whatever the model: samples that are no numbers, angles that begin anew, sensors that stand
+    still while their input moves, and a run that is there twice.
     """
-    found, seen = list[Finding](), dict[bytes, str]()
+    wrapped, seen = wrapped_positions(experiments), dict[bytes, str]()
+    fitted = setup.channels or tuple(name for _, name in wrapped)
+    found = [refusal(None, n, f"{said}.") for (_, n), said in wrapped.items() if n in fitted]
     for each in experiments:
         found += _samples(each, setup.channels or tuple(each.channels))
     if _refused(found):

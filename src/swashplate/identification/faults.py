@@ -67,6 +67,8 @@ LAG = 0.01
 FASTEST, WINDOW = 0.99, 0.0625
 """Part of the largest measured speed beyond which a counter is asked whether it follows, and the
 time over which that speed is taken. [s]"""
+TO_AND_FRO = 0.05
+"""Share of a channel's changes that turn back by more than one step where it is noisy. [1]"""
 DWELLS = 0.1
 """Time for which a noisy channel stands at its very largest value only if it is clipped. [s]"""
 
@@ -282,8 +284,10 @@ def clipped_channels(experiments: Sequence[Experiment]) -> tuple[str, ...]:
     """Sentences on channels that stand at an end of their instrument, with the limits to state.
 
     A channel is clipped where it reads its very largest or smallest value for 0.1 s and longer
-    while the input moves by more than a tenth of its range: no noisy signal does that. Positions
-    are passed over, as they stand still by themselves.
+    while the input moves by more than a tenth of its range: no noisy signal does that. Nor does one
+    stand there so long at inputs that far apart, a machine at its stop included; but one without
+    noise does, and one that reads it at a run's first sample is at rest. Positions are passed over,
+    as they stand still by themselves.
     """
     said = []
     for name in dict.fromkeys(name for each in experiments for name in each.channels):
@@ -296,30 +300,51 @@ def clipped_channels(experiments: Sequence[Experiment]) -> tuple[str, ...]:
         for end in (low, high):
             if any(end in (each[name].limits or ()) for each in runs):
                 continue
-            moved = max((_moved_at(end, each, name) for each in runs), default=0.0)
-            if moved <= 0.1 * reach:
+            spans = np.array([span for each in runs for span in _inputs_at(end, each, name)])
+            if not spans.size or low == high:
                 continue
+            rests = any(each[name].values[0] == end for each in runs)
+            moved, apart = float(np.ptp(spans, axis=1).max()), float(np.ptp(spans))
             # a rounded reading stands still by itself for as long as a step of it lasts
             coarse = float(np.diff(np.unique(np.round(values / (high - low), 9))).min())
+            step = max(coarse, 3e-4) * (high - low)
+            if apart > moved and not rests and _is_noisy(values, step):
+                moved = apart
             if moved > (0.1 + 2.0 * coarse) * reach:
                 said.append(
-                    f"'{name}' stands at exactly {end:.6g} {runs[0][name].unit} while the input "
-                    f"moves by {moved:.3g} {runs[0].input.unit}: it is clipped there. Set limits = "
-                    f"[{low:.6g}, {high:.6g}] in its channel, and such samples are ignored."
+                    f"'{name}' stands at exactly {end:.6g} {runs[0][name].unit} at inputs that "
+                    f"differ by {moved:.3g} {runs[0].input.unit}: it is clipped there. "
+                    f"Set limits = [{low:.6g}, {high:.6g}] in its channel, and such samples are "
+                    "ignored."
                 )
     return tuple(said)
 
 
-def _moved_at(end: float, experiment: Experiment, name: str) -> float:
-    """By how much the input moves in any stretch in which a channel stands at an end.
+def _inputs_at(end: float, experiment: Experiment, name: str) -> list[tuple[float, float]]:
+    """Smallest and largest input of each stretch in which a channel stands at an end.
 
     In its first three quarters: a rounded reading that lags stays where it is when the input has
     left already.
     """
-    channel, most = experiment[name], 0.0
+    channel, spans = experiment[name], list[tuple[float, float]]()
     edges = np.flatnonzero(np.diff(np.concatenate([[0], channel.values == end, [0]])))
     for first, after in zip(edges[::2], edges[1::2], strict=True):
         if channel.time[after - 1] - channel.time[first] >= DWELLS:
             stretch = channel.time[first : after - (after - first) // 4]
-            most = max(most, float(np.ptp(experiment.input.at(stretch))))
-    return most
+            inputs = experiment.input.at(stretch)
+            spans.append((float(inputs.min()), float(inputs.max())))
+    return spans
+
+
+def _is_noisy(values: Array, step: float) -> bool:
+    """Whether samples (n,) go to and fro by two of their steps or more, both ends left out.
+
+    No motion does that from sample to sample, nor rounding. Of the pairs of changes that noise of
+    one step makes, a tenth are such.
+    """
+    inner = (values > values.min()) & (values < values.max())
+    first, after = np.diff(values)[:-1], np.diff(values)[1:]
+    within = inner[:-2] & inner[1:-1] & inner[2:]
+    least = np.minimum(np.abs(first), np.abs(after))
+    turns = within & (first * after < 0.0) & (least > 1.5 * step)
+    return bool(turns.sum() > TO_AND_FRO * max(within.sum(), 1))

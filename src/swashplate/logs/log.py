@@ -82,6 +82,7 @@ class Log:
         matches: list[str] = []
         for found in (
             [name for name in names if name == wanted],
+            [name for name in names if name.lstrip("/") == wanted.lstrip("/")],
             [name for name, bare in names.items() if bare == wanted],
             [name for name in names if suffixed.fullmatch(name)],
             [name for name, bare in names.items() if wanted in (_last(name), _last(bare))],
