@@ -87,6 +87,8 @@ def test_an_encoding_that_must_be_given(text, all_of):
         ("time,voltage,n\n[s],[mV],\n0,1.5,2\n", ["s", "mV", None]),
         ("time,voltage,n\ns,mV,1\n0,1.5,2\n", ["s", "mV", "1"]),
         ("time,speed,pressure\nms,1/min,N/mm²\n0,1.5,2\n", ["ms", "1/min", "N/mm²"]),
+        ("t;u;n\ns;V;U/min\n0;1,5;2\n", ["s", "V", "U/min"]),
+        ("t;u;n\ns;V;tr/min\n0;1,5;2\n", ["s", "V", "tr/min"]),
         ("time [s] voltage [mV]\n0 1.5\n", ["s", "mV"]),
         ("# time,voltage\n# s,mV\n0,1.5\n", ["s", "mV"]),
         ("time_ms,voltage_mV\n0,1.5\n", [None, None]),

@@ -38,7 +38,10 @@ NO_TIME = "# time = { rate = 512 }"
 NO_ENCODER = "# No column looks like an encoder's counts"
 FIXME = "FIXME"
 """What the lines hold that say what the draft leaves out or open."""
-TIME = r"time|zeit|uhrzeit|stamp|timestamp|time stamp|datetime|date time|clock|t|seconds?|exp time"
+TIME = (
+    r"time|zeit|uhrzeit|zeitstempel|temps|stamp|timestamp|time stamp|datetime|date time|clock|t|"
+    r"seconds?|exp time"
+)
 """Names of columns of time stamps; those of signals are in `KINDS`."""
 ROD = r"(?:.* )?(?:ms|displacement|stroke|cylinder|rod|extension|hub|weg)"
 """Names of positions that are a rod's and not a shaft's."""

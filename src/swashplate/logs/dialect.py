@@ -14,6 +14,7 @@ from typing import Any, ClassVar, Literal, NamedTuple
 
 from swashplate.errors import FileError, InputError
 from swashplate.logs.log import Column, check_kind, printable, split_unit
+from swashplate.units import speed_unit
 
 _NAMED = {"comma": ",", "semicolon": ";", "tab": "\t", "space": " ", "spaces": " ", "bar": "|"}
 _COMMENTS = ("#", "%", "//")
@@ -460,7 +461,7 @@ def _units_of(cells: Sequence[str]) -> _Units | None:
 
 
 def _is_unit(cell: str) -> bool:
-    if _BRACKETS.fullmatch(cell) or cell.lower() in _KNOWN:
+    if _BRACKETS.fullmatch(cell) or cell.lower() in _KNOWN or speed_unit(cell) != cell:
         return True
     parts = [part for part in _PARTS.split(cell.lower()) if part]
     return bool(parts) and all(part in _KNOWN for part in parts)
