@@ -51,15 +51,17 @@ COMMANDS = {
 }
 
 
-def runs(kind: str = "shaft_speed", noise: float = 0.02, **numbers: float) -> list[Experiment]:
-    """A run of each command, measured by a tacho or by a position."""
+def runs(
+    kind: str = "shaft_speed", noise: float = 0.02, rough: float = 0.0, **numbers: float
+) -> list[Experiment]:
+    """A run of each command, measured by a tacho or by a position, which may be rough."""
     random, made = np.random.default_rng(1), []
     for name, command in COMMANDS.items():
         speed = machine(command, **numbers)
         position = np.concatenate([[0.0], np.cumsum(0.5 * (speed[1:] + speed[:-1])) / RATE])
         values = speed + random.normal(0.0, noise, TIME.size)
         if kind == "position":
-            values = np.round(position, 3)
+            values = np.round(position + random.normal(0.0, rough, TIME.size), 3)
         unit = "rad/s" if kind == "shaft_speed" else "rad"
         channel = Channel("measured", kind, unit, TIME, values, np.ones(TIME.size), SOURCE)
         signal = InputSignal("voltage", "V", TIME, command, "previous", SOURCE)
@@ -80,6 +82,14 @@ def test_dead_zones_gains_lag_and_delay_are_found_again(kind: str) -> None:
     assert found.top_speed == found.acceleration == (np.inf, np.inf)
     assert found.unit == "rad/s"
     assert found.fit_percent > 97.0
+
+
+def test_a_noisy_position_shows_the_same() -> None:
+    """Neighbours differ by up to 20 times what the machine moves in between."""
+    found = guess_drive(runs("position", rough=0.1))
+    assert found.dead_zone == pytest.approx(DEAD, abs=0.15)
+    assert found.gain == pytest.approx(GAIN, rel=0.05)
+    assert found.lag + found.delay == pytest.approx(LAG + DELAY, abs=0.05)
 
 
 def test_limits_are_found_where_they_act() -> None:

@@ -40,6 +40,8 @@ TOLD = 0.01
 """Lag that mean speeds tell from a delay: a fifth of their window, two steps of the march. [s]"""
 FEW = 10.0
 """Counts in a window at the greatest speed below which an encoder's edges are joined by lines."""
+QUIET = 0.05
+"""Noise of mean speeds over the greatest one, to which windows of a noisy position are widened."""
 FEWEST = 40
 """Mean speeds that tell anything."""
 SEEN, NEXT_TO_NOTHING = 1.02, 1e-4
@@ -129,13 +131,14 @@ def march_guess(
 
 
 class _Run(NamedTuple):
-    """A run on the march's grid (n,), and mean speeds (m,) in windows between edges (m,) [s]."""
+    """A run on the march's grid (n,), and mean speeds (m,) of windows that begin at edges (m,)."""
 
     time: Array
     command: Array
     start: float
     begins: Array
-    ends: Array
+    width: float
+    """[s]"""
     speeds: Array
     coarse: float
     """Mean speed of one count in a window; 0 of a channel that is no encoder. [unit]"""
@@ -150,9 +153,18 @@ def _errors(runs: Sequence[_Run], numbers: Array) -> Array:
         command = np.interp(run.time - numbers[11], run.time, run.command)
         edge = EDGE * float(np.abs(run.command).max()) or 1.0
         march_guess(command, STEP, numbers, share, edge, position)
-        there, back = (np.interp(each, run.time, position) for each in (run.ends, run.begins))
-        errors.append((there - back) / (run.ends - run.begins) - run.speeds)
+        errors.append(_mean_speeds(run.time, position, run.begins, run.width) - run.speeds)
     return np.concatenate(errors)
+
+
+def _mean_speeds(time: Array, position: Array, begins: Array, width: float) -> Array:
+    """Change (m,) of the mean position from a window to the next, over its width [s].
+
+    All samples of a noisy position count, which a difference of two of them would lose.
+    """
+    area = np.concatenate([[0.0], np.cumsum(0.5 * (position[1:] + position[:-1]) * np.diff(time))])
+    first, middle, last = (np.interp(begins + k * width, time, area) for k in range(3))
+    return np.asarray((last - 2.0 * middle + first) / width**2)
 
 
 def guess_drive(experiments: Sequence[Experiment]) -> Guess:
@@ -230,15 +242,28 @@ def _run(experiment: Experiment, channel: Channel) -> _Run:
     if not channel.is_position:
         steps = 0.5 * (values[1:] + values[:-1]) * np.diff(time)
         travelled = np.concatenate([[0.0], np.cumsum(steps)])
-    edges = np.arange(max(time[0], drive.time[0]), min(time[-1], drive.time[-1]), width)
-    # a window across ignored samples or a gap tells of no speed
-    whole = np.ones(max(edges.size - 1, 0), dtype=np.bool_)
+    if channel.kind == "position":
+        width = max(width, _quiet_width(time, values, interval))
+    ends = max(time[0], drive.time[0]), min(time[-1], drive.time[-1])
+    begins = np.arange(ends[0], ends[1] - 2.0 * width, width)
+    # windows across ignored samples or a gap tell of no speed
     for gap in np.flatnonzero(np.diff(time) > 3.0 * interval):
-        whole &= (edges[:-1] >= time[gap + 1]) | (edges[1:] <= time[gap])
-    speeds = np.diff(np.interp(edges, time, travelled))[whole] / width
+        begins = begins[(begins >= time[gap + 1]) | (begins + 2.0 * width <= time[gap])]
+    speeds = _mean_speeds(time, travelled, begins, width)
     grid = np.arange(drive.time[0], drive.time[-1] + STEP, STEP)
     start = 0.0 if experiment.start == "rest" or not speeds.size else float(speeds[0])
-    return _Run(grid, drive.at(grid), start, edges[:-1][whole], edges[1:][whole], speeds, coarse)
+    return _Run(grid, drive.at(grid), start, begins, width, speeds, coarse)
+
+
+def _quiet_width(time: Array, position: Array, interval: float) -> float:
+    """Windows in which white noise of a position leaves 5 % of its greatest speed. [s]"""
+    # 20 = 1 + 9 + 9 + 1, of the squares of a third difference
+    noise = float(np.median(np.abs(np.diff(position, 3)))) / (0.6745 * sqrt(20.0))
+    rough = max(round(0.5 / interval), 1)
+    moved = np.abs(position[rough:] - position[:-rough]) / (time[rough:] - time[:-rough])
+    fastest = float(moved.max(initial=0.0))
+    # of means over w/h samples the difference over w has the deviation noise √(2 h)/w^1.5
+    return (noise * sqrt(2.0 * interval) / (QUIET * fastest)) ** (2.0 / 3.0) if fastest else 0.0
 
 
 def _searched(runs: Sequence[_Run], speeds: Array, size: Array, scale: float) -> Array:

@@ -76,7 +76,8 @@ KINDS: Mapping[str, Kind] = {
         "displacement of the spool, positive with the force", "spool position|spool"),
     "shaft_speed": Kind(("rad/s", "m/s"), "shaft_speed",
         "speed of the shaft, or of a cylinder's rod",
-        r"speed|rpm|omega|velocity|drehzahl|vitesse|n|n \w+", ("rad/s", "deg/s", "rpm", "m/s", "mm/s")),
+        r"speed|rpm|omega|velocity|drehzahl|vitesse|n|n \w+",
+        ("rad/s", "deg/s", "rpm", "m/s", "mm/s")),
     "position": Kind(("rad", "m"), "shaft_position", "integral of the speed from a free zero",
         "position|pos|angle|pos fb|ms|displacement|stroke|cylinder|rod|extension|hub|weg"),
 }

@@ -208,7 +208,7 @@ def of_instrument(
         last = np.maximum.accumulate(np.where(turned != 0.0, np.arange(turned.size), 0))
         way = turned[last] * (np.abs(slope) > 1e-3 * np.abs(slope).max(initial=0.0))
         lost, angle = np.ones_like(time), channel.unit.startswith("rad")
-        unit, factor = ("deg", degrees(1.0)) if angle else (channel.unit, 1.0)
+        unit, factor = channel.unit.replace("rad", "deg"), degrees(1.0) if angle else 1.0
         if channel.is_position:
             step, unit = np.diff(time, prepend=time[:1]), f"{unit}/s"
             beyond = np.sign(slope) * np.maximum(np.abs(slope) - FASTEST * largest, 0.0)
