@@ -191,7 +191,7 @@ def guess_drive(experiments: Sequence[Experiment]) -> Guess:
             raise InputError(
                 f"{each.input.source}: the input is of the kind '{each.input.kind}', but a guess "
                 'needs a command in V: write kind = "voltage", unit = "V", and a scale that makes '
-                "its full range ±10 V."
+                "its full range ±10 V; an offset is added after scaling, in V."
             )
         sentence, gross = spoilt.get((each.name, channel.name), ("", False))
         if gross:
