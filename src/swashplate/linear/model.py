@@ -210,8 +210,8 @@ class LinearModel:
         level = abs(self.gain) / np.sqrt(2.0)
         if level == inf:
             raise DomainError(
-                f"{self.name}: {self.outputs[0]} integrates {self.input} (its gain is infinite), so it "
-                "has no bandwidth; ask for the margins of a loop around it."
+                f"{self.name}: {self.outputs[0]} integrates {self.input}, with an infinite gain, "
+                "so it has no bandwidth; ask for the margins of a loop around it."
             )
         falls = _roots(lambda f: np.abs(self.response(f)[0]) - level, grid)
         return falls[0] if falls else inf
