@@ -377,6 +377,11 @@ class ModelSetup(Result):
                         f"{name}: the {what} of '{key}' is {number!r}, but must be {must}."
                     )
         free = {key: _unknown(key, each) for key, each in self.free.items()}
+        ranges = equations.ranges if isinstance(equations, Equations) else {}
+        for key, each in free.items():
+            for bound in (each.low, each.high):
+                if key in ranges and not ranges[key].holds(bound):
+                    raise ParameterError(f"{name}, a bound: {ranges[key].broken(key, bound)}.")
         for key, made in {"model": own, "name": name, "free": free}.items():
             object.__setattr__(self, key, made)
         _ = self.setup  # refuses what is no uncertainty

@@ -141,6 +141,9 @@ def simulate_many(
         rule = "a finite number, at least 0" if late else "a finite number"
         for i in np.flatnonzero(~np.isfinite(column) | (late & (column < 0.0))):
             failures[int(i)] = f"{model.name}: {path} is {column[i]:g}, but must be {rule}."
+        if path in model.ranges:
+            for i in np.flatnonzero(~model.ranges[path].holds(column)):
+                failures[int(i)] = f"{model.name}: {model.ranges[path].broken(path, column[i])}."
     columns = {path: np.full(count, number) for path, number in numbers.items()} | values
     good = np.setdiff1d(np.arange(count), list(failures))
     blocks = [(good[k : k + LANES], instance.options) for k in range(0, good.size, LANES)]

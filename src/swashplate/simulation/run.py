@@ -51,6 +51,11 @@ def drive_records(
     found = on_grid(inputs, rate, time=time, interpolation=between, substeps=steps)
     if driver == "voltage":
         found["voltage"] = check_voltage(found["voltage"], clip)
+    if (supply := found.get("supply_pressure")) and not (low := supply.values.min()) > 0.0:
+        raise InputError(
+            f"The supply_pressure falls to {low:g} Pa, but must be above 0: it is the supply less "
+            "the static pressure."
+        )
     return found
 
 

@@ -19,9 +19,17 @@ from swashplate.equations.fields import floats_of, is_real, made, numbers_of, va
 from swashplate.equations.marching.march import march_source
 from swashplate.equations.marching.part import Stored, taps_of
 from swashplate.equations.marching.pieces import Planned, addresses, piece, pointers, run_once
-from swashplate.equations.model import Link, Model, Window, arguments_of, place, state_paths
+from swashplate.equations.model import (
+    Link,
+    Model,
+    Window,
+    arguments_of,
+    parameter_paths,
+    place,
+    state_paths,
+)
 from swashplate.equations.syntax import plain
-from swashplate.errors import DomainError, InputError
+from swashplate.errors import DomainError, InputError, ParameterError
 
 Array = NDArray[np.float64]
 Start = Literal["rest", "steady"]
@@ -266,6 +274,8 @@ def instance_of(
     ------
     InputError
         If a tuple has not the type that the model declares.
+    ParameterError
+        If a parameter lies beyond the range of its `Definition`.
     """
     parts = []
     for part in model.parts:
@@ -298,7 +308,12 @@ def instance_of(
         if own.options is not None:  # off is None, so that code is made for one form of it
             own = own._replace(options=type(own.options)(*(each or None for each in own.options)))
         parts.append(own)
-    return Instance(model, tuple(parts), name or model.name)
+    instance = Instance(model, tuple(parts), name or model.name)
+    numbers = dict(zip(parameter_paths(model), instance.params.tolist(), strict=True))
+    for path, definition in model.ranges.items():
+        if not definition.holds(numbers[path]):
+            raise ParameterError(f"{instance.name}: {definition.broken(path, numbers[path])}.")
+    return instance
 
 
 # --- marching -------------------------------------------------------------------------------------
