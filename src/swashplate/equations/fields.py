@@ -11,11 +11,12 @@ from dataclasses import dataclass, field
 from enum import Enum
 from functools import cache
 from math import inf, isfinite
-from typing import Any, Final, NamedTuple, get_type_hints
+from typing import Any, Final, NamedTuple, TypeGuard, get_type_hints
 
 import numpy as np
 
 from swashplate.equations.syntax import is_named_tuple
+from swashplate.errors import InputError
 
 Flag = bool | None
 """An option: None is off, True is on. In compiled code they are two types, and the branch that is
@@ -166,9 +167,15 @@ def _floats_of(kind: Any) -> tuple[str, ...]:
 floats_of: Callable[[Any], tuple[str, ...]] = cache(_floats_of)
 
 
-def is_real(value: object) -> bool:
+def is_real(value: object) -> TypeGuard[float]:
     """Whether something is a real number, finite or not."""
     return isinstance(value, int | float | np.integer | np.floating)
+
+
+def check_mapping(what: str, given: object) -> None:
+    """Refuse what is no mapping of names to values."""
+    if not isinstance(given, Mapping):
+        raise InputError(f"{what} is {given!r}, but must be a mapping of names to values.")
 
 
 def value_at(value: Any, path: str) -> Any:

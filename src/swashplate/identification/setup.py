@@ -22,7 +22,7 @@ from swashplate.campaign.experiment import Experiment
 from swashplate.campaign.schema import Finite, NotNegative, Positive, Weight, Window
 from swashplate.documents import parse_toml, read_text, validated
 from swashplate.equations import Model as Equations
-from swashplate.equations.fields import is_real
+from swashplate.equations.fields import check_mapping, is_real
 from swashplate.errors import FileError, InputError, ParameterError
 from swashplate.identification.model import OFFSET, OwnModel, simulated
 from swashplate.identification.problem import Problem, noise_scales
@@ -345,9 +345,7 @@ class ModelSetup(Result):
 
     def __post_init__(self) -> None:
         for what in ("free", "noise", "fixed", "standard_uncertainty"):
-            if not isinstance(given := getattr(self, what), Mapping):
-                means = "lower bound, nominal value and upper bound" if what == "free" else "values"
-                raise InputError(f"{what} is {given!r}, but must be a mapping of names to {means}.")
+            check_mapping(what, getattr(self, what))
         if isinstance(self.channels, str):
             raise InputError(f"Give the channels as ('{self.channels}',).")
         own = OwnModel(self.model) if isinstance(self.model, Equations) else self.model

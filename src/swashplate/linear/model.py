@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from swashplate.equations.marching.record import column
 from swashplate.errors import DomainError, InputError
 from swashplate.tables import Form, ending, write_text
 
@@ -142,11 +143,11 @@ class LinearModel:
         e^(-jω delay) with G = C (p - A)⁻¹ B + D, p being jω or, sampled, e^(jωh). At 0 Hz it is
         infinite of an output that integrates, with the sign of its growth.
         """
-        f = np.atleast_1d(np.asarray(frequency, dtype=np.float64))
+        f = column(np.atleast_1d(np.asarray(frequency)), "The frequency", finite=False)
         h = self.sample_time
         highest = inf if h is None else 0.5 / h
         # half the rate may have been computed in another way
-        if f.ndim != 1 or not (np.isfinite(f) & (f >= 0.0) & (f <= highest * (1.0 + 1e-12))).all():
+        if not (np.isfinite(f) & (f >= 0.0) & (f <= highest * (1.0 + 1e-12))).all():
             raise InputError(
                 "Frequencies must be one row of finite numbers from 0 on"
                 + ("." if h is None else f" to 1/(2 h) = {highest:g} Hz.")
@@ -239,7 +240,12 @@ class LinearModel:
         """
 
         def loop(frequency: Array) -> ComplexArray:
-            factor = controller(frequency) if callable(controller) else controller
+            factor = np.asarray(controller(frequency) if callable(controller) else controller)
+            if factor.dtype.kind not in "iufc" or factor.shape not in ((), frequency.shape):
+                raise InputError(
+                    f"{self.name}: the controller must be a gain, or a function of frequencies "
+                    "[Hz] that gives as many numbers."
+                )
             return np.asarray(factor * self.response(frequency)[0])
 
         return loop_margins(loop, self.delay, self._fastest(), self.name)

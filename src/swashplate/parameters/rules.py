@@ -163,6 +163,7 @@ def applied(rule: Rule, n: Values) -> Broken:
 
 def range_rule(definition: Definition, column: str, values: Array) -> Broken:
     """Which values lie outside a definition's range, and what is wrong with one of them."""
+
     def sentence(i: int) -> str:
         value, hint = float(values[i]), ""
         if value < 0.0 and definition.directional and isfinite(value):

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from swashplate.equations import Model, instance_of, parameter_paths, state_paths
+from swashplate.equations.fields import check_mapping
 from swashplate.equations.library import TAN_22_5
 from swashplate.equations.marching.lanes import LANES, lanes_of
 from swashplate.equations.marching.march import output_of
@@ -365,6 +366,7 @@ def _make_folder(folder: Path) -> None:
 
 def _given_sets(changes: Mapping[str, ArrayLike]) -> tuple[dict[str, Array], int]:
     """Values as columns, and how many sets there are."""
+    check_mapping("changes", changes)
     values: dict[str, Array] = {}
     for name, given in changes.items():
         column = np.asarray(given)

@@ -15,7 +15,14 @@ from numpy.typing import NDArray
 from swashplate.equations.cache import generated, kernel
 from swashplate.equations.code import compiled_names, generating
 from swashplate.equations.equation import inlined, interpreted
-from swashplate.equations.fields import floats_of, is_real, made, numbers_of, value_at
+from swashplate.equations.fields import (
+    check_mapping,
+    floats_of,
+    is_real,
+    made,
+    numbers_of,
+    value_at,
+)
 from swashplate.equations.marching.march import march_source
 from swashplate.equations.marching.part import Stored, taps_of
 from swashplate.equations.marching.pieces import Planned, addresses, piece, pointers, run_once
@@ -287,7 +294,7 @@ def instance_of(
         kinds = {"parameters": part.parameters, "options": part.options, "given": part.given}
         for (what, kind), number in zip(kinds.items(), own, strict=True):
             if kind is None:
-                if number is not None and len(model.parts) == 1 and what != "options":
+                if number is not None and len(model.parts) == 1:
                     raise InputError(f"Model {part.name} has no {what}, but is passed {number!r}.")
                 continue
             if not isinstance(number, kind):
@@ -372,6 +379,7 @@ def marched(
 
 def begun(instance: Instance, started: Started, begin: Mapping[str, float]) -> Array:
     """States as numbers, some of them as given by path."""
+    check_mapping("begin", begin)
     states = started.flat
     known = state_paths(instance.model) if begin else ()
     for path, value in begin.items():
