@@ -99,7 +99,7 @@ WRONG: list[tuple[Callable[..., Any], tuple[Any, ...], str]] = [
     (lambda outputs: linear(outputs=outputs), ((),), "needs an output"),
     (lambda model: linearize(model, STILL, 0.1), (LAG, None), "is no model with numbers"),
     (lambda k: linear().margins(k), ("a", None, lambda f: f[:3]), "the controller must be a gain"),
-    (lambda f: linear().response(f), ("a", None), "The frequency must be a sequence of real num"),
+    (lambda f: linear().response(f), ("a", None), "Frequencies must be one row of finite num"),
     (
         lambda begin: simulated(begin=begin),
         ((1, 2), 3, "place", [("place", 1.0)]),

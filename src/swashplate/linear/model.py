@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from swashplate.equations.marching.record import column
 from swashplate.errors import DomainError, InputError
 from swashplate.tables import Form, ending, write_text
 
@@ -24,7 +23,7 @@ ComplexArray = NDArray[np.complex128]
 Matrices = tuple[Array, Array, Array, Array]
 Response = Callable[[Array], ComplexArray]
 
-INTEGRATES = 1e-7
+INTEGRATES = 3e-8
 """Distance from s = 0, or z = 1, by the size of the poles, at which a pole counts as there.
 
 Two that integrate one after the other are found some 1e-8 apart."""
@@ -143,11 +142,12 @@ class LinearModel:
         e^(-jω delay) with G = C (p - A)⁻¹ B + D, p being jω or, sampled, e^(jωh). At 0 Hz it is
         infinite of an output that integrates, with the sign of its growth.
         """
-        f = column(np.atleast_1d(np.asarray(frequency)), "The frequency", finite=False)
+        f = np.atleast_1d(np.asarray(frequency))
         h = self.sample_time
         highest = inf if h is None else 0.5 / h
         # half the rate may have been computed in another way
-        if not (np.isfinite(f) & (f >= 0.0) & (f <= highest * (1.0 + 1e-12))).all():
+        numbers = f.dtype.kind in "fiub" and f.ndim == 1
+        if not numbers or not (np.isfinite(f) & (f >= 0.0) & (f <= highest * (1.0 + 1e-12))).all():
             raise InputError(
                 "Frequencies must be one row of finite numbers from 0 on"
                 + ("." if h is None else f" to 1/(2 h) = {highest:g} Hz.")
