@@ -140,8 +140,9 @@ def least_substeps(rate: float, wanted: int | None = None) -> int:
         For a rate out of range, or too few steps.
     """
     if not is_real(rate) or not SLOWEST <= rate <= FASTEST:
+        shown = f"{rate:g}" if is_real(rate) else repr(rate)
         raise InputError(
-            f"The rate is {rate!r} Hz, but must be between {SLOWEST:g} and {FASTEST:g} Hz."
+            f"The rate is {shown} Hz, but must be between {SLOWEST:g} and {FASTEST:g} Hz."
         )
     least = max(ceil(SOURCE_RATE / rate - 1e-9), 1)
     if is_real(wanted) and wanted < least:
