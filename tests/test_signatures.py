@@ -1,13 +1,24 @@
-"""Signatures that can be read: few arguments by position."""
+"""Signatures that can be read: few arguments by position; what does not fit them is said."""
 
 import ast
 import inspect
+from collections.abc import Callable
+from math import inf, nan
 from pathlib import Path
+from typing import Annotated, Any, NamedTuple
 
+import pytest
 import typer
 
 import swashplate
+from swashplate import Drive, simulate_many
 from swashplate.cli import app
+from swashplate.equations import Definition, Model, equation, instance_of, sensitivities, simulate
+from swashplate.errors import SwashplateError
+from swashplate.export import content_of, fmu
+from swashplate.identification import ModelSetup
+from swashplate.linear import linearize
+from swashplate.models.displacement_control import spool_balance
 
 MOST = 8
 """Arguments by position; the options of a command are none, they are given by name."""
@@ -31,3 +42,137 @@ def test_no_function_takes_many_arguments_by_position() -> None:
             if len(own) > MOST and (path, node.name) not in commands:
                 found.append(f"{path.relative_to(package)}: {node.name} takes {len(own)}")
     assert found == []
+
+
+# --- what does not fit ----------------------------------------------------------------------------
+
+
+class Lag(NamedTuple):
+    time: Annotated[float, Definition("time constant", "s", above=0.0)]
+    gain: float = 1.0
+
+
+class State(NamedTuple):
+    place: float
+
+
+@equation
+def step(state: State, command: float, p: Lag, h: float) -> State:
+    return State(state.place + h / p.time * (p.gain * command - state.place))
+
+
+LAG = Model("lagging", Lag, State, step)
+RECORD = {"command": [1.0, 2.0]}
+STILL, BEGUN, NUMBERS = {"command": 0.0}, (State(0.0),), Lag(0.1)
+HOIST = Drive.preset("hoist")
+
+
+def simulated(p: Any = NUMBERS, inputs: Any = RECORD, **given: Any) -> Any:
+    return simulate(LAG, p, inputs, 10.0, **given)
+
+
+def linear(at: Any = STILL, h: Any = 0.1, states: Any = BEGUN, **given: Any) -> Any:
+    return linearize(instance_of(LAG, NUMBERS), at, h, states=states, **given)
+
+
+def exported(step: Any) -> Any:
+    return content_of(LAG, step, parameters=NUMBERS)
+
+
+WRONG: list[tuple[Callable[..., Any], tuple[Any, ...], str]] = [
+    (exported, (inf, nan, 0.0, "a", None), "The step is .* but must be a number above 0"),
+    (
+        lambda step: fmu(HOIST, "a.fmu", step=step),
+        (inf, nan, -1.0, "a", None),
+        "The step is .* but must be a number above 0",
+    ),
+    (lambda what: content_of(what, 0.1), ("hoist", None), "give a Drive or a Model"),
+    (lambda at: linear(at), (3, None, [0.2]), "at is .* but must be a mapping"),
+    (lambda x: linear({"command": x}), ("a", nan, [1]), "command is .* but must be a finite"),
+    (lambda h: linear(h=h), (inf, nan, -1.0, "a"), "The step is .* must be a number above 0"),
+    (
+        lambda states: linear(states=states),
+        ((), (1,), State(0.1), 3, (State("a"),), (State(nan),), (State(0.1), State(0.1))),
+        "lagging: states are .* but must be a tuple of one State of finite numbers",
+    ),
+    (lambda inputs: linear(inputs=inputs), ((),), "needs an input"),
+    (lambda outputs: linear(outputs=outputs), ((),), "needs an output"),
+    (lambda model: linearize(model, STILL, 0.1), (LAG, None), "is no model with numbers"),
+    (lambda k: linear().margins(k), ("a", None, lambda f: f[:3]), "the controller must be a gain"),
+    (lambda f: linear().response(f), ("a", None), "Frequencies must be one row of finite num"),
+    (
+        lambda begin: simulated(begin=begin),
+        ((1, 2), 3, "place", [("place", 1.0)]),
+        "begin is .* but must be a mapping",
+    ),
+    (
+        lambda begin: sensitivities(LAG, NUMBERS, RECORD, 10.0, output="place", begin=begin),
+        ((1, 2), "place"),
+        "begin is .* but must be a mapping",
+    ),
+    (lambda inputs: simulated(inputs=inputs), (3, None, [1, 2]), "inputs is .* must be a mapping"),
+    (
+        lambda number: simulated(substeps=number),
+        (0, 1.5, inf, nan, "a"),
+        "substeps is .* but must be a whole number",
+    ),
+    (lambda options: simulated(options=options), (3,), "has no options"),
+    (
+        lambda time: simulated(Lag(time)),
+        (0.0, -0.1, nan),
+        r"lagging: time \(time constant\) is .* s, but must be above 0",
+    ),
+    (
+        lambda low: ModelSetup(LAG, {"time": (low, 0.1, 1.0)}),
+        (0.0, -0.1),
+        r"lagging, a bound: time \(time constant\) is .* s, but must be above 0",
+    ),
+    (
+        lambda changes: simulate_many(LAG, NUMBERS, changes, RECORD, 10.0, output="place"),
+        (3, [("time", [1.0])]),
+        "changes is .* but must be a mapping",
+    ),
+    (lambda z: HOIST.scale(Z10=z), ("text", None), "The factor of Z10 must be a number"),
+    (lambda name: HOIST[name], (3, "Z99"), "There is no parameter"),
+    (lambda old: HOIST.with_equation(old, spool_balance), ("text", None, 3), "is no equation"),
+    (lambda new: HOIST.with_equation(spool_balance, new), ("text", None, 3), "is no equation"),
+    (
+        lambda own: HOIST.with_equation(spool_balance, spool_balance, own),
+        (3, dict),
+        "no class of named tuples",
+    ),
+    (lambda h: HOIST.stepper(h), ("a", None, inf), "The sample interval is .* above 0"),
+    (lambda rate: HOIST.compiled_step(rate=rate), ("a", inf, -1.0), "The rate is .* above 0"),
+    (lambda rate: HOIST.simulate([1.0, 2.0], rate), ("a", None, nan), "The rate is .* between"),
+    (lambda at: HOIST.linearize(at), ("a", nan, inf), "Linearise at a finite number"),
+    (lambda at: HOIST.steady_speed(at), ("a", nan, [[1.0], [1.0, 2.0]]), "finite commands"),
+    (
+        lambda each: HOIST.simulate([1.0, 1.0], supply_pressure=each),
+        (0.0, -1.0, [1e6, -1.0]),
+        "The supply_pressure falls to .* Pa, but must be above 0",
+    ),
+    (
+        lambda bias: HOIST.frequency_response([1.0], [1.0], bias=bias),
+        ("a", None, nan),
+        "The bias is .* but must be a finite number",
+    ),
+]
+
+
+@pytest.mark.parametrize(
+    ("call", "value", "sentence"),
+    [(call, value, sentence) for call, values, sentence in WRONG for value in values],
+)
+def test_what_does_not_fit_is_said_in_a_sentence(
+    call: Callable[..., Any], value: Any, sentence: str
+) -> None:
+    with pytest.raises(SwashplateError, match=sentence) as caught:
+        call(value)
+    assert "\n" not in str(caught.value)
+
+
+def test_sets_beyond_a_range_do_not_stop_the_others() -> None:
+    sets = {"time": [0.1, -0.1, 0.2]}
+    batch = simulate_many(LAG, NUMBERS, sets, RECORD, 10.0, output="place")
+    assert list(batch.failures) == [1]
+    assert "time (time constant) is -0.1 s, but must be above 0" in batch.failures[1]

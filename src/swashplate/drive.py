@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, NamedTuple, TypedDict, Unpack, overload
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from swashplate.equations.marching.record import SOURCE_RATE, Interpolation
+from swashplate.equations.marching.record import SOURCE_RATE, Interpolation, check_rate
 from swashplate.equations.marching.run import Start
 from swashplate.equations.marching.stepping import CompiledStep, stored_of
 from swashplate.equations.marching.use import Stepper
@@ -358,6 +358,7 @@ class Drive(Result):
         InputError
             For signals that a drive does not have, and a rate too low for the card's filter.
         """
+        check_rate(rate)
         check_filter_stability(self.parameters, 1.0 / rate)
         instance = instance_of(self.parameters, by_voltage=True)
         return CompiledStep(instance, inputs, stored_of(instance.model, outputs), 1.0 / rate)
@@ -480,7 +481,10 @@ class Drive(Result):
         return self._steady(voltage)[0]
 
     def _steady(self, voltage: float | Sequence[float] | Array) -> tuple[float | Array, ...]:
-        volts = np.atleast_1d(np.array(voltage, dtype=np.float64))
+        try:
+            volts = np.atleast_1d(np.array(voltage, dtype=np.float64))
+        except (TypeError, ValueError):
+            volts = np.array([np.nan])
         if not (np.abs(volts) <= FULL_VOLTAGE).all():
             raise InputError("A steady state needs finite commands within ±10 V.")
         current, speed = steady_states(self.parameters, volts.reshape(-1))

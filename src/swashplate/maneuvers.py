@@ -109,12 +109,15 @@ class Maneuver(Result):
         Starts [s], the first at 0, and curves in their order. At a jump the later piece holds.
     amplitude : float
         What the maneuver states and its voltage never exceeds, inf where it states none. [V]
+    highest : float
+        Frequency of its fastest sine, 0 where it has none. [Hz]
     """
 
     name: str
     length: float
     pieces: tuple[Piece, ...]
     amplitude: float = math.inf
+    highest: float = 0.0
 
     def __call__(self, time: npt.ArrayLike) -> Array:
         """Voltage [V] at `time` [s] of any shape, zero outside [0, length]."""
@@ -153,8 +156,19 @@ class Maneuver(Result):
         return np.arange(round(samples) + 1) / rate
 
     def sample(self, rate: float = 512.0) -> Array:
-        """Voltage [V] at the instants of `time(rate)`, which also says what is raised."""
+        """Voltage [V] at the instants of `time(rate)`.
+
+        Raises
+        ------
+        InputError
+            As `time`, and if a sine is not below half the rate.
+        """
         time = self.time(rate)
+        if self.highest >= 0.5 * rate:
+            raise InputError(
+                f"{self.name} reaches {self.highest:g} Hz, but samples at {rate:g} Hz show only "
+                f"what lies below {0.5 * rate:g} Hz: lower its frequency or raise the rate."
+            )
         time[-1] = self.length  # its stamp may lie a rounding error before or after the end
         return self(time)
 
@@ -164,13 +178,15 @@ class Maneuver(Result):
         moved = ((self.length + start, curve) for start, curve in after.pieces)
         name, length = f"{self.name} + {after.name}", self.length + after.length
         amplitude = max(self.amplitude, after.amplitude)
-        return Maneuver(name, length, (*self.pieces, *moved), amplitude)
+        highest = max(self.highest, after.highest)
+        return Maneuver(name, length, (*self.pieces, *moved), amplitude, highest)
 
     def __mul__(self, factor: float) -> Maneuver:
         factor = finite("factor", factor)
         pieces = ((start, partial(_scaled, factor=factor, curve=c)) for start, c in self.pieces)
         amplitude = abs(factor) * self.amplitude if factor else 0.0
-        return Maneuver(f"{factor:g} * ({self.name})", self.length, tuple(pieces), amplitude)
+        name = f"{factor:g} * ({self.name})"
+        return replace(self, name=name, pieces=tuple(pieces), amplitude=amplitude)
 
     __rmul__ = __mul__
 
@@ -469,7 +485,9 @@ def _oscillation(
         growth=growth,
     )
     last = float(curve(np.array(end - start), slope=True))
-    return _settled(name, amplitude, [(start, curve)], end, length, last)
+    highest = max(max(frequencies), frequencies[0] + growth * (end - start))
+    made = _settled(name, amplitude, [(start, curve)], end, length, last)
+    return replace(made, highest=highest)
 
 
 def _band(band: Sequence[float], period: float) -> Array:

@@ -137,6 +137,12 @@ def test_all_that_can_be_asked_for_besides(done: Words, campaign: Path, tmp_path
         low, high = (float(row[f"{side} 95 %"]) for side in ("lower", "upper"))
         least, most = (float(row[f"bootstrap {side} 95 %"]) for side in ("lower", "upper"))
         assert 0.3 < (most - least) / (high - low) < 2.0, row["parameter"]
+    # nearly quadratic: the profile ends where the linear interval does
+    (ends,) = re.findall(r"^ *pump +Z8 +(.*)$", said.partition("Profile likelihoods")[2], re.M)
+    (linear,) = (row for row in rows if row["parameter"] == "Z8")
+    found = [float(each) for each in re.findall(r"\d\S*", ends)][-3:]
+    wanted = [float(linear[each]) for each in ("estimate", "lower 95 %", "upper 95 %")]
+    assert found == pytest.approx(wanted, rel=0.01)
     assert "profile" in (tmp_path / "fitted" / "report.html").read_text("utf-8").lower()
 
 

@@ -331,11 +331,31 @@ def moving_table(x: float, k: tuple[float, float, float], v: tuple[float, float,
     return interpolate(x, k, v) * x
 
 
+class Knots(NamedTuple):
+    low: float
+    middle: float
+    high: float
+
+
+class Map(NamedTuple):
+    """A table as parameters of a model hold it: named tuples of floats."""
+
+    knots: Knots
+    values: Knots
+
+
+@equation
+def table_of_fields(x: float, p: Map) -> float:
+    return interpolate(x, p.knots, p.values) * x
+
+
 @pytest.mark.parametrize("x", [-3.0, -0.6, 0.1, 1.1, 4.0])
 def test_interpolation(x: float, derivative: Callable[..., float]) -> None:
     check(table, derivative, ("x", "a", "v"), x=x, a=1.1, v=(0.3, -1.0, 2.0, 0.5))
     k, v = (-1.0, 0.5, 2.0), (0.3, -1.0, 2.0)
     check(moving_table, derivative, ("x", "k", "v"), x=x, k=k, v=v)
+    check(table_of_fields, derivative, ("x", "p"), x=x, p=Map(Knots(*k), Knots(*v)))
+    assert table_of_fields(x, Map(Knots(*k), Knots(*v))) == moving_table(x, k, v)
 
 
 def test_a_knot_counts_to_its_right_and_ends_hold() -> None:
@@ -427,6 +447,40 @@ def coasting(state: Swing, number: float, drag: float) -> Swing:
 @equation
 def many_times(state: Swing, drag: float) -> Swing:
     return repeated(coasting, 3.0, state, drag)
+
+
+@equation
+def cooled(state: float, number: float, share: float) -> float:
+    return state - share * sin(state) + number * share
+
+
+@equation
+def cooling(x: float, share: float) -> float:
+    return share * repeated(cooled, 3.0, x * x, share)
+
+
+class Heat(NamedTuple):
+    heat: float
+
+
+@equation
+def cooled_tuple(state: Heat, number: float, share: float) -> Heat:
+    return Heat(cooled(state.heat, number, share))
+
+
+@equation
+def cooling_tuple(x: float, share: float) -> float:
+    return repeated(cooled_tuple, 3.0, Heat(x * x), share).heat
+
+
+def test_a_repeated_state_may_be_one_float(derivative: Callable[..., float]) -> None:
+    expected = 0.49
+    for number in range(3):
+        expected = expected - 0.2 * sin(expected) + number * 0.2
+    assert cooling(0.7, 0.2) == 0.2 * expected
+    check(cooling, derivative, ("x", "share"), x=0.7, share=0.2)
+    assert cooling_tuple(0.7, 0.2) == expected
+    check(cooling_tuple, derivative, ("x", "share"), x=0.7, share=0.2)
 
 
 # --- conventions ----------------------------------------------------------------------------------

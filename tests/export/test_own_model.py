@@ -11,6 +11,7 @@ import pytest
 from tests.equations.test_own_model import COMMAND, STROKE, P, valve
 from tests.export.conftest import InC
 from tests.export.webassembly import Page
+from tests.simulation.test_own_equation import DRAGGED
 
 from swashplate import Drive, InputError
 from swashplate.equations import (
@@ -298,12 +299,13 @@ def test_webassembly_of_a_model_has_the_bits_of_its_march(tmp_path: Path) -> Non
 
 def test_a_folder_of_c_compiles_and_runs(compiled: Any, hoist: Drive, tmp_path: Path) -> None:
     for what, numbers, steady in (
-        (hoist, {}, hoist.steady_speed(9.0)),
+        (hoist.renamed("2-axis"), {}, hoist.steady_speed(9.0)),
         (valve, {"step": 0.01, "parameters": P, "given": STROKE}, None),
     ):
         files = c(what, tmp_path / what.name, **numbers)
         sources = {file.name: file.read_text("utf-8") for file in files}
-        assert {"main.c", "CMakeLists.txt", "README.md", f"{what.name}_values.h"} <= set(sources)
+        assert {"main.c", "CMakeLists.txt", "README.md"} <= set(sources)
+        assert {"_2_axis_values.h", "valve_values.h"} & set(sources)
         program = compiled(sources, program="example")
         printed = subprocess.run([program], capture_output=True, text=True, check=True).stdout
         rows = [line.split() for line in printed.splitlines()]
@@ -311,6 +313,27 @@ def test_a_folder_of_c_compiles_and_runs(compiled: Any, hoist: Drive, tmp_path: 
         assert float(rows[-1][0]) == pytest.approx(2.0, abs=0.11)
         if steady is not None:
             assert float(rows[-1][1]) == pytest.approx(steady, rel=1e-6)
+
+
+class Register(NamedTuple):
+    switch: float
+    register: float
+
+
+@equation
+def register_step(state: Register, double: float, short: float, p: Lag, h: float) -> Register:
+    switch = state.switch + h / p.time * (double - state.switch)
+    return Register(switch, state.register + h * short)
+
+
+def test_names_that_c_keeps_for_itself(compiled: Any, tmp_path: Path) -> None:
+    model = Model("volatile", Lag, Register, register_step)
+    files = c(model, tmp_path, 0.01, parameters=Lag(0.5))
+    program = compiled({each.name: each.read_text("utf-8") for each in files}, program="example")
+    printed = subprocess.run([program], capture_output=True, text=True, check=True).stdout
+    run = simulate(model, Lag(0.5), {"double": np.ones(201), "short": 1.0}, 100.0)
+    last = [float(line.split()[1]) for line in printed.splitlines()]
+    np.testing.assert_allclose(last, run["register"][::10], rtol=1e-8)
 
 
 def test_steps_that_are_none_are_refused(hoist: Drive, tmp_path: Path) -> None:
@@ -322,8 +345,19 @@ def test_steps_that_are_none_are_refused(hoist: Drive, tmp_path: Path) -> None:
         c(valve, tmp_path)
 
 
-def test_a_drive_with_an_equation_of_its_own_has_it_in_c(compiled: Any, hoist: Drive) -> None:
-    own = hoist.with_equation(displacement_control.head_root, slower_root)
+@equation
+def slower_root(head: float) -> float:
+    return 0.9 * head / (1.0 + abs(head) ** 2 / 1e14)
+
+
+SLOWER = Drive.preset("hoist").with_equation(displacement_control.head_root, slower_root)
+
+
+# of the sealed drive the equation calls the one whose place it takes
+@pytest.mark.parametrize("own", [SLOWER, DRAGGED], ids=["another", "on top"])
+def test_a_drive_with_an_equation_of_its_own_has_it_in_c(
+    own: Drive, compiled: Any, hoist: Drive
+) -> None:
     command = 9.0 * np.sin(np.arange(1500) / 80.0)
     run = own.simulate(command, 512.0, interpolation="previous", start="steady")
     model = InC(compiled(drive_sources(own)), "swp", values_of(own))
@@ -332,11 +366,6 @@ def test_a_drive_with_an_equation_of_its_own_has_it_in_c(compiled: Any, hoist: D
     assert (run.shaft_speed == found).all()
     plain = hoist.simulate(command, 512.0, interpolation="previous", start="steady")
     assert (plain.shaft_speed != found).any()
-
-
-@equation
-def slower_root(head: float) -> float:
-    return 0.9 * head / (1.0 + abs(head) ** 2 / 1e14)
 
 
 # --- what has no counterpart ----------------------------------------------------------------------

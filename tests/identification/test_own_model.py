@@ -1,7 +1,7 @@
 """A model of one's own in a fit: exact derivatives, starts and loads, and all that drives have."""
 
 from dataclasses import replace
-from math import exp
+from math import exp, nan
 from pathlib import Path
 from typing import NamedTuple
 
@@ -9,7 +9,15 @@ import numpy as np
 import pytest
 from tests.identification.given import run_of
 
-from swashplate import Campaign, Channel, DomainError, Experiment, FileError, InputError
+from swashplate import (
+    Campaign,
+    Channel,
+    DomainError,
+    Experiment,
+    FileError,
+    InputError,
+    ParameterError,
+)
 from swashplate.equations import Model, Tap, equation, simulate
 from swashplate.identification import (
     Judged,
@@ -397,6 +405,29 @@ def test_data_are_checked_before_the_search() -> None:
 def test_fits_without_sense_are_refused(model, runs, free, sentence: str) -> None:
     with pytest.raises(InputError, match=sentence):
         fit(model, runs, free, **({"fixed": {"gain": 1.0, "lag": 1.0}} if "lagg" in free else {}))
+
+
+FREE_LAG = {"lag": (0.1, 0.3, 1.0)}
+
+
+@pytest.mark.parametrize(
+    ("stated", "sentence"),
+    [
+        ({"noise": {"speed": 0.1}}, "noise is stated for 'speed', but the channels are place"),
+        ({"noise": {"place": 0.0}}, "the noise of 'place' is 0.0, but must be above 0"),
+        ({"noise": {"place": nan}}, "the noise of 'place' is nan, but must be above 0"),
+        ({"noise": 0.1}, "noise is 0.1, but must be a mapping"),
+        ({"channels": "place"}, r"Give the channels as \('place',\)"),
+        ({"fixed": {"gain": "1"}}, "the fixed value of 'gain' is '1', but must be finite"),
+        (
+            {"fixed": {"gain": 1.0}, "standard_uncertainty": {"gain": -1.0}},
+            "servo: standard_uncertainty.gain.* is -1.0",
+        ),
+    ],
+)
+def test_statements_without_sense_are_refused(stated: dict, sentence: str) -> None:
+    with pytest.raises((InputError, ParameterError), match=sentence):
+        ModelSetup(servo, FREE_LAG, **stated).nominal(RUNS)
 
 
 def test_files_without_a_model_are_refused(tmp_path: Path, monkeypatch) -> None:

@@ -1,17 +1,19 @@
 """The linear model of any model's step against its march."""
 
-from math import exp
+from collections.abc import Callable
+from math import exp, inf
 from typing import NamedTuple
 
 import numpy as np
 import pytest
 
 from swashplate import DomainError, Drive, InputError
+from swashplate.equations import instance_of as instance_of_model
 from swashplate.equations.equation import equation
 from swashplate.equations.marching.part import Stored
 from swashplate.equations.marching.run import Instance, Part, marched
-from swashplate.equations.model import Model, Tap, join
-from swashplate.linear import linearize
+from swashplate.equations.model import Model, Tap, discretised, join
+from swashplate.linear import LinearModel, linearize
 from swashplate.simulation.instance import instance_of
 
 H = 0.01
@@ -148,6 +150,74 @@ def test_feedthrough_and_the_settled_state() -> None:
     np.testing.assert_allclose(model.gains, [2.0 + 6.0 * 0.2 + 0.1, 1.0])
     assert model.largest_gain > 0.0
     assert model.to_scipy().dt == H
+
+
+class Table(NamedTuple):
+    position: float
+    speed: float
+
+
+@equation
+def table_rates(state: Table, command: float, p: Share) -> Table:
+    return Table(state.speed, (command - state.speed) / p.share)
+
+
+@equation
+def table_coasts(state: Table, command: float, p: Share) -> Table:
+    return Table(state.speed, command / p.share)
+
+
+def table(rates: Callable[..., Table], lag: float, outputs: tuple[str, ...]) -> LinearModel:
+    model = Model("table", parameters=Share, state=Table, step=discretised(rates, "euler"))
+    states = (Table(0.0, 0.0),)
+    return linearize(
+        instance_of_model(model, Share(lag)), {"command": 0.0}, H, states=states, outputs=outputs
+    )
+
+
+def test_a_position_loop_has_margins() -> None:
+    model = table(table_rates, 0.2, ("position", "speed"))
+    assert not model.is_stable
+    np.testing.assert_allclose(model.gains, [inf, 1.0])
+    np.testing.assert_allclose(model.response([0.0])[:, 0].real, [inf, 1.0])
+    with pytest.raises(DomainError, match="position integrates command, .* no bandwidth"):
+        model.bandwidth  # noqa: B018
+    # z² - (2 - h/T) z + 1 - h/T + K h²/T has its roots on the circle at K = 1/h
+    assert model.largest_gain == pytest.approx(1.0 / H)
+    margins = model.margins(2.0)
+    assert margins.gain_margin == pytest.approx(0.5 / H)
+    # |L| = 1 and the phase there, of K h²/T / ((z - 1) (z - 1 + h/T))
+    z = np.exp(2j * np.pi * margins.crossover * H)
+    loop = 2.0 * H * H / 0.2 / ((z - 1.0) * (z - 1.0 + H / 0.2))
+    assert abs(loop) == pytest.approx(1.0)
+    assert margins.phase_margin == pytest.approx(np.pi + np.angle(loop))
+    tiny = model.margins(1e-12)  # its crossover lies far below all else
+    assert tiny.crossover == pytest.approx(1e-12 / (2.0 * np.pi))
+    assert tiny.phase_margin == pytest.approx(np.pi / 2.0)
+    with pytest.raises(DomainError, match="the closed loop is unstable"):
+        model.margins(-2.0)
+    # the speed alone: its response is that of the lag, whatever the position does
+    speed = table(table_rates, 0.2, ("speed",))
+    assert speed.gain == pytest.approx(1.0)
+    assert speed.largest_gain == pytest.approx(2.0 * 0.2 / H - 1.0)
+
+
+def test_two_integrators_need_a_lead() -> None:
+    model = table(table_coasts, -0.2, ("position",))
+    assert model.gain == -inf
+    with pytest.raises(DomainError, match="the closed loop is unstable"):
+        model.margins(-1.0)
+
+    gain, lead = 1.0, 0.5 / H  # in samples
+
+    def controller(f: np.ndarray) -> np.ndarray:
+        return -gain * (1.0 + lead * (1.0 - np.exp(-2j * np.pi * f * H)))
+
+    # z (z - 1)² + K h²/T ((1 + lead) z - lead) has a root on the circle at the margin
+    factor = model.margins(controller).gain_margin * gain * H * H / 0.2
+    roots = np.roots([1.0, -2.0, 1.0 + factor * (1.0 + lead), -factor * lead])
+    assert np.abs(roots).max() == pytest.approx(1.0)
+    assert factor > H * H / 0.2
 
 
 def test_refusals() -> None:

@@ -122,7 +122,7 @@ def test_small_steps_lead_to_the_continuous_model(hoist: Drive, changes: dict) -
 
 def test_refusals(hoist: Drive) -> None:
     model = hoist.linearize(4.0)
-    with pytest.raises(InputError, match="must be above 0"):
+    with pytest.raises(InputError, match="must be a number above 0"):
         model.discrete(float("nan"))
     with pytest.raises(InputError, match="between 10 and 100000 Hz"):
         model.discrete(1.0)

@@ -231,6 +231,8 @@ def _say_fit(found: Judged) -> None:
         drawn = () if bootstrap is None else bootstrap.sentences()
         bullets(each.identifiability.sentences(), each.uncertainty.sentences(), drawn)
         bullets(each.stage.bounds_reached())
+    if found.profiles:
+        show(tables.profiles_table(found))
     for profile in found.profiles:
         bullets(profile.profile.sentences(found.name_of(profile)))
     say(tables.fixed_line(found.result))

@@ -10,12 +10,13 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from enum import Enum
 from functools import cache
-from math import inf
-from typing import Any, Final, NamedTuple, get_type_hints
+from math import inf, isfinite
+from typing import Any, Final, NamedTuple, TypeGuard, get_type_hints
 
 import numpy as np
 
 from swashplate.equations.syntax import is_named_tuple
+from swashplate.errors import InputError
 
 Flag = bool | None
 """An option: None is off, True is on. In compiled code they are two types, and the branch that is
@@ -58,6 +59,19 @@ class Definition:
     def __post_init__(self) -> None:
         if self.above is not None:
             object.__setattr__(self, "lower", self.above)
+
+    def holds(self, values: Any) -> Any:
+        """Whether a value, or each of an array, lies in the range; what is no number does not."""
+        strict = self.above is not None or not isfinite(self.lower)
+        allowed: Any = values > self.lower if strict else values >= self.lower
+        if isfinite(self.upper) or not self.can_be_off:
+            allowed = allowed & (values < self.upper)
+        return allowed
+
+    def broken(self, column: str, value: float) -> str:
+        """What is wrong with a value beyond the range, without the stop."""
+        unit = "" if self.unit == "1" else f" {self.unit}"
+        return f"{column} ({self.name}) is {value:g}{unit}, but must be {self.range}"
 
     @property
     def range(self) -> str:
@@ -128,6 +142,16 @@ def declared_by(parameters: Any) -> Iterator[Declared]:
             yield Declared(name, definition, (name,))
 
 
+def ranges_of(kind: Any) -> dict[str, Definition]:
+    """Definitions with a range that a named tuple declares, by dotted path."""
+    return {
+        path: each.definition
+        for each in declared_by(kind)
+        for path in each.fields
+        if each.definition.range != Definition("", "").range
+    }
+
+
 # --- numbers by dotted paths ----------------------------------------------------------------------
 
 
@@ -143,9 +167,15 @@ def _floats_of(kind: Any) -> tuple[str, ...]:
 floats_of: Callable[[Any], tuple[str, ...]] = cache(_floats_of)
 
 
-def is_real(value: object) -> bool:
+def is_real(value: object) -> TypeGuard[float]:
     """Whether something is a real number, finite or not."""
     return isinstance(value, int | float | np.integer | np.floating)
+
+
+def check_mapping(what: str, given: object) -> None:
+    """Refuse what is no mapping of names to values."""
+    if not isinstance(given, Mapping):
+        raise InputError(f"{what} is {given!r}, but must be a mapping of names to values.")
 
 
 def value_at(value: Any, path: str) -> Any:

@@ -133,7 +133,7 @@ def repeated(step: Callable[..., S], count: float, state: S, *arguments: Any) ->
         state.
     count : float
         How often, 0 or more.
-    state : named tuple of floats
+    state : named tuple of floats, or float
         Where it begins.
     *arguments
         What else the step depends on.
@@ -278,32 +278,30 @@ def repetition(
 ) -> Value:
     """`repeated` as a call of a generated function, with one that carries its derivatives along."""
     inner = _inner(code, step, [state, ex.name("number")], rest, read)
-    if not (
-        isinstance(state, Tuple)
-        and state.cls
-        and all(isinstance(each, Node) for each in state.items)
-        and isinstance(count, Node)
-        and alike(inner.result, state)
-    ):
+    names: tuple[str, ...] = ("state",)
+    items: tuple[Value, ...] = (state,)
+    if isinstance(state, Tuple) and state.cls:
+        names, items = state.fields, state.items
+    numbers = all(isinstance(each, Node) for each in items)
+    if not (numbers and isinstance(count, Node) and alike(inner.result, state)):
         what = f"repeated of {step.name}, which does not return a state"
-        code.under_way[-1].refuse(
-            None, what, "let it take and return the same named tuple of floats"
-        )
+        instead = "let it take and return the same named tuple of floats, or a float"
+        code.under_way[-1].refuse(None, what, instead)
     *now, number = inner.leading
     times = inner.code.fresh("count")
     given = [times, *now, *inner.formals]
-    states = ", ".join(now) + ("," if len(now) == 1 else "")
+    states = ", ".join(now)
     called = ", ".join([*now, f"float({number})", *inner.formals])
     function = inner.function()
     lines = [
         f"for {number} in range(int({times})):",
         f"    {states} = {function.name}({called})",
-        f"return {states}",
+        f"return {states},",
     ]
     name = f"repeated_{function.name}"
     text = function_source(f"{name}({', '.join(given)})", f"{step.name}, repeated.", lines, "")
     loop = Function(name, text, {function.name: function})
-    results = tuple(code.fresh(each) for each in state.fields)
+    results = tuple(code.fresh(each) for each in names)
     arguments = (count, *(node for _, node in leaves(state)), *inner.actuals)
 
     def derivative(by: tuple[int, ...]) -> Derived:

@@ -32,7 +32,7 @@ from types import FunctionType
 from typing import Any, Literal, NamedTuple, get_args, get_type_hints
 
 from swashplate.equations.equation import equation, equation_of_text
-from swashplate.equations.fields import floats_of
+from swashplate.equations.fields import Definition, floats_of, ranges_of
 from swashplate.equations.syntax import is_named_tuple, plain
 from swashplate.errors import InputError
 
@@ -250,6 +250,12 @@ class Model:
         """Part and path of every number of its parameters, given or state, in flat order."""
         kinds = [getattr(part, kind) for part in self.parts]
         return tuple((i, p) for i, each in enumerate(kinds) if each for p in floats_of(each))
+
+    @cached_property
+    def ranges(self) -> dict[str, Definition]:
+        """Definitions of the parameters that have a range, by path."""
+        found = [(i, ranges_of(part.parameters)) for i, part in enumerate(self.parts)]
+        return {f"{self.prefix(i)}{p}": each for i, own in found for p, each in own.items()}
 
     def tap(self, name: str) -> Tap:
         """How an input is looked at."""

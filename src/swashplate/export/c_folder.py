@@ -16,7 +16,7 @@ from swashplate.drive import Drive
 from swashplate.equations.c_source import Exported, c_name, interface, literal
 from swashplate.equations.c_source.model import Writer
 from swashplate.equations.fields import declared_by, numbers_of
-from swashplate.equations.marching.record import SOURCE_RATE
+from swashplate.equations.marching.record import SOURCE_RATE, check_rate
 from swashplate.equations.marching.run import Instance, called
 from swashplate.equations.marching.run import instance_of as instance_of_model
 from swashplate.equations.model import Model
@@ -155,8 +155,9 @@ def content_of(
     InputError
         If the step is none, the filter of a drive is unstable at it, or numbers are none.
     """
+    check_rate(step, "step", "s")
     if isinstance(what, Drive):
-        if not 0.0 < step <= LONGEST_STEP:
+        if not step <= LONGEST_STEP:
             raise InputError(
                 f"The step is {step:g} s, but must be above 0 and at most 1/{SOURCE_RATE:g} s; "
                 "the steps of an FMU's master may be longer."
@@ -165,8 +166,8 @@ def content_of(
         exported, instance = exported_drive(what), instance_of(what.parameters, True)
         name, title, references, words = what.name, what.parameters.title, DRIVE, DRIVE_WORDS
     else:
-        if not step > 0.0:
-            raise InputError(f"The step is {step:g} s, but must be above 0.")
+        if not isinstance(what, Model):
+            raise InputError(f"{what!r} cannot be exported: give a Drive or a Model of equations.")
         instance = instance_of_model(what, parameters, options=options, given=given)
         exported, name, title = Exported(what, prefix), what.name, f"Model {what.name}"
         references, words = OWN, words_of(exported)
@@ -226,7 +227,7 @@ def c(
     FileError
         If the folder cannot be written.
     """
-    own = "swp" if isinstance(what, Drive) else c_name(what.name)
+    own = c_name(what.name) if isinstance(what, Model) else "swp"
     content = content_of(
         what, step, parameters=parameters, options=options, given=given, prefix=own
     )

@@ -23,6 +23,7 @@ from swashplate.__about__ import __version__
 from swashplate.drive import Drive
 from swashplate.equations.c_source import feedthrough, newest
 from swashplate.equations.fields import value_at
+from swashplate.equations.marching.record import check_rate
 from swashplate.equations.model import Model
 from swashplate.errors import FileError, InputError
 from swashplate.export.c_folder import LONGEST_STEP, Content, content_of
@@ -123,6 +124,7 @@ def exportable(what: Drive | Model, step: float, **numbers: Any) -> Content:
     InputError
         For a step out of range, or one that the filter or the delay line does not allow.
     """
+    check_rate(step, "step", "s")
     if isinstance(what, Drive):
         rate = what.parameters.rate
         if rate is not None and abs(rate * step - 1.0) > 1e-9 and 0.0 < step <= LONGEST_STEP:

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 from importlib import import_module
 from importlib.resources import files
+from math import inf
 from pathlib import Path
 from traceback import extract_tb
 from typing import Annotated, Any, ClassVar, Literal
@@ -21,6 +22,7 @@ from swashplate.campaign.experiment import Experiment
 from swashplate.campaign.schema import Finite, NotNegative, Positive, Weight, Window
 from swashplate.documents import parse_toml, read_text, validated
 from swashplate.equations import Model as Equations
+from swashplate.equations.fields import check_mapping, is_real
 from swashplate.errors import FileError, InputError, ParameterError
 from swashplate.identification.model import OFFSET, OwnModel, simulated
 from swashplate.identification.problem import Problem, noise_scales
@@ -342,6 +344,10 @@ class ModelSetup(Result):
     """What one unit of residual is, by channel: its noise. [unit]"""
 
     def __post_init__(self) -> None:
+        for what in ("free", "noise", "fixed", "standard_uncertainty"):
+            check_mapping(what, getattr(self, what))
+        if isinstance(self.channels, str):
+            raise InputError(f"Give the channels as ('{self.channels}',).")
         own = OwnModel(self.model) if isinstance(self.model, Equations) else self.model
         if not callable(getattr(own, "simulate", None)):
             raise InputError(
@@ -360,9 +366,23 @@ class ModelSetup(Result):
             )
         if both := [each for each in self.free if each in self.fixed]:
             raise InputError(f"{both[0]} of {name} is free and fixed: name it in one of them.")
+        numbers = (("noise", self.noise, 0.0), ("fixed value", self.fixed, -inf))
+        for what, given, least in numbers:
+            for key, number in given.items():
+                if not is_real(number) or not least < number < inf:
+                    must = "finite" if least < 0.0 else "above 0"
+                    raise InputError(
+                        f"{name}: the {what} of '{key}' is {number!r}, but must be {must}."
+                    )
         free = {key: _unknown(key, each) for key, each in self.free.items()}
+        ranges = equations.ranges if isinstance(equations, Equations) else {}
+        for key, each in free.items():
+            for bound in (each.low, each.high):
+                if key in ranges and not ranges[key].holds(bound):
+                    raise ParameterError(f"{name}, a bound: {ranges[key].broken(key, bound)}.")
         for key, made in {"model": own, "name": name, "free": free}.items():
             object.__setattr__(self, key, made)
+        _ = self.setup  # refuses what is no uncertainty
 
     @classmethod
     def from_file(cls, path: str | Path) -> ModelSetup:
@@ -400,11 +420,6 @@ class ModelSetup(Result):
                     f"{path} has no '{name}': it needs model = Model(...) and free = "
                     "{'lag': (0.005, 0.06, 0.5), ...}, lower bound, nominal value and upper bound."
                 )
-        if not isinstance(module.free, Mapping):
-            raise InputError(
-                f"{path}: free is {module.free!r}, but must be a mapping of names to lower bound, "
-                "nominal value and upper bound."
-            )
         known = ("model", "free", "name", "channels", "noise", "fixed", "standard_uncertainty")
         return cls(**{key: getattr(module, key) for key in known if hasattr(module, key)})
 
@@ -416,11 +431,18 @@ class ModelSetup(Result):
             for each in self.free.values()
         }
         stage = Stage(name=self.name, part="model", free=free)
-        uncertain = dict(self.standard_uncertainty)
-        return Setup(title=self.name, stages=(stage,), standard_uncertainty=uncertain)
+        content = {"title": self.name, "stages": (stage,)}
+        uncertain = {"standard_uncertainty": dict(self.standard_uncertainty)}
+        return validated(content | uncertain, Setup, self.name)
 
     def nominal(self, experiments: Sequence[Experiment]) -> ModelSetup:
         """The set-up with the numbers before a fit to some runs."""
+        had = dict.fromkeys(name for each in experiments for name in each.channels)
+        if strange := [each for each in self.noise if each not in had]:
+            raise InputError(
+                f"{self.name}: noise is stated for '{strange[0]}', but the channels are "
+                f"{', '.join(had) or 'none'}."
+            )
         problem = self.problem(experiments)
         numbers = {**self.fixed, **problem.unknowns.targets(problem.start, "")}
         return replace(self, numbers=numbers, scales=problem.scales)

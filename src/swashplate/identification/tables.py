@@ -21,7 +21,7 @@ from swashplate.units import chosen_unit, display_unit
 
 if TYPE_CHECKING:
     from swashplate.campaign.experiment import Channel, Experiment
-    from swashplate.identification.assessment import Assessment
+    from swashplate.identification.assessment import Assessment, Judged
     from swashplate.identification.fitting import Fit, StageFit
     from swashplate.identification.resampling import Bootstrap, CrossValidation
     from swashplate.identification.validation import Measures, RunQuality
@@ -114,6 +114,22 @@ def estimates_table(
             unit=unknown.unit,
             look=status != "estimated",
         )
+    return made
+
+
+def profiles_table(found: Judged) -> Table:
+    """Ends of the intervals that profiles give; none where the cost does not rise enough."""
+    ends = f"{100.0 * LEVEL:g} %"
+    lower, upper = (Column(f"{side} {ends}", ".5g", none=NONE) for side in ("lower", "upper"))
+    columns = (Column("stage"), Column("parameter"), UNIT, Column("estimate", ".5g"), lower, upper)
+    made = Table("Profile likelihoods", columns, si=True)
+    for given in found.profiles:
+        stage = next(each for each in found.result.stages if each.stage.name == given.stage)
+        unknown, one = stage.problem.unknowns.items[given.profile.index], given.profile
+        found_ends = (None, None) if one.better is not None else (one.lower, one.upper)
+        numbers = (float(stage.solution.vector[one.index]), *found_ends)
+        values = (None if each is None else unknown.to_value(each) for each in numbers)
+        made.add(given.stage, found.name_of(given), *values, unit=unknown.unit)
     return made
 
 

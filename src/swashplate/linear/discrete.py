@@ -9,8 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swashplate.equations.derivatives import derive
-from swashplate.equations.fields import floats_of, value_at
+from swashplate.equations.fields import check_mapping, floats_of, is_real, value_at
 from swashplate.equations.marching.part import HOLDS, taps_of
+from swashplate.equations.marching.record import check_rate
 from swashplate.equations.marching.run import Instance, Started, called, outside
 from swashplate.equations.model import Link, Window, arguments_of, state_paths
 from swashplate.errors import DomainError, InputError
@@ -59,7 +60,19 @@ def linearize(
     DomainError
         If the point lies outside the model's domain.
     """
+    if not isinstance(instance, Instance):
+        raise InputError(
+            f"{instance!r} is no model with numbers: give swashplate.equations.instance_of(model, "
+            "p)."
+        )
+    check_rate(h, "step", "s")
+    check_mapping("at", at)
+    for name, value in at.items():
+        if not is_real(value) or not np.isfinite(value):
+            raise InputError(f"{instance.name}: {name} is {value!r}, but must be a finite number.")
     moving = tuple(at if inputs is None else inputs)
+    if not moving:
+        raise InputError(f"{instance.name}: a linear model needs an input that moves, of at.")
     for name in moving:
         if name not in at or name not in instance.model.external:
             raise InputError(
@@ -67,6 +80,12 @@ def linearize(
                 f"{', '.join(each for each in instance.model.external if each in at)}."
             )
     model = instance.model
+    kinds = [part.state for part in model.parts]
+    if states is not None and not _are(states, kinds):
+        raise InputError(
+            f"{instance.name}: states are {states!r}, but must be a tuple of one "
+            f"{' and one '.join(kind.__name__ for kind in kinds)} of finite numbers."
+        )
     if states is None:
         # what belongs to the first sample alone has passed
         known = instance.start(at, h, "steady").arguments
@@ -75,8 +94,20 @@ def linearize(
     named = tuple(model.outputs) or tuple(model.parts[-1].outputs)
     named = tuple(each for each in named if each not in model.integrals)
     wanted = (named or model.parts[-1].signal_names) if outputs is None else tuple(outputs)
+    if not wanted:
+        raise InputError(f"{instance.name}: a linear model needs an output.")
     matrices, names, memory, whole = recurrence(instance, started, h, moving, wanted)
     return LinearModel(*matrices, names, moving, wanted, whole * h, h, instance.name, memory)
+
+
+def _are(states: Any, kinds: Sequence[Any]) -> bool:
+    """Whether these are states of these types, all of finite numbers."""
+    if not isinstance(states, list | tuple) or len(states) != len(kinds):
+        return False
+    if not all(map(isinstance, states, kinds)):
+        return False
+    values = [value_at(each, path) for each in states for path in floats_of(type(each))]
+    return all(is_real(value) and np.isfinite(value) for value in values)
 
 
 def recurrence(

@@ -15,7 +15,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swashplate.equations.equation import interpreted
-from swashplate.equations.marching.record import SOURCE_RATE, Interpolation, least_substeps
+from swashplate.equations.fields import is_real
+from swashplate.equations.marching.record import (
+    SOURCE_RATE,
+    Interpolation,
+    check_rate,
+    least_substeps,
+)
 from swashplate.equations.marching.run import Instance, called
 from swashplate.errors import DomainError, InputError
 from swashplate.linear.discrete import recurrence
@@ -150,8 +156,7 @@ class LinearDrive(LinearModel):
         """
         if interpolation not in ("linear", "previous"):
             raise InputError(f"interpolation is '{interpolation}'; it is 'linear' or 'previous'.")
-        if not sample_time > 0.0:
-            raise InputError(f"The sample time is {sample_time:g} s, but must be above 0.")
+        check_rate(sample_time, "sample time", "s")
         rate = 1.0 / sample_time
         substeps = least_substeps(round(rate) if abs(rate - round(rate)) < 1e-9 * rate else rate)
         step = sample_time / substeps
@@ -242,7 +247,7 @@ def operating_point(
     name, given = parameters.name, current if voltage is None else voltage
     if given is None or (voltage is not None and current is not None):
         raise InputError("Linearise at a voltage or a current; give exactly one of them.")
-    if not isfinite(given):
+    if not is_real(given) or not isfinite(given):
         raise InputError(f"Linearise at a finite number of volts or amperes, not {given}.")
     if input == "voltage" and voltage is None:
         raise InputError("A model from the voltage needs a voltage to linearise at, not a current.")

@@ -12,8 +12,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from swashplate.equations.fields import is_real
 from swashplate.equations.marching.march import output_of
-from swashplate.equations.marching.record import FASTEST, SOURCE_RATE
+from swashplate.equations.marching.record import FASTEST, SOURCE_RATE, check_rate
 from swashplate.equations.marching.run import Instance, marched
 from swashplate.errors import DomainError, InputError
 from swashplate.linear.drive import OUTPUTS
@@ -126,6 +127,7 @@ def sweep(
 ) -> FrequencyResponse:
     """Describing function by sine sweep; see `Drive.frequency_response`."""
     f, a = _checked(frequencies, "frequencies"), _checked(amplitudes, "amplitudes")
+    check_rate(rate)
     if not SOURCE_RATE <= rate <= FASTEST:
         raise InputError(
             f"The rate is {rate:g} Hz, but must be between {SOURCE_RATE:g} and {FASTEST:g} Hz."
@@ -136,8 +138,8 @@ def sweep(
             f"The frequencies must rise from {lowest:g} Hz or above to at most {highest:g} Hz, an "
             "eighth of the rate."
         )
-    if not 0.0 < tolerance < 1.0:
-        raise InputError(f"The tolerance is {tolerance:g}, but must be between 0 and 1.")
+    if not is_real(tolerance) or not 0.0 < tolerance < 1.0:
+        raise InputError(f"The tolerance is {tolerance!r}, but must be between 0 and 1.")
     if input not in ("voltage", "current"):
         raise InputError(f"The input is '{input}'; it is 'voltage' or 'current'.")
     if output not in SWEPT_OUTPUTS or output == input:
@@ -145,7 +147,7 @@ def sweep(
             f"'{output}' is no output of a sweep of the {input}; there are "
             f"{', '.join(name for name in SWEPT_OUTPUTS if name != input)}."
         )
-    if not np.isfinite(bias):
+    if not is_real(bias) or not np.isfinite(bias):
         raise InputError(f"The bias is {bias}, but must be a finite number.")
     if input == "voltage" and (largest := abs(bias) + float(a.max())) > FULL_VOLTAGE:
         raise InputError(f"Bias and amplitude reach {largest:g} V, but the card takes ±10 V.")

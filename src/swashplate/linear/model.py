@@ -23,6 +23,11 @@ ComplexArray = NDArray[np.complex128]
 Matrices = tuple[Array, Array, Array, Array]
 Response = Callable[[Array], ComplexArray]
 
+INTEGRATES = 3e-8
+"""Distance from s = 0, or z = 1, by the size of the poles, at which a pole counts as there.
+
+Two that integrate one after the other are found some 1e-8 apart."""
+
 UNITS = {
     "voltage": "V",
     "current": "A",
@@ -101,9 +106,26 @@ class LinearModel:
         return bool((np.abs(self.poles) < 1.0).all())
 
     @cached_property
+    def _slowest(self) -> float:
+        """Frequency far below every motion that dies out if some state integrates, else 0. [Hz]"""
+        rates = np.abs(self.poles - (self.sample_time is not None))
+        dying = rates[rates > INTEGRATES * self._scale]
+        if dying.size == rates.size:
+            return 0.0
+        return float(1e-6 * dying.min(initial=self._scale) / (2.0 * pi * (self.sample_time or 1.0)))
+
+    @property
+    def _scale(self) -> float:
+        """Size of the poles: 1 in the z-plane, in the s-plane the fastest."""
+        if self.sample_time is not None:
+            return 1.0
+        return float(np.abs(self.poles).max(initial=0.0)) or 1.0
+
+    @cached_property
     def gains(self) -> Array:
         """Steady gain of the first input to each output, in the output's unit by the input's, (m,).
 
+        Infinite, with the sign of its growth, of an output that integrates, as a position does.
         Those of the other inputs are the `response` to them at 0 Hz.
         """
         return np.asarray(self.response([0.0])[:, 0].real)
@@ -117,13 +139,15 @@ class LinearModel:
         """Frequency response of the outputs to an input, the first by default, with its delay.
 
         At frequencies from 0 on, of a sampled model up to 1/(2 h) [Hz]: (m,) or (m, f) complex G
-        e^(-jω delay) with G = C (p - A)⁻¹ B + D, p being jω or, sampled, e^(jωh).
+        e^(-jω delay) with G = C (p - A)⁻¹ B + D, p being jω or, sampled, e^(jωh). At 0 Hz it is
+        infinite of an output that integrates, with the sign of its growth.
         """
-        f = np.atleast_1d(np.asarray(frequency, dtype=np.float64))
+        f = np.atleast_1d(np.asarray(frequency))
         h = self.sample_time
         highest = inf if h is None else 0.5 / h
         # half the rate may have been computed in another way
-        if f.ndim != 1 or not (np.isfinite(f) & (f >= 0.0) & (f <= highest * (1.0 + 1e-12))).all():
+        numbers = f.dtype.kind in "fiub" and f.ndim == 1
+        if not numbers or not (np.isfinite(f) & (f >= 0.0) & (f <= highest * (1.0 + 1e-12))).all():
             raise InputError(
                 "Frequencies must be one row of finite numbers from 0 on"
                 + ("." if h is None else f" to 1/(2 h) = {highest:g} Hz.")
@@ -133,7 +157,8 @@ class LinearModel:
                 f"The model of {self.name} has no input '{input}'; it has {', '.join(self.inputs)}."
             )
         at = 0 if input is None else self.inputs.index(input)
-        s = 2j * np.pi * f
+        steady = (f == 0.0) & (self._slowest > 0.0)
+        s = 2j * np.pi * np.where(steady, self._slowest, f)
         point = s if h is None else np.exp(s * h)
         n = self.A.shape[0]
         system = point[:, np.newaxis, np.newaxis] * np.eye(n) - self.A
@@ -141,39 +166,54 @@ class LinearModel:
         found = (self.C @ np.linalg.solve(system, into))[:, :, 0].T + self.D[:, at : at + 1]
         if at == 0:
             found = found * np.exp(-s * self.delay)
+        if steady.any():
+            # halving with the frequency, an output integrates once; a quarter of it, twice
+            near, twice = found[:, steady], self.response([2.0 * self._slowest], input)
+            ratio = np.maximum(np.abs(near), 1e-300) / np.maximum(np.abs(twice), 1e-300)
+            order = np.maximum(np.rint(np.log2(ratio)), 0.0)
+            growth = (near * s[steady] ** order).real
+            found[:, steady] = np.where(order > 0.0, np.copysign(inf, growth), near.real)
         return np.asarray(found[:, 0] if np.ndim(frequency) == 0 else found, dtype=np.complex128)
 
     # --- loops ------------------------------------------------------------------------------------
 
     def _fastest(self) -> float:
         """Frequency far beyond all poles, or half the rate of a sampled model. [Hz]"""
-        if not self.is_stable:
+        sampled = self.sample_time is not None
+        growth = np.abs(self.poles) - 1.0 if sampled else self.poles.real
+        integrates = np.abs(self.poles - sampled) <= INTEGRATES * self._scale
+        if (growth[~integrates] >= 0.0).any():
             raise DomainError(
                 f"{self.name}: the linear model is unstable (poles {self.poles}), so that a "
                 "bandwidth or margin means nothing."
             )
-        if self.sample_time is not None:
-            return 0.5 / self.sample_time
-        return 1e3 * float(np.abs(self.poles).max())
+        return 0.5 / self.sample_time if self.sample_time is not None else 1e3 * self._scale
 
-    def _size(self, grid: Array) -> float:
-        """Magnitude of the steady gain, of an output that follows a steady input."""
-        size = abs(self.gain)
-        if size <= 1e-9 * float(np.abs(self.response(grid)[0]).max()):
+    def _largest(self, grid: Array) -> float:
+        """Largest magnitude of the response of an output that follows a steady input."""
+        largest = float(np.abs(self.response(grid)[0]).max())
+        if abs(self.gain) <= 1e-9 * largest:
             raise DomainError(
                 "The output does not follow a steady input (its gain is 0), so it has neither a "
                 "bandwidth nor a largest gain; ask for another output."
             )
-        return size
+        return largest
 
     @property
     def bandwidth(self) -> float:
         """Frequency at which the first output falls 3 dB (to 1/√2) below its steady gain. [Hz]
 
-        Infinite where it never does, below half the rate of a sampled model.
+        Infinite where it never does, below half the rate of a sampled model; a `DomainError` where
+        the output integrates.
         """
         grid = _grid(self._fastest())
-        level = self._size(grid) / np.sqrt(2.0)
+        self._largest(grid)
+        level = abs(self.gain) / np.sqrt(2.0)
+        if level == inf:
+            raise DomainError(
+                f"{self.name}: {self.outputs[0]} integrates {self.input}, with an infinite gain, "
+                "so it has no bandwidth; ask for the margins of a loop around it."
+            )
         falls = _roots(lambda f: np.abs(self.response(f)[0]) - level, grid)
         return falls[0] if falls else inf
 
@@ -183,7 +223,7 @@ class LinearModel:
 
         In the input's unit by the output's, positive; infinite where none does.
         """
-        small = 1e-6 / self._size(_grid(self._fastest()))
+        small = 0.5 / self._largest(_grid(self._fastest()))
         return small * self.margins(copysign(small, self.gain)).gain_margin
 
     def margins(self, controller: float | Response) -> LoopMargins:
@@ -200,7 +240,12 @@ class LinearModel:
         """
 
         def loop(frequency: Array) -> ComplexArray:
-            factor = controller(frequency) if callable(controller) else controller
+            factor = np.asarray(controller(frequency) if callable(controller) else controller)
+            if factor.dtype.kind not in "iufc" or factor.shape not in ((), frequency.shape):
+                raise InputError(
+                    f"{self.name}: the controller must be a gain, or a function of frequencies "
+                    "[Hz] that gives as many numbers."
+                )
             return np.asarray(factor * self.response(frequency)[0])
 
         return loop_margins(loop, self.delay, self._fastest(), self.name)
@@ -312,11 +357,14 @@ def loop_margins(loop: Response, delay: float, fastest: float, name: str) -> Loo
     """
     grid = _grid(fastest)
     values = loop(grid)
+    # a loop that integrates begins at -90° or, twice, at -180°; another one on the positive axis
+    integrates = abs(values[0]) > 2.0 * abs(loop(10.0 * grid[:1])[0])
+    if integrates and abs(values[0]) < 10.0:  # begin where it is large
+        grid = np.geomspace(0.1 * grid[0] * abs(values[0]), fastest, POINTS)
+        values = loop(grid)
     if not np.isfinite(values).all():
         raise InputError(f"{name}: the controller's frequency response is not finite.")
     argument = np.unwrap(np.angle(1.0 + values))
-    # a loop that integrates begins at -90° or, twice, at -180°; another one on the positive axis
-    integrates = abs(values[0]) > 2.0 * abs(loop(10.0 * grid[:1])[0])
     begins_well = (-pi if integrates else -0.5 * pi) <= argument[0] <= 0.25 * pi
     turned = 2.0 * pi * delay * grid > MOST_TURN
     if abs(argument[-1]) > 0.5 * pi or not begins_well or (np.abs(values[turned]) >= 1.0).any():

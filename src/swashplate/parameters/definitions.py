@@ -138,7 +138,7 @@ def find(name: str) -> Definition:
 
 def unknown_parameter(name: str) -> ParameterError:
     """Error for a name that no parameter has."""
-    close = get_close_matches(name, [*CATALOGUE, *COLUMNS, *REFINEMENTS], n=1)
+    close = get_close_matches(str(name), [*CATALOGUE, *COLUMNS, *REFINEMENTS], n=1)
     hint = f" (did you mean {close[0]}?)" if close else ""
     return ParameterError(
         f"There is no parameter '{name}'{hint}; the parameters are {', '.join(CATALOGUE)}, "

@@ -8,6 +8,7 @@ from typing import Any, Literal, NamedTuple, Protocol, Self
 
 import numpy as np
 
+from swashplate.equations.fields import is_real
 from swashplate.equations.replacement import Replacement
 from swashplate.errors import ParameterError
 from swashplate.parameters.definitions import (
@@ -271,7 +272,10 @@ class ParameterSet(Entries):
             if len(each) != len(columns):
                 takes = "one value, so it takes one factor" if len(columns) == 1 else "two values"
                 raise ParameterError(f"{name} has {takes}, not {len(each)}.")
-            changes |= {k: numbers[k] * times for k, times in zip(columns, each, strict=True)}
+            for k, times in zip(columns, each, strict=True):
+                if not is_real(times):
+                    raise ParameterError(f"The factor of {name} must be a number, not {times!r}.")
+                changes[k] = numbers[k] * times
         return self.replace(changes)
 
 

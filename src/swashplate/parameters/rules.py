@@ -163,21 +163,14 @@ def applied(rule: Rule, n: Values) -> Broken:
 
 def range_rule(definition: Definition, column: str, values: Array) -> Broken:
     """Which values lie outside a definition's range, and what is wrong with one of them."""
-    # what is no number passes no comparison
-    strict = definition.above is not None or not isfinite(definition.lower)
-    allowed = values > definition.lower if strict else values >= definition.lower
-    if isfinite(definition.upper) or not definition.can_be_off:
-        allowed &= values < definition.upper
 
     def sentence(i: int) -> str:
         value, hint = float(values[i]), ""
         if value < 0.0 and definition.directional and isfinite(value):
             hint = "; minus values are stored as magnitudes"
-        unit = "" if definition.unit == "1" else f" {definition.unit}"
-        what = f"{column} ({definition.name}) is {value:g}{unit}"
-        return f"{what}, but must be {definition.range}{hint}."
+        return f"{definition.broken(column, value)}{hint}."
 
-    return np.logical_not(allowed), sentence
+    return np.logical_not(definition.holds(values)), sentence
 
 
 # --- static rules ---------------------------------------------------------------------------------

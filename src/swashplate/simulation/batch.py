@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from swashplate.equations import Model, instance_of, parameter_paths, state_paths
+from swashplate.equations.fields import check_mapping
 from swashplate.equations.library import TAN_22_5
 from swashplate.equations.marching.lanes import LANES, lanes_of
 from swashplate.equations.marching.march import output_of
@@ -141,6 +142,9 @@ def simulate_many(
         rule = "a finite number, at least 0" if late else "a finite number"
         for i in np.flatnonzero(~np.isfinite(column) | (late & (column < 0.0))):
             failures[int(i)] = f"{model.name}: {path} is {column[i]:g}, but must be {rule}."
+        if path in model.ranges:
+            for i in np.flatnonzero(~model.ranges[path].holds(column)):
+                failures[int(i)] = f"{model.name}: {model.ranges[path].broken(path, column[i])}."
     columns = {path: np.full(count, number) for path, number in numbers.items()} | values
     good = np.setdiff1d(np.arange(count), list(failures))
     blocks = [(good[k : k + LANES], instance.options) for k in range(0, good.size, LANES)]
@@ -362,6 +366,7 @@ def _make_folder(folder: Path) -> None:
 
 def _given_sets(changes: Mapping[str, ArrayLike]) -> tuple[dict[str, Array], int]:
     """Values as columns, and how many sets there are."""
+    check_mapping("changes", changes)
     values: dict[str, Array] = {}
     for name, given in changes.items():
         column = np.asarray(given)

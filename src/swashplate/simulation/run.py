@@ -10,7 +10,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from swashplate.equations.marching.part import Stored
-from swashplate.equations.marching.record import Interpolation, Record, least_substeps, on_grid
+from swashplate.equations.marching.record import (
+    Interpolation,
+    Record,
+    check_rate,
+    least_substeps,
+    on_grid,
+)
 from swashplate.equations.marching.run import Instance, Start, Started, marched
 from swashplate.equations.marching.use import Stepper
 from swashplate.errors import DomainError, InputError
@@ -51,6 +57,11 @@ def drive_records(
     found = on_grid(inputs, rate, time=time, interpolation=between, substeps=steps)
     if driver == "voltage":
         found["voltage"] = check_voltage(found["voltage"], clip)
+    if (supply := found.get("supply_pressure")) and not (low := supply.values.min()) > 0.0:
+        raise InputError(
+            f"The supply_pressure falls to {low:g} Pa, but must be above 0: it is the supply less "
+            "the static pressure."
+        )
     return found
 
 
@@ -129,8 +140,7 @@ def drive_stepper(
     parameters: ParameterSet, h: float, interpolation: Interpolation, start: Start
 ) -> Stepper[Sample]:
     """The drive one sample at a time; see `Drive.stepper`."""
-    if not h > 0.0:
-        raise InputError(f"The sample interval is {h:g} s, but must be above 0.")
+    check_rate(h, "sample interval", "s")
     rate = 1.0 / h
     if abs(rate - round(rate)) < 1e-9 * rate:
         rate = float(round(rate))  # 1/(1/49) is not 49, but the user means 49 Hz

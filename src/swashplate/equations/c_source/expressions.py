@@ -112,6 +112,14 @@ class Expressions:
         assert isinstance(index, int)
         return Text(f"{_grouped(made, 13)}{dot}v{index}", 13, items[index])
 
+    def numbered(self, made: Text) -> Text:
+        """A value whose elements have numbers: a named tuple as a tuple."""
+        if made.kind.word != "struct":
+            return made
+        parts = self.parts(self.held(made))
+        kind = Kind("tuple", None, tuple(each.kind for each in parts))
+        return Text(self.composed(kind, [pointed(each) for each in parts]), 12, kind)
+
     def given(self, made: Text) -> str:
         """A value as a function takes it."""
         if not made.kind.whole:
@@ -221,7 +229,7 @@ class Expressions:
         except ValueError:
             index = constant_of(node.slice)
         if index is None:
-            return self.element(made, self.value(node.slice).text)
+            return self.element(self.numbered(made), self.value(node.slice).text)
         length = len(made.kind.items if made.kind.word == "tuple" else made.kind.cls._fields)
         if not -length <= index < length:
             self.refuse(node, f"the element {index}, which is not there")
@@ -421,6 +429,8 @@ class Expressions:
             leading = len(own) - (len(args) - len(formals))
             formals += own[leading:]
         made = [self.value(each) for each in args]
+        if formals[-1] == "values":  # of `interpolate`, which counts them
+            made = [made[0], *(self.numbered(each) for each in made[1:])]
         made = [Text(_double(m), 12, DOUBLE) if m.kind == INT else m for m in made]
         kinds = {name: each.kind for name, each in zip(formals, made, strict=True)}
         kinds["return"] = kinds.get("state", DOUBLE)

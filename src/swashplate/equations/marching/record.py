@@ -139,12 +139,13 @@ def least_substeps(rate: float, wanted: int | None = None) -> int:
     InputError
         For a rate out of range, or too few steps.
     """
-    if not SLOWEST <= rate <= FASTEST:
+    if not is_real(rate) or not SLOWEST <= rate <= FASTEST:
+        shown = f"{rate:g}" if is_real(rate) else repr(rate)
         raise InputError(
-            f"The rate is {rate:g} Hz, but must be between {SLOWEST:g} and {FASTEST:g} Hz."
+            f"The rate is {shown} Hz, but must be between {SLOWEST:g} and {FASTEST:g} Hz."
         )
     least = max(ceil(SOURCE_RATE / rate - 1e-9), 1)
-    if wanted is not None and wanted < least:
+    if is_real(wanted) and wanted < least:
         raise InputError(
             f"substeps is {wanted}, but at {rate:g} Hz at least {least} are needed to keep the "
             "step at or below 1/512 s."
@@ -152,10 +153,10 @@ def least_substeps(rate: float, wanted: int | None = None) -> int:
     return least if wanted is None else wanted
 
 
-def check_rate(rate: float) -> None:
-    """Refuse a rate that is no number above 0. [Hz]"""
-    if not is_real(rate) or not 0.0 < rate < np.inf:
-        raise InputError(f"The rate is {rate!r} Hz, but must be a number above 0.")
+def check_rate(value: float, what: str = "rate", unit: str = "Hz") -> None:
+    """Refuse a rate, or a step, that is no finite number above 0."""
+    if not is_real(value) or not 0.0 < value < np.inf:
+        raise InputError(f"The {what} is {value!r} {unit}, but must be a number above 0.")
 
 
 def checked_sampling(
@@ -163,7 +164,8 @@ def checked_sampling(
 ) -> tuple[dict[str, Interpolation | None], int]:
     """What each input is between two samples, and the steps a sample, one where none are said."""
     check_rate(rate)
-    if substeps is not None and (substeps < 1 or substeps != int(substeps)):
+    counts = is_real(substeps) and 1 <= substeps < np.inf and substeps == int(substeps)
+    if substeps is not None and not counts:
         raise InputError(f"substeps is {substeps!r}, but must be a whole number, at least 1.")
     if isinstance(interpolation, Mapping):
         names = tuple(names)

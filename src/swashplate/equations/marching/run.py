@@ -15,13 +15,28 @@ from numpy.typing import NDArray
 from swashplate.equations.cache import generated, kernel
 from swashplate.equations.code import compiled_names, generating
 from swashplate.equations.equation import inlined, interpreted
-from swashplate.equations.fields import floats_of, is_real, made, numbers_of, value_at
+from swashplate.equations.fields import (
+    check_mapping,
+    floats_of,
+    is_real,
+    made,
+    numbers_of,
+    value_at,
+)
 from swashplate.equations.marching.march import march_source
 from swashplate.equations.marching.part import Stored, taps_of
 from swashplate.equations.marching.pieces import Planned, addresses, piece, pointers, run_once
-from swashplate.equations.model import Link, Model, Window, arguments_of, place, state_paths
+from swashplate.equations.model import (
+    Link,
+    Model,
+    Window,
+    arguments_of,
+    parameter_paths,
+    place,
+    state_paths,
+)
 from swashplate.equations.syntax import plain
-from swashplate.errors import DomainError, InputError
+from swashplate.errors import DomainError, InputError, ParameterError
 
 Array = NDArray[np.float64]
 Start = Literal["rest", "steady"]
@@ -266,6 +281,8 @@ def instance_of(
     ------
     InputError
         If a tuple has not the type that the model declares.
+    ParameterError
+        If a parameter lies beyond the range of its `Definition`.
     """
     parts = []
     for part in model.parts:
@@ -277,7 +294,7 @@ def instance_of(
         kinds = {"parameters": part.parameters, "options": part.options, "given": part.given}
         for (what, kind), number in zip(kinds.items(), own, strict=True):
             if kind is None:
-                if number is not None and len(model.parts) == 1 and what != "options":
+                if number is not None and len(model.parts) == 1:
                     raise InputError(f"Model {part.name} has no {what}, but is passed {number!r}.")
                 continue
             if not isinstance(number, kind):
@@ -298,7 +315,12 @@ def instance_of(
         if own.options is not None:  # off is None, so that code is made for one form of it
             own = own._replace(options=type(own.options)(*(each or None for each in own.options)))
         parts.append(own)
-    return Instance(model, tuple(parts), name or model.name)
+    instance = Instance(model, tuple(parts), name or model.name)
+    numbers = dict(zip(parameter_paths(model), instance.params.tolist(), strict=True))
+    for path, definition in model.ranges.items():
+        if not definition.holds(numbers[path]):
+            raise ParameterError(f"{instance.name}: {definition.broken(path, numbers[path])}.")
+    return instance
 
 
 # --- marching -------------------------------------------------------------------------------------
@@ -357,6 +379,7 @@ def marched(
 
 def begun(instance: Instance, started: Started, begin: Mapping[str, float]) -> Array:
     """States as numbers, some of them as given by path."""
+    check_mapping("begin", begin)
     states = started.flat
     known = state_paths(instance.model) if begin else ()
     for path, value in begin.items():

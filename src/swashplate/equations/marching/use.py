@@ -24,6 +24,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from swashplate.equations.cache import kernel
 from swashplate.equations.code import generating
+from swashplate.equations.fields import check_mapping
 from swashplate.equations.marching.jacobian import jacobian
 from swashplate.equations.marching.march import output_of
 from swashplate.equations.marching.observation import Own, every_sample
@@ -249,6 +250,7 @@ def inputs_of(
     **sampling: Unpack[Sampling],
 ) -> dict[str, Record]:
     """External signals of a model on its grid, checked; see `on_grid`."""
+    check_mapping("inputs", inputs)
     instance.check_inputs(inputs)
     if not inputs:
         raise InputError(f"{instance.name} needs a record of {', '.join(instance.model.external)}.")
