@@ -55,7 +55,9 @@ def read_run(place: str, name: str, run: schema.Run, axes: Axes, log: Log) -> It
             full = f"{name} {key}" if len(axes) > 1 else name
             others = ", ".join(toml_string(each) for each in tested if each != key)
             without = f"only = [{others}]" if others else 'role = "ignore"'
-            yield from _experiments(full, name, key, run, axis, columns, cut, resumes, without)
+            yield from _experiments(
+                full, name, key, run, axis, columns, cut, resumes=resumes, without=without
+            )
 
 
 def _axes_of(place: str, run: schema.Run, axes: Axes) -> dict[str, schema.Axis]:
@@ -220,6 +222,7 @@ def _experiments(
     axis: schema.Axis,
     columns: _Columns,
     window: str,
+    *,
     resumes: bool,
     without: str,
 ) -> Iterator[Experiment]:
