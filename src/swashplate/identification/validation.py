@@ -290,28 +290,35 @@ def with_speeds(qualities: Iterable[RunQuality]) -> tuple[RunQuality, ...]:
     """The qualities, each of a position followed by that of its speed.
 
     Measured and simulated positions go through the same filters (`speed_of`, ``"exact"``), so that
-    both carry the same phase. A position whose stamps no filter takes has no speed. What its
-    noise is behind them is stated as the speed's, beside measures that contain it.
+    both carry the same phase. What the position's noise is behind them is stated as the speed's,
+    beside measures that contain it. A position whose stamps no filter takes has no speed, nor has
+    one in whose noise the speed drowns.
     """
-    made: list[RunQuality] = []
+    found = list[tuple[RunQuality, RunQuality | None]]()
     for each in qualities:
-        made.append(each)
+        found.append((each, None))
         channel = each.experiment[each.channel]
         if not channel.is_position:
             continue
         unread = replace(channel, noise=None, limits=None, encoder=None, counts=None)
         try:
-            found = speed_of(channel, "exact").speed
+            filtered = speed_of(channel, "exact").speed
             same = speed_of(replace(unread, values=each.simulated), "exact").speed
         except InputError:
             continue
         name, unit = f"speed from {channel.name}", f"{channel.unit}/s"
         noise = _noise_of_speed(each, same)
-        speed = replace(unread, name=name, kind="shaft_speed", unit=unit, values=found, noise=noise)
+        speed = replace(unread, name=name, kind="shaft_speed", unit=unit, values=filtered)
+        speed = replace(speed, noise=noise)
         run = replace(each.experiment, channels={**each.experiment.channels, name: speed})
         # the residuals of a filtered signal are coloured by the filter: there is no test of them
-        made.append(RunQuality(run, name, same, measures((found, same, speed.weight)), None, noise))
-    return tuple(made)
+        own = RunQuality(run, name, same, measures((filtered, same, speed.weight)), None, noise)
+        found[-1] = each, own
+    speeds = [own for _, own in found if own is not None]
+    clean, raw = pooled(speeds, without_noise=True), pooled(speeds)
+    clear = {name for name in raw if clean[name].spread ** 2 >= 0.5 * raw[name].spread ** 2}
+    both = (own for pair in found for own in pair if own is not None)
+    return tuple(each for each in both if each.channel in clear or each.channel not in raw)
 
 
 def _noise_of_speed(quality: RunQuality, speed: Array) -> float:

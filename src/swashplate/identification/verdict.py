@@ -153,14 +153,10 @@ class _Side(NamedTuple):
     @classmethod
     def of(cls, which: str, qualities: Sequence[RunQuality]) -> _Side:
         found = with_speeds(qualities)
-        clean, raw = pooled(found, without_noise=True), pooled(found)
-        # a speed that drowns in the position's noise shows nothing: then the position is judged
-        clear = {name for name in clean if clean[name].spread ** 2 >= 0.5 * raw[name].spread ** 2}
-        speeds = {name: f"speed from {name}" for name in clean}
-        lost = {own if speed in clear else speed for own, speed in speeds.items()}
-        kept = [each for each in found if each.channel not in lost]
+        named = {each.channel for each in found}
+        kept = [each for each in found if f"speed from {each.channel}" not in named]
         kept.sort(key=lambda each: each.experiment[each.channel].kind != "shaft_speed")
-        measures = {name: clean[name] for name in dict.fromkeys(e.channel for e in kept)}
+        measures = pooled(kept, without_noise=True)
         return cls(which, kept, measures, {name: part_of_range(kept, name) for name in measures})
 
     @property

@@ -16,8 +16,6 @@ from swashplate.drive import Drive
 from swashplate.errors import SwashplateError
 from swashplate.identification.assessment import Assessment
 from swashplate.identification.validation import (
-    Measures,
-    RunQuality,
     following,
     percent,
     pooled,
@@ -167,17 +165,18 @@ def run_lights(runs: Sequence[ShownRun], findings: dict[str, list[int]]) -> list
         Findings on the data, by the name of their run.
     """
     fitted = [each.quality for run in runs if not run.validates for each in run.channels]
-    whole = pooled(fitted or [each.quality for run in runs for each in run.channels])
+    fitted = fitted or [each.quality for run in runs for each in run.channels]
+    whole = pooled(fitted, without_noise=True)
     made = list[tuple[Light, str]]()
     for run in runs:
         bad, look = [], []
         for each in (shown.quality for shown in run.channels):
-            own = each.measures.nrmse or 0.0
-            pool = whole.get(each.channel)
-            if own >= POOR and _moves(each, pool):
+            found = pooled([each], without_noise=True)[each.channel]
+            own, pool = found.nrmse or 0.0, whole.get(each.channel)
+            if own >= POOR and (pool is None or found.spread > 0.05 * pool.spread):
                 bad.append(f"{each.channel} misses {percent(min(own, 9.99))} of the movement")
-            elif pool and each.measures.rmse > 2.0 * CARRIES_OVER * pool.rmse:
-                ratio = each.measures.rmse / pool.rmse
+            elif pool and found.rmse > 2.0 * CARRIES_OVER * pool.rmse:
+                ratio = found.rmse / pool.rmse
                 look.append(f"{each.channel}: {ratio:.1f} times the usual RMSE")
             elif following([each], each.channel)[1]:
                 look.append(f"residuals of {each.channel} follow the input")
@@ -189,10 +188,6 @@ def run_lights(runs: Sequence[ShownRun], findings: dict[str, list[int]]) -> list
         else:
             made.append(("look", "; ".join(look)) if look else ("good", "as the others"))
     return made
-
-
-def _moves(quality: RunQuality, pool: Measures | None) -> bool:
-    return pool is None or quality.measures.spread > 0.05 * pool.spread
 
 
 # --- section --------------------------------------------------------------------------------------
