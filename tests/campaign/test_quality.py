@@ -134,3 +134,11 @@ def test_no_channel_measures_the_motion_and_a_command_is_beyond_the_card(edited:
     assert "up.csv: column 'joystick': the voltage is 12 V at 0.5 s, but the card takes" in up
     assert "the voltage is -12 V" in down
     assert "[axes.winch.input]" in down
+
+
+def test_a_stick_that_rests_away_from_zero_is_named(edited: Edit) -> None:
+    """One that goes from 1 to 9 V about 5 V, as many do."""
+    path = edited('unit = "mV" }', 'unit = "mV", offset = 5000.0 }')
+    said, *_ = campaign_findings(Campaign.from_toml(path))
+    assert said.startswith("axis 'winch': it moves both ways though its command never changes its")
+    assert "rests at 5 V needs offset = -5 in [axes.winch.input]" in said

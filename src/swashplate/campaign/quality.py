@@ -367,6 +367,7 @@ def campaign_findings(campaign: Campaign) -> tuple[str, ...]:
         ours = [each for each in campaign if each.run == (run.name or Path(run.file).stem)]
         for key in ("ignore", "weights") if run.role != "ignore" else ():
             found += _unused(f"run {number} ({run.file}): {key}", getattr(run, key), ours)
+        found += _one_sided(name, runs)
     moving = {e.axis for e in campaign if e.of_kind("shaft_speed", "position", "encoder_counts")}
     found += [
         f"axis '{axis}': no channel measures its motion; a fit of the pump needs one of the kind "
@@ -375,6 +376,33 @@ def campaign_findings(campaign: Campaign) -> tuple[str, ...]:
         if axis not in moving
     ]
     return (*found, *unsigned_currents(campaign).values(), *wrapped_positions(campaign).values())
+
+
+def _one_sided(axis: str, runs: Sequence[Experiment]) -> Iterator[str]:
+    """A sentence if a machine moves both ways under a command that has one sign, as its rest has.
+
+    Over 0.5 s, by more than a third of the largest such motion each way.
+    """
+    commands = [each.input.values for each in runs if each.input.kind == "voltage"]
+    if not commands or min(c.min() for c in commands) < 0.0 < max(c.max() for c in commands):
+        return
+    moved, driven = list[Array](), list[Array]()
+    for each in runs:
+        for channel in each.of_kind("shaft_speed", "position", "encoder_counts"):
+            time, values = channel.time[channel.used], channel.values[channel.used]
+            width = max(round(0.5 / float(np.median(np.diff(time)))), 1) if time.size > 1 else 1
+            area = values if channel.is_position else np.cumsum(values)
+            moved.append(area[width:] - area[:-width])
+            driven.append(each.input.at(time[width:]))
+    motion, command = (np.concatenate([np.zeros(0), *each]) for each in (moved, driven))
+    most = float(np.abs(motion).max(initial=0.0))
+    still = np.abs(motion) < 0.02 * most
+    if still.any() and min(motion.max(), -motion.min()) > most / 3.0:
+        rest = float(np.median(command[still]))
+        yield (
+            f"axis '{axis}': it moves both ways though its command never changes its sign; a stick "
+            f"that rests at {rest:.3g} V needs offset = {-rest:.3g} in [axes.{axis}.input]"
+        )
 
 
 def beyond_the_card(experiment: Experiment) -> tuple[str, ...]:
