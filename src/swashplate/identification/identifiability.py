@@ -6,7 +6,7 @@ import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from math import inf, isfinite, sqrt
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +19,9 @@ from swashplate.models.displacement_control import FORCE, MOTION, PRESSURE, TRAV
 from swashplate.parameters.definitions import CATALOGUE
 from swashplate.results import Result
 from swashplate.tables import listed
+
+if TYPE_CHECKING:
+    from swashplate.identification.assessment import Assessment
 
 Array = NDArray[np.float64]
 Known = Mapping[str, float]
@@ -341,3 +344,14 @@ def _fixing(places: list[int], vector: Array, null: Array, fixed: list[int]) -> 
             if singular.size == len(fixed) + 1 and singular[-1] > 1e-6:
                 return place
     return None
+
+
+def weak_unknowns(assessment: Assessment) -> list[str]:
+    """Unknowns of the machine with an interval wider than 10 % of the value, or without one."""
+    try:
+        found = {each.name: each.relative_half_width for each in assessment.uncertainty.estimates}
+    except InputError:
+        found = {}
+    machine = [each.name for each in assessment.stage.problem.unknowns if each.run is None]
+    bounds = assessment.identifiability.at_bounds
+    return [name for name in machine if found.get(name, inf) > WIDE and name not in bounds]

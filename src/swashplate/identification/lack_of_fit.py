@@ -53,6 +53,19 @@ class ChannelFit(NamedTuple):
     samples: int
 
 
+class RunScale(NamedTuple):
+    """Scale that one channel seems to have in one run, beside that of all runs."""
+
+    run: str
+    channel: str
+    place: float
+    """Of the run among those of its stage, from -1/2 to 1/2."""
+    error: float
+    """One-step estimate of its scale less 1, from what the fit leaves of this run alone. [1]"""
+    standard_error: float
+    """Of that, of independent noise; inf where nothing moves. [1]"""
+
+
 @dataclass(frozen=True, eq=False)
 class LackOfFit:
     """What a fit leaves unexplained, and what would explain it."""
@@ -66,6 +79,8 @@ class LackOfFit:
     them."""
     clipped: tuple[str, ...]
     """Sentences on channels that stand at an end of their instrument."""
+    scales: tuple[RunScale, ...] = ()
+    """Of each channel in each run."""
 
     @property
     def ratios(self) -> dict[str, float]:
@@ -141,14 +156,17 @@ class _Block(NamedTuple):
             ratio = float(np.sqrt(np.mean((left / self.weight) ** 2))) / error
             yield ChannelFit(self.run, self.channel.name, ratio, left.size)
 
-    def own_scale(self, left: Array) -> tuple[float, float, float]:
-        """Its place, error of its scale in this run alone by what is left (n,), and its weight."""
+    def own_scale(self, left: Array) -> RunScale:
+        """Scale of the channel in this run alone, by what is left (n,)."""
         scale = self.columns[FAULT, faults.SCALE.words.format(self.channel.name)]
         if self.channel.is_position:
             # a position has a free zero
             scale = scale - self.weight * (self.weight @ scale) / (self.weight @ self.weight)
         weight = float(scale @ scale)
-        return self.place, float(scale @ left) / weight if weight > 0.0 else 0.0, weight
+        own = float(scale @ left) / weight if weight > 0.0 else 0.0
+        error = 1.0 / sqrt(weight) if weight > 0.0 else inf
+        # a reading that is larger than what is simulated leaves a negative residual
+        return RunScale(self.run, self.channel.name, self.place, -own, error)
 
 
 def lack_of_fit(assessments: Sequence[Assessment]) -> LackOfFit:
@@ -216,11 +234,10 @@ def lack_of_fit(assessments: Sequence[Assessment]) -> LackOfFit:
         )
     shift = inverse @ residual
     rest = [block.left(places, shift) for block in blocks]
+    scales = tuple(b.own_scale(r) for b, r in zip(blocks, rest, strict=True))
     steady = {
-        DRIFT.words.format(name): _in_order(
-            [b.own_scale(r) for b, r in zip(blocks, rest, strict=True) if b.channel.name == name]
-        )
-        for name in dict.fromkeys(block.channel.name for block in blocks)
+        DRIFT.words.format(name): _in_order([each for each in scales if each.channel == name])
+        for name in dict.fromkeys(each.channel for each in scales)
     }
     found = [
         replace(each, share=each.share * steady[each.name]) if each.kind is DRIFT else each
@@ -232,17 +249,20 @@ def lack_of_fit(assessments: Sequence[Assessment]) -> LackOfFit:
         (*sorted(found, key=lambda each: -each.share), *_late_commands(assessments)),
         _units(columns[:, :known], constants, found),
         faults.clipped_channels(list(runs.values())),
+        scales,
     )
 
 
-def _in_order(scales: Sequence[tuple[float, float, float]]) -> float:
+def _in_order(scales: Sequence[RunScale]) -> float:
     """Part of the differences between the scales of runs that is a straight line over their order.
 
-    `scales` has each run's place, its own scale and its weight. Freed of what a line explains by
+    Freed of what a line explains by
     chance (adjusted R², Draper and Smith 1998, section 5.1): a machine that differs between
     maneuvers differs between runs too, in whatever order they stand.
     """
-    place, own, weight = np.array([each for each in scales if each[2] > 0.0]).reshape(-1, 3).T
+    moving = [each for each in scales if isfinite(each.standard_error)]
+    rows = [(each.place, each.error, each.standard_error**-2) for each in moving]
+    place, own, weight = np.reshape(rows, (-1, 3)).T
     if own.size < 3:
         return 1.0
     own, about = own - np.average(own, weights=weight), place - np.average(place, weights=weight)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from math import inf
+from math import inf, isfinite
 from typing import TYPE_CHECKING, Literal, NamedTuple
 
 import numpy as np
@@ -14,26 +14,24 @@ from swashplate.errors import DomainError, InputError
 from swashplate.identification.data_checks import contradicting_runs
 from swashplate.identification.drive_model import CURRENTS, DriveModel, limits_reached
 from swashplate.identification.faults import DRIFT, LOSS, Fault, measurement_error
-from swashplate.identification.identifiability import WIDE
+from swashplate.identification.identifiability import WIDE, weak_unknowns
 from swashplate.identification.intervals import open_unknowns
 from swashplate.identification.lack_of_fit import LackOfFit, lack_of_fit
 from swashplate.identification.solving import Solution
 from swashplate.identification.validation import (
     FOLLOWS,
+    Side,
     beyond_noise,
     following,
-    part_of_range,
     percent,
     pooled,
-    range_of,
-    with_speeds,
 )
 from swashplate.results import Result
 from swashplate.tables import Column, Table, listed
 
 if TYPE_CHECKING:
     from swashplate.identification.assessment import Assessment
-    from swashplate.identification.validation import Measures, RunQuality
+    from swashplate.identification.validation import RunQuality
 
 Grade = Literal["Usable", "Usable for prediction", "Not usable"]
 
@@ -59,9 +57,15 @@ UNEXPLAINED = 0.003
 """The same where no measurement error is known: residuals beyond white noise over the range. Sound
 tachos and positions of simulated machines have 0 to 0.2 %; one run with a scale 15 % off, a load in
 half of the runs, play, or a drift of 9 % leave 0.4 to 1.9 %."""
+OWN_SCALE, OUTLIES = 0.02, 4.0
+"""Scale of one run's motion beside the median run's from which values are those of no machine, and
+how many robust standard deviations of all runs that is at least. Sound campaigns lie below 0.3 %,
+those where fixed parameters are 10 % off below 1 %; a run whose scale is 15 % off gave 12 %."""
 DRIFTS, DRIFTS_AWAY = 0.01, 0.03
 """Change of a channel over the campaign from which values are those of a mean machine, and from
 which no one set of parameters holds."""
+FEWEST_RUNS = 4
+"""Runs of which one can stand out."""
 SAME = 1e-6
 """Costs that differ by less than this part are the same optimum."""
 LIMITS: Mapping[str, str] = {
@@ -138,41 +142,6 @@ class Verdict(Result):
         return tuple(f"Not judged: {each.name}, as {each.reason}." for each in left)
 
 
-class _Side(NamedTuple):
-    """Runs that were fitted, or predicted; speeds in place of the positions that have one.
-
-    Of a position nearly everything is its trend.
-    """
-
-    which: str
-    qualities: list[RunQuality]
-    measures: dict[str, Measures]
-    parts: dict[str, float | None]
-    """Error over range, by channel."""
-
-    @classmethod
-    def of(cls, which: str, qualities: Sequence[RunQuality]) -> _Side:
-        found = with_speeds(qualities)
-        named = {each.channel for each in found}
-        kept = [each for each in found if f"speed from {each.channel}" not in named]
-        kept.sort(key=lambda each: each.experiment[each.channel].kind != "shaft_speed")
-        measures = pooled(kept, without_noise=True)
-        return cls(which, kept, measures, {name: part_of_range(kept, name) for name in measures})
-
-    @property
-    def accuracy(self) -> str:
-        """``speed to 1.2 % of its range (worst run 1.6 %) and current to 2.0 % (...)``."""
-        said = list[str]()
-        for name, part in self.parts.items():
-            alike = [each for each in self.qualities if each.channel == name]
-            if part is not None:
-                reach = range_of(alike)
-                largest = max(pooled([each], without_noise=True)[name].rmse for each in alike)
-                worst = f" (worst run {percent(largest / reach)})" if len(alike) > 1 else ""
-                said.append(f"{name} to {percent(part)}{'' if said else ' of its range'}{worst}")
-        return listed(said) or "channels that never move"
-
-
 def verdict(
     assessments: Sequence[Assessment],
     predicted: Sequence[RunQuality],
@@ -201,8 +170,8 @@ def verdict(
         nothing, and says what would be needed.
     """
     runs = [each for assessment in assessments for each in assessment.runs]
-    fitted = _Side.of("fitted", runs)
-    out = _Side.of("held-out" if assessments else "predicted", predicted)
+    fitted = Side.of("fitted", runs)
+    out = Side.of("held-out" if assessments else "predicted", predicted)
     criteria, misfit = [*_convergence(assessments, planned)], None
     for side in (fitted, out):
         criteria += [_followed(side), _no_worse_than_mean(side)] if side.qualities else []
@@ -220,7 +189,7 @@ def verdict(
             criteria.append(_open("lack of fit", f"{MISFIT:g}", str(error).rstrip(".")))
         else:
             criteria += _fits(misfit, out if out.qualities else fitted, assessments)
-            criteria += _nothing_left_out(misfit, fitted)
+            criteria += [*_nothing_left_out(misfit, fitted), _alike(misfit, assessments)]
     criteria.append(_model_error(runs or predicted))
 
     unusable, untrusted = (
@@ -269,17 +238,6 @@ def starts_of(assessments: Sequence[Assessment]) -> dict[str, Sequence[Solution]
     return {each.stage.name: each.starts for each in stages if len(each.starts) > 1}
 
 
-def weak_unknowns(assessment: Assessment) -> list[str]:
-    """Unknowns of the machine with an interval wider than 10 % of the value, or without one."""
-    try:
-        found = {each.name: each.relative_half_width for each in assessment.uncertainty.estimates}
-    except InputError:
-        found = {}
-    machine = [each.name for each in assessment.stage.problem.unknowns if each.run is None]
-    bounds = assessment.identifiability.at_bounds
-    return [name for name in machine if found.get(name, inf) > WIDE and name not in bounds]
-
-
 # --- criteria -------------------------------------------------------------------------------------
 
 
@@ -302,7 +260,7 @@ def _convergence(assessments: Sequence[Assessment], planned: Sequence[str]) -> I
         yield Criterion("stages", f"{len(missing)} missing", "all", why, failure)
 
 
-def _followed(side: _Side) -> Criterion:
+def _followed(side: Side) -> Criterion:
     """That each channel follows the movement at all."""
     errors = {k: m.nrmse for k, m in side.measures.items() if m.nrmse is not None}
     clauses = []
@@ -321,7 +279,7 @@ def _followed(side: _Side) -> Criterion:
     )
 
 
-def _no_worse_than_mean(side: _Side) -> Criterion:
+def _no_worse_than_mean(side: Side) -> Criterion:
     """That no run that moves is simulated no better than by its own mean."""
     runs: dict[str, list[str]] = {}
     for each in side.qualities:
@@ -347,7 +305,7 @@ def _no_worse_than_mean(side: _Side) -> Criterion:
     )
 
 
-def _required_accuracy(out: _Side, required: float) -> Criterion:
+def _required_accuracy(out: Side, required: float) -> Criterion:
     """That the error of the runs predicted is what the user can live with."""
     name, limit = "error / range, runs predicted", percent(required)
     if not out.qualities:
@@ -360,7 +318,7 @@ def _required_accuracy(out: _Side, required: float) -> Criterion:
     return Criterion(name, worst, limit, "what is required of the model (--require)", failure)
 
 
-def _ratios(fitted: _Side, out: _Side) -> dict[str, tuple[float, float]]:
+def _ratios(fitted: Side, out: Side) -> dict[str, tuple[float, float]]:
     """RMSE of held-out over that of fitted runs, and NRMSE of held-out ones, by channel."""
     return {
         name: (found.rmse / fitted.measures[name].rmse, found.nrmse)
@@ -369,7 +327,7 @@ def _ratios(fitted: _Side, out: _Side) -> dict[str, tuple[float, float]]:
     }
 
 
-def _carried_over(fitted: _Side, out: _Side) -> Criterion:
+def _carried_over(fitted: Side, out: Side) -> Criterion:
     """That runs that were held out are simulated about as well as those that were fitted."""
     found, name, limit = _ratios(fitted, out), "RMSE, held-out / fitted", f"{FAR:g}"
     if not found:
@@ -429,7 +387,7 @@ def _bounded_predictions(
     return Criterion(name, names or "none", "none", why, failure)
 
 
-def _fits(misfit: LackOfFit, side: _Side, assessments: Sequence[Assessment]) -> Iterator[Criterion]:
+def _fits(misfit: LackOfFit, side: Side, assessments: Sequence[Assessment]) -> Iterator[Criterion]:
     """That residuals are no larger than the known measurement error, and follow no fault."""
     likely, limit = f" (likely: {misfit.likely})" if misfit.likely else "", f"{MISFIT:g}"
     for name, ratio in misfit.ratios.items():
@@ -508,7 +466,7 @@ def _of_instrument(fault: Fault, wrong: Sequence[Fault]) -> Criterion:
     )
 
 
-def _nothing_left_out(misfit: LackOfFit, fitted: _Side) -> Iterator[Criterion]:
+def _nothing_left_out(misfit: LackOfFit, fitted: Side) -> Iterator[Criterion]:
     """That residuals of a motion whose measurement error is not known are white noise.
 
     Not of an ammeter, as currents ripple.
@@ -529,6 +487,36 @@ def _nothing_left_out(misfit: LackOfFit, fitted: _Side) -> Iterator[Criterion]:
             failure if part > UNEXPLAINED else "",
             "values",
         )
+
+
+def _alike(misfit: LackOfFit, assessments: Sequence[Assessment]) -> Criterion:
+    """That no run's motion has another scale than that of the others."""
+    kinds = {n: c.kind for run in _fitted_runs(assessments) for n, c in run.channels.items()}
+    found, judged = list[tuple[float, str]](), False
+    for name in dict.fromkeys(e.channel for e in misfit.scales if kinds[e.channel] not in CURRENTS):
+        alike = [e for e in misfit.scales if e.channel == name and isfinite(e.standard_error)]
+        if len(alike) < FEWEST_RUNS:
+            continue
+        judged = True
+        apart = np.array([each.error for each in alike])
+        apart -= np.median(apart)
+        usual = OUTLIES * float(np.median(np.abs(apart))) / 0.6745
+        for each, own in zip(alike, apart.tolist(), strict=True):
+            if abs(own) > max(usual, each.standard_error):
+                found.append((100.0 * own, f"{name} in {each.run} by {100.0 * own:+.2g} %"))
+    found.sort(key=lambda each: -abs(each[0]))
+    off = [words for size, words in found if abs(size) > 100.0 * OWN_SCALE][:3]
+    return Criterion(
+        "scale of a run of its own",
+        f"{found[0][0]:+.2g} %" if found else "none" if judged else "-",
+        percent(OWN_SCALE),
+        "runs of one machine through one instrument have one scale"
+        if judged
+        else f"fewer than {FEWEST_RUNS} runs measure the same motion",
+        f"runs differ in scale from the others: {listed(off)}" if off else "",
+        "values",
+        judged,
+    )
 
 
 def _model_error(qualities: Sequence[RunQuality]) -> Criterion:
@@ -557,8 +545,8 @@ def _model_error(qualities: Sequence[RunQuality]) -> Criterion:
 
 def _remarks(
     assessments: Sequence[Assessment],
-    fitted: _Side,
-    out: _Side,
+    fitted: Side,
+    out: Side,
     own: Sequence[RunQuality],
     misfit: LackOfFit | None,
 ) -> Iterator[str]:

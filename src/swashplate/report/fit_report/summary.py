@@ -15,6 +15,7 @@ from swashplate.campaign import Campaign
 from swashplate.drive import Drive
 from swashplate.errors import SwashplateError
 from swashplate.identification.assessment import Assessment
+from swashplate.identification.identifiability import weak_unknowns
 from swashplate.identification.validation import (
     following,
     percent,
@@ -26,7 +27,6 @@ from swashplate.identification.verdict import (
     POOR,
     Grade,
     Verdict,
-    weak_unknowns,
 )
 from swashplate.parameters.rules import FULL_VOLTAGE
 from swashplate.report.fit_report.page import Block, Section, listed_block, text
