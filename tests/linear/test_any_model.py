@@ -181,7 +181,7 @@ def test_a_position_loop_has_margins() -> None:
     np.testing.assert_allclose(model.gains, [inf, 1.0])
     np.testing.assert_allclose(model.response([0.0])[:, 0].real, [inf, 1.0])
     with pytest.raises(DomainError, match="position integrates command, .* no bandwidth"):
-        model.bandwidth  # noqa: B018
+        print(model.bandwidth)
     # z² - (2 - h/T) z + 1 - h/T + K h²/T has its roots on the circle at K = 1/h
     assert model.largest_gain == pytest.approx(1.0 / H)
     margins = model.margins(2.0)
