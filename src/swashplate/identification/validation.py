@@ -346,12 +346,12 @@ def _white_noise(quality: RunQuality) -> float:
     a model's error, and spikes count little in their median.
     """
     channel = quality.experiment[quality.channel]
-    left, levels = quality.residual[channel.used], np.unique(channel.values[channel.used])
-    if left.size < FEWEST or levels.size < 2:
+    left, steps = quality.residual[channel.used], np.abs(np.diff(channel.values[channel.used]))
+    if left.size < FEWEST or not steps.any():
         return 0.0
     # 20 = 1 + 9 + 9 + 1, and the median of a normal magnitude is 0.6745 standard deviations
     white = np.median(np.abs(np.diff(left, 3))) / (0.6745 * np.sqrt(20.0))
-    return float(max(white, np.diff(levels).min() / np.sqrt(12.0)))
+    return float(max(white, steps[steps > 0.0].min() / np.sqrt(12.0)))
 
 
 def pooled(qualities: Iterable[RunQuality], *, without_noise: bool = False) -> dict[str, Measures]:
