@@ -178,8 +178,22 @@ def _sentence(error: ErrorDetails, model: type[BaseModel], others: list[ErrorDet
     message = error["msg"].removeprefix("Value error, ").rstrip(".")
     if kind == "value_error":
         return f"{path}: {message}" if path else message
+    if should := _SHAPES.get(kind):
+        keys = ", ".join(_known_keys(model, where)) if should == "a table" else ""
+        message = f"should be {should}" + (f" with entries such as {keys}" if keys else "")
     return f"{path} is {_SHORT.repr(error['input'])}, but {message[0].lower()}{message[1:]}"
 
+
+_SHAPES = {
+    "dataclass_type": "a table",
+    "model_type": "a table",
+    "model_attributes_type": "a table",
+    "dict_type": "a table",
+    "list_type": "a list",
+    "tuple_type": "a list",
+    "string_type": "text in quotes",
+}
+"""What an entry should be, by pydantic's kind of error."""
 
 _BRANCHES = ("str", "float", "list[float]", "constrained-list")
 """Parts of a location that name a branch of a union, not an entry."""

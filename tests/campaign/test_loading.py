@@ -130,7 +130,7 @@ def test_a_counter_that_rolls_over(edited: Edit) -> None:
 @pytest.mark.parametrize(
     ("old", "new", "sentence"),
     [
-        ('title = "Bench"', "title = 3", "title is 3, but input should be a valid string"),
+        ('title = "Bench"', "title = 3", "title is 3, but should be text in quotes"),
         ('title = "Bench"', "titel = 'x'", "no entry 'titel': perhaps 'title' is meant"),
         ('column = "joystick"', 'colum = "joystick"', "axes.winch.input"),
         ('kind = "voltage"', 'kind = "volt"', "axes.winch.input.kind is 'volt'"),

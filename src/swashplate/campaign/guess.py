@@ -176,10 +176,11 @@ def guess_drive(experiments: Sequence[Experiment]) -> Guess:
     Raises
     ------
     InputError
-        If no run has such a channel, the input is no voltage, the speed goes against the command,
-        a channel has gross spikes, or too little moves.
+        If no run has such a channel, the input is no voltage, the speed of a run or of all goes
+        against the command, a channel has gross spikes, or too little moves.
     """
     runs, unit, spoilt = list[_Run](), "", spiked(experiments)
+    reversed_runs = list[tuple[str, str]]()
     kinds: tuple[ChannelKind, ...] = ("shaft_speed", "encoder_counts", "position")
     for each in experiments:
         # the channel that tells how it moves: a speed before a position
@@ -198,6 +199,14 @@ def guess_drive(experiments: Sequence[Experiment]) -> Guess:
             raise InputError(f"{sentence}.")
         unit = f"{channel.unit}/s" if channel.is_position else channel.unit
         runs.append(_run(each, channel))
+        if not _goes_with(runs[-1]):
+            reversed_runs.append((each.name, channel.name))
+    if 0 < len(reversed_runs) < len(runs):
+        run, name = reversed_runs[0]
+        raise InputError(
+            f"In {run} '{name}' goes against the command, in other runs with it: reverse it with "
+            'sign = -1 for this run, or leave the run out with role = "ignore".'
+        )
     speeds = np.concatenate([np.zeros(0), *(run.speeds for run in runs)])
     if speeds.size < FEWEST:
         raise InputError(
@@ -253,6 +262,13 @@ def _run(experiment: Experiment, channel: Channel) -> _Run:
     grid = np.arange(drive.time[0], drive.time[-1] + STEP, STEP)
     start = 0.0 if experiment.start == "rest" or not speeds.size else float(speeds[0])
     return _Run(grid, drive.at(grid), start, begins, width, speeds, coarse)
+
+
+def _goes_with(run: _Run) -> bool:
+    """Whether a motion goes with its command at any of the delays from which the search begins."""
+    middle = run.begins + run.width
+    commands = (np.interp(middle - late, run.time, run.command) for late in DELAYS)
+    return any(float(command @ run.speeds) >= 0.0 for command in commands)
 
 
 def _quiet_width(time: Array, position: Array, interval: float) -> float:

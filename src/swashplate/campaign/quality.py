@@ -47,6 +47,12 @@ AT_FIRST, SLOW = 0.1, 0.1
 than so many seconds tell nothing of it. [s]"""
 NEIGHBOURS = 11
 """Samples of the running median: up to five in a row may be a spike."""
+COARSE = 0.03
+"""Step of a reading over its range from which slow motions cannot be told."""
+AVERAGED, HELD, LARGE, OFF_SCALE = 0.5, 1.0, 0.4, 3.0
+"""Time over which motions are averaged, and for which a command has been larger than this part of
+the largest one, so that the machine has about its steady speed [s]; and the factor by which a run's
+speed for a volt does not differ from that of the other runs of one machine."""
 NAMED = 6
 """Windows, or maneuvers, that a sentence names."""
 
@@ -147,6 +153,16 @@ def _of_channel(experiment: Experiment, channel: Channel, signed: bool) -> Itera
     yield from _of_spikes(experiment, channel)
     if channel.kind == "rectified_current" and has_sign([values], NEGATIVE):
         yield "turns negative, so it is not rectified: should it be signed_current?"
+    steps = np.diff(np.unique(values))
+    if channel.kind in ("shaft_speed", "position") and steps.size > 2:
+        step, extent = float(np.median(steps)), float(np.ptp(values))
+        if step > COARSE * extent:
+            size = display_unit(channel.unit, extent)
+            yield (
+                f"reads in steps of {size.factor * step:.3g} {size.name}, "
+                f"{100.0 * step / extent:.2g} % of its range: smaller motions and dead zones "
+                "cannot be told"
+            )
     motion, at = values, time
     if channel.is_position:
         motion, at = np.diff(values) / np.diff(time), 0.5 * (time[1:] + time[:-1])
@@ -363,11 +379,11 @@ def campaign_findings(campaign: Campaign) -> tuple[str, ...]:
             of = f"{where}.channels.{key}"
             found += _unused(f"{of}.ignore", channel.ignore, runs, key)
             found += _unused(f"{of}.weights", channel.weights, runs, key)
+        found += [*_one_sided(name, runs), *_of_other_scale(runs)]
     for number, run in enumerate(file.runs, 1):
         ours = [each for each in campaign if each.run == (run.name or Path(run.file).stem)]
         for key in ("ignore", "weights") if run.role != "ignore" else ():
             found += _unused(f"run {number} ({run.file}): {key}", getattr(run, key), ours)
-        found += _one_sided(name, runs)
     moving = {e.axis for e in campaign if e.of_kind("shaft_speed", "position", "encoder_counts")}
     found += [
         f"axis '{axis}': no channel measures its motion; a fit of the pump needs one of the kind "
@@ -388,12 +404,9 @@ def _one_sided(axis: str, runs: Sequence[Experiment]) -> Iterator[str]:
         return
     moved, driven = list[Array](), list[Array]()
     for each in runs:
-        for channel in each.of_kind("shaft_speed", "position", "encoder_counts"):
-            time, values = channel.time[channel.used], channel.values[channel.used]
-            width = max(round(0.5 / float(np.median(np.diff(time)))), 1) if time.size > 1 else 1
-            area = values if channel.is_position else np.cumsum(values)
-            moved.append(area[width:] - area[:-width])
-            driven.append(each.input.at(time[width:]))
+        for _, time, speed in _mean_speeds(each):
+            moved.append(speed)
+            driven.append(each.input.at(time))
     motion, command = (np.concatenate([np.zeros(0), *each]) for each in (moved, driven))
     most = float(np.abs(motion).max(initial=0.0))
     still = np.abs(motion) < 0.02 * most
@@ -403,6 +416,52 @@ def _one_sided(axis: str, runs: Sequence[Experiment]) -> Iterator[str]:
             f"axis '{axis}': it moves both ways though its command never changes its sign; a stick "
             f"that rests at {rest:.3g} V needs offset = {-rest:.3g} in [axes.{axis}.input]"
         )
+
+
+def _mean_speeds(experiment: Experiment) -> Iterator[tuple[Channel, Array, Array]]:
+    """Each channel that moves, with instants (m,) [s] and its mean speeds (m,) over 0.5 s before.
+
+    [unit, or unit/s of a position]
+    """
+    for channel in experiment.of_kind("shaft_speed", "position", "encoder_counts"):
+        time, values = channel.time[channel.used], channel.values[channel.used]
+        width = 1
+        if time.size > 1:
+            width = max(round(AVERAGED / float(np.median(np.diff(time)))), 1)
+        if not channel.is_position:
+            values = np.concatenate([[0.0], np.cumsum(values[:-1] * np.diff(time))])
+        some = np.arange(width, time.size, max(width // 4, 1))
+        yield (
+            channel,
+            time[some],
+            (values[some] - values[some - width]) / (time[some] - time[some - width]),
+        )
+
+
+def _of_other_scale(runs: Sequence[Experiment]) -> Iterator[str]:
+    """A sentence on a run that moves far more or less than others do at such commands."""
+    largest = max((float(np.abs(each.input.values).max()) for each in runs), default=0.0)
+    gains = dict[str, dict[str, tuple[float, str]]]()
+    for each in runs if largest > 0.0 else ():
+        for channel, time, speed in _mean_speeds(each):
+            before = np.linspace(-HELD, 0.0, 9)[:, None] + time
+            command = each.input.at(before.ravel()).reshape(before.shape)
+            size = np.abs(command).min(axis=0)
+            one_way = np.abs(np.sign(command).sum(axis=0)) == before.shape[0]
+            steady = one_way & (size > LARGE * largest) & (time > each.input.time[0] + HELD)
+            if steady.sum() > 1:
+                gain = float(np.median(np.abs(speed[steady] / command[-1, steady])))
+                gains.setdefault(channel.name, {})[each.name] = gain, channel.source.column
+    for name, of_runs in gains.items():
+        for run, (gain, column) in of_runs.items():
+            others = [other for key, (other, _) in of_runs.items() if key != run]
+            usual = float(np.median(others)) if len(others) > 2 else gain
+            if min(gain, usual) > 0.0 and not 1.0 / OFF_SCALE < gain / usual < OFF_SCALE:
+                yield (
+                    f"{run}: '{name}' moves {gain / usual:.3g} times as fast as in the other runs "
+                    f"at such commands; check the unit of '{column}' in this log (1 rad/s is 9.55 "
+                    "1/min), its scale and the machine's gear"
+                )
 
 
 def beyond_the_card(experiment: Experiment) -> tuple[str, ...]:
