@@ -106,6 +106,11 @@ def test_a_speed_that_was_wanted_and_a_load(hoist: Drive) -> None:
         limit_shares(hoist, SINE, wanted=np.zeros(3))
 
 
+def test_a_machine_that_was_guessed_need_not_have_an_orifice() -> None:
+    (said,) = limit_shares(Drive.preset("neutral").replace(Z16=2e-5), SINE).sentences()
+    assert said.startswith("Change first: what limits the acceleration, in the model an in-line")
+
+
 def test_a_removal_outside_the_domain_is_said() -> None:
     """Without the solenoids' dead zone of this drive they would overpower the spring."""
     drive = Drive.preset("neutral").replace(Z17=0.0075)

@@ -144,6 +144,24 @@ def test_a_stick_that_rests_away_from_zero_is_named(edited: Edit) -> None:
     assert "rests at 5 V needs offset = -5 in [axes.winch.input]" in said
 
 
+@pytest.mark.parametrize("step", [1, 4])
+def test_an_encoder_resolves_the_step_of_its_counts(edited: Edit, step: int) -> None:
+    """A decoder that counts every fourth edge is four times as coarse."""
+
+    def faster(table: np.ndarray) -> np.ndarray:
+        turned = step * np.rint(1e-4 * table[:, 0] ** 2)
+        return np.column_stack([table[:, :3], turned])
+
+    run = Campaign.from_toml(rewrite(edited("", ""), faster))["up"]
+    assert run["counts"].resolution == step * abs(run["counts"].encoder.angle_per_count)
+    assert run["current"].resolution is None
+
+
+def test_equal_steps_are_a_constant_speed(campaign_folder: Path) -> None:
+    counts = Campaign.from_toml(campaign_folder / "campaign.toml")["up"]["counts"]
+    assert counts.resolution == abs(counts.encoder.angle_per_count)
+
+
 # --- runs beside each other -----------------------------------------------------------------------
 
 TIME = np.arange(800) / 100.0

@@ -55,6 +55,9 @@ def removals(drive: Drive) -> list[Removal]:
     plate = min(atan(FEEDBACK_ARM / numbers["Z3"]), WIDEST)
     stops = {name: max(plate, numbers[name]) for name in ("Z13_plus", "Z13_minus")}
     larger = "pump: larger, or a smaller motor (Z10, Z13)"
+    orifice = "in-line orifice: larger bore (Z16)"
+    if drive.parameters["Z4"].status == "assumed":  # a guessed machine may have no orifice
+        orifice = "what limits the acceleration, in the model an in-line orifice (Z16)"
     compensated = "card: dead-zone compensation (V_dz, or an inverse map)"
     ramp = {"lim1": inf, "lim2": inf}
     known = (
@@ -62,7 +65,7 @@ def removals(drive: Drive) -> list[Removal]:
         Removal("current rate", "card: faster ramp (lim1, lim2)", Limit.CURRENT_RATE, {**ramp}),
         Removal("final decay", "card: no decay of the current (I_t2)", None, {"I_t2": 0.0}),
         Removal("delay", "card: shorter delay (tau)", None, {"tau": 0.0}),
-        Removal("orifice", "in-line orifice: larger bore (Z16)", Limit.ORIFICE, {"Z16": inf}),
+        Removal("orifice", orifice, Limit.ORIFICE, {"Z16": inf}),
         Removal("spool stop", "spool: longer stroke (Z14)", Limit.SPOOL, {"Z14": inf}),
         Removal("swash stop", larger, Limit.SWASH_STOP, {**stops}),
         Removal("relief valve", "relief valve: higher setting (Z15)", Limit.RELIEF, {"Z15": inf}),

@@ -23,6 +23,9 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
+VARIED = 8
+"""Changes of an encoder's steps from which their common divisor is the decoder's."""
+
 
 class Source(NamedTuple):
     """Where a signal comes from."""
@@ -117,6 +120,22 @@ class Channel(Result):
     def used(self) -> NDArray[np.bool_]:
         """(m,) whether a sample counts."""
         return self.weight > 0.0
+
+    @cached_property
+    def resolution(self) -> float | None:
+        """Step of an encoder's readings, None of other channels. [unit]
+
+        A count; more where it moves by multiples of more alone, as behind a decoder that counts
+        every fourth edge.
+        """
+        if self.encoder is None:
+            return None
+        steps = np.diff(np.zeros(0) if self.counts is None else self.counts)
+        # equal steps are a constant speed
+        varied = np.count_nonzero(np.diff(steps)) > VARIED
+        whole = varied and np.array_equal(steps, np.rint(steps))
+        divisor = int(np.gcd.reduce(steps.astype(np.int64))) if whole else 1
+        return divisor * abs(self.encoder.angle_per_count)
 
     @property
     def is_position(self) -> bool:

@@ -241,8 +241,8 @@ def _run(experiment: Experiment, channel: Channel) -> _Run:
     time, values = channel.time[used], channel.values[used]
     interval = float(np.median(np.diff(time)))
     width, coarse = max(WINDOW, 2.0 * interval), 0.0
-    if channel.encoder is not None:
-        count, rows = abs(channel.encoder.angle_per_count), round(width / interval)
+    if count := channel.resolution:
+        rows = round(width / interval)
         coarse = count / width
         # a slow staircase shows a count in a window or none, whatever the speed between
         if np.abs(values[rows:] - values[:-rows]).max(initial=0.0) < FEW * count:

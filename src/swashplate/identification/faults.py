@@ -164,12 +164,12 @@ Effects = dict[str, tuple[Kind, Array]]
 def measurement_error(channel: Channel) -> float | None:
     """Known standard deviation of a channel's measurement error, in its unit.
 
-    The stated noise, or that of rounding to whole counts, 1/√12 of one; None where neither is
+    The stated noise, or that of rounding to an encoder's steps, 1/√12 of one; None where neither is
     known.
     """
     if channel.noise is not None:
         return channel.noise
-    return None if channel.encoder is None else abs(channel.encoder.angle_per_count) / sqrt(12.0)
+    return channel.resolution and channel.resolution / sqrt(12.0)
 
 
 def fastest(name: str, experiments: Sequence[Experiment]) -> float:

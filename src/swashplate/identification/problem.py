@@ -256,9 +256,9 @@ def noise_scales(experiments: Sequence[Experiment], channels: Sequence[str]) -> 
         scales[name] = 0.01 * max(ranges, default=0.0)
         if stated:
             scales[name] = float(np.sqrt(np.mean(np.square(stated))))
-        elif having[0].encoder is not None:
-            # rounding to whole counts leaves an error between -1/2 and 1/2 of one
-            scales[name] = abs(having[0].encoder.angle_per_count) / np.sqrt(12.0)
+        elif step := having[0].resolution:
+            # rounding leaves an error between -1/2 and 1/2 of a step
+            scales[name] = step / np.sqrt(12.0)
         if scales[name] == 0.0:
             raise InputError(f"The channel '{name}' never changes: nothing can be fitted to it.")
     return scales

@@ -329,8 +329,9 @@ def _noise_of_speed(quality: RunQuality, speed: Array) -> float:
     another position that of its white noise.
     """
     channel = quality.experiment[quality.channel]
-    if channel.encoder is not None:
-        counts = np.round(quality.simulated / channel.encoder.angle_per_count)
+    if channel.encoder is not None and (step := channel.resolution):
+        each = step / channel.encoder.angle_per_count
+        counts = each * np.round(quality.simulated / step)
         rounded = speed_of(replace(channel, counts=counts), "exact").speed - speed
         return float(np.sqrt(np.mean(rounded[channel.used] ** 2)))
     pulse = np.zeros(channel.time.size)
