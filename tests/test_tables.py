@@ -131,6 +131,11 @@ def test_an_interval_is_shown_to_two_digits_of_its_half_width(value: float, shar
         assert float(text) == pytest.approx(exact, abs=0.06 * half)
 
 
+def test_an_uneven_interval_leaves_its_value_two_digits() -> None:
+    assert spread(0.0348, 0.0006, 2.1) == ("0.035", "0.001", "2.100")
+    assert spread(5.0, 5.0, 6.0) == ("5.0000", "5.0000", "6.0000")
+
+
 @pytest.mark.parametrize("text", ["=1+1", "@sum(a)", "+cmd|' /C calc'!A0", "-a"])
 def test_no_text_of_a_csv_is_a_formula_to_a_spreadsheet(tmp_path: Path, text: str) -> None:
     path = tmp_path / "runs.csv"

@@ -229,8 +229,12 @@ def plain(value: float, digits: int = 5) -> str:
 
 
 def spread(value: float, lower: float, upper: float) -> tuple[str, str, str]:
-    """A value and the ends of its interval, all to two digits of the interval's half width."""
+    """A value and the ends of its interval, all to two digits of its half width.
+
+    Of an uneven one that is its narrower side, or a hundredth of the half width if that is more.
+    """
     half = 0.5 * (upper - lower)
+    half = max(min(half, value - lower, upper - value), 0.01 * half)
     if not (isfinite(half) and half > 0.0):
         return plain(value), plain(lower), plain(upper)
     power = floor(log10(max(abs(value), half)) + 1e-3)
