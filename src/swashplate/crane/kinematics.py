@@ -68,17 +68,29 @@ class Boom(NamedTuple):
 
 
 class Rotation(NamedTuple):
-    """Matrix from the ship's frame to the inertial one, row by row."""
+    """The ship's axes in the inertial frame, columns of the matrix from one to the other."""
 
-    xx: float
-    xy: float
-    xz: float
-    yx: float
-    yy: float
-    yz: float
-    zx: float
-    zy: float
-    zz: float
+    forward: Vector
+    port: Vector
+    up: Vector
+
+
+@equation
+def dot(a: Vector, b: Vector) -> float:
+    """Scalar product."""
+    return a.x * b.x + a.y * b.y + a.z * b.z
+
+
+@equation
+def size(a: Vector) -> float:
+    """Length of a vector."""
+    return sqrt(dot(a, a))
+
+
+@equation
+def moved(a: Vector, share: float, b: Vector) -> Vector:
+    """The vector a + share b."""
+    return Vector(a.x + share * b.x, a.y + share * b.y, a.z + share * b.z)
 
 
 @equation
@@ -86,36 +98,22 @@ def rotation(roll: float, pitch: float, yaw: float) -> Rotation:
     """R = Rz(yaw) Ry(pitch) Rx(roll); roll lifts port, pitch lowers the bow, yaw turns to port."""
     cf, sf, ct, st, cy, sy = cos(roll), sin(roll), cos(pitch), sin(pitch), cos(yaw), sin(yaw)
     return Rotation(
-        cy * ct,
-        cy * st * sf - sy * cf,
-        cy * st * cf + sy * sf,
-        sy * ct,
-        sy * st * sf + cy * cf,
-        sy * st * cf - cy * sf,
-        -st,
-        ct * sf,
-        ct * cf,
+        Vector(cy * ct, sy * ct, -st),
+        Vector(cy * st * sf - sy * cf, sy * st * sf + cy * cf, ct * sf),
+        Vector(cy * st * cf + sy * sf, sy * st * cf - cy * sf, ct * cf),
     )
 
 
 @equation
 def to_inertial(r: Rotation, p: Vector, shift: Vector) -> Vector:
     """Position in the inertial frame of a point of the ship, R p + s. [m]"""
-    return Vector(
-        shift.x + r.xx * p.x + r.xy * p.y + r.xz * p.z,
-        shift.y + r.yx * p.x + r.yy * p.y + r.yz * p.z,
-        shift.z + r.zx * p.x + r.zy * p.y + r.zz * p.z,
-    )
+    return moved(moved(moved(shift, p.x, r.forward), p.y, r.port), p.z, r.up)
 
 
 @equation
 def to_ship(r: Rotation, v: Vector) -> Vector:
     """Components along the ship's axes of an inertial vector, Rᵀ v."""
-    return Vector(
-        r.xx * v.x + r.yx * v.y + r.zx * v.z,
-        r.xy * v.x + r.yy * v.y + r.zy * v.z,
-        r.xz * v.x + r.yz * v.y + r.zz * v.z,
-    )
+    return Vector(dot(r.forward, v), dot(r.port, v), dot(r.up, v))
 
 
 @equation
@@ -218,9 +216,3 @@ def shaft_torques(force: Vector, slew: float, boom: Boom, tension: float, g: Geo
         - force.z * g.boom * boom.cos * rise
         - tension * g.coupling * g.luff,
     )
-
-
-@equation
-def elevation(boom: Boom) -> float:
-    """Elevation β of the boom. [rad]"""
-    return atan2(boom.sin, boom.cos)

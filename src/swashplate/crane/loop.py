@@ -15,7 +15,7 @@ they are marched before.
 from __future__ import annotations
 
 from collections.abc import Callable
-from math import inf, pi, sqrt
+from math import atan2, inf, pi, sqrt
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -26,29 +26,21 @@ from swashplate.crane.kinematics import (
     Boom,
     Geometry,
     Home,
-    Rotation,
     Shafts,
     Vector,
     boom_at,
-    elevation,
+    moved,
     reach_rate,
     rope_length,
     rotation,
     shaft_torques,
     shafts_for,
+    size,
     tip_of,
     to_inertial,
     to_ship,
 )
-from swashplate.crane.rope import (
-    GRAVITY,
-    Hanging,
-    Hung,
-    hanging_load,
-    moved,
-    rope_step,
-    size,
-)
+from swashplate.crane.rope import GRAVITY, Hanging, Hung, hanging_load, rope_step
 from swashplate.equations import Machine, equation, inlined, kernel
 from swashplate.equations.code import generating
 from swashplate.parameters.rules import FULL_VOLTAGE
@@ -80,10 +72,11 @@ BRAKE_WAITS, BRAKE_TAKES = 0.3, 0.2
 class Inverse(NamedTuple):
     """An `InverseMap` as the loop takes it."""
 
-    minus_speed: Array
-    minus_voltage: Array
-    plus_speed: Array
-    plus_voltage: Array
+    speed: Array
+    voltage: Array
+    """Points of both branches, rising. [rad/s], [V]"""
+    gap: int
+    """Last point of the lower branch; between it and the next there is nothing but the creep."""
     creep: float
     low: float
     high: float
@@ -170,39 +163,24 @@ def shaped(
 
 
 @inlined
-def on_branch(wanted: float, speed: Array, voltage: Array) -> float:
-    """Voltage for a speed on one branch of an inverse map, held at its ends."""
-    low, high = 0, speed.size - 1
-    inside = min(max(wanted, speed[low]), speed[high])
-    while high - low > 1:
-        middle = (low + high) // 2
-        if speed[middle] <= inside:
-            low = middle
-        else:
-            high = middle
-    share = (inside - speed[low]) / (speed[high] - speed[low])
-    made: float = voltage[low] + share * (voltage[high] - voltage[low])
-    return made
-
-
-@inlined
 def voltage_for(wanted: float, inverse: Inverse, actuation: int) -> float:
     """Command of a drive for a wanted speed of its shaft, by `InverseMap.voltage`, clipped. [V]"""
     if actuation == VOLTS:
         full = inverse.high if wanted > 0.0 else -inverse.low
         return min(max(FULL_VOLTAGE * wanted / full, -FULL_VOLTAGE), FULL_VOLTAGE)
-    lower: float = inverse.minus_speed[inverse.minus_speed.size - 1]
-    upper: float = inverse.plus_speed[0]
-    if wanted < lower:
-        return on_branch(wanted, inverse.minus_speed, inverse.minus_voltage)
-    if wanted > upper:
-        return on_branch(wanted, inverse.plus_speed, inverse.plus_voltage)
-    at_rest = abs(wanted - inverse.creep)
-    if at_rest <= wanted - lower and at_rest <= upper - wanted:
-        return 0.0
-    minus: float = inverse.minus_voltage[inverse.minus_voltage.size - 1]
-    plus: float = inverse.plus_voltage[0]
-    return minus if wanted - lower <= upper - wanted else plus
+    speed, voltage, gap = inverse.speed, inverse.voltage, inverse.gap
+    below, above = wanted - speed[gap], speed[gap + 1] - wanted
+    if below >= 0.0 and above >= 0.0:
+        at_rest = abs(wanted - inverse.creep)
+        if at_rest <= below and at_rest <= above:
+            return 0.0
+        edge: float = voltage[gap] if below <= above else voltage[gap + 1]
+        return edge
+    inside = min(max(wanted, inverse.low), inverse.high)
+    n = min(np.searchsorted(speed, inside, side="right"), speed.size - 1)
+    share = (inside - speed[n - 1]) / (speed[n] - speed[n - 1])
+    made: float = voltage[n - 1] + share * (voltage[n] - voltage[n - 1])
+    return made
 
 
 @equation
@@ -290,8 +268,7 @@ def loop_of(hoist: Any, slew: Any, luff: Any, law: Any) -> Callable[..., tuple[S
         boom, rope = boom_at(shafts.luff, g, home), rope_length(shafts, g, home)
         wanted, volts, omega, limits = np.zeros(3), np.zeros(3), np.zeros(3), np.zeros(3)
         seen = np.zeros(13)
-        r = Rotation(1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
-        shift = Vector(0.0, 0.0, 0.0)
+        r, shift = rotation(0.0, 0.0, 0.0), Vector(0.0, 0.0, 0.0)
         ended = FINE
         for m in range(len(stick)):
             half = pi * sqrt(rope / GRAVITY) / h
@@ -322,10 +299,9 @@ def loop_of(hoist: Any, slew: Any, luff: Any, law: Any) -> Callable[..., tuple[S
                     back = 2.0 * half * settings.delay
                     x = settings.feedback * delayed(memory, 5, sample, back)
                     y = settings.feedback * delayed(memory, 6, sample, back)
-                    if moving:
-                        turned = to_ship(r, Vector(x, y, 0.0))
-                        x, y = turned.x, turned.y
-                if settings.ship and moving:
+                    turned = to_ship(r, Vector(x, y, 0.0))
+                    x, y = turned.x, turned.y
+                if settings.ship:
                     # over its place on the sea, at the tip's own height
                     over = Vector(path_x - shift.x, path_y - shift.y, tip.z - shift.z)
                     place = to_ship(r, over)
@@ -333,7 +309,7 @@ def loop_of(hoist: Any, slew: Any, luff: Any, law: Any) -> Callable[..., tuple[S
                     y += place.y - path_y
                 if own:
                     seen[0], seen[1], seen[2] = swing_x, swing_y, rope
-                    seen[3], seen[4] = home.slew + shafts.slew, elevation(boom)
+                    seen[3], seen[4] = home.slew + shafts.slew, atan2(boom.sin, boom.cos)
                     seen[5], seen[6] = path_x, path_y
                     if moving:
                         for i in range(6):
@@ -389,7 +365,7 @@ def loop_of(hoist: Any, slew: Any, luff: Any, law: Any) -> Callable[..., tuple[S
             boom, rope = boom_at(shafts.luff, g, home), rope_length(shafts, g, home)
             shorter -= rope
             in_ship = tip_of(home.slew + shafts.slew, boom, g)
-            following = to_inertial(r, in_ship, shift) if moving else in_ship
+            following = to_inertial(r, in_ship, shift)
             if not (fixed.ropes[0] <= rope <= fixed.ropes[1]):
                 ended = ROPE_OUT
                 break
@@ -424,9 +400,8 @@ def loop_of(hoist: Any, slew: Any, luff: Any, law: Any) -> Callable[..., tuple[S
             if loaded:
                 tension = fixed.mass * hung.pull
                 along = moved(hung.hook, -1.0, tip)
-                force = moved(Vector(0.0, 0.0, 0.0), tension / size(along), along)
-                if moving:
-                    force = to_ship(r, force)
+                pulled = moved(Vector(0.0, 0.0, 0.0), tension / size(along), along)
+                force = to_ship(r, pulled)
                 felt = shaft_torques(force, home.slew + shafts.slew, boom, tension, g)
                 axes[TORQUE, 0], axes[TORQUE, 1], axes[TORQUE, 2] = felt
             sample += 1

@@ -356,7 +356,6 @@ def _speed_lost(drive: Drive) -> float:
 
 def _inverse(inverse: InverseMap) -> Inverse:
     """An inverse map as the loop takes it."""
-    branches = (*inverse.minus, *inverse.plus)
-    a, b, c, d = (np.ascontiguousarray(each, dtype=np.float64) for each in branches)
-    low, high = inverse.limits
-    return Inverse(a, b, c, d, inverse.creep, low, high, min(inverse.acceleration))
+    speed, voltage = np.hstack([inverse.minus, inverse.plus])
+    gap, (low, high) = inverse.minus.speed.size - 1, inverse.limits
+    return Inverse(speed, voltage, gap, inverse.creep, low, high, min(inverse.acceleration))
