@@ -49,7 +49,7 @@ Array = NDArray[np.float64]
 
 IDEAL, VOLTS, INVERSE, DIRECT, MARCHED = range(5)
 """Actuation: speeds at once; 10 V for full speed; the inverse map's voltage; voltages as given;
-voltages, speeds and limits of drives that were marched before."""
+drives that were marched before, whose voltages, speeds and limits stand in the rows already."""
 ROWS = (
     *("voltage_hoist", "voltage_slew", "voltage_luff"),
     *("speed_hoist", "speed_slew", "speed_luff"),
@@ -117,8 +117,6 @@ class Plant(NamedTuple):
     """Delayed signals, a row each: three commands, wanted tip x and y, swing x and y."""
     margins: Array
     """Worst margins of the domains of the drives and the law."""
-    marched: Array
-    """(9, n) voltages, speeds and limits of drives that were marched before the loop."""
 
 
 class State(NamedTuple):
@@ -177,7 +175,7 @@ def voltage_for(wanted: float, inverse: Inverse, actuation: int) -> float:
         edge: float = voltage[gap] if below <= above else voltage[gap + 1]
         return edge
     inside = min(max(wanted, inverse.low), inverse.high)
-    n = min(np.searchsorted(speed, inside, side="right"), speed.size - 1)
+    n = min(int(np.searchsorted(speed, inside, side="right")), speed.size - 1)
     share = (inside - speed[n - 1]) / (speed[n] - speed[n - 1])
     made: float = voltage[n - 1] + share * (voltage[n] - voltage[n - 1])
     return made
@@ -259,18 +257,19 @@ def loop_of(hoist: Any, slew: Any, luff: Any, law: Any) -> Callable[..., tuple[S
         """Take the stick's samples; the state behind the last, and how the pass ended."""
         inverses, settings, actuation = fixed.inverses, fixed.settings, fixed.actuation
         laws, picks, memory, margins = plant.law, plant.picks, plant.memory, plant.margins
-        given = plant.marched
+        a, b, c = plant.drives
         g, home, loaded = fixed.geometry, fixed.home, fixed.loaded
         moving = ship.shape[1] > 1
         last = memory.shape[1] - 1
         sample, axes, tip, hung, still, brake = state
         shafts = shafts_of(axes, ANGLE)
         boom, rope = boom_at(shafts.luff, g, home), rope_length(shafts, g, home)
-        wanted, volts, omega, limits = np.zeros(3), np.zeros(3), np.zeros(3), np.zeros(3)
-        seen = np.zeros(13)
+        wanted, seen = np.zeros(3), np.zeros(13)
         r, shift = rotation(0.0, 0.0, 0.0), Vector(0.0, 0.0, 0.0)
         ended = FINE
         for m in range(len(stick)):
+            row = out[m]
+            volts, omega, limits = row[0:3], row[3:6], row[6:9]
             half = pi * sqrt(rope / GRAVITY) / h
             if moving:
                 shift = Vector(ship[m, 0], ship[m, 1], ship[m, 2])
@@ -332,14 +331,11 @@ def loop_of(hoist: Any, slew: Any, luff: Any, law: Any) -> Callable[..., tuple[S
                     wanted[i] = (aim - axes[AIM, i]) / h * (sample > 0) + behind
                     axes[AIM, i] = aim
             # actuation
-            if actuation == MARCHED:
-                for i in range(3):
-                    volts[i], omega[i], limits[i] = given[i, m], given[3 + i, m], given[6 + i, m]
-            elif actuation == IDEAL:
+            if actuation == IDEAL:
                 for i in range(3):
                     omega[i] = min(max(wanted[i], inverses[i].low), inverses[i].high)
-            else:
-                a, b, c = plant.drives
+                    volts[i], limits[i] = 0.0, 0.0
+            elif actuation != MARCHED:
                 for i in range(3):
                     volts[i] = stick[m, i]
                     if actuation != DIRECT:
@@ -390,13 +386,11 @@ def loop_of(hoist: Any, slew: Any, luff: Any, law: Any) -> Callable[..., tuple[S
                 break
             tip = following
             for i in range(3):
-                out[m, i], out[m, 3 + i], out[m, 6 + i] = volts[i], omega[i], limits[i]
-                out[m, 9 + i], out[m, 25 + i] = axes[ANGLE, i], axes[TORQUE, i]
-            out[m, 12], out[m, 13], out[m, 14] = tip.x, tip.y, tip.z
-            out[m, 15], out[m, 16], out[m, 17] = hung.load.x, hung.load.y, hung.load.z
-            out[m, 18], out[m, 19], out[m, 20] = hung.hook.x, hung.hook.y, hung.hook.z
-            out[m, 21], out[m, 22] = hung.pull, rope
-            out[m, 23], out[m, 24] = boom.cos, boom.sin
+                row[9 + i], row[25 + i] = axes[ANGLE, i], axes[TORQUE, i]
+            row[12], row[13], row[14] = tip
+            row[15], row[16], row[17] = hung.load
+            row[18], row[19], row[20] = hung.hook
+            row[21], row[22], row[23], row[24] = hung.pull, rope, boom.cos, boom.sin
             if loaded:
                 tension = fixed.mass * hung.pull
                 along = moved(hung.hook, -1.0, tip)

@@ -49,6 +49,7 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 Actuation = Literal["ideal", "volts", "inverse", "direct"]
+ACTUATIONS: tuple[str, ...] = get_args(Actuation)
 """In the order of `loop.IDEAL` and the others."""
 RATE = 512.0
 """Samples a second of the loop: the packaged drives' own. [Hz]"""
@@ -121,11 +122,11 @@ class CraneStepper:
         how: dict[str, Any] = dict(setup)
         check_names("A crane's run", how, Setup.__annotations__)
         control = how.pop("control", None)
-        self._crane, self.actuation = crane, how.get("actuation", "inverse")
-        if self.actuation == "direct" and control is not None:
-            raise InputError("With direct actuation the voltages are given: leave control out.")
         settings, law = settings_of(control)
-        self.fixed = fixed = _fixed(crane, settings, **how)
+        self._crane, self.fixed = crane, _fixed(crane, settings, **how)
+        fixed = self.fixed
+        if fixed.actuation == DIRECT and control is not None:
+            raise InputError("With direct actuation the voltages are given: leave control out.")
         given = ("voltage", "load_torque") if fixed.loaded else ("voltage",)
         compiled = [_compiled(getattr(crane, axis), given) for axis in AXES]
         self._steps = [step for step, _ in compiled]
@@ -151,7 +152,7 @@ class CraneStepper:
         memory = np.zeros((7, 1 << int(longest).bit_length()))
         memory[3:5] = [[tip.x], [tip.y]]
         drives, best = (hoist, slew, luff), np.full(4, np.inf)
-        self._plant = Plant(drives, own, picks, memory, best, np.zeros((9, 0)))
+        self._plant = Plant(drives, own, picks, memory, best)
 
     def step(
         self, command: tuple[float, float, float], ship: ArrayLike | None = None
@@ -208,9 +209,29 @@ class CraneStepper:
         InputError, DomainError
             As `Crane.simulate`.
         """
-        out = np.empty((len(commands), len(ROWS)))
+        return self._advanced(self.fixed, commands, ship, np.empty((len(commands), len(ROWS))))
+
+    def run(self, commands: Array, ship: Array) -> Array:
+        """A whole run from the start, as `take`; the stepper itself is then of no more use."""
+        fixed, h, out = self.fixed, 1.0 / RATE, np.empty((len(commands), len(ROWS)))
+        if self._open:  # the drives by themselves, which is quicker
+            given = np.empty((9, len(commands)))
+            for i, axis in enumerate(AXES):
+                stick = np.ascontiguousarray(commands[:, i])
+                volts = open_voltages(stick, fixed.inverses[i], fixed.actuation)
+                instance = instance_of(getattr(self._crane, axis).parameters, by_voltage=True)
+                begun = instance.start({"voltage": 0.0}, h, "rest")
+                wanted = stored_of(instance.model, OUTPUTS)
+                made = marched(instance, {"voltage": volts}, h, begun, wanted, "command")
+                given[i], given[3 + i], given[6 + i] = volts, *made
+            out[:, :9] = given.T
+            fixed = fixed._replace(actuation=MARCHED)
+        return self._advanced(fixed, commands, ship, out)
+
+    def _advanced(self, fixed: Fixed, commands: Array, ship: Array, out: Array) -> Array:
+        """The rows, filled by the loop; refuses what has stopped it."""
         self._state, ended = self._loop(
-            1.0 / RATE, self.fixed, self._state, self._plant, commands, ship, out
+            1.0 / RATE, fixed, self._state, self._plant, commands, ship, out
         )
         if ended != FINE:
             raise self._stopped(ended)
@@ -218,22 +239,6 @@ class CraneStepper:
         for step, machine, worst in zip(self._steps, machines, margins, strict=False):
             step.check(machine, worst, "command")
         return out
-
-    def run(self, commands: Array, ship: Array) -> Array:
-        """A whole run from the start, as `take`; the stepper itself is then of no more use."""
-        if self._open:  # the drives by themselves, which is quicker
-            given, h = np.empty((9, len(commands))), 1.0 / RATE
-            for i, axis in enumerate(AXES):
-                stick = np.ascontiguousarray(commands[:, i])
-                volts = open_voltages(stick, self.fixed.inverses[i], self.fixed.actuation)
-                instance = instance_of(getattr(self._crane, axis).parameters, by_voltage=True)
-                begun = instance.start({"voltage": 0.0}, h, "rest")
-                wanted = stored_of(instance.model, OUTPUTS)
-                made = marched(instance, {"voltage": volts}, h, begun, wanted, "command")
-                given[i], given[3 + i], given[6 + i] = volts, *made
-            self._plant = self._plant._replace(marched=given)
-            self.fixed = self.fixed._replace(actuation=MARCHED)
-        return self.take(commands, ship)
 
     def _stopped(self, ended: int) -> Exception:
         """What has stopped the loop, as the error to raise."""
@@ -276,9 +281,8 @@ def _fixed(
     brake: bool = True,
 ) -> Fixed:
     """What stays as it is during a run, of a `Setup`; refuses one that cannot be."""
-    kinds = get_args(Actuation)
-    if actuation not in kinds:
-        raise InputError(f"actuation is '{actuation}'; it is {', '.join(kinds[:-1])}.")
+    if actuation not in ACTUATIONS:
+        raise InputError(f"actuation is '{actuation}'; it is {', '.join(ACTUATIONS[:-1])}.")
     load = crane.safe_load if load is None else load
     numbers = {"slew_deg": slew_deg, "boom_deg": boom_deg, "rope_m": rope_m, "load": load}
     for name, value in (numbers | {"drag_area": drag_area}).items():
@@ -301,7 +305,7 @@ def _fixed(
         crane.geometry,
         crane.home(slew_deg, boom_deg, rope_m),
         settings,
-        kinds.index(actuation),
+        ACTUATIONS.index(actuation),
         bool(brake),
         (below or -FULL_VOLTAGE, above or FULL_VOLTAGE),
         (sin(low), sin(high)),

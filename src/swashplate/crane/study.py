@@ -218,7 +218,7 @@ def _of_seaway(work: tuple[tuple[Case, ...], Seaway | None, float], item: tuple[
             continue
         counts = run.settling if sea is None else slice(round(start * RATE), None)
         _counted(run.out[counts], row)
-        row[2] += run.home.slew
+        row[2] += run.fixed.home.slew
     return made
 
 

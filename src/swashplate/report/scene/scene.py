@@ -53,7 +53,7 @@ def write_scene(runs: CraneRun | Mapping[str, CraneRun], path: str | Path) -> No
     g = first.crane.geometry
     content = {
         "step": STEP / RATE,
-        "slew": first.home.slew,
+        "slew": first.fixed.home.slew,
         "axis": list(g.axis),
         "foot": g.foot,
         "sheave": [g.sheave * g.sheave_cos, g.sheave * g.sheave_sin],
