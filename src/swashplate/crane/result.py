@@ -41,6 +41,12 @@ THREES = {
 """Signals of three neighbours of `ROWS`, by the first of them."""
 
 
+def swing_of(load: Array, tip: Array) -> Array:
+    """Angle between rope and plumb line. [rad]"""
+    x, y, z = (load - tip).T
+    return np.asarray(np.arctan2(np.hypot(x, y), -z))
+
+
 @dataclass(frozen=True, eq=False)
 class CraneRun(Tabular):
     """Signals of one run at 512 Hz, each by its name in `rows`, SI: ``run["pull"]``.
@@ -133,8 +139,7 @@ class CraneRun(Tabular):
     @cached_property
     def swing_deg(self) -> Array:
         """(n,) angle between rope and plumb line. [deg]"""
-        d = self.load - self.tip
-        return np.degrees(np.arctan2(np.hypot(d[:, 0], d[:, 1]), -d[:, 2]))
+        return np.degrees(swing_of(self.load, self.tip))
 
     @property
     def settling(self) -> slice:
