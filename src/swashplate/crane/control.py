@@ -150,18 +150,12 @@ class TipShaper(JointShaper):
 
 @dataclass(frozen=True)
 class DelayedFeedback(Control):
-    """Delayed position feedback (Masoud and Nayfeh): the tip follows the load of a moment ago.
-
-    Attributes
-    ----------
-    gain : float
-        k, part of the load's horizontal distance from the tip that is added to the wanted tip.
-    delay : float
-        τ in periods of the present rope, at most 1. The damping ratio is about k/2 at 0.25.
-    """
+    """Delayed position feedback (Masoud and Nayfeh): the tip follows the load of a moment ago."""
 
     gain: float = 0.2
+    """k, part of the load's horizontal distance from the tip that is added to the wanted tip."""
     delay: float = 0.25
+    """τ in periods of the present rope, at most 1. The damping ratio is about k/2 at 0.25."""
     kind, sets = "delayed feedback", ("feedback", "delay")
 
 
@@ -183,19 +177,13 @@ class Clip(Control):
 
     It is static, so that it has no phase: it can take authority from the controller, but never feed
     the swing.
-
-    Attributes
-    ----------
-    size : float
-        Along the boom [m]; by default the largest sine of the load's frequency ω₀ that luff and
-        slew can follow, min(v/ω₀, a/ω₀²) with their limits of speed v and acceleration a, times
-        `share`.
-    share : float
-        Part of it that is used.
     """
 
     size: float | Literal["auto"] = "auto"
+    """Along the boom [m]; by default the largest sine of the load's frequency ω₀ that luff and slew
+    can follow, min(v/ω₀, a/ω₀²) with their limits of speed v and acceleration a, times `share`."""
     share: float = 0.8
+    """Part of it that is used."""
     kind = "a clip"
 
     @property
@@ -206,32 +194,21 @@ class Clip(Control):
 
 @dataclass(frozen=True)
 class PositionLoop(Control):
-    """Loop that brings slew and luff back to the wanted path; 0.7 /s without one.
-
-    Attributes
-    ----------
-    gain : float
-        Speed added for each radian of a shaft's error. [1/s]
-    """
+    """Loop that brings slew and luff back to the wanted path; 0.7 /s without one."""
 
     gain: float = 0.7
+    """Speed added for each radian of a shaft's error. [1/s]"""
     kind, sets = "position loop", ("gain",)
 
 
 @dataclass(frozen=True)
 class Law(Control):
-    """A law of one's own: an offset of the wanted tip, as a model of the engine with its own state.
-
-    Attributes
-    ----------
-    model : Model
-        Its inputs are of `SEEN`, its signals or states among others `GIVES`.
-    values : named tuple
-        Of its parameters.
-    """
+    """A law of one's own: an offset of the wanted tip, as a model of the engine with its state."""
 
     model: Model
+    """Its inputs are of `SEEN`, its signals or states among others `GIVES`."""
     values: Any = ()
+    """Named tuple of its parameters."""
     kind = "law"
 
     def __post_init__(self) -> None:
@@ -265,16 +242,9 @@ def settings_of(control: Control | None) -> tuple[Settings, Law | None]:
 def feedback_damping(gain: ArrayLike, delay: ArrayLike) -> Array:
     """Damping ratio that delayed position feedback gives the load on ideal drives.
 
-    Parameters
-    ----------
-    gain, delay : array_like
-        k, above 0 and below 1, and τ in periods of the load; ``gain[:, None]`` and ``delay`` make a
-        map.
-
-    Returns
-    -------
-    array
-        ζ = -Re(s)/abs(s) of the rightmost root with abs(s) < 2 ω₀; negative where the swing grows.
+    Of gains k, above 0 and below 1, and delays τ in periods of the load; ``gain[:, None]`` and
+    ``delay`` make a map. ζ = -Re(s)/abs(s) of the rightmost root with abs(s) < 2 ω₀ is negative
+    where the swing grows.
 
     Raises
     ------

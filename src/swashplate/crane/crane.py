@@ -30,8 +30,7 @@ from swashplate.units import to_si
 
 if TYPE_CHECKING:
     from swashplate.analysis.monte_carlo import Draws
-    from swashplate.crane.following import Followable
-    from swashplate.crane.judgment import Judgment
+    from swashplate.crane.judgment import Followable, Judgment
     from swashplate.crane.study import Laws, Sweep
     from swashplate.linear import LinearModel
 
@@ -318,7 +317,7 @@ class Crane:
 
     def follow(self, periods: ArrayLike = tuple(range(4, 17)), **how: Any) -> Followable:
         """Largest sines of the tip that each axis can follow; see `swashplate.crane.follow`."""
-        from swashplate.crane.following import follow
+        from swashplate.crane.judgment import follow
 
         return follow(self, periods, **how)
 

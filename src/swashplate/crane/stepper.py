@@ -169,12 +169,7 @@ class CraneStepper:
         Returns
         -------
         dict
-            Signals by name, SI: voltages, speeds and angles of the shafts, tip, load, pull, rope.
-
-        Raises
-        ------
-        InputError, DomainError
-            As `Crane.simulate`, and for a command out of range.
+            Signals by name, as of a run, SI; errors are those of `Crane.simulate`.
         """
         most = FULL_VOLTAGE if self.fixed.actuation == DIRECT else 1.0
         commands = np.array([command], dtype=np.float64)
@@ -190,24 +185,9 @@ class CraneStepper:
         return dict(zip(ROWS, row.tolist(), strict=True))
 
     def take(self, commands: Array, ship: Array) -> Array:
-        """Advance by many samples at once.
+        """Advance by many samples at once: a row for each, a column for each of `step`'s signals.
 
-        Parameters
-        ----------
-        commands : (n, 3) array
-            As of `step`.
-        ship : (n, 6) array
-            Motion of the ship [m], [rad]; (n, 1) if it does not move.
-
-        Returns
-        -------
-        (n, 28) array
-            Signals, a column for each that `step` returns.
-
-        Raises
-        ------
-        InputError, DomainError
-            As `Crane.simulate`.
+        Commands are (n, 3), the ship's motion (n, 6), or (n, 1) if it does not move.
         """
         return self._advanced(self.fixed, commands, ship, np.empty((len(commands), len(ROWS))))
 
