@@ -70,8 +70,6 @@ class Control:
     """One stage of control, or several; see the module's text."""
 
     kind: ClassVar[str] = ""
-    sets: ClassVar[tuple[str, ...]] = ()
-    """Fields of `Settings` that its own fields are."""
 
     def __post_init__(self) -> None:
         for name, value in vars(self).items():
@@ -89,11 +87,6 @@ class Control:
     def stages(self) -> tuple[Control, ...]:
         """Single stages."""
         return (self,)
-
-    @property
-    def settings(self) -> dict[str, Any]:
-        """Fields of `Settings` that it sets."""
-        return dict(zip(self.sets, vars(self).values(), strict=False))
 
 
 @dataclass(frozen=True, repr=False)
@@ -126,16 +119,11 @@ class JointShaper(Control):
     """
 
     shape: Shaping = "zv"
-    kind, sets = "shaper", ("joint",)
+    kind = "shaper"
 
     def __post_init__(self) -> None:
         if self.shape not in IMPULSES:
             raise InputError(f"A shaper is 'zv', 'zvd' or 'ei', not '{self.shape}'.")
-
-    @property
-    def settings(self) -> dict[str, Any]:
-        """Its impulses."""
-        return {self.sets[0]: IMPULSES[self.shape]}
 
 
 class TipShaper(JointShaper):
@@ -144,8 +132,6 @@ class TipShaper(JointShaper):
     Swing is linear in that path, so what cancels in it cancels in the swing, in a turn as well; and
     the path ends where the operator's ends, whatever the rope does.
     """
-
-    sets = ("tip",)
 
 
 @dataclass(frozen=True)
@@ -156,7 +142,7 @@ class DelayedFeedback(Control):
     """k, part of the load's horizontal distance from the tip that is added to the wanted tip."""
     delay: float = 0.25
     """τ in periods of the present rope, at most 1. The damping ratio is about k/2 at 0.25."""
-    kind, sets = "delayed feedback", ("feedback", "delay")
+    kind = "delayed feedback"
 
 
 @dataclass(frozen=True)
@@ -164,11 +150,6 @@ class ShipCompensation(Control):
     """Compensation of the ship's motion: the wanted tip keeps its place over the sea."""
 
     kind = "ship compensation"
-
-    @property
-    def settings(self) -> dict[str, Any]:
-        """That it acts."""
-        return {"ship": True}
 
 
 @dataclass(frozen=True)
@@ -186,11 +167,6 @@ class Clip(Control):
     """Part of it that is used."""
     kind = "a clip"
 
-    @property
-    def settings(self) -> dict[str, Any]:
-        """Its size, 0 for one that follows from the limits, and share."""
-        return {"clip": 0.0 if self.size == "auto" else float(self.size), "share": self.share}
-
 
 @dataclass(frozen=True)
 class PositionLoop(Control):
@@ -198,7 +174,7 @@ class PositionLoop(Control):
 
     gain: float = 0.7
     """Speed added for each radian of a shaft's error. [1/s]"""
-    kind, sets = "position loop", ("gain",)
+    kind = "position loop"
 
 
 @dataclass(frozen=True)
@@ -232,11 +208,25 @@ def settings_of(control: Control | None) -> tuple[Settings, Law | None]:
         return Settings(), None
     if not isinstance(control, Control):
         raise InputError(f"{control!r} is no control of a crane; see swashplate.crane.control.")
-    made: dict[str, Any] = {"path": any("joint" not in each.sets for each in control.stages)}
+    made: dict[str, Any] = {"path": any(type(each) is not JointShaper for each in control.stages)}
+    law = None
     for each in control.stages:
-        made |= each.settings
-    laws = [each for each in control.stages if isinstance(each, Law)]
-    return Settings(**made), laws[0] if laws else None
+        match each:
+            case TipShaper():
+                made["tip"] = IMPULSES[each.shape]
+            case JointShaper():
+                made["joint"] = IMPULSES[each.shape]
+            case DelayedFeedback():
+                made |= {"feedback": each.gain, "delay": each.delay}
+            case ShipCompensation():
+                made["ship"] = True
+            case Clip(size):
+                made |= {"clip": 0.0 if size == "auto" else float(size), "share": each.share}
+            case PositionLoop():
+                made["gain"] = each.gain
+            case Law():
+                law = each
+    return Settings(**made), law
 
 
 def feedback_damping(gain: ArrayLike, delay: ArrayLike) -> Array:
