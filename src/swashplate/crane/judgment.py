@@ -7,15 +7,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import reduce
 from math import cos, pi, radians, sin, sqrt
-from operator import or_
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from swashplate.crane.control import Clip, PositionLoop
+from swashplate.crane.control import Chain, Clip, PositionLoop
 from swashplate.crane.crane import Crane
 from swashplate.crane.kinematics import boom_at, reach_rate, tip_of
 from swashplate.crane.loop import largest_sine
@@ -117,9 +115,9 @@ def follow(
     boom = boom_at(0.0, g, home)
     rates = (g.hoist, g.foot + g.boom * boom.cos, float(reach_rate(boom, g)))
     amplitude = np.zeros((times.size, 3))
-    for i, (axis, rate) in enumerate(zip(AXES, rates, strict=True)):
-        (low, high), inverse = crane.inverse(axis).limits, crane.inverse(axis)
-        speed, acceleration = rate * min(high, -low), rate * min(inverse.acceleration)
+    for i, (inverse, rate) in enumerate(zip(map(crane.inverse, AXES), rates, strict=True)):
+        speed = rate * min(np.abs(inverse.limits))
+        acceleration = rate * min(inverse.acceleration)
         amplitude[:, i] = [largest_sine(speed, acceleration, w) for w in 2.0 * pi / times]
     # motion of the tip, linear in the ship's: up, across the boom, along it
     base, omega = seaway or Seaway(), np.linspace(*BAND, 1000)
@@ -214,13 +212,7 @@ class Judgment(Tabular):
         return self.names[-1]
 
     def counted(self, name: str, what: str = "rms_swing") -> Array:
-        """(n,) number of a variant in each seaway, of `COUNTED`; NaN where it was stopped.
-
-        Raises
-        ------
-        InputError
-            If there is no such variant.
-        """
+        """(n,) number of a variant in each seaway, of `COUNTED`; NaN where it was stopped."""
         if name not in self.names:
             raise InputError(f"There is no variant '{name}'; there are {', '.join(self.names)}.")
         return np.asarray(self.values[:, self.names.index(name), COUNTED.index(what)])
@@ -284,15 +276,7 @@ class Judgment(Tabular):
         return f": {axis} at its {names[limit]} {100.0 * share:.0f} % of the time"
 
     def run(self, name: str, seed: int) -> CraneRun:
-        """The whole run of a variant in one seaway, with all signals.
-
-        Raises
-        ------
-        InputError
-            If there is no such variant, or the seaway was not of the judgment.
-        DomainError
-            If the run was stopped.
-        """
+        """The whole run of a variant in one seaway; a `DomainError` if it was stopped."""
         study = self.study
         if seed not in study.seeds or name not in self.names or study.sea is None:
             raise InputError(f"There is no seaway {seed} of a variant '{name}' in this judgment.")
@@ -320,11 +304,11 @@ class Judgment(Tabular):
         )
         for name in self.names:
             rms, largest = self.counted(name), self.counted(name, "largest_swing")
-            worse = None if name == NONE else self.worse(name)
+            worse = np.nan if name == NONE else self.worse(name)
             known = largest[np.isfinite(largest)]
-            numbers = *mean_of(rms), float(np.median(known)) if known.size else np.nan, worse
-            look = worse is not None and worse > self.allowed
-            swings.add(name, *numbers, int(np.isnan(rms).sum()), look=look)
+            median = float(np.median(known)) if known.size else np.nan
+            stopped, look = int(np.isnan(rms).sum()), worse > self.allowed
+            swings.add(name, *mean_of(rms), median, worse, stopped, look=look)
         spec = [Column(each, "+.2f", "rad", none="–") for each in ("difference", "from", "to")]
         heads = (Column("variant", wrap=True), Column("less", wrap=True), *spec)
         paired = Table("Differences of RMS swing within each seaway", heads)
@@ -337,16 +321,12 @@ class Judgment(Tabular):
             if self.study.cases[name].driven
             for axis in AXES
         ]
-        made = [swings, paired, limit_table(acting)]
-        if self.remedies:
-            said = (
-                f"tried on the crane's own drives; a clip with a position loop of {LOOP.gain:g} /s"
-            )
-            columns = (Column("remedy"), Column("worse than none", ".0%"), *interval)
-            made.append(Table("What would do", columns, said))
-            for each in self.remedies:
-                made[-1].add(each.what, each.worse, *each.swing)
-        return made
+        columns = (Column("remedy"), Column("worse than none", ".0%"), *interval)
+        said = f"tried on the crane's own drives; a clip with a position loop of {LOOP.gain:g} /s"
+        remedies = Table("What would do", columns, said)
+        for each in self.remedies:
+            remedies.add(each.what, each.worse, *each.swing)
+        return [swings, paired, limit_table(acting), *([remedies] if self.remedies else [])]
 
     def to_polars(self) -> polars.DataFrame:
         """Numbers of every variant in every seaway, SI, shares of time of limits."""
@@ -362,18 +342,17 @@ class Judgment(Tabular):
     def sentences(self) -> tuple[str, ...]:
         """The verdict, and what it rests on."""
         study, assumed = self.study, self.study.crane.assumed
-        length = study.cases[NONE].stick.length
         rests = (
-            f"Swing counts from {study.start:g} s to {length:g} s of each seaway. "
-            f"Control fails if it is worse than none in more than {100.0 * self.allowed:.0f} % of "
-            "them."
+            f"Swing counts from {study.start:g} s to {study.cases[NONE].stick.length:g} s of each "
+            "seaway. Control fails if it is worse than none in more than "
+            f"{100.0 * self.allowed:.0f} % of them."
         )
         crane = (f"{assumed} of the crane are assumed.",) if assumed else ()
         return (self.verdict(), rests, *crane)
 
 
 def _worse(own: Array, none: Array) -> NDArray[np.bool_]:
-    """Seaways in which a variant is worse than none."""
+    """Seaways in which a variant swings more than no control, or was stopped where that was not."""
     return np.asarray((own > none) | (np.isnan(own) & np.isfinite(none)))
 
 
@@ -389,7 +368,6 @@ def judge(
 
     Parameters
     ----------
-    crane : Crane
     control : Control or mapping of str to Control
         One controller, or several by name.
     allowed : float
@@ -422,24 +400,16 @@ def judge(
     pose: dict[str, Any] = {name: case.setup[name] for name in ("slew_deg", "boom_deg", "rope_m")}
     period = 2.0 * pi * sqrt(pose["rope_m"] / GRAVITY)
     reach = float(follow(cranes[0], [period], seas=(), **pose).amplitude[0, 2])
-    larger = [
-        (f"luff orifice ×{x:g}", x, case._replace(cranes=with_orifice(cranes, x))) for x in FACTORS
-    ]
+    larger = [(f"luff orifice ×{x:g}", x, with_orifice(cranes, x), law) for x in FACTORS]
     clipped = [
-        (
-            f"a clip of {share * reach:.2g} m",
-            share * reach,
-            case.moved(control=reduce(or_, [*stages, Clip(share=share), LOOP]))._replace(
-                cranes=cranes
-            ),
-        )
-        for share in SHARES
+        (f"a clip of {x * reach:.2g} m", x * reach, cranes, Chain((*stages, Clip(share=x), LOOP)))
+        for x in SHARES
     ]
     found: list[Remedy] = []
     tried: list[str] = []
     for trials in (larger, clipped):
-        for what, size, trial in trials:
-            values = _trial(made, trial)
+        for what, size, built, control in trials:
+            values = _trial(made, case.moved(control=control)._replace(cranes=built))
             if values is not None:
                 worse = float(_worse(values, made.counted(NONE)).mean())
                 found.append(Remedy(what, size, worse, mean_of(values)))

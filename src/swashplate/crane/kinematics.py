@@ -157,12 +157,8 @@ def rope_length(shafts: Shafts, g: Geometry, home: Home) -> float:
 def shafts_for(x: float, y: float, now: Shafts, g: Geometry, home: Home) -> Shafts:
     """Shaft angles that put the tip over a point of the deck's plane, the slew by the nearer way.
 
-    Parameters
-    ----------
-    x, y : float
-        Wanted tip in the ship's frame; beyond the boom's reach it is the nearest reach. [m]
-    now : Shafts
-        Where the shafts are; the hoist's is returned as it is. [rad]
+    The point is in the ship's frame [m]; beyond the boom's reach it is the nearest reach. The
+    hoist's angle stays as it is.
     """
     e_x, e_y = x - g.axis.x, y - g.axis.y
     c = min(max((sqrt(e_x * e_x + e_y * e_y) - g.foot) / g.boom, 0.0), 1.0)
@@ -176,10 +172,7 @@ def shafts_for(x: float, y: float, now: Shafts, g: Geometry, home: Home) -> Shaf
 
 @equation
 def boom_rate(boom: Boom, g: Geometry) -> float:
-    """Rise of the boom for each radian of the luff's shaft, ∂β/∂θ_l > 0.
-
-    dℓ/dβ = -B D sin(γ - β)/ℓ.
-    """
+    """Rise of the boom for each radian of the luff's shaft, ∂β/∂θ_l, by ∂ℓ/∂β = -B D sin(γ-β)/ℓ."""
     sine = g.sheave_sin * boom.cos - g.sheave_cos * boom.sin
     return g.luff * luff_rope(boom, g) / (g.boom * g.sheave * sine)
 
@@ -194,17 +187,9 @@ def reach_rate(boom: Boom, g: Geometry) -> float:
 def shaft_torques(force: Vector, slew: float, boom: Boom, tension: float, g: Geometry) -> Shafts:
     """Torques of the hoist rope on the three shafts, positive against positive speed. [N m]
 
-    Parameters
-    ----------
-    force : Vector
-        Of the rope on the tip, along the ship's axes. [N]
-    tension : float
-        Of the rope. [N]
-
-    Notes
-    -----
-    By virtual work C = -T ∂L/∂θ - F·∂p/∂θ for each shaft θ, where the rope L shortens by r_h/n_h
-    with the hoist's and lengthens by κ r_l/n_l with the luff's.
+    By virtual work C = -T ∂L/∂θ - F·∂p/∂θ for each shaft θ, with the rope's force F on the tip,
+    along the ship's axes [N], where the rope L shortens by r_h/n_h with the hoist's and lengthens
+    by κ r_l/n_l with the luff's.
     """
     rise = boom_rate(boom, g)
     reach, along = g.foot + g.boom * boom.cos, -g.boom * boom.sin * rise

@@ -289,19 +289,16 @@ def load_motion(
     tip : (n, 3) array_like
         Path of the upper end, z up, inertial. [m]
     length : (n,) array_like or float
-        Length of the rope. [m]
+        Of the rope. [m]
     rate : float
         Samples a second. [Hz]
     start, velocity : (3,) array_like, optional
         Of the load; by default it hangs below the tip and moves with it. [m], [m/s]
-    drag : float
-        ρ C_d A/(2 m). [1/m]
-    wind : (3,) array_like
-        Velocity of the air. [m/s]
-    suspension : Suspension, optional
-        Elastic rope, hook with slings; a hook starts straight between tip and load.
-    mass : float
-        Of the load, which counts with a suspension. [kg]
+    drag, wind
+        ρ C_d A/(2 m) [1/m], and velocity of the air, (3,) [m/s].
+    suspension, mass
+        Elastic rope, hook with slings, and mass of the load, which then counts [kg]; a hook starts
+        straight between tip and load.
 
     Raises
     ------

@@ -61,48 +61,35 @@ would swing against each other from sample to sample."""
 
 
 class Setup(TypedDict, total=False):
-    """How a run is set up: keywords of `Crane.simulate` and `Crane.stepper`.
-
-    Attributes
-    ----------
-    control : Control, optional
-        Controller, of `swashplate.crane.control`; by default the stick's commands as they are.
-    actuation : {"inverse", "volts", "ideal", "direct"}
-        What makes speeds of wanted speeds: the real drives behind their inverse maps or behind
-        10 V for full speed, or drives that follow at once within their limits of speed. A stepper
-        also takes voltages, with "direct".
-    slew_deg, boom_deg, rope_m : float
-        Slew from forward to starboard, boom's elevation, rope below the tip; by default 0, 45
-        and 20, in studies 90, 45 and 27.
-    load : float, optional
-        Its mass, by default the safe load. [kg]
-    suspension : Suspension
-        Elastic rope, hook with slings; by default a point on a rigid rope.
-    loaded : bool
-        Whether the rope loads the drives: its tension is a torque on each shaft, by virtual work,
-        which they take a sample later as their ``load_torque``. Off by default, as their tests were
-        without load; drives feel it by their ``motor_leakage`` and ``line_stiffness``. What the
-        boom weighs is not in it.
-    drag_area : float
-        C_d A of the load. [m²]
-    wind : (float, float)
-        Forward and to port. [m/s]
-    brake : bool
-        Whether a brake holds the hoist 0.3 s after its command has returned to the dead zone; on by
-        default.
-    """
+    """How a run is set up: keywords of `Crane.simulate` and `Crane.stepper`."""
 
     control: Control | None
+    """Of `swashplate.crane.control`; by default the stick's commands as they are."""
     actuation: Actuation
+    """What makes speeds of wanted speeds: the real drives behind their inverse maps, ``"inverse"``
+    (the default), or behind 10 V for full speed, ``"volts"``; or drives that follow at once within
+    their limits of speed, ``"ideal"``. A stepper also takes voltages, ``"direct"``."""
     slew_deg: float
     boom_deg: float
     rope_m: float
+    """Slew from forward to starboard, boom's elevation, rope below the tip; by default 0, 45 and
+    20, in studies 90, 45 and 27."""
     load: float | None
+    """Its mass, by default the safe load. [kg]"""
     suspension: Suspension
+    """Elastic rope, hook with slings; by default a point on a rigid rope."""
     loaded: bool
+    """Whether the rope loads the drives: its tension is a torque on each shaft, by virtual work,
+    which they take a sample later as their ``load_torque``. Off by default, as their tests were
+    without load; drives feel it by their ``motor_leakage`` and ``line_stiffness``. What the boom
+    weighs is not in it."""
     drag_area: float
+    """C_d A of the load. [m²]"""
     wind: tuple[float, float]
+    """Forward and to port. [m/s]"""
     brake: bool
+    """Whether a brake holds the hoist 0.3 s after its command has returned to the dead zone; on by
+    default."""
 
 
 def check_names(what: str, given: Iterable[str], known: Iterable[str]) -> None:

@@ -290,7 +290,7 @@ class Sweep(Result):
 def sweep(
     crane: Crane, over: str, control: Laws, *, points: ArrayLike | None = None, **study: Any
 ) -> Sweep:
-    """Swing over a quantity, in the same seaways at every point.
+    """Swing over a quantity at some points of it, in the same seaways.
 
     Parameters
     ----------
@@ -300,12 +300,8 @@ def sweep(
         luff drive's in-line orifice under control, in 20; the stick, part of the full speed, in a
         slew of 45 degrees from forward on 20 m of rope in a calm sea, of which the residual swing
         counts.
-    control : Control or mapping of str to Control or None
-        One controller, or several by name.
-    points : (n,) array_like, optional
-        Of the quantity.
-    **study
-        Seaways, drives, where each run begins: see `Study.of`.
+    control, **study
+        Controllers, seaways, drives, where each run begins: see `Study.of`.
 
     Raises
     ------
