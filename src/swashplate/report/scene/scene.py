@@ -28,21 +28,14 @@ COLUMNS = (
 
 
 def write_scene(runs: CraneRun | Mapping[str, CraneRun], path: str | Path) -> None:
-    """Write the scene of one run or of several of one crane and length.
+    """Write the scene of one run or of several of one crane and length, into a file.
 
-    Parameters
-    ----------
-    runs : CraneRun or mapping of str to CraneRun
-        Up to four, by their names; the page shows one at a time over the swing of all.
-    path : path
-        The file, which replaces an older one.
+    Up to four, by their names; the page shows one at a time over the swing of all.
 
     Raises
     ------
-    InputError
-        For none, more than four, or runs that differ in length.
-    FileError
-        If the file cannot be written.
+    InputError, FileError
+        For none, more than four, or runs that differ in length; if the file cannot be written.
     """
     named = {runs.actuation: runs} if isinstance(runs, CraneRun) else dict(runs)
     if not 0 < len(named) <= MOST_RUNS:

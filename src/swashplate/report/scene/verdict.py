@@ -39,16 +39,7 @@ ASSUMED = "Shaded rows of the geometry are assumed: measure them before you rely
 def write_judgment(judgment: Judgment, path: str | Path) -> None:
     """Write a judgment's page: one HTML file, whole or not at all, that needs no network.
 
-    Parameters
-    ----------
-    judgment : Judgment
-    path : path
-        The file, which replaces an older one.
-
-    Raises
-    ------
-    FileError
-        If the file cannot be written.
+    It replaces an older file; a `FileError` if it cannot be written.
     """
     study, judged = judgment.study, judgment.judged
     crane, setup = study.crane, study.cases[NONE].setup
