@@ -76,7 +76,7 @@ class Inverse(NamedTuple):
     voltage: Array
     """Points of both branches, rising. [rad/s], [V]"""
     gap: int
-    """Last point of the lower branch; between it and the next there is nothing but the creep."""
+    """Last point of the lower branch; to the next it is the dead zone, with only the creep."""
     creep: float
     low: float
     high: float
@@ -92,8 +92,6 @@ class Fixed(NamedTuple):
     settings: Settings
     actuation: int
     brake: bool
-    slowest: tuple[float, float]
-    """Voltages of the hoist's dead zone, negative and positive. [V]"""
     boom: tuple[float, float]
     """Sines of the boom's limits."""
     ropes: tuple[float, float]
@@ -152,11 +150,10 @@ def shaped(
     memory: Array, row: int, sample: int, half: float, impulses: tuple[float, float, float]
 ) -> float:
     """A remembered signal through a shaper whose impulses are `half` samples apart."""
-    made: float = impulses[0] * memory[row, sample & (memory.shape[1] - 1)]
-    if impulses[1] > 0.0:
-        made += impulses[1] * delayed(memory, row, sample, half)
-    if impulses[2] > 0.0:
-        made += impulses[2] * delayed(memory, row, sample, 2.0 * half)
+    made = 0.0
+    for k in range(3):
+        if impulses[k] > 0.0:
+            made += impulses[k] * delayed(memory, row, sample, k * half)
     return made
 
 
@@ -258,6 +255,8 @@ def loop_of(hoist: Any, slew: Any, luff: Any, law: Any) -> Callable[..., tuple[S
         inverses, settings, actuation = fixed.inverses, fixed.settings, fixed.actuation
         laws, picks, memory, margins = plant.law, plant.picks, plant.memory, plant.margins
         a, b, c = plant.drives
+        edge = inverses[0].gap
+        slowest = inverses[0].voltage[edge], inverses[0].voltage[edge + 1]
         g, home, loaded = fixed.geometry, fixed.home, fixed.loaded
         moving = ship.shape[1] > 1
         last = memory.shape[1] - 1
@@ -350,7 +349,7 @@ def loop_of(hoist: Any, slew: Any, luff: Any, law: Any) -> Callable[..., tuple[S
                 omega[0], omega[1], omega[2] = a.outputs[0], b.outputs[0], c.outputs[0]
                 limits[0], limits[1], limits[2] = a.outputs[1], b.outputs[1], c.outputs[1]
             if fixed.brake and actuation != IDEAL:
-                within_zone = fixed.slowest[0] < volts[0] < fixed.slowest[1]
+                within_zone = slowest[0] < volts[0] < slowest[1]
                 still = still + h if within_zone else 0.0
                 falls = h / BRAKE_TAKES if still >= BRAKE_WAITS else -h / BRAKE_TAKES
                 brake = min(max(brake + falls, 0.0), 1.0)

@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Any, Literal, TypedDict, Unpack, get_args
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from swashplate.analysis.capability import dead_zone
 from swashplate.analysis.compensation import InverseMap
 from swashplate.crane.control import GIVES, SEEN, Control, settings_of
 from swashplate.crane.kinematics import Shafts, Vector, boom_at, rope_length, shaft_torques, tip_of
@@ -265,7 +264,6 @@ def _fixed(
     drag = AIR * drag_area / (2.0 * load) if load > 0.0 else 0.0  # which the suspension refuses
     if loaded:
         _check_loaded(crane, actuation, load + suspension.hook, suspension)
-    below, above = _edges(crane.hoist)
     low, high = crane.boom_limits
     hoist, slew, luff = (_inverse(crane.inverse(axis)) for axis in AXES)
     return Fixed(
@@ -274,7 +272,6 @@ def _fixed(
         settings,
         ACTUATIONS.index(actuation),
         bool(brake),
-        (below or -FULL_VOLTAGE, above or FULL_VOLTAGE),
         (sin(low), sin(high)),
         crane.rope_limits,
         load + suspension.hook,
@@ -310,12 +307,6 @@ def _compiled(drive: Drive, inputs: tuple[str, ...]) -> tuple[CompiledStep, Mach
     """A drive's step, and a machine at its start to copy."""
     made = drive.compiled_step(OUTPUTS, inputs=inputs, rate=RATE)
     return made, made.machine()
-
-
-@lru_cache(maxsize=64)
-def _edges(drive: Drive) -> tuple[float | None, float | None]:
-    """Voltages of a drive's dead zone, negative and positive. [V]"""
-    return dead_zone(drive, -1.0)[1], dead_zone(drive, 1.0)[1]
 
 
 @lru_cache(maxsize=64)
