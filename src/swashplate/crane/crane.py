@@ -20,7 +20,7 @@ from swashplate.crane.loop import DIRECT, IDEAL
 from swashplate.crane.result import CraneRun
 from swashplate.crane.sea import Seaway, motion_of
 from swashplate.crane.stepper import RATE, CraneStepper, Setup
-from swashplate.crane.stick import AXES, Array, Stick
+from swashplate.crane.stick import AXES, Array, Stick, check_names
 from swashplate.documents import parse_toml, read_text, validated
 from swashplate.drive import Drive
 from swashplate.errors import InputError, ParameterError
@@ -141,9 +141,7 @@ class Crane:
         InputError, FileError, ParameterError
             For an axis that there is not, no such file, or one that is no drive's.
         """
-        strange = [axis for axis in drives if axis not in AXES]
-        if strange:
-            raise InputError(f"A crane has no drive '{strange[0]}': it has {', '.join(AXES)}.")
+        check_names("A crane has no drive", drives, AXES, "it has")
         made: dict[str, Any] = {axis: _drive(each, Path()) for axis, each in drives.items()}
         return replace(self, **made)
 

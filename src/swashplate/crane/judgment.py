@@ -21,7 +21,7 @@ from swashplate.crane.result import PUMPS, CraneRun, limit_table
 from swashplate.crane.rope import GRAVITY
 from swashplate.crane.sea import BAND, SEA_STATES, Seaway
 from swashplate.crane.stepper import RATE
-from swashplate.crane.stick import AXES
+from swashplate.crane.stick import AXES, check_names
 from swashplate.crane.study import COUNTED, NONE, Case, Laws, Study, with_orifice
 from swashplate.errors import InputError
 from swashplate.results import Result, Tabular
@@ -213,8 +213,7 @@ class Judgment(Tabular):
 
     def counted(self, name: str, what: str = "rms_swing") -> Array:
         """(n,) number of a variant in each seaway, of `COUNTED`; NaN where it was stopped."""
-        if name not in self.names:
-            raise InputError(f"There is no variant '{name}'; there are {', '.join(self.names)}.")
+        check_names("There is no variant", [name], self.names)
         return np.asarray(self.values[:, self.names.index(name), COUNTED.index(what)])
 
     def difference(self, name: str, other: str = NONE) -> Estimate:

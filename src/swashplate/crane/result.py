@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from swashplate.crane.loop import ROWS, Fixed
 from swashplate.crane.rope import GRAVITY
 from swashplate.crane.stepper import ACTUATIONS, RATE
-from swashplate.crane.stick import AXES
+from swashplate.crane.stick import AXES, check_names
 from swashplate.errors import InputError
 from swashplate.results import Tabular
 from swashplate.simulation.result import Limit, Named, Simulation
@@ -81,8 +81,7 @@ class CraneRun(Tabular):
     def __getitem__(self, signal: str) -> Array:
         """(n,) signal by its name in `rows`, or (n, 3) of `THREES`; an `InputError` for another."""
         first = THREES.get(signal, signal)
-        if first not in ROWS:
-            raise InputError(f"A crane's run has no signal '{signal}'; it has {', '.join(ROWS)}.")
+        check_names("A crane's run has no signal", [first], ROWS, "it has")
         place = ROWS.index(first)
         return self.out[:, place : place + 3] if signal in THREES else self.out[:, place]
 

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from swashplate.crane.rope import GRAVITY
+from swashplate.crane.stick import check_names
 from swashplate.crane.transfer_functions import CRANE_SHIP, MOTIONS, Hull, TransferFunctions
 from swashplate.equations import kernel
 from swashplate.errors import InputError
@@ -126,8 +127,8 @@ class Seaway(Result):
         if not isinstance(self.sea, str | Spectrum):
             kind = type(self.sea).__name__
             raise InputError(f"A sea is a name, as 'ss3', or a Spectrum, not of type {kind}.")
-        if isinstance(self.sea, str) and self.sea not in SEA_STATES:
-            raise InputError(f"There is no sea '{self.sea}'; there are {', '.join(SEA_STATES)}.")
+        if isinstance(self.sea, str):
+            check_names("There is no sea", [self.sea], SEA_STATES)
         if not (isfinite(self.heading_deg) and isfinite(self.speed) and self.components >= 2):
             raise InputError("A seaway has a finite heading and speed and two or more components.")
         if not str(self.seed).isdigit():

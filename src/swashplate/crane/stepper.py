@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from functools import lru_cache
 from math import degrees, inf, isfinite, pi, sin, sqrt
 from numbers import Real
@@ -12,29 +11,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from swashplate.analysis.compensation import InverseMap
+from swashplate.crane import loop
 from swashplate.crane.control import GIVES, SEEN, Control, settings_of
 from swashplate.crane.kinematics import Shafts, Vector, boom_at, rope_length, shaft_torques, tip_of
-from swashplate.crane.loop import (
-    ANGLE,
-    DIRECT,
-    FINE,
-    INVERSE,
-    MARCHED,
-    NO_NUMBER,
-    ROPE_OUT,
-    ROWS,
-    TOO_FAST,
-    TORQUE,
-    VOLTS,
-    Fixed,
-    Inverse,
-    Plant,
-    State,
-    loop_of,
-    open_voltages,
-)
+from swashplate.crane.loop import ROWS, Fixed, Inverse, Plant, State
 from swashplate.crane.rope import AIR, GRAVITY, Hung, Suspension, too_fast
-from swashplate.crane.stick import AXES
+from swashplate.crane.stick import AXES, check_names
 from swashplate.drive import Drive
 from swashplate.equations import CompiledStep, Machine, compiled_step
 from swashplate.equations.marching.run import marched
@@ -91,13 +73,6 @@ class Setup(TypedDict, total=False):
     default."""
 
 
-def check_names(what: str, given: Iterable[str], known: Iterable[str]) -> None:
-    """Refuse keywords that are not known."""
-    strange = [each for each in given if each not in known]
-    if strange:
-        raise InputError(f"{what} has no '{strange[0]}'; it has {', '.join(known)}.")
-
-
 class CraneStepper:
     """A crane that takes commands and gives signals, the same numbers as `Crane.simulate`.
 
@@ -106,12 +81,12 @@ class CraneStepper:
 
     def __init__(self, crane: Crane, **setup: Unpack[Setup]) -> None:
         how: dict[str, Any] = dict(setup)
-        check_names("A crane's run", how, Setup.__annotations__)
+        check_names("A crane's run has no", how, Setup.__annotations__, "it has")
         control = how.pop("control", None)
         settings, law = settings_of(control)
         self._crane, self.fixed = crane, _fixed(crane, settings, **how)
         fixed = self.fixed
-        if fixed.actuation == DIRECT and control is not None:
+        if fixed.actuation == loop.DIRECT and control is not None:
             raise InputError("With direct actuation the voltages are given: leave control out.")
         given = ("voltage", "load_torque") if fixed.loaded else ("voltage",)
         compiled = [_compiled(getattr(crane, axis), given) for axis in AXES]
@@ -124,15 +99,17 @@ class CraneStepper:
             own = self._steps[3].machine()
             picks = np.array([SEEN.index(each) for each in seen], dtype=np.int64)
         # in open loop nothing acts back on the drives
-        self._open = control is None and not fixed.loaded and fixed.actuation in (VOLTS, INVERSE)
+        self._open = (
+            control is None and not fixed.loaded and fixed.actuation in (loop.VOLTS, loop.INVERSE)
+        )
         one, two, three, *last = (each.step for each in self._steps)
-        self._loop = loop_of(one, two, three, last[0] if last else None)
+        self._loop = loop.loop_of(one, two, three, last[0] if last else None)
         g, home = fixed.geometry, fixed.home
         axes, boom = np.zeros((6, 3)), boom_at(0.0, g, home)
         tip = tip_of(home.slew, boom, g)
         if fixed.loaded:
             weight = fixed.mass * GRAVITY
-            axes[TORQUE] = shaft_torques(Vector(0.0, 0.0, -weight), home.slew, boom, weight, g)
+            axes[loop.TORQUE] = shaft_torques(Vector(0.0, 0.0, -weight), home.slew, boom, weight, g)
         self._state = State(0, axes, tip, Hung(tip, tip, tip, tip, 0.0, 0.0), 0.0, 0.0)
         longest = 2.0 * pi * sqrt(fixed.ropes[1] / GRAVITY) * RATE + 4.0
         memory = np.zeros((7, 1 << int(longest).bit_length()))
@@ -157,7 +134,7 @@ class CraneStepper:
         dict
             Signals by name, as of a run, SI; errors are those of `Crane.simulate`.
         """
-        most = FULL_VOLTAGE if self.fixed.actuation == DIRECT else 1.0
+        most = FULL_VOLTAGE if self.fixed.actuation == loop.DIRECT else 1.0
         commands = np.array([command], dtype=np.float64)
         if commands.shape != (1, 3) or not (np.abs(commands) <= most).all():
             raise InputError(f"A crane takes three commands of at most ±{most:g}.")
@@ -184,14 +161,14 @@ class CraneStepper:
             given = np.empty((9, len(commands)))
             for i, axis in enumerate(AXES):
                 stick = np.ascontiguousarray(commands[:, i])
-                volts = open_voltages(stick, fixed.inverses[i], fixed.actuation)
+                volts = loop.open_voltages(stick, fixed.inverses[i], fixed.actuation)
                 instance = instance_of(getattr(self._crane, axis).parameters, by_voltage=True)
                 begun = instance.start({"voltage": 0.0}, h, "rest")
                 wanted = stored_of(instance.model, OUTPUTS)
                 made = marched(instance, {"voltage": volts}, h, begun, wanted, "command")
                 given[i], given[3 + i], given[6 + i] = volts, *made
             out[:, :9] = given.T
-            fixed = fixed._replace(actuation=MARCHED)
+            fixed = fixed._replace(actuation=loop.MARCHED)
         return self._advanced(fixed, commands, ship, out)
 
     def _advanced(self, fixed: Fixed, commands: Array, ship: Array, out: Array) -> Array:
@@ -199,7 +176,7 @@ class CraneStepper:
         self._state, ended = self._loop(
             1.0 / RATE, fixed, self._state, self._plant, commands, ship, out
         )
-        if ended != FINE:
+        if ended != loop.FINE:
             raise self._stopped(ended)
         machines, margins = (*self._plant.drives, self._plant.law), self._plant.margins.tolist()
         for step, machine, worst in zip(self._steps, machines, margins, strict=False):
@@ -209,16 +186,16 @@ class CraneStepper:
     def _stopped(self, ended: int) -> Exception:
         """What has stopped the loop, as the error to raise."""
         name, time = self._crane.name, self._state.sample / RATE
-        shafts = Shafts(*self._state.axes[ANGLE])
+        shafts = Shafts(*self._state.axes[loop.ANGLE])
         rope = float(rope_length(shafts, self.fixed.geometry, self.fixed.home))
-        if ended == NO_NUMBER:
+        if ended == loop.NO_NUMBER:
             return DomainError(
                 f"{name}: at {time:.2f} s the control law gives an offset of the tip that is no "
                 "finite number; look for a division by zero or a root of what is negative in it."
             )
-        if ended == TOO_FAST:
+        if ended == loop.TOO_FAST:
             return InputError(too_fast(rope, time, RATE))
-        if ended == ROPE_OUT:
+        if ended == loop.ROPE_OUT:
             low, high = self._crane.rope_limits
             return DomainError(
                 f"{name}: at {time:.2f} s the rope is {rope:.2f} m long, but can be {low:g} to "

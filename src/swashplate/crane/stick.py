@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from math import cos, inf, radians, sin
 from typing import TYPE_CHECKING
@@ -22,6 +22,15 @@ Array = NDArray[np.float64]
 AXES = ("hoist", "slew", "luff")
 TARGETS = {"hoist": "rope_m", "slew": "slew_deg", "luff": "boom_deg"}
 """Where an axis is led to: rope below the tip, slew, elevation of the boom."""
+
+
+def check_names(
+    said: str, given: Iterable[str], known: Iterable[str], has: str = "there are"
+) -> None:
+    """Refuse names that are not known, in a sentence that begins as said."""
+    strange = [each for each in given if each not in known]
+    if strange:
+        raise InputError(f"{said} '{strange[0]}'; {has} {', '.join(known)}.")
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,11 +86,7 @@ class Stick(Result):
             For a command beyond ±1, a target or duration too few or too many.
         """
         parts, targets = {"hoist": hoist, "slew": slew, "luff": luff}, dict(until or {})
-        strange = [each for each in targets if each not in TARGETS.values()]
-        if strange:
-            raise InputError(
-                f"There is no target '{strange[0]}'; there are {', '.join(TARGETS.values())}."
-            )
+        check_names("There is no target", targets, TARGETS.values())
         for axis, part in parts.items():
             target = TARGETS[axis]
             if not -1.0 <= part <= 1.0:

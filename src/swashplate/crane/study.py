@@ -18,8 +18,8 @@ from swashplate.crane.control import Control
 from swashplate.crane.crane import Crane, begun
 from swashplate.crane.result import PUMPS, CraneRun, swing_of
 from swashplate.crane.sea import Seaway, Spectrum
-from swashplate.crane.stepper import RATE, Actuation, Setup, check_names
-from swashplate.crane.stick import AXES, Stick
+from swashplate.crane.stepper import RATE, Actuation, Setup
+from swashplate.crane.stick import AXES, Stick, check_names
 from swashplate.errors import DomainError, InputError
 from swashplate.executors import Executor, Threads
 from swashplate.results import Result
@@ -145,7 +145,7 @@ class Study(Result):
             raise InputError("A study needs a controller, a set of drives and a seed at least.")
         poses = [each for each in Setup.__annotations__ if each not in ("control", "actuation")]
         words = ("seeds", "sea", "drives", "stick", "length", "start", *poses)
-        check_names("A study", setup, words)
+        check_names("A study has no", setup, words, "it has")
         stick = stick or Stick.rest(length)
         if not 0.0 <= start < stick.length:
             raise InputError(
@@ -158,11 +158,7 @@ class Study(Result):
         for law, stages in laws.items():
             for name, given in sets.items():
                 if isinstance(given, str):
-                    if given not in ACTUATED:
-                        raise InputError(
-                            f"There are no drives '{given}'; there are {', '.join(ACTUATED)}, or "
-                            "cranes."
-                        )
+                    check_names("There are no drives", [given], ACTUATED)
                     case = none.moved(control=stages, actuation=ACTUATED[given])
                 elif not given:
                     raise InputError(f"The drives '{name}' are an empty list of cranes.")
@@ -308,8 +304,7 @@ def sweep(
     InputError
         For another quantity, points that are none, and keywords that make no study.
     """
-    if over not in SWEPT:
-        raise InputError(f"There is no sweep over '{over}'; there are {', '.join(SWEPT)}.")
+    check_names("There is no sweep over", [over], SWEPT)
     swept = SWEPT[over]
     taken = [each for each in study if each in swept.fixed]
     if taken:
