@@ -234,13 +234,7 @@ def feedback_damping(gain: ArrayLike, delay: ArrayLike) -> Array:
 
     Of gains k, above 0 and below 1, and delays τ in periods of the load; ``gain[:, None]`` and
     ``delay`` make a map. ζ = -Re(s)/abs(s) of the rightmost root with abs(s) < 2 ω₀ is negative
-    where the swing grows.
-
-    Raises
-    ------
-    InputError
-        For a gain out of range, with 1 or more of which every delay is unstable, or a delay that is
-        not above 0 and at most 1.
+    where the swing grows. With a gain of 1 or more every delay is unstable: it is refused.
 
     Notes
     -----
@@ -278,11 +272,7 @@ def linearize(crane: Crane, boom_deg: float, rope_m: float) -> LinearModel:
     along the boom and across it to starboard [m], and the load's speed that way [m/s]; rope [m],
     slew and boom [rad] from where they are. Outputs are angles of the rope outwards and to
     starboard [rad], rope, slew, boom.
-
-    Raises
-    ------
-    InputError
-        For a boom or rope beyond the crane's limits.
+    An `InputError` for a boom or rope beyond the crane's limits.
 
     Notes
     -----

@@ -135,11 +135,6 @@ class Crane:
 
         Each is a drive, ``luff=crane.luff.scale(Z16=1.5)``; the result of a fit; or a place: a
         packaged name, a parameter file, or the folder that a fit wrote.
-
-        Raises
-        ------
-        InputError, FileError, ParameterError
-            For an axis that there is not, no such file, or one that is no drive's.
         """
         check_names("A crane has no drive", drives, AXES, "it has")
         made: dict[str, Any] = {axis: _drive(each, Path()) for axis, each in drives.items()}
@@ -150,11 +145,6 @@ class Crane:
 
         Draws are those of `analysis.monte_carlo.drives`: as many cranes as the shortest has, of
         several axes the first with the first.
-
-        Raises
-        ------
-        InputError
-            For an axis that there is not, or if no draws are given.
         """
         if not draws:
             raise InputError("Cranes are drawn from the draws of at least one axis.")

@@ -92,21 +92,10 @@ def follow(
     boom_deg: float = 45.0,
     rope_m: float = 27.0,
 ) -> Followable:
-    """Largest amplitudes of the tip that each axis can follow, and what seas ask for.
+    """Largest amplitudes of the tip that each axis can follow over periods [s]; what seas ask for.
 
-    Parameters
-    ----------
-    periods : (n,) array_like
-        [s]
-    seas : sequence of str
-        Names of `SEA_STATES`.
-    seaway : Seaway, optional
-        Ship and heading; by default the crane ship's hull in beam waves.
-
-    Raises
-    ------
-    InputError
-        For a period that is not above 0, or a pose beyond the crane's limits.
+    Seas are names of `SEA_STATES`; ship and heading are those of the seaway, by default the crane
+    ship's hull in beam waves.
     """
     times = np.atleast_1d(np.asarray(periods, dtype=np.float64))
     if not (np.isfinite(times).all() and (times > 0.0).all() and times.size):
@@ -377,11 +366,6 @@ def judge(
     **study
         Seaways, drives, stick, where each run begins: see `Study.of`. The verdict is on the last of
         the drives.
-
-    Raises
-    ------
-    InputError
-        For seeds, drives or a start that make no study, or a pose beyond the crane's limits.
     """
     if not 0.0 <= allowed < 1.0:
         raise InputError(

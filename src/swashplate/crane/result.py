@@ -184,13 +184,7 @@ class CraneRun(Tabular):
         return {str(each.name).lower(): float(self.active(axis, each).mean()) for each in PUMPS}
 
     def drive(self, axis: str) -> Simulation:
-        """The simulation of one drive under its voltages, with all signals inside it.
-
-        Raises
-        ------
-        InputError
-            For ideal drives, which have none.
-        """
+        """The simulation of one drive under its voltages, with all signals; not of ideal ones."""
         if self.actuation == "ideal":
             raise InputError("Ideal drives have neither voltages nor limits other than of speed.")
         torque = self[f"torque_{axis}"] if self.fixed.loaded else None

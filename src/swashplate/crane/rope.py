@@ -56,13 +56,7 @@ def multiplier_of(free: Vector, along: Vector, length: float) -> float:
 
 @dataclass(frozen=True)
 class Suspension(Result):
-    """How the load hangs: elastic rope, hook with slings; by default neither.
-
-    Raises
-    ------
-    InputError
-        For numbers without sense, and a hook without slings.
-    """
+    """How the load hangs: elastic rope, hook with slings; by default neither."""
 
     stiffness: float = inf
     """EA, force for a strain of one of the rope's parts together; infinite for a rigid rope. What

@@ -152,27 +152,16 @@ class Seaway(Result):
     @cached_property
     def waves(self) -> Components:
         """Regular waves: one anywhere in each of equal bands, so that nothing repeats."""
-        rng = np.random.default_rng(self.seed)
-        edges, width = np.linspace(*BAND, self.components, endpoint=False, retstep=True)
-        omega = edges + rng.random(self.components) * width
-        phase = 2.0 * np.pi * rng.random(self.components)
-        heading = np.full(self.components, radians(self.heading_deg))
+        rng, n = np.random.default_rng(self.seed), self.components
+        edges, width = np.linspace(*BAND, n, endpoint=False, retstep=True)
+        omega = edges + rng.random(n) * width
+        amplitude = np.sqrt(2.0 * self.spectrum.density(omega) * width)
+        phase, heading = 2.0 * np.pi * rng.random(n), np.full(n, radians(self.heading_deg))
         if self.spread:
             grid = np.linspace(-0.5 * np.pi, 0.5 * np.pi, 1001)
             below = 0.5 + (grid + 0.5 * np.sin(2.0 * grid)) / np.pi
-            heading += np.interp(rng.random(self.components), below, grid)
-        return Components(
-            omega, np.sqrt(2.0 * self.spectrum.density(omega) * width), phase, heading
-        )
-
-    @cached_property
-    def _phasors(self) -> tuple[Array, NDArray[np.complex128]]:
-        """Frequencies of encounter, and complex amplitudes of six motions, (6, components)."""
-        waves = self.waves
-        number = waves.frequency**2 / GRAVITY
-        met = waves.frequency - number * self.speed * np.cos(waves.heading)
-        made = self.ship.response(waves.frequency, waves.heading, self.speed)
-        return met, made * (waves.amplitude * np.exp(1j * waves.phase))
+            heading += np.interp(rng.random(n), below, grid)
+        return Components(omega, amplitude, phase, heading)
 
     def motion(self, count: int, rate: float = 512.0) -> Array:
         """Motion of the ship, (count, 6): surge, sway, heave [m], roll, pitch, yaw [rad].
@@ -183,11 +172,14 @@ class Seaway(Result):
         inner = round(rate / COARSE)
         if inner < 1 or abs(inner * COARSE - rate) > 1e-9 * rate:
             raise InputError(f"A ship's motion has a multiple of {COARSE:g} samples a second.")
-        met, amplitude = self._phasors
+        omega, amplitude, phase, heading = self.waves
+        met = omega - omega**2 / GRAVITY * self.speed * np.cos(heading)  # as the ship meets them
+        response = self.ship.response(omega, heading, self.speed)
+        motions = (response * (amplitude * np.exp(1j * phase))).T
         intervals = max(-(-(count - 1) // inner), 1)
         # value, slope and curvature of each motion, by e^{iωt}
         w = met[:, None]
-        sums = np.hstack([amplitude.T, 1j * w * amplitude.T, -w * w * amplitude.T])
+        sums = np.hstack([motions, 1j * w * motions, -w * w * motions])
         made = np.empty((intervals * inner + 1, 6))
         _synthesised(met, sums.real.copy(), sums.imag.copy(), _basis(inner), made)
         return made[:count]

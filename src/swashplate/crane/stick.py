@@ -79,11 +79,6 @@ class Stick(Result):
             Of an axis without target. [s]
         start, ramp, length : float
             Moment of the first ramp, time of each ramp, length of the record. [s]
-
-        Raises
-        ------
-        InputError
-            For a command beyond ±1, a target or duration too few or too many.
         """
         parts, targets = {"hoist": hoist, "slew": slew, "luff": luff}, dict(until or {})
         check_names("There is no target", targets, TARGETS.values())

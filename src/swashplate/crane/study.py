@@ -131,11 +131,6 @@ class Study(Result):
         **setup
             Where each run begins, what hangs on it: see `Setup`, whose control and actuation follow
             from controllers and drives. By default the load hangs abeam on 27 m of rope.
-
-        Raises
-        ------
-        InputError
-            For seeds, drives or a start that make no study.
         """
         laws = control if isinstance(control, Mapping) else {"": control}
         sets = drives if isinstance(drives, Mapping) else {each: each for each in drives}
@@ -298,11 +293,6 @@ def sweep(
         counts.
     control, **study
         Controllers, seaways, drives, where each run begins: see `Study.of`.
-
-    Raises
-    ------
-    InputError
-        For another quantity, points that are none, and keywords that make no study.
     """
     check_names("There is no sweep over", [over], SWEPT)
     swept = SWEPT[over]

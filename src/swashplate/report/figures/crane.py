@@ -86,16 +86,9 @@ def plot_crane(
     Parameters
     ----------
     runs : CraneRun or mapping of str to CraneRun
-        Runs of one length, by their names.
+        Up to six of one length, by their names.
     sea : mapping of str to CraneRun, optional
         The same in a seaway, whose swing gets a panel of its own.
-    title : str, optional
-        By default the crane's.
-
-    Raises
-    ------
-    InputError
-        For none, or more than six runs.
     """
     named = {runs.actuation: runs} if isinstance(runs, CraneRun) else dict(runs)
     if not 0 < len(named) <= MOST_RUNS:
