@@ -310,8 +310,7 @@ def loop_of(hoist: Any, slew: Any, luff: Any, law: Any) -> Callable[..., tuple[S
                     seen[3], seen[4] = home.slew + shafts.slew, atan2(boom.sin, boom.cos)
                     seen[5], seen[6] = path_x, path_y
                     if moving:
-                        for i in range(6):
-                            seen[7 + i] = ship[m, i]
+                        seen[7:13] = ship[m]
                     for i in range(picks.size):
                         laws.inputs[i] = seen[picks[i]]
                     margin = advance_law(laws)

@@ -11,7 +11,8 @@ from __future__ import annotations
 import csv
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
-from math import isfinite, pi
+from itertools import count
+from math import inf, isfinite, pi
 from pathlib import Path
 
 import numpy as np
@@ -236,18 +237,18 @@ def read_ship(path: str | Path, length: float | None = None) -> TransferFunction
 
 def _numbers(path: str | Path, line: int, words: Sequence[str | None], wanted: str) -> list[float]:
     """Finite numbers of a line, as many as are wanted, joined by commas."""
-    names = wanted.split(", ")
+    names, made = wanted.split(", "), list[float]()
     for name, word in zip(names, [*words, *([None] * len(names))], strict=False):
         try:
-            fine = isfinite(float(word or ""))
+            made.append(float(word or ""))
         except ValueError:
-            fine = False
-        if not fine:
+            made.append(inf)
+        if not isfinite(made[-1]):
             raise FileError(
                 f"{path}, line {line}: {name} is {'missing' if word is None else repr(word)}, but "
                 f"must be a number; needed are {wanted}: the file is cut or another one."
             )
-    return [float(word or "") for word in words[: len(names)]]
+    return made
 
 
 def _veres(path: str | Path) -> Iterator[Amplitude]:
@@ -256,25 +257,23 @@ def _veres(path: str | Path) -> Iterator[Amplitude]:
         raise FileError(
             f"{path} is no VERES file of motion transfer functions: its first line differs."
         )
-    row = 9
+    rows = count(10)
 
     def following(wanted: str) -> list[float]:
-        nonlocal row
-        row += 1
+        row = next(rows)
         words = lines[row - 1].split() if row <= len(lines) else []
         return _numbers(path, row, words, wanted)
 
     speeds, headings, frequencies, _ = map(int, following("speeds, headings, frequencies, motions"))
     for _ in range(speeds):
-        speed = following("speed")[0]
+        (speed,) = following("speed")
         for _ in range(headings):
             (heading,) = following("heading")
             for _ in range(frequencies):
                 (omega,) = following("frequency")
                 for _ in MOTIONS:
-                    motion, real, imaginary = following("motion, real part, imaginary part")
-                    value = complex(real, imaginary)
-                    yield speed, heading, omega, int(motion) - 1, value
+                    motion, *parts = following("motion, real part, imaginary part")
+                    yield speed, heading, omega, int(motion) - 1, complex(*parts)
 
 
 def _wamit(path: str | Path) -> Iterator[Amplitude]:
