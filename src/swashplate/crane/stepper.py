@@ -36,6 +36,8 @@ RATE = 512.0
 """Samples a second of the loop: the packaged drives' own. [Hz]"""
 OUTPUTS = ("shaft_speed", "limits")
 """What the loop takes of each drive."""
+RIGID = Suspension()
+"""A point on a rigid rope."""
 QUICKEST = 0.4
 """Largest part of a rope's pull by which a leaking drive may lower it within a sample: at 0.7 they
 would swing against each other from sample to sample."""
@@ -185,27 +187,21 @@ class CraneStepper:
 
     def _stopped(self, ended: int) -> Exception:
         """What has stopped the loop, as the error to raise."""
-        name, time = self._crane.name, self._state.sample / RATE
+        crane, time = self._crane, self._state.sample / RATE
         shafts = Shafts(*self._state.axes[loop.ANGLE])
         rope = float(rope_length(shafts, self.fixed.geometry, self.fixed.home))
-        if ended == loop.NO_NUMBER:
-            return DomainError(
-                f"{name}: at {time:.2f} s the control law gives an offset of the tip that is no "
-                "finite number; look for a division by zero or a root of what is negative in it."
-            )
         if ended == loop.TOO_FAST:
             return InputError(too_fast(rope, time, RATE))
-        if ended == loop.ROPE_OUT:
-            low, high = self._crane.rope_limits
-            return DomainError(
-                f"{name}: at {time:.2f} s the rope is {rope:.2f} m long, but can be {low:g} to "
-                f"{high:g} m; hoist or lower less, or start elsewhere."
-            )
-        low, high = map(degrees, self._crane.boom_limits)
-        return DomainError(
-            f"{name}: at {time:.2f} s the boom meets the limits of its travel, {low:g} to "
-            f"{high:g} deg; luff less, or start elsewhere."
-        )
+        (short, long), (low, high) = crane.rope_limits, map(degrees, crane.boom_limits)
+        said = {
+            loop.NO_NUMBER: "the control law gives an offset of the tip that is no finite number; "
+            "look for a division by zero or a root of what is negative in it",
+            loop.ROPE_OUT: f"the rope is {rope:.2f} m long, but can be {short:g} to {long:g} m; "
+            "hoist or lower less, or start elsewhere",
+            loop.BOOM_OUT: f"the boom meets the limits of its travel, {low:g} to {high:g} deg; "
+            "luff less, or start elsewhere",
+        }
+        return DomainError(f"{crane.name}: at {time:.2f} s {said[ended]}.")
 
 
 def _fixed(
@@ -217,7 +213,7 @@ def _fixed(
     boom_deg: float = 45.0,
     rope_m: float = 20.0,
     load: float | None = None,
-    suspension: Suspension = Suspension(),  # noqa: B008  immutable
+    suspension: Suspension = RIGID,
     loaded: bool = False,
     drag_area: float = 0.0,
     wind: tuple[float, float] = (0.0, 0.0),
