@@ -107,7 +107,7 @@ def test_follow_and_sectors_print_their_tables(tmp_path):
         ("run tg3637 --drive luff=none", "or the result or folder of a fit, but there is no such"),
         ("run tg3637 --ship hull.re1", "--ship hull.re1 needs a --sea to move in."),
         ("run tg3637 --at rope=3", "--at has no rope; it has slew_deg, boom_deg, rope_m."),
-        ("run tg3637 --drive boom=hoist", "A crane has no drive 'boom': it has hoist, slew, luff."),
+        ("run tg3637 --drive boom=hoist", "A crane has no drive 'boom'; it has hoist, slew, luff."),
         ("judge tg3637 --scale boom.orifice=2", "the axes are hoist, slew, luff."),
         ("run tg3637 --slew 1 --until 45", "has no equals sign"),
         ("run tg3637 --at rope_m=20 --at rope_m=30", "--at rope_m=... is given twice"),

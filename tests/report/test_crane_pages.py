@@ -19,7 +19,7 @@ from swashplate.crane import (
 )
 from swashplate.report import figures
 from swashplate.report.scene import write_judgment, write_scene
-from swashplate.report.scene.scene import COLUMNS
+from swashplate.report.scene.pages import COLUMNS
 
 MEANT = control.DelayedFeedback(0.2, 0.2) | control.ShipCompensation()
 SHORT = {"length": 30.0, "start": 10.0}

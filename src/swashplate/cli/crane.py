@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from pathlib import Path
@@ -17,7 +17,7 @@ from swashplate.errors import InputError
 from swashplate.tables import FIGURE, TABLE, Form, Table
 
 if TYPE_CHECKING:
-    from swashplate.crane import Crane, Seaway
+    from swashplate.crane import Crane, Judgment, Seaway, Sweep
     from swashplate.crane.control import Control
 
 PAGE = Form("a page", (".html",))
@@ -107,23 +107,29 @@ class Studied(Placed):
     drives: str | None = None
     scale: list[str] | None = None
 
-    def asked(self) -> tuple[Control, dict[str, Any]]:
-        """The controller, and keywords of a study."""
-        from swashplate.analysis.monte_carlo import stored_draws
-        from swashplate.analysis.whatif import find_lever, pulled
-
+    def through(self, study: Callable[..., Any], *first: Any, **more: Any) -> Any:
+        """A study of the controller, whose progress is shown."""
         law = control_of(self.control)
         if law is None:
             raise InputError("--control is empty: there is nothing to judge.")
-        how: dict[str, Any] = dict(self.pose)
+        how = self.pose | more
         if self.sea or self.ship is not None:
             how["sea"] = self.seaway(self.sea or ["ss3"], "ss3,90")
         if self.seeds is not None:
             how["seeds"] = range(self.seeds)
-        if self.drives is None and not self.scale:
-            return law, how
-        words = filter(None, map(str.strip, (self.drives or "ideal,identified").split(",")))
-        sets: dict[str, Any] = {name: name for name in words}
+        if self.drives is not None or self.scale:
+            how["drives"] = self.sets()
+        with long_work("Seaways") as shown:
+            how["progress"] = lambda done, of: shown(f"{done} of {of} seaways", done / of)
+            return study(*first, law, **how)
+
+    def sets(self) -> dict[str, Any]:
+        """Sets of drives by name."""
+        from swashplate.analysis.monte_carlo import stored_draws
+        from swashplate.analysis.whatif import find_lever, pulled
+
+        names = filter(None, map(str.strip, (self.drives or "ideal,identified").split(",")))
+        sets: dict[str, Any] = {name: name for name in names}
         if "drawn" in sets:
             pairs = pairs_of("--drive", self.drive, "luff=fitted")
             draws = {axis: stored_draws(place) for axis, place in pairs if Path(place).is_dir()}
@@ -132,19 +138,19 @@ class Studied(Placed):
             sets["drawn"] = self.chosen.drawn(**draws)
         crane, changed = self.chosen, []
         for name, text in pairs_of("--scale", self.scale, "luff.orifice=1.5"):
-            axis, _, lever = name.partition(".")
-            if not lever:
-                raise InputError(f"--scale {name}={text}: write the axis first, luff.orifice=1.5.")
+            (axis, _, lever), words = name.partition("."), f"--scale {name}={text}"
+            if not lever or axis not in AXES:
+                raise InputError(
+                    f"{words}: write the axis first, luff.orifice=1.5; the axes are "
+                    f"{', '.join(AXES)}."
+                )
             find_lever(lever)
-            factor = _number(f"--scale {name}={text}", text)
-            if axis not in AXES:
-                raise InputError(f"--scale {name}={text}: the axes are {', '.join(AXES)}.")
-            drive = getattr(crane, axis)
-            crane = crane.with_drive(**{axis: pulled(drive, {lever: factor})})
+            factor = _number(words, text)
+            crane = crane.with_drive(**{axis: pulled(getattr(crane, axis), {lever: factor})})
             changed.append(f"{axis} {lever} ×{factor:g}")
         if changed:
             sets[", ".join(changed)] = crane
-        return law, how | {"drives": sets}
+        return sets
 
 
 def show_crane(crane: str, *, toml: bool = False) -> None:
@@ -162,8 +168,8 @@ def show_crane(crane: str, *, toml: bool = False) -> None:
         from swashplate.crane.crane import preset_text
         from swashplate.documents import read_text
 
-        own = crane.endswith(".toml")
-        typer.echo(read_text(crane) if own else preset_text(crane), nl=False)
+        read = read_text if crane.endswith(".toml") else preset_text
+        typer.echo(read(crane), nl=False)
         return
     chosen = Placed(crane).chosen
     show(chosen.table())
@@ -267,14 +273,12 @@ def judge(
       swashplate crane judge tg3637 --drive luff=fitted --drives identified,drawn
     """
     files = Outputs((out, VERDICT), (plot, FIGURE))
-    law, how = study.asked()
+    more: dict[str, Any] = {"allowed": allowed / 100.0, "remedies": remedies}
     if dask is not None:
         from swashplate.executors import Dask
 
-        how["executor"] = Dask(dask)
-    with long_work("Seaways") as shown:
-        how["progress"] = lambda done, of: shown(f"{done} of {of} seaways", done / of)
-        found = study.chosen.judge(law, allowed=allowed / 100.0, remedies=remedies, **how)
+        more["executor"] = Dask(dask)
+    found: Judgment = study.through(study.chosen.judge, **more)
     page = out is not None and out.suffix.lower() == ".html"
     write = (lambda path: _pages().write_judgment(found, path)) if page else found.write
     files.write(out, "Verdict", write)
@@ -339,12 +343,10 @@ def sweep(
       swashplate crane sweep tg3637 stick --control zv-joint --plot stick.png
     """
     files = Outputs((out, TABLE), (plot, FIGURE))
-    law, how = study.asked()
+    more: dict[str, Any] = {}
     if points is not None:
-        how["points"] = [_number(f"--points {points}", each) for each in points.split(",")]
-    with long_work("Seaways") as shown:
-        how["progress"] = lambda done, of: shown(f"{done} of {of} seaways", done / of)
-        found = study.chosen.sweep(over, law, **how)
+        more["points"] = [_number(f"--points {points}", each) for each in points.split(",")]
+    found: Sweep = study.through(study.chosen.sweep, over, **more)
     files.write(out, "Swing, in SI", found.tables()[0].write)
     files.draw(plot, "plot_sweep", found)
     _end(files, study.chosen, found.tables())
@@ -376,7 +378,7 @@ def control_of(words: str) -> Control | None:
     }
     for where, shaper in (("tip", control.TipShaper), ("joint", control.JointShaper)):
         kinds |= {f"{shape}-{where}": (partial(shaper, shape), 0) for shape in control.IMPULSES}
-    made: Control | None = None
+    stages: list[Control] = []
     for word in filter(None, words.split("+")):
         name, _, text = word.partition("=")
         numbers = [_number(f"The control '{word}'", each) for each in text.split("/") if text]
@@ -386,9 +388,8 @@ def control_of(words: str) -> Control | None:
                 f"There is no control '{word}'; there are zv-joint, zv-tip (zvd, ei), "
                 "feedback=0.2/0.25, ship, clip=0.25 and loop=0.7."
             )
-        stage = kind(*numbers)
-        made = stage if made is None else made | stage
-    return made
+        stages.append(kind(*numbers))
+    return control.Chain(tuple(stages)) if stages else None
 
 
 def _numbers(

@@ -1,11 +1,11 @@
 from . import control as control
 from .crane import Crane as Crane
-from .following import Demand as Demand
-from .following import Followable as Followable
-from .following import follow as follow
+from .judgment import Demand as Demand
 from .judgment import Estimate as Estimate
+from .judgment import Followable as Followable
 from .judgment import Judgment as Judgment
 from .judgment import Remedy as Remedy
+from .judgment import follow as follow
 from .judgment import judge as judge
 from .result import CraneRun as CraneRun
 from .result import run_tables as run_tables

@@ -70,8 +70,6 @@ class Control:
     """One stage of control, or several; see the module's text."""
 
     kind: ClassVar[str] = ""
-    sets: ClassVar[tuple[str, ...]] = ()
-    """Fields of `Settings` that its own fields are."""
 
     def __post_init__(self) -> None:
         for name, value in vars(self).items():
@@ -89,11 +87,6 @@ class Control:
     def stages(self) -> tuple[Control, ...]:
         """Single stages."""
         return (self,)
-
-    @property
-    def settings(self) -> dict[str, Any]:
-        """Fields of `Settings` that it sets."""
-        return dict(zip(self.sets, vars(self).values(), strict=False))
 
 
 @dataclass(frozen=True, repr=False)
@@ -126,16 +119,11 @@ class JointShaper(Control):
     """
 
     shape: Shaping = "zv"
-    kind, sets = "shaper", ("joint",)
+    kind = "shaper"
 
     def __post_init__(self) -> None:
         if self.shape not in IMPULSES:
             raise InputError(f"A shaper is 'zv', 'zvd' or 'ei', not '{self.shape}'.")
-
-    @property
-    def settings(self) -> dict[str, Any]:
-        """Its impulses."""
-        return {self.sets[0]: IMPULSES[self.shape]}
 
 
 class TipShaper(JointShaper):
@@ -145,24 +133,16 @@ class TipShaper(JointShaper):
     the path ends where the operator's ends, whatever the rope does.
     """
 
-    sets = ("tip",)
-
 
 @dataclass(frozen=True)
 class DelayedFeedback(Control):
-    """Delayed position feedback (Masoud and Nayfeh): the tip follows the load of a moment ago.
-
-    Attributes
-    ----------
-    gain : float
-        k, part of the load's horizontal distance from the tip that is added to the wanted tip.
-    delay : float
-        τ in periods of the present rope, at most 1. The damping ratio is about k/2 at 0.25.
-    """
+    """Delayed position feedback (Masoud and Nayfeh): the tip follows the load of a moment ago."""
 
     gain: float = 0.2
+    """k, part of the load's horizontal distance from the tip that is added to the wanted tip."""
     delay: float = 0.25
-    kind, sets = "delayed feedback", ("feedback", "delay")
+    """τ in periods of the present rope, at most 1. The damping ratio is about k/2 at 0.25."""
+    kind = "delayed feedback"
 
 
 @dataclass(frozen=True)
@@ -171,11 +151,6 @@ class ShipCompensation(Control):
 
     kind = "ship compensation"
 
-    @property
-    def settings(self) -> dict[str, Any]:
-        """That it acts."""
-        return {"ship": True}
-
 
 @dataclass(frozen=True)
 class Clip(Control):
@@ -183,55 +158,33 @@ class Clip(Control):
 
     It is static, so that it has no phase: it can take authority from the controller, but never feed
     the swing.
-
-    Attributes
-    ----------
-    size : float
-        Along the boom [m]; by default the largest sine of the load's frequency ω₀ that luff and
-        slew can follow, min(v/ω₀, a/ω₀²) with their limits of speed v and acceleration a, times
-        `share`.
-    share : float
-        Part of it that is used.
     """
 
     size: float | Literal["auto"] = "auto"
+    """Along the boom [m]; by default the largest sine of the load's frequency ω₀ that luff and slew
+    can follow, min(v/ω₀, a/ω₀²) with their limits of speed v and acceleration a, times `share`."""
     share: float = 0.8
+    """Part of it that is used."""
     kind = "a clip"
-
-    @property
-    def settings(self) -> dict[str, Any]:
-        """Its size, 0 for one that follows from the limits, and share."""
-        return {"clip": 0.0 if self.size == "auto" else float(self.size), "share": self.share}
 
 
 @dataclass(frozen=True)
 class PositionLoop(Control):
-    """Loop that brings slew and luff back to the wanted path; 0.7 /s without one.
-
-    Attributes
-    ----------
-    gain : float
-        Speed added for each radian of a shaft's error. [1/s]
-    """
+    """Loop that brings slew and luff back to the wanted path; 0.7 /s without one."""
 
     gain: float = 0.7
-    kind, sets = "position loop", ("gain",)
+    """Speed added for each radian of a shaft's error. [1/s]"""
+    kind = "position loop"
 
 
 @dataclass(frozen=True)
 class Law(Control):
-    """A law of one's own: an offset of the wanted tip, as a model of the engine with its own state.
-
-    Attributes
-    ----------
-    model : Model
-        Its inputs are of `SEEN`, its signals or states among others `GIVES`.
-    values : named tuple
-        Of its parameters.
-    """
+    """A law of one's own: an offset of the wanted tip, as a model of the engine with its state."""
 
     model: Model
+    """Its inputs are of `SEEN`, its signals or states among others `GIVES`."""
     values: Any = ()
+    """Named tuple of its parameters."""
     kind = "law"
 
     def __post_init__(self) -> None:
@@ -255,32 +208,33 @@ def settings_of(control: Control | None) -> tuple[Settings, Law | None]:
         return Settings(), None
     if not isinstance(control, Control):
         raise InputError(f"{control!r} is no control of a crane; see swashplate.crane.control.")
-    made: dict[str, Any] = {"path": any("joint" not in each.sets for each in control.stages)}
+    made: dict[str, Any] = {"path": any(type(each) is not JointShaper for each in control.stages)}
+    law = None
     for each in control.stages:
-        made |= each.settings
-    laws = [each for each in control.stages if isinstance(each, Law)]
-    return Settings(**made), laws[0] if laws else None
+        match each:
+            case TipShaper():
+                made["tip"] = IMPULSES[each.shape]
+            case JointShaper():
+                made["joint"] = IMPULSES[each.shape]
+            case DelayedFeedback():
+                made |= {"feedback": each.gain, "delay": each.delay}
+            case ShipCompensation():
+                made["ship"] = True
+            case Clip(size):
+                made |= {"clip": 0.0 if size == "auto" else float(size), "share": each.share}
+            case PositionLoop():
+                made["gain"] = each.gain
+            case Law():
+                law = each
+    return Settings(**made), law
 
 
 def feedback_damping(gain: ArrayLike, delay: ArrayLike) -> Array:
     """Damping ratio that delayed position feedback gives the load on ideal drives.
 
-    Parameters
-    ----------
-    gain, delay : array_like
-        k, above 0 and below 1, and τ in periods of the load; ``gain[:, None]`` and ``delay`` make a
-        map.
-
-    Returns
-    -------
-    array
-        ζ = -Re(s)/abs(s) of the rightmost root with abs(s) < 2 ω₀; negative where the swing grows.
-
-    Raises
-    ------
-    InputError
-        For a gain out of range, with 1 or more of which every delay is unstable, or a delay that is
-        not above 0 and at most 1.
+    Of gains k, above 0 and below 1, and delays τ in periods of the load; ``gain[:, None]`` and
+    ``delay`` make a map. ζ = -Re(s)/abs(s) of the rightmost root with abs(s) < 2 ω₀ is negative
+    where the swing grows. With a gain of 1 or more every delay is unstable: it is refused.
 
     Notes
     -----
@@ -318,11 +272,7 @@ def linearize(crane: Crane, boom_deg: float, rope_m: float) -> LinearModel:
     along the boom and across it to starboard [m], and the load's speed that way [m/s]; rope [m],
     slew and boom [rad] from where they are. Outputs are angles of the rope outwards and to
     starboard [rad], rope, slew, boom.
-
-    Raises
-    ------
-    InputError
-        For a boom or rope beyond the crane's limits.
+    An `InputError` for a boom or rope beyond the crane's limits.
 
     Notes
     -----

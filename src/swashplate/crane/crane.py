@@ -20,7 +20,7 @@ from swashplate.crane.loop import DIRECT, IDEAL
 from swashplate.crane.result import CraneRun
 from swashplate.crane.sea import Seaway, motion_of
 from swashplate.crane.stepper import RATE, CraneStepper, Setup
-from swashplate.crane.stick import AXES, Array, Stick
+from swashplate.crane.stick import AXES, Array, Stick, check_names
 from swashplate.documents import parse_toml, read_text, validated
 from swashplate.drive import Drive
 from swashplate.errors import InputError, ParameterError
@@ -30,8 +30,7 @@ from swashplate.units import to_si
 
 if TYPE_CHECKING:
     from swashplate.analysis.monte_carlo import Draws
-    from swashplate.crane.following import Followable
-    from swashplate.crane.judgment import Judgment
+    from swashplate.crane.judgment import Followable, Judgment
     from swashplate.crane.study import Laws, Sweep
     from swashplate.linear import LinearModel
 
@@ -103,7 +102,7 @@ class Crane:
     name: str
     title: str
     quantities: Mapping[str, Quantity]
-    """Geometry by name, each with value, unit, status and source."""
+    """Geometry by name."""
     hoist: Drive
     slew: Drive
     luff: Drive
@@ -132,44 +131,20 @@ class Crane:
         return f"{count} of {len(self.quantities)} quantities" if count else ""
 
     def with_drive(self, **drives: DriveLike) -> Crane:
-        """The crane with other drives.
+        """The crane with other drives by axis.
 
-        Parameters
-        ----------
-        **drives : Drive, Fit, str or path
-            By axis: a drive, ``luff=crane.luff.scale(Z16=1.5)``; the result of a fit; or a place: a
-            packaged name, a parameter file, or the folder that a fit wrote.
-
-        Raises
-        ------
-        InputError
-            For an axis that there is not.
-        FileError, ParameterError
-            If there is no such file, or it is no drive's.
+        Each is a drive, ``luff=crane.luff.scale(Z16=1.5)``; the result of a fit; or a place: a
+        packaged name, a parameter file, or the folder that a fit wrote.
         """
-        strange = [axis for axis in drives if axis not in AXES]
-        if strange:
-            raise InputError(f"A crane has no drive '{strange[0]}': it has {', '.join(AXES)}.")
+        check_names("A crane has no drive", drives, AXES, "it has")
         made: dict[str, Any] = {axis: _drive(each, Path()) for axis, each in drives.items()}
         return replace(self, **made)
 
     def drawn(self, **draws: Draws) -> tuple[Crane, ...]:
-        """Cranes whose drives are drawn from the errors of fits.
+        """Cranes whose drives are drawn from the errors of fits, by axis; others keep their drive.
 
-        Parameters
-        ----------
-        **draws : Draws
-            By axis, of `analysis.monte_carlo.drives`; axes without keep their drive.
-
-        Returns
-        -------
-        tuple of Crane
-            As many as the shortest of the draws; of several axes the first with the first.
-
-        Raises
-        ------
-        InputError
-            For an axis that there is not, or if no draws are given.
+        Draws are those of `analysis.monte_carlo.drives`: as many cranes as the shortest has, of
+        several axes the first with the first.
         """
         if not draws:
             raise InputError("Cranes are drawn from the draws of at least one axis.")
@@ -179,10 +154,7 @@ class Crane:
     def with_geometry(self, **changes: float | tuple[float, ...]) -> Crane:
         """The crane with other quantities, in SI and by name: ``boom_length=38.0``.
 
-        Raises
-        ------
-        ParameterError
-            For an unknown name, or lengths that make no crane.
+        A `ParameterError` for an unknown name, or lengths that make no crane.
         """
         made = dict(self.quantities)
         for name, value in changes.items():
@@ -262,13 +234,7 @@ class Crane:
         return _inverse(getattr(self, axis))
 
     def home(self, slew_deg: float = 0.0, boom_deg: float = 45.0, rope_m: float = 20.0) -> Home:
-        """Where the crane stands at the start of a run, as the equations take it.
-
-        Raises
-        ------
-        InputError
-            If boom or rope are beyond the crane's limits.
-        """
+        """Where a run starts; an `InputError` if boom or rope are beyond the crane's limits."""
         low, high = map(degrees, self.boom_limits)
         if not low - 1e-9 <= boom_deg <= high + 1e-9:
             raise InputError(
@@ -310,28 +276,11 @@ class Crane:
             If boom or rope meet a limit, or a drive leaves its domain.
         """
         stepper, commands, end = begun(self, stick, setup)
-        fixed = stepper.fixed
         ship = motion_of(sea, len(commands), RATE)
-        impulses = (*fixed.settings.joint[1:], *fixed.settings.tip[1:])
-        return CraneRun(
-            crane=self,
-            stick=commands,
-            ship=ship,
-            out=stepper.run(commands, ship),
-            home=fixed.home,
-            actuation=stepper.actuation,
-            stick_end=end,
-            halves=sum(each > 0.0 for each in impulses),
-            mass=fixed.mass,
-            loaded=fixed.loaded,
-        )
+        return CraneRun(self, commands, ship, stepper.run(commands, ship), stepper.fixed, end)
 
     def stepper(self, **setup: Unpack[Setup]) -> CraneStepper:
-        """The crane one sample at a time, for loops that the user writes.
-
-        Parameters are those of `simulate`; with ``actuation="direct"`` the commands are the drives'
-        voltages. [V]
-        """
+        """The crane one sample at a time, set up as `simulate`, for loops that the user writes."""
         return CraneStepper(self, **setup)
 
     def linearize(self, boom_deg: float = 45.0, rope_m: float = 20.0) -> LinearModel:
@@ -356,19 +305,17 @@ class Crane:
 
     def follow(self, periods: ArrayLike = tuple(range(4, 17)), **how: Any) -> Followable:
         """Largest sines of the tip that each axis can follow; see `swashplate.crane.follow`."""
-        from swashplate.crane.following import follow
+        from swashplate.crane.judgment import follow
 
         return follow(self, periods, **how)
 
     def table(self) -> Table:
         """Geometry with status and source; what is assumed is marked."""
         heads = ("quantity", "value", "unit", "status")
-        columns = (*map(Column, heads), Column("source", wrap=True))
-        made = Table(self.title or self.name, columns)
+        made = Table(self.title or self.name, (*map(Column, heads), Column("source", wrap=True)))
         for name, each in self.quantities.items():
             values = each.value if isinstance(each.value, list) else [each.value]
-            text = ", ".join(f"{value:g}" for value in values)
-            look = each.status == "assumed"
+            text, look = ", ".join(f"{value:g}" for value in values), each.status == "assumed"
             made.add(name.replace("_", " "), text, each.unit, each.status, each.source, look=look)
         return made
 

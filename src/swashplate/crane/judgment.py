@@ -1,26 +1,30 @@
-"""Judgment of control over seaways: does it work on the drives, and if not, what would do?"""
+"""Judgment of control over seaways: does it work on the drives, and if not, what would do?
+
+What an axis can follow, the largest sine of the tip, is known beforehand from its drive.
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from functools import reduce
-from math import pi, sqrt
-from operator import or_
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from math import cos, pi, radians, sin, sqrt
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
-from swashplate.crane.control import Clip, PositionLoop
+from swashplate.crane.control import Chain, Clip, PositionLoop
 from swashplate.crane.crane import Crane
-from swashplate.crane.following import follow
+from swashplate.crane.kinematics import boom_at, reach_rate, tip_of
+from swashplate.crane.loop import largest_sine
 from swashplate.crane.result import PUMPS, CraneRun, limit_table
 from swashplate.crane.rope import GRAVITY
+from swashplate.crane.sea import BAND, SEA_STATES, Seaway
 from swashplate.crane.stepper import RATE
-from swashplate.crane.stick import AXES
+from swashplate.crane.stick import AXES, check_names
 from swashplate.crane.study import COUNTED, NONE, Case, Laws, Study, with_orifice
 from swashplate.errors import InputError
-from swashplate.results import Tabular
+from swashplate.results import Result, Tabular
 from swashplate.simulation.result import Limit
 from swashplate.tables import Column, Table, count, listed
 
@@ -37,6 +41,93 @@ BLOCK = 20
 """Seaways of a trial after which it is given up if it has failed already."""
 LOOP = PositionLoop()
 """What a clip is tried with: a stiffer loop brings back what the clip takes."""
+
+
+# --- what axes can follow -------------------------------------------------------------------------
+
+
+class Demand(NamedTuple):
+    """What a sea asks of the tip of a boom that shall stand still over the sea."""
+
+    period: float
+    """Mean time between crossings of zero of the motion along the boom. [s]"""
+    amplitude: tuple[float, float, float]
+    """Significant single amplitude: up, across the boom, along it. [m]"""
+
+
+@dataclass(frozen=True, eq=False)
+class Followable(Result):
+    """Largest sines that the axes of a crane can follow."""
+
+    periods: Array
+    """(n,) [s]"""
+    amplitude: Array
+    """(n, 3) min(v/ω, a/ω²) of the hook's height by the hoist, of the tip across the boom by the
+    slew, and along it by the luff. [m]"""
+    seas: Mapping[str, Demand]
+    crane: Crane = field(repr=False)
+    boom_deg: float
+
+    figure = "plot_follow"
+
+    def tables(self) -> list[Table]:
+        """Amplitudes over the period, and what seas ask for."""
+        heads = [Column("period", ".1f", "s"), *(Column(each, ".3f", "m") for each in AXES)]
+        made = Table("Largest sine an axis can follow", heads)
+        for period, amplitudes in zip(self.periods.tolist(), self.amplitude.tolist(), strict=True):
+            made.add(period, *amplitudes)
+        asked = Table("What seas ask, significant amplitudes", [Column("sea"), *heads])
+        for name, each in self.seas.items():
+            asked.add(name, each.period, *each.amplitude)
+        return [made, asked]
+
+
+def follow(
+    crane: Crane,
+    periods: ArrayLike = tuple(range(4, 17)),
+    *,
+    seas: Sequence[str] = tuple(SEA_STATES),
+    seaway: Seaway | None = None,
+    slew_deg: float = 90.0,
+    boom_deg: float = 45.0,
+    rope_m: float = 27.0,
+) -> Followable:
+    """Largest amplitudes of the tip that each axis can follow over periods [s]; what seas ask for.
+
+    Seas are names of `SEA_STATES`; ship and heading are those of the seaway, by default the crane
+    ship's hull in beam waves.
+    """
+    times = np.atleast_1d(np.asarray(periods, dtype=np.float64))
+    if not (np.isfinite(times).all() and (times > 0.0).all() and times.size):
+        raise InputError("Periods to follow must be above 0 s.")
+    g, home = crane.geometry, crane.home(slew_deg, boom_deg, rope_m)
+    boom = boom_at(0.0, g, home)
+    rates = (g.hoist, g.foot + g.boom * boom.cos, float(reach_rate(boom, g)))
+    amplitude = np.zeros((times.size, 3))
+    for i, (inverse, rate) in enumerate(zip(map(crane.inverse, AXES), rates, strict=True)):
+        speed = rate * min(np.abs(inverse.limits))
+        acceleration = rate * min(inverse.acceleration)
+        amplitude[:, i] = [largest_sine(speed, acceleration, w) for w in 2.0 * pi / times]
+    # motion of the tip, linear in the ship's: up, across the boom, along it
+    base, omega = seaway or Seaway(), np.linspace(*BAND, 1000)
+    heading = np.full(omega.size, radians(base.heading_deg))
+    motion = base.ship.response(omega, heading, base.speed)
+    arm = np.array(tip_of(home.slew, boom, g))[:, None]
+    forward, port, up = motion[:3] + np.cross(motion[3:], arm, axis=0)
+    c, s = cos(home.slew), sin(home.slew)
+    powers = np.abs([up, s * forward + c * port, c * forward - s * port]) ** 2
+    asked = {}
+    for name in seas:
+        spectra = replace(base, sea=name).spectrum.density(omega) * powers
+        zeroth = np.trapezoid(spectra, omega, axis=1)
+        second = np.trapezoid(spectra[2] * omega**2, omega)
+        height, across, along = (2.0 * np.sqrt(zeroth)).tolist()
+        period = 2.0 * pi * float(np.sqrt(zeroth[2] / second))
+        asked[name] = Demand(period, (height, across, along))
+    return Followable(times, amplitude, asked, crane, boom_deg)
+
+
+# --- judgment -------------------------------------------------------------------------------------
 
 
 class Estimate(NamedTuple):
@@ -110,15 +201,8 @@ class Judgment(Tabular):
         return self.names[-1]
 
     def counted(self, name: str, what: str = "rms_swing") -> Array:
-        """(n,) number of a variant in each seaway, of `COUNTED`; NaN where it was stopped.
-
-        Raises
-        ------
-        InputError
-            If there is no such variant.
-        """
-        if name not in self.names:
-            raise InputError(f"There is no variant '{name}'; there are {', '.join(self.names)}.")
+        """(n,) number of a variant in each seaway, of `COUNTED`; NaN where it was stopped."""
+        check_names("There is no variant", [name], self.names)
         return np.asarray(self.values[:, self.names.index(name), COUNTED.index(what)])
 
     def difference(self, name: str, other: str = NONE) -> Estimate:
@@ -180,15 +264,7 @@ class Judgment(Tabular):
         return f": {axis} at its {names[limit]} {100.0 * share:.0f} % of the time"
 
     def run(self, name: str, seed: int) -> CraneRun:
-        """The whole run of a variant in one seaway, with all signals.
-
-        Raises
-        ------
-        InputError
-            If there is no such variant, or the seaway was not of the judgment.
-        DomainError
-            If the run was stopped.
-        """
+        """The whole run of a variant in one seaway; a `DomainError` if it was stopped."""
         study = self.study
         if seed not in study.seeds or name not in self.names or study.sea is None:
             raise InputError(f"There is no seaway {seed} of a variant '{name}' in this judgment.")
@@ -216,11 +292,11 @@ class Judgment(Tabular):
         )
         for name in self.names:
             rms, largest = self.counted(name), self.counted(name, "largest_swing")
-            worse = None if name == NONE else self.worse(name)
+            worse = np.nan if name == NONE else self.worse(name)
             known = largest[np.isfinite(largest)]
-            numbers = *mean_of(rms), float(np.median(known)) if known.size else np.nan, worse
-            look = worse is not None and worse > self.allowed
-            swings.add(name, *numbers, int(np.isnan(rms).sum()), look=look)
+            median = float(np.median(known)) if known.size else np.nan
+            stopped, look = int(np.isnan(rms).sum()), worse > self.allowed
+            swings.add(name, *mean_of(rms), median, worse, stopped, look=look)
         spec = [Column(each, "+.2f", "rad", none="–") for each in ("difference", "from", "to")]
         heads = (Column("variant", wrap=True), Column("less", wrap=True), *spec)
         paired = Table("Differences of RMS swing within each seaway", heads)
@@ -233,16 +309,12 @@ class Judgment(Tabular):
             if self.study.cases[name].driven
             for axis in AXES
         ]
-        made = [swings, paired, limit_table(acting)]
-        if self.remedies:
-            said = (
-                f"tried on the crane's own drives; a clip with a position loop of {LOOP.gain:g} /s"
-            )
-            columns = (Column("remedy"), Column("worse than none", ".0%"), *interval)
-            made.append(Table("What would do", columns, said))
-            for each in self.remedies:
-                made[-1].add(each.what, each.worse, *each.swing)
-        return made
+        columns = (Column("remedy"), Column("worse than none", ".0%"), *interval)
+        said = f"tried on the crane's own drives; a clip with a position loop of {LOOP.gain:g} /s"
+        remedies = Table("What would do", columns, said)
+        for each in self.remedies:
+            remedies.add(each.what, each.worse, *each.swing)
+        return [swings, paired, limit_table(acting), *([remedies] if self.remedies else [])]
 
     def to_polars(self) -> polars.DataFrame:
         """Numbers of every variant in every seaway, SI, shares of time of limits."""
@@ -258,18 +330,17 @@ class Judgment(Tabular):
     def sentences(self) -> tuple[str, ...]:
         """The verdict, and what it rests on."""
         study, assumed = self.study, self.study.crane.assumed
-        length = study.cases[NONE].stick.length
         rests = (
-            f"Swing counts from {study.start:g} s to {length:g} s of each seaway. "
-            f"Control fails if it is worse than none in more than {100.0 * self.allowed:.0f} % of "
-            "them."
+            f"Swing counts from {study.start:g} s to {study.cases[NONE].stick.length:g} s of each "
+            "seaway. Control fails if it is worse than none in more than "
+            f"{100.0 * self.allowed:.0f} % of them."
         )
         crane = (f"{assumed} of the crane are assumed.",) if assumed else ()
         return (self.verdict(), rests, *crane)
 
 
 def _worse(own: Array, none: Array) -> NDArray[np.bool_]:
-    """Seaways in which a variant is worse than none."""
+    """Seaways in which a variant swings more than no control, or was stopped where that was not."""
     return np.asarray((own > none) | (np.isnan(own) & np.isfinite(none)))
 
 
@@ -285,7 +356,6 @@ def judge(
 
     Parameters
     ----------
-    crane : Crane
     control : Control or mapping of str to Control
         One controller, or several by name.
     allowed : float
@@ -296,11 +366,6 @@ def judge(
     **study
         Seaways, drives, stick, where each run begins: see `Study.of`. The verdict is on the last of
         the drives.
-
-    Raises
-    ------
-    InputError
-        For seeds, drives or a start that make no study, or a pose beyond the crane's limits.
     """
     if not 0.0 <= allowed < 1.0:
         raise InputError(
@@ -318,24 +383,16 @@ def judge(
     pose: dict[str, Any] = {name: case.setup[name] for name in ("slew_deg", "boom_deg", "rope_m")}
     period = 2.0 * pi * sqrt(pose["rope_m"] / GRAVITY)
     reach = float(follow(cranes[0], [period], seas=(), **pose).amplitude[0, 2])
-    larger = [
-        (f"luff orifice ×{x:g}", x, case._replace(cranes=with_orifice(cranes, x))) for x in FACTORS
-    ]
+    larger = [(f"luff orifice ×{x:g}", x, with_orifice(cranes, x), law) for x in FACTORS]
     clipped = [
-        (
-            f"a clip of {share * reach:.2g} m",
-            share * reach,
-            case.moved(control=reduce(or_, [*stages, Clip(share=share), LOOP]))._replace(
-                cranes=cranes
-            ),
-        )
-        for share in SHARES
+        (f"a clip of {x * reach:.2g} m", x * reach, cranes, Chain((*stages, Clip(share=x), LOOP)))
+        for x in SHARES
     ]
     found: list[Remedy] = []
     tried: list[str] = []
     for trials in (larger, clipped):
-        for what, size, trial in trials:
-            values = _trial(made, trial)
+        for what, size, built, control in trials:
+            values = _trial(made, case.moved(control=control)._replace(cranes=built))
             if values is not None:
                 worse = float(_worse(values, made.counted(NONE)).mean())
                 found.append(Remedy(what, size, worse, mean_of(values)))

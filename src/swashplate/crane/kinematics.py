@@ -68,17 +68,29 @@ class Boom(NamedTuple):
 
 
 class Rotation(NamedTuple):
-    """Matrix from the ship's frame to the inertial one, row by row."""
+    """The ship's axes in the inertial frame, columns of the matrix from one to the other."""
 
-    xx: float
-    xy: float
-    xz: float
-    yx: float
-    yy: float
-    yz: float
-    zx: float
-    zy: float
-    zz: float
+    forward: Vector
+    port: Vector
+    up: Vector
+
+
+@equation
+def dot(a: Vector, b: Vector) -> float:
+    """Scalar product."""
+    return a.x * b.x + a.y * b.y + a.z * b.z
+
+
+@equation
+def size(a: Vector) -> float:
+    """Length of a vector."""
+    return sqrt(dot(a, a))
+
+
+@equation
+def moved(a: Vector, share: float, b: Vector) -> Vector:
+    """The vector a + share b."""
+    return Vector(a.x + share * b.x, a.y + share * b.y, a.z + share * b.z)
 
 
 @equation
@@ -86,36 +98,22 @@ def rotation(roll: float, pitch: float, yaw: float) -> Rotation:
     """R = Rz(yaw) Ry(pitch) Rx(roll); roll lifts port, pitch lowers the bow, yaw turns to port."""
     cf, sf, ct, st, cy, sy = cos(roll), sin(roll), cos(pitch), sin(pitch), cos(yaw), sin(yaw)
     return Rotation(
-        cy * ct,
-        cy * st * sf - sy * cf,
-        cy * st * cf + sy * sf,
-        sy * ct,
-        sy * st * sf + cy * cf,
-        sy * st * cf - cy * sf,
-        -st,
-        ct * sf,
-        ct * cf,
+        Vector(cy * ct, sy * ct, -st),
+        Vector(cy * st * sf - sy * cf, sy * st * sf + cy * cf, ct * sf),
+        Vector(cy * st * cf + sy * sf, sy * st * cf - cy * sf, ct * cf),
     )
 
 
 @equation
 def to_inertial(r: Rotation, p: Vector, shift: Vector) -> Vector:
     """Position in the inertial frame of a point of the ship, R p + s. [m]"""
-    return Vector(
-        shift.x + r.xx * p.x + r.xy * p.y + r.xz * p.z,
-        shift.y + r.yx * p.x + r.yy * p.y + r.yz * p.z,
-        shift.z + r.zx * p.x + r.zy * p.y + r.zz * p.z,
-    )
+    return moved(moved(moved(shift, p.x, r.forward), p.y, r.port), p.z, r.up)
 
 
 @equation
 def to_ship(r: Rotation, v: Vector) -> Vector:
     """Components along the ship's axes of an inertial vector, Rᵀ v."""
-    return Vector(
-        r.xx * v.x + r.yx * v.y + r.zx * v.z,
-        r.xy * v.x + r.yy * v.y + r.zy * v.z,
-        r.xz * v.x + r.yz * v.y + r.zz * v.z,
-    )
+    return Vector(dot(r.forward, v), dot(r.port, v), dot(r.up, v))
 
 
 @equation
@@ -159,12 +157,8 @@ def rope_length(shafts: Shafts, g: Geometry, home: Home) -> float:
 def shafts_for(x: float, y: float, now: Shafts, g: Geometry, home: Home) -> Shafts:
     """Shaft angles that put the tip over a point of the deck's plane, the slew by the nearer way.
 
-    Parameters
-    ----------
-    x, y : float
-        Wanted tip in the ship's frame; beyond the boom's reach it is the nearest reach. [m]
-    now : Shafts
-        Where the shafts are; the hoist's is returned as it is. [rad]
+    The point is in the ship's frame [m]; beyond the boom's reach it is the nearest reach. The
+    hoist's angle stays as it is.
     """
     e_x, e_y = x - g.axis.x, y - g.axis.y
     c = min(max((sqrt(e_x * e_x + e_y * e_y) - g.foot) / g.boom, 0.0), 1.0)
@@ -178,10 +172,7 @@ def shafts_for(x: float, y: float, now: Shafts, g: Geometry, home: Home) -> Shaf
 
 @equation
 def boom_rate(boom: Boom, g: Geometry) -> float:
-    """Rise of the boom for each radian of the luff's shaft, ∂β/∂θ_l > 0.
-
-    dℓ/dβ = -B D sin(γ - β)/ℓ.
-    """
+    """Rise of the boom for each radian of the luff's shaft, ∂β/∂θ_l, by ∂ℓ/∂β = -B D sin(γ-β)/ℓ."""
     sine = g.sheave_sin * boom.cos - g.sheave_cos * boom.sin
     return g.luff * luff_rope(boom, g) / (g.boom * g.sheave * sine)
 
@@ -196,17 +187,9 @@ def reach_rate(boom: Boom, g: Geometry) -> float:
 def shaft_torques(force: Vector, slew: float, boom: Boom, tension: float, g: Geometry) -> Shafts:
     """Torques of the hoist rope on the three shafts, positive against positive speed. [N m]
 
-    Parameters
-    ----------
-    force : Vector
-        Of the rope on the tip, along the ship's axes. [N]
-    tension : float
-        Of the rope. [N]
-
-    Notes
-    -----
-    By virtual work C = -T ∂L/∂θ - F·∂p/∂θ for each shaft θ, where the rope L shortens by r_h/n_h
-    with the hoist's and lengthens by κ r_l/n_l with the luff's.
+    By virtual work C = -T ∂L/∂θ - F·∂p/∂θ for each shaft θ, with the rope's force F on the tip,
+    along the ship's axes [N], where the rope L shortens by r_h/n_h with the hoist's and lengthens
+    by κ r_l/n_l with the luff's.
     """
     rise = boom_rate(boom, g)
     reach, along = g.foot + g.boom * boom.cos, -g.boom * boom.sin * rise
@@ -218,9 +201,3 @@ def shaft_torques(force: Vector, slew: float, boom: Boom, tension: float, g: Geo
         - force.z * g.boom * boom.cos * rise
         - tension * g.coupling * g.luff,
     )
-
-
-@equation
-def elevation(boom: Boom) -> float:
-    """Elevation β of the boom. [rad]"""
-    return atan2(boom.sin, boom.cos)

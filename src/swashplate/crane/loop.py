@@ -15,7 +15,7 @@ they are marched before.
 from __future__ import annotations
 
 from collections.abc import Callable
-from math import inf, pi, sqrt
+from math import atan2, inf, pi, sqrt
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -26,29 +26,21 @@ from swashplate.crane.kinematics import (
     Boom,
     Geometry,
     Home,
-    Rotation,
     Shafts,
     Vector,
     boom_at,
-    elevation,
+    moved,
     reach_rate,
     rope_length,
     rotation,
     shaft_torques,
     shafts_for,
+    size,
     tip_of,
     to_inertial,
     to_ship,
 )
-from swashplate.crane.rope import (
-    GRAVITY,
-    Hanging,
-    Hung,
-    hanging_load,
-    moved,
-    rope_step,
-    size,
-)
+from swashplate.crane.rope import GRAVITY, Hanging, Hung, hanging_load, rope_step
 from swashplate.equations import Machine, equation, inlined, kernel
 from swashplate.equations.code import generating
 from swashplate.parameters.rules import FULL_VOLTAGE
@@ -57,7 +49,7 @@ Array = NDArray[np.float64]
 
 IDEAL, VOLTS, INVERSE, DIRECT, MARCHED = range(5)
 """Actuation: speeds at once; 10 V for full speed; the inverse map's voltage; voltages as given;
-voltages, speeds and limits of drives that were marched before."""
+drives that were marched before, whose voltages, speeds and limits stand in the rows already."""
 ROWS = (
     *("voltage_hoist", "voltage_slew", "voltage_luff"),
     *("speed_hoist", "speed_slew", "speed_luff"),
@@ -80,10 +72,11 @@ BRAKE_WAITS, BRAKE_TAKES = 0.3, 0.2
 class Inverse(NamedTuple):
     """An `InverseMap` as the loop takes it."""
 
-    minus_speed: Array
-    minus_voltage: Array
-    plus_speed: Array
-    plus_voltage: Array
+    speed: Array
+    voltage: Array
+    """Points of both branches, rising. [rad/s], [V]"""
+    gap: int
+    """Last point of the lower branch; to the next it is the dead zone, with only the creep."""
     creep: float
     low: float
     high: float
@@ -99,8 +92,6 @@ class Fixed(NamedTuple):
     settings: Settings
     actuation: int
     brake: bool
-    slowest: tuple[float, float]
-    """Voltages of the hoist's dead zone, negative and positive. [V]"""
     boom: tuple[float, float]
     """Sines of the boom's limits."""
     ropes: tuple[float, float]
@@ -124,8 +115,6 @@ class Plant(NamedTuple):
     """Delayed signals, a row each: three commands, wanted tip x and y, swing x and y."""
     margins: Array
     """Worst margins of the domains of the drives and the law."""
-    marched: Array
-    """(9, n) voltages, speeds and limits of drives that were marched before the loop."""
 
 
 class State(NamedTuple):
@@ -161,27 +150,10 @@ def shaped(
     memory: Array, row: int, sample: int, half: float, impulses: tuple[float, float, float]
 ) -> float:
     """A remembered signal through a shaper whose impulses are `half` samples apart."""
-    made: float = impulses[0] * memory[row, sample & (memory.shape[1] - 1)]
-    if impulses[1] > 0.0:
-        made += impulses[1] * delayed(memory, row, sample, half)
-    if impulses[2] > 0.0:
-        made += impulses[2] * delayed(memory, row, sample, 2.0 * half)
-    return made
-
-
-@inlined
-def on_branch(wanted: float, speed: Array, voltage: Array) -> float:
-    """Voltage for a speed on one branch of an inverse map, held at its ends."""
-    low, high = 0, speed.size - 1
-    inside = min(max(wanted, speed[low]), speed[high])
-    while high - low > 1:
-        middle = (low + high) // 2
-        if speed[middle] <= inside:
-            low = middle
-        else:
-            high = middle
-    share = (inside - speed[low]) / (speed[high] - speed[low])
-    made: float = voltage[low] + share * (voltage[high] - voltage[low])
+    made = 0.0
+    for k in range(3):
+        if impulses[k] > 0.0:
+            made += impulses[k] * delayed(memory, row, sample, k * half)
     return made
 
 
@@ -191,18 +163,19 @@ def voltage_for(wanted: float, inverse: Inverse, actuation: int) -> float:
     if actuation == VOLTS:
         full = inverse.high if wanted > 0.0 else -inverse.low
         return min(max(FULL_VOLTAGE * wanted / full, -FULL_VOLTAGE), FULL_VOLTAGE)
-    lower: float = inverse.minus_speed[inverse.minus_speed.size - 1]
-    upper: float = inverse.plus_speed[0]
-    if wanted < lower:
-        return on_branch(wanted, inverse.minus_speed, inverse.minus_voltage)
-    if wanted > upper:
-        return on_branch(wanted, inverse.plus_speed, inverse.plus_voltage)
-    at_rest = abs(wanted - inverse.creep)
-    if at_rest <= wanted - lower and at_rest <= upper - wanted:
-        return 0.0
-    minus: float = inverse.minus_voltage[inverse.minus_voltage.size - 1]
-    plus: float = inverse.plus_voltage[0]
-    return minus if wanted - lower <= upper - wanted else plus
+    speed, voltage, gap = inverse.speed, inverse.voltage, inverse.gap
+    below, above = wanted - speed[gap], speed[gap + 1] - wanted
+    if below >= 0.0 and above >= 0.0:
+        at_rest = abs(wanted - inverse.creep)
+        if at_rest <= below and at_rest <= above:
+            return 0.0
+        edge: float = voltage[gap] if below <= above else voltage[gap + 1]
+        return edge
+    inside = min(max(wanted, inverse.low), inverse.high)
+    n = min(int(np.searchsorted(speed, inside, side="right")), speed.size - 1)
+    share = (inside - speed[n - 1]) / (speed[n] - speed[n - 1])
+    made: float = voltage[n - 1] + share * (voltage[n] - voltage[n - 1])
+    return made
 
 
 @equation
@@ -281,19 +254,21 @@ def loop_of(hoist: Any, slew: Any, luff: Any, law: Any) -> Callable[..., tuple[S
         """Take the stick's samples; the state behind the last, and how the pass ended."""
         inverses, settings, actuation = fixed.inverses, fixed.settings, fixed.actuation
         laws, picks, memory, margins = plant.law, plant.picks, plant.memory, plant.margins
-        given = plant.marched
+        a, b, c = plant.drives
+        edge = inverses[0].gap
+        slowest = inverses[0].voltage[edge], inverses[0].voltage[edge + 1]
         g, home, loaded = fixed.geometry, fixed.home, fixed.loaded
         moving = ship.shape[1] > 1
         last = memory.shape[1] - 1
         sample, axes, tip, hung, still, brake = state
         shafts = shafts_of(axes, ANGLE)
         boom, rope = boom_at(shafts.luff, g, home), rope_length(shafts, g, home)
-        wanted, volts, omega, limits = np.zeros(3), np.zeros(3), np.zeros(3), np.zeros(3)
-        seen = np.zeros(13)
-        r = Rotation(1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
-        shift = Vector(0.0, 0.0, 0.0)
+        wanted, seen = np.zeros(3), np.zeros(13)
+        r, shift = rotation(0.0, 0.0, 0.0), Vector(0.0, 0.0, 0.0)
         ended = FINE
         for m in range(len(stick)):
+            row = out[m]
+            volts, omega, limits = row[0:3], row[3:6], row[6:9]
             half = pi * sqrt(rope / GRAVITY) / h
             if moving:
                 shift = Vector(ship[m, 0], ship[m, 1], ship[m, 2])
@@ -322,10 +297,9 @@ def loop_of(hoist: Any, slew: Any, luff: Any, law: Any) -> Callable[..., tuple[S
                     back = 2.0 * half * settings.delay
                     x = settings.feedback * delayed(memory, 5, sample, back)
                     y = settings.feedback * delayed(memory, 6, sample, back)
-                    if moving:
-                        turned = to_ship(r, Vector(x, y, 0.0))
-                        x, y = turned.x, turned.y
-                if settings.ship and moving:
+                    turned = to_ship(r, Vector(x, y, 0.0))
+                    x, y = turned.x, turned.y
+                if settings.ship:
                     # over its place on the sea, at the tip's own height
                     over = Vector(path_x - shift.x, path_y - shift.y, tip.z - shift.z)
                     place = to_ship(r, over)
@@ -333,11 +307,10 @@ def loop_of(hoist: Any, slew: Any, luff: Any, law: Any) -> Callable[..., tuple[S
                     y += place.y - path_y
                 if own:
                     seen[0], seen[1], seen[2] = swing_x, swing_y, rope
-                    seen[3], seen[4] = home.slew + shafts.slew, elevation(boom)
+                    seen[3], seen[4] = home.slew + shafts.slew, atan2(boom.sin, boom.cos)
                     seen[5], seen[6] = path_x, path_y
                     if moving:
-                        for i in range(6):
-                            seen[7 + i] = ship[m, i]
+                        seen[7:13] = ship[m]
                     for i in range(picks.size):
                         laws.inputs[i] = seen[picks[i]]
                     margin = advance_law(laws)
@@ -356,14 +329,11 @@ def loop_of(hoist: Any, slew: Any, luff: Any, law: Any) -> Callable[..., tuple[S
                     wanted[i] = (aim - axes[AIM, i]) / h * (sample > 0) + behind
                     axes[AIM, i] = aim
             # actuation
-            if actuation == MARCHED:
-                for i in range(3):
-                    volts[i], omega[i], limits[i] = given[i, m], given[3 + i, m], given[6 + i, m]
-            elif actuation == IDEAL:
+            if actuation == IDEAL:
                 for i in range(3):
                     omega[i] = min(max(wanted[i], inverses[i].low), inverses[i].high)
-            else:
-                a, b, c = plant.drives
+                    volts[i], limits[i] = 0.0, 0.0
+            elif actuation != MARCHED:
                 for i in range(3):
                     volts[i] = stick[m, i]
                     if actuation != DIRECT:
@@ -378,7 +348,7 @@ def loop_of(hoist: Any, slew: Any, luff: Any, law: Any) -> Callable[..., tuple[S
                 omega[0], omega[1], omega[2] = a.outputs[0], b.outputs[0], c.outputs[0]
                 limits[0], limits[1], limits[2] = a.outputs[1], b.outputs[1], c.outputs[1]
             if fixed.brake and actuation != IDEAL:
-                within_zone = fixed.slowest[0] < volts[0] < fixed.slowest[1]
+                within_zone = slowest[0] < volts[0] < slowest[1]
                 still = still + h if within_zone else 0.0
                 falls = h / BRAKE_TAKES if still >= BRAKE_WAITS else -h / BRAKE_TAKES
                 brake = min(max(brake + falls, 0.0), 1.0)
@@ -389,7 +359,7 @@ def loop_of(hoist: Any, slew: Any, luff: Any, law: Any) -> Callable[..., tuple[S
             boom, rope = boom_at(shafts.luff, g, home), rope_length(shafts, g, home)
             shorter -= rope
             in_ship = tip_of(home.slew + shafts.slew, boom, g)
-            following = to_inertial(r, in_ship, shift) if moving else in_ship
+            following = to_inertial(r, in_ship, shift)
             if not (fixed.ropes[0] <= rope <= fixed.ropes[1]):
                 ended = ROPE_OUT
                 break
@@ -414,19 +384,16 @@ def loop_of(hoist: Any, slew: Any, luff: Any, law: Any) -> Callable[..., tuple[S
                 break
             tip = following
             for i in range(3):
-                out[m, i], out[m, 3 + i], out[m, 6 + i] = volts[i], omega[i], limits[i]
-                out[m, 9 + i], out[m, 25 + i] = axes[ANGLE, i], axes[TORQUE, i]
-            out[m, 12], out[m, 13], out[m, 14] = tip.x, tip.y, tip.z
-            out[m, 15], out[m, 16], out[m, 17] = hung.load.x, hung.load.y, hung.load.z
-            out[m, 18], out[m, 19], out[m, 20] = hung.hook.x, hung.hook.y, hung.hook.z
-            out[m, 21], out[m, 22] = hung.pull, rope
-            out[m, 23], out[m, 24] = boom.cos, boom.sin
+                row[9 + i], row[25 + i] = axes[ANGLE, i], axes[TORQUE, i]
+            row[12], row[13], row[14] = tip
+            row[15], row[16], row[17] = hung.load
+            row[18], row[19], row[20] = hung.hook
+            row[21], row[22], row[23], row[24] = hung.pull, rope, boom.cos, boom.sin
             if loaded:
                 tension = fixed.mass * hung.pull
                 along = moved(hung.hook, -1.0, tip)
-                force = moved(Vector(0.0, 0.0, 0.0), tension / size(along), along)
-                if moving:
-                    force = to_ship(r, force)
+                pulled = moved(Vector(0.0, 0.0, 0.0), tension / size(along), along)
+                force = to_ship(r, pulled)
                 felt = shaft_torques(force, home.slew + shafts.slew, boom, tension, g)
                 axes[TORQUE, 0], axes[TORQUE, 1], axes[TORQUE, 2] = felt
             sample += 1

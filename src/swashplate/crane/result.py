@@ -11,14 +11,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from swashplate.crane.kinematics import Home
-from swashplate.crane.loop import ROWS
+from swashplate.crane.loop import ROWS, Fixed
 from swashplate.crane.rope import GRAVITY
-from swashplate.crane.stepper import RATE
-from swashplate.crane.stick import AXES
+from swashplate.crane.stepper import ACTUATIONS, RATE
+from swashplate.crane.stick import AXES, check_names
 from swashplate.errors import InputError
 from swashplate.results import Tabular
-from swashplate.simulation.result import Limit, Simulation
+from swashplate.simulation.result import Limit, Named, Simulation
 from swashplate.tables import Column, Table
 
 if TYPE_CHECKING:
@@ -35,6 +34,18 @@ SETTLED = 1.0
 PUMPS = (Limit.DEAD_ZONE, Limit.ORIFICE, Limit.SPOOL, Limit.SWASH_STOP, Limit.RELIEF)
 """Limits that the loop leaves of each drive, in the order of its bits."""
 
+THREES = {
+    **{"tip": "tip_x", "load": "load_x", "hook": "hook_x", "voltage": "voltage_hoist"},
+    **{"shaft_speed": "speed_hoist", "load_torque": "torque_hoist"},
+}
+"""Signals of three neighbours of `ROWS`, by the first of them."""
+
+
+def swing_of(load: Array, tip: Array) -> Array:
+    """Angle between rope and plumb line. [rad]"""
+    x, y, z = (load - tip).T
+    return np.asarray(np.arctan2(np.hypot(x, y), -z))
+
 
 @dataclass(frozen=True, eq=False)
 class CraneRun(Tabular):
@@ -50,17 +61,10 @@ class CraneRun(Tabular):
     """(n, 6) surge, sway, heave [m], roll, pitch, yaw [rad]; (n, 1) zeros for a ship at rest."""
     out: Array = field(repr=False)
     """(n, 28) signals by `loop.ROWS`, SI."""
-    home: Home
-    """Where it began."""
-    actuation: str
+    fixed: Fixed = field(repr=False)
+    """What stayed as it was: home, mass of load and hook, settings of the controller."""
     stick_end: float
     """When the last command has returned to zero. [s]"""
-    halves: int
-    """Half periods of the load that the shaper takes."""
-    mass: float
-    """Of the load and its hook. [kg]"""
-    loaded: bool
-    """Whether the drives felt the rope."""
 
     figure = "plot_crane"
     rows = ROWS
@@ -75,59 +79,41 @@ class CraneRun(Tabular):
         )
 
     def __getitem__(self, signal: str) -> Array:
-        """(n,) signal by its name in `rows`, SI; an `InputError` for another."""
-        if signal not in ROWS:
-            raise InputError(f"A crane's run has no signal '{signal}'; it has {', '.join(ROWS)}.")
-        return self.out[:, ROWS.index(signal)]
-
-    def _three(self, first: str) -> Array:
+        """(n,) signal by its name in `rows`, or (n, 3) of `THREES`; an `InputError` for another."""
+        first = THREES.get(signal, signal)
+        check_names("A crane's run has no signal", [first], ROWS, "it has")
         place = ROWS.index(first)
-        return self.out[:, place : place + 3]
+        return self.out[:, place : place + 3] if signal in THREES else self.out[:, place]
+
+    tip = Named()
+    """(n, 3) tip of the boom. [m]"""
+    load = Named()
+    """(n, 3) load. [m]"""
+    hook = Named()
+    """(n, 3) hook, or the load where there is none. [m]"""
+    voltage = Named()
+    """(n, 3) commands of the drives, zero with ideal ones. [V]"""
+    shaft_speed = Named()
+    """(n, 3) speeds of the shafts; the slew's at the turret, the hoist's braked. [rad/s]"""
+    load_torque = Named()
+    """(n, 3) torques of the rope that the drives took, zero unless they are loaded. [N m]"""
+    rope = Named()
+    """(n,) rope below the tip. [m]"""
+
+    @property
+    def actuation(self) -> str:
+        """What made speeds of wanted speeds, as of `Setup`."""
+        return ACTUATIONS[self.fixed.actuation]
 
     @cached_property
     def time(self) -> Array:
         """(n,) [s]"""
         return np.arange(len(self.out)) / RATE
 
-    @property
-    def tip(self) -> Array:
-        """(n, 3) tip of the boom. [m]"""
-        return self._three("tip_x")
-
-    @property
-    def load(self) -> Array:
-        """(n, 3) load. [m]"""
-        return self._three("load_x")
-
-    @property
-    def hook(self) -> Array:
-        """(n, 3) hook, or the load where there is none. [m]"""
-        return self._three("hook_x")
-
-    @property
-    def voltage(self) -> Array:
-        """(n, 3) commands of the drives, zero with ideal ones. [V]"""
-        return self._three("voltage_hoist")
-
-    @property
-    def shaft_speed(self) -> Array:
-        """(n, 3) speeds of the shafts; the slew's at the turret, the hoist's braked. [rad/s]"""
-        return self._three("speed_hoist")
-
-    @property
-    def load_torque(self) -> Array:
-        """(n, 3) torques of the rope that the drives took, zero unless they are loaded. [N m]"""
-        return self._three("torque_hoist")
-
-    @property
-    def rope(self) -> Array:
-        """(n,) rope below the tip. [m]"""
-        return self["rope"]
-
     @cached_property
     def slew_deg(self) -> Array:
         """(n,) slew from forward, positive to starboard. [deg]"""
-        return np.degrees(self.home.slew + self["shaft_slew"])
+        return np.degrees(self.fixed.home.slew + self["shaft_slew"])
 
     @cached_property
     def boom_deg(self) -> Array:
@@ -137,7 +123,7 @@ class CraneRun(Tabular):
     @property
     def tension(self) -> Array:
         """(n,) tension of the rope, 0 where it is slack. [N]"""
-        return self.mass * self["pull"]
+        return self.fixed.mass * self["pull"]
 
     @property
     def stretch(self) -> Array:
@@ -152,8 +138,7 @@ class CraneRun(Tabular):
     @cached_property
     def swing_deg(self) -> Array:
         """(n,) angle between rope and plumb line. [deg]"""
-        d = self.load - self.tip
-        return np.degrees(np.arctan2(np.hypot(d[:, 0], d[:, 1]), -d[:, 2]))
+        return np.degrees(swing_of(self.load, self.tip))
 
     @property
     def settling(self) -> slice:
@@ -162,7 +147,9 @@ class CraneRun(Tabular):
         25 s from 4 s after the stick's end and the shaper's last impulse; an `InputError` if the
         run ends before.
         """
-        starts = self.stick_end + self.halves * pi * sqrt(self.rope[-1] / GRAVITY) + CALMS
+        impulses = (*self.fixed.settings.joint[1:], *self.fixed.settings.tip[1:])
+        halves = sum(each > 0.0 for each in impulses)
+        starts = self.stick_end + halves * pi * sqrt(self.rope[-1] / GRAVITY) + CALMS
         first = round(starts * RATE)
         if first >= len(self.out):
             raise InputError(
@@ -197,16 +184,10 @@ class CraneRun(Tabular):
         return {str(each.name).lower(): float(self.active(axis, each).mean()) for each in PUMPS}
 
     def drive(self, axis: str) -> Simulation:
-        """The simulation of one drive under its voltages, with all signals inside it.
-
-        Raises
-        ------
-        InputError
-            For ideal drives, which have none.
-        """
+        """The simulation of one drive under its voltages, with all signals; not of ideal ones."""
         if self.actuation == "ideal":
             raise InputError("Ideal drives have neither voltages nor limits other than of speed.")
-        torque = self[f"torque_{axis}"] if self.loaded else None
+        torque = self[f"torque_{axis}"] if self.fixed.loaded else None
         drive = getattr(self.crane, axis)
         made: Simulation = drive.simulate(self[f"voltage_{axis}"], RATE, load_torque=torque)
         return made

@@ -19,7 +19,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from swashplate.crane.kinematics import Vector
+from swashplate.crane.kinematics import Vector, dot, moved, size
 from swashplate.equations import equation, kernel
 from swashplate.errors import InputError
 from swashplate.results import Result
@@ -34,24 +34,6 @@ FASTEST = 0.3
 """Angle of an elastic bounce over one sample beyond which it is not computed. [rad]"""
 TOO_FAST = -1.0
 """Pull that says that the tip moves through the rope's length within a step."""
-
-
-@equation
-def dot(a: Vector, b: Vector) -> float:
-    """Scalar product."""
-    return a.x * b.x + a.y * b.y + a.z * b.z
-
-
-@equation
-def size(a: Vector) -> float:
-    """Length of a vector."""
-    return sqrt(dot(a, a))
-
-
-@equation
-def moved(a: Vector, share: float, b: Vector) -> Vector:
-    """The vector a + share b."""
-    return Vector(a.x + share * b.x, a.y + share * b.y, a.z + share * b.z)
 
 
 @equation
@@ -74,30 +56,17 @@ def multiplier_of(free: Vector, along: Vector, length: float) -> float:
 
 @dataclass(frozen=True)
 class Suspension(Result):
-    """How the load hangs: elastic rope, hook with slings; by default neither.
-
-    Attributes
-    ----------
-    stiffness : float
-        EA, force for a strain of one of the rope's parts together; infinite for a rigid rope. What
-        lies between the tip and the drum does not stretch. [N]
-    damping : float
-        Damping ratio of the load's bounce on the elastic rope.
-    hook : float
-        Mass of the hook block; 0 for a load that hangs on the rope itself. [kg]
-    sling : float
-        From the hook to the load. [m]
-
-    Raises
-    ------
-    InputError
-        For numbers without sense, and a hook without slings.
-    """
+    """How the load hangs: elastic rope, hook with slings; by default neither."""
 
     stiffness: float = inf
+    """EA, force for a strain of one of the rope's parts together; infinite for a rigid rope. What
+    lies between the tip and the drum does not stretch. [N]"""
     damping: float = 0.02
+    """Damping ratio of the load's bounce on the elastic rope."""
     hook: float = 0.0
+    """Mass of the hook block; 0 for a load that hangs on the rope itself. [kg]"""
     sling: float = 0.0
+    """From the hook to the load. [m]"""
 
     def __post_init__(self) -> None:
         if not self.stiffness > 0.0:
@@ -115,14 +84,9 @@ class Suspension(Result):
     def hanging(
         self, load: float, shortest: float, rate: float, drag: float, wind: ArrayLike
     ) -> Hanging:
-        """Numbers of the suspension with a load [kg], on a rope of at least a length [m].
+        """Numbers with a load [kg], on a rope of at least a length [m], at a rate [Hz].
 
-        `drag` and `wind` are those of `Hanging`.
-
-        Raises
-        ------
-        InputError
-            If the load bounces too fast for the rate [Hz].
+        An `InputError` if the load bounces too fast for the rate.
         """
         if not (isfinite(load) and load > 0.0):
             raise InputError(f"The load is {load:g} kg, but must be above 0.")
@@ -161,10 +125,10 @@ class Hung(NamedTuple):
 
     load: Vector
     before: Vector
-    """Load one step earlier. [m]"""
+    """Load, and one step earlier. [m]"""
     hook: Vector
-    """Where the rope ends: the hook, or the load without one. [m]"""
     hook_before: Vector
+    """Where the rope ends, the hook or the load without one, and one step earlier. [m]"""
     pull: float
     """Tension of the rope for each kilogram of load and hook. [N/kg]"""
     stretch: float
@@ -190,16 +154,8 @@ def both_taut(
 ) -> tuple[float, float]:
     """Multipliers u of the rope and w of the slings where both are taut, by Newton's method.
 
-    Parameters
-    ----------
-    rope, sling : Vector
-        Without pulls, from the new tip to the hook, and from the hook to the load. [m]
-    d, b : Vector
-        The same at the step's beginning, along which rope and slings pull. [m]
-
-    Notes
-    -----
-    |rope - u d + q w b| = L and |sling + u d - (1 + q) w b| = l, with q the ratio of masses.
+    |rope - u d + q w b| = L and |sling + u d - (1 + q) w b| = l, with q the ratio of masses; rope
+    and sling are without pulls, d and b those at the step's beginning, along which they pull. [m]
     """
     u, w = 0.0, 0.0
     for _ in range(4):
@@ -231,33 +187,13 @@ def hook_pulls(
 
 @equation
 def rope_step(
-    now: Hung,
-    tip: Vector,
-    following: Vector,
-    length: float,
-    s: Hanging,
-    h: float,
-    square: float,
+    now: Hung, tip: Vector, following: Vector, length: float, s: Hanging, h: float, square: float
 ) -> Hung:
-    """Load and hook one step later.
+    """Load and hook one step later, with the tip at n and n + 1 and the rope at n + 1. [m]
 
-    Parameters
-    ----------
-    now : Hung
-        At n and n - 1. [m]
-    tip, following : Vector
-        Tip at n and n + 1. [m]
-    length : float
-        Rope at n + 1. [m]
-    s : Hanging
-        Suspension, drag and wind.
-    h, square : float
-        Step [s], and h², half of it in the first step. [s²]
-
-    Notes
-    -----
     x = 2 x_n - x_(n-1) + h² a - μ d, with the rope's multiplier μ. An elastic rope pulls by its
-    stretch at n, so that the step stays explicit and, undamped, symplectic.
+    stretch at n, so that the step stays explicit and, undamped, symplectic. `square` is h², half of
+    it in the first step. [s²]
     """
     weight = Vector(0.0, 0.0, -GRAVITY)
     load = coasting(now.load, now.before, square, weight)
@@ -347,19 +283,16 @@ def load_motion(
     tip : (n, 3) array_like
         Path of the upper end, z up, inertial. [m]
     length : (n,) array_like or float
-        Length of the rope. [m]
+        Of the rope. [m]
     rate : float
         Samples a second. [Hz]
     start, velocity : (3,) array_like, optional
         Of the load; by default it hangs below the tip and moves with it. [m], [m/s]
-    drag : float
-        ρ C_d A/(2 m). [1/m]
-    wind : (3,) array_like
-        Velocity of the air. [m/s]
-    suspension : Suspension, optional
-        Elastic rope, hook with slings; a hook starts straight between tip and load.
-    mass : float
-        Of the load, which counts with a suspension. [kg]
+    drag, wind
+        ρ C_d A/(2 m) [1/m], and velocity of the air, (3,) [m/s].
+    suspension, mass
+        Elastic rope, hook with slings, and mass of the load, which then counts [kg]; a hook starts
+        straight between tip and load.
 
     Raises
     ------

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from swashplate.crane.rope import GRAVITY
+from swashplate.crane.stick import check_names
 from swashplate.crane.transfer_functions import CRANE_SHIP, MOTIONS, Hull, TransferFunctions
 from swashplate.equations import kernel
 from swashplate.errors import InputError
@@ -36,28 +37,18 @@ beyond a file's frequencies, where the motions of its ends are taken."""
 class Spectrum:
     """JONSWAP's spectrum of waves; Bretschneider's with a peak factor of 1.
 
-    Attributes
-    ----------
-    height : float
-        Significant wave height, four standard deviations of the surface. [m]
-    period : float
-        Of the peak. [s]
-    peak_factor : float
-        γ, 3.3 for young wind seas.
-
-    Raises
-    ------
-    InputError
-        Unless all are above 0 and most of the energy lies at waves of 2.5 to 25 s.
+    An `InputError` unless all are above 0 and most of the energy lies at waves of 2.5 to 25 s.
     """
 
     height: float
+    """Significant wave height, four standard deviations of the surface. [m]"""
     period: float
+    """Of the peak. [s]"""
     peak_factor: float = 1.0
+    """γ, 3.3 for young wind seas."""
 
     def __post_init__(self) -> None:
-        for name in ("height", "period", "peak_factor"):
-            value = getattr(self, name)
+        for name, value in vars(self).items():
             if not (isfinite(value) and value > 0.0):
                 raise InputError(f"The {name} of a sea is {value:g}, but must be above 0.")
         omega = np.linspace(*BAND, 2001)
@@ -110,23 +101,6 @@ class Components(NamedTuple):
 class Seaway(Result):
     """A seeded seaway and the ship in it.
 
-    Attributes
-    ----------
-    sea : str or Spectrum
-        A name of `SEA_STATES`, or a spectrum.
-    heading_deg : float
-        0 following, 90 abeam to port, 180 head sea.
-    seed : int
-        Of the components.
-    ship : Hull or TransferFunctions
-        What the waves make of; by default a hull of a crane ship's size in closed form.
-    speed : float
-        Of the ship, forward. [m/s]
-    spread : bool
-        Directions spread by cos² around the heading, instead of long crests.
-    components : int
-        Number of regular waves.
-
     Raises
     ------
     InputError
@@ -135,19 +109,26 @@ class Seaway(Result):
     """
 
     sea: str | Spectrum = "ss3"
+    """A name of `SEA_STATES`, or a spectrum."""
     heading_deg: float = 90.0
+    """0 following, 90 abeam to port, 180 head sea."""
     seed: int = 0
+    """Of the components."""
     ship: Hull | TransferFunctions = field(default=CRANE_SHIP, repr=False)
+    """What moves in the waves; by default a hull of a crane ship's size in closed form."""
     speed: float = 0.0
+    """Of the ship, forward. [m/s]"""
     spread: bool = False
+    """Directions spread by cos² around the heading, instead of long crests."""
     components: int = 200
+    """Number of regular waves."""
 
     def __post_init__(self) -> None:
         if not isinstance(self.sea, str | Spectrum):
             kind = type(self.sea).__name__
             raise InputError(f"A sea is a name, as 'ss3', or a Spectrum, not of type {kind}.")
-        if isinstance(self.sea, str) and self.sea not in SEA_STATES:
-            raise InputError(f"There is no sea '{self.sea}'; there are {', '.join(SEA_STATES)}.")
+        if isinstance(self.sea, str):
+            check_names("There is no sea", [self.sea], SEA_STATES)
         if not (isfinite(self.heading_deg) and isfinite(self.speed) and self.components >= 2):
             raise InputError("A seaway has a finite heading and speed and two or more components.")
         if not str(self.seed).isdigit():
@@ -171,56 +152,34 @@ class Seaway(Result):
     @cached_property
     def waves(self) -> Components:
         """Regular waves: one anywhere in each of equal bands, so that nothing repeats."""
-        rng = np.random.default_rng(self.seed)
-        edges, width = np.linspace(*BAND, self.components, endpoint=False, retstep=True)
-        omega = edges + rng.random(self.components) * width
-        phase = 2.0 * np.pi * rng.random(self.components)
-        heading = np.full(self.components, radians(self.heading_deg))
+        rng, n = np.random.default_rng(self.seed), self.components
+        edges, width = np.linspace(*BAND, n, endpoint=False, retstep=True)
+        omega = edges + rng.random(n) * width
+        amplitude = np.sqrt(2.0 * self.spectrum.density(omega) * width)
+        phase, heading = 2.0 * np.pi * rng.random(n), np.full(n, radians(self.heading_deg))
         if self.spread:
             grid = np.linspace(-0.5 * np.pi, 0.5 * np.pi, 1001)
             below = 0.5 + (grid + 0.5 * np.sin(2.0 * grid)) / np.pi
-            heading += np.interp(rng.random(self.components), below, grid)
-        return Components(
-            omega, np.sqrt(2.0 * self.spectrum.density(omega) * width), phase, heading
-        )
-
-    @cached_property
-    def _phasors(self) -> tuple[Array, NDArray[np.complex128]]:
-        """Frequencies of encounter, and complex amplitudes of six motions, (6, components)."""
-        waves = self.waves
-        number = waves.frequency**2 / GRAVITY
-        met = waves.frequency - number * self.speed * np.cos(waves.heading)
-        made = self.ship.response(waves.frequency, waves.heading, self.speed)
-        return met, made * (waves.amplitude * np.exp(1j * waves.phase))
+            heading += np.interp(rng.random(n), below, grid)
+        return Components(omega, amplitude, phase, heading)
 
     def motion(self, count: int, rate: float = 512.0) -> Array:
-        """Motion of the ship.
+        """Motion of the ship, (count, 6): surge, sway, heave [m], roll, pitch, yaw [rad].
 
-        Parameters
-        ----------
-        count : int
-            Samples.
-        rate : float
-            Samples a second, a multiple of 8. [Hz]
-
-        Returns
-        -------
-        (count, 6) array
-            Surge, sway, heave [m], roll, pitch, yaw [rad].
-
-        Notes
-        -----
-        Value and two derivatives are summed up at 8 Hz, from phasors that are turned, not computed;
-        quintic polynomials join them.
+        Samples a second are a multiple of 8. Value and two derivatives are summed up at 8 Hz, from
+        phasors that are turned, not computed; quintic polynomials join them.
         """
         inner = round(rate / COARSE)
         if inner < 1 or abs(inner * COARSE - rate) > 1e-9 * rate:
             raise InputError(f"A ship's motion has a multiple of {COARSE:g} samples a second.")
-        met, amplitude = self._phasors
+        omega, amplitude, phase, heading = self.waves
+        met = omega - omega**2 / GRAVITY * self.speed * np.cos(heading)  # as the ship meets them
+        response = self.ship.response(omega, heading, self.speed)
+        motions = (response * (amplitude * np.exp(1j * phase))).T
         intervals = max(-(-(count - 1) // inner), 1)
         # value, slope and curvature of each motion, by e^{iωt}
         w = met[:, None]
-        sums = np.hstack([amplitude.T, 1j * w * amplitude.T, -w * w * amplitude.T])
+        sums = np.hstack([motions, 1j * w * motions, -w * w * motions])
         made = np.empty((intervals * inner + 1, 6))
         _synthesised(met, sums.real.copy(), sums.imag.copy(), _basis(inner), made)
         return made[:count]
@@ -237,7 +196,9 @@ def ship_motion(
     rate: float = 512.0,
     options: TextOptions | None = None,
 ) -> Array:
-    """Motion of a ship from a log, as `Crane.simulate` takes it for a sea.
+    """Motion of a ship from a log, (n, 6) at a rate [Hz], as `Crane.simulate` takes it for a sea.
+
+    Cubic splines through the samples, from the first time stamp on; z up, y to port. [m], [rad]
 
     Parameters
     ----------
@@ -247,17 +208,8 @@ def ship_motion(
     columns : mapping of str to str, optional
         Column of each motion, surge, sway, heave, roll, pitch, yaw; those that are left out are
         zero. By default all six by these names.
-    time_column : str
-    rate : float
-        Samples a second of the result. [Hz]
     options : TextOptions, optional
         How a text file is written, where that cannot be recognised from it.
-
-    Returns
-    -------
-    (n, 6) array
-        [m], [rad], by cubic splines through the samples, from the first time stamp on. Axes are
-        those of the package: z up, y to port.
 
     Raises
     ------
@@ -295,13 +247,7 @@ def ship_motion(
 
 
 def motion_of(sea: Seaway | ArrayLike | None, count: int, rate: float) -> Array:
-    """The ship's motion over so many samples, (count, 6); one column if it is at rest.
-
-    Raises
-    ------
-    InputError
-        For a motion of another shape, or a shorter one.
-    """
+    """The ship's motion, (count, 6), one column at rest; refuses another shape or a shorter one."""
     if sea is None:
         return np.zeros((count, 1))
     if isinstance(sea, Seaway):
@@ -345,13 +291,8 @@ def _basis(inner: int) -> Array:
 def _synthesised(met: Array, real: Array, imag: Array, basis: Array, out: Array) -> None:
     """Add up components on the coarse grid, turned from point to point; join the points.
 
-    Parameters
-    ----------
-    real, imag : (components, 3 motions) array
-        Amplitudes of value, slope and curvature, a row for each component: the inner loop runs
-        along rows, which the processor takes several numbers at a time.
-    basis : (inner, 6) array
-        Polynomials within an interval.
+    Amplitudes of value, slope and curvature are a row for each component: the inner loop runs along
+    rows, which the processor takes several numbers at a time.
     """
     size, columns = real.shape
     inner, motions = basis.shape[0], columns // 3

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from functools import lru_cache
 from math import degrees, inf, isfinite, pi, sin, sqrt
 from numbers import Real
@@ -11,31 +10,13 @@ from typing import TYPE_CHECKING, Any, Literal, TypedDict, Unpack, get_args
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from swashplate.analysis.capability import dead_zone
 from swashplate.analysis.compensation import InverseMap
+from swashplate.crane import loop
 from swashplate.crane.control import GIVES, SEEN, Control, settings_of
 from swashplate.crane.kinematics import Shafts, Vector, boom_at, rope_length, shaft_torques, tip_of
-from swashplate.crane.loop import (
-    ANGLE,
-    DIRECT,
-    FINE,
-    INVERSE,
-    MARCHED,
-    NO_NUMBER,
-    ROPE_OUT,
-    ROWS,
-    TOO_FAST,
-    TORQUE,
-    VOLTS,
-    Fixed,
-    Inverse,
-    Plant,
-    State,
-    loop_of,
-    open_voltages,
-)
+from swashplate.crane.loop import ROWS, Fixed, Inverse, Plant, State
 from swashplate.crane.rope import AIR, GRAVITY, Hung, Suspension, too_fast
-from swashplate.crane.stick import AXES
+from swashplate.crane.stick import AXES, check_names
 from swashplate.drive import Drive
 from swashplate.equations import CompiledStep, Machine, compiled_step
 from swashplate.equations.marching.run import marched
@@ -49,66 +30,49 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 Actuation = Literal["ideal", "volts", "inverse", "direct"]
+ACTUATIONS: tuple[str, ...] = get_args(Actuation)
 """In the order of `loop.IDEAL` and the others."""
 RATE = 512.0
 """Samples a second of the loop: the packaged drives' own. [Hz]"""
 OUTPUTS = ("shaft_speed", "limits")
 """What the loop takes of each drive."""
+RIGID = Suspension()
+"""A point on a rigid rope."""
 QUICKEST = 0.4
 """Largest part of a rope's pull by which a leaking drive may lower it within a sample: at 0.7 they
 would swing against each other from sample to sample."""
 
 
 class Setup(TypedDict, total=False):
-    """How a run is set up: keywords of `Crane.simulate` and `Crane.stepper`.
-
-    Attributes
-    ----------
-    control : Control, optional
-        Controller, of `swashplate.crane.control`; by default the stick's commands as they are.
-    actuation : {"inverse", "volts", "ideal", "direct"}
-        What makes speeds of wanted speeds: the real drives behind their inverse maps or behind
-        10 V for full speed, or drives that follow at once within their limits of speed. A stepper
-        also takes voltages, with "direct".
-    slew_deg, boom_deg, rope_m : float
-        Slew from forward to starboard, boom's elevation, rope below the tip; by default 0, 45
-        and 20, in studies 90, 45 and 27.
-    load : float, optional
-        Its mass, by default the safe load. [kg]
-    suspension : Suspension
-        Elastic rope, hook with slings; by default a point on a rigid rope.
-    loaded : bool
-        Whether the rope loads the drives: its tension is a torque on each shaft, by virtual work,
-        which they take a sample later as their ``load_torque``. Off by default, as their tests were
-        without load; drives feel it by their ``motor_leakage`` and ``line_stiffness``. What the
-        boom weighs is not in it.
-    drag_area : float
-        C_d A of the load. [m²]
-    wind : (float, float)
-        Forward and to port. [m/s]
-    brake : bool
-        Whether a brake holds the hoist 0.3 s after its command has returned to the dead zone; on by
-        default.
-    """
+    """How a run is set up: keywords of `Crane.simulate` and `Crane.stepper`."""
 
     control: Control | None
+    """Of `swashplate.crane.control`; by default the stick's commands as they are."""
     actuation: Actuation
+    """What makes speeds of wanted speeds: the real drives behind their inverse maps, ``"inverse"``
+    (the default), or behind 10 V for full speed, ``"volts"``; or drives that follow at once within
+    their limits of speed, ``"ideal"``. A stepper also takes voltages, ``"direct"``."""
     slew_deg: float
     boom_deg: float
     rope_m: float
+    """Slew from forward to starboard, boom's elevation, rope below the tip; by default 0, 45 and
+    20, in studies 90, 45 and 27."""
     load: float | None
+    """Its mass, by default the safe load. [kg]"""
     suspension: Suspension
+    """Elastic rope, hook with slings; by default a point on a rigid rope."""
     loaded: bool
+    """Whether the rope loads the drives: its tension is a torque on each shaft, by virtual work,
+    which they take a sample later as their ``load_torque``. Off by default, as their tests were
+    without load; drives feel it by their ``motor_leakage`` and ``line_stiffness``. What the boom
+    weighs is not in it."""
     drag_area: float
+    """C_d A of the load. [m²]"""
     wind: tuple[float, float]
+    """Forward and to port. [m/s]"""
     brake: bool
-
-
-def check_names(what: str, given: Iterable[str], known: Iterable[str]) -> None:
-    """Refuse keywords that are not known."""
-    strange = [each for each in given if each not in known]
-    if strange:
-        raise InputError(f"{what} has no '{strange[0]}'; it has {', '.join(known)}.")
+    """Whether a brake holds the hoist 0.3 s after its command has returned to the dead zone; on by
+    default."""
 
 
 class CraneStepper:
@@ -119,13 +83,13 @@ class CraneStepper:
 
     def __init__(self, crane: Crane, **setup: Unpack[Setup]) -> None:
         how: dict[str, Any] = dict(setup)
-        check_names("A crane's run", how, Setup.__annotations__)
+        check_names("A crane's run has no", how, Setup.__annotations__, "it has")
         control = how.pop("control", None)
-        self._crane, self.actuation = crane, how.get("actuation", "inverse")
-        if self.actuation == "direct" and control is not None:
-            raise InputError("With direct actuation the voltages are given: leave control out.")
         settings, law = settings_of(control)
-        self.fixed = fixed = _fixed(crane, settings, **how)
+        self._crane, self.fixed = crane, _fixed(crane, settings, **how)
+        fixed = self.fixed
+        if fixed.actuation == loop.DIRECT and control is not None:
+            raise InputError("With direct actuation the voltages are given: leave control out.")
         given = ("voltage", "load_torque") if fixed.loaded else ("voltage",)
         compiled = [_compiled(getattr(crane, axis), given) for axis in AXES]
         self._steps = [step for step, _ in compiled]
@@ -137,21 +101,23 @@ class CraneStepper:
             own = self._steps[3].machine()
             picks = np.array([SEEN.index(each) for each in seen], dtype=np.int64)
         # in open loop nothing acts back on the drives
-        self._open = control is None and not fixed.loaded and fixed.actuation in (VOLTS, INVERSE)
+        self._open = (
+            control is None and not fixed.loaded and fixed.actuation in (loop.VOLTS, loop.INVERSE)
+        )
         one, two, three, *last = (each.step for each in self._steps)
-        self._loop = loop_of(one, two, three, last[0] if last else None)
+        self._loop = loop.loop_of(one, two, three, last[0] if last else None)
         g, home = fixed.geometry, fixed.home
         axes, boom = np.zeros((6, 3)), boom_at(0.0, g, home)
         tip = tip_of(home.slew, boom, g)
         if fixed.loaded:
             weight = fixed.mass * GRAVITY
-            axes[TORQUE] = shaft_torques(Vector(0.0, 0.0, -weight), home.slew, boom, weight, g)
+            axes[loop.TORQUE] = shaft_torques(Vector(0.0, 0.0, -weight), home.slew, boom, weight, g)
         self._state = State(0, axes, tip, Hung(tip, tip, tip, tip, 0.0, 0.0), 0.0, 0.0)
         longest = 2.0 * pi * sqrt(fixed.ropes[1] / GRAVITY) * RATE + 4.0
         memory = np.zeros((7, 1 << int(longest).bit_length()))
         memory[3:5] = [[tip.x], [tip.y]]
         drives, best = (hoist, slew, luff), np.full(4, np.inf)
-        self._plant = Plant(drives, own, picks, memory, best, np.zeros((9, 0)))
+        self._plant = Plant(drives, own, picks, memory, best)
 
     def step(
         self, command: tuple[float, float, float], ship: ArrayLike | None = None
@@ -168,14 +134,9 @@ class CraneStepper:
         Returns
         -------
         dict
-            Signals by name, SI: voltages, speeds and angles of the shafts, tip, load, pull, rope.
-
-        Raises
-        ------
-        InputError, DomainError
-            As `Crane.simulate`, and for a command out of range.
+            Signals by name, as of a run, SI; errors are those of `Crane.simulate`.
         """
-        most = FULL_VOLTAGE if self.fixed.actuation == DIRECT else 1.0
+        most = FULL_VOLTAGE if self.fixed.actuation == loop.DIRECT else 1.0
         commands = np.array([command], dtype=np.float64)
         if commands.shape != (1, 3) or not (np.abs(commands) <= most).all():
             raise InputError(f"A crane takes three commands of at most ±{most:g}.")
@@ -189,75 +150,58 @@ class CraneStepper:
         return dict(zip(ROWS, row.tolist(), strict=True))
 
     def take(self, commands: Array, ship: Array) -> Array:
-        """Advance by many samples at once.
+        """Advance by many samples at once: a row for each, a column for each of `step`'s signals.
 
-        Parameters
-        ----------
-        commands : (n, 3) array
-            As of `step`.
-        ship : (n, 6) array
-            Motion of the ship [m], [rad]; (n, 1) if it does not move.
-
-        Returns
-        -------
-        (n, 28) array
-            Signals, a column for each that `step` returns.
-
-        Raises
-        ------
-        InputError, DomainError
-            As `Crane.simulate`.
+        Commands are (n, 3), the ship's motion (n, 6), or (n, 1) if it does not move.
         """
-        out = np.empty((len(commands), len(ROWS)))
+        return self._advanced(self.fixed, commands, ship, np.empty((len(commands), len(ROWS))))
+
+    def run(self, commands: Array, ship: Array) -> Array:
+        """A whole run from the start, as `take`; the stepper itself is then of no more use."""
+        fixed, h, out = self.fixed, 1.0 / RATE, np.empty((len(commands), len(ROWS)))
+        if self._open:  # the drives by themselves, which is quicker
+            given = np.empty((9, len(commands)))
+            for i, axis in enumerate(AXES):
+                stick = np.ascontiguousarray(commands[:, i])
+                volts = loop.open_voltages(stick, fixed.inverses[i], fixed.actuation)
+                instance = instance_of(getattr(self._crane, axis).parameters, by_voltage=True)
+                begun = instance.start({"voltage": 0.0}, h, "rest")
+                wanted = stored_of(instance.model, OUTPUTS)
+                made = marched(instance, {"voltage": volts}, h, begun, wanted, "command")
+                given[i], given[3 + i], given[6 + i] = volts, *made
+            out[:, :9] = given.T
+            fixed = fixed._replace(actuation=loop.MARCHED)
+        return self._advanced(fixed, commands, ship, out)
+
+    def _advanced(self, fixed: Fixed, commands: Array, ship: Array, out: Array) -> Array:
+        """The rows, filled by the loop; refuses what has stopped it."""
         self._state, ended = self._loop(
-            1.0 / RATE, self.fixed, self._state, self._plant, commands, ship, out
+            1.0 / RATE, fixed, self._state, self._plant, commands, ship, out
         )
-        if ended != FINE:
+        if ended != loop.FINE:
             raise self._stopped(ended)
         machines, margins = (*self._plant.drives, self._plant.law), self._plant.margins.tolist()
         for step, machine, worst in zip(self._steps, machines, margins, strict=False):
             step.check(machine, worst, "command")
         return out
 
-    def run(self, commands: Array, ship: Array) -> Array:
-        """A whole run from the start, as `take`; the stepper itself is then of no more use."""
-        if self._open:  # the drives by themselves, which is quicker
-            given, h = np.empty((9, len(commands))), 1.0 / RATE
-            for i, axis in enumerate(AXES):
-                stick = np.ascontiguousarray(commands[:, i])
-                volts = open_voltages(stick, self.fixed.inverses[i], self.fixed.actuation)
-                instance = instance_of(getattr(self._crane, axis).parameters, by_voltage=True)
-                begun = instance.start({"voltage": 0.0}, h, "rest")
-                wanted = stored_of(instance.model, OUTPUTS)
-                made = marched(instance, {"voltage": volts}, h, begun, wanted, "command")
-                given[i], given[3 + i], given[6 + i] = volts, *made
-            self._plant = self._plant._replace(marched=given)
-            self.fixed = self.fixed._replace(actuation=MARCHED)
-        return self.take(commands, ship)
-
     def _stopped(self, ended: int) -> Exception:
         """What has stopped the loop, as the error to raise."""
-        name, time = self._crane.name, self._state.sample / RATE
-        shafts = Shafts(*self._state.axes[ANGLE])
+        crane, time = self._crane, self._state.sample / RATE
+        shafts = Shafts(*self._state.axes[loop.ANGLE])
         rope = float(rope_length(shafts, self.fixed.geometry, self.fixed.home))
-        if ended == NO_NUMBER:
-            return DomainError(
-                f"{name}: at {time:.2f} s the control law gives an offset of the tip that is no "
-                "finite number; look for a division by zero or a root of what is negative in it."
-            )
-        if ended == TOO_FAST:
+        if ended == loop.TOO_FAST:
             return InputError(too_fast(rope, time, RATE))
-        if ended == ROPE_OUT:
-            low, high = self._crane.rope_limits
-            return DomainError(
-                f"{name}: at {time:.2f} s the rope is {rope:.2f} m long, but can be {low:g} to "
-                f"{high:g} m; hoist or lower less, or start elsewhere."
-            )
-        low, high = map(degrees, self._crane.boom_limits)
-        return DomainError(
-            f"{name}: at {time:.2f} s the boom meets the limits of its travel, {low:g} to "
-            f"{high:g} deg; luff less, or start elsewhere."
-        )
+        (short, long), (low, high) = crane.rope_limits, map(degrees, crane.boom_limits)
+        said = {
+            loop.NO_NUMBER: "the control law gives an offset of the tip that is no finite number; "
+            "look for a division by zero or a root of what is negative in it",
+            loop.ROPE_OUT: f"the rope is {rope:.2f} m long, but can be {short:g} to {long:g} m; "
+            "hoist or lower less, or start elsewhere",
+            loop.BOOM_OUT: f"the boom meets the limits of its travel, {low:g} to {high:g} deg; "
+            "luff less, or start elsewhere",
+        }
+        return DomainError(f"{crane.name}: at {time:.2f} s {said[ended]}.")
 
 
 def _fixed(
@@ -269,16 +213,15 @@ def _fixed(
     boom_deg: float = 45.0,
     rope_m: float = 20.0,
     load: float | None = None,
-    suspension: Suspension = Suspension(),  # noqa: B008  immutable
+    suspension: Suspension = RIGID,
     loaded: bool = False,
     drag_area: float = 0.0,
     wind: tuple[float, float] = (0.0, 0.0),
     brake: bool = True,
 ) -> Fixed:
     """What stays as it is during a run, of a `Setup`; refuses one that cannot be."""
-    kinds = get_args(Actuation)
-    if actuation not in kinds:
-        raise InputError(f"actuation is '{actuation}'; it is {', '.join(kinds[:-1])}.")
+    if actuation not in ACTUATIONS:
+        raise InputError(f"actuation is '{actuation}'; it is {', '.join(ACTUATIONS[:-1])}.")
     load = crane.safe_load if load is None else load
     numbers = {"slew_deg": slew_deg, "boom_deg": boom_deg, "rope_m": rope_m, "load": load}
     for name, value in (numbers | {"drag_area": drag_area}).items():
@@ -294,16 +237,14 @@ def _fixed(
     drag = AIR * drag_area / (2.0 * load) if load > 0.0 else 0.0  # which the suspension refuses
     if loaded:
         _check_loaded(crane, actuation, load + suspension.hook, suspension)
-    below, above = _edges(crane.hoist)
     low, high = crane.boom_limits
     hoist, slew, luff = (_inverse(crane.inverse(axis)) for axis in AXES)
     return Fixed(
         crane.geometry,
         crane.home(slew_deg, boom_deg, rope_m),
         settings,
-        kinds.index(actuation),
+        ACTUATIONS.index(actuation),
         bool(brake),
-        (below or -FULL_VOLTAGE, above or FULL_VOLTAGE),
         (sin(low), sin(high)),
         crane.rope_limits,
         load + suspension.hook,
@@ -342,12 +283,6 @@ def _compiled(drive: Drive, inputs: tuple[str, ...]) -> tuple[CompiledStep, Mach
 
 
 @lru_cache(maxsize=64)
-def _edges(drive: Drive) -> tuple[float | None, float | None]:
-    """Voltages of a drive's dead zone, negative and positive. [V]"""
-    return dead_zone(drive, -1.0)[1], dead_zone(drive, 1.0)[1]
-
-
-@lru_cache(maxsize=64)
 def _speed_lost(drive: Drive) -> float:
     """Speed that a drive loses at once for each N m of load. [rad/s/(N m)]"""
     still, pulled = (drive.simulate([0.0], load_torque=torque) for torque in (0.0, 1e5))
@@ -356,7 +291,6 @@ def _speed_lost(drive: Drive) -> float:
 
 def _inverse(inverse: InverseMap) -> Inverse:
     """An inverse map as the loop takes it."""
-    branches = (*inverse.minus, *inverse.plus)
-    a, b, c, d = (np.ascontiguousarray(each, dtype=np.float64) for each in branches)
-    low, high = inverse.limits
-    return Inverse(a, b, c, d, inverse.creep, low, high, min(inverse.acceleration))
+    speed, voltage = np.hstack([inverse.minus, inverse.plus])
+    gap, (low, high) = inverse.minus.speed.size - 1, inverse.limits
+    return Inverse(speed, voltage, gap, inverse.creep, low, high, min(inverse.acceleration))

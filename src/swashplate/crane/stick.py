@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from math import cos, inf, radians, sin
 from typing import TYPE_CHECKING
@@ -24,12 +24,20 @@ TARGETS = {"hoist": "rope_m", "slew": "slew_deg", "luff": "boom_deg"}
 """Where an axis is led to: rope below the tip, slew, elevation of the boom."""
 
 
+def check_names(
+    said: str, given: Iterable[str], known: Iterable[str], has: str = "there are"
+) -> None:
+    """Refuse names that are not known, in a sentence that begins as said."""
+    strange = [each for each in given if each not in known]
+    if strange:
+        raise InputError(f"{said} '{strange[0]}'; {has} {', '.join(known)}.")
+
+
 @dataclass(frozen=True, eq=False)
 class Stick(Result):
     """Commands of hoist, slew and luff, each from -1 to 1.
 
-    Positive commands hoist, slew to starboard, lift the boom. Made by `trapezoid`, `record` or
-    `rest`.
+    Positive ones hoist, slew to starboard, lift the boom. Made by `trapezoid`, `record`, `rest`.
     """
 
     length: float
@@ -66,24 +74,14 @@ class Stick(Result):
             Part of the full speed, -1 to 1, its sign that of the way.
         until : mapping of str to float, optional
             Where an ideal drive would end: ``slew_deg`` from forward, ``boom_deg``, ``rope_m``;
-            each needs the command of its axis. What the ship, the other axes and the real drives
-            make of it is another matter.
+            each needs the command of its axis.
         duration : float, optional
             Of an axis without target. [s]
         start, ramp, length : float
             Moment of the first ramp, time of each ramp, length of the record. [s]
-
-        Raises
-        ------
-        InputError
-            For a command beyond ±1, a target or duration too few or too many.
         """
         parts, targets = {"hoist": hoist, "slew": slew, "luff": luff}, dict(until or {})
-        strange = [each for each in targets if each not in TARGETS.values()]
-        if strange:
-            raise InputError(
-                f"There is no target '{strange[0]}'; there are {', '.join(TARGETS.values())}."
-            )
+        check_names("There is no target", targets, TARGETS.values())
         for axis, part in parts.items():
             target = TARGETS[axis]
             if not -1.0 <= part <= 1.0:
@@ -105,14 +103,9 @@ class Stick(Result):
 
     @classmethod
     def record(cls, commands: ArrayLike, rate: float = 512.0) -> Stick:
-        """Commands as they were recorded, straight between samples.
+        """Commands as they were recorded at a rate [Hz], straight between samples.
 
-        Parameters
-        ----------
-        commands : (n, 3) array_like
-            Of hoist, slew and luff, -1 to 1.
-        rate : float
-            Samples a second. [Hz]
+        They are (n, 3), of hoist, slew and luff, -1 to 1.
         """
         made = np.array(commands, dtype=np.float64)
         if made.ndim != 2 or made.shape[1] != 3 or len(made) < 2 or not rate > 0.0:
@@ -132,18 +125,9 @@ class Stick(Result):
         return cls.trapezoid(length=length)
 
     def sample(self, crane: Crane, home: Home, rate: float) -> tuple[Array, float]:
-        """Commands at a rate for a crane that starts at its home, and when the last one ends.
+        """Commands (n, 3) at a rate for a crane that starts at its home; when the last ends. [s]
 
-        Returns
-        -------
-        commands : (n, 3) array
-        end : float
-            [s]
-
-        Raises
-        ------
-        InputError
-            If a command does not end within the record, or leads away from its target.
+        An `InputError` if one does not end within the record, or leads away from its target.
         """
         time = np.arange(round(self.length * rate) + 1) / rate
         if self.samples is not None:

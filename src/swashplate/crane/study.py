@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from math import atan2, sqrt
 from typing import Any, NamedTuple, Unpack
 
 import numpy as np
@@ -17,12 +16,10 @@ from numpy.typing import ArrayLike, NDArray
 from swashplate.analysis.whatif import pulled
 from swashplate.crane.control import Control
 from swashplate.crane.crane import Crane, begun
-from swashplate.crane.loop import ROWS
-from swashplate.crane.result import PUMPS, CraneRun
+from swashplate.crane.result import PUMPS, CraneRun, swing_of
 from swashplate.crane.sea import Seaway, Spectrum
-from swashplate.crane.stepper import RATE, Actuation, Setup, check_names
-from swashplate.crane.stick import AXES, Stick
-from swashplate.equations import kernel
+from swashplate.crane.stepper import RATE, Actuation, Setup
+from swashplate.crane.stick import AXES, Stick, check_names
 from swashplate.errors import DomainError, InputError
 from swashplate.executors import Executor, Threads
 from swashplate.results import Result
@@ -30,15 +27,16 @@ from swashplate.tables import Column, Table
 
 Array = NDArray[np.float64]
 Laws = Control | Mapping[str, Control | None]
-"""A controller, or several by name; None is none."""
 Drives = Sequence[str] | Mapping[str, str | Crane | Sequence[Crane]]
-"""Drives of a study, by words or names."""
+"""Controllers and drives of a study, by words or names; no controller is None."""
 
 COUNTED = (
     *("rms_swing", "largest_swing", "slew"),
     *(f"{axis}_{str(limit.name).lower()}" for axis in AXES for limit in PUMPS),
 )
 """What is kept of a run: swing and slew at the end [rad], shares of time for which limits act."""
+BITS = np.arange(2 ** len(PUMPS))[:, None] >> np.arange(len(PUMPS)) & 1
+"""Which of `PUMPS` act, a row for each sum of the loop's bits."""
 IDEAL, BUILT = "ideal", "identified"
 ACTUATED: Mapping[str, Actuation] = {IDEAL: "ideal", BUILT: "inverse", "volts": "volts"}
 """Drives that follow at once; the crane's own behind their inverse maps; the same, 10 V for full
@@ -110,7 +108,6 @@ class Study(Result):
 
         Parameters
         ----------
-        crane : Crane
         control : Control or mapping of str to Control or None
             One controller, or several by name.
         seeds : sequence of int
@@ -134,11 +131,6 @@ class Study(Result):
         **setup
             Where each run begins, what hangs on it: see `Setup`, whose control and actuation follow
             from controllers and drives. By default the load hangs abeam on 27 m of rope.
-
-        Raises
-        ------
-        InputError
-            For seeds, drives or a start that make no study.
         """
         laws = control if isinstance(control, Mapping) else {"": control}
         sets = drives if isinstance(drives, Mapping) else {each: each for each in drives}
@@ -148,7 +140,7 @@ class Study(Result):
             raise InputError("A study needs a controller, a set of drives and a seed at least.")
         poses = [each for each in Setup.__annotations__ if each not in ("control", "actuation")]
         words = ("seeds", "sea", "drives", "stick", "length", "start", *poses)
-        check_names("A study", setup, words)
+        check_names("A study has no", setup, words, "it has")
         stick = stick or Stick.rest(length)
         if not 0.0 <= start < stick.length:
             raise InputError(
@@ -161,11 +153,7 @@ class Study(Result):
         for law, stages in laws.items():
             for name, given in sets.items():
                 if isinstance(given, str):
-                    if given not in ACTUATED:
-                        raise InputError(
-                            f"There are no drives '{given}'; there are {', '.join(ACTUATED)}, or "
-                            "cranes."
-                        )
+                    check_names("There are no drives", [given], ACTUATED)
                     case = none.moved(control=stages, actuation=ACTUATED[given])
                 elif not given:
                     raise InputError(f"The drives '{name}' are an empty list of cranes.")
@@ -177,18 +165,10 @@ class Study(Result):
         return cls(crane, cases, seaway, tuple(seeds), start, executor or Threads(), progress)
 
     def outcomes(self, cases: Sequence[Case], numbers: range | None = None) -> Array:
-        """Swing and limits of all cases in the seaways, or in some of them by their numbers.
+        """`COUNTED` of all cases in the seaways, or in some of them by their numbers, (n, m, 18).
 
-        Returns
-        -------
-        (n, m, 18) array
-            Of seaways and cases, `COUNTED`; NaN where a run met a limit of the crane's travel or
-            left the model's domain.
-
-        Raises
-        ------
-        InputError, ParameterError
-            If a case cannot begin as it is asked to.
+        NaN where a run met a limit of the crane's travel or left the model's domain. An
+        `InputError` or `ParameterError` if a case cannot begin as it is asked to.
         """
         for case in cases:  # said here, once, and not by a worker
             begun(case.cranes[0], case.stick, case.setup)
@@ -217,34 +197,13 @@ def _of_seaway(work: tuple[tuple[Case, ...], Seaway | None, float], item: tuple[
         except (DomainError, InputError):  # stopped: by the travel's limits, or the tip too fast
             continue
         counts = run.settling if sea is None else slice(round(start * RATE), None)
-        _counted(run.out[counts], row)
-        row[2] += run.home.slew
+        swing = swing_of(run.load[counts], run.tip[counts])
+        slew = run.fixed.home.slew + run["shaft_slew"][-1]
+        row[:3] = np.sqrt(np.mean(swing**2)), swing.max(), slew
+        for share, axis in zip(row[3:].reshape(3, -1), AXES, strict=True):
+            bits = run[f"limits_{axis}"][counts].astype(np.uint8)
+            share[:] = np.bincount(bits, minlength=len(BITS)) @ BITS / len(bits)
     return made
-
-
-_TIP, _LOAD, _BITS, _SLEW = map(ROWS.index, ("tip_x", "load_x", "limits_hoist", "shaft_slew"))
-
-
-@kernel
-def _counted(out: Array, made: Array) -> None:
-    """Root mean square and largest swing, angle of the slew [rad]; shares of the limits' bits."""
-    square, largest = 0.0, 0.0
-    made[:] = 0.0
-    for m in range(out.shape[0]):
-        x, y, z = (
-            out[m, _LOAD] - out[m, _TIP],
-            out[m, _LOAD + 1] - out[m, _TIP + 1],
-            out[m, _LOAD + 2] - out[m, _TIP + 2],
-        )
-        swing = atan2(sqrt(x * x + y * y), -z)
-        square += swing * swing
-        largest = max(largest, swing)
-        for axis in range(3):
-            bits = int(out[m, _BITS + axis])
-            for bit in range(5):
-                made[3 + 5 * axis + bit] += (bits >> bit) & 1
-    made /= out.shape[0]
-    made[0], made[1], made[2] = sqrt(square / out.shape[0]), largest, out[-1, _SLEW]
 
 
 # --- sweeps ---------------------------------------------------------------------------------------
@@ -284,9 +243,8 @@ class Sweep(Result):
     """Swing of several variants over a quantity, in the same seaways."""
 
     over: str
-    """``"bearing"``, ``"height"``, ``"orifice"`` or ``"stick"``."""
     points: Array
-    """(n,) [rad], [m], factors, parts of the full speed."""
+    """(n,) bearings [rad], heights [m], factors on the orifice, parts of the full speed."""
     names: tuple[str, ...]
     values: Array = field(repr=False)
     """(seaways, n, variants, 3) root mean square and largest swing, slew at the end [rad]; NaN:
@@ -321,38 +279,22 @@ class Sweep(Result):
 
 
 def sweep(
-    crane: Crane,
-    over: str,
-    control: Laws,
-    *,
-    points: ArrayLike | None = None,
-    **study: Any,
+    crane: Crane, over: str, control: Laws, *, points: ArrayLike | None = None, **study: Any
 ) -> Sweep:
-    """Swing over a quantity, in the same seaways at every point.
+    """Swing over a quantity at some points of it, in the same seaways.
 
     Parameters
     ----------
-    crane : Crane
     over : {"bearing", "height", "orifice", "stick"}
         Bearing of the boom from the bow to starboard [deg], in 4 seaways; significant height of
         waves [m] with a peak at 7.5 s, in 40, where of `sea` ship and heading count; factor on the
         luff drive's in-line orifice under control, in 20; the stick, part of the full speed, in a
         slew of 45 degrees from forward on 20 m of rope in a calm sea, of which the residual swing
         counts.
-    control : Control or mapping of str to Control or None
-        One controller, or several by name.
-    points : (n,) array_like, optional
-        Of the quantity.
-    **study
-        Seaways, drives, where each run begins: see `Study.of`.
-
-    Raises
-    ------
-    InputError
-        For another quantity, points that are none, and keywords that make no study.
+    control, **study
+        Controllers, seaways, drives, where each run begins: see `Study.of`.
     """
-    if over not in SWEPT:
-        raise InputError(f"There is no sweep over '{over}'; there are {', '.join(SWEPT)}.")
+    check_names("There is no sweep over", [over], SWEPT)
     swept = SWEPT[over]
     taken = [each for each in study if each in swept.fixed]
     if taken:

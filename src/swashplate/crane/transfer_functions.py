@@ -11,7 +11,8 @@ from __future__ import annotations
 import csv
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
-from math import isfinite, pi
+from itertools import count
+from math import inf, isfinite, pi
 from pathlib import Path
 
 import numpy as np
@@ -53,28 +54,18 @@ class Hull:
     """A box-shaped hull in closed form: Jensen, Mansour and Olsen (Ocean Engineering 31, 2004).
 
     Heave and pitch are theirs; roll is the waves' slope through one resonance; sway and surge
-    follow the water. Ask the ship for its roll period first: nothing else matters as much.
-
-    Attributes
-    ----------
-    length, beam, draught : float
-        [m]
-    roll_period : float
-        Natural period. [s]
-    roll_damping : float
-        Damping ratio.
-
-    Raises
-    ------
-    InputError
-        Unless all are above 0.
+    follow the water. Ask the ship for its roll period first: nothing else matters as much. An
+    `InputError` unless all numbers are above 0.
     """
 
     length: float
     beam: float
     draught: float
+    """[m], as length and beam."""
     roll_period: float = 13.0
+    """Natural period. [s]"""
     roll_damping: float = 0.06
+    """Damping ratio."""
 
     def __post_init__(self) -> None:
         for name, value in vars(self).items():
@@ -163,24 +154,11 @@ class TransferFunctions(Result):
             )
 
     def response(self, omega: Array, heading: Array, speed: float = 0.0) -> Complex:
-        """Complex amplitudes of the six motions for each metre of wave.
+        """Complex amplitudes of the six motions for each metre of wave, (6, n).
 
-        Parameters
-        ----------
-        omega, heading : (n,) array
-            Frequency [rad/s] and heading [rad] of each wave.
-        speed : float
-            [m/s]
-
-        Returns
-        -------
-        (6, n) array
-            Beyond the file's frequencies, those of its ends.
-
-        Raises
-        ------
-        InputError
-            For a speed that the table does not reach, or another heading than its only one.
+        Of waves by their frequencies [rad/s] and headings [rad], (n,), at a speed [m/s]. Beyond the
+        file's frequencies those of its ends are taken; an `InputError` for a speed that the table
+        does not reach, or another heading than its only one.
         """
         low, high = self.speeds[0], self.speeds[-1]
         if not low <= speed <= high:
@@ -259,18 +237,18 @@ def read_ship(path: str | Path, length: float | None = None) -> TransferFunction
 
 def _numbers(path: str | Path, line: int, words: Sequence[str | None], wanted: str) -> list[float]:
     """Finite numbers of a line, as many as are wanted, joined by commas."""
-    names = wanted.split(", ")
+    names, made = wanted.split(", "), list[float]()
     for name, word in zip(names, [*words, *([None] * len(names))], strict=False):
         try:
-            fine = isfinite(float(word or ""))
+            made.append(float(word or ""))
         except ValueError:
-            fine = False
-        if not fine:
+            made.append(inf)
+        if not isfinite(made[-1]):
             raise FileError(
                 f"{path}, line {line}: {name} is {'missing' if word is None else repr(word)}, but "
                 f"must be a number; needed are {wanted}: the file is cut or another one."
             )
-    return [float(word or "") for word in words[: len(names)]]
+    return made
 
 
 def _veres(path: str | Path) -> Iterator[Amplitude]:
@@ -279,25 +257,23 @@ def _veres(path: str | Path) -> Iterator[Amplitude]:
         raise FileError(
             f"{path} is no VERES file of motion transfer functions: its first line differs."
         )
-    row = 9
+    rows = count(10)
 
     def following(wanted: str) -> list[float]:
-        nonlocal row
-        row += 1
+        row = next(rows)
         words = lines[row - 1].split() if row <= len(lines) else []
         return _numbers(path, row, words, wanted)
 
     speeds, headings, frequencies, _ = map(int, following("speeds, headings, frequencies, motions"))
     for _ in range(speeds):
-        speed = following("speed")[0]
+        (speed,) = following("speed")
         for _ in range(headings):
             (heading,) = following("heading")
             for _ in range(frequencies):
                 (omega,) = following("frequency")
                 for _ in MOTIONS:
-                    motion, real, imaginary = following("motion, real part, imaginary part")
-                    value = complex(real, imaginary)
-                    yield speed, heading, omega, int(motion) - 1, value
+                    motion, *parts = following("motion, real part, imaginary part")
+                    yield speed, heading, omega, int(motion) - 1, complex(*parts)
 
 
 def _wamit(path: str | Path) -> Iterator[Amplitude]:
@@ -354,37 +330,31 @@ def _capytaine(path: str | Path) -> Iterator[Amplitude]:
 def _gathered(
     path: str | Path, amplitudes: Iterable[Amplitude], length: float
 ) -> TransferFunctions:
-    """A table of all amplitudes, each grid rising, headings from 0 to 180 degrees.
-
-    Rotations are in rad for so much of the wave. [m]
-    """
-    waves: dict[tuple[float, float, float, int], complex] = {}
-    mirrored = waves.copy()
-    for sailed, heading, frequency, number, value in amplitudes:
-        angle = round(heading, 9) % 360.0
-        if angle > 180.0:  # the other side, which follows by symmetry, where this one lacks it
-            sign = complex(MIRRORED[number]) if 0 <= number <= 5 else 1.0
-            mirrored[sailed, 360.0 - angle, frequency, number] = sign * value
-            continue
-        wave = sailed, angle, frequency, number
-        if abs(waves.get(wave, value) - value) > 1e-3 * max(abs(value), 1e-3):
-            raise FileError(
-                f"{path}: motion {number + 1} in waves of {frequency:g} rad/s and {angle:g} deg is "
-                "there twice, with other values."
-            )
-        waves[wave] = value
-    found = [(*wave, value) for wave, value in (mirrored | waves).items()]
-    if not found:
+    """A table, each grid rising, headings from 0 to 180 degrees; rotations by a length [m]."""
+    found = np.array(list(amplitudes), dtype=np.complex128)
+    if not found.size:
         raise FileError(f"{path} has no motions in waves.")
-    columns = [np.array(column) for column in zip(*found, strict=True)]
-    (speeds, v), (headings, m), (omega, f) = (
-        np.unique(column, return_inverse=True) for column in columns[:3]
-    )
-    motion, amplitude = columns[3:]
+    sailed, heading, frequency, number = found[:, :4].real.T
+    motion, amplitude = number.astype(np.int64), found[:, 4]
     if motion.min() < 0 or motion.max() > 5:
         raise FileError(f"{path} has a motion {motion.max() + 1} of a ship; there are 1 to 6.")
+    angle = np.round(heading, 9) % 360.0
+    grids = sailed, np.minimum(angle, 360.0 - angle), frequency
+    (speeds, v), (headings, m), (omega, f) = (np.unique(x, return_inverse=True) for x in grids)
     values = np.full((speeds.size, headings.size, omega.size, 6), np.nan, dtype=np.complex128)
-    values[v, m, f, motion] = amplitude / np.where(motion > 2, length, 1.0)
+    # the other side, which follows by symmetry, where this one lacks it
+    other, at = angle > 180.0, np.stack([v, m, f, motion])
+    values[*at[:, other]] = MIRRORED[motion[other]] * amplitude[other]
+    own, given = at[:, ~other], amplitude[~other]
+    values[*own] = given
+    twice = np.abs(values[*own] - given) > 1e-3 * np.maximum(np.abs(given), 1e-3)
+    if twice.any():
+        _, i, j, which = own[:, twice][:, 0]
+        raise FileError(
+            f"{path}: motion {which + 1} in waves of {omega[j]:g} rad/s and {headings[i]:g} deg is "
+            "there twice, with other values."
+        )
+    values[..., 3:] /= length
     gaps = np.argwhere(~np.isfinite(values))
     if gaps.size:
         _, i, j, lacks = gaps[0]

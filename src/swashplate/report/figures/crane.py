@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any, Literal, NamedTuple
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -48,17 +48,9 @@ def seaway_words(sea: Seaway | None, height: bool = True) -> str:
 
 def remark(ax: Axes, *said: str, rows: int = 0, right: bool = False) -> None:
     """Write grey words above a panel, over so many rows of a legend."""
-    words, side = "; ".join(filter(None, said)), 1.0 if right else 0.0
-    ax.annotate(
-        words,
-        (side, 1.0),
-        xytext=(0.0, 5.0 + 13.0 * rows),
-        xycoords="axes fraction",
-        textcoords="offset points",
-        fontsize=style.SMALL,
-        color=style.GREY,
-        ha="right" if right else "left",
-    )
+    words, shift = "; ".join(filter(None, said)), (0.0, 5.0 + 13.0 * rows)
+    side = "right" if right else "left"
+    style.write(ax, words, (float(right), 1.0), shift, color=style.GREY, ha=side)
 
 
 def _panels(
@@ -94,16 +86,9 @@ def plot_crane(
     Parameters
     ----------
     runs : CraneRun or mapping of str to CraneRun
-        Runs of one length, by their names.
+        Up to six of one length, by their names.
     sea : mapping of str to CraneRun, optional
         The same in a seaway, whose swing gets a panel of its own.
-    title : str, optional
-        By default the crane's.
-
-    Raises
-    ------
-    InputError
-        For none, or more than six runs.
     """
     named = {runs.actuation: runs} if isinstance(runs, CraneRun) else dict(runs)
     if not 0 < len(named) <= MOST_RUNS:
@@ -140,9 +125,8 @@ def _acting(ax: Axes, runs: Mapping[str, CraneRun], looks: Mapping[str, style.St
     rows = [(name, axis) for name in runs for axis in ("slew", "luff")]
     ax.set_ylim(len(rows) - 0.4, -0.6)
     for row, (name, axis) in enumerate(rows):
-        run = runs[name]
         for limit in ACTING:
-            spans = stretches(run.time, run.active(axis, limit))
+            spans = stretches(runs[name].time, runs[name].active(axis, limit))
             bars = [(start, end - start) for start, end in spans]
             color = SHADES[limit].color
             ax.broken_barh(bars, (row - 0.36, 0.72), facecolors=color, edgecolor="none")
@@ -158,37 +142,22 @@ def _acting(ax: Axes, runs: Mapping[str, CraneRun], looks: Mapping[str, style.St
 # --- studies --------------------------------------------------------------------------------------
 
 
-class Look(NamedTuple):
-    """How a sweep over a quantity looks."""
-
-    title: str
-    below: str
-    label: str
-    remark: str
-    """Of how many seaways there are."""
-
-
 LOOKS = {
-    "bearing": Look("Swing over the bearing of the boom", "", "", "RMS, mean of {}"),
-    "height": Look(
-        "Seaways in which the load swings less than {:g}°",
-        "significant height of the waves (m)",
-        "share of seaways (%)",
-        "{} a height",
+    "bearing": ("Swing over the bearing of the boom", "RMS, mean of {}", "", ""),
+    "height": (
+        *("Seaways in which the load swings less than {:g}°", "{} a height"),
+        *("share of seaways (%)", "significant height of the waves (m)"),
     ),
-    "orifice": Look(
-        "Swing over the size of the luff drive's orifice",
-        "orifice of the luff drive, to the identified one",
-        "swing, RMS (deg)",
-        "mean of {} with its 95 % interval",
+    "orifice": (
+        *("Swing over the size of the luff drive's orifice", "mean of {} with its 95 % interval"),
+        *("swing, RMS (deg)", "orifice of the luff drive, to the identified one"),
     ),
-    "stick": Look(
-        "Residual swing after a slew",
-        "stick, part of the full speed",
-        "residual swing (deg)",
-        "",
+    "stick": (
+        *("Residual swing after a slew", ""),
+        *("residual swing (deg)", "stick, part of the full speed"),
     ),
 }
+"""Title of a sweep over a quantity, remark on its seaways, ordinate, abscissa."""
 
 
 def plot_sweep(result: Sweep, *, limit_deg: float = 3.0, title: str = "") -> Figure:
@@ -198,10 +167,11 @@ def plot_sweep(result: Sweep, *, limit_deg: float = 3.0, title: str = "") -> Fig
     shows the share of seaways in which the largest swing stays below a limit; over the stick the
     residual swing, and where the slew ends.
     """
-    look, looks, points = LOOKS[result.over], style.strokes(result.names), result.points
-    words = title or look.title.format(limit_deg)
+    looks, points = style.strokes(result.names), result.points
+    usual, seaways, label, below = LOOKS[result.over]
+    words = title or usual.format(limit_deg)
     sea = seaway_words(result.sea, result.over != "height")
-    said = (sea, look.remark.format(count(len(result.values), "seaway")), assumed(result.crane))
+    said = (sea, seaways.format(count(len(result.values), "seaway")), assumed(result.crane))
     if result.over == "bearing":
         return _polar(result, words, looks, *said)
     stick = result.over == "stick"
@@ -219,7 +189,7 @@ def plot_sweep(result: Sweep, *, limit_deg: float = 3.0, title: str = "") -> Fig
             middle, low, high = np.maximum(found, LEAST).T
             ax.fill_between(points, low, high, color=color, alpha=0.15, linewidth=0.0)
             ax.plot(points, middle, **how)
-    style.dress(ax, look.label)
+    style.dress(ax, label)
     if result.over == "height":
         ax.set_ylim(0.0, 100.0)
         ax.set_xlim(left=0.0)
@@ -233,7 +203,7 @@ def plot_sweep(result: Sweep, *, limit_deg: float = 3.0, title: str = "") -> Fig
         ax.axvline(1.0, color=style.FAINT, linewidth=0.8, zorder=1.0)
         style.write(ax, "as built", (1.0, low), (4.0, 4.0), coords="data", color=style.GREY)
         ax.set_xlim(points[0], points[-1])
-    style.label_below(ends[0] if ends else ax, look.below)
+    style.label_below(ends[0] if ends else ax, below)
     return figure
 
 
@@ -241,11 +211,10 @@ def _polar(result: Sweep, title: str, looks: dict[str, style.Stroke], *said: str
     """Swing over the bearing around the ship."""
     legend = [style.handle(name, *look) for name, look in looks.items()]
     rows = style.legend_rows(legend)
-    figure = style.new_figure(
-        style.WIDTH, style.HEAD + style.ROW * (rows + 1) + 5.4 + style.FOOT, layout="none"
-    )
+    above = style.HEAD + style.ROW * (rows + 1)
+    figure = style.new_figure(style.WIDTH, above + 5.4 + style.FOOT, layout="none")
     style.write_title(figure, title)
-    top = 1.0 - (style.HEAD + style.ROW * (rows + 1) + 0.05) / float(figure.get_figheight())
+    top = 1.0 - (above + 0.05) / float(figure.get_figheight())
     ax: Any = figure.add_axes((0.16, 0.06, 0.68, top - 0.11), projection="polar")
     ax.set_theta_zero_location("N")
     ax.set_theta_direction(-1)
@@ -268,14 +237,14 @@ def _polar(result: Sweep, title: str, looks: dict[str, style.Stroke], *said: str
     ax.tick_params(labelsize=style.SMALL, labelcolor=style.INK)
     ax.tick_params(axis="x", pad=8.0)
     for angle, text in zip(angles, ax.get_xticklabels(), strict=True):
-        side: Literal["left", "right"] = "left" if angle < 180 else "right"
+        side = "left" if angle < 180 else "right"
         text.set_horizontalalignment("center" if angle % 180 == 0 else side)
     ax.grid(True, color=style.GRID, linewidth=0.6)
     ax.spines["polar"].set_color(style.FAINT)
-    above = figure.add_axes((0.012, top + 0.01, 0.9, 0.001))
-    above.set_axis_off()
-    style.put_legend(above, legend)
-    remark(above, *said, rows=rows)
+    head = figure.add_axes((0.012, top + 0.01, 0.9, 0.001))
+    head.set_axis_off()
+    style.put_legend(head, legend)
+    remark(head, *said, rows=rows)
     return figure
 
 
@@ -287,13 +256,13 @@ def plot_follow(result: Followable, *, title: str = "") -> Figure:
     figure, (ax,) = _panels([3.3], words, looks, said, assumed(result.crane))
     for (color, dashes), values in zip(looks.values(), result.amplitude.T, strict=True):
         ax.plot(result.periods, values, color=color, linestyle=dashes, linewidth=1.4)
-    asked = {name: (each.period, each.amplitude[2]) for name, each in result.seas.items()}
-    for name, place in asked.items():
+    box = {"facecolor": "white", "edgecolor": "none", "pad": 0.6}
+    for name, each in result.seas.items():
+        place = each.period, each.amplitude[2]
         ax.plot(*place, "D", color=style.INK, ms=4.5)
-        box = {"facecolor": "white", "edgecolor": "none", "pad": 0.6}
         style.write(ax, name, place, (6.0, -3.0), coords="data", bbox=box)
     style.dress(ax, "amplitude (m)")
-    every = [*result.amplitude.ravel(), *(amplitude for _, amplitude in asked.values())]
+    every = [*result.amplitude.ravel(), *(each.amplitude[2] for each in result.seas.values())]
     _logarithmic(ax, 0.8 * min(every), 1.25 * max(every))
     ax.set_xlim(result.periods[0], result.periods[-1])
     style.label_below(ax, "period (s)")
@@ -318,10 +287,8 @@ def plot_judgment(result: Judgment, *, title: str = "") -> Figure:
         spread = row + random.uniform(-0.25, 0.25, known.size)
         ax.plot(known, spread, "o", color=color, ms=3.2, alpha=0.45, mew=0.0)
         mean = mean_of(known)
-        ax.plot(
-            [mean.low, mean.high], [row, row], color=style.INK, linewidth=3.0, solid_capstyle="butt"
-        )
-        ax.plot([mean.value] * 2, [row - 0.3, row + 0.3], color=style.INK, linewidth=1.6)
+        ax.hlines(row, mean.low, mean.high, color=style.INK, linewidth=3.0)
+        ax.vlines(mean.value, row - 0.3, row + 0.3, color=style.INK, linewidth=1.6)
         worse = f"\nworse than none: {100.0 * share:.0f} %" if name in result.names[1:] else ""
         labels.append(name + worse)
     style.dress(ax)

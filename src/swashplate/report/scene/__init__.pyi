@@ -1,2 +1,2 @@
-from .scene import write_scene as write_scene
-from .verdict import write_judgment as write_judgment
+from .pages import write_judgment as write_judgment
+from .pages import write_scene as write_scene

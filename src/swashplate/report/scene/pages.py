@@ -1,23 +1,103 @@
-"""Page of a judgment: does the controller work on this crane's drives, and what would do?"""
+"""Pages of cranes: a scene that moves, and the verdict of a judgment; each is one file."""
 
 from __future__ import annotations
 
+from base64 import b64encode
+from collections.abc import Mapping
 from datetime import date
+from importlib.resources import files
 from io import StringIO
 from pathlib import Path
 
 import numpy as np
+from jinja2 import Environment, StrictUndefined
 from markupsafe import Markup
 from matplotlib import rc_context
 from matplotlib.figure import Figure
 
-from swashplate.crane import Judgment
+from swashplate.crane import CraneRun, Judgment
+from swashplate.crane.stepper import RATE
 from swashplate.crane.study import NONE
-from swashplate.errors import DomainError
+from swashplate.errors import DomainError, InputError
 from swashplate.report.figures.crane import plot_crane, plot_follow, plot_judgment, seaway_words
-from swashplate.report.fit_report.page import Block, Section, listed_block, page, text
+from swashplate.report.fit_report.page import (
+    Block,
+    Section,
+    listed_block,
+    page,
+    script_json,
+    text,
+)
 from swashplate.report.fit_report.summary import Light, light
 from swashplate.tables import Table, count, listed, write_text
+
+# --- scene ----------------------------------------------------------------------------------------
+
+STEP = round(RATE / 30.0)
+"""Samples between two pictures of the page."""
+MOST_RUNS = 4
+COLUMNS = (
+    *("tip_x", "tip_y", "tip_z", "load_x", "load_y", "load_z", "shaft_slew", "pull", "rope"),
+    *("limits_hoist", "limits_slew", "limits_luff"),
+)
+"""What the page keeps of each picture, beside the ship's six motions."""
+
+
+def write_scene(runs: CraneRun | Mapping[str, CraneRun], path: str | Path) -> None:
+    """Write the scene of one run or of several of one crane and length, into a file.
+
+    Up to four, by their names; the page shows one at a time over the swing of all.
+
+    Raises
+    ------
+    InputError, FileError
+        For none, more than four, or runs that differ in length; if the file cannot be written.
+    """
+    named = {runs.actuation: runs} if isinstance(runs, CraneRun) else dict(runs)
+    if not 0 < len(named) <= MOST_RUNS:
+        raise InputError(f"A scene shows 1 to {MOST_RUNS} runs of a crane, not {len(named)}.")
+    if len({len(each.out) for each in named.values()}) > 1:
+        raise InputError("The runs of a scene must be of one length.")
+    first = next(iter(named.values()))
+    g = first.crane.geometry
+    content = {
+        "step": STEP / RATE,
+        "slew": first.fixed.home.slew,
+        "axis": list(g.axis),
+        "foot": g.foot,
+        "sheave": [g.sheave * g.sheave_cos, g.sheave * g.sheave_sin],
+        "columns": len(COLUMNS) + 6,
+        "runs": [
+            {"name": name, "ideal": run.actuation == "ideal", "code": _pictures(run)}
+            for name, run in named.items()
+        ],
+    }
+    css, js, template = (
+        files("swashplate.report.scene").joinpath(f"scene.{each}").read_text("utf-8")
+        for each in ("css", "js", "html")
+    )
+    environment = Environment(
+        autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
+    )
+    made = environment.from_string(template).render(
+        title=first.crane.title,
+        names=list(named),
+        assumed=first.crane.assumed,
+        data=script_json(content),
+        css=Markup(css),
+        js=Markup(js),
+    )
+    write_text(made, path)
+
+
+def _pictures(run: CraneRun) -> str:
+    """Rows of `COLUMNS` and of the ship's motion, as 4-byte numbers in base64."""
+    kept = np.stack([run[name][::STEP] for name in COLUMNS], axis=1)
+    ship = run.ship[::STEP] if run.ship.shape[1] == 6 else np.zeros((len(kept), 6))
+    return b64encode(np.hstack([kept, ship]).astype("<f4").tobytes()).decode("ascii")
+
+
+# --- verdict --------------------------------------------------------------------------------------
 
 IN_WORDS = (
     "No control: the crane as it is, under the operator's stick alone. Every variant goes through "
@@ -39,16 +119,7 @@ ASSUMED = "Shaded rows of the geometry are assumed: measure them before you rely
 def write_judgment(judgment: Judgment, path: str | Path) -> None:
     """Write a judgment's page: one HTML file, whole or not at all, that needs no network.
 
-    Parameters
-    ----------
-    judgment : Judgment
-    path : path
-        The file, which replaces an older one.
-
-    Raises
-    ------
-    FileError
-        If the file cannot be written.
+    It replaces an older file; a `FileError` if it cannot be written.
     """
     study, judged = judgment.study, judgment.judged
     crane, setup = study.crane, study.cases[NONE].setup
