@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from swashplate.equations.code import generating
-from swashplate.equations.fields import value_at
 from swashplate.equations.marching.graph import Graph, Moved, graph_of
 from swashplate.equations.marching.layout import Layout, layout_of, started_by
 from swashplate.equations.marching.observation import ObservedRecord, Own
@@ -26,16 +25,10 @@ def _slopes(
     graph: Graph, instance: Instance, first: Mapping[str, float], h: float, start: Start
 ) -> dict[Moved, float]:
     """Derivatives of constants and of states at the start by all parameters that move them."""
-    starting = graph.starting(start)
-    values = []
-    for part, kind, path in starting.arguments:
-        if kind in ("p", "given"):
-            own = instance.parts[part]
-            values.append(value_at(own.p if kind == "p" else own.given, path))
-        elif kind == "input":
-            values.append(first.get(path, 0.0) if start == "steady" else 0.0)
-        else:
-            values.append(h if kind == "h" else 0.0)
+    starting, before = graph.starting(start), dict.fromkeys(first, 0.0)
+    if start == "steady":
+        before.update(first)
+    values = [instance.number_at(each, before, h) for each in starting.arguments]
     found = starting.derived.python(*values)
     return dict(zip(starting.moves, found[len(found) - len(starting.moves) :], strict=True))
 

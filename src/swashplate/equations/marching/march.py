@@ -20,7 +20,7 @@ from itertools import chain
 from typing import Any
 
 from swashplate.equations import expressions as ex
-from swashplate.equations.code import Code, Value, leaves
+from swashplate.equations.code import Code, Item, Let, Value, leaves
 from swashplate.equations.equation import inlined
 from swashplate.equations.expressions import Node, text
 from swashplate.equations.fields import floats_of
@@ -126,6 +126,23 @@ class Sampler:
             node = self.sources[source] = self.parts[source.part].signal(source.signal)
             self.ends[source.part].append(node)
 
+    def items(self, part: PartCode) -> list[Item]:
+        """A part's sample, and the signals of it that other parts or links need."""
+        own = [(source, node) for source, node in self.sources.items() if source.part == part.part]
+        return [*part.code.items, *(Let(part.source(source), node) for source, node in own)]
+
+    def outside(self) -> dict[str, Stored]:
+        """What is known ahead of a sample, by name: numbers, the state, places and records."""
+        known = {"h": Stored(0, "h")}
+        for part in self.used:
+            i = part.part
+            for kind, value in (("p", part.p), ("given", part.given), ("state", part.state)):
+                known |= {node.value: Stored(i, kind, path) for path, node in leaves(value)}
+            known |= part.outside
+            for tap in part.taps:
+                known[part.fraction(tap)] = Stored(i, "fraction", str(tap.number))
+        return known
+
     @property
     def names(self) -> dict[str, Any]:
         """What the text refers to."""
@@ -204,7 +221,7 @@ class Sampler:
 
     def observed(self, part: PartCode, stored: Stored) -> tuple[Code, Node]:
         """A number that is kept, and the code that makes it of what is known at its part's end."""
-        code = Code(part.code.taken)
+        code = Code(part.code.taken, ruled=part.code.ruled)
         if stored.kind != "link":
             return code, part.node(stored)
         link = self.model.links[stored.path]

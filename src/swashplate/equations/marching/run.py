@@ -135,6 +135,16 @@ class Instance:
         rest = [[each.fraction, each.slope] for each in found]
         return Places(whole, *np.array(rest).reshape(-1, 2).T.copy())
 
+    def number_at(self, stored: Stored, before: Mapping[str, float], h: float) -> float:
+        """Number that is known ahead of a sample, of constant records; 0 for the place of a tap."""
+        own, kind, path = self.parts[stored.part], stored.kind, stored.path
+        if kind in ("p", "given"):
+            return float(value_at(own.p if kind == "p" else own.given, path))
+        if kind in ("tap", "input"):
+            part, name = self.model.parts[stored.part], path.partition(".")[0]
+            return before.get(part.tap(name).signal, 0.0)
+        return h if kind == "h" else 0.0
+
     def check_inputs(self, signals: Collection[str]) -> None:
         """Refuse external signals that the model does not know, and the lack of those it needs."""
         known = self.model.external
