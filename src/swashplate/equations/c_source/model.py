@@ -6,18 +6,19 @@ samples every part in the order of the flow, and then takes all states to the ne
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from math import inf
 from typing import Any, get_type_hints
 
+from swashplate.equations import expressions as ex
 from swashplate.equations.c_source.text import c_name, fields_of, indented, literal
 from swashplate.equations.c_source.unit import Unit
-from swashplate.equations.expressions import Node
+from swashplate.equations.code import Code
 from swashplate.equations.fields import Definition, declared_by, floats_of, value_at
-from swashplate.equations.marching.march import output_of
-from swashplate.equations.marching.part import HOLDS, PartCode
+from swashplate.equations.marching.march import Sampler, output_of
+from swashplate.equations.marching.part import HOLDS
 from swashplate.equations.marching.run import Instance
 from swashplate.equations.model import Equation, Link, Model, Tap, Window, arguments_of
 from swashplate.equations.syntax import is_named_tuple, plain
@@ -517,18 +518,20 @@ def feedthrough(exported: Exported, instance: Instance, step: float) -> dict[str
         newest sample.
     """
     model, at_once = exported.model, newest(exported, instance, step)
-    options = [part.options for part in instance.parts]
-    parts = [PartCode(model, i, model.external, each) for i, each in enumerate(options)]
+    places = [output_of(model, name)[0] for name in exported.names]
+    sampler = Sampler(model, model.external, instance.options, places)
+    code = Code(sampler.used[0].code.taken)
+    for part in sampler.used:
+        code.items += sampler.items(part)
+    signals = {f"x_{name}": name for name in model.external}
+    for part in sampler.used:
+        signals |= {part.tap_samples(each)[0]: each.tap.signal
+                    for each in part.taps if each.tap.signal in at_once}  # fmt: skip
     found = {}
-    for name in exported.names:
-        stored, _ = output_of(model, model.integrals.get(name, name))
-        link = model.links.get(stored.path) if stored.kind == "link" else None
-        nodes = (
-            [(s.part, parts[s.part].signal(s.signal)) for s in link.sources]
-            if link is not None
-            else [(stored.part, parts[stored.part].node(stored))]
-        )
-        found[name] = _read(parts, nodes, at_once)
+    for name, place in zip(exported.names, places, strict=True):
+        own, node = sampler.observed(sampler.parts[place.part], place)
+        read = code.reads([ex.name(each) for each in own.reads([node])])
+        found[name] = frozenset(signals[each] for each in read & signals.keys())
     return found
 
 
@@ -543,26 +546,3 @@ def newest(exported: Exported, instance: Instance, step: float) -> dict[str, tup
         if delay < (1.0 + tap.ahead) * step * (1.0 - 1e-12):
             found[tap.signal] = delay, steps[tap.signal]
     return found
-
-
-def _read(
-    parts: Sequence[PartCode], nodes: Iterable[tuple[int, Node]], at_once: Collection[str]
-) -> frozenset[str]:
-    """External signals that some nodes follow at once."""
-    found: set[str] = set()
-    for i, node in nodes:
-        read = parts[i].code.reads([node])
-        found |= {
-            each.tap.signal
-            for each in parts[i].taps
-            if each.tap.signal in at_once and parts[i].tap_samples(each)[0] in read
-        }
-        for name in parts[i].own.input_types:
-            link = parts[i].model.link_of(i, name)
-            if link is None:
-                signal = parts[i].own.tap(name).signal
-                found |= {signal} if f"x_{signal}" in read else set()
-            elif any(parts[i].source(s) in read for s in link.sources):
-                before = [(s.part, parts[s.part].signal(s.signal)) for s in link.sources]
-                found |= _read(parts, before, at_once)
-    return frozenset(found)
