@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -108,52 +108,28 @@ def _are(states: Any, kinds: Sequence[Any]) -> bool:
     return all(is_real(value) and np.isfinite(value) for value in values)
 
 
-class _Step(NamedTuple):
-    """A model's next states and some outputs with their derivatives, as a function of scalars."""
-
-    arguments: tuple[Stored, ...]
-    by: tuple[Stored, ...]  # States, and what is read of the inputs that move.
-    derived: Derived
-
-
 @generating
-def _step_of(
-    model: Model,
-    signals: tuple[str, ...],
-    options: tuple[Any, ...],
-    seen: tuple[Stored, ...],
-    moving: tuple[str, ...],
-) -> _Step:
+def _whole_step(
+    model: Model, signals: tuple[str, ...], options: tuple[Any, ...], seen: tuple[Stored, ...]
+) -> tuple[dict[str, Stored], Derived]:
+    """A model's next states, then what is seen, with their derivatives: arguments and function."""
     states = [Stored(i, "state", path) for i, path in model.places("state")]
     sampler = Sampler(model, signals, options, [*states, *seen], ruled=True)
-    code, following = Code(sampler.used[0].code.taken, ruled=True), list[Node]()
+    code, results = Code(sampler.used[0].code.taken, ruled=True), list[Node]()
     for part in sampler.used:
         code.items += [*part.prologue.items, *sampler.items(part)]
-        following += [node for _, node in leaves(part.following)]
-    results = [(f"next {k}", node) for k, node in enumerate(following)]
+        results += [node for _, node in leaves(part.following)]
     for place in seen:
         own, node = sampler.observed(sampler.parts[place.part], place)
         code.items += own.items
-        results.append((place.path, node))
-    known = sampler.outside()
-    arguments = sorted(code.reads(node for _, node in results) & known.keys())
-    by = []
-    for name in arguments:
-        part, kind, path = known[name]
-        signal = model.parts[part].tap(path.partition(".")[0]).signal
-        if kind == "state" or (kind in ("tap", "input") and signal in moving):
-            by.append(name)
-    derived = derived_function(
-        f"{model.name}_linear",
-        f"Next states and outputs of {model.name}.",
-        arguments,
-        code,
-        results,
-        [(name, name) for name in by],
-        chained=True,
-    )
-    found = [tuple(known[name] for name in names) for names in (arguments, by)]
-    return _Step(*found, derived)
+        results.append(node)
+    outside = sampler.outside()
+    known = {name: outside[name] for name in sorted(code.reads(results) & outside.keys())}
+    by = [name for name, each in known.items() if each.kind in ("state", "tap", "input")]
+    name, says = f"{model.name}_linear", f"Next states and outputs of {model.name}."
+    paths = [(str(k), node) for k, node in enumerate(results)]
+    pairs = [(each, each) for each in by]
+    return known, derived_function(name, says, [*known], code, paths, pairs, chained=True)
 
 
 def recurrence(
@@ -181,10 +157,10 @@ def recurrence(
                 f"not have; ask for '{model.integrals[name]}'."
             )
     seen = tuple(output_of(model, name)[0] for name in outputs)
-    step = _step_of(model, signals, instance.options, seen, inputs)
+    arguments, derived = _whole_step(model, signals, instance.options, seen)
     places, states = instance.places(signals, h), state_paths(model)
     n, values = len(states), []
-    for stored in step.arguments:
+    for stored in arguments.values():
         if stored.kind == "fraction":
             values.append(float(places.fraction[int(stored.path)]))
         elif stored.kind == "state":
@@ -193,20 +169,19 @@ def recurrence(
             values.append(instance.number_at(stored, started.before, h))
     whole = {(t.part, t.input): int(places.whole[t.number]) for t in taps_of(model, signals)}
     moved: list[Any] = []  # of each derivative the state, or the input and its age in samples
-    for i, kind, path in step.by:
+    for i, kind, path in map(arguments.__getitem__, derived.inputs):
         name, _, sample = path.partition(".")
-        if kind == "state":
-            moved.append(f"{model.prefix(i)}{path}")
-        else:
-            late = whole[i, name] + int(sample) if kind == "tap" else 0
-            moved.append((model.parts[i].tap(name).signal, late))
-    ages = {each for each in moved if isinstance(each, tuple)}
+        late = whole[i, name] + int(sample) if kind == "tap" else 0
+        signal = model.parts[i].tap(name).signal
+        moved.append(f"{model.prefix(i)}{path}" if kind == "state" else (signal, late))
+    ages = {each for each in moved if isinstance(each, tuple) and each[0] in inputs}
     columns = sorted(ages, key=lambda each: (inputs.index(each[0]), each[1]))
     column = {each: k for k, each in enumerate([*states, *columns])}
     slopes = np.zeros((n + len(outputs), n + len(columns)))
-    results = step.derived.python(*values)
-    for (row, k), slope in zip(step.derived.entries, results[len(slopes) :], strict=True):
-        slopes[row, column[moved[k]]] += slope
+    results = derived.python(*values)
+    for (row, k), slope in zip(derived.entries, results[len(slopes) :], strict=True):
+        if moved[k] in column:
+            slopes[row, column[moved[k]]] += slope
     into, out = slopes[:n], slopes[n:]
     read = [(*each, k) for k, each in enumerate(columns, n) if slopes[:, k].any()]
     lags = {name: [lag for of, lag, _ in read if of == name] or [0] for name in inputs}

@@ -18,21 +18,21 @@ from swashplate.equations.c_source.unit import Unit
 from swashplate.equations.code import Code
 from swashplate.equations.fields import Definition, declared_by, floats_of, value_at
 from swashplate.equations.marching.march import Sampler, output_of
-from swashplate.equations.marching.part import HOLDS
+from swashplate.equations.marching.part import HOLDS, TapOf, taps_of
 from swashplate.equations.marching.run import Instance
-from swashplate.equations.model import Equation, Link, Model, Tap, Window, arguments_of
+from swashplate.equations.model import Equation, Link, Model, Window, arguments_of
 from swashplate.equations.syntax import is_named_tuple, plain
 
 OWN = """
 number_at put_at is_finite all_finite in_range number_of placed seen constant_window before_all
 good_inputs put_inputs taken one_sample rested_start settled_start checked computed switched
-ranges parameter_table given_places flag_places constant_places parameter_names output_names
-input_names option_names name_of
+ranges value_table option_places parameter_names output_names input_names option_names name_of
+one_of flag_at put_flag
 """
 PUBLIC = """
 size value_count init reset settle step correct output limits set_input clear_input set get
 set_option get_option set_step get_step update find find_output find_input find_option
-parameter_name output_name sentence memory inputs parameter range
+parameter_name output_name sentence memory inputs measured value range
 """
 """Names that the interface takes, of its own and behind the prefix."""
 
@@ -135,37 +135,23 @@ class Exported:
     @cached_property
     def names(self) -> tuple[str, ...]:
         """All outputs."""
-        every: dict[str, None] = dict.fromkeys(self.outputs)
-        if not every:
-            for part in self.model.parts:
-                every |= dict.fromkeys(part.signal_names)
-            every |= dict.fromkeys([*self.model.links, *self.model.integrals])
-        return tuple(every)
+        every = self.outputs or (*self.model.every_signal, *self.model.integrals)
+        return tuple(dict.fromkeys(every))
 
     @cached_property
     def limits(self) -> list[tuple[int, str]]:
         """Part and name of every limit."""
-        found = []
-        for i, part in enumerate(self.model.parts):
-            if part.limits is not None:
-                kind = get_type_hints(plain(part.limits))["return"]
-                found += [(i, name) for name in kind._fields]
-        return found
+        return [(part, name) for name, (part, _) in self.model.limit_bits.items()]
 
-    @cached_property
-    def taps(self) -> list[tuple[int, str, Tap]]:
-        """Part, input and tap of what is read through a line."""
-        return [
-            (i, name, part.tap(name))
-            for i, part in enumerate(self.model.parts)
-            for name in part.input_types
-            if part.looked_at(name) and self.model.link_of(i, name) is None
-        ]
+    @property
+    def taps(self) -> tuple[TapOf, ...]:
+        """What is read through a line."""
+        return taps_of(self.model, self.model.external)
 
     @cached_property
     def lines(self) -> tuple[str, ...]:
         """External signals that are kept in delay lines."""
-        return tuple(dict.fromkeys(tap.signal for _, _, tap in self.taps))
+        return tuple(dict.fromkeys(each.tap.signal for each in self.taps))
 
     @property
     def settles(self) -> bool:
@@ -175,7 +161,7 @@ class Exported:
     @cached_property
     def widest(self) -> int:
         """Samples of the widest window."""
-        return max([tap.samples for _, _, tap in self.taps], default=3)
+        return max([each.tap.samples for each in self.taps], default=3)
 
 
 # --- source ---------------------------------------------------------------------------------------
@@ -278,26 +264,23 @@ class Writer:
             if link is not None:
                 lines.append(f"const double {local} = {self.link(link, state)};")
             elif part.looked_at(name):
-                number = self.e.taps.index((i, name, tap))
+                number = next(t.number for t in self.e.taps if (t.part, t.input) == (i, name))
                 line, struct = self.e.lines.index(tap.signal), self.unit.struct(Window)
                 made = f"seen(m, {number}, {line}, {tap.samples})"
                 if window == "before":
                     made = f"constant_window(m->before_record[{line}])"
                 lines.append(f"const struct {struct} {local} = {made};")
-                if not tap.width:
-                    value = f"{self.unit.add(HOLDS[tap.hold])}(&{local})"
-                    if default is not None:
-                        flag = f"m->inputs.{c_name(tap.signal)}_given"
-                        value = f"{flag} ? {value} : m->{member}.{path_of(default)}"
-                    lines.append(f"const double {local}_held = {value};")
-                    local = f"{local}_held"
-                else:
+                if tap.width:
                     found[name] = f"&{local}"
                     continue
+                value = f"{self.unit.add(HOLDS[tap.hold])}(&{local})"
+                local = f"{local}_held"
             else:
-                value = f"m->inputs.{c_name(tap.signal)}"
+                value = self.value_of(tap.signal)
+            if link is None:
                 if default is not None:
-                    value = f"{value}_given ? {value} : m->{member}.{path_of(default)}"
+                    given = f"m->inputs.measured[{self.P}_INPUT_{c_name(tap.signal)}].given"
+                    value = f"{given} ? {value} : m->{member}.{path_of(default)}"
                 lines.append(f"const double {local} = {value};")
             found[name] = local
         if part.inputs is not None:
@@ -307,6 +290,13 @@ class Writer:
             made = f"(struct {struct}){{{', '.join(values)}}}"
             lines.append(f"const struct {struct} {member}_inputs = {made};")
         return lines, found
+
+    def value_of(self, signal: str) -> str:
+        """Where the newest value of an external signal stands."""
+        own = c_name(signal)
+        if signal in self.e.measured:
+            return f"m->inputs.measured[{self.P}_INPUT_{own}].value"
+        return f"m->inputs.{own}"
 
     def used(self, lines: list[str], tail: list[str]) -> list[str]:
         """Lines without the locals that nothing reads."""
@@ -391,7 +381,7 @@ class Writer:
             f"if (!({self.call(i, equation, {})} > 0.0)) {{\n    return {self.P}_UNSTABLE;\n}}"
             for i, equation in self.e.stable.items()
         ]
-        for number, (i, _, tap) in enumerate(self.e.taps):
+        for i, _, number, tap in self.e.taps:
             delay = f"m->{self.e.members[i]}.{path_of(tap.delay)}" if tap.delay else "0.0"
             places.append(
                 f"placed(m, {number}, {delay}, {literal(float(tap.ahead))}, {tap.samples})"
@@ -500,22 +490,9 @@ def _wider(named: Any, kind: Any) -> Iterator[tuple[Any, Any]]:
 
 
 def feedthrough(exported: Exported, instance: Instance, step: float) -> dict[str, frozenset[str]]:
-    """Inputs that each output follows at the same sample, with these options and delays.
+    """External signals that each output follows at the same sample, with these options and delays.
 
-    Parameters
-    ----------
-    exported : Exported
-        The model as it is in C.
-    instance : Instance
-        Its numbers and options.
-    step : float
-        Step of its grid. [s]
-
-    Returns
-    -------
-    dict of str to frozenset of str
-        External signals by output. One that is read through a tap counts if the window reaches its
-        newest sample.
+    One that is read through a tap counts if the window reaches its newest sample.
     """
     model, at_once = exported.model, newest(exported, instance, step)
     places = [output_of(model, name)[0] for name in exported.names]
@@ -538,10 +515,10 @@ def feedthrough(exported: Exported, instance: Instance, step: float) -> dict[str
 def newest(exported: Exported, instance: Instance, step: float) -> dict[str, tuple[float, float]]:
     """Signals that are read at their newest sample: delay [s], and steps that would be enough."""
     steps = dict[str, float]()
-    for _, _, tap in exported.taps:
+    for _, _, _, tap in exported.taps:
         steps[tap.signal] = max(1.0 + tap.ahead, steps.get(tap.signal, 0.0))
     found = {}
-    for i, _, tap in exported.taps:
+    for i, _, _, tap in exported.taps:
         delay = float(value_at(instance.parts[i].p, tap.delay)) if tap.delay else 0.0
         if delay < (1.0 + tap.ahead) * step * (1.0 - 1e-12):
             found[tap.signal] = delay, steps[tap.signal]

@@ -74,15 +74,10 @@ class Starting(NamedTuple):
 class Graph:
     """A model's whole structure for some observed signals, and the pieces of its march.
 
-    Attributes
-    ----------
-    observed : list of (Stored, bool)
-        What is observed, and whether as an integral.
-    row_of : dict of Stored to int
-        First place of each number that the march leaves in the block.
-    partials : dict
-        Of each result (signal, or state at the next sample) its partial derivatives by parameters
-        (``p``), constants (``k``), places of taps (``fraction``), states and signals.
+    `observed` says what is observed, and whether as an integral; `row_of` has the first place of
+    each number that the march leaves in the block; `partials` of each result (signal, or state at
+    the next sample) its partial derivatives by parameters (``p``), constants (``k``), places of
+    taps (``fraction``), states and signals.
     """
 
     def __init__(

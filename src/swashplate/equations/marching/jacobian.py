@@ -109,13 +109,6 @@ def residuals(instance: Instance, observed: ObservedRecord, own: Own = NOTHING_O
 
     Of each weight · (simulated + offset - measured) in its signal's SI unit; `own` are values of
     the experiment's own unknowns.
-
-    Raises
-    ------
-    DomainError
-        If the model leaves its domain.
-    InputError
-        If the own unknowns do not fit.
     """
     rows = np.empty((1, observed.rows))
     _march(instance, observed, own, (), (), rows, 0)
@@ -131,19 +124,11 @@ def jacobian(
     moved: Sequence[bool] | None = None,
     out: Array | None = None,
 ) -> Jacobian:
-    """The same residuals with their exact derivatives.
+    """The same residuals with their exact derivatives by columns.
 
-    Parameters
-    ----------
-    instance, observed, own :
-        As in `residuals`.
-    columns : sequence of str
-        Paths of parameters, and ``start.`` with the path of a state.
-    moved : sequence of bool, optional
-        Whether the record may depend on a column at all; the others give zeros.
-    out : (k + 1, m) array, optional
-        Where to write; the `rows` of an earlier call, for example. New memory takes longer to get
-        than the whole march.
+    Columns are paths of parameters, and ``start.`` with the path of a state; `moved` says whether
+    the record may depend on each at all: the others give zeros. `out` is (k + 1, m) memory to write
+    to, the `rows` of an earlier call for example: new memory takes longer to get than the march.
     """
     to = np.flatnonzero(np.ones(len(columns)) if moved is None else moved)
     names = (*columns, *observed.own_columns)
@@ -169,11 +154,6 @@ def triangle(
     """Triangular factor of [J r]; arguments as in `jacobian`, which is never held.
 
     Memory does not grow with the record, apart from the record and the observations themselves.
-
-    Raises
-    ------
-    DomainError
-        Also if a derivative is so large that its square overflows.
     """
     to = np.flatnonzero(np.ones(len(columns)) if moved is None else moved)
     names = (*columns, *observed.own_columns)

@@ -254,10 +254,7 @@ def march_source(
 ) -> tuple[str, dict[str, Any]]:
     """Text of the march over samples as a `piece`, and what its names mean.
 
-    Parameters
-    ----------
-    places : mapping of Stored to str
-        What is kept, and where it goes at sample ``n``.
+    `places` says what is kept, and where it goes at sample ``n``.
     """
     sampler = Sampler(model, signals, options, [*places])
     parts = sampler.used
@@ -305,20 +302,12 @@ def march_source(
 def step_source(
     model: Model, signals: Sequence[str], options: Sequence[Any], stored: Sequence[Stored]
 ) -> tuple[str, dict[str, Any], int]:
-    """Text of one sample, for steppers and for kernels that close loops.
+    """Text of one sample, for steppers and loops, what it refers to, and how many constants it has.
 
     ``prepare(params, given, h, constants)`` computes constants once. ``step(machine)`` shifts the
     newest inputs into the delay lines (a row for each signal, newest first), fills the outputs with
     the numbers of this sample in the order of `stored`, takes the states to the next one, and
     returns the margin of the domain.
-
-    Returns
-    -------
-    text : str
-    names : dict
-        What the text refers to.
-    count : int
-        Constants.
     """
     sampler = Sampler(model, signals, options, stored)
     row = sampler.signals.index
@@ -355,13 +344,7 @@ def step_source(
 
 
 def output_of(model: Model, output: str) -> tuple[Stored, bool]:
-    """Where a signal comes from, and whether it is that signal's integral.
-
-    Raises
-    ------
-    InputError
-        If the model has no such signal.
-    """
+    """Where a signal comes from, and whether it is that signal's integral."""
     integral = output in model.integrals
     name = model.integrals[output] if integral else output
     if name in model.links:

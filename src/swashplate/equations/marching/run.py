@@ -165,26 +165,11 @@ class Instance:
         start: Start = "rest",
         chosen: Sequence[Any] | None = None,
     ) -> Started:
-        """States at the first sample.
+        """States at the first sample, under the `first` values of the external signals.
 
-        Parameters
-        ----------
-        first : mapping of str to float
-            External signals at the first sample.
-        h : float
-            Step. [s]
-        start : {"rest", "steady"}
-            At rest, where signals that are read through taps were zero before; or settled at the
-            first values, which then held before, too.
-        chosen : sequence, optional
-            State of each part, in place of the one that `start` says.
-
-        Raises
-        ------
-        InputError
-            If a signal is missing or unknown, or the model cannot start settled.
-        DomainError
-            If constants or the state cannot be computed for these numbers.
+        At rest signals that are read through taps were zero before; ``"steady"`` is settled at the
+        first values, which then held before, too. `chosen` are states of the parts in place of
+        that.
         """
         if chosen is not None:
             return self._start(first, h, start, chosen)
@@ -363,17 +348,10 @@ def marched(
     cause: str = "input",
     begin: Mapping[str, float] = MappingProxyType({}),
 ) -> Array:
-    """March over whole records from where it begins, or from states by path.
+    """(r, n) numbers in the order of `stored`, marched over whole records; limits as sums of bits.
 
-    Returns
-    -------
-    (r, n) array
-        What is kept, in the order of `stored`; limits as the sum of their bits.
-
-    Raises
-    ------
-    DomainError
-        If the model leaves its domain, or a number overflows; `cause` is what drives the model.
+    From where `started` begins, or from states by path; `cause` is what drives the model, for the
+    sentence where it leaves its domain or a number overflows.
     """
     signals, size = tuple(records), next(iter(records.values())).size
     planned = march_of(instance.model, signals, instance.options, stored)
@@ -419,13 +397,7 @@ def arrays_of(
 
 
 def check_domain(instance: Instance, states: Array, worst: float, cause: str) -> None:
-    """Refuse what was computed outside the model's equations.
-
-    Raises
-    ------
-    DomainError
-        If the worst margin is not above 0, or a state is not finite.
-    """
+    """Refuse what was computed outside the model's equations, or is no finite state."""
     if not worst > 0.0:
         raise DomainError(f"{instance.name}: {outside(instance.model, worst, cause)}")
     if np.isfinite(states).all():
