@@ -23,6 +23,7 @@ from typing import Any, NamedTuple
 from swashplate.documents import parse_toml
 from swashplate.drive import Drive
 from swashplate.equations.c_source import Exported, interface
+from swashplate.equations.c_source.text import filled
 from swashplate.equations.model import Model
 from swashplate.errors import FileError, InputError
 from swashplate.export.c_folder import (
@@ -30,7 +31,6 @@ from swashplate.export.c_folder import (
     Content,
     content_of,
     exported_drive,
-    filled,
     source_text,
 )
 from swashplate.export.variables import DRIVE, References, c_header

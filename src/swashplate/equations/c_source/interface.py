@@ -2,19 +2,24 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Sequence
-from importlib.resources import files
 from math import inf
 
 from swashplate.equations.c_source.model import Exported, Writer, path_of
-from swashplate.equations.c_source.text import HELPERS, c_name, indented, literal, wrapped
+from swashplate.equations.c_source.text import (
+    HELPERS,
+    c_name,
+    filled,
+    function,
+    indented,
+    literal,
+    sections,
+    wrapped,
+)
 from swashplate.equations.fields import Definition
 from swashplate.equations.model import Window
 
-_SECTION = re.compile(r"^/\*== (\w+) ==\*/\n", re.MULTILINE)
-_PARTS = _SECTION.split((files(__package__) / "interface.c.in").read_text("utf-8"))[1:]
-TEXTS = dict(zip(_PARTS[::2], _PARTS[1::2], strict=True))
+TEXTS = sections("interface.c.in")
 """Sections of the text around the equations, by name."""
 
 
@@ -24,40 +29,40 @@ def interface(exported: Exported) -> dict[str, str]:
     return {f"{exported.file}.h": made.header(), f"{exported.file}.c": made.source()}
 
 
-class _Interface:
+class _Interface(Writer):
     """Fills the texts above."""
 
     def __init__(self, exported: Exported) -> None:
-        self.e, self.writer = exported, Writer(exported)
-        self.model, self.P = exported.model, self.writer.P
+        super().__init__(exported)
         self.arguments = [c_name(name) for name in exported.signals]
-        self.rows = list(self.writer.ranges())
-        self.values = self.writer.values()
+        self.rows, self.numbers = list(self.ranges()), self.values()
         # first, so that the equations behind links are among the functions
-        self.read = [self.writer.output(name) for name in exported.names]
+        self.read = [self.output(name) for name in exported.names]
 
     def filled(self, text: str, **more: str) -> str:
-        e = self.e
-        signals = "".join(f", double {name}" for name in self.arguments)
-        return self.writer.filled(
-            text,
-            title=e.title or f"The model {self.model.name}, one sample at a time.",
-            file=e.file,
-            GUARD=f"{e.file.upper()}_H",
-            signals=signals,
-            formals=signals[2:] or "void",
-            passed="".join(f", {name}" for name in self.arguments),
-            given=", ".join(self.arguments),
-            zeros=", 0.0" * len(self.arguments),
-            count=str(len(self.values) + 1),
-            longest=literal(e.longest),
-            **more,
-        )
+        e, signals = self.e, "".join(f", double {name}" for name in self.arguments)
+        words = {
+            "type": e.type,
+            "p": e.prefix,
+            "P": self.P,
+            "samples": e.widest,
+            "title": e.title or f"The model {self.model.name}, one sample at a time.",
+            "file": e.file,
+            "GUARD": f"{e.file.upper()}_H",
+            "signals": signals,
+            "formals": signals[2:] or "void",
+            "passed": "".join(f", {name}" for name in self.arguments),
+            "given": ", ".join(self.arguments),
+            "zeros": ", 0.0" * len(self.arguments),
+            "count": len(self.numbers) + 1,
+            "longest": literal(e.longest),
+        }
+        return filled(text, {**words, **more})
 
     # -- header ------------------------------------------------------------------------------------
 
     def header(self) -> str:
-        e, writer, P = self.e, self.writer, self.P
+        e, P = self.e, self.P
         enums = [
             _enum("Outputs", f"{P}_", e.names, f"{P}_OUTPUTS"),
             _enum("Parameters", f"{P}_PARAMETER_", [n for n, _, _ in self.rows], f"{P}_PARAMETERS"),
@@ -71,8 +76,8 @@ class _Interface:
             ),
             _enum("Limits, as bits", f"{P}_LIMIT_", [n for _, n in e.limits], "", bits=True),
         ]  # fmt: skip
-        structs = [text for _, text in list(writer.unit.structs.values())]
-        structs = [*structs[: self.first_private()], self.struct()]
+        structs = [text for _, text in list(self.unit.structs.values())]
+        structs = [*structs[: self.public], self.struct()]
         settle = self.filled(TEXTS["settle"]) if e.settles else ""
         return self.filled(
             TEXTS["header"],
@@ -81,13 +86,9 @@ class _Interface:
             settle=settle,
         )
 
-    def first_private(self) -> int:
-        """Number of structs that the header needs."""
-        return self.writer.public
-
     def struct(self) -> str:
         """The struct that holds all of a model."""
-        e, unit = self.e, self.writer.unit
+        e, unit = self.e, self.unit
         lines = [f"struct {e.prefix}_memory {{ /* what changes from sample to sample */"]
         for member, part in zip(e.members, self.model.parts, strict=True):
             lines.append(f"    struct {unit.struct(part.state)} {member};")
@@ -106,7 +107,7 @@ class _Interface:
         lines.append(f"    struct {e.prefix}_measured measured[{max(len(e.measured), 1)}];")
         lines += ["};", "", f"struct {e.type} {{", "    double step; /* [s] */"]
         for member, part in zip(e.members, self.model.parts, strict=True):
-            tags = self.writer.members_of(part)
+            tags = self.members_of(part)
             lines += [f"    struct {tag} {member}{tail};" for tag, tail in tags]
         lines.append(f"    struct {e.prefix}_inputs inputs;")
         lines.append(f"    struct {e.prefix}_memory now, before; /* before the last sample */")
@@ -126,11 +127,11 @@ class _Interface:
     # -- source ------------------------------------------------------------------------------------
 
     def source(self) -> str:
-        e, writer, unit = self.e, self.writer, self.writer.unit
+        e, unit = self.e, self.unit
         window = unit.struct(Window) if e.taps else ""
-        private = [text for _, text in list(unit.structs.values())[self.first_private() :]]
+        private = [text for _, text in list(unit.structs.values())[self.public :]]
         constants = [text for _, text in unit.constants.values()]
-        core = "\n\n".join(writer.core)
+        core = "\n\n".join(self.core)
         sections = [
             self.filled(TEXTS["top"]),
             "\n".join(self.helpers()),
@@ -163,7 +164,7 @@ class _Interface:
 
     def helpers(self) -> list[str]:
         """What the equations call, and the lines."""
-        found = self.writer.unit.helpers()
+        found = self.unit.helpers()
         own = HELPERS["greater_of"]
         return [*found, own] if self.e.taps and own not in found else found
 
@@ -192,7 +193,7 @@ class _Interface:
     def pushed(self) -> str:
         lines = [f"m->inputs.{name} = {name};" for name in self.arguments]
         for k, signal in enumerate(self.e.lines):
-            lines.append(f"m->line[{k}][m->newest] = {self.writer.value_of(signal)};")
+            lines.append(f"m->line[{k}][m->newest] = {self.value_of(signal)};")
         return _body(lines or ["(void)m;"])
 
     def moved(self) -> str:
@@ -206,7 +207,7 @@ class _Interface:
         declared = {place: definition for _, place, definition in self.rows}
         flags = {f"{e.members[i]}_options.{c_name(name)}" for i, name in e.options}
         rows = []
-        for _, place in self.values:
+        for _, place in self.numbers:
             d = declared.get(place, Definition("", "", can_be_off=True))
             above = d.above is not None or (place in declared and d.lower == -inf)
             closed = d.can_be_off and d.upper == inf
@@ -240,15 +241,14 @@ class _Interface:
             test = " || ".join(f"m->{place} != 0.0" for place in own)
             line = f"m->{member}_options.{c_name(option)} = {test};"
             cases.setdefault(line, []).extend(str(places[place]) for place in own)
-        lines = ["/* Terms of the equations that are on where their parameters are not 0. */",
-                 f"static void switched({self.e.type} *m, int parameter)", "{"]  # fmt: skip
+        says = "Terms of the equations that are on where their parameters are not 0."
+        head = f"static void switched({self.e.type} *m, int parameter)"
         if not cases:
-            return "\n".join([*lines, "    (void)m;", "    (void)parameter;", "}", ""])
-        lines.append("    switch (parameter) {")
+            return function(says, head, ["(void)m;", "(void)parameter;"]) + "\n"
+        lines = ["switch (parameter) {"]
         for line, numbers in cases.items():
-            lines += [f"    case {number}:" for number in numbers]
-            lines += [*indented([f"    {line}"]), "        break;"]
-        return "\n".join([*lines, "    default:", "        break;", "    }", "}", ""])
+            lines += [*(f"case {number}:" for number in numbers), f"    {line}", "    break;"]
+        return function(says, head, [*lines, "default:", "    break;", "}"]) + "\n"
 
     def outputs(self) -> str:
         lines = []

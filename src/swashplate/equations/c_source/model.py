@@ -13,7 +13,7 @@ from math import inf
 from typing import Any, get_type_hints
 
 from swashplate.equations import expressions as ex
-from swashplate.equations.c_source.text import c_name, fields_of, indented, literal
+from swashplate.equations.c_source.text import c_name, fields_of, function, literal
 from swashplate.equations.c_source.unit import Unit
 from swashplate.equations.code import Code
 from swashplate.equations.fields import Definition, declared_by, floats_of, value_at
@@ -176,12 +176,6 @@ class Writer:
         own |= {exported.type}
         self.unit = Unit(f"{exported.prefix}_", exported.widest, own)
         self.P = exported.prefix.upper()
-        self.taken = {
-            "type": exported.type,
-            "p": exported.prefix,
-            "P": self.P,
-            "samples": exported.widest,
-        }
         for part in self.model.parts:
             for equation in (part.step, part.sample, part.constants):
                 named = get_type_hints(plain(equation)).get("p") if equation is not None else None
@@ -198,12 +192,6 @@ class Writer:
             self.unit.struct(Window)
         self.public = len(self.unit.structs)
         self.core = self.functions()
-
-    def filled(self, text: str, **more: str) -> str:
-        """A text with names in place of ``@name@``."""
-        for key, value in {**self.taken, **more}.items():
-            text = text.replace(f"@{key}@", str(value))
-        return text
 
     # -- the sample --------------------------------------------------------------------------------
 
@@ -331,15 +319,11 @@ class Writer:
             body.append(f"m->now.{own}_rate = {value};")
             grown = f"m->before.{own} + 0.5 * m->step * (m->before.{own}_rate + m->now.{own}_rate)"
             body.append(f"m->now.{own} = m->before.begun ? {grown} : 0.0;")
-        head = [
-            "/* One sample: everything at this instant, then all states to the next. */",
-            f"static int one_sample({self.e.type} *m)",
-            "{",
-            "    bool good = true;",
-        ]
         body.append("m->now.begun = true;")
-        end = [f"return good && all_finite(&m->now) ? {self.P}_OK : {self.P}_DOMAIN;"]
-        return "\n".join([*head, *indented([*body, *end]), "}"])
+        body.append(f"return good && all_finite(&m->now) ? {self.P}_OK : {self.P}_DOMAIN;")
+        says = "One sample: everything at this instant, then all states to the next."
+        head = f"static int one_sample({self.e.type} *m)"
+        return function(says, head, ["bool good = true;", *body])
 
     def starts(self, settled: bool) -> str:
         """States at the first sample, at rest or settled."""
@@ -363,9 +347,8 @@ class Writer:
             body += [*self.used(lines, tail), *tail]
         what = "settled under what it was given" if settled else "at rest"
         name = "settled_start" if settled else "rested_start"
-        head = [f"/* States before the first sample, {what}. */",
-                f"static void {name}({self.e.type} *m)", "{"]  # fmt: skip
-        return "\n".join([*head, *indented(body), "}"])
+        head = f"static void {name}({self.e.type} *m)"
+        return function(f"States before the first sample, {what}.", head, body)
 
     def updates(self) -> str:
         """What follows from parameters and step: options, constants, places of the taps."""
@@ -390,20 +373,12 @@ class Writer:
             test = "\n    || ".join(f"!{each}" for each in places)
             places = [f"if ({test}) {{\n    return {self.P}_BAD_DELAY;\n}}"]
         lines = [line for each in (*options, *checks, *places) for line in each.split("\n")]
-        texts = [
-            "/* Options, stability and delays of these parameters and this step. */",
-            f"static int checked({self.e.type} *m)",
-            "{",
-            *indented([*(lines or ["(void)m;"]), f"return {self.P}_OK;"]),
-            "}",
-            "",
-            "/* Constants of these parameters and this step. */",
-            f"static void computed({self.e.type} *m)",
-            "{",
-            *indented(constants or ["(void)m;"]),
-            "}",
-        ]
-        return "\n".join(texts)
+        says = "Options, stability and delays of these parameters and this step."
+        body = [*(lines or ["(void)m;"]), f"return {self.P}_OK;"]
+        checked = function(says, f"static int checked({self.e.type} *m)", body)
+        says, head = "Constants of these parameters and this step.", "static void computed"
+        computed = function(says, f"{head}({self.e.type} *m)", constants or ["(void)m;"])
+        return f"{checked}\n\n{computed}"
 
     def finite(self) -> str:
         """Whether all states are finite: without a branch for each."""
@@ -412,14 +387,9 @@ class Writer:
             place = f"s->{self.e.members[i]}.{path_of(path)}"
             lines.append(f"none += {place} - {place};")
         lines += ["return none == 0.0;"] if len(lines) > 1 else ["(void)s;", "return none == 0.0;"]
-        text = [
-            "/* Whether all states are finite: what is not leaves no zero behind. */",
-            f"static bool all_finite(const struct {self.e.prefix}_memory *s)",
-            "{",
-            *indented(lines),
-            "}",
-        ]
-        return "\n".join(text)
+        says = "Whether all states are finite: what is not leaves no zero behind."
+        head = f"static bool all_finite(const struct {self.e.prefix}_memory *s)"
+        return function(says, head, lines)
 
     # -- numbers -----------------------------------------------------------------------------------
 

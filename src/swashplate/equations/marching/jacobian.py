@@ -13,9 +13,17 @@ from swashplate.equations.marching.graph import Graph, Moved, graph_of
 from swashplate.equations.marching.layout import Layout, layout_of, started_by
 from swashplate.equations.marching.observation import ObservedRecord, Own
 from swashplate.equations.marching.pieces import addresses
-from swashplate.equations.marching.rows import STRIDE, Program, Sink, march_observed
+from swashplate.equations.marching.rows import (
+    EIGHTH,
+    ROWS,
+    STRIDE,
+    Program,
+    Sink,
+    aligned,
+    march_observed,
+    upright,
+)
 from swashplate.equations.marching.run import Instance, Start, arrays_of, begun, check_domain
-from swashplate.equations.marching.triangle import EIGHTH, ROWS, aligned, upright
 from swashplate.errors import DomainError, InputError
 
 Array = NDArray[np.float64]

@@ -29,8 +29,8 @@ from swashplate.equations.equation import JIT_OFF
 from swashplate.equations.expressions import Node, text
 from swashplate.equations.marching.march import Sampler, lower, output_of
 from swashplate.equations.marching.part import Stored, choose
+from swashplate.equations.marching.rows import aligned
 from swashplate.equations.marching.run import module
-from swashplate.equations.marching.triangle import aligned
 from swashplate.equations.model import Model
 from swashplate.equations.writing import function_source, indented, lines_of
 

@@ -18,8 +18,8 @@ from swashplate.equations.marching.rows import (
     RECUR,
     STRIDE,
     Program,
+    aligned_room,
 )
-from swashplate.equations.marching.triangle import aligned_room
 from swashplate.equations.model import Model
 
 Array = NDArray[np.float64]
