@@ -277,10 +277,6 @@ class Model:
         """How an input is looked at."""
         return self.taps.get(name, Tap(name))
 
-    def looked_at(self, name: str) -> bool:
-        """Whether an input is read through a tap, and not simply at n."""
-        return name in self.taps
-
     @property
     def equations(self) -> tuple[Equation, ...]:
         """Its equations that may ask for inputs."""

@@ -251,7 +251,7 @@ class Writer:
             default = part.defaults.get(name)
             if link is not None:
                 lines.append(f"const double {local} = {self.link(link, state)};")
-            elif part.looked_at(name):
+            elif name in part.taps:
                 number = next(t.number for t in self.e.taps if (t.part, t.input) == (i, name))
                 line, struct = self.e.lines.index(tap.signal), self.unit.struct(Window)
                 made = f"seen(m, {number}, {line}, {tap.samples})"

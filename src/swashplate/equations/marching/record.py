@@ -116,10 +116,9 @@ def record_of(
     what: str,
     time: ArrayLike | None = None,
     interpolation: Interpolation | None = None,
-    substeps: int | None = None,
 ) -> Record:
     """A drive's input, `what` by name, on the march's grid: see `on_grid` and `least_substeps`."""
-    steps = least_substeps(rate, substeps)
+    steps = least_substeps(rate)
     made = on_grid({what: values}, rate, time=time, interpolation=interpolation, substeps=steps)
     return made[what]
 

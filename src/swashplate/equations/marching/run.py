@@ -194,7 +194,7 @@ class Instance:
                     known[name] = linked(link, states, found)
                     continue
                 if tap.signal in first:
-                    value = (before if part.looked_at(name) else first)[tap.signal]
+                    value = (before if name in part.taps else first)[tap.signal]
                 else:
                     value = float(value_at(own.p, part.defaults[name]))
                 known[name] = Window((value,) * tap.width, 0.0) if tap.width else value
@@ -258,9 +258,7 @@ def linked(link: Link, states: Sequence[Any], found: Sequence[Mapping[str, Any]]
     return float(interpreted(link.equation)(*values))
 
 
-def instance_of(
-    model: Model, p: Any, *, options: Any = None, given: Any = None, name: str | None = None
-) -> Instance:
+def instance_of(model: Model, p: Any, *, options: Any = None, given: Any = None) -> Instance:
     """A model with its numbers.
 
     Parameters
@@ -269,8 +267,6 @@ def instance_of(
         A single model, or a joined one.
     p, options, given : named tuple
         Of a joined model each has a field for every part that has any.
-    name : str, optional
-        For messages; by default the model's.
 
     Raises
     ------
@@ -310,7 +306,7 @@ def instance_of(
         if own.options is not None:  # off is None, so that code is made for one form of it
             own = own._replace(options=type(own.options)(*(each or None for each in own.options)))
         parts.append(own)
-    instance = Instance(model, tuple(parts), name or model.name)
+    instance = Instance(model, tuple(parts), model.name)
     numbers = dict(zip(parameter_paths(model), instance.params.tolist(), strict=True))
     for path, definition in model.ranges.items():
         if not definition.holds(numbers[path]):
