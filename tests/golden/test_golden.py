@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from tests.simulation.experiments import ALL
 
 from swashplate import Drive, Simulation
 
@@ -23,12 +24,7 @@ SIGNALS = (
     *("current", "current_positive", "current_negative", "solenoid_force", "spool_position"),
     *("orifice_opening", "stroker_pressure", "swash_angle", "shaft_speed", "shaft_position"),
 )
-LOADED = {
-    **{"spool_friction": 0.115, "spool_presliding": 5e-5, "dither_time": 0.6, "Z7": 0.4},
-    **{"load_torque": 3e4, "load_inertia": 5e3, "motor_leakage": 1e-6, "motor_constant": 250.0},
-    **{"cam_ripple": 0.01, "cam_ripple_per_torque": 5e-7, "cam_phase": 0.3, "Z13": 0.6},
-    **{"solenoid_hysteresis": 0.005, "swash_damping": 0.02, "line_stiffness": 1e6},
-}
+LOADED = {**ALL, "Z7": 0.4, "Z13": 0.6}
 
 
 def columns(run: Simulation) -> Array:

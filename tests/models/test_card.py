@@ -36,9 +36,6 @@ def test_share_of_an_interval_above_the_dead_zone() -> None:
     assert single.jump_share(2.0, 1.0, 0.0, 0.3, 1.0) == pytest.approx(0.7)
 
 
-# --- Kruse's recursion ----------------------------------------------------------------------
-
-
 # --- the filter's differential equation ----------------------------------------------------------
 
 

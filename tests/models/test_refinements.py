@@ -60,9 +60,6 @@ def test_a_closed_loop_takes_energy(path: list[float]) -> None:
     assert taken >= -1e-15
 
 
-# --- ripple ---------------------------------------------------------------------------------------
-
-
 # --- damping --------------------------------------------------------------------------------------
 
 PRESSURES = st.floats(-5e6, 5e6)
@@ -89,9 +86,6 @@ def test_it_solves_the_plates_equation() -> None:
     expected = solve_ivp(rates, (0.0, time), [2e6, 5e5], rtol=1e-10, atol=1e-3).y[:, -1]
     made = plate_follows(2e6, 5e5, Z6, damping_factor(T, Z6, time))
     assert made == pytest.approx(tuple(expected), rel=1e-7)
-
-
-# --- leakage --------------------------------------------------------------------------------------
 
 
 # --- line -----------------------------------------------------------------------------------------

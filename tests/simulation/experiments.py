@@ -20,6 +20,16 @@ def steps(*levels: float) -> np.ndarray:
     return np.interp(t, corners, np.repeat([0.0, *levels], 2)[1:-1])
 
 
+STICTION = {"spool_friction": 0.115, "spool_presliding": 5e-5, "dither_time": 0.6}
+LOAD = {"load_torque": 3e4, "load_inertia": 5e3, "motor_leakage": 1e-6, "motor_constant": 250.0}
+RIPPLE = {"cam_ripple": 0.01, "cam_ripple_per_torque": 5e-7, "cam_phase": 0.3}
+ALL = {
+    **STICTION,
+    **LOAD,
+    **RIPPLE,
+    **{"solenoid_hysteresis": 0.005, "swash_damping": 0.02, "line_stiffness": 1e6},
+}
+"""Every refinement."""
 SWING = maneuvers.sine(3.0, 0.8, start=0.05, length=3.0, settle=0.4).sample(RATE)
 HARD = steps(9.0, 9.0, 0.0, -9.0, -9.0, 0.0, 3.0)
 

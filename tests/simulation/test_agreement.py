@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from tests.simulation.experiments import jacobian, residuals
+from tests.simulation.experiments import ALL, LOAD, RIPPLE, jacobian, residuals
 
 from swashplate import Drive, Simulation, maneuvers
 from swashplate.equations.marching.observation import Observation, ObservedRecord
@@ -45,14 +45,7 @@ FORMS = {
     "equation": {"rate": None},
 }
 TERMS = {"Z7": 0.4, "Z12": 0.2, "Z11": 0.05, "Z2": 0.01, "Z13": 0.6, "C": 5.0}
-LOAD = {"load_torque": 3e4, "load_inertia": 5e3, "motor_leakage": 1e-6, "motor_constant": 250.0}
-RIPPLE = {"cam_ripple": 0.01, "cam_ripple_per_torque": 5e-7, "cam_phase": 0.3}
-EVERYTHING = {
-    **{"spool_friction": 0.115, "spool_presliding": 5e-5, "dither_time": 0.6, "Z7": 0.4},
-    **LOAD,
-    **RIPPLE,
-    **{"solenoid_hysteresis": 0.005, "swash_damping": 0.02, "line_stiffness": 1e6, "Z13": 0.6},
-}
+EVERYTHING = {**ALL, "Z7": 0.4, "Z13": 0.6}
 CASES = {
     "published": ({}, "published"),
     "rough card": ({"C": 5.0, "tau": 0.0}, "published"),

@@ -5,26 +5,13 @@ from math import inf
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from tests.simulation.experiments import ALL, LOAD, RATE, STICTION
 
 from swashplate import Drive, Simulation, maneuvers
 
 pytestmark = pytest.mark.traced
 
 Array = NDArray[np.float64]
-
-RATE = 512.0
-STICTION = {"spool_friction": 0.115, "spool_presliding": 5e-5, "dither_time": 0.6}
-LOAD = {"load_torque": 3e4, "load_inertia": 5e3, "motor_leakage": 1e-6, "motor_constant": 250.0}
-ALL = {
-    **STICTION,
-    **LOAD,
-    "solenoid_hysteresis": 0.005,
-    "cam_ripple": 0.01,
-    "cam_ripple_per_torque": 5e-7,
-    "cam_phase": 0.3,
-    "swash_damping": 0.02,
-    "line_stiffness": 1e6,
-}
 
 
 def refined(drive: Drive, **changes: float) -> Simulation:

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 import pytest
-from tests.simulation.experiments import HARD, RATE, SWING
+from tests.simulation.experiments import ALL, HARD, RATE, SWING
 
 from swashplate import Drive, InputError, Limit, Simulation, maneuvers
 from swashplate.simulation.residuals import ALL_COLUMNS, Sensitivities
@@ -50,12 +50,7 @@ SCENES = {
 }
 
 # those of every refinement, and some of card and pump beside
-REFINED = {
-    **{"spool_friction": 0.115, "spool_presliding": 5e-5, "dither_time": 0.6},
-    **{"load_torque": 3e4, "load_inertia": 5e3, "motor_leakage": 1e-6, "motor_constant": 250.0},
-    **{"solenoid_hysteresis": 0.005, "swash_damping": 0.02, "cam_cycles": 5.4, "cam_phase": 0.3},
-    **{"cam_ripple": 0.01, "cam_ripple_per_torque": 5e-7, "line_stiffness": 1e6},
-}
+REFINED = {**ALL, "cam_cycles": 5.4}
 BESIDE = ("Z1", "Z8", "Z10", "Z16_plus", "G1_plus", "tau")
 SLOWLY = 0.5 + maneuvers.sine(4.0, 0.8, start=0.05, length=2.0, settle=0.4).sample(RATE)
 for title, left_out in (("all refinements", ()), ("all without the line", ("line_stiffness",))):

@@ -207,26 +207,11 @@ def cache_folder() -> Path | None:
 
 
 def generated(name: str, text: str, names: Mapping[str, Any]) -> dict[str, Any]:
-    """Write a generated module where it is kept, and execute it.
+    """Globals of a generated module, written where it is kept and executed.
 
-    Parameters
-    ----------
-    name : str
-        What the file's name begins with.
-    text : str
-        The module. `kernel`s in it are cached on disk as those of any file.
-    names : mapping
-        What the text refers to: its globals, beside what it defines.
-
-    Returns
-    -------
-    dict
-        The module's globals.
-
-    Notes
-    -----
-    The file's name carries a hash of the text without its docstrings, and of all that its names
-    reach; many processes may write it at once.
+    Its file's name begins with `name` and carries a hash of the text without its docstrings, and of
+    all that the `names` it refers to reach; many processes may write it at once. `kernel`s in it
+    are cached on disk as those of any file.
     """
     words = set(re.findall(r"\w+", text))
     used = {n: v for n, v in names.items() if n in words}

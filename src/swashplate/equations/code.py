@@ -21,7 +21,7 @@ from typing import Any, ParamSpec, TypeVar
 from swashplate.equations import expressions as ex
 from swashplate.equations.equation import inlined, interpreted, remember_text
 from swashplate.equations.expressions import Node
-from swashplate.equations.syntax import CHOICES, MATH, Parsed, is_named_tuple
+from swashplate.equations.syntax import CHOICES, MATH, Parsed, hints_of, is_named_tuple
 from swashplate.errors import EquationError
 
 P = ParamSpec("P")
@@ -274,12 +274,6 @@ class Code:
         self.origins: dict[str, str] = {}  # Equation that each name comes from.
         self.under_way: list[Parsed] = []  # Equations that are being read.
 
-    @property
-    def repeats(self) -> bool:
-        """Whether loops are run in it."""
-        within = (each.items if isinstance(each, Rule) else (each,) for each in self.items)
-        return any(isinstance(each, Call) for items in within for each in items)
-
     def fresh(self, stem: str) -> str:
         """A name that is not yet taken."""
         stem = stem.replace(".", "_")
@@ -325,18 +319,9 @@ class Code:
 def arguments(
     source: Parsed, options: Mapping[str, Any], lengths: Mapping[str, int]
 ) -> dict[str, Value]:
-    """Values of an equation's arguments from its annotations, each scalar a name by its path.
-
-    Raises
-    ------
-    EquationError
-        If a type is unknown or none that an equation takes.
-    """
-    f = source.function
-    cells = zip(f.__code__.co_freevars, f.__closure__ or (), strict=False)
-    free = {name: cell.cell_contents for name, cell in cells}
+    """Values of an equation's arguments from its annotations, each scalar a name by its path."""
     try:
-        hints = typing.get_type_hints(f, None, free or None, include_extras=True)
+        hints = hints_of(source.function)
     except NameError as error:
         raise EquationError(
             f"{source.file}, line {source.node.lineno}: the types of {source.name} are not all "

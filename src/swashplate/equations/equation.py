@@ -175,15 +175,8 @@ def _reached(thing: Any) -> Iterator[tuple[str, Any]]:
 def closure(function: Any) -> dict[str, Any]:
     """All equations, classes of named tuples and constants that a function reaches, by name.
 
-    Parameters
-    ----------
-    function : callable
-        An equation or a kernel; it is the first entry.
-
-    Returns
-    -------
-    dict
-        Of two things of one name, the second has its module's name before its own.
+    The function is the first entry. Of two things of one name, the second has its module's name
+    before its own.
     """
     found: dict[str, Any] = {plain(function).__name__: function}
     met, pending = {plain(function)}, [function]

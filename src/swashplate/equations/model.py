@@ -227,6 +227,22 @@ class Model:
         return tuple(dict.fromkeys((*own, *floats_of(self.state))))
 
     @cached_property
+    def every_signal(self) -> tuple[str, ...]:
+        """Signals of all parts, numbers of their states, and links; integrals apart."""
+        own = [name for part in self.parts for name in part.signal_names]
+        return tuple(dict.fromkeys([*own, *self.links]))
+
+    @cached_property
+    def limit_bits(self) -> dict[str, tuple[int, int]]:
+        """Part and bit of every limit, by its name."""
+        found: dict[str, tuple[int, int]] = {}
+        for i, part in enumerate(self.parts):
+            if part.limits is not None:
+                fields = get_type_hints(plain(part.limits))["return"]._fields
+                found |= {name: (i, bit) for bit, name in enumerate(fields)}
+        return found
+
+    @cached_property
     def external(self) -> tuple[str, ...]:
         """Signals that come from outside, in the order in which the parts ask for them."""
         asked = [(i, name) for i, part in enumerate(self.parts) for name in part.input_types]
@@ -260,10 +276,6 @@ class Model:
     def tap(self, name: str) -> Tap:
         """How an input is looked at."""
         return self.taps.get(name, Tap(name))
-
-    def looked_at(self, name: str) -> bool:
-        """Whether an input is read through a tap, and not simply at n."""
-        return name in self.taps
 
     @property
     def equations(self) -> tuple[Equation, ...]:

@@ -60,11 +60,6 @@ def read(code: Code, equation: Any, given: Mapping[str, Value]) -> Value:
     """Append what an equation does to some code, and return its result.
 
     Arguments that are not `given` by name have their defaults.
-
-    Raises
-    ------
-    EquationError
-        If the equation does what equations may not, or its arguments are none that it takes.
     """
     source = parsed(equation)
     if source in code.under_way:

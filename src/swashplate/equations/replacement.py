@@ -48,13 +48,7 @@ def _sent(places: Mapping[str, str]) -> Replacement:
 
 
 def found_at(places: Mapping[str, str]) -> Replacement:
-    """A replacement by `Replacement.places`.
-
-    Raises
-    ------
-    InputError
-        If a name is not found in the modules that are imported.
-    """
+    """A replacement by `Replacement.places`, all of whose modules must be imported."""
     found: dict[str, Any] = {}
     for what, place in places.items():
         module, _, name = place.partition(":")

@@ -11,6 +11,7 @@ import linecache
 import math
 import os
 import sys
+import typing
 from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import lru_cache
@@ -186,17 +187,13 @@ class Parsed:
         """Names of its arguments and of what it assigns."""
         return set(self.function.__code__.co_varnames)
 
-    def resolve(self, name: str) -> Any:
-        """What a name that is not local stands for; `NameError` if for nothing."""
-        return resolved(self.function, name)
-
     def called(self, function: ast.expr) -> Any:
         """What a call calls; `NameError` or `AttributeError` if nothing."""
         if isinstance(function, ast.Attribute):
             return getattr(self.called(function.value), function.attr)
         if not isinstance(function, ast.Name):
             raise NameError(ast.unparse(function))
-        return self.resolve(function.id)
+        return resolved(self.function, function.id)
 
     def refuse(self, node: ast.AST | None, what: str, instead: str) -> NoReturn:
         """Refuse a construct in a sentence with file and line."""
@@ -214,6 +211,13 @@ def resolved(function: FunctionType, name: str) -> Any:
         return space[name] if name in space else getattr(builtins, name)
     except (ValueError, AttributeError):  # a cell without content yet, or no such name
         raise NameError(name) from None
+
+
+def hints_of(function: FunctionType) -> dict[str, Any]:
+    """Types of a function's arguments and of its result, those that it closes over among them."""
+    cells = zip(function.__code__.co_freevars, function.__closure__ or (), strict=False)
+    free = {name: cell.cell_contents for name, cell in cells}
+    return typing.get_type_hints(function, None, free or None, include_extras=True)
 
 
 def plain(function: Any) -> Any:
@@ -236,13 +240,7 @@ def _functions(text: str) -> dict[int, ast.FunctionDef]:
 
 
 def unchecked(function: Any) -> Parsed:
-    """Source of any function, as it stands: for those that equations are built on.
-
-    Raises
-    ------
-    EquationError
-        If there is no source.
-    """
+    """Source of any function, as it stands: for those that equations are built on."""
     f = plain(function)
     if not isinstance(f, FunctionType):
         raise EquationError(f"{function!r} is not a function that can be an equation.")
@@ -268,13 +266,7 @@ _parsed: "WeakKeyDictionary[FunctionType, Parsed]" = WeakKeyDictionary()
 
 
 def parsed(function: Any) -> Parsed:
-    """Source of an equation, compiled or plain, checked once.
-
-    Raises
-    ------
-    EquationError
-        If there is no source, or something in it that an equation may not use.
-    """
+    """Source of an equation, compiled or plain, checked once."""
     f = plain(function)
     known = _parsed.get(f) if isinstance(f, FunctionType) else None
     if known is None:

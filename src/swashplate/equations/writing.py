@@ -208,9 +208,9 @@ def _trivial(node: Node) -> bool:
     return node.op == "neg" and node.args[0].op in ex.LEAVES
 
 
-def lines_of(code: Code, wanted: Iterable[Node], straight: bool = False) -> list[str]:
-    """Text of all that some names in straight code need; `straight` as of `Writer`."""
-    writer = Writer(code.taken, code.items, [*wanted], straight=straight)
+def lines_of(code: Code, wanted: Iterable[Node]) -> list[str]:
+    """Text of all that some names in straight code need."""
+    writer = Writer(code.taken, code.items, [*wanted])
     code.names |= writer.functions
     return writer.lines
 

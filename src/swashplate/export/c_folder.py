@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from swashplate.drive import Drive
 from swashplate.equations.c_source import Exported, c_name, interface, literal
 from swashplate.equations.c_source.model import Writer
+from swashplate.equations.c_source.text import filled
 from swashplate.equations.fields import declared_by, numbers_of
 from swashplate.equations.marching.record import SOURCE_RATE, check_rate
 from swashplate.equations.marching.run import Instance, called
@@ -25,11 +26,7 @@ from swashplate.export.variables import DRIVE, DRIVE_WORDS, OWN, References, Wor
 from swashplate.models.card import stable_step
 from swashplate.models.displacement_control import steep_stops
 from swashplate.parameters.rules import FULL_VOLTAGE
-from swashplate.simulation.instance import (
-    check_filter_stability,
-    instance_of,
-    models_of,
-)
+from swashplate.simulation.instance import check_filter_stability, instance_of, models_of
 from swashplate.simulation.run import Sample
 from swashplate.tables import write_text
 
@@ -179,13 +176,6 @@ def content_of(
 def source_text(name: str) -> str:
     """A text of the package's folder ``sources``."""
     return (files("swashplate.export") / "sources" / name).read_text("utf-8")
-
-
-def filled(text: str, words: Mapping[str, str]) -> str:
-    """A text with words in the place of their names, ``@name@``."""
-    for name, word in words.items():
-        text = text.replace(f"@{name}@", word)
-    return text
 
 
 # --- a folder -------------------------------------------------------------------------------------

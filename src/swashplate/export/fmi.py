@@ -51,6 +51,13 @@ DISPLAYED = {"rad": ("deg",), "rad/s": ("deg/s", "rpm"), "Pa": ("bar",), "m": ("
 """Units that people read, offered beside SI ones."""
 WHOLE = "fmu.c"
 """The source that an importer compiles."""
+ABILITIES_2 = (
+    "canInterpolateInputs",
+    "canGetAndSetFMUstate",
+    "canSerializeFMUstate",
+    "canNotUseMemoryManagementFunctions",
+)
+ABILITIES_3 = ("canGetAndSetFMUState", "canSerializeFMUState")
 _EARLIEST = (1980, 1, 1, 0, 0, 0)
 
 
@@ -117,13 +124,7 @@ def fmu(
 
 
 def exportable(what: Drive | Model, step: float, **numbers: Any) -> Content:
-    """What runs at a step: a drive's recursion for another rate becomes its equation.
-
-    Raises
-    ------
-    InputError
-        For a step out of range, or one that the filter or the delay line does not allow.
-    """
+    """What runs at a step: a drive's recursion for another rate becomes its equation."""
     check_rate(step, "step", "s")
     if isinstance(what, Drive):
         rate = what.parameters.rate
@@ -135,7 +136,7 @@ def exportable(what: Drive | Model, step: float, **numbers: Any) -> Content:
                 stacklevel=3,
             )
     content = content_of(what, step, **numbers)
-    for i, _, tap in content.exported.taps:
+    for i, _, _, tap in content.exported.taps:
         delay = value_at(content.instance.parts[i].p, tap.delay) if tap.delay else 0.0
         if delay > LONGEST_LINE * step:
             raise InputError(
@@ -228,58 +229,34 @@ def _xml(root: ET.Element) -> bytes:
 def description(content: Content, table: Sequence[Variable], fmi: Version, token: str) -> bytes:
     """``modelDescription.xml``."""
     root = ET.Element("fmiModelDescription", _head(content, table, fmi, token))
-    steps = {
-        "canHandleVariableCommunicationStepSize": "true",
-        "modelIdentifier": content.identifier,
-    }
-    if fmi == "2.0":
-        slave = ET.SubElement(
-            root,
-            "CoSimulation",
-            {
-                **steps,
-                "canInterpolateInputs": "true",
-                "canGetAndSetFMUstate": "true",
-                "canSerializeFMUstate": "true",
-                "canNotUseMemoryManagementFunctions": "true",
-            },
-        )
-        listed = ET.SubElement(slave, "SourceFiles")
-        ET.SubElement(listed, "File", {"name": WHOLE})
-    else:
-        ET.SubElement(
-            root,
-            "CoSimulation",
-            {
-                **steps,
-                "fixedInternalStepSize": repr(content.step),
-                "canGetAndSetFMUState": "true",
-                "canSerializeFMUState": "true",
-            },
-        )
+    step, two = repr(content.step), fmi == "2.0"
+    abilities = ["canHandleVariableCommunicationStepSize", *(ABILITIES_2 if two else ABILITIES_3)]
+    said = {"modelIdentifier": content.identifier, **dict.fromkeys(abilities, "true")}
+    slave = ET.SubElement(
+        root, "CoSimulation", said if two else {**said, "fixedInternalStepSize": step}
+    )
+    if two:
+        ET.SubElement(ET.SubElement(slave, "SourceFiles"), "File", {"name": WHOLE})
     _add_units(root, table)
     categories = ET.SubElement(root, "LogCategories")
     for name in ("logStatusWarning", "logStatusDiscard", "logStatusError"):
         ET.SubElement(categories, "Category", {"name": name})
-    ET.SubElement(
-        root,
-        "DefaultExperiment",
-        {"startTime": "0", "stopTime": "10", "stepSize": repr(content.step)},
-    )
+    span = {"startTime": "0", "stopTime": "10", "stepSize": step}
+    ET.SubElement(root, "DefaultExperiment", span)
     listed = ET.SubElement(root, "ModelVariables")
     for each in table:
-        (_variable2 if fmi == "2.0" else _variable3)(listed, each)
-    structure = ET.SubElement(root, "ModelStructure")
-    if fmi == "2.0":
-        _structure2(structure, table)
-    else:
-        clock = {
-            "name": "time",
-            "valueReference": str(content.references.TIME),
-            "causality": "independent",
-        }
-        ET.SubElement(listed, "Float64", {**clock, "variability": "continuous", "unit": "s"})
-        _structure3(structure, table)
+        flag = isinstance(each.start, bool)
+        own = {"start": str(each.start).lower()} if flag else _number(each)
+        if two:
+            scalar = ET.SubElement(listed, "ScalarVariable", _attributes(each))
+            ET.SubElement(scalar, "Boolean" if flag else "Real", own)
+        else:
+            ET.SubElement(listed, "Boolean" if flag else "Float64", {**_attributes(each), **own})
+    if not two:
+        clock = {"name": "time", "valueReference": str(content.references.TIME)}
+        clock |= {"causality": "independent", "variability": "continuous", "unit": "s"}
+        ET.SubElement(listed, "Float64", clock)
+    _add_structure(ET.SubElement(root, "ModelStructure"), table, two)
     return _xml(root)
 
 
@@ -328,69 +305,29 @@ def _number(each: Variable) -> dict[str, str]:
     return made
 
 
-def _variable2(listed: ET.Element, each: Variable) -> None:
-    made = ET.SubElement(listed, "ScalarVariable", _attributes(each))
-    if isinstance(each.start, bool):
-        ET.SubElement(made, "Boolean", {"start": str(each.start).lower()})
-    else:
-        ET.SubElement(made, "Real", _number(each))
-
-
-def _variable3(listed: ET.Element, each: Variable) -> None:
-    if isinstance(each.start, bool):
-        start = {"start": str(each.start).lower()}
-        ET.SubElement(listed, "Boolean", {**_attributes(each), **start})
-    else:
-        ET.SubElement(listed, "Float64", {**_attributes(each), **_number(each)})
-
-
-def _structure2(structure: ET.Element, table: Sequence[Variable]) -> None:
-    places = {each.name: i for i, each in enumerate(table, 1)}
-    outputs = [each for each in table if each.causality == "output"]
-    listed = ET.SubElement(structure, "Outputs")
-    for each in outputs:
-        read = sorted(places[name] for name in each.feedthrough)
-        ET.SubElement(
-            listed,
-            "Unknown",
-            {
-                "index": str(places[each.name]),
-                "dependencies": " ".join(map(str, read)),
-                "dependenciesKind": " ".join("dependent" for _ in read),
-            },
-        )
-    listed = ET.SubElement(structure, "InitialUnknowns")
-    for each in outputs:
-        ET.SubElement(listed, "Unknown", {"index": str(places[each.name])})
-
-
-def _structure3(structure: ET.Element, table: Sequence[Variable]) -> None:
-    references = {each.name: each.reference for each in table}
-    outputs = [each for each in table if each.causality == "output"]
-    for each in outputs:
-        read = sorted(references[name] for name in each.feedthrough)
-        ET.SubElement(
-            structure,
-            "Output",
-            {
-                "valueReference": str(each.reference),
-                "dependencies": " ".join(map(str, read)),
-                "dependenciesKind": " ".join("dependent" for _ in read),
-            },
-        )
-    for each in outputs:
-        ET.SubElement(structure, "InitialUnknown", {"valueReference": str(each.reference)})
+def _add_structure(structure: ET.Element, table: Sequence[Variable], two: bool) -> None:
+    """Outputs with the inputs that they follow at once; in FMI 2 by their places in the table."""
+    numbers = {each.name: i if two else each.reference for i, each in enumerate(table, 1)}
+    key = "index" if two else "valueReference"
+    names = [each for each in table if each.causality == "output"]
+    listed, initial = structure, structure
+    if two:
+        listed, initial = (ET.SubElement(structure, n) for n in ("Outputs", "InitialUnknowns"))
+    for each in names:
+        read = sorted(numbers[name] for name in each.feedthrough)
+        said = {key: str(numbers[each.name]), "dependencies": " ".join(map(str, read))}
+        said["dependenciesKind"] = " ".join("dependent" for _ in read)
+        ET.SubElement(listed, "Unknown" if two else "Output", said)
+    for each in names:
+        own = {key: str(numbers[each.name])}
+        ET.SubElement(initial, "Unknown" if two else "InitialUnknown", own)
 
 
 def _build_description(identifier: str) -> bytes:
     root = ET.Element("fmiBuildDescription", {"fmiVersion": "3.0"})
-    configuration = ET.SubElement(root, "BuildConfiguration", {"modelIdentifier": identifier})
-    sources = ET.SubElement(
-        configuration,
-        "SourceFileSet",
-        {"language": "C11", "compilerOptions": "-ffp-contract=off"},
-    )
-    ET.SubElement(sources, "SourceFile", {"name": WHOLE})
+    made = ET.SubElement(root, "BuildConfiguration", {"modelIdentifier": identifier})
+    said = {"language": "C11", "compilerOptions": "-ffp-contract=off"}
+    ET.SubElement(ET.SubElement(made, "SourceFileSet", said), "SourceFile", {"name": WHOLE})
     return _xml(root)
 
 

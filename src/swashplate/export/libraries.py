@@ -23,6 +23,7 @@ from typing import Any, NamedTuple
 from swashplate.documents import parse_toml
 from swashplate.drive import Drive
 from swashplate.equations.c_source import Exported, interface
+from swashplate.equations.c_source.text import filled
 from swashplate.equations.model import Model
 from swashplate.errors import FileError, InputError
 from swashplate.export.c_folder import (
@@ -30,7 +31,6 @@ from swashplate.export.c_folder import (
     Content,
     content_of,
     exported_drive,
-    filled,
     source_text,
 )
 from swashplate.export.variables import DRIVE, References, c_header
@@ -107,13 +107,7 @@ FMI_SOURCES = ("fmi.h", "fmi.c", "fmi2.c", "fmi3.c")
 
 
 def chosen_platforms(names: Sequence[str] | None, compiling: bool = False) -> tuple[Platform, ...]:
-    """Platforms by name; by default all, or those that can be compiled for.
-
-    Raises
-    ------
-    InputError
-        For an unknown name, or none at all.
-    """
+    """Platforms by name; by default all, or those that can be compiled for."""
     if names is None:
         own = this_machine() if compiling and not has_zig() else None
         return (own,) if own else tuple(PLATFORMS.values())
@@ -147,13 +141,7 @@ class Sources(NamedTuple):
 
 
 def sources(content: Content | None = None) -> Sources:
-    """C texts of libraries and WebAssembly.
-
-    Parameters
-    ----------
-    content : Content, optional
-        A drive with equations of its own, or a model; by default the packaged drive.
-    """
+    """C texts of libraries and WebAssembly; by default those of the packaged drive."""
     if content is None or content.packaged:
         return _packaged_sources()
     return _made(content.exported, content.references)
@@ -194,13 +182,7 @@ def manifest() -> dict[str, Any]:
 
 @cache
 def packaged(name: str) -> bytes:
-    """A library of the package, or its WebAssembly, by its file's name.
-
-    Raises
-    ------
-    FileError
-        If the file is damaged.
-    """
+    """A library of the package, or its WebAssembly, by its file's name."""
     path = files("swashplate.export") / "binaries" / name
     try:
         content = path.read_bytes()
@@ -281,13 +263,7 @@ def has_zig() -> bool:
 
 
 def compiled(made: Sources, platform: Platform) -> bytes:
-    """A library for a platform, made of C texts by Zig's compiler, or for this machine by ``cc``.
-
-    Raises
-    ------
-    InputError
-        If a compiler or FMI's headers are missing, or it fails.
-    """
+    """A library for a platform, of C texts, by Zig's compiler or this machine's ``cc``."""
     with TemporaryDirectory(prefix="swashplate-") as place:
         folder = Path(place)
         written(made.texts, folder)
@@ -308,19 +284,9 @@ def compiled(made: Sources, platform: Platform) -> bytes:
 
 
 def compiled_c(folder: Path, header: str) -> Path:
-    """A shared library of a folder of C source, made for this machine.
+    """A shared library for this machine, of a folder that `swashplate.export.c` wrote.
 
-    Parameters
-    ----------
-    folder : path
-        With what `swashplate.export.c` wrote.
-    header : str
-        Name of the header there, ``swashplate_drive.h``.
-
-    Raises
-    ------
-    InputError
-        If there is no compiler, or it fails.
+    `header` is the name of the header there, ``swashplate_drive.h``.
     """
     stem = header.removesuffix(".h")
     machine = this_machine()

@@ -132,18 +132,9 @@ def variables(
 ) -> tuple[Variable, ...]:
     """Every variable of a model: inputs, outputs, parameters, settings.
 
-    Parameters
-    ----------
-    exported : Exported
-        The model as it is in C, whose order of inputs, outputs, options and parameters counts.
-    values : (n,) sequence of float
-        Those of its ``init``: step, parameters, givens, options, constants.
-    feedthrough : mapping
-        By output, the inputs that it depends on at the same instant.
-    words : mapping
-        Meaning and unit of signals and options.
-    references : References
-        First value reference of each kind.
+    `values` are those of the C ``init``: step, parameters, givens, options, constants;
+    `feedthrough` has the inputs that each output depends on at the same instant, `words` meaning
+    and unit of signals and options.
     """
     r = references
     parameters = exported.named("parameters")
@@ -229,14 +220,7 @@ def _parameter(name: str, reference: int, known: Declared, path: str, value: flo
 def c_header(exported: Exported, layout: int, references: References) -> str:
     """Text of ``variables.h``: what FMI's and the page's C code have of the model and this table.
 
-    Parameters
-    ----------
-    exported : Exported
-        The model as it is in C.
-    layout : int
-        Hash of the model's C sources, 64 bits: whose numbers the library can read.
-    references : References
-        First value reference of each kind.
+    `layout` is a hash of the model's C sources, 64 bits: whose numbers the library can read.
     """
     numbers = "\n".join(f"#define SWP_FMI_{n} {k}u" for n, k in references._asdict().items())
     signals = exported.signals

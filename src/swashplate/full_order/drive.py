@@ -19,7 +19,7 @@ from swashplate.drive import Drive
 from swashplate.equations.derivatives import derive
 from swashplate.equations.equation import interpreted
 from swashplate.equations.marching.jacobian import jacobian
-from swashplate.equations.marching.observation import Observation, ObservedRecord
+from swashplate.equations.marching.observation import every_sample
 from swashplate.equations.marching.record import (
     SOURCE_RATE,
     Interpolation,
@@ -367,10 +367,7 @@ class FullOrderDrive:
         """
         record = record_of(voltage, rate, what="voltage")
         columns = [path_of(name) for name in parameters]
-        zeros = np.zeros(record.time.size)
-        observed = ObservedRecord(
-            record, [Observation(signal, record.time, zeros)], "voltage", start
-        )
+        observed = every_sample(record, signal, "voltage", start)
         return jacobian(self.instance(record.step, substeps=substeps), observed, columns).columns
 
 

@@ -6,20 +6,18 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from swashplate.equations.derivatives import derive
+from swashplate.equations.adjoints import Derived, derived_function
+from swashplate.equations.code import Code, generating, leaves
+from swashplate.equations.expressions import Node
 from swashplate.equations.fields import check_mapping, floats_of, is_real, value_at
-from swashplate.equations.marching.part import HOLDS, taps_of
+from swashplate.equations.marching.march import Sampler, output_of
+from swashplate.equations.marching.part import Stored, taps_of
 from swashplate.equations.marching.record import check_rate
 from swashplate.equations.marching.run import Instance, Started, called, outside
-from swashplate.equations.model import Link, Window, arguments_of, state_paths
+from swashplate.equations.model import Model, state_paths
 from swashplate.errors import DomainError, InputError
 from swashplate.linear.model import LinearModel, Matrices
-
-Array = NDArray[np.float64]
-Rows = dict[str, Array]
-"""Derivatives of numbers by all that moves, by the numbers' paths."""
 
 
 def linearize(
@@ -110,6 +108,30 @@ def _are(states: Any, kinds: Sequence[Any]) -> bool:
     return all(is_real(value) and np.isfinite(value) for value in values)
 
 
+@generating
+def _whole_step(
+    model: Model, signals: tuple[str, ...], options: tuple[Any, ...], seen: tuple[Stored, ...]
+) -> tuple[dict[str, Stored], Derived]:
+    """A model's next states, then what is seen, with their derivatives: arguments and function."""
+    states = [Stored(i, "state", path) for i, path in model.places("state")]
+    sampler = Sampler(model, signals, options, [*states, *seen], ruled=True)
+    code, results = Code(sampler.used[0].code.taken, ruled=True), list[Node]()
+    for part in sampler.used:
+        code.items += [*part.prologue.items, *sampler.items(part)]
+        results += [node for _, node in leaves(part.following)]
+    for place in seen:
+        own, node = sampler.observed(sampler.parts[place.part], place)
+        code.items += own.items
+        results.append(node)
+    outside = sampler.outside()
+    known = {name: outside[name] for name in sorted(code.reads(results) & outside.keys())}
+    by = [name for name, each in known.items() if each.kind in ("state", "tap", "input")]
+    name, says = f"{model.name}_linear", f"Next states and outputs of {model.name}."
+    paths = [(str(k), node) for k, node in enumerate(results)]
+    pairs = [(each, each) for each in by]
+    return known, derived_function(name, says, [*known], code, paths, pairs, chained=True)
+
+
 def recurrence(
     instance: Instance,
     started: Started,
@@ -124,92 +146,44 @@ def recurrence(
     memory. The delay is in whole samples: those by which all that is read of the first input is
     late.
     """
-    model, places = instance.model, instance.places(inputs, h)
-    states = state_paths(model)
-    taps = {(each.part, each.input): each for each in taps_of(model, inputs)}
-    late = {(name, 0) for name in inputs}
-    for tap in taps.values():
-        whole = int(places.whole[tap.number])
-        late |= {(tap.tap.signal, whole + j) for j in range(tap.tap.samples)}
-    columns = sorted(late, key=lambda each: (inputs.index(each[0]), each[1]))
-    n = len(states)
-    units: dict[Any, Array] = dict(zip([*states, *columns], np.eye(n + len(columns)), strict=True))
-    none = np.zeros(n + len(columns))
-    parts: list[Rows] = []  # of each part: signals and states
-
-    def link_row(link: Link) -> Array:
-        values, rows = [], []
-        for part, signal in link.sources:
-            kind = "signals" if f"signals.{signal}" in parts[part] else "state"
-            rows.append(parts[part].get(f"{kind}.{signal}", none))
-            values.append(value_at(started.arguments[part][kind], signal))
-        if link.equation is None:
-            return rows[0]
-        names = arguments_of(link.equation)
-        known = dict(zip(names, values, strict=True))
-        return _through(link.equation, known, dict(zip(names, rows, strict=True)))["value"]
-
-    def input_rows(i: int, name: str, known: dict[str, Any]) -> Rows:
-        """Rows of what a part takes, its windows read where the taps are."""
-        part, tap = model.parts[i], taps.get((i, name))
-        if (link := model.link_of(i, name)) is not None:
-            return {name: link_row(link)}
-        if tap is None:
-            still = part.input_types[name] is Window
-            return {} if still else {name: units.get((part.tap(name).signal, 0), none)}
-        signal, first = tap.tap.signal, int(places.whole[tap.number])
-        fraction = float(places.fraction[tap.number])
-        read = [units[signal, first + j] for j in range(tap.tap.samples)]
-        if part.input_types[name] is Window:
-            known[name] = known[name]._replace(f=fraction)
-            return {f"{name}.s.{j}": row for j, row in enumerate(read)}
-        window = Window((started.before[signal],) * len(read), fraction)
-        rows = {f"window.s.{j}": row for j, row in enumerate(read)}
-        held = _through(HOLDS[tap.tap.hold], {"window": window}, rows, {"window.s": len(read)})
-        return {name: held["value"]}
-
-    following = []
-    for i, part in enumerate(model.parts):
-        known = dict(started.arguments[i])
-        rows = {
-            f"state.{path}": units[f"{model.prefix(i)}{path}"] for path in floats_of(part.state)
-        }
-        lengths: dict[str, int] = {}
-        for name in part.input_types:
-            taken = input_rows(i, name, known)
-            rows |= taken | {f"inputs.{path}": row for path, row in taken.items()}
-            if part.tap(name).width:
-                lengths |= dict.fromkeys((f"{name}.s", f"inputs.{name}.s"), part.tap(name).width)
-        if part.inputs is not None:
-            known["inputs"] = part.inputs(*(known[name] for name in part.input_types))
-        if part.sample is not None:
-            signals = _through(part.sample, known, rows, lengths)
-            rows |= {f"signals.{path}": row for path, row in signals.items()}
+    model, signals = instance.model, tuple(started.before)
+    for part, known in zip(model.parts, started.arguments, strict=True):
         if part.domain is not None and not (margin := called(part.domain, known)) > 0.0:
             raise DomainError(f"{instance.name}: {outside(model, margin, 'operating point')}")
-        parts.append(rows)
-        found = _through(part.step, known, rows, lengths)
-        following += [found.get(path, none) for path in floats_of(part.state)]
-
-    def output_row(name: str) -> Array:
-        for part, rows in zip(reversed(model.parts), reversed(parts), strict=True):
-            if name in part.signal_names:
-                return rows.get(f"signals.{name}", rows.get(f"state.{name}", none))
-        if name in model.links:
-            return link_row(model.links[name])
+    for name in outputs:
         if name in model.integrals:
             raise InputError(
                 f"{instance.name}: '{name}' is an integral of a signal, which a linear model does "
                 f"not have; ask for '{model.integrals[name]}'."
             )
-        there = dict.fromkeys(each for part in model.parts for each in part.signal_names)
-        raise InputError(
-            f"{instance.name}: there is no signal '{name}'; there are "
-            f"{', '.join((*there, *model.links))}."
-        )
-
-    into, out = np.array(following).reshape(n, none.size), np.array(list(map(output_row, outputs)))
-    read = [(*each, k) for k, each in enumerate(columns, n) if into[:, k].any() or out[:, k].any()]
+    seen = tuple(output_of(model, name)[0] for name in outputs)
+    arguments, derived = _whole_step(model, signals, instance.options, seen)
+    places, states = instance.places(signals, h), state_paths(model)
+    n, values = len(states), []
+    for stored in arguments.values():
+        if stored.kind == "fraction":
+            values.append(float(places.fraction[int(stored.path)]))
+        elif stored.kind == "state":
+            values.append(float(value_at(started.states[stored.part], stored.path)))
+        else:
+            values.append(instance.number_at(stored, started.before, h))
+    whole = {(t.part, t.input): int(places.whole[t.number]) for t in taps_of(model, signals)}
+    moved: list[Any] = []  # of each derivative the state, or the input and its age in samples
+    for i, kind, path in map(arguments.__getitem__, derived.inputs):
+        name, _, sample = path.partition(".")
+        late = whole[i, name] + int(sample) if kind == "tap" else 0
+        signal = model.parts[i].tap(name).signal
+        moved.append(f"{model.prefix(i)}{path}" if kind == "state" else (signal, late))
+    ages = {each for each in moved if isinstance(each, tuple) and each[0] in inputs}
+    columns = sorted(ages, key=lambda each: (inputs.index(each[0]), each[1]))
+    column = {each: k for k, each in enumerate([*states, *columns])}
+    slopes = np.zeros((n + len(outputs), n + len(columns)))
+    results = derived.python(*values)
+    for (row, k), slope in zip(derived.entries, results[len(slopes) :], strict=True):
+        if moved[k] in column:
+            slopes[row, column[moved[k]]] += slope
+    into, out = slopes[:n], slopes[n:]
+    read = [(*each, k) for k, each in enumerate(columns, n) if slopes[:, k].any()]
     lags = {name: [lag for of, lag, _ in read if of == name] or [0] for name in inputs}
     first = {name: min(lags[name]) if name == inputs[0] else 0 for name in inputs}
     past = [(name, lag) for name in inputs for lag in range(first[name] + 1, max(lags[name]) + 1)]
@@ -225,24 +199,3 @@ def recurrence(
     matrices = A[:, :size], A[:, size:], C[:, :size], C[:, size:]
     memory = tuple(f"{name}_{lag}" for name, lag in past)
     return matrices, (*states, *memory), memory, first[inputs[0]]
-
-
-def _through(
-    equation: Any, known: Mapping[str, Any], rows: Rows, lengths: Mapping[str, int] | None = None
-) -> Rows:
-    """Rows of an equation's results, from what is known by its arguments' names and their rows."""
-    taken = arguments_of(equation)
-    moving = {path.partition(".")[0] for path in rows}
-    by = tuple(name for name in taken if name in moving)
-    if not by:
-        return {}
-    options = {"options": known["options"]} if "options" in taken else {}
-    derived = derive(equation, by=by, options=options, lengths=lengths)
-    values = derived.python(*(known[name] for name in taken))
-    slopes = np.zeros((len(derived.outputs), len(derived.inputs)))
-    if derived.entries:
-        slopes[tuple(np.transpose(derived.entries))] = values[len(derived.outputs) :]
-    # constants and the places of windows do not move
-    still = np.zeros(next(iter(rows.values())).size)
-    into = np.array([rows.get(path, still) for path in derived.inputs])
-    return dict(zip(derived.outputs, slopes @ into, strict=True))

@@ -233,16 +233,10 @@ def operating_point(
 ) -> OperatingPoint:
     """Steady state at which small motions of an input, one of `INPUTS`, have an answer.
 
-    Given by either of voltage [V] and current [A].
-
-    Raises
-    ------
-    InputError
-        If not exactly one is given, or it cannot be had.
-    DomainError
-        Where nothing moves: in a dead zone, within the solenoids' hysteresis, at a stop of the
-        swash plate, at the relief pressure, behind a saturated orifice, in the grip of a friction
-        without presliding; or where the solenoid overpowers the feedback spring.
+    Given by either of voltage [V] and current [A]. Refused is where nothing moves: in a dead zone,
+    within the solenoids' hysteresis, at a stop of the swash plate, at the relief pressure, behind a
+    saturated orifice, in the grip of a friction without presliding; or where the solenoid
+    overpowers the feedback spring.
     """
     name, given = parameters.name, current if voltage is None else voltage
     if given is None or (voltage is not None and current is not None):

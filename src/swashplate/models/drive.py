@@ -5,12 +5,7 @@ from typing import NamedTuple
 
 from swashplate.equations.equation import equation
 from swashplate.equations.model import Model, join
-from swashplate.models.card import (
-    Card,
-    Currents,
-    card,
-    flowing_card,
-)
+from swashplate.models.card import Card, Currents, card, flowing_card
 from swashplate.models.channel import CardOptions, channel_level
 from swashplate.models.displacement_control import Pump, PumpConstants, PumpOptions
 from swashplate.models.pump import (

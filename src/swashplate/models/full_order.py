@@ -89,12 +89,6 @@ class PlantState(NamedTuple):
     begun: float  # 0 at the first sample, 1 from the second on.
 
 
-class PlantInputs(NamedTuple):
-    """What drives the machine at a sample."""
-
-    current: float  # Signed, that of the positive channel less that of the negative one. [A]
-
-
 class PlantConstants(NamedTuple):
     """What follows from the parameters alone."""
 
@@ -243,27 +237,27 @@ def plant_signals(
 @equation
 def plant_sample(
     state: PlantState,
-    inputs: PlantInputs,
+    current: float,
     p: Plant,
     k: PlantConstants,
     h: float,
     options: PlantOptions,
     given: Substeps,
 ) -> PlantSignals:
-    """Everything at a sample, the sub-steps from the one before done.
+    """Everything at a sample under a signed current [A], the sub-steps from the one before done.
 
     The current of this sample must be known for the straight line to it, so what is remembered is
     one sample old; the first sample has no time before it.
     """
     count = given.substeps
-    rise = (inputs.current - state.current) / count
+    rise = (current - state.current) / count
     span = Span(state.begun * h / count, state.current, rise)
     motion = repeated(substep, count, state.motion, span, p, k, options)
-    return plant_signals(motion, inputs.current, p, k, options)
+    return plant_signals(motion, current, p, k, options)
 
 
 @equation
-def plant_step(signals: PlantSignals, inputs: PlantInputs) -> PlantState:
+def plant_step(signals: PlantSignals, current: float) -> PlantState:
     """The machine from a sample to the next."""
     motion = Motion(
         signals.spool_position,
@@ -272,7 +266,7 @@ def plant_step(signals: PlantSignals, inputs: PlantInputs) -> PlantState:
         signals.swash_angle,
         signals.swash_rate,
     )
-    return PlantState(motion, inputs.current, 1.0)
+    return PlantState(motion, current, 1.0)
 
 
 @equation
@@ -282,12 +276,10 @@ def plant_rest(p: Plant, k: PlantConstants) -> PlantState:
 
 
 @equation
-def plant_settled(
-    inputs: PlantInputs, p: Plant, k: PlantConstants, options: PlantOptions
-) -> PlantState:
+def plant_settled(current: float, p: Plant, k: PlantConstants, options: PlantOptions) -> PlantState:
     """Where the machine settles under a constant current."""
     m = p.machine
-    force = solenoid_force(inputs.current, p.solenoids)
+    force = solenoid_force(current, p.solenoids)
     closed = root(surplus_flow, -m.spool_stroke, m.spool_stroke, force, m, options.symmetric)
     tangent = balanced_tangent(closed, force, m)
     # at a stop of the plate the valve stays open
@@ -295,7 +287,7 @@ def plant_settled(
     pressure = holding_pressure(tangent, m.motor_constant * m.load_torque, m)
     held = min(max(pressure, k.lower), k.upper)
     angle = min(max(atan(tangent), -m.swash_stop_minus), m.swash_stop_plus)
-    return PlantState(Motion(position, 0.0, held, angle, 0.0), inputs.current, 0.0)
+    return PlantState(Motion(position, 0.0, held, angle, 0.0), current, 0.0)
 
 
 @equation
@@ -321,7 +313,6 @@ plant = Model(
     constants=plant_constants,
     rest=plant_rest,
     settled=plant_settled,
-    inputs=PlantInputs,
     options=PlantOptions,
     given=Substeps,
     domain=plant_domain,

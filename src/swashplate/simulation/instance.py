@@ -195,13 +195,7 @@ def unstable_filters(numbers: Mapping[str, Array], step: float, exact: bool) -> 
 
 @lru_cache(maxsize=256)
 def check_filter_stability(parameters: ParameterSet, step: float) -> None:
-    """Refuse a step at which the filter would settle on wrong values without a word.
-
-    Raises
-    ------
-    InputError
-        Unless ωh is below `step_limit`; the sentence says how many steps a sample would do.
-    """
+    """Refuse a step at which the filter would settle on wrong values without a word."""
     names = [f"{name}_{side}" for name in ("zeta", "omega") for side in SIDES]
     numbers = {name: np.array([parameters.numbers[name]]) for name in names}
     for broken, sentence in unstable_filters(numbers, step, parameters.rate is None):

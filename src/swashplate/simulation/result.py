@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from swashplate.equations.marching.use import Run, limits_of, read_only
+from swashplate.equations.marching.use import Run, read_only
 from swashplate.errors import InputError
 from swashplate.models.displacement_control import Pump
 from swashplate.results import figures
@@ -152,7 +152,7 @@ class Simulation(Run):
     def limits(self) -> Flags:
         """Limits that act at each sample, bits of `Limit`."""
         bits = np.zeros(self.time.size, dtype=np.uint8)
-        for name in limits_of(self.instance.model):
+        for name in self.instance.model.limit_bits:
             bits |= super().active(name).astype(np.uint8) * np.uint8(Limit[name.upper()])
         return read_only(bits)
 

@@ -99,15 +99,7 @@ def simulate_drive(
 
 
 def start_states(instance: Instance, pressure: float, started: Started) -> dict[str, float]:
-    """Numbers of the pump's state that a pressure at the start sets, by path. [Pa]
-
-    Raises
-    ------
-    InputError
-        If it is no finite number.
-    DomainError
-        If it lies beyond a stop of the swash plate or Z15.
-    """
+    """Numbers of the pump's state that a pressure at the start sets, by path. [Pa]"""
     if not np.isfinite(pressure):
         raise InputError(f"The pressure at the start must be a finite number, not {pressure}.")
     k = started.arguments[1]["k"]

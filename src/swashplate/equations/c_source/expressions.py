@@ -28,6 +28,7 @@ from swashplate.equations.syntax import (
     COMPARISONS,
     MATH,
     Parsed,
+    hints_of,
     is_named_tuple,
     parsed,
     plain,
@@ -46,12 +47,7 @@ class Expressions:
         self, unit: Unit, source: Parsed, kinds: dict[str, Kind], calls: dict[str, Any]
     ) -> None:
         self.unit, self.source, self.calls = unit, source, calls
-        f = source.function
-        if not kinds:
-            cells = zip(f.__code__.co_freevars, f.__closure__ or (), strict=False)
-            free = {cell: each.cell_contents for cell, each in cells}
-            hints = typing.get_type_hints(f, None, free or None)
-            kinds = {n: unit.kind(hint, n) for n, hint in hints.items()}
+        kinds = kinds or self.hints(source)
         self.returns = kinds["return"]
         self.formals = {n: kind for n, kind in kinds.items() if n != "return"}
         own = {each.arg for each in source.arguments}
@@ -187,12 +183,12 @@ class Expressions:
             return Text(c_name(node.id), 13, self.kinds[node.id], pointer)
         return self.outside(node, node.id, self.resolved(node))
 
-    def resolved(self, node: ast.Name) -> Any:
-        """What a name of the module stands for."""
+    def resolved(self, node: ast.expr) -> Any:
+        """What a name of the module, or one in another module, stands for."""
         try:
-            return self.source.resolve(node.id)
-        except NameError:
-            self.refuse(node, f"the unknown name {node.id}")
+            return self.source.called(node)
+        except (NameError, AttributeError):
+            self.refuse(node, f"the unknown name {ast.unparse(node)}")
 
     def outside(self, node: ast.AST, name: str, value: Any) -> Text:
         """A constant of a module."""
@@ -317,13 +313,7 @@ class Expressions:
         name = function.id if isinstance(function, ast.Name) else ""
         if name in self.calls:
             return self.called(node, self.calls[name])
-        if isinstance(function, ast.Attribute) and isinstance(function.value, ast.Name):
-            found = getattr(self.resolved(function.value), function.attr, None)
-        elif name:
-            assert isinstance(function, ast.Name)
-            found = self.resolved(function)
-        else:
-            self.refuse(node, ast.unparse(node))
+        found = self.resolved(function)
         if found in (min, max):
             return self.least(node, "lesser_of" if found is min else "greater_of")
         if found is len:
@@ -405,11 +395,8 @@ class Expressions:
 
     def hints(self, source: Parsed) -> dict[str, Kind]:
         """Kinds of what an equation takes and returns."""
-        f = source.function
-        cells = zip(f.__code__.co_freevars, f.__closure__ or (), strict=False)
-        free = {cell: each.cell_contents for cell, each in cells}
-        hints = typing.get_type_hints(f, None, free or None)
-        return {name: self.unit.kind(hint, name) for name, hint in hints.items()}
+        hints = hints_of(source.function).items()
+        return {name: self.unit.kind(hint, name) for name, hint in hints}
 
     def specialised(self, node: ast.Call, function: Any) -> Text:
         """A call of `root`, `repeated` or `interpolate`, made for what it is given."""
@@ -417,12 +404,7 @@ class Expressions:
         formals = [each.arg for each in source.arguments]
         calls, args = {}, list(node.args)
         if formals[0] in ("residual", "step"):
-            first = args.pop(0)
-            assert isinstance(first, ast.Name | ast.Attribute)
-            base = first if isinstance(first, ast.Name) else first.value
-            assert isinstance(base, ast.Name)
-            found = self.resolved(base)
-            found = found if base is first else getattr(found, first.attr)  # type: ignore[union-attr]
+            found = self.resolved(args.pop(0))
             calls = {formals.pop(0): found}
             inner = parsed(found)
             own = [each.arg for each in inner.arguments]

@@ -2,74 +2,67 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Sequence
-from importlib.resources import files
+from math import inf
 
 from swashplate.equations.c_source.model import Exported, Writer, path_of
-from swashplate.equations.c_source.text import HELPERS, c_name, indented, literal, wrapped
+from swashplate.equations.c_source.text import (
+    HELPERS,
+    c_name,
+    filled,
+    function,
+    indented,
+    literal,
+    sections,
+    wrapped,
+)
+from swashplate.equations.fields import Definition
 from swashplate.equations.model import Window
 
-_SECTION = re.compile(r"^/\*== (\w+) ==\*/\n", re.MULTILINE)
-_PARTS = _SECTION.split((files(__package__) / "interface.c.in").read_text("utf-8"))[1:]
-TEXTS = dict(zip(_PARTS[::2], _PARTS[1::2], strict=True))
+TEXTS = sections("interface.c.in")
 """Sections of the text around the equations, by name."""
 
 
 def interface(exported: Exported) -> dict[str, str]:
-    """Header and source of a model.
-
-    Returns
-    -------
-    dict of str to str
-        Text by file name.
-
-    Raises
-    ------
-    EquationError
-        If something in an equation has no counterpart in C; the sentence has file, line and name.
-    """
+    """Header and source of a model, by file name."""
     made = _Interface(exported)
     return {f"{exported.file}.h": made.header(), f"{exported.file}.c": made.source()}
 
 
-class _Interface:
+class _Interface(Writer):
     """Fills the texts above."""
 
     def __init__(self, exported: Exported) -> None:
-        self.e, self.writer = exported, Writer(exported)
-        self.model, self.P = exported.model, self.writer.P
+        super().__init__(exported)
         self.arguments = [c_name(name) for name in exported.signals]
-        self.rows = list(self.writer.ranges())
-        self.values = self.writer.values()
+        self.rows, self.numbers = list(self.ranges()), self.values()
         # first, so that the equations behind links are among the functions
-        self.read = [self.writer.output(name) for name in exported.names]
+        self.read = [self.output(name) for name in exported.names]
 
     def filled(self, text: str, **more: str) -> str:
-        e = self.e
-        signals = "".join(f", double {name}" for name in self.arguments)
-        return self.writer.filled(
-            text,
-            title=e.title or f"The model {self.model.name}, one sample at a time.",
-            file=e.file,
-            GUARD=f"{e.file.upper()}_H",
-            signals=signals,
-            formals=signals[2:] or "void",
-            passed="".join(f", {name}" for name in self.arguments),
-            given=", ".join(self.arguments),
-            zeros=", 0.0" * len(self.arguments),
-            count=str(len(self.values) + 1),
-            longest=literal(e.longest),
-            no_inputs="" if e.measured else "    (void)m;\n",
-            no_options="" if e.settable else "    (void)m;\n",
-            no_on="" if e.settable else "    (void)on;\n",
-            **more,
-        )
+        e, signals = self.e, "".join(f", double {name}" for name in self.arguments)
+        words = {
+            "type": e.type,
+            "p": e.prefix,
+            "P": self.P,
+            "samples": e.widest,
+            "title": e.title or f"The model {self.model.name}, one sample at a time.",
+            "file": e.file,
+            "GUARD": f"{e.file.upper()}_H",
+            "signals": signals,
+            "formals": signals[2:] or "void",
+            "passed": "".join(f", {name}" for name in self.arguments),
+            "given": ", ".join(self.arguments),
+            "zeros": ", 0.0" * len(self.arguments),
+            "count": len(self.numbers) + 1,
+            "longest": literal(e.longest),
+        }
+        return filled(text, {**words, **more})
 
     # -- header ------------------------------------------------------------------------------------
 
     def header(self) -> str:
-        e, writer, P = self.e, self.writer, self.P
+        e, P = self.e, self.P
         enums = [
             _enum("Outputs", f"{P}_", e.names, f"{P}_OUTPUTS"),
             _enum("Parameters", f"{P}_PARAMETER_", [n for n, _, _ in self.rows], f"{P}_PARAMETERS"),
@@ -83,8 +76,8 @@ class _Interface:
             ),
             _enum("Limits, as bits", f"{P}_LIMIT_", [n for _, n in e.limits], "", bits=True),
         ]  # fmt: skip
-        structs = [text for _, text in list(writer.unit.structs.values())]
-        structs = [*structs[: self.first_private()], self.struct()]
+        structs = [text for _, text in list(self.unit.structs.values())]
+        structs = [*structs[: self.public], self.struct()]
         settle = self.filled(TEXTS["settle"]) if e.settles else ""
         return self.filled(
             TEXTS["header"],
@@ -93,26 +86,28 @@ class _Interface:
             settle=settle,
         )
 
-    def first_private(self) -> int:
-        """Number of structs that the header needs."""
-        return self.writer.public
-
     def struct(self) -> str:
         """The struct that holds all of a model."""
-        e, unit = self.e, self.writer.unit
+        e, unit = self.e, self.unit
         lines = [f"struct {e.prefix}_memory {{ /* what changes from sample to sample */"]
         for member, part in zip(e.members, self.model.parts, strict=True):
             lines.append(f"    struct {unit.struct(part.state)} {member};")
         for name in self.model.integrals:
             lines += [f"    double {c_name(name)};", f"    double {c_name(name)}_rate;"]
         lines += ["    bool begun; /* a sample was taken */", "};", ""]
+        lines += [
+            f"struct {e.prefix}_measured {{",
+            "    double value;",
+            "    bool given;",
+            "};",
+            "",
+        ]
         lines.append(f"struct {e.prefix}_inputs {{")
         lines += [f"    double {name};" for name in self.arguments]
-        for name in e.measured:
-            lines += [f"    double {c_name(name)};", f"    bool {c_name(name)}_given;"]
+        lines.append(f"    struct {e.prefix}_measured measured[{max(len(e.measured), 1)}];")
         lines += ["};", "", f"struct {e.type} {{", "    double step; /* [s] */"]
         for member, part in zip(e.members, self.model.parts, strict=True):
-            tags = self.writer.members_of(part)
+            tags = self.members_of(part)
             lines += [f"    struct {tag} {member}{tail};" for tag, tail in tags]
         lines.append(f"    struct {e.prefix}_inputs inputs;")
         lines.append(f"    struct {e.prefix}_memory now, before; /* before the last sample */")
@@ -132,11 +127,11 @@ class _Interface:
     # -- source ------------------------------------------------------------------------------------
 
     def source(self) -> str:
-        e, writer, unit = self.e, self.writer, self.writer.unit
+        e, unit = self.e, self.unit
         window = unit.struct(Window) if e.taps else ""
-        private = [text for _, text in list(unit.structs.values())[self.first_private() :]]
+        private = [text for _, text in list(unit.structs.values())[self.public :]]
         constants = [text for _, text in unit.constants.values()]
-        core = "\n\n".join(writer.core)
+        core = "\n\n".join(self.core)
         sections = [
             self.filled(TEXTS["top"]),
             "\n".join(self.helpers()),
@@ -159,22 +154,17 @@ class _Interface:
             self.switched(),
             self.filled(
                 TEXTS["interface"],
-                rest=self.rest(),
                 settle=self.filled(TEXTS["settled"]) if e.settles else "",
                 move=self.moved(),
                 outputs=self.outputs(),
                 limits=self.limits(),
-                set_inputs=self.set_inputs(),
-                clear_inputs=self.clear_inputs(),
-                set_options=self.set_options(),
-                get_options=self.get_options(),
             ),
         ]
         return "\n".join(sections)
 
     def helpers(self) -> list[str]:
         """What the equations call, and the lines."""
-        found = self.writer.unit.helpers()
+        found = self.unit.helpers()
         own = HELPERS["greater_of"]
         return [*found, own] if self.e.taps and own not in found else found
 
@@ -203,8 +193,7 @@ class _Interface:
     def pushed(self) -> str:
         lines = [f"m->inputs.{name} = {name};" for name in self.arguments]
         for k, signal in enumerate(self.e.lines):
-            value = f"m->inputs.{c_name(signal)}"
-            lines.append(f"m->line[{k}][m->newest] = {value};")
+            lines.append(f"m->line[{k}][m->newest] = {self.value_of(signal)};")
         return _body(lines or ["(void)m;"])
 
     def moved(self) -> str:
@@ -213,33 +202,25 @@ class _Interface:
         return f"    m->newest = m->newest > 0 ? m->newest - 1 : {self.P}_LINE - 1;\n"
 
     def tables(self) -> str:
-        """Parameters, names and places."""
-        e, lines = self.e, list[str]()
-        ranges: dict[str, int] = {}
+        """Values with their places and ranges, places of options, names."""
+        e, ranges = self.e, dict[str, int]()
+        declared = {place: definition for _, place, definition in self.rows}
+        flags = {f"{e.members[i]}_options.{c_name(name)}" for i, name in e.options}
         rows = []
-        for _, place, d in self.rows:
-            above = d.above is not None or d.lower == -float("inf")
-            closed = d.can_be_off and d.upper == float("inf")
-            range_ = ", ".join(literal(each) for each in (d.lower, d.upper, above, closed))
-            number = ranges.setdefault(range_, len(ranges))
+        for _, place in self.numbers:
+            d = declared.get(place, Definition("", "", can_be_off=True))
+            above = d.above is not None or (place in declared and d.lower == -inf)
+            closed = d.can_be_off and d.upper == inf
+            limits = (d.lower, d.upper, above, closed, place in flags)
+            number = ranges.setdefault(", ".join(map(literal, limits)), len(ranges))
             rows.append(f"    {{offsetof({e.type}, {place}), {number}}},")
-        lines.append(f"static const struct {e.prefix}_range ranges[] = {{")
+        lines = [f"static const struct {e.prefix}_range ranges[] = {{"]
         lines += [*(f"    {{{each}}}," for each in ranges), "};", ""]
-        lines.append(f"static const struct {e.prefix}_parameter parameter_table[] = {{")
-        lines += [*rows, "};", ""]
-        count = len(self.rows)
-        given = self.values[count : count + len(e.named("given"))]
-        flags = [f"{e.members[i]}_options.{c_name(name)}" for i, name in e.options]
-        constants = self.values[count + len(given) + len(flags) :]
-        for word, places in (
-            ("given_places", [place for _, place in given]),
-            ("flag_places", flags),
-            ("constant_places", [place for _, place in constants]),
-        ):
-            if places:
-                lines.append(f"static const unsigned {word}[] = {{")
-                lines += [f"    offsetof({e.type}, {place})," for place in places]
-                lines += ["};", ""]
+        lines += [f"static const struct {e.prefix}_value value_table[] = {{", *rows, "};", ""]
+        options = [f"{e.members[i]}_options.{c_name(name)}" for i, name in e.settable]
+        lines.append("static const unsigned option_places[] = {")
+        lines += [f"    offsetof({e.type}, {place})," for place in options] or ["    0,"]
+        lines += ["};", ""]
         for word, names in (
             ("parameter", [name for name, _, _ in self.rows]),
             ("output", e.names),
@@ -249,33 +230,6 @@ class _Interface:
             listed = " ".join(f'"{name}\\0"' for name in names) or '""'
             lines += [*wrapped(f"static const char {word}_names[] = {listed};"), ""]
         return "\n".join(lines)
-
-    def rest(self) -> str:
-        """Lines of an initialisation behind the parameters."""
-        e, lines = self.e, list[str]()
-        P = self.P
-        sized = "(int)(sizeof {0} / sizeof {0}[0])"
-        for word, present in (
-            ("given_places", bool(e.named("given"))),
-            ("flag_places", bool(e.options)),
-            ("constant_places", any(p.constants is not None for p in self.model.parts)),
-        ):
-            if not present:
-                continue
-            bad = "*next != 0.0 && *next != 1.0" if word == "flag_places" else "*next != *next"
-            lines += [
-                f"for (int i = 0; i < {sized.format(word)}; i++, next++) {{",
-                f"    if ({bad}) {{",
-                f"        return {P}_BAD_VALUE;",
-                "    }",
-            ]
-            if word == "flag_places":
-                lines.append("    const bool on = *next != 0.0;")
-                lines.append("    memcpy((char *)m + flag_places[i], &on, sizeof on);")
-            else:
-                lines.append(f"    put_at(m, {word}[i], *next);")
-            lines.append("}")
-        return _body(lines)
 
     def switched(self) -> str:
         """Terms that come on and go off with their parameters."""
@@ -287,15 +241,14 @@ class _Interface:
             test = " || ".join(f"m->{place} != 0.0" for place in own)
             line = f"m->{member}_options.{c_name(option)} = {test};"
             cases.setdefault(line, []).extend(str(places[place]) for place in own)
-        lines = ["/* Terms of the equations that are on where their parameters are not 0. */",
-                 f"static void switched({self.e.type} *m, int parameter)", "{"]  # fmt: skip
+        says = "Terms of the equations that are on where their parameters are not 0."
+        head = f"static void switched({self.e.type} *m, int parameter)"
         if not cases:
-            return "\n".join([*lines, "    (void)m;", "    (void)parameter;", "}", ""])
-        lines.append("    switch (parameter) {")
+            return function(says, head, ["(void)m;", "(void)parameter;"]) + "\n"
+        lines = ["switch (parameter) {"]
         for line, numbers in cases.items():
-            lines += [f"    case {number}:" for number in numbers]
-            lines += [*indented([f"    {line}"]), "        break;"]
-        return "\n".join([*lines, "    default:", "        break;", "    }", "}", ""])
+            lines += [*(f"case {number}:" for number in numbers), f"    {line}", "    break;"]
+        return function(says, head, [*lines, "default:", "    break;", "}"]) + "\n"
 
     def outputs(self) -> str:
         lines = []
@@ -311,47 +264,6 @@ class _Interface:
             place = f"m->{self.e.members[i]}_limits.{c_name(name)}"
             lines.append(f"bits |= {place} ? (unsigned){self.P}_LIMIT_{c_name(name)} : 0u;")
         return _body([*lines, "return bits;"])
-
-    def set_inputs(self) -> str:
-        lines = []
-        for name in self.e.measured:
-            own = c_name(name)
-            lines += [
-                f"case {self.P}_INPUT_{own}:",
-                f"    m->inputs.{own} = value;",
-                f"    m->inputs.{own}_given = true;",
-                f"    return {self.P}_OK;",
-            ]
-        return _body(lines)
-
-    def clear_inputs(self) -> str:
-        lines = []
-        for name in self.e.measured:
-            own = c_name(name)
-            lines += [f"case {self.P}_INPUT_{own}:", f"    m->inputs.{own}_given = false;",
-                      f"    return {self.P}_OK;"]  # fmt: skip
-        return _body(lines)
-
-    def set_options(self) -> str:
-        lines = []
-        for i, name in self.e.settable:
-            place = f"m->{self.e.members[i]}_options.{c_name(name)}"
-            lines += [
-                f"case {self.P}_OPTION_{c_name(name)}:",
-                f"    if ({place} != on) {{",
-                f"        {place} = on;",
-                "        m->stale = true;",
-                "    }",
-                f"    return {self.P}_OK;",
-            ]
-        return _body(lines)
-
-    def get_options(self) -> str:
-        lines = []
-        for i, name in self.e.settable:
-            lines += [f"case {self.P}_OPTION_{c_name(name)}:",
-                      f"    return m->{self.e.members[i]}_options.{c_name(name)};"]  # fmt: skip
-        return _body(lines)
 
 
 def path_name(name: str) -> str:

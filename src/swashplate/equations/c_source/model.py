@@ -6,32 +6,33 @@ samples every part in the order of the flow, and then takes all states to the ne
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from math import inf
 from typing import Any, get_type_hints
 
-from swashplate.equations.c_source.text import c_name, fields_of, indented, literal
+from swashplate.equations import expressions as ex
+from swashplate.equations.c_source.text import c_name, fields_of, function, literal
 from swashplate.equations.c_source.unit import Unit
-from swashplate.equations.expressions import Node
+from swashplate.equations.code import Code
 from swashplate.equations.fields import Definition, declared_by, floats_of, value_at
-from swashplate.equations.marching.march import output_of
-from swashplate.equations.marching.part import HOLDS, PartCode
+from swashplate.equations.marching.march import Sampler, output_of
+from swashplate.equations.marching.part import HOLDS, TapOf, taps_of
 from swashplate.equations.marching.run import Instance
-from swashplate.equations.model import Equation, Link, Model, Tap, Window, arguments_of
+from swashplate.equations.model import Equation, Link, Model, Window, arguments_of
 from swashplate.equations.syntax import is_named_tuple, plain
 
 OWN = """
 number_at put_at is_finite all_finite in_range number_of placed seen constant_window before_all
 good_inputs put_inputs taken one_sample rested_start settled_start checked computed switched
-ranges parameter_table given_places flag_places constant_places parameter_names output_names
-input_names option_names name_of
+ranges value_table option_places parameter_names output_names input_names option_names name_of
+one_of flag_at put_flag
 """
 PUBLIC = """
 size value_count init reset settle step correct output limits set_input clear_input set get
 set_option get_option set_step get_step update find find_output find_input find_option
-parameter_name output_name sentence memory inputs parameter range
+parameter_name output_name sentence memory inputs measured value range
 """
 """Names that the interface takes, of its own and behind the prefix."""
 
@@ -134,37 +135,23 @@ class Exported:
     @cached_property
     def names(self) -> tuple[str, ...]:
         """All outputs."""
-        every: dict[str, None] = dict.fromkeys(self.outputs)
-        if not every:
-            for part in self.model.parts:
-                every |= dict.fromkeys(part.signal_names)
-            every |= dict.fromkeys([*self.model.links, *self.model.integrals])
-        return tuple(every)
+        every = self.outputs or (*self.model.every_signal, *self.model.integrals)
+        return tuple(dict.fromkeys(every))
 
     @cached_property
     def limits(self) -> list[tuple[int, str]]:
         """Part and name of every limit."""
-        found = []
-        for i, part in enumerate(self.model.parts):
-            if part.limits is not None:
-                kind = get_type_hints(plain(part.limits))["return"]
-                found += [(i, name) for name in kind._fields]
-        return found
+        return [(part, name) for name, (part, _) in self.model.limit_bits.items()]
 
-    @cached_property
-    def taps(self) -> list[tuple[int, str, Tap]]:
-        """Part, input and tap of what is read through a line."""
-        return [
-            (i, name, part.tap(name))
-            for i, part in enumerate(self.model.parts)
-            for name in part.input_types
-            if part.looked_at(name) and self.model.link_of(i, name) is None
-        ]
+    @property
+    def taps(self) -> tuple[TapOf, ...]:
+        """What is read through a line."""
+        return taps_of(self.model, self.model.external)
 
     @cached_property
     def lines(self) -> tuple[str, ...]:
         """External signals that are kept in delay lines."""
-        return tuple(dict.fromkeys(tap.signal for _, _, tap in self.taps))
+        return tuple(dict.fromkeys(each.tap.signal for each in self.taps))
 
     @property
     def settles(self) -> bool:
@@ -174,7 +161,7 @@ class Exported:
     @cached_property
     def widest(self) -> int:
         """Samples of the widest window."""
-        return max([tap.samples for _, _, tap in self.taps], default=3)
+        return max([each.tap.samples for each in self.taps], default=3)
 
 
 # --- source ---------------------------------------------------------------------------------------
@@ -189,12 +176,6 @@ class Writer:
         own |= {exported.type}
         self.unit = Unit(f"{exported.prefix}_", exported.widest, own)
         self.P = exported.prefix.upper()
-        self.taken = {
-            "type": exported.type,
-            "p": exported.prefix,
-            "P": self.P,
-            "samples": exported.widest,
-        }
         for part in self.model.parts:
             for equation in (part.step, part.sample, part.constants):
                 named = get_type_hints(plain(equation)).get("p") if equation is not None else None
@@ -211,12 +192,6 @@ class Writer:
             self.unit.struct(Window)
         self.public = len(self.unit.structs)
         self.core = self.functions()
-
-    def filled(self, text: str, **more: str) -> str:
-        """A text with names in place of ``@name@``."""
-        for key, value in {**self.taken, **more}.items():
-            text = text.replace(f"@{key}@", str(value))
-        return text
 
     # -- the sample --------------------------------------------------------------------------------
 
@@ -276,27 +251,24 @@ class Writer:
             default = part.defaults.get(name)
             if link is not None:
                 lines.append(f"const double {local} = {self.link(link, state)};")
-            elif part.looked_at(name):
-                number = self.e.taps.index((i, name, tap))
+            elif name in part.taps:
+                number = next(t.number for t in self.e.taps if (t.part, t.input) == (i, name))
                 line, struct = self.e.lines.index(tap.signal), self.unit.struct(Window)
                 made = f"seen(m, {number}, {line}, {tap.samples})"
                 if window == "before":
                     made = f"constant_window(m->before_record[{line}])"
                 lines.append(f"const struct {struct} {local} = {made};")
-                if not tap.width:
-                    value = f"{self.unit.add(HOLDS[tap.hold])}(&{local})"
-                    if default is not None:
-                        flag = f"m->inputs.{c_name(tap.signal)}_given"
-                        value = f"{flag} ? {value} : m->{member}.{path_of(default)}"
-                    lines.append(f"const double {local}_held = {value};")
-                    local = f"{local}_held"
-                else:
+                if tap.width:
                     found[name] = f"&{local}"
                     continue
+                value = f"{self.unit.add(HOLDS[tap.hold])}(&{local})"
+                local = f"{local}_held"
             else:
-                value = f"m->inputs.{c_name(tap.signal)}"
+                value = self.value_of(tap.signal)
+            if link is None:
                 if default is not None:
-                    value = f"{value}_given ? {value} : m->{member}.{path_of(default)}"
+                    given = f"m->inputs.measured[{self.P}_INPUT_{c_name(tap.signal)}].given"
+                    value = f"{given} ? {value} : m->{member}.{path_of(default)}"
                 lines.append(f"const double {local} = {value};")
             found[name] = local
         if part.inputs is not None:
@@ -306,6 +278,13 @@ class Writer:
             made = f"(struct {struct}){{{', '.join(values)}}}"
             lines.append(f"const struct {struct} {member}_inputs = {made};")
         return lines, found
+
+    def value_of(self, signal: str) -> str:
+        """Where the newest value of an external signal stands."""
+        own = c_name(signal)
+        if signal in self.e.measured:
+            return f"m->inputs.measured[{self.P}_INPUT_{own}].value"
+        return f"m->inputs.{own}"
 
     def used(self, lines: list[str], tail: list[str]) -> list[str]:
         """Lines without the locals that nothing reads."""
@@ -340,15 +319,11 @@ class Writer:
             body.append(f"m->now.{own}_rate = {value};")
             grown = f"m->before.{own} + 0.5 * m->step * (m->before.{own}_rate + m->now.{own}_rate)"
             body.append(f"m->now.{own} = m->before.begun ? {grown} : 0.0;")
-        head = [
-            "/* One sample: everything at this instant, then all states to the next. */",
-            f"static int one_sample({self.e.type} *m)",
-            "{",
-            "    bool good = true;",
-        ]
         body.append("m->now.begun = true;")
-        end = [f"return good && all_finite(&m->now) ? {self.P}_OK : {self.P}_DOMAIN;"]
-        return "\n".join([*head, *indented([*body, *end]), "}"])
+        body.append(f"return good && all_finite(&m->now) ? {self.P}_OK : {self.P}_DOMAIN;")
+        says = "One sample: everything at this instant, then all states to the next."
+        head = f"static int one_sample({self.e.type} *m)"
+        return function(says, head, ["bool good = true;", *body])
 
     def starts(self, settled: bool) -> str:
         """States at the first sample, at rest or settled."""
@@ -372,9 +347,8 @@ class Writer:
             body += [*self.used(lines, tail), *tail]
         what = "settled under what it was given" if settled else "at rest"
         name = "settled_start" if settled else "rested_start"
-        head = [f"/* States before the first sample, {what}. */",
-                f"static void {name}({self.e.type} *m)", "{"]  # fmt: skip
-        return "\n".join([*head, *indented(body), "}"])
+        head = f"static void {name}({self.e.type} *m)"
+        return function(f"States before the first sample, {what}.", head, body)
 
     def updates(self) -> str:
         """What follows from parameters and step: options, constants, places of the taps."""
@@ -390,7 +364,7 @@ class Writer:
             f"if (!({self.call(i, equation, {})} > 0.0)) {{\n    return {self.P}_UNSTABLE;\n}}"
             for i, equation in self.e.stable.items()
         ]
-        for number, (i, _, tap) in enumerate(self.e.taps):
+        for i, _, number, tap in self.e.taps:
             delay = f"m->{self.e.members[i]}.{path_of(tap.delay)}" if tap.delay else "0.0"
             places.append(
                 f"placed(m, {number}, {delay}, {literal(float(tap.ahead))}, {tap.samples})"
@@ -399,20 +373,12 @@ class Writer:
             test = "\n    || ".join(f"!{each}" for each in places)
             places = [f"if ({test}) {{\n    return {self.P}_BAD_DELAY;\n}}"]
         lines = [line for each in (*options, *checks, *places) for line in each.split("\n")]
-        texts = [
-            "/* Options, stability and delays of these parameters and this step. */",
-            f"static int checked({self.e.type} *m)",
-            "{",
-            *indented([*(lines or ["(void)m;"]), f"return {self.P}_OK;"]),
-            "}",
-            "",
-            "/* Constants of these parameters and this step. */",
-            f"static void computed({self.e.type} *m)",
-            "{",
-            *indented(constants or ["(void)m;"]),
-            "}",
-        ]
-        return "\n".join(texts)
+        says = "Options, stability and delays of these parameters and this step."
+        body = [*(lines or ["(void)m;"]), f"return {self.P}_OK;"]
+        checked = function(says, f"static int checked({self.e.type} *m)", body)
+        says, head = "Constants of these parameters and this step.", "static void computed"
+        computed = function(says, f"{head}({self.e.type} *m)", constants or ["(void)m;"])
+        return f"{checked}\n\n{computed}"
 
     def finite(self) -> str:
         """Whether all states are finite: without a branch for each."""
@@ -421,14 +387,9 @@ class Writer:
             place = f"s->{self.e.members[i]}.{path_of(path)}"
             lines.append(f"none += {place} - {place};")
         lines += ["return none == 0.0;"] if len(lines) > 1 else ["(void)s;", "return none == 0.0;"]
-        text = [
-            "/* Whether all states are finite: what is not leaves no zero behind. */",
-            f"static bool all_finite(const struct {self.e.prefix}_memory *s)",
-            "{",
-            *indented(lines),
-            "}",
-        ]
-        return "\n".join(text)
+        says = "Whether all states are finite: what is not leaves no zero behind."
+        head = f"static bool all_finite(const struct {self.e.prefix}_memory *s)"
+        return function(says, head, lines)
 
     # -- numbers -----------------------------------------------------------------------------------
 
@@ -499,70 +460,36 @@ def _wider(named: Any, kind: Any) -> Iterator[tuple[Any, Any]]:
 
 
 def feedthrough(exported: Exported, instance: Instance, step: float) -> dict[str, frozenset[str]]:
-    """Inputs that each output follows at the same sample, with these options and delays.
+    """External signals that each output follows at the same sample, with these options and delays.
 
-    Parameters
-    ----------
-    exported : Exported
-        The model as it is in C.
-    instance : Instance
-        Its numbers and options.
-    step : float
-        Step of its grid. [s]
-
-    Returns
-    -------
-    dict of str to frozenset of str
-        External signals by output. One that is read through a tap counts if the window reaches its
-        newest sample.
+    One that is read through a tap counts if the window reaches its newest sample.
     """
     model, at_once = exported.model, newest(exported, instance, step)
-    options = [part.options for part in instance.parts]
-    parts = [PartCode(model, i, model.external, each) for i, each in enumerate(options)]
+    places = [output_of(model, name)[0] for name in exported.names]
+    sampler = Sampler(model, model.external, instance.options, places)
+    code = Code(sampler.used[0].code.taken)
+    for part in sampler.used:
+        code.items += sampler.items(part)
+    signals = {f"x_{name}": name for name in model.external}
+    for part in sampler.used:
+        signals |= {part.tap_samples(each)[0]: each.tap.signal
+                    for each in part.taps if each.tap.signal in at_once}  # fmt: skip
     found = {}
-    for name in exported.names:
-        stored, _ = output_of(model, model.integrals.get(name, name))
-        link = model.links.get(stored.path) if stored.kind == "link" else None
-        nodes = (
-            [(s.part, parts[s.part].signal(s.signal)) for s in link.sources]
-            if link is not None
-            else [(stored.part, parts[stored.part].node(stored))]
-        )
-        found[name] = _read(parts, nodes, at_once)
+    for name, place in zip(exported.names, places, strict=True):
+        own, node = sampler.observed(sampler.parts[place.part], place)
+        read = code.reads([ex.name(each) for each in own.reads([node])])
+        found[name] = frozenset(signals[each] for each in read & signals.keys())
     return found
 
 
 def newest(exported: Exported, instance: Instance, step: float) -> dict[str, tuple[float, float]]:
     """Signals that are read at their newest sample: delay [s], and steps that would be enough."""
     steps = dict[str, float]()
-    for _, _, tap in exported.taps:
+    for _, _, _, tap in exported.taps:
         steps[tap.signal] = max(1.0 + tap.ahead, steps.get(tap.signal, 0.0))
     found = {}
-    for i, _, tap in exported.taps:
+    for i, _, _, tap in exported.taps:
         delay = float(value_at(instance.parts[i].p, tap.delay)) if tap.delay else 0.0
         if delay < (1.0 + tap.ahead) * step * (1.0 - 1e-12):
             found[tap.signal] = delay, steps[tap.signal]
     return found
-
-
-def _read(
-    parts: Sequence[PartCode], nodes: Iterable[tuple[int, Node]], at_once: Collection[str]
-) -> frozenset[str]:
-    """External signals that some nodes follow at once."""
-    found: set[str] = set()
-    for i, node in nodes:
-        read = parts[i].code.reads([node])
-        found |= {
-            each.tap.signal
-            for each in parts[i].taps
-            if each.tap.signal in at_once and parts[i].tap_samples(each)[0] in read
-        }
-        for name in parts[i].own.input_types:
-            link = parts[i].model.link_of(i, name)
-            if link is None:
-                signal = parts[i].own.tap(name).signal
-                found |= {signal} if f"x_{signal}" in read else set()
-            elif any(parts[i].source(s) in read for s in link.sources):
-                before = [(s.part, parts[s.part].signal(s.signal)) for s in link.sources]
-                found |= _read(parts, before, at_once)
-    return frozenset(found)

@@ -5,45 +5,25 @@ from __future__ import annotations
 import inspect
 import math
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from importlib.resources import files
 from typing import Any, NamedTuple, get_type_hints
 
 from swashplate.equations.syntax import MATH
 
 WIDTH = 100
 """Longest line of C."""
-HELPERS = {
-    "lesser_of": """\
-/* Python's min: of two that are equal or do not compare, the first. */
-static double lesser_of(double a, double b) { return b < a ? b : a; }
-""",
-    "greater_of": """\
-/* Python's max: of two that are equal or do not compare, the first. */
-static double greater_of(double a, double b) { return b > a ? b : a; }
-""",
-    "whole_power": """\
-/* A power with a whole number, by squaring as the equations' compiler does it. */
-static double whole_power(double base, int exponent)
-{
-    double power = 1.0;
-    for (int left = exponent < 0 ? -exponent : exponent; left != 0; left >>= 1) {
-        if (left & 1) {
-            power *= base;
-        }
-        base *= base;
-    }
-    return exponent < 0 ? 1.0 / power : power;
-}
-""",
-    "whole_number": """\
-/* A number without its fraction as a whole number; for what has none the lowest. */
-static long long whole_number(double value)
-{
-    return value >= -9.2e18 && value <= 9.2e18 ? (long long)value : -9223372036854775807LL - 1;
-}
-""",
-}
+_SECTION = re.compile(r"^/\*== (\w+) ==\*/\n", re.MULTILINE)
+
+
+def sections(name: str) -> dict[str, str]:
+    """Sections of a file of C beside this one, by name."""
+    parts = _SECTION.split((files(__package__) / name).read_text("utf-8"))[1:]
+    return dict(zip(parts[::2], parts[1::2], strict=True))
+
+
+HELPERS = sections("helpers.c.in")
 """Functions that stand for what C has not, or has otherwise."""
 WORDS = set(
     """
@@ -146,3 +126,15 @@ def fields_of(cls: Any) -> list[tuple[str, Any]]:
 def indented(lines: Iterable[str]) -> list[str]:
     """Lines of C moved in, long ones on several."""
     return [each for line in lines for each in (wrapped(f"    {line}") if line else [""])]
+
+
+def function(says: str, head: str, body: Iterable[str]) -> str:
+    """Text of a function of C."""
+    return "\n".join([f"/* {says} */", head, "{", *indented(body), "}"])
+
+
+def filled(text: str, words: Mapping[str, Any]) -> str:
+    """A text with words in the place of their names, ``@name@``."""
+    for name, word in words.items():
+        text = text.replace(f"@{name}@", str(word))
+    return text

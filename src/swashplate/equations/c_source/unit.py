@@ -56,13 +56,7 @@ class Unit:
     with those of an equation of one's own among them."""
 
     def add(self, function: Any) -> str:
-        """Translate an equation and all that it calls; its name in C.
-
-        Raises
-        ------
-        EquationError
-            If something in it has no counterpart in C; the sentence has file, line and function.
-        """
+        """Translate an equation and all that it calls; its name in C."""
         return self.made(parsed(function), (), {}, {})
 
     def made(
@@ -135,6 +129,8 @@ class Unit:
     def kind(self, hint: Any, where: str) -> Kind:
         """Kind of what has a type."""
         origin, args = typing.get_origin(hint), typing.get_args(hint)
+        if origin is typing.Annotated:
+            return self.kind(args[0], where)
         known = {float: DOUBLE, int: INT, bool: BOOL, type(None): FLAG}
         if hint in known:
             return known[hint]

@@ -23,8 +23,7 @@ from swashplate.equations.marching.part import PartCode, Stored
 from swashplate.equations.marching.pieces import PIECE, Planned, piece
 from swashplate.equations.marching.rows import STRIDE
 from swashplate.equations.marching.run import module
-from swashplate.equations.model import Model, Source, arguments_of
-from swashplate.equations.reading import read
+from swashplate.equations.model import Model, Source
 from swashplate.equations.writing import Writer, function_source, indented
 from swashplate.errors import InputError
 
@@ -75,15 +74,10 @@ class Starting(NamedTuple):
 class Graph:
     """A model's whole structure for some observed signals, and the pieces of its march.
 
-    Attributes
-    ----------
-    observed : list of (Stored, bool)
-        What is observed, and whether as an integral.
-    row_of : dict of Stored to int
-        First place of each number that the march leaves in the block.
-    partials : dict
-        Of each result (signal, or state at the next sample) its partial derivatives by parameters
-        (``p``), constants (``k``), places of taps (``fraction``), states and signals.
+    `observed` says what is observed, and whether as an integral; `row_of` has the first place of
+    each number that the march leaves in the block; `partials` of each result (signal, or state at
+    the next sample) its partial derivatives by parameters (``p``), constants (``k``), places of
+    taps (``fraction``), states and signals.
     """
 
     def __init__(
@@ -107,7 +101,7 @@ class Graph:
         for place in places:
             if place.kind == "link":
                 self._keep(place)
-                self.partials[place] = self._link(place.path)
+                self.partials[place] = self._link(place)
         kept = {each: f"flat[{row} + n - first]" for each, row in self.row_of.items()}
         text, names = march_source(model, signals, options, kept)
         self.pieces.insert(0, _planned(f"{model.name}_march", "march", text, names))
@@ -213,23 +207,20 @@ class Graph:
         self.pieces.append(_planned(f"{self.model.name}_{name}", name, text, names))
         return len(self.pieces), range(first, self.size)
 
-    def _link(self, name: str) -> dict[Stored, Term]:
+    def _link(self, place: Stored) -> dict[Stored, Term]:
         """Partial derivatives of a link: numbers, or refused."""
-        link = self.model.links[name]
-        assert link.equation is not None
-        arguments = arguments_of(link.equation)
-        code = Code(arguments, ruled=True)
-        made = read(code, link.equation, {each: ex.name(each) for each in arguments})
-        assert isinstance(made, Node)
-        derived = Derivatives(code, [made], arguments)
+        part, link = self.sampler.parts[place.part], self.model.links[place.path]
+        code, made = self.sampler.observed(part, place)
+        by = {part.source(source): self.number_of(source) for source in link.sources}
+        derived = Derivatives(code, [made], [*by])
         if any(each.op != "number" for each in derived.partials):
             raise InputError(
-                f"Model {self.model.name}: the link {name} must be a sum of signals with "
+                f"Model {self.model.name}: the link {link.name} must be a sum of signals with "
                 "constant factors; put anything else into a part's sample."
             )
-        known = {source.signal: self.number_of(source) for source in link.sources}
+        known = [*by.values()]
         return {
-            known[arguments[inp]]: Term((), float(node.value))
+            known[inp]: Term((), float(node.value))
             for (_, inp), node in zip(derived.entries, derived.partials, strict=True)
         }
 
@@ -242,36 +233,22 @@ class Graph:
         return self._starting[start]
 
     def _started(self, start: str) -> Starting:
-        codes = self.sampler.used
-        code = Code(codes[0].code.taken, ruled=True)
+        sampler = self.sampler
+        outside = {n: each for n, each in sampler.outside().items() if each.kind != "state"}
+        code = Code(sampler.used[0].code.taken, ruled=True)
         results: dict[Stored, Node] = {}
         by: dict[str, str] = {}
-        outside = {"h": Stored(0, "h")}
-        for part in codes:
+        for part in sampler.used:
             i, prefix = part.part, self.model.prefix(part.part)
             begun, value = part.begun(start)
             begins, states = dict(leaves(value)), dict(leaves(part.state))
             code.items += [*part.prologue.items, *begun.items]
             code.items += [Let(states[path].value, node) for path, node in begins.items()]
-            code.items += part.code.items
-            code.items += [
-                Let(part.source(source), part.signal(source.signal))
-                for source in self.sampler.sources
-                if source.part == i
-            ]
-            for name in self.sampler.constants(part):
-                results[Stored(i, "k", name)] = ex.name(name)
-            for number in self.partials:
-                if number[:2] == (i, "state"):
-                    results[number] = begins[number.path]
+            code.items += sampler.items(part)
+            results |= {Stored(i, "k", name): ex.name(name) for name in sampler.constants(part)}
+            kept = [each for each in self.partials if each[:2] == (i, "state")]
+            results |= {state: begins[state.path] for state in kept}
             by |= {name: f"{prefix}{path}" for name, path in part.parameters.items()}
-            outside |= {name: Stored(i, "p", path) for name, path in part.parameters.items()}
-            outside |= {node.value: Stored(i, "given", path) for path, node in leaves(part.given)}
-            for tap in part.taps:
-                read = Stored(i, "input", tap.tap.signal)
-                outside |= dict.fromkeys(part.tap_samples(tap), read)
-                outside[part.fraction(tap)] = Stored(i, "fraction")
-        outside |= {f"x_{name}": Stored(0, "input", name) for name in self.sampler.signals}
         arguments = sorted(code.reads(results.values()) & outside.keys())
         active = [each for each in arguments if each in by]
         derived = derived_function(

@@ -9,14 +9,21 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from swashplate.equations.code import generating
-from swashplate.equations.fields import value_at
 from swashplate.equations.marching.graph import Graph, Moved, graph_of
 from swashplate.equations.marching.layout import Layout, layout_of, started_by
 from swashplate.equations.marching.observation import ObservedRecord, Own
 from swashplate.equations.marching.pieces import addresses
-from swashplate.equations.marching.rows import STRIDE, Program, Sink, march_observed
+from swashplate.equations.marching.rows import (
+    EIGHTH,
+    ROWS,
+    STRIDE,
+    Program,
+    Sink,
+    aligned,
+    march_observed,
+    upright,
+)
 from swashplate.equations.marching.run import Instance, Start, arrays_of, begun, check_domain
-from swashplate.equations.marching.triangle import EIGHTH, ROWS, aligned, upright
 from swashplate.errors import DomainError, InputError
 
 Array = NDArray[np.float64]
@@ -26,16 +33,10 @@ def _slopes(
     graph: Graph, instance: Instance, first: Mapping[str, float], h: float, start: Start
 ) -> dict[Moved, float]:
     """Derivatives of constants and of states at the start by all parameters that move them."""
-    starting = graph.starting(start)
-    values = []
-    for part, kind, path in starting.arguments:
-        if kind in ("p", "given"):
-            own = instance.parts[part]
-            values.append(value_at(own.p if kind == "p" else own.given, path))
-        elif kind == "input":
-            values.append(first.get(path, 0.0) if start == "steady" else 0.0)
-        else:
-            values.append(h if kind == "h" else 0.0)
+    starting, before = graph.starting(start), dict.fromkeys(first, 0.0)
+    if start == "steady":
+        before.update(first)
+    values = [instance.number_at(each, before, h) for each in starting.arguments]
     found = starting.derived.python(*values)
     return dict(zip(starting.moves, found[len(found) - len(starting.moves) :], strict=True))
 
@@ -116,13 +117,6 @@ def residuals(instance: Instance, observed: ObservedRecord, own: Own = NOTHING_O
 
     Of each weight · (simulated + offset - measured) in its signal's SI unit; `own` are values of
     the experiment's own unknowns.
-
-    Raises
-    ------
-    DomainError
-        If the model leaves its domain.
-    InputError
-        If the own unknowns do not fit.
     """
     rows = np.empty((1, observed.rows))
     _march(instance, observed, own, (), (), rows, 0)
@@ -138,19 +132,11 @@ def jacobian(
     moved: Sequence[bool] | None = None,
     out: Array | None = None,
 ) -> Jacobian:
-    """The same residuals with their exact derivatives.
+    """The same residuals with their exact derivatives by columns.
 
-    Parameters
-    ----------
-    instance, observed, own :
-        As in `residuals`.
-    columns : sequence of str
-        Paths of parameters, and ``start.`` with the path of a state.
-    moved : sequence of bool, optional
-        Whether the record may depend on a column at all; the others give zeros.
-    out : (k + 1, m) array, optional
-        Where to write; the `rows` of an earlier call, for example. New memory takes longer to get
-        than the whole march.
+    Columns are paths of parameters, and ``start.`` with the path of a state; `moved` says whether
+    the record may depend on each at all: the others give zeros. `out` is (k + 1, m) memory to write
+    to, the `rows` of an earlier call for example: new memory takes longer to get than the march.
     """
     to = np.flatnonzero(np.ones(len(columns)) if moved is None else moved)
     names = (*columns, *observed.own_columns)
@@ -176,11 +162,6 @@ def triangle(
     """Triangular factor of [J r]; arguments as in `jacobian`, which is never held.
 
     Memory does not grow with the record, apart from the record and the observations themselves.
-
-    Raises
-    ------
-    DomainError
-        Also if a derivative is so large that its square overflows.
     """
     to = np.flatnonzero(np.ones(len(columns)) if moved is None else moved)
     names = (*columns, *observed.own_columns)

@@ -29,8 +29,8 @@ from swashplate.equations.equation import JIT_OFF
 from swashplate.equations.expressions import Node, text
 from swashplate.equations.marching.march import Sampler, lower, output_of
 from swashplate.equations.marching.part import Stored, choose
+from swashplate.equations.marching.rows import aligned
 from swashplate.equations.marching.run import module
-from swashplate.equations.marching.triangle import aligned
 from swashplate.equations.model import Model
 from swashplate.equations.writing import function_source, indented, lines_of
 
@@ -248,13 +248,9 @@ class Marched(NamedTuple):
 class Lanes:
     """The march of LANES sets of a model over one record, for one output.
 
-    Attributes
-    ----------
-    prepare : callable
-        ``prepare(h, flat)`` computes what does not change, and states at rest, of every lane.
-    march : callable
-        ``march(records, whole, h, flat, measured, weight, outputs)`` marches: costs and the worst
-        margins are rows of the block, and ``outputs``, unless empty, are a row for each lane.
+    ``prepare(h, flat)`` computes what does not change, and states at rest, of every lane.
+    ``march(records, whole, h, flat, measured, weight, outputs)`` marches: costs and the worst
+    margins are rows of the block, and ``outputs``, unless empty, are a row for each lane.
     """
 
     def __init__(

@@ -18,8 +18,8 @@ from swashplate.equations.marching.rows import (
     RECUR,
     STRIDE,
     Program,
+    aligned_room,
 )
-from swashplate.equations.marching.triangle import aligned_room
 from swashplate.equations.model import Model
 
 Array = NDArray[np.float64]
@@ -30,17 +30,9 @@ Todo = tuple[int, int, int, int]
 class Layout:
     """A program without the numbers that depend on parameters, and the memory it needs.
 
-    Attributes
-    ----------
-    program : Program
-    pieces : set of int
-        Numbers of the pieces that are called.
-    slots : list of (int, Moved)
-        Terms with a factor of this kind.
-    tangents : int
-        Numbers in the vector of tangents; the first belongs to idle columns.
-    places : dict of Moved to int
-        Place of the tangent of a state by a column.
+    `pieces` are the numbers of those that are called, `slots` the numbers of terms with a factor of
+    their kind, `tangents` counts the vector of tangents, of which the first belongs to idle
+    columns, and `places` has the place of the tangent of a state by a column.
     """
 
     def __init__(

@@ -20,7 +20,7 @@ from itertools import chain
 from typing import Any
 
 from swashplate.equations import expressions as ex
-from swashplate.equations.code import Code, Value, leaves
+from swashplate.equations.code import Code, Item, Let, Value, leaves
 from swashplate.equations.equation import inlined
 from swashplate.equations.expressions import Node, text
 from swashplate.equations.fields import floats_of
@@ -126,6 +126,23 @@ class Sampler:
             node = self.sources[source] = self.parts[source.part].signal(source.signal)
             self.ends[source.part].append(node)
 
+    def items(self, part: PartCode) -> list[Item]:
+        """A part's sample, and the signals of it that other parts or links need."""
+        own = [(source, node) for source, node in self.sources.items() if source.part == part.part]
+        return [*part.code.items, *(Let(part.source(source), node) for source, node in own)]
+
+    def outside(self) -> dict[str, Stored]:
+        """What is known ahead of a sample, by name: numbers, the state, places and records."""
+        known = {"h": Stored(0, "h")}
+        for part in self.used:
+            i = part.part
+            for kind, value in (("p", part.p), ("given", part.given), ("state", part.state)):
+                known |= {node.value: Stored(i, kind, path) for path, node in leaves(value)}
+            known |= part.outside
+            for tap in part.taps:
+                known[part.fraction(tap)] = Stored(i, "fraction", str(tap.number))
+        return known
+
     @property
     def names(self) -> dict[str, Any]:
         """What the text refers to."""
@@ -204,7 +221,7 @@ class Sampler:
 
     def observed(self, part: PartCode, stored: Stored) -> tuple[Code, Node]:
         """A number that is kept, and the code that makes it of what is known at its part's end."""
-        code = Code(part.code.taken)
+        code = Code(part.code.taken, ruled=part.code.ruled)
         if stored.kind != "link":
             return code, part.node(stored)
         link = self.model.links[stored.path]
@@ -237,10 +254,7 @@ def march_source(
 ) -> tuple[str, dict[str, Any]]:
     """Text of the march over samples as a `piece`, and what its names mean.
 
-    Parameters
-    ----------
-    places : mapping of Stored to str
-        What is kept, and where it goes at sample ``n``.
+    `places` says what is kept, and where it goes at sample ``n``.
     """
     sampler = Sampler(model, signals, options, [*places])
     parts = sampler.used
@@ -288,20 +302,12 @@ def march_source(
 def step_source(
     model: Model, signals: Sequence[str], options: Sequence[Any], stored: Sequence[Stored]
 ) -> tuple[str, dict[str, Any], int]:
-    """Text of one sample, for steppers and for kernels that close loops.
+    """Text of one sample, for steppers and loops, what it refers to, and how many constants it has.
 
     ``prepare(params, given, h, constants)`` computes constants once. ``step(machine)`` shifts the
     newest inputs into the delay lines (a row for each signal, newest first), fills the outputs with
     the numbers of this sample in the order of `stored`, takes the states to the next one, and
     returns the margin of the domain.
-
-    Returns
-    -------
-    text : str
-    names : dict
-        What the text refers to.
-    count : int
-        Constants.
     """
     sampler = Sampler(model, signals, options, stored)
     row = sampler.signals.index
@@ -338,13 +344,7 @@ def step_source(
 
 
 def output_of(model: Model, output: str) -> tuple[Stored, bool]:
-    """Where a signal comes from, and whether it is that signal's integral.
-
-    Raises
-    ------
-    InputError
-        If the model has no such signal.
-    """
+    """Where a signal comes from, and whether it is that signal's integral."""
     integral = output in model.integrals
     name = model.integrals[output] if integral else output
     if name in model.links:

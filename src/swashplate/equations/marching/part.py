@@ -66,7 +66,7 @@ def taps_of(model: Model, signals: tuple[str, ...]) -> tuple[TapOf, ...]:
         for name in part.input_types:
             tap = part.tap(name)
             outside = model.link_of(i, name) is None and tap.signal in signals
-            if outside and part.looked_at(name):
+            if outside and name in part.taps:
                 found.append(TapOf(i, name, len(found), tap))
     return tuple(found)
 

@@ -71,14 +71,7 @@ def on_grid(
     interpolation: Between = None,
     substeps: int | None = None,
 ) -> dict[str, Record]:
-    """Inputs by name as records on one grid; arguments as of `swashplate.equations.simulate`.
-
-    Raises
-    ------
-    InputError
-        For an empty, non-finite or unsorted record, naming the sample, for more points than anyone
-        means, and for options that there are not.
-    """
+    """Inputs by name as records on one grid; arguments as of `swashplate.equations.simulate`."""
     between, substeps = checked_sampling(inputs, rate, interpolation, substeps)
     data = {name: column(v, f"The {name}") for name, v in inputs.items() if not is_real(v)}
     sizes = {name: samples.size for name, samples in data.items()}
@@ -123,22 +116,15 @@ def record_of(
     what: str,
     time: ArrayLike | None = None,
     interpolation: Interpolation | None = None,
-    substeps: int | None = None,
 ) -> Record:
     """A drive's input, `what` by name, on the march's grid: see `on_grid` and `least_substeps`."""
-    steps = least_substeps(rate, substeps)
+    steps = least_substeps(rate)
     made = on_grid({what: values}, rate, time=time, interpolation=interpolation, substeps=steps)
     return made[what]
 
 
 def least_substeps(rate: float, wanted: int | None = None) -> int:
-    """Steps a sample that keep a drive's h at or below 1/512 s, or those that are wanted.
-
-    Raises
-    ------
-    InputError
-        For a rate out of range, or too few steps.
-    """
+    """Steps a sample that keep a drive's h at or below 1/512 s, or those that are wanted."""
     if not is_real(rate) or not SLOWEST <= rate <= FASTEST:
         shown = f"{rate:g}" if is_real(rate) else repr(rate)
         raise InputError(

@@ -135,6 +135,16 @@ class Instance:
         rest = [[each.fraction, each.slope] for each in found]
         return Places(whole, *np.array(rest).reshape(-1, 2).T.copy())
 
+    def number_at(self, stored: Stored, before: Mapping[str, float], h: float) -> float:
+        """Number that is known ahead of a sample, of constant records; 0 for the place of a tap."""
+        own, kind, path = self.parts[stored.part], stored.kind, stored.path
+        if kind in ("p", "given"):
+            return float(value_at(own.p if kind == "p" else own.given, path))
+        if kind in ("tap", "input"):
+            part, name = self.model.parts[stored.part], path.partition(".")[0]
+            return before.get(part.tap(name).signal, 0.0)
+        return h if kind == "h" else 0.0
+
     def check_inputs(self, signals: Collection[str]) -> None:
         """Refuse external signals that the model does not know, and the lack of those it needs."""
         known = self.model.external
@@ -155,26 +165,11 @@ class Instance:
         start: Start = "rest",
         chosen: Sequence[Any] | None = None,
     ) -> Started:
-        """States at the first sample.
+        """States at the first sample, under the `first` values of the external signals.
 
-        Parameters
-        ----------
-        first : mapping of str to float
-            External signals at the first sample.
-        h : float
-            Step. [s]
-        start : {"rest", "steady"}
-            At rest, where signals that are read through taps were zero before; or settled at the
-            first values, which then held before, too.
-        chosen : sequence, optional
-            State of each part, in place of the one that `start` says.
-
-        Raises
-        ------
-        InputError
-            If a signal is missing or unknown, or the model cannot start settled.
-        DomainError
-            If constants or the state cannot be computed for these numbers.
+        At rest signals that are read through taps were zero before; ``"steady"`` is settled at the
+        first values, which then held before, too. `chosen` are states of the parts in place of
+        that.
         """
         if chosen is not None:
             return self._start(first, h, start, chosen)
@@ -199,7 +194,7 @@ class Instance:
                     known[name] = linked(link, states, found)
                     continue
                 if tap.signal in first:
-                    value = (before if part.looked_at(name) else first)[tap.signal]
+                    value = (before if name in part.taps else first)[tap.signal]
                 else:
                     value = float(value_at(own.p, part.defaults[name]))
                 known[name] = Window((value,) * tap.width, 0.0) if tap.width else value
@@ -263,9 +258,7 @@ def linked(link: Link, states: Sequence[Any], found: Sequence[Mapping[str, Any]]
     return float(interpreted(link.equation)(*values))
 
 
-def instance_of(
-    model: Model, p: Any, *, options: Any = None, given: Any = None, name: str | None = None
-) -> Instance:
+def instance_of(model: Model, p: Any, *, options: Any = None, given: Any = None) -> Instance:
     """A model with its numbers.
 
     Parameters
@@ -274,8 +267,6 @@ def instance_of(
         A single model, or a joined one.
     p, options, given : named tuple
         Of a joined model each has a field for every part that has any.
-    name : str, optional
-        For messages; by default the model's.
 
     Raises
     ------
@@ -315,7 +306,7 @@ def instance_of(
         if own.options is not None:  # off is None, so that code is made for one form of it
             own = own._replace(options=type(own.options)(*(each or None for each in own.options)))
         parts.append(own)
-    instance = Instance(model, tuple(parts), name or model.name)
+    instance = Instance(model, tuple(parts), model.name)
     numbers = dict(zip(parameter_paths(model), instance.params.tolist(), strict=True))
     for path, definition in model.ranges.items():
         if not definition.holds(numbers[path]):
@@ -353,17 +344,10 @@ def marched(
     cause: str = "input",
     begin: Mapping[str, float] = MappingProxyType({}),
 ) -> Array:
-    """March over whole records from where it begins, or from states by path.
+    """(r, n) numbers in the order of `stored`, marched over whole records; limits as sums of bits.
 
-    Returns
-    -------
-    (r, n) array
-        What is kept, in the order of `stored`; limits as the sum of their bits.
-
-    Raises
-    ------
-    DomainError
-        If the model leaves its domain, or a number overflows; `cause` is what drives the model.
+    From where `started` begins, or from states by path; `cause` is what drives the model, for the
+    sentence where it leaves its domain or a number overflows.
     """
     signals, size = tuple(records), next(iter(records.values())).size
     planned = march_of(instance.model, signals, instance.options, stored)
@@ -409,13 +393,7 @@ def arrays_of(
 
 
 def check_domain(instance: Instance, states: Array, worst: float, cause: str) -> None:
-    """Refuse what was computed outside the model's equations.
-
-    Raises
-    ------
-    DomainError
-        If the worst margin is not above 0, or a state is not finite.
-    """
+    """Refuse what was computed outside the model's equations, or is no finite state."""
     if not worst > 0.0:
         raise DomainError(f"{instance.name}: {outside(instance.model, worst, cause)}")
     if np.isfinite(states).all():

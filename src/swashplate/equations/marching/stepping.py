@@ -166,13 +166,7 @@ def compiled_step(
 
 
 def stored_of(model: Model, outputs: Sequence[str]) -> tuple[Stored, ...]:
-    """Where the outputs of a step come from; ``"limits"`` of the last part that has any.
-
-    Raises
-    ------
-    InputError
-        For signals that the model does not have, and integrals, which a loop adds up itself.
-    """
+    """Where the outputs of a step come from; ``"limits"`` of the last part that has any."""
     found = []
     limited = [i for i, part in enumerate(model.parts) if part.limits is not None]
     for output in outputs:

@@ -7,17 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from difflib import get_close_matches
 from functools import cached_property, lru_cache
-from typing import (
-    TYPE_CHECKING,
-    Any,
-    ClassVar,
-    Generic,
-    NamedTuple,
-    Self,
-    TypeVar,
-    Unpack,
-    get_type_hints,
-)
+from typing import TYPE_CHECKING, Any, ClassVar, Generic, NamedTuple, Self, TypeVar, Unpack
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -46,7 +36,6 @@ from swashplate.equations.marching.run import (
 )
 from swashplate.equations.marching.stepping import CompiledStep, Machine
 from swashplate.equations.model import Model, parameter_paths
-from swashplate.equations.syntax import plain
 from swashplate.errors import InputError
 from swashplate.results import Tabular
 
@@ -56,24 +45,6 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 S = TypeVar("S")
 T = TypeVar("T", bound=np.generic)
-
-
-@lru_cache(maxsize=64)
-def signals_of(model: Model) -> tuple[str, ...]:
-    """Signals of all parts and numbers of their states, and links; integrals apart."""
-    own = [name for part in model.parts for name in part.signal_names]
-    return tuple(dict.fromkeys([*own, *model.links]))
-
-
-@lru_cache(maxsize=64)
-def limits_of(model: Model) -> dict[str, tuple[int, int]]:
-    """Part and bit of every limit, by its name."""
-    found: dict[str, tuple[int, int]] = {}
-    for i, part in enumerate(model.parts):
-        if part.limits is not None:
-            fields = get_type_hints(plain(part.limits))["return"]._fields
-            found |= {name: (i, bit) for bit, name in enumerate(fields)}
-    return found
 
 
 @lru_cache(maxsize=256)
@@ -122,7 +93,7 @@ class Run(Tabular):
 
     def marched(self) -> Self:
         """The run with its first march done."""
-        self._march(self.kept or signals_of(self.instance.model))
+        self._march(self.kept or self.instance.model.every_signal)
         return self
 
     def _march(self, names: tuple[str, ...], limits: tuple[int, ...] = ()) -> None:
@@ -163,13 +134,13 @@ class Run(Tabular):
     def names(self) -> tuple[str, ...]:
         """All signals, behind ``"time"`` and the inputs."""
         model = self.instance.model
-        every = ("time", *self.records, *signals_of(model), *model.integrals)
+        every = ("time", *self.records, *model.every_signal, *model.integrals)
         return tuple(dict.fromkeys(every))
 
     @property
     def limit_names(self) -> tuple[str, ...]:
         """Limits of the model."""
-        return tuple(limits_of(self.instance.model))
+        return tuple(self.instance.model.limit_bits)
 
     def __repr__(self) -> str:
         samples = f"{self.time.size} samples at {self.record.rate:g} Hz"
@@ -228,7 +199,7 @@ class Run(Tabular):
         InputError
             If the model has no such limit.
         """
-        limits = limits_of(self.instance.model)
+        limits = self.instance.model.limit_bits
         if limit not in limits:
             raise InputError(f"There is no limit '{limit}'; there are {', '.join(limits)}.")
         part, bit = limits[limit]
@@ -239,7 +210,7 @@ class Run(Tabular):
         return np.asarray(acts != 0)
 
     def _march_again(self, names: tuple[str, ...]) -> None:
-        parts = {part for part, _ in limits_of(self.instance.model).values()}
+        parts = {part for part, _ in self.instance.model.limit_bits.values()}
         self._march(names, tuple(sorted(parts)))
 
 
@@ -429,7 +400,7 @@ class Stepper(Generic[S]):
         check_start(start)
         between, self._substeps = checked_sampling(inputs, rate, interpolation, substeps)
         self._start, self._sample, self._bound = start, sample, bound
-        self.inputs, limits = tuple(inputs), limits_of(instance.model)
+        self.inputs, limits = tuple(inputs), instance.model.limit_bits
         found = [
             (Stored(limits[name][0], "limits"), False)
             if name in limits
@@ -544,9 +515,9 @@ def stepper(
     outputs : sequence of str, optional
         Signals that come out, and limits by their names, true where they act; by default all.
     """
-    instance, limits = instance_of(model, p, options=options, given=given), limits_of(model)
+    instance, limits = instance_of(model, p, options=options, given=given), model.limit_bits
     if outputs is None:
-        outputs = (*signals_of(model), *model.integrals, *limits)
+        outputs = (*model.every_signal, *model.integrals, *limits)
     names = (*inputs, *outputs)
 
     def sample(values: list[float]) -> dict[str, float]:
