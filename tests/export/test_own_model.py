@@ -13,7 +13,7 @@ from tests.export.conftest import InC
 from tests.export.webassembly import Page
 from tests.simulation.test_own_equation import DRAGGED
 
-from swashplate import Drive, InputError
+from swashplate import Drive
 from swashplate.equations import (
     Model,
     Tap,
@@ -336,15 +336,6 @@ def test_names_that_c_keeps_for_itself(compiled: Any, tmp_path: Path) -> None:
     np.testing.assert_allclose(last, run["register"][::10], rtol=1e-8)
 
 
-def test_steps_that_are_none_are_refused(hoist: Drive, tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="step"):
-        c(valve, tmp_path, 0.0, parameters=P, given=STROKE)
-    with pytest.raises(InputError, match="1/512"):
-        c(hoist, tmp_path, 0.1)
-    with pytest.raises(InputError, match="parameters must be a Valve"):
-        c(valve, tmp_path)
-
-
 @equation
 def slower_root(head: float) -> float:
     return 0.9 * head / (1.0 + abs(head) ** 2 / 1e14)
@@ -366,6 +357,3 @@ def test_a_drive_with_an_equation_of_its_own_has_it_in_c(
     assert (run.shaft_speed == found).all()
     plain = hoist.simulate(command, 512.0, interpolation="previous", start="steady")
     assert (plain.shaft_speed != found).any()
-
-
-# --- what has no counterpart ----------------------------------------------------------------------

@@ -21,7 +21,7 @@ load_torque = { value = 30, unit = "kN m", status = "assumed" }
 """
 
 
-def test_published_sets_have_none(axis: Drive) -> None:
+def test_published_sets_and_their_files_have_none(axis: Drive, tmp_path: Path) -> None:
     assert list(axis.parameters) == list(CATALOGUE)
     assert axis.parameters.refinements == ()
     assert REFINEMENTS.keys().isdisjoint(axis.parameters.numbers)
@@ -30,9 +30,6 @@ def test_published_sets_have_none(axis: Drive) -> None:
     assert (off.value, off.status, off.unit) == (0.0, "inactive", "N")
     assert axis["dither_time"].value == inf
     assert axis["cam_cycles"].value == 5.5
-
-
-def test_without_them_a_file_says_nothing_of_them(axis: Drive, tmp_path: Path) -> None:
     axis.to_toml(tmp_path / "set.toml")
     assert "refinements" not in (tmp_path / "set.toml").read_text("utf-8")
 
