@@ -75,9 +75,10 @@ def test_hoist_has_the_thirteen_runs_of_the_source():
 
 
 def test_source_tests_are_what_their_names_say():
-    hoist, slew = maneuvers.source_tests("hoist"), maneuvers.source_tests("slew")
+    hoist, slew, luff = map(maneuvers.source_tests, ("hoist", "slew", "luff"))
     assert hoist["step -6.5 V"](3.0) == -6.5
     assert hoist["ramp -1 V/s"](10.5) == -9.5
+    assert luff["ramp +1 V/s"](10.5) == 9.5
     assert hoist["sine 9 V 0.3 Hz"](1.0 + 0.25 / 0.3) == pytest.approx(9.0)
     # The return of slewing takes 4.5 s: the ramp comes to 7.5 V before it.
     assert slew["ramp +1 V/s"](8.5) == 7.5

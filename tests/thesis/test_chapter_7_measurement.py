@@ -119,22 +119,6 @@ def test_erratum_27_what_a_speed_below_its_limit_does_not_show() -> None:
     assert (hard.max(), -hard.min()) == pytest.approx(limits, rel=1e-12)
 
 
-@pytest.mark.parametrize(("axis", "settle"), [("hoist", 2.5), ("slew", 4.5), ("luff", 2.5)])
-def test_sections_7_3_to_7_5_tests_end_by_a_cubic(axis: str, settle: float) -> None:
-    """The return takes 2.5 s, on slew 4.5 s, and meets the command and its slope at both ends."""
-    runs = maneuvers.source_tests(axis)
-    run = runs["ramp +1 V/s"]
-    end, begin = run.length, run.length - settle
-    before = begin - 1e-6
-    assert run(begin) == pytest.approx(run(before), abs=1e-5)
-    h = 1e-5
-    rises = [(run(at + h) - run(at)) / h for at in (before - h, begin, end - h)]
-    assert rises == pytest.approx([1.0, 1.0, 0.0], abs=1e-4)
-    assert run(end) == pytest.approx(0.0, abs=1e-12)
-    inside = run(np.linspace(begin, end, 9))
-    assert np.diff(inside, 4) == pytest.approx(np.zeros(5), abs=1e-9)  # a cubic's fourth difference
-
-
 @pytest.mark.parametrize(
     ("axis", "volts", "hertz"),
     [

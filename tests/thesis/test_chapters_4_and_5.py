@@ -65,12 +65,13 @@ def test_section_1_2_counts_14_and_22_parameters(hoist: Drive) -> None:
     assert [each for each in symbols if each[0] == "Z"] == [f"Z{n}" for n in range(1, 23)]
 
 
-def test_slew_and_luff_have_one_card() -> None:
-    """Table 1.1 and section 7.5: MDSD-1K-2x/4, with the hoist's rising and falling limits."""
+def test_erratum_06_slew_and_luff_have_one_card() -> None:
+    """Table 1.1 and section 7.5: MDSD-1K-2x/4; 8.2 and 8.3 print its limits with opposite signs."""
     slew, luff, hoist = (Drive.preset(name) for name in ("slew", "luff", "hoist"))
     assert slew.parameters.card == luff.parameters.card != hoist.parameters.card
     for symbol in ("V_dz", "J", "G1", "zeta", "omega", "C", "lim1", "lim2", "I_t1", "I_t2", "a"):
         assert slew[symbol].values == luff[symbol].values
+        assert min(luff[symbol].values) >= 0.0
 
 
 BENCH = {1.0: 0.2537, 4.0: 0.4090, 7.0: 0.5635, 10.0: 0.7185}

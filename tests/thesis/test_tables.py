@@ -50,11 +50,3 @@ def test_cells_and_how_they_were_found(
 def test_erratum_05_units_of_g2_and_g3() -> None:
     """Table 8.1 prints A/V for both; 3.3 needs A/V² and A/V³."""
     assert (CATALOGUE["G2"].unit, CATALOGUE["G3"].unit) == ("A/V^2", "A/V^3")
-
-
-def test_erratum_06_rate_limits_of_slew_and_luff_are_magnitudes() -> None:
-    """One card, printed with opposite signs in tables 8.2 and 8.3."""
-    slew, luff = Drive.preset("slew"), Drive.preset("luff")
-    for symbol in ("lim1", "lim2"):
-        assert slew[symbol].values == luff[symbol].values
-        assert min(luff[symbol].values) > 0.0
