@@ -205,15 +205,6 @@ def test_lumps_have_the_units_of_the_tables() -> None:
         assert lump.check(unit(CATALOGUE[symbol].unit).dimensionality), symbol
 
 
-def test_table_6_1_names_the_limits() -> None:
-    words = {"Z13": "swash plate", "Z14": "stroke", "Z15": "pressure", "Z16": "orifice"}
-    words["Z17"] = "dead zone"
-    for symbol, word in words.items():
-        assert word in CATALOGUE[symbol].name
-    directional = {each for each in words if CATALOGUE[each].directional}
-    assert directional == {"Z13", "Z16"}  # the two that "will have 2 different values"
-
-
 @pytest.mark.parametrize("name", ["hoist", "slew"])
 def test_stated_stops_lie_about_15_degrees(name: str) -> None:
     """Section 6.2.5; the luff's lie where its tests ended, at 3.4 and 4.2 degrees (section 7.5)."""
