@@ -14,7 +14,6 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 from nptdms import ChannelObject, GroupObject, RootObject, TdmsWriter
 
-from swashplate import FileError
 from swashplate.logs import Column, TextOptions, open_log
 
 TIME = np.arange(60) / 7.0
@@ -291,37 +290,3 @@ def test_logs_of_other_machines(name, form):
     assert log.format == form
     for key, read in log.read(list(expected)).items():
         np.testing.assert_array_equal(read, expected[key])
-
-
-MATLAB = Path(scipy.io.__file__).parent / "matlab" / "tests" / "data"
-
-
-@pytest.mark.skipif(not MATLAB.exists(), reason="SciPy is installed without the files of its tests")
-def test_files_that_matlab_wrote():
-    """SciPy's collection, from version 4 to 7.4 on several machines, read as SciPy reads it."""
-    compared = 0
-    refused = []
-    for path in sorted(MATLAB.glob("test*.mat")):
-        try:
-            log = open_log(path)
-            names = [column.name for column in log.columns]
-            read = log.read(names)
-        except FileError as error:
-            refused.append(str(error))
-            continue
-        if log.format == "MATLAB 7.3":
-            continue
-        expected = scipy.io.loadmat(path)
-        for name in names:
-            variable, _, place = name.partition("(")
-            if "." in variable:
-                continue
-            array = expected[variable]
-            if place:
-                row, column = place.rstrip(")").split(",")
-                array = array[:, int(column) - 1] if row == ":" else array[int(row) - 1]
-            np.testing.assert_array_equal(read[name], np.ravel(array))
-            compared += 1
-    assert compared > 30
-    said = ("has no vectors of numbers", "it holds complex numbers")
-    assert all(any(words in sentence for words in said) for sentence in refused)

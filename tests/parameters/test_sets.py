@@ -68,6 +68,18 @@ def test_replace_and_scale(hoist: Drive) -> None:
         ({"Z14": -inf}, "or inf for none"),
         ({"tau": -0.01}, "at least 0"),
         ({"tau": 11.0}, "below 10"),
+        # refinements
+        ({"spool_friction": -0.1}, r"spool_friction .* is -0.1 N, but must be at least 0"),
+        ({"spool_friction": (0.1, 0.2)}, "spool_friction has one value"),
+        ({"dither_time": 0.0}, "dither_time .* must be above 0, or inf for none"),
+        ({"spool_friction": 0.1, "dither_time": 0.6}, "spool_presliding is 0.* give that travel"),
+        ({"line_stiffness": 1e6}, "line_stiffness is 1e.06 N m/rad, but load_inertia is 0: give"),
+        ({"cam_ripple": 1.0}, "cam_ripple .* at least 0 and below 1"),
+        (
+            {"cam_ripple": 0.5, "cam_ripple_per_torque": 1e-5, "load_torque": -6e4},
+            r"cam_ripple \+ cam_ripple_per_torque·\|load_torque\| is 1.1, but must be below 1",
+        ),
+        ({"spool_frction": 0.1}, "did you mean spool_friction"),
     ],
 )
 def test_broken_rules_are_sentences(hoist: Drive, changes: dict, sentence: str) -> None:

@@ -12,7 +12,6 @@ from swashplate.campaign import (
     DIFFERENTIATOR,
     LOW_PASS,
     Encoder,
-    interpolate_counts,
     speed_from_angle,
 )
 
@@ -58,12 +57,6 @@ def test_erratum_25_eq_7_6_has_its_inequality_reversed(deg_s: float, shared: boo
     assert bool(np.any(np.diff(counts) == 0.0)) == shared
     assert (2.0 * np.pi / (HOIST_TURN * speed) > H) == shared
     assert HOIST_TURN * speed / (2.0 * np.pi) > H
-
-
-def test_section_7_2_interpolates_between_changes_of_the_count() -> None:
-    time = np.arange(8) * H
-    filled = interpolate_counts(time, [0, 0, 0, 3, 3, 5, 5, 5])
-    assert filled == pytest.approx([0, 1, 2, 3, 4, 5, 5, 5])
 
 
 def test_eq_7_7_cut_offs() -> None:

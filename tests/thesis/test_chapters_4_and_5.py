@@ -46,12 +46,6 @@ def test_erratum_05_negative_channel_takes_magnitudes(hoist: Drive, volts: float
         assert literal + magnitude == pytest.approx(0.013, abs=0.0005)
 
 
-def test_erratum_05_decay_of_table_4_4_would_grow() -> None:
-    """exp(-a t) with the printed -21.379 doubles every 32 ms."""
-    assert np.log(2.0) / 21.379 == pytest.approx(0.032, abs=0.0005)
-    assert min(Drive.preset("hoist")["a"].values) > 0.0
-
-
 def test_erratum_32_multiples_of_zero_do_not_move(hoist: Drive) -> None:
     for symbol in ("C", "Z2", "Z7", "Z11", "Z12"):
         assert set(hoist[symbol].values) == {0.0}
