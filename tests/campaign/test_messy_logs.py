@@ -4,9 +4,9 @@ import tomllib
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
-import h5py
 import numpy as np
 import pytest
+from tests.logs.writing import write_log
 
 from swashplate import Campaign, Drive, FileError, InputError, ParameterError
 from swashplate.campaign import campaign_findings, draft_campaign, examine, unsigned_currents
@@ -353,33 +353,11 @@ def test_a_run_that_begins_in_motion(drafted: Drafted, what: str, begin: float) 
 # --- files whose groups have their own time -------------------------------------------------------
 
 
-def write_groups(log: Path, groups: Mapping[str, tuple[np.ndarray, str, np.ndarray, str]]) -> None:
-    """Groups of a time and a named column with its unit, in the form of the file's ending."""
-    if log.suffix == ".h5":
-        with h5py.File(log, "w") as file:
-            for group, (time, name, values, unit) in groups.items():
-                file[f"{group}/time"], file[f"{group}/{name}"] = time, values
-                file[f"{group}/{name}"].attrs["unit"] = unit
-    elif log.suffix == ".mf4":
-        asammdf = pytest.importorskip("asammdf")
-        with asammdf.MDF(version="4.10") as mdf:
-            for group, (time, name, values, unit) in groups.items():
-                mdf.append(asammdf.Signal(values, time, unit, name), acq_name=group)
-            mdf.save(log)
-    else:
-        nptdms = pytest.importorskip("nptdms")
-        with nptdms.TdmsWriter(log) as file:
-            for group, (time, name, values, unit) in groups.items():
-                given = {"unit_string": unit}
-                pair = [nptdms.ChannelObject(group, "time", time)]
-                file.write_segment([*pair, nptdms.ChannelObject(group, name, values, given)])
-
-
 @pytest.mark.parametrize("suffix", [".h5", ".mf4", ".tdms"])
 def test_each_group_has_its_own_clock(tmp_path: Path, suffix: str) -> None:
     log, late, speed = tmp_path / f"log{suffix}", TIME[::2] + 1e-3, lagged(BOTH)[::2]
-    commanded = (TIME, "voltage", BOTH, "V")
-    write_groups(log, {"cmd": commanded, "meas": (late, "speed", speed, "rad/s")})
+    groups = {"cmd": {"time": TIME, "voltage": BOTH}, "meas": {"time": late, "speed": speed}}
+    write_log(log, groups, units={"voltage": "V", "speed": "rad/s"})
     path = tmp_path / "campaign.toml"
     path.write_text(draft_campaign([log], tmp_path, drive="hoist"), "utf-8")
     tests = Campaign.from_toml(path)
