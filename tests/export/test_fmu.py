@@ -75,20 +75,22 @@ class Master:
         self.set(**values)
         self.fmu.exitInitializationMode()
 
+    def call(self, two: str, three: str, *arguments: Any) -> Any:
+        """A function by its names in FMI 2.0 and 3.0."""
+        return getattr(self.fmu, two if self.two else three)(*arguments)
+
     def set(self, **values: float) -> None:
         for name, value in values.items():
             variable = self.by_name[name]
-            references = [variable.valueReference]
-            if variable.type == "Boolean":
-                self.fmu.setBoolean(references, [value])
-            elif self.two:
-                self.fmu.setReal(references, [value])
-            else:
-                self.fmu.setFloat64(references, [value])
+            real = "setBoolean" if variable.type == "Boolean" else "setReal"
+            other = "setBoolean" if variable.type == "Boolean" else "setFloat64"
+            self.call(real, other, [variable.valueReference], [value])
+
+    def read(self, references: list[int]) -> list[float]:
+        return self.call("getReal", "getFloat64", references)
 
     def get(self, *names: str) -> list[float]:
-        references = [self.by_name[name].valueReference for name in names]
-        return self.fmu.getReal(references) if self.two else self.fmu.getFloat64(references)
+        return self.read([self.by_name[name].valueReference for name in names])
 
     def step(self, time: float, interval: float) -> None:
         self.fmu.doStep(currentCommunicationPoint=time, communicationStepSize=interval)
@@ -96,22 +98,15 @@ class Master:
     @property
     def state(self) -> bytes:
         """The state, serialized."""
-        if self.two:
-            kept = self.fmu.getFMUstate()
-            made = self.fmu.serializeFMUstate(kept)
-            self.fmu.freeFMUstate(kept)
-        else:
-            kept = self.fmu.getFMUState()
-            made = self.fmu.serializeFMUState(kept)
-            self.fmu.freeFMUState(kept)
+        kept = self.call("getFMUstate", "getFMUState")
+        made = self.call("serializeFMUstate", "serializeFMUState", kept)
+        self.call("freeFMUstate", "freeFMUState", kept)
         return bytes(made)
 
     @state.setter
     def state(self, given: bytes) -> None:
-        if self.two:
-            self.fmu.setFMUstate(self.fmu.deSerializeFMUstate(given))
-        else:
-            self.fmu.setFMUState(self.fmu.deserializeFMUState(given))
+        made = self.call("deSerializeFMUstate", "deserializeFMUState", given)
+        self.call("setFMUstate", "setFMUState", made)
 
     def played(self, voltage: Any, interval: float = H, start: float = 0.0) -> np.ndarray:
         """Outputs at each communication point, each read before the voltage of its instant is set.
@@ -272,8 +267,7 @@ def test_instances_do_not_meet(made, hoist, tmp_path):
             found[which, i] = master.get(*OUTPUTS)
             master.set(voltage=voltages[which][i])
             master.step(i * H, H)
-    free = two.fmu.fmi2FreeInstance if two.two else two.fmu.fmi3FreeInstance
-    free(two.fmu.component)
+    two.call("fmi2FreeInstance", "fmi3FreeInstance", two.fmu.component)
     for which, voltage in enumerate(voltages):
         expected = stepped(hoist, voltage)
         assert np.array_equal(found[which, 1:], expected[1:])
@@ -388,9 +382,8 @@ def test_calls_in_a_wrong_order_fail(made, hoist):
     master.initialize()
     refuses(master, master.fmu.enterInitializationMode)
     refuses(master, lambda: master.set(start_steady=True))  # fixed by then
-    read = master.fmu.getReal if master.two else master.fmu.getFloat64
     for reference in (99, 310, 4_000_000_000):
-        refuses(master, lambda reference=reference: read([reference]))
+        refuses(master, lambda reference=reference: master.read([reference]))
 
 
 def test_late_without_a_delay_unless_inputs_are_set_first(made):
