@@ -73,13 +73,6 @@ def test_eq_6_55_follows_from_6_53() -> None:
     assert sp.simplify(equilibrium(STATIC) - Z1_OF * rise) == 0
 
 
-def test_eq_6_55_angle(points: Callable) -> None:
-    for pressure, Z1, Z2 in points((-6e5, 6e5), (3e-7, 6e-7), (-0.05, 0.05)):
-        p = PUMP._replace(Z1=Z1, Z2=Z2, Z13_plus=1.0, Z13_minus=1.0)
-        found = swash_angle(swash_tangent(pressure, p), p, True)
-        assert found == pytest.approx(np.arctan(Z1 * pressure - Z2), rel=1e-14)
-
-
 def test_erratum_20_eq_6_56_offset_is_zero_and_a_ratio() -> None:
     """Z2 = K_mf C_g A_p d5/(k_r d4²) - Z1 P0; printed is P0, a pressure, in place of Z1 P0."""
     offset = -equilibrium(P0).subs(rise, 0)
