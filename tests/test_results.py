@@ -14,6 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import pytest
 from matplotlib.figure import Figure
+from tests.identification.given import TWO_STAGES
 
 import swashplate
 from swashplate import Campaign, Drive, FullOrderDrive, InputError, Limit, SquaredError, maneuvers
@@ -29,14 +30,11 @@ from swashplate.analysis import (
 )
 from swashplate.campaign import examine, guess_drive, rig
 from swashplate.crane import Crane, Seaway, Stick, TransferFunctions, control
-from swashplate.equations import Model, equation
 from swashplate.full_order import compare
 from swashplate.identification import (
     Fit,
-    Stage,
     fit,
     judge_fit,
-    load_setup,
     outlook,
     predict,
 )
@@ -44,7 +42,6 @@ from swashplate.results import LONGEST
 
 API = Path(__file__).parents[1] / "docs" / "api.toml"
 TESTS = [maneuvers.step(volts, stop=3.0, length=4.0) for volts in (4.0, -5.0, 9.0)]
-FREE = ("G1", "J", "Z10", "Z8")
 
 
 class Work(NamedTuple):
@@ -59,17 +56,9 @@ class Work(NamedTuple):
 def work(tmp_path_factory: pytest.TempPathFactory) -> Work:
     path = rig.write(rig.run("hoist", TESTS, seed=1), tmp_path_factory.mktemp("tests") / "logs")
     campaign = Campaign.from_toml(path)
-    usual = load_setup("hoist")
-    stages = [
-        Stage(**{**each.model_dump(exclude={"forces", "free"}), "free": free})
-        for each in usual.stages
-        for free in [{name: each.free[name] for name in FREE if name in each.free}]
-    ]
-    setup = usual.model_copy(update={"stages": stages})
-    runs = campaign.select(role="fit")
-    hoist = Drive.preset("hoist")
-    fitted = fit(hoist, campaign, setup)
-    judged = judge_fit(campaign, runs, hoist.parameters, setup, fitted)
+    hoist, runs = Drive.preset("hoist"), campaign.select(role="fit")
+    fitted = fit(hoist, campaign, TWO_STAGES)
+    judged = judge_fit(campaign, runs, hoist.parameters, TWO_STAGES, fitted)
     return Work(campaign, fitted, judged)
 
 
@@ -119,25 +108,6 @@ def analyses(drive: Drive) -> list[Any]:
     ]
 
 
-class Still(NamedTuple):
-    """A law of one's own that does nothing."""
-
-    gain: float
-
-
-class Tip(NamedTuple):
-    """What it adds to the wanted tip."""
-
-    tip_x: float = 0.0
-    tip_y: float = 0.0
-
-
-@equation
-def rest(state: Tip) -> Tip:
-    """The offset stays as it is."""
-    return state
-
-
 def cranes() -> list[object]:
     """A crane, a run of it, and what they are made of."""
     crane = Crane.preset("tg3637")
@@ -149,8 +119,7 @@ def cranes() -> list[object]:
     grid = TransferFunctions(
         "box", np.zeros(1), np.array([0.0, np.pi]), np.linspace(0.5, 2.0, 30), values
     )
-    law = control.Law(Model("still", Still, Tip, rest), Still(0.0))
-    parts = (control.JointShaper("zvd"), control.ShipCompensation(), control.PositionLoop(0.7), law)
+    parts = (control.JointShaper("zvd"), control.ShipCompensation(), control.PositionLoop(0.7))
     return [crane, stick, waves, feedback, *parts, run, grid, crane.stepper()]
 
 
@@ -190,10 +159,10 @@ def test_every_public_class_has_a_short_repr(work: Work) -> None:
     own = {kind: n for kind, n in sizes.items() if not kind.__module__.startswith(inner)}
     assert {kind: n for kind, n in own.items() if n > LONGEST + 40} == {}
     for name, kind in public_classes().items():
-        # a dataclass's own repr will do where there is nothing but numbers and words
+        # a dataclass's own repr will do where there is nothing but numbers, words and models
         if hasattr(kind.__repr__, "__wrapped__") and kind not in sizes:
             kinds = {str(each) for each in getattr(kind, "__annotations__", {}).values()}
-            plain = r"((float|int|str|bool|None|Annotated\[float, .*\])( \| )?)+"
+            plain = r"((float|int|str|bool|None|Any|Model|Annotated\[float, .*\])( \| )?)+"
             assert all(re.fullmatch(plain, each) for each in kinds), name
 
 

@@ -87,6 +87,7 @@ WRONG: list[tuple[Callable[..., Any], tuple[Any, ...], str]] = [
         "The step is .* but must be a number above 0",
     ),
     (lambda what: content_of(what, 0.1), ("hoist", None), "give a Drive or a Model"),
+    (lambda p: content_of(LAG, 0.1, parameters=p), (None, 3), "parameters must be a Lag"),
     (lambda at: linear(at), (3, None, [0.2]), "at is .* but must be a mapping"),
     (lambda x: linear({"command": x}), ("a", nan, [1]), "command is .* but must be a finite"),
     (lambda h: linear(h=h), (inf, nan, -1.0, "a"), "The step is .* must be a number above 0"),

@@ -6,21 +6,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from tests.identification.given import run_of
 
-from swashplate import Campaign, Channel, Drive, Experiment, InputError
-from swashplate.campaign import (
-    Encoder,
-    InputSignal,
-    Source,
-    fit_configuration,
-    guess_drive,
-    guessed_set,
-)
+from swashplate import Campaign, Drive, Experiment, InputError
+from swashplate.campaign import Encoder, fit_configuration, guess_drive, guessed_set
 from swashplate.identification.setup import Setup
 
 RATE = 500.0
 TIME = np.arange(int(12.0 * RATE)) / RATE
-SOURCE = Source(Path("log.csv"), "x")
 DEAD, GAIN, LAG, DELAY = (0.8, 0.5), (0.4, 0.6), 0.15, 0.06
 
 
@@ -62,12 +55,7 @@ def runs(
         values = speed + random.normal(0.0, noise, TIME.size)
         if kind == "position":
             values = np.round(position + random.normal(0.0, rough, TIME.size), 3)
-        unit = "rad/s" if kind == "shaft_speed" else "rad"
-        channel = Channel("measured", kind, unit, TIME, values, np.ones(TIME.size), SOURCE)
-        signal = InputSignal("voltage", "V", TIME, command, "previous", SOURCE)
-        made.append(
-            Experiment(name, "winch", name, "fit", "rest", None, signal, {"measured": channel})
-        )
+        made.append(run_of(name, command, {kind: values}, time=TIME, hold="previous"))
     return made
 
 
@@ -123,8 +111,8 @@ def test_an_encoder_of_few_pulses_shows_no_jump(pulses: float) -> None:
         encoder = Encoder(pulses, 1.0, 1, None)
         counts = np.floor(position / encoder.angle_per_count + 0.3)
         read = {"counts": counts, "values": counts * encoder.angle_per_count, "encoder": encoder}
-        channel = replace(each["measured"], kind="encoder_counts", **read)
-        made.append(replace(each, channels={"measured": channel}))
+        channel = replace(each["position"], kind="encoder_counts", **read)
+        made.append(replace(each, channels={"counts": channel}))
     found = guess_drive(made)
     assert found.jump == (0.0, 0.0)
     assert found.gain == pytest.approx(GAIN, rel=0.08)
@@ -168,13 +156,13 @@ def test_a_way_that_was_not_tried_is_the_other_s_and_fixed() -> None:
 
 def test_what_tells_nothing_is_refused() -> None:
     (sine, *_) = runs()
-    speed = sine["measured"]
+    speed = sine["shaft_speed"]
     for changes, said in (
         ({"values": -speed.values}, "against the command: reverse it with sign = -1"),
         ({"weight": np.zeros(TIME.size)}, "No run measures a motion"),
     ):
         with pytest.raises(InputError, match=said):
-            guess_drive([replace(sine, channels={"measured": replace(speed, **changes)})])
+            guess_drive([replace(sine, channels={"speed": replace(speed, **changes)})])
     with pytest.raises(InputError, match="needs a command in V"):
         guess_drive([replace(sine, input=replace(sine.input, kind="other", unit="%"))])
 

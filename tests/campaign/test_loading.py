@@ -114,19 +114,6 @@ def test_missing_samples_are_refused_or_dropped_and_counted(edited: Edit) -> Non
     assert up["counts"].time.size == 101
 
 
-def test_a_counter_that_rolls_over(edited: Edit) -> None:
-    text = ["time,joystick,ammeter,counts"]
-    text += [f"{10 * k},{0 if k < 5 else 4000},0,{(30 * k) % 256}" for k in range(60)]
-    path = edited(
-        'file = "up.csv"',
-        'file = "up.csv"\naxes.winch.channels.counts.rolls_over_at = 256',
-    )
-    (path.parent / "up.csv").write_text("\n".join(text) + "\n", "utf-8")
-    counts = Campaign.from_toml(path)["up"]["counts"].counts
-    assert counts is not None
-    assert counts[-1] == 30 * 59
-
-
 @pytest.mark.parametrize(
     ("old", "new", "sentence"),
     [

@@ -3,12 +3,10 @@
 from collections.abc import Callable
 from pathlib import Path
 
-import h5py
 import numpy as np
 import polars as pl
 import pytest
-from asammdf import MDF, Signal
-from nptdms import ChannelObject, TdmsWriter
+from tests.logs.writing import write_log
 
 from swashplate import FileError, InputError
 from swashplate.campaign import Campaign
@@ -83,29 +81,10 @@ def test_the_table_serves_until_the_log_changes(long, tmp_path):
     assert pl.read_parquet_schema(beside).names() == ["0", "1", "2"]  # what is asked for
 
 
-def written(path: Path, table: dict[str, np.ndarray]) -> None:
-    """The table as a file of its ending: Parquet, HDF5, TDMS in three segments, or MDF."""
-    if path.suffix == ".parquet":
-        pl.DataFrame(table).write_parquet(path)
-    elif path.suffix == ".h5":
-        with h5py.File(path, "w") as file:
-            for name, column in table.items():
-                file[name] = column
-    elif path.suffix == ".tdms":
-        with TdmsWriter(path) as writer:
-            for part in np.array_split(np.arange(ROWS), 3):
-                channels = [ChannelObject("a", name, each[part]) for name, each in table.items()]
-                writer.write_segment(channels)
-    else:
-        with MDF(version="4.10") as mdf:
-            mdf.append([Signal(table[name], table["time"], name=name) for name in ("u", "n")])
-            mdf.save(path, overwrite=True)
-
-
 @pytest.mark.parametrize("suffix", ["parquet", "h5", "tdms", "mf4"])
 def test_a_span_of_a_log_that_can_be_read_in_parts(long, tmp_path, suffix):
     time, u, n = signals()
-    written(tmp_path / f"log.{suffix}", {"time": time, "u": u, "n": n})
+    write_log(tmp_path / f"log.{suffix}", {"a": {"time": time, "u": u, "n": n}}, segments=3)
     toml = TOML.replace("log.csv", f"log.{suffix}") + "span = { from = 50.0 }\n"
     (found,) = long(toml=toml)
     assert found.name == "log from 58 s"
@@ -117,11 +96,8 @@ def test_a_span_of_a_log_that_can_be_read_in_parts(long, tmp_path, suffix):
 
 def test_a_long_log_whose_columns_differ_in_length(long, tmp_path, monkeypatch):
     time, u, n = signals()
-    with TdmsWriter(tmp_path / "log.tdms") as writer:
-        fast = {"time": time, "u": u}
-        writer.write_segment([ChannelObject("fast", *each) for each in fast.items()])
-        slow = {"stamp": time[::2], "n": n[::2]}
-        writer.write_segment([ChannelObject("slow", *each) for each in slow.items()])
+    groups = {"fast": {"time": time, "u": u}, "slow": {"stamp": time[::2], "n": n[::2]}}
+    write_log(tmp_path / "log.tdms", groups)
     toml = TOML.replace("log.csv", "log.tdms").replace('"n",', '"n", time = { column = "stamp" },')
     (found,) = long(toml=toml)
     assert found.input.time.size == 2 * found["speed"].time.size == ROWS

@@ -48,19 +48,6 @@ def test_from_logs_to_a_check(run: Callable[..., Result], done: Words, logs: lis
     assert run("campaign", "check", "--strict").exit_code == 1
 
 
-def test_a_wrong_sign_and_a_long_name(done: Words, logs: list[str], tmp_path: Path) -> None:
-    done("campaign", "init", *logs, *COUNTS)
-    path, name = tmp_path / "campaign.toml", "encoder_counts_of_the_drum_behind_the_gear"
-    text = path.read_text("utf-8").replace("counts_per_turn", "sign = -1\ncounts_per_turn")
-    path.write_text(text.replace("channels.encoder_counts", f"channels.{name}"), "utf-8")
-    said = done("campaign", "check")
-    assert "moves against the input: should its sign be -1? " in " ".join(said.split())
-    # folded, so that the columns behind it are there: the last one counts lost counts
-    lines = said.splitlines()
-    rows = [k for k, line in enumerate(lines) if re.match(r"encoder_counts_of\S*  .* 0$", line)]
-    assert [lines[k].split()[0] + lines[k + 1].strip() for k in rows] == [name] * 2
-
-
 TACHO = """
 [axes.hoist]
 drive = "hoist"

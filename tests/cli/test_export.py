@@ -36,13 +36,3 @@ def test_writes_c_and_compiles_it(done, tmp_path):
     library = tmp_path / "folder" / f"{header.stem}.so"
     assert library.exists()
     assert f"C: folder/{library.name}" in said
-
-
-def test_writes_webassembly_with_the_drives_numbers(done, tmp_path):
-    wasmtime = pytest.importorskip("wasmtime")
-    assert "WebAssembly: a.wasm" in done("export", "hoist", "--wasm", "a.wasm")
-    content = (tmp_path / "a.wasm").read_bytes()
-    store = wasmtime.Store()
-    module = wasmtime.Module(store.engine, content)
-    assert module.imports == []
-    assert b"swashplate.values" in content

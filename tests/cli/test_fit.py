@@ -12,6 +12,7 @@ from pathlib import Path
 
 import pytest
 from tests.cli.conftest import STEPS
+from tests.shown import check_shown
 from typer.testing import Result
 
 from swashplate import Campaign, Drive
@@ -299,21 +300,6 @@ def test_the_main_job(done, tmp_path):
     assert inside > 0.8 * counted
     for name in ("drive.toml", "estimates.csv", "report.html"):
         assert f"sub/demo/{name}" in printed
-    check_readme(printed)
-
-
-def check_readme(printed: str) -> None:
-    """The README shows lines of this output, with all but the last digits of its numbers."""
     readme = (Path(__file__).parents[2] / "README.md").read_text("utf-8")
     (shown,) = re.findall(r"```text\n(parameter .*?)```", readme, re.DOTALL)
-    lines = [line.split() for line in printed.splitlines()]
-    for words in (line.split() for line in shown.splitlines()):
-        if words != ["..."] and "─" not in words[0]:
-            assert any(len(words) == len(each) and all(map(alike, words, each)) for each in lines)
-
-
-def alike(shown: str, printed: str) -> bool:
-    try:
-        return float(printed) == pytest.approx(float(shown), rel=2e-3)
-    except ValueError:
-        return printed == shown
+    check_shown(f"...\n{shown}\n...", printed, "README.md", share=2e-3)

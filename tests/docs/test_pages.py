@@ -32,6 +32,7 @@ from pathlib import Path
 from shutil import which
 
 import pytest
+from tests.shown import check_shown, lines, same
 from typer.testing import CliRunner
 
 from swashplate.campaign import CampaignFile
@@ -48,7 +49,6 @@ ELSEWHERE = {"examples.md"}
 each_page = pytest.mark.parametrize("page", PAGES, ids=lambda path: str(path.relative_to(ROOT)))
 
 BLOCK = re.compile(r"^```([^\n`]*)\n(.*?)^```[ \t]*$", re.MULTILINE | re.DOTALL)
-NUMBER = re.compile(r"(?<![\w.+−-])[-+−]?\d+(?:,\d{3})*(\.\d+)?(e[-+]?\d+)?(?![\w.]*_)")
 TARGETS = set(re.findall(r"^([.a-z-]+):.*##", (ROOT / "Makefile").read_text("utf-8"), re.MULTILINE))
 NOT_RUN = (
     r"(cd|mkdir) \S+",
@@ -65,44 +65,6 @@ def blocks(text: str) -> list[tuple[str, str]]:
         "an indented block of code, which would not be run: fence it"
     )
     return [(language.strip(), content) for language, content in BLOCK.findall(text)]
-
-
-def close(shown: re.Match[str], printed: re.Match[str]) -> bool:
-    """Whether two numbers agree to 2 % or one unit of the last digit that is shown."""
-    a, b = (float(each[0].replace(",", "").replace("−", "-")) for each in (shown, printed))
-    unit = 10.0 ** (int((shown[2] or "e0")[1:]) - max(len(shown[1] or "") - 1, 0))
-    return abs(a - b) <= max(0.02 * abs(a), 1.001 * unit)
-
-
-def same(shown: str, printed: str) -> bool:
-    """Whether a line that is shown is the one that was printed; `` ...`` ends one that goes on."""
-    if shown.endswith(" ..."):
-        shown = shown.removesuffix(" ...")
-        printed = " ".join(printed.split()[: len(shown.split())])
-    if NUMBER.sub("0", shown) != NUMBER.sub("0", printed):
-        return False
-    return all(map(close, NUMBER.finditer(shown), NUMBER.finditer(printed)))
-
-
-def lines(text: str) -> list[str]:
-    """Its lines that are not empty, spaces and rules shortened."""
-    words = (" ".join(re.sub("─+", "─", line).split()) for line in text.splitlines())
-    return [line for line in words if line]
-
-
-def check_shown(shown: str, printed: str, by: str) -> None:
-    """Fail unless the lines shown are the lines printed, ``...`` for any that are left out."""
-    rest, free = lines(printed), False
-    for line in lines(shown):
-        if line == "...":
-            free = True
-            continue
-        found = next((k for k, each in enumerate(rest) if same(line, each)), None)
-        at_once = f"\nprinted {rest[0]}" if rest and not free else ""
-        assert found is not None, f"{by}\nshows   {line}{at_once}\n\n{printed}"
-        assert free or found == 0, f"{by}\nshows   {line}{at_once}\n\n{printed}"
-        rest, free = rest[found + 1 :], False
-    assert free or not rest, f"{by}\nprinted more: {rest[0]}"
 
 
 @contextmanager

@@ -12,6 +12,7 @@ from types import ModuleType
 from typing import Any, NamedTuple
 
 import pytest
+from tests.shown import check_shown
 
 ROOT = Path(__file__).parents[2]
 PAGE = ROOT / "docs" / "examples.md"
@@ -61,24 +62,13 @@ def load_example() -> Iterator[Callable[[str], ModuleType]]:
         yield load
 
 
-def stated(name: str) -> str:
-    """What the page says that an example prints."""
-    text = PAGE.read_text("utf-8")
-    (found,) = re.findall(rf"examples/{name}\.py\n.*?```text\n(.*?)```", text, re.DOTALL)
-    return found
-
-
-def same(printed: str, said: str) -> None:
-    """Equal words, and numbers that differ by what another processor may round."""
-    number = re.compile(r"[-+]?\d+\.?\d*(?:e[-+]?\d+)?")
-    assert number.sub("#", printed).split() == number.sub("#", said).split()
-    for ours, theirs in zip(number.findall(printed), number.findall(said), strict=True):
-        mantissa, _, exponent = theirs.partition("e")
-        decimals = len(mantissa.partition(".")[2])
-        last = 10.0 ** (int(exponent or 0) - decimals) if decimals else 1.0
-        assert float(ours) == pytest.approx(float(theirs), abs=1.01 * last), (ours, theirs)
-
-
 @pytest.fixture
 def matches_page() -> Callable[[str, str], None]:
-    return lambda name, printed: same(printed, stated(name))
+    """What an example prints is what the page says, but for what another processor may round."""
+
+    def check(name: str, printed: str) -> None:
+        text = PAGE.read_text("utf-8")
+        (said,) = re.findall(rf"examples/{name}\.py\n.*?```text\n(.*?)```", text, re.DOTALL)
+        check_shown(said, printed, name, share=0.0)
+
+    return check

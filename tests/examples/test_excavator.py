@@ -65,6 +65,10 @@ def test_traps_of_the_data(excavator: ModuleType) -> None:
         # mm and cm come out alike, and each command begins at neutral
         assert 0.0 <= each["position"].values.min() < each["position"].values.max() < 0.13
         assert each.input.values[0] == pytest.approx(0.0, abs=1e-9)
+        assert each.maneuver == "unnamed motion"  # of hands at a joystick
+    # irregular stamps are kept as they are
+    stamps = tests["manual_1021_mitch boom"].input.time
+    assert stamps[:2].tolist() == [0.00605297088623, 0.0761840343475]
 
 
 def table() -> list[list[str]]:

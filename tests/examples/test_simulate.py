@@ -1,4 +1,4 @@
-"""examples/simulate.py: what it prints is what Kruse's numbers and equations say."""
+"""examples/simulate.py: what it prints is what Kruse's equations say."""
 
 import re
 from collections.abc import Callable
@@ -17,14 +17,6 @@ def run(run_example: Callable[..., Any]) -> Any:
 
 def test_the_page(run: Any, matches_page: Callable[[str, str], None]) -> None:
     matches_page("simulate", run.printed)
-
-
-def test_steady_speeds_are_the_source_s(run: Any) -> None:
-    rows = re.findall(r"^(\w+)\s+at .*?V:(.*) deg/s$", run.printed, re.MULTILINE)
-    speeds = {name: [float(each) for each in row.split()] for name, row in rows}
-    # at -9, -4, 4 and 9 V; the middle is the creep
-    assert speeds["hoist"] == [-185.0, -85.72, 3.09, 97.75, 196.0]
-    assert speeds["slew"] == [-4.29, -3.06, 0.0, 3.23, 4.24]
 
 
 def test_without_its_stop_the_plate_is_where_the_spool_balances(run: Any) -> None:

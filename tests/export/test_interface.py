@@ -157,15 +157,6 @@ def test_a_corrected_sample_is_as_if_the_command_had_been_known(
         guess = voltage
 
 
-def test_with_a_delay_no_output_waits_for_the_newest_command(hoist: Drive, in_c: Any) -> None:
-    drive = hoist.replace(tau=1.5 * H)
-    known, late = in_c(drive), in_c(drive)
-    for voltage in COMMAND.tolist():
-        assert known.step(voltage) == late.step(0.0) == OK
-        assert outputs(known) == outputs(late)
-        assert late.correct(voltage) == OK
-
-
 def test_inputs_set_and_cleared(hoist: Drive, in_c: Any) -> None:
     model, plain = in_c(hoist), in_c(hoist)
     speed = model.number("_input", "pump_speed")

@@ -13,7 +13,7 @@ from tests.export.conftest import InC
 from tests.export.webassembly import Page
 from tests.simulation.test_own_equation import DRAGGED
 
-from swashplate import Drive, InputError
+from swashplate import Drive
 from swashplate.equations import (
     Model,
     Tap,
@@ -131,15 +131,6 @@ def exported(model: Model, compiled: Any, rate: float, **numbers: Any) -> InC:
     return InC(compiled(interface(content.exported)), model.name, content.values)
 
 
-def test_a_valve_has_the_bits_of_its_march(compiled: Any) -> None:
-    run = simulate(valve, P, {"command": COMMAND}, 100.0, given=STROKE)
-    model = exported(valve, compiled, 100.0, parameters=P, given=STROKE)
-    found = model.run(COMMAND, ["opening", "position"])
-    for name, values in found.items():
-        assert (run[name] == values).all()
-    assert np.ptp(found["position"]) > 0.1
-
-
 @pytest.mark.parametrize(
     "options", [Ways(), Ways(rough=True), Ways(stepped=True), Ways(True, True)]
 )
@@ -161,17 +152,6 @@ def test_roots_tables_loops_and_options_have_the_bits_of_the_march(
     assert np.ptp(run["level"]) > 0.1
 
 
-def test_models_in_series_have_the_bits_of_their_march(compiled: Any) -> None:
-    line = join("line", tank, follower, links={"gap": gap}, integrals={"travel": "place"})
-    numbers = line.parameters(NUMBERS, Lag(0.1))
-    given = line.given(AROUND)
-    run = simulate(line, numbers, {"pumped": PUMPED}, RATE, given=given)
-    model = exported(line, compiled, RATE, parameters=numbers, given=given)
-    found = model.run(PUMPED, ["place", "gap", "travel", "level"])
-    for name, values in found.items():
-        assert (run[name] == values).all(), name
-
-
 class Oil(NamedTuple):
     stiffness: float
     drag: float
@@ -185,16 +165,6 @@ class Motion(NamedTuple):
 @equation
 def oil_rates(state: Motion, flow: float, p: Oil) -> Motion:
     return Motion(p.stiffness * (flow - state.speed), state.pressure - p.drag * state.speed)
-
-
-def test_continuous_equations_have_the_bits_of_their_march(compiled: Any) -> None:
-    cylinder = Model("cylinder", Oil, Motion, discretised(oil_rates, "midpoint"))
-    p = Oil(40.0, 2.0)
-    run = simulate(cylinder, p, {"flow": PUMPED}, RATE)
-    found = exported(cylinder, compiled, RATE, parameters=p).run(PUMPED, ["pressure", "speed"])
-    for name, values in found.items():
-        assert (run[name] == values).all()
-    assert np.ptp(found["pressure"]) > 0.1
 
 
 class Lag(NamedTuple):
@@ -216,6 +186,32 @@ def gap(head: float, place: float) -> float:
 
 
 follower = Model("follower", Lag, Place, follow)
+
+
+CYLINDER = Model("cylinder", Oil, Motion, discretised(oil_rates, "midpoint"))
+SERIES = join("line", tank, follower, links={"gap": gap}, integrals={"travel": "place"})
+MODELS = {
+    "valve": (valve, P, STROKE, "command", COMMAND, "opening position"),
+    "in series": (
+        SERIES,
+        SERIES.parameters(NUMBERS, Lag(0.1)),
+        SERIES.given(AROUND),
+        "pumped",
+        PUMPED,
+        "place gap travel level",
+    ),
+    "continuous": (CYLINDER, Oil(40.0, 2.0), None, "flow", PUMPED, "pressure speed"),
+}
+
+
+@pytest.mark.parametrize("case", MODELS.values(), ids=MODELS)
+def test_a_model_has_the_bits_of_its_march(case: Any, compiled: Any) -> None:
+    model, numbers, given, name, command, outputs = case
+    run = simulate(model, numbers, {name: command}, RATE, given=given)
+    found = exported(model, compiled, RATE, parameters=numbers, given=given)
+    for output, values in found.run(command, outputs.split()).items():
+        assert np.ptp(values) > 0.1, output
+        assert (run[output] == values).all(), output
 
 
 def test_a_domain_that_is_left_is_said(compiled: Any) -> None:
@@ -336,15 +332,6 @@ def test_names_that_c_keeps_for_itself(compiled: Any, tmp_path: Path) -> None:
     np.testing.assert_allclose(last, run["register"][::10], rtol=1e-8)
 
 
-def test_steps_that_are_none_are_refused(hoist: Drive, tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="step"):
-        c(valve, tmp_path, 0.0, parameters=P, given=STROKE)
-    with pytest.raises(InputError, match="1/512"):
-        c(hoist, tmp_path, 0.1)
-    with pytest.raises(InputError, match="parameters must be a Valve"):
-        c(valve, tmp_path)
-
-
 @equation
 def slower_root(head: float) -> float:
     return 0.9 * head / (1.0 + abs(head) ** 2 / 1e14)
@@ -366,6 +353,3 @@ def test_a_drive_with_an_equation_of_its_own_has_it_in_c(
     assert (run.shaft_speed == found).all()
     plain = hoist.simulate(command, 512.0, interpolation="previous", start="steady")
     assert (plain.shaft_speed != found).any()
-
-
-# --- what has no counterpart ----------------------------------------------------------------------

@@ -17,9 +17,8 @@ from swashplate.logs import open_log
 
 
 def text(content: str | bytes) -> Callable[[Path], None]:
-    return lambda path: (
-        path.write_bytes(content if isinstance(content, bytes) else content.encode()) and None
-    )
+    raw = content if isinstance(content, bytes) else content.encode()
+    return lambda path: path.write_bytes(raw) and None
 
 
 def rows(*more: str) -> Callable[[Path], None]:
@@ -29,15 +28,6 @@ def rows(*more: str) -> Callable[[Path], None]:
     return text("\n".join(lines) + "\n")
 
 
-def hdf5_of(**datasets: object) -> Callable[[Path], None]:
-    def write(path: Path) -> None:
-        with h5py.File(path, "w") as file:
-            for name, options in datasets.items():
-                file.create_dataset(name, **options)
-
-    return write
-
-
 def cut(write: Callable[[Path], None], share: float) -> Callable[[Path], None]:
     def damage(path: Path) -> None:
         write(path)
@@ -45,6 +35,22 @@ def cut(write: Callable[[Path], None], share: float) -> Callable[[Path], None]:
         path.write_bytes(content[: int(share * len(content))])
 
     return damage
+
+
+def claims(numbers: int) -> Callable[[Path], None]:
+    """HDF5 that says it has so many numbers, and stores none."""
+
+    def write(path: Path) -> None:
+        with h5py.File(path, "w") as file:
+            file.create_dataset("voltage", (numbers,), "f8", chunks=(1000,))
+
+    return write
+
+
+def disguised(path: Path) -> None:
+    """Parquet by another ending."""
+    parquet(path.with_name("other.parquet"))
+    path.with_name("other.parquet").rename(path)
 
 
 def changed(
@@ -70,15 +76,6 @@ def bomb(path: Path) -> None:
     packed = zlib.compress(inner + bytes(1000))
     header = b"MATLAB 5.0 MAT-file".ljust(124) + b"\x00\x01IM"
     path.write_bytes(header + struct.pack("<II", 15, len(packed)) + packed)
-
-
-def table_of(suffix: str) -> Callable[[Path], None]:
-    def write(path: Path) -> None:
-        other = path.with_name(f"other{suffix}")
-        parquet(other)
-        other.rename(path)
-
-    return write
 
 
 def external(path: Path) -> None:
@@ -140,7 +137,7 @@ DAMAGED = [
     ("open.csv", text('a,b\n1,"2\n3,4\n'), "misplaced quotes in data row 1 (line 2)"),
     ("wide.csv", text("time,u\n0,1\n".encode("utf-16")[:-1]), "is no text in utf-16-le"),
     ("excel.csv", text(b"PK\x03\x04" + bytes(50)), "ends in '.csv' but holds Excel or zip"),
-    ("parquet.csv", table_of(".parquet"), "ends in '.csv' but holds Parquet"),
+    ("parquet.csv", disguised, "ends in '.csv' but holds Parquet"),
     # Parquet
     ("text.parquet", text("time,voltage\n0,1\n"), "cannot be read as Parquet"),
     ("cut.parquet", cut(parquet, 0.6), "cut.parquet"),
@@ -158,12 +155,12 @@ DAMAGED = [
     ("block.h5", changed(hdf5, b"x^", b"\xff" * 20), "block.h5 cannot be read as HDF5"),
     (
         "larger.h5",
-        hdf5_of(voltage={"shape": (10**12,), "dtype": "f8", "chunks": (1000,)}),
+        claims(10**12),
         "has 1000000000000 numbers in the 1 columns that are wanted, more than the 100000000",
     ),
     (
         "huge.h5",
-        hdf5_of(voltage={"shape": (10**7,), "dtype": "f8", "chunks": (1000,)}),
+        claims(10**7),
         "'/voltage' claims 10000000 numbers, but none is stored",
     ),
     ("unwritten.h5", unwritten, "'/voltage' has only 1 of its 4 blocks"),

@@ -124,7 +124,6 @@ def test_series_are_si(tmp_path, text, column, unit, options, time, values):
 @pytest.mark.parametrize(
     ("text", "error", "sentence"),
     [
-        ("", FileError, "log.csv is empty"),
         ("time,volts\n0,1\n", InputError, "no column 'voltage'; it has 'time', 'volts'"),
         ("t,voltage\n0,1\n", InputError, "no column 'time'"),
         ("time,voltage [m]\n0,1\n", InputError, "'m', which does not measure the same as V"),

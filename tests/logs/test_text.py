@@ -55,12 +55,7 @@ def test_layout_is_told_from_the_rows(text, all_of, content, form):
 
 @pytest.mark.parametrize(
     ("encoding", "said"),
-    [
-        ("utf-8", ""),
-        ("utf-8-sig", ""),
-        ("utf-16", ", UTF-16"),
-        ("latin-1", ", Latin-1"),
-    ],
+    [("utf-8", ""), ("utf-8-sig", ""), ("utf-16", ", UTF-16"), ("latin-1", ", Latin-1")],
 )
 def test_encodings(text, all_of, encoding, said):
     log = text("time [µs];α\n0;1,5\n0,5;2,5\n".replace("α", "é"), encoding=encoding)
@@ -102,15 +97,7 @@ def test_missing_and_infinite_numbers(text):
     words = [
         "",
         " ",
-        "NaN",
-        "nan",
-        "-NAN",
-        "n/a",
-        "#N/A",
-        "null",
-        "1.#QNAN",
-        "-1.#IND",
-        "-nan(ind)",
+        *["NaN", "nan", "-NAN", "n/a", "#N/A", "null", "1.#QNAN", "-1.#IND", "-nan(ind)"],
     ]
     log = text("time,u\n" + "".join(f"{i},{word}\n" for i, word in enumerate(words)) + "11,1\n")
     numbers = log.read(["u"])["u"]
@@ -160,18 +147,13 @@ def test_options(text, all_of, content, options, expected):
 
 
 @pytest.mark.parametrize(
-    "options",
-    [
-        {"delimiter": ",,"},
-        {"delimiter": "1"},
-        {"decimal": ";"},
-        {"header_row": -1},
-        {"encoding": "zlib"},
-    ],
-)
-def test_options_that_make_no_sense(options):
-    with pytest.raises(InputError, match=next(iter(options))):
-        TextOptions(**options)
+    "option",
+    [("delimiter", ",,"), ("delimiter", "1"), ("decimal", ";"), ("header_row", -1),
+     ("encoding", "zlib")],
+)  # fmt: skip
+def test_options_that_make_no_sense(option):
+    with pytest.raises(InputError, match=option[0]):
+        TextOptions(**dict([option]))
 
 
 def test_a_large_file_is_read_in_pieces(tmp_path, text, all_of, monkeypatch):

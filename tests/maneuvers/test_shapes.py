@@ -65,30 +65,20 @@ def test_multisine_band_is_rounded_to_whole_periods():
 
 def test_hoist_has_the_thirteen_runs_of_the_source():
     runs = maneuvers.source_tests("hoist")
-    sizes = {name: run.sample().size for name, run in runs.items()}
-    assert sizes == {
-        "ramp +1 V/s": 6657,
-        "ramp -1 V/s": 6657,
-        "step +4 V": 5121,
-        "step -4 V": 5121,
-        "step +6.5 V": 5121,
-        "step -6.5 V": 5121,
-        "step +9 V": 5121,
-        "step -9 V": 5121,
-        "sine 4 V 0.1 Hz": 15361,
-        "sine 6.5 V 0.1 Hz": 15361,
-        "sine 9 V 0.1 Hz": 15361,
-        "sine 6.5 V 0.3 Hz": 10241,
-        "sine 9 V 0.3 Hz": 10241,
-    }
-    assert sum(sizes.values()) == 110_605
+    steps = [f"step {sign}{volts} V" for volts in ("4", "6.5", "9") for sign in "+-"]
+    slow = [f"sine {volts} V 0.1 Hz" for volts in ("4", "6.5", "9")]
+    sizes = dict.fromkeys(["ramp +1 V/s", "ramp -1 V/s"], 6657) | dict.fromkeys(steps, 5121)
+    sizes |= dict.fromkeys(slow, 15361)
+    sizes |= dict.fromkeys(["sine 6.5 V 0.3 Hz", "sine 9 V 0.3 Hz"], 10241)
+    assert {name: run.sample().size for name, run in runs.items()} == sizes
     assert all(run.name == name for name, run in runs.items())
 
 
 def test_source_tests_are_what_their_names_say():
-    hoist, slew = maneuvers.source_tests("hoist"), maneuvers.source_tests("slew")
+    hoist, slew, luff = map(maneuvers.source_tests, ("hoist", "slew", "luff"))
     assert hoist["step -6.5 V"](3.0) == -6.5
     assert hoist["ramp -1 V/s"](10.5) == -9.5
+    assert luff["ramp +1 V/s"](10.5) == 9.5
     assert hoist["sine 9 V 0.3 Hz"](1.0 + 0.25 / 0.3) == pytest.approx(9.0)
     # The return of slewing takes 4.5 s: the ramp comes to 7.5 V before it.
     assert slew["ramp +1 V/s"](8.5) == 7.5

@@ -5,12 +5,13 @@ import pickle
 from math import inf, nan
 from pathlib import Path
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from swashplate import Drive, FileError, Pair, ParameterError
-from swashplate.parameters import CATALOGUE, preset_names
+from swashplate.parameters import dump_set, preset_names, read_set
 
 
 def test_presets() -> None:
@@ -67,6 +68,18 @@ def test_replace_and_scale(hoist: Drive) -> None:
         ({"Z14": -inf}, "or inf for none"),
         ({"tau": -0.01}, "at least 0"),
         ({"tau": 11.0}, "below 10"),
+        # refinements
+        ({"spool_friction": -0.1}, r"spool_friction .* is -0.1 N, but must be at least 0"),
+        ({"spool_friction": (0.1, 0.2)}, "spool_friction has one value"),
+        ({"dither_time": 0.0}, "dither_time .* must be above 0, or inf for none"),
+        ({"spool_friction": 0.1, "dither_time": 0.6}, "spool_presliding is 0.* give that travel"),
+        ({"line_stiffness": 1e6}, "line_stiffness is 1e.06 N m/rad, but load_inertia is 0: give"),
+        ({"cam_ripple": 1.0}, "cam_ripple .* at least 0 and below 1"),
+        (
+            {"cam_ripple": 0.5, "cam_ripple_per_torque": 1e-5, "load_torque": -6e4},
+            r"cam_ripple \+ cam_ripple_per_torque·\|load_torque\| is 1.1, but must be below 1",
+        ),
+        ({"spool_frction": 0.1}, "did you mean spool_friction"),
     ],
 )
 def test_broken_rules_are_sentences(hoist: Drive, changes: dict, sentence: str) -> None:
@@ -89,7 +102,6 @@ def test_toml_gives_an_equal_drive_back(name: str, tmp_path: Path) -> None:
 
 @given(st.floats(1e-12, 1e3), st.floats(1e-12, 1e3))
 def test_toml_keeps_every_bit(plus: float, minus: float) -> None:
-    from swashplate.parameters import dump_set, read_set
 
     drive = Drive.preset("hoist").replace(Z16=(plus, minus))
     assert read_set(dump_set(drive.parameters), "text")["Z16"].value == Pair(plus, minus)
@@ -116,7 +128,6 @@ control_card = "rexroth_mdsd_1k_2x_2"
 @pytest.fixture
 def lines() -> dict[str, str]:
     """The hoist's pump and motor, a line a parameter."""
-    from swashplate.parameters import dump_set
 
     text = dump_set(Drive.preset("hoist").parameters).split("[pump_motor]\n")[1]
     return {line.split(" = ")[0]: line for line in text.strip().splitlines()}
@@ -181,19 +192,11 @@ def test_missing_file_and_card(lines: dict[str, str], tmp_path: Path) -> None:
         load(lines, tmp_path, HOIST.replace("2x_2", "9x_9"))
 
 
-def test_catalogue_has_the_models_parameters() -> None:
-    card = [d for d in CATALOGUE.values() if d.block == "control_card"]
-    pump = [d for d in CATALOGUE.values() if d.block == "pump_motor"]
-    assert len(card) == 14
-    assert [d.symbol for d in pump] == [f"Z{k}" for k in range(1, 23)]
-
-
 def test_neutral_set_is_a_straight_line_with_one_lag() -> None:
     """Unit gain each way; the step answer is 1 - exp(-t/T), T = 208333 s/Z8.
 
     Straight are the tangents of the plate's angle, 0.01 a volt: the speed is 100 of its angles.
     """
-    import numpy as np
 
     neutral = Drive.preset("neutral").replace(Z8=1e6 / 4.8 / 0.3)
     volts = np.array([-10.0, 0.0, 0.1, 7.0])

@@ -33,27 +33,19 @@ from swashplate.report.fit_report.runs import (
 from swashplate.report.fit_report.summary import numbers_table
 
 HOSTILE = "</script><img src=x onerror=alert(1)>"
-SETUP = Setup.model_validate(
-    {
-        "title": "two stages",
-        "stages": [
-            {
-                "name": "card",
-                "part": "card",
-                "free": {
-                    "G1": {"relative": (0.5, 2.0), "log": True},
-                    # stands at its upper bound, which lies below the truth
-                    "omega": {"relative": (0.5, 1.1), "log": True, "tied": True},
-                },
-            },
-            {
-                "name": "pump",
-                "part": "pump",
-                "free": {"Z10": {"relative": (0.8, 1.4), "log": True}},
-            },
-        ],
-    }
-)
+
+
+def within(low: float, high: float, **more: object) -> dict[str, object]:
+    return {"relative": (low, high), "log": True, **more}
+
+
+# omega stands at its upper bound, which lies below the truth
+FREE = {
+    "card": {"G1": within(0.5, 2.0), "omega": within(0.5, 1.1, tied=True)},
+    "pump": {"Z10": within(0.8, 1.4)},
+}
+STAGES = [{"name": part, "part": part, "free": free} for part, free in FREE.items()]
+SETUP = Setup.model_validate({"title": "two stages", "stages": STAGES})
 
 
 @pytest.fixture(scope="module")

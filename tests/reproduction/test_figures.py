@@ -4,12 +4,9 @@ import re
 
 import numpy as np
 import pytest
-from matplotlib.patches import FancyBboxPatch
 from reproduction.build import ALL, reproduce
 from reproduction.catalogue import FIGURES
 from reproduction.content import Curve, Diagram, Figure, Reproduction
-from reproduction.diagrams import DIAGRAMS
-from reproduction.drawing import own_canvas
 from reproduction.errata import ERRATA
 
 from swashplate import Drive, InputError, maneuvers
@@ -67,20 +64,6 @@ def test_an_axis_names_all_that_is_drawn_on_it(small: Reproduction) -> None:
                 assert panel.ordinate.endswith(f",\n{words}"), figure.number
                 scaled += 1
     assert scaled > 3
-
-
-@pytest.mark.parametrize("number", sorted(DIAGRAMS))
-def test_arrows_of_a_diagram_have_shafts(number: str) -> None:
-    """Blocks of a row are apart by more than an arrow's head."""
-    canvas = own_canvas(DIAGRAMS[number])
-    canvas.draw_without_rendering()
-    boxes = [each.get_window_extent() for each in canvas.findobj(FancyBboxPatch)]
-    assert len(boxes) > 3
-    for box in boxes:
-        after = [
-            each.x0 - box.x1 for each in boxes if each.x0 > box.x0 and abs(each.y0 - box.y0) < 1.0
-        ]
-        assert min(after, default=1e3) > 0.16 * canvas.dpi
 
 
 def test_the_source_s_filters_delay_the_speed() -> None:

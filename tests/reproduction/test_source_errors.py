@@ -80,44 +80,11 @@ def test_dither_is_averaged_over() -> None:
 PULSE = np.where((TIME >= 1.0) & (TIME < 6.0), 1.0, 0.0)
 
 
-def excluded(name: str, run: ComparedRun) -> np.ndarray:
-    """Samples that one of Kruse's rules leaves out."""
-    (rule,) = (each for each in SOURCE_RULES if each.name == name)
-    return np.broadcast_to(rule.excluded(run), run.time.shape)
-
-
-def test_the_start_transient_is_the_speeds() -> None:
-    early = TIME < 400.0 / 512.0
-    np.testing.assert_array_equal(excluded("start transient", step()), early)
-    assert not excluded("start transient", step(quantity="rectified_current")).any()
-
-
 def test_edges_of_a_step_and_of_a_ramp() -> None:
     np.testing.assert_allclose(edges(step()), [1.0, 6.0])
     ramp = step(kind="ramp", command=np.clip(TIME - 1.0, 0.0, None))
     np.testing.assert_allclose(edges(ramp), [1.1])
     assert edges(step(command=np.zeros(TIME.size))).size == 0
-
-
-def test_overshoot_windows() -> None:
-    expected = ((TIME > 0.95) & (TIME < 2.95)) | ((TIME > 5.95) & (TIME < 7.95))
-    np.testing.assert_array_equal(excluded("overshoot", step()), expected)
-    assert not excluded("overshoot", step(kind="ramp")).any()
-
-
-def test_zero_crossings_are_the_rectified_currents() -> None:
-    out = excluded("zero crossings", sine(quantity="rectified_current"))
-    np.testing.assert_array_equal(out, np.abs(np.sin(0.2 * np.pi * TIME)) < 0.1)
-    assert not excluded("zero crossings", sine()).any()
-    assert not excluded("zero crossings", step(quantity="rectified_current")).any()
-
-
-def test_fast_and_small() -> None:
-    assert excluded("fast sines", sine(0.3)).all()
-    assert not excluded("fast sines", sine(0.1)).any()
-    assert not excluded("fast sines", replace(sine(), frequency=None)).any()
-    found = excluded("small values", step(measured=30.0 * PULSE + 70.0 * PULSE * (TIME > 3.0)))
-    np.testing.assert_array_equal(found, PULSE == 0.0)
 
 
 def test_the_table_of_a_channel() -> None:
@@ -147,3 +114,34 @@ def test_the_table_of_a_channel() -> None:
     ]
     (slew,) = error_tables([compared(step, "rectified_current", simulated)], source_rules("slew"))
     assert slew.rows[0].percent is None
+
+
+EDGES = ((TIME > 0.95) & (TIME < 2.95)) | ((TIME > 5.95) & (TIME < 7.95))
+NONE, ALL = np.zeros(TIME.size, dtype=bool), np.ones(TIME.size, dtype=bool)
+LATE = 30.0 * PULSE + 70.0 * PULSE * (TIME > 3.0)
+
+
+@pytest.mark.parametrize(
+    ("name", "run", "out"),
+    [
+        ("start transient", step(), TIME < 400.0 / 512.0),
+        ("start transient", step(quantity="rectified_current"), NONE),
+        ("overshoot", step(), EDGES),
+        ("overshoot", step(kind="ramp"), NONE),
+        (
+            "zero crossings",
+            sine(quantity="rectified_current"),
+            np.abs(np.sin(0.2 * np.pi * TIME)) < 0.1,
+        ),
+        ("zero crossings", sine(), NONE),
+        ("zero crossings", step(quantity="rectified_current"), NONE),
+        ("fast sines", sine(0.3), ALL),
+        ("fast sines", sine(0.1), NONE),
+        ("fast sines", replace(sine(), frequency=None), NONE),
+        ("small values", step(measured=LATE), PULSE == 0.0),
+    ],
+)
+def test_samples_that_a_rule_leaves_out(name: str, run: ComparedRun, out: np.ndarray) -> None:
+    (rule,) = (each for each in SOURCE_RULES if each.name == name)
+    found = np.broadcast_to(rule.excluded(run), run.time.shape)
+    np.testing.assert_array_equal(found, out)

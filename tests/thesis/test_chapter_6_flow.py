@@ -150,12 +150,6 @@ def test_eq_6_32_to_6_35_stroker_pressure(points: Callable) -> None:
         assert found == pytest.approx(expected(*at), rel=1e-9)
 
 
-def test_eq_6_34_piston_speed(gap: Callable) -> None:
-    d4, angle, turning = sp.symbols("d4 alpha alpha_d")
-    printed = d4 * turning * (1 + sp.tan(angle) ** 2)
-    assert gap(sp.diff(d4 * sp.tan(angle), angle) * turning, printed).largest < 1e-30
-
-
 def test_eq_6_35_valve_flow(points: Callable) -> None:
     for pressure, opening, gain, ahead in points(
         (-5e6, 5e6), (-2e-4, 2e-4), (1e-4, 2e-4), (6e6, 1e7)

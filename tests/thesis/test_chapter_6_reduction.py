@@ -73,13 +73,6 @@ def test_eq_6_55_follows_from_6_53() -> None:
     assert sp.simplify(equilibrium(STATIC) - Z1_OF * rise) == 0
 
 
-def test_eq_6_55_angle(points: Callable) -> None:
-    for pressure, Z1, Z2 in points((-6e5, 6e5), (3e-7, 6e-7), (-0.05, 0.05)):
-        p = PUMP._replace(Z1=Z1, Z2=Z2, Z13_plus=1.0, Z13_minus=1.0)
-        found = swash_angle(swash_tangent(pressure, p), p, True)
-        assert found == pytest.approx(np.arctan(Z1 * pressure - Z2), rel=1e-14)
-
-
 def test_erratum_20_eq_6_56_offset_is_zero_and_a_ratio() -> None:
     """Z2 = K_mf C_g A_p d5/(k_r d4²) - Z1 P0; printed is P0, a pressure, in place of Z1 P0."""
     offset = -equilibrium(P0).subs(rise, 0)
@@ -203,23 +196,6 @@ def test_lumps_have_the_units_of_the_tables() -> None:
     }
     for symbol, lump in lumps.items():
         assert lump.check(unit(CATALOGUE[symbol].unit).dimensionality), symbol
-
-
-def test_table_6_1_names_the_limits() -> None:
-    words = {"Z13": "swash plate", "Z14": "stroke", "Z15": "pressure", "Z16": "orifice"}
-    words["Z17"] = "dead zone"
-    for symbol, word in words.items():
-        assert word in CATALOGUE[symbol].name
-    directional = {each for each in words if CATALOGUE[each].directional}
-    assert directional == {"Z13", "Z16"}  # the two that "will have 2 different values"
-
-
-@pytest.mark.parametrize("name", ["hoist", "slew"])
-def test_stated_stops_lie_about_15_degrees(name: str) -> None:
-    """Section 6.2.5; the luff's lie where its tests ended, at 3.4 and 4.2 degrees (section 7.5)."""
-    assert np.rad2deg(Drive.preset(name)["Z13"].values) == pytest.approx(15.0, abs=1.0)
-    luff = np.rad2deg(Drive.preset("luff")["Z13"].values)
-    assert luff == pytest.approx((3.41, 4.17), abs=0.005)
 
 
 def test_stated_five_states_and_40_hz() -> None:

@@ -12,7 +12,6 @@ from swashplate.campaign import (
     DIFFERENTIATOR,
     LOW_PASS,
     Encoder,
-    interpolate_counts,
     speed_from_angle,
 )
 
@@ -58,12 +57,6 @@ def test_erratum_25_eq_7_6_has_its_inequality_reversed(deg_s: float, shared: boo
     assert bool(np.any(np.diff(counts) == 0.0)) == shared
     assert (2.0 * np.pi / (HOIST_TURN * speed) > H) == shared
     assert HOIST_TURN * speed / (2.0 * np.pi) > H
-
-
-def test_section_7_2_interpolates_between_changes_of_the_count() -> None:
-    time = np.arange(8) * H
-    filled = interpolate_counts(time, [0, 0, 0, 3, 3, 5, 5, 5])
-    assert filled == pytest.approx([0, 1, 2, 3, 4, 5, 5, 5])
 
 
 def test_eq_7_7_cut_offs() -> None:
@@ -117,22 +110,6 @@ def test_erratum_27_what_a_speed_below_its_limit_does_not_show() -> None:
     hard = luff.simulate_current(np.repeat([1.0, -1.0], [5000, 9000])).shaft_speed
     limits = [luff["Z10"].value * each for each in luff["Z13"].values]
     assert (hard.max(), -hard.min()) == pytest.approx(limits, rel=1e-12)
-
-
-@pytest.mark.parametrize(("axis", "settle"), [("hoist", 2.5), ("slew", 4.5), ("luff", 2.5)])
-def test_sections_7_3_to_7_5_tests_end_by_a_cubic(axis: str, settle: float) -> None:
-    """The return takes 2.5 s, on slew 4.5 s, and meets the command and its slope at both ends."""
-    runs = maneuvers.source_tests(axis)
-    run = runs["ramp +1 V/s"]
-    end, begin = run.length, run.length - settle
-    before = begin - 1e-6
-    assert run(begin) == pytest.approx(run(before), abs=1e-5)
-    h = 1e-5
-    rises = [(run(at + h) - run(at)) / h for at in (before - h, begin, end - h)]
-    assert rises == pytest.approx([1.0, 1.0, 0.0], abs=1e-4)
-    assert run(end) == pytest.approx(0.0, abs=1e-12)
-    inside = run(np.linspace(begin, end, 9))
-    assert np.diff(inside, 4) == pytest.approx(np.zeros(5), abs=1e-9)  # a cubic's fourth difference
 
 
 @pytest.mark.parametrize(

@@ -150,12 +150,6 @@ def test_erratum_31_what_the_published_routine_does_otherwise(hoist: Drive, test
     assert np.rad2deg(np.abs(ahead[:-1] - run.shaft_speed[1:]).max()) < 0.05
 
 
-def test_erratum_06_eq_8_6_lost_its_dots(hoist: Drive) -> None:
-    """8.6 sets a current equal to a rate; 3.9, which it repeats, has rates on both sides."""
-    assert hoist["lim2"].unit == "A/s"
-    assert hoist["I_t2"].unit == "A"
-
-
 def test_erratum_15_eq_8_11_limits_the_opening_by_itself(hoist: Drive) -> None:
     """Printed with conditions on α: a small angle would leave a wide open spool unlimited."""
     run = hoist.simulate_current(np.full(3, 0.7))
