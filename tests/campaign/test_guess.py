@@ -195,8 +195,8 @@ file = "{(DATA / "exp_data_1_3.csv").as_posix()}"
 
 def test_a_run_that_goes_the_other_way_is_named() -> None:
     first, second, *others = runs()
-    turned = replace(second["measured"], values=-second["measured"].values)
+    turned = replace(second["shaft_speed"], values=-second["shaft_speed"].values)
     with pytest.raises(
-        InputError, match=f"In {second.name} 'measured' goes against the command, in"
+        InputError, match=f"In {second.name} 'shaft_speed' goes against the command, in"
     ):
-        guess_drive([first, replace(second, channels={"measured": turned}), *others])
+        guess_drive([first, replace(second, channels={"shaft_speed": turned}), *others])
