@@ -66,10 +66,9 @@ def work(tmp_path_factory: pytest.TempPathFactory) -> Work:
         for free in [{name: each.free[name] for name in FREE if name in each.free}]
     ]
     setup = usual.model_copy(update={"stages": stages})
-    runs = campaign.select(role="fit")
     hoist = Drive.preset("hoist")
     fitted = fit(hoist, campaign, setup)
-    judged = judge_fit(campaign, runs, hoist.parameters, setup, fitted)
+    judged = judge_fit(campaign, fitted)
     return Work(campaign, fitted, judged)
 
 

@@ -73,6 +73,13 @@ REACHED = (
     (Limit.RELIEF, "", "Z15"),
 )
 """Limits, the signal whose sign says which side acts, and the parameter that sets them."""
+LIMITS: Mapping[str, str] = {
+    "Z13": "the swash plate's stop Z13",
+    "Z14": "the spool's stop Z14",
+    "Z15": "the relief valve Z15",
+    "Z16": "the orifices' limit Z16",
+}
+"""What a drive may never have reached in the fitted runs, by symbol."""
 
 # --- what drives an experiment --------------------------------------------------------------------
 

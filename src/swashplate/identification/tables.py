@@ -21,7 +21,7 @@ from swashplate.units import chosen_unit, display_unit
 
 if TYPE_CHECKING:
     from swashplate.campaign.experiment import Channel, Experiment
-    from swashplate.identification.assessment import Assessment, Judged
+    from swashplate.identification.assessment import Judged
     from swashplate.identification.fitting import Fit, StageFit
     from swashplate.identification.resampling import Bootstrap, CrossValidation
     from swashplate.identification.validation import Measures, RunQuality
@@ -31,26 +31,18 @@ if TYPE_CHECKING:
 
 
 def estimates_table(
-    assessment: Assessment,
+    stage: StageFit,
     *,
     truth: ParameterSet | None = None,
     bootstrap: Bootstrap | None = None,
     own: bool = False,
 ) -> Table:
-    """Estimates of a stage with their intervals.
+    """Estimates of a stage with their intervals, those of a bootstrap beside them.
 
-    Parameters
-    ----------
-    assessment : Assessment
-        Of the stage.
-    truth : ParameterSet, optional
-        Of virtual tests: what was simulated.
-    bootstrap : Bootstrap, optional
-        Whose intervals stand beside.
-    own : bool
-        Whether the unknowns of single runs are meant, instead of those of the machine.
+    `truth` is what virtual tests were simulated with; with `own` the unknowns of single runs are
+    meant, instead of those of the machine.
     """
-    stage, unknowns = assessment.stage, assessment.stage.problem.unknowns
+    unknowns = stage.problem.unknowns
     redrawn = None if bootstrap is None else bootstrap.intervals()
     known, drawn = "" if truth is None else "tpf", "tpf" if redrawn else ""
     ends = f"{100.0 * LEVEL:g} %"
@@ -76,8 +68,8 @@ def estimates_table(
         ),
         si=True,
     )
-    pairs = zip(unknowns, unknowns.names, _estimates(assessment), strict=True)
-    for k, (unknown, name, (_, value, status, error, low, high, _)) in enumerate(pairs):
+    pairs = zip(unknowns, unknowns.names, _estimates(stage), strict=True)
+    for k, (unknown, name, (_, value, status, error, low, high)) in enumerate(pairs):
         if (unknown.run is None) == own:
             continue
         factor, true, holds = chosen_unit(unknown.unit).factor, None, ""
@@ -123,24 +115,24 @@ def profiles_table(found: Judged) -> Table:
     lower, upper = (Column(f"{side} {ends}", ".5g", none=NONE) for side in ("lower", "upper"))
     columns = (Column("stage"), Column("parameter"), UNIT, Column("estimate", ".5g"), lower, upper)
     made = Table("Profile likelihoods", columns, si=True)
-    for given in found.profiles:
-        stage = next(each for each in found.result.stages if each.stage.name == given.stage)
-        unknown, one = stage.problem.unknowns.items[given.profile.index], given.profile
-        found_ends = (None, None) if one.better is not None else (one.lower, one.upper)
-        numbers = (float(stage.solution.vector[one.index]), *found_ends)
+    for one in found.profiles:
+        stage = found.result.stage(one.stage)
+        unknown = stage.problem.unknowns.items[one.index]
+        ends_found = (None, None) if one.better is not None else (one.lower, one.upper)
+        numbers = (float(stage.solution.vector[one.index]), *ends_found)
         values = (None if each is None else unknown.to_value(each) for each in numbers)
-        made.add(given.stage, found.name_of(given), *values, unit=unknown.unit)
+        made.add(one.stage, one.name, *values, unit=unknown.unit)
     return made
 
 
-def _estimates(assessment: Assessment) -> Sequence[Estimate]:
+def _estimates(stage: StageFit) -> Sequence[Estimate]:
     """The estimates, without intervals where too few samples tell the noise."""
     try:
-        return assessment.uncertainty.estimates
+        return stage.uncertainty.estimates
     except InputError:
-        point = assessment.stage.problem.unknowns.at(assessment.stage.solution.vector)
+        point = stage.problem.unknowns.at(stage.solution.vector)
         values = zip(point.names, point.estimates.tolist(), strict=True)
-        return [Estimate(name, value, "undetermined", *[None] * 4) for name, value in values]
+        return [Estimate(name, value, "undetermined", *[None] * 3) for name, value in values]
 
 
 def truth_count(tables: Sequence[Table]) -> tuple[int, int]:
@@ -267,7 +259,6 @@ def runs_tables(qualities: Sequence[RunQuality]) -> list[Table]:
                 UNIT,
                 Column("NRMSE", ".3g", "1", none="-", key="nrmse"),
                 Column("fit %", ".2f", "1", none="-", key="fit_percent"),
-                Column("R²", ".4f", "1", none="-", key="r_squared"),
                 Column("residuals_correlated_s", ".2g", "1", of="f"),
                 Column("correlation_with_input", "+.2f", "1", of="f"),
                 Column("correlation_band", ".2f", "1", of="f"),
@@ -296,7 +287,7 @@ def runs_tables(qualities: Sequence[RunQuality]) -> list[Table]:
 
 
 def _measures(found: Measures) -> tuple[float | None, ...]:
-    return found.samples, found.rmse, found.nrmse, found.fit_percent, found.r_squared
+    return found.samples, found.rmse, found.nrmse, found.fit_percent
 
 
 def start_words(experiment: Experiment) -> str:
@@ -320,9 +311,9 @@ def ignored_words(experiment: Experiment, channel: Channel) -> str:
 # --- cross-validation -----------------------------------------------------------------------------
 
 
-def folds_tables(found: CrossValidation, assessments: Sequence[Assessment]) -> list[Table]:
+def folds_tables(found: CrossValidation, stages: Sequence[StageFit]) -> list[Table]:
     """Errors held out beside those of the fit to all runs, and the folds."""
-    whole = pooled(with_speeds(each for stage in assessments for each in stage.runs))
+    whole = pooled(with_speeds(each for stage in stages for each in stage.runs))
     held_out = Table(
         "Cross-validation: each part predicted by a fit to the others",
         (
@@ -332,14 +323,13 @@ def folds_tables(found: CrossValidation, assessments: Sequence[Assessment]) -> l
             Column("RMSE fitted", ".3g", none=NONE),
             UNIT,
             Column("ratio", ".2f", "1", none=NONE),
-            Column("R²", ".5f", "1", none=NONE, of="pf"),
             Column("samples", ",d", "1", of="pf"),
         ),
     )
     for name, measures in found.measures.items():
         fitted = whole[name].rmse if name in whole else None
         ratio = measures.rmse / fitted if fitted else None
-        cells = (name, measures.fit_percent, measures.rmse, fitted, ratio, measures.r_squared)
+        cells = (name, measures.fit_percent, measures.rmse, fitted, ratio)
         held_out.add(*cells, measures.samples, unit=found.units[name])
     columns = (Column("fold", "d"), Column("held out", wrap=True), Column("fit to the others"))
     folds = Table("Folds", (*columns, Column("fit % of those held out")))
