@@ -161,11 +161,7 @@ def _interval_words(stages: Sequence[StageFit], found: ParameterSet) -> dict[str
                 forces = ("Z19", "Z20", "Z21", "Z22")
                 words |= {symbol: ["from the fitted forces"] for symbol in forces}
             elif unknown.run is None:
-                low, high = estimate.lower, estimate.upper
-                ends: str = estimate.status
-                if low is not None or high is not None:
-                    ends = f"{'none below' if low is None else f'{low:.5g}'} to "
-                    ends += "none above" if high is None else f"{high:.5g}"
+                ends = " to ".join(filter(None, estimate.ends()))
                 for target in (each for each in unknown.targets if each in found.numbers):
                     side = target.rpartition("_")[2]
                     side = f"{side} " if side in ("plus", "minus") else ""

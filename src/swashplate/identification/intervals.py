@@ -70,6 +70,13 @@ class Estimate(NamedTuple):
     is no end."""
     upper: float | None
 
+    def ends(self, factor: float = 1.0) -> tuple[str, str]:
+        """Both ends in words, times a factor; the status where there is none."""
+        if self.lower is None and self.upper is None:
+            return self.status, ""
+        low = "none below" if self.lower is None else f"{factor * self.lower:.5g}"
+        return low, "none above" if self.upper is None else f"{factor * self.upper:.5g}"
+
     @property
     def relative_half_width(self) -> float:
         """Half of the interval over the value's size; infinite where an end is missing."""

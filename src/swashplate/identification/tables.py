@@ -68,25 +68,22 @@ def estimates_table(
         ),
         si=True,
     )
-    pairs = zip(unknowns, unknowns.names, _estimates(stage), strict=True)
-    for k, (unknown, name, (_, value, status, error, low, high)) in enumerate(pairs):
+    pairs = zip(unknowns, _estimates(stage), strict=True)
+    for k, (unknown, estimate) in enumerate(pairs):
         if (unknown.run is None) == own:
             continue
+        name, value, status, error, low, high = estimate
         factor, true, holds = chosen_unit(unknown.unit).factor, None, ""
         if truth is not None:
             assert isinstance(stage.problem.model, DriveModel)
             true = true_value(unknown, stage.problem.model, truth)
-        shown = [f"{factor * each:.5g}" for each in (value, low or 0.0, high or 0.0)]
-        if low is None and high is None:
-            shown[1:] = [status, ""]
-        elif low is None or high is None:
-            shown[1 if low is None else 2] = f"none {'below' if low is None else 'above'}"
-        else:
-            shown = [*spread(factor * value, factor * low, factor * high)]
+        both = low is not None and high is not None
+        shown: Sequence[str] = (f"{factor * value:.5g}", *estimate.ends(factor))
+        if low is not None and high is not None:
+            shown = spread(factor * value, factor * low, factor * high)
         if true is not None and (low, high) != (None, None):
             inside = (-inf if low is None else low) <= true <= (inf if high is None else high)
             holds = "yes" if inside else "no"
-        both = low is not None and high is not None
         made.add(
             stage.stage.name,
             name,
