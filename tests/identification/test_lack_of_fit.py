@@ -11,7 +11,7 @@ from tests.identification.given import bench_run
 from swashplate import Campaign, Drive
 from swashplate.campaign import rig
 from swashplate.identification import faults
-from swashplate.identification.faults import Fault, clipped_channels
+from swashplate.identification.faults import clipped_channels
 from swashplate.identification.fitting import StageFit, fit
 from swashplate.identification.lack_of_fit import lack_of_fit
 from swashplate.identification.setup import load_setup
@@ -53,10 +53,6 @@ def fitted(
     stages = list(result.stages)
     predicted = predict(result.parameters, campaign.select(role="validate"))
     return stages, verdict(stages, predicted)
-
-
-def named(stages: list[StageFit], name: str) -> Fault | None:
-    return next((each for each in lack_of_fit(stages).faults if each.name == name), None)
 
 
 @pytest.fixture(scope="module")
@@ -102,7 +98,7 @@ def test_an_estimate_at_its_bound_is_a_unit_like_a_fixed_one(tmp_path: Path) -> 
 
 
 def test_late_stamps_of_the_command_are_the_fixed_delay(sound) -> None:
-    fault = named(sound[0], "time stamps of the command")
+    fault = lack_of_fit(sound[0]).fault("time stamps of the command")
     assert fault is not None
     assert fault.hidden
     assert fault.outside < 0.01
@@ -222,7 +218,7 @@ def test_a_scale_that_is_off_is_named_with_the_fixed_value_that_looks_like_it(
     stages, found = fitted(tmp_path, **change)
     assert found.grade == "Usable for prediction", found.headline
     assert f"{said} by +" in found.headline
-    fault = named(stages, f"scale of {name}")
+    fault = lack_of_fit(stages).fault(f"scale of {name}")
     assert fault is not None
     # one step from where the estimates have made up for a part of it
     assert 2.0 < fault.size < 5.0

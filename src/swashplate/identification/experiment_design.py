@@ -38,7 +38,7 @@ from swashplate.maneuvers import Maneuver, multisine, ramp, sine, stairs, step
 from swashplate.parameters.definitions import CATALOGUE, COLUMNS
 from swashplate.parameters.parameter_set import HasParameters, ParameterSet, set_of
 from swashplate.parameters.rules import FULL_VOLTAGE
-from swashplate.results import Result, short
+from swashplate.results import Result
 from swashplate.tables import Column, Table, listed
 
 Array = NDArray[np.float64]
@@ -331,11 +331,9 @@ NAMED = 4
 """Unknowns that a row of advice names."""
 
 
-class Candidate(NamedTuple):
+@dataclass(frozen=True, eq=False)
+class Candidate(Result):
     """A test that could be made."""
-
-    def __repr__(self) -> str:
-        return short(self)
 
     name: str
     derivatives: Array

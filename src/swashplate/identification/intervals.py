@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from math import inf, log
 from types import MappingProxyType
-from typing import TYPE_CHECKING, ClassVar, Literal, NamedTuple
+from typing import TYPE_CHECKING, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -44,7 +44,6 @@ Status = Literal[
     "no lower end",
     "no upper end",
 ]
-LEVEL = 0.95
 DECADES = 100.0
 """Factor each way from which an interval says nothing; for an unknown that is not logarithmic, half
 width in its scales."""
@@ -87,11 +86,8 @@ class Estimate(NamedTuple):
 
 def reach(covariance: Covariance) -> Array:
     """(K,) half widths of the intervals in the solver's vector; 0 for unknowns without one."""
-    from scipy.special import stdtrit  # of scipy.stats, without its second to load
-
     known = covariance.determined & covariance.variables.free
-    quantiles = stdtrit(covariance.degrees_of_freedom, 0.5 + 0.5 * LEVEL)
-    half: Array = quantiles * np.where(known, covariance.standard_errors, 0.0)
+    half: Array = covariance.quantiles * np.where(known, covariance.standard_errors, 0.0)
     return half
 
 
@@ -258,9 +254,6 @@ def with_handed(
 @dataclass(frozen=True, eq=False)
 class Uncertainty(Result):
     """Errors of a fit's estimates: those to quote, and what they rest on."""
-
-    level: ClassVar[float] = LEVEL
-    """Probability of the intervals."""
 
     own: Covariance
     """That of the stage's own noise."""

@@ -103,6 +103,10 @@ class LackOfFit:
         """Faults of instruments that these logs cannot tell: they are assumed away."""
         return tuple(each for each in self.faults if each.hidden)
 
+    def fault(self, name: str) -> Fault | None:
+        """The fault of a name, None if it was not looked at."""
+        return next((each for each in self.faults if each.name == name), None)
+
 
 ESTIMATE, CONSTANT, FAULT = range(3)
 """What a column of derivatives is by: what the fit moves, what it keeps, what is looked for."""

@@ -19,6 +19,10 @@ from swashplate.results import Result
 Array = NDArray[np.float64]
 
 
+LEVEL = 0.95
+"""Probability of the intervals."""
+
+
 @dataclass(frozen=True, eq=False)
 class Covariance(Result):
     """Covariance of the solver's vector under one assumption on the noise."""
@@ -36,6 +40,13 @@ class Covariance(Result):
         """(K,) of the solver's numbers; inf where undetermined, 0 for one at its bound."""
         known = self.determined | ~self.variables.free
         return np.where(known, np.sqrt(np.maximum(np.diag(self.matrix), 0.0)), np.inf)
+
+    @property
+    def quantiles(self) -> Array:
+        """(K,) half widths of the intervals in standard errors, Student's."""
+        from scipy.special import stdtrit  # of scipy.stats, without its second to load
+
+        return np.asarray(stdtrit(self.degrees_of_freedom, 0.5 + 0.5 * LEVEL))
 
     @property
     def correlation(self) -> Array:

@@ -379,8 +379,6 @@ def profiles_of(
     that count as one independent sample: on a linear model exactly the estimate ± q standard
     errors.
     """
-    from scipy.special import stdtrit
-
     problem, found, fit = stage.problem, stage.uncertainty, stage.linearised
     variables, vector = found.own.variables, stage.solution.vector
     if names is None:
@@ -389,8 +387,7 @@ def profiles_of(
     else:
         chosen = sorted({variables.index(name) for name in names})
     cost = problem.cost(vector)
-    quantiles = stdtrit(found.own.degrees_of_freedom, 0.5 + 0.5 * found.level)
-    every = quantiles**2 * found.inflation * cost / fit.spare_samples
+    every = found.own.quantiles**2 * found.inflation * cost / fit.spare_samples
     rises = {k: float(every[k]) for k in chosen}
     shared = replace(problem, threads=1), vector, cost, rises, found.own.standard_errors
     made: dict[str, Profile] = {}

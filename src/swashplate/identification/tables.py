@@ -12,7 +12,8 @@ from typing import TYPE_CHECKING
 from swashplate.errors import InputError
 from swashplate.identification.drive_model import START_PRESSURE, DriveModel, true_value
 from swashplate.identification.identifiability import GAUGES
-from swashplate.identification.intervals import LEVEL, Estimate
+from swashplate.identification.intervals import Estimate
+from swashplate.identification.noise import LEVEL
 from swashplate.identification.setup import ModelSetup
 from swashplate.identification.validation import ignored_windows, pooled, with_speeds
 from swashplate.parameters.definitions import CATALOGUE, COLUMNS
