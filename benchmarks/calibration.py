@@ -79,7 +79,6 @@ def drive_campaign(axis, case, seed, compared):
     """Rows of a campaign of a drive."""
     from swashplate import Campaign, Drive
     from swashplate.campaign import rig
-    from swashplate.identification.assessment import assess
     from swashplate.identification.drive_model import true_value
     from swashplate.identification.fitting import drawn, fit
     from swashplate.identification.setup import load_setup
@@ -101,26 +100,26 @@ def drive_campaign(axis, case, seed, compared):
     with tempfile.TemporaryDirectory() as folder:
         read = Campaign.from_toml(rig.write(tests, Path(folder) / "virtual"))
         runs, held = read.select(role="fit"), read.select(role="validate")
-    assessments = assess(fit(nominal.parameters, runs, setup, threads=1).stages)
+    stages = fit(nominal.parameters, runs, setup, threads=1).stages
     planned = [each.name for each in setup.stages]
-    fitted = assessments[-1].stage.parameters
-    judged = verdict(assessments, predict(fitted, held), planned=planned)
-    found = [("product", fitted, [a.uncertainty for a in assessments])]
+    fitted = stages[-1].parameters
+    judged = verdict(stages, predict(fitted, held), planned=planned)
+    found = [("product", fitted, [a.uncertainty for a in stages])]
     if compared:
-        found += candidates(assessments)
+        found += candidates(stages)
     rows = []
     own = true_error(found[0][1], truth, axis) if axis != "luff" else ""
     for method, parameters, uncertainties in found:
         # most methods differ in their intervals alone
         new = own if parameters is None or axis == "luff" else true_error(parameters, truth, axis)
-        for each, estimates in zip(assessments, uncertainties, strict=True):
-            problem = each.stage.problem
+        for each, estimates in zip(stages, uncertainties, strict=True):
+            problem = each.problem
             values = getattr(estimates, "estimates", estimates)
             for unknown, estimate in zip(problem.unknowns, values, strict=True):
                 true = true_value(unknown, problem.model, machine.parameters)
                 if true is not None:
                     numbers = (true, estimate.value, estimate.lower, estimate.upper, new)
-                    words = (axis, case, seed, method, each.stage.stage.name, unknown.name)
+                    words = (axis, case, seed, method, each.stage.name, unknown.name)
                     rows.append((*words, *numbers, judged.grade))
     return rows
 
@@ -134,7 +133,7 @@ def own_campaign(seed):
     from valve import model
 
     from swashplate import Campaign
-    from swashplate.identification import assess, fit, predict, verdict
+    from swashplate.identification import fit, predict, verdict
 
     random, h = np.random.default_rng([seed, 0x0BEEF]), 0.02
     truth = {name: v * np.exp(0.1 * random.standard_normal()) for name, v in VALVE.items()}
@@ -166,12 +165,10 @@ def own_campaign(seed):
         read = Campaign.from_toml(Path(folder, "campaign.toml"))
         runs, held = read.select(role="fit"), read.select(role="validate")
     found = fit(model, runs, VALVE_FREE, noise={"rod": np.sqrt(2.0) * 1e-4}, threads=1)
-    (assessment,) = assess(found.stages)
-    grade = verdict([assessment], predict(found.parameters, held)).grade
+    (stage,) = found.stages
+    grade = verdict([stage], predict(found.parameters, held)).grade
     rows = []
-    for unknown, estimate in zip(
-        assessment.stage.problem.unknowns, assessment.uncertainty.estimates, strict=True
-    ):
+    for unknown, estimate in zip(stage.problem.unknowns, stage.uncertainty.estimates, strict=True):
         true = starts[unknown.run] if unknown.run else truth[unknown.name]
         numbers = (true, estimate.value, estimate.lower, estimate.upper, "")
         rows.append(("own", "realistic", seed, "product", "valve", unknown.name, *numbers, grade))
@@ -194,16 +191,16 @@ VALVE_FREE = {
 }
 
 
-def candidates(assessments):
+def candidates(stages):
     """Methods beside the product's: name, drive, and for each stage its estimates."""
     from swashplate.identification.intervals import estimates, with_handed
 
     made = []
     for method in METHODS:
-        covariances, results, parameters = [], [], assessments[0].stage.parameters
+        covariances, results, parameters = [], [], stages[0].parameters
         shifts = np.zeros(0)
-        for each in assessments:
-            fit, problem = each.linearised, each.stage.problem
+        for each in stages:
+            fit, problem = each.linearised, each.problem
             own, shift = METHODS[method](fit)
             handed = [
                 old._replace(covariance=covariance)
@@ -213,7 +210,7 @@ def candidates(assessments):
             if handed:
                 shift = shift + handed[0].slopes @ shifts
             shifts = shift
-            vector = np.clip(each.stage.solution.vector + shift, *problem.bounds)
+            vector = np.clip(each.solution.vector + shift, *problem.bounds)
             parameters = replace(problem.model, parameters=parameters).parameters_at(
                 problem.unknowns.targets(vector, "")
             )
@@ -229,15 +226,15 @@ def white(fit):
     from swashplate.identification.noise import covariance_of
 
     matrix = fit.squares / fit.spare_samples * (fit.whitening @ fit.whitening.T)
-    free = np.full(fit.variables.count, float(fit.spare_samples))
-    return covariance_of(fit, matrix, free), np.zeros(fit.variables.count)
+    free = np.full(len(fit.variables), float(fit.spare_samples))
+    return covariance_of(fit, matrix, free), np.zeros(len(fit.variables))
 
 
 def autocovariance(fit):
     """Sandwich with the residuals' autocovariance, one to a channel (Maine and Iliff 1981)."""
     from scipy.fft import irfft, next_fast_len, rfft
 
-    from swashplate.identification.noise import covariance_of, grid_of, noise_colours, unweighted
+    from swashplate.identification.noise import covariance_of, grid_of, noise_colours
 
     spare = fit.samples / fit.spare_samples
     middle = np.zeros((fit.rank, fit.rank))
@@ -252,12 +249,12 @@ def autocovariance(fit):
             window[:lags] = colour.correlation
             window[size - lags + 1 :] = colour.correlation[:0:-1]
             power = np.maximum(rfft(window).real, 0.0)[:, None]
-            level = spare * np.mean(unweighted(run) ** 2)
+            level = spare * np.mean(run.unweighted**2)
             filtered = irfft(rfft(columns, size, axis=0) * power, size, axis=0)[: grid.size]
             middle += level * columns.T @ filtered
     matrix = fit.whitening @ (0.5 * (middle + middle.T)) @ fit.whitening.T
-    free = np.full(fit.variables.count, float(fit.spare_samples))
-    return covariance_of(fit, matrix, free), np.zeros(fit.variables.count)
+    free = np.full(len(fit.variables), float(fit.spare_samples))
+    return covariance_of(fit, matrix, free), np.zeros(len(fit.variables))
 
 
 def autocovariance_without_lines(fit):
@@ -279,7 +276,7 @@ def leverage_corrected(power):
         from swashplate.identification.noise import covariance_of, grid_of
 
         middle = np.zeros((fit.rank, fit.rank))
-        total, squares = np.zeros(fit.variables.count), np.zeros(fit.variables.count)
+        total, squares = np.zeros(len(fit.variables)), np.zeros(len(fit.variables))
         for run in fit.runs:
             grid = grid_of(run.time)
             derivatives = rfft(grid.spread(run.jacobian @ fit.whitening), axis=0)
@@ -297,7 +294,7 @@ def leverage_corrected(power):
         free = np.divide(2.0 * total**2, squares, out=np.ones_like(total), where=squares > 0.0)
         matrix = fit.whitening @ middle @ fit.whitening.T
         found = covariance_of(fit, matrix, np.maximum(free, 1.0))
-        return found, np.zeros(fit.variables.count)
+        return found, np.zeros(len(fit.variables))
 
     return method
 
@@ -322,8 +319,8 @@ def prewhitened_scores(fit):
         recolour = 1.0 / (1.0 - slope)
         middle += recolour[:, None] * total * recolour
     matrix = fit.whitening @ middle @ fit.whitening.T
-    free = np.full(fit.variables.count, float(fit.spare_samples))
-    return covariance_of(fit, matrix, free), np.zeros(fit.variables.count)
+    free = np.full(len(fit.variables), float(fit.spare_samples))
+    return covariance_of(fit, matrix, free), np.zeros(len(fit.variables))
 
 
 def autoregression(colour, samples):
@@ -360,10 +357,10 @@ def autoregression(colour, samples):
 
 def generalised(fit):
     """Generalised least squares: one Gauss-Newton step on residuals whitened by an AR model."""
-    from swashplate.identification.noise import covariance_of, grid_of, noise_colours, unweighted
+    from swashplate.identification.noise import covariance_of, grid_of, noise_colours
     from swashplate.identification.problem import triangular_factor, whitening
 
-    rows, count = [], fit.variables.count
+    rows, count = [], len(fit.variables)
     for colour in noise_colours(fit):
         samples = sum(fit.runs[m].time.size for m in colour.members)
         coefficients = autoregression(colour, samples)
@@ -373,7 +370,7 @@ def generalised(fit):
         for m in colour.members:
             run, grid = fit.runs[m], grid_of(fit.runs[m].time)
             plain = run.jacobian if run.weight is None else run.jacobian / run.weight[:, None]
-            both = np.column_stack([plain, unweighted(run)])
+            both = np.column_stack([plain, run.unweighted])
             spread = grid.spread(both)
             filtered = sum(
                 tap * spread[order - k : spread.shape[0] - k] for k, tap in enumerate(taps)
@@ -394,14 +391,14 @@ def smoothed_spectrum(fit):
     """Sandwich with the smoothed spectrum of the residuals (Hannan 1963), HC2."""
     from swashplate.identification.noise import spectral_covariance
 
-    return spectral_covariance(fit), np.zeros(fit.variables.count)
+    return spectral_covariance(fit), np.zeros(len(fit.variables))
 
 
 def larger_of_both(fit):
     """The larger error of the smoothed spectrum and of band scores."""
     from swashplate.identification.noise import coloured_noise_covariance
 
-    return coloured_noise_covariance(fit), np.zeros(fit.variables.count)
+    return coloured_noise_covariance(fit), np.zeros(len(fit.variables))
 
 
 METHODS = {

@@ -225,7 +225,6 @@ def campaign(_, item):
     from swashplate import Campaign, Drive
     from swashplate.campaign import rig
     from swashplate.errors import SwashplateError
-    from swashplate.identification.assessment import assess
     from swashplate.identification.data_checks import check_runs
     from swashplate.identification.drive_model import true_value
     from swashplate.identification.fitting import fit, smooth
@@ -244,13 +243,13 @@ def campaign(_, item):
         result = fit(nominal.parameters, runs, load_setup(axis), threads=1)
     except SwashplateError as error:
         return [(name, axis, seed, "refused", "Not usable", 2, "", str(error), "", "", "B", "")]
-    assessments, drive = assess(result.stages), result.parameters
+    stages, drive = result.stages, result.parameters
     predicted = predict(drive, held)
-    judged = verdict(assessments, predicted, planned=[s.name for s in result.setup.stages])
-    misfit = lack_of_fit(assessments)
+    judged = verdict(stages, predicted, planned=[s.name for s in result.setup.stages])
+    misfit = lack_of_fit(stages)
     worst = 0.0
-    for each in assessments:
-        problem = each.stage.problem
+    for each in stages:
+        problem = each.problem
         for unknown, estimate in zip(problem.unknowns, each.uncertainty.estimates, strict=True):
             true = true_value(unknown, problem.model, machine.parameters)
             if true is not None and estimate.lower is not None and estimate.upper is not None:

@@ -37,12 +37,12 @@ def fit_study_rows() -> Iterator[Row]:
         # the first round is not counted: it compiles, or loads what was compiled
         for _ in range(ROUNDS + 1):
             begin = time.perf_counter()
-            found = Judged(campaign, fit(nominal, runs, setup), runs)
+            found = Judged(campaign, fit(nominal, runs, setup))
             fitted.append(time.perf_counter() - begin)
             begin = time.perf_counter()
             # what a stage says is computed where it is asked for; the verdict judges held-out runs
-            assessed = found.assessments
-            for each in assessed:
+            stages = found.result.stages
+            for each in stages:
                 _ = each.identifiability, each.uncertainty, each.runs
             _ = found.verdict
             judged.append(time.perf_counter() - begin)
@@ -54,7 +54,7 @@ def fit_study_rows() -> Iterator[Row]:
         yield Row("what the fit is worth: intervals, tests", duration(median(judged[1:])))
         yield _limited("its report", median(written[1:]), REPORT)
         begin = time.perf_counter()
-        bootstraps_of(assessed, REFITS, seed=0, executor=Processes())
+        bootstraps_of(stages, REFITS, seed=0, executor=Processes())
         spent = time.perf_counter() - begin
         yield _limited(f"{REFITS:,} bootstrap refits of both stages, all cores", spent, REFITTED)
 

@@ -16,7 +16,6 @@ import numpy as np
 
 from swashplate import Campaign, Drive
 from swashplate.campaign import rig
-from swashplate.identification.assessment import assess
 from swashplate.identification.drive_model import true_value
 from swashplate.identification.experiment_design import outlook
 from swashplate.identification.fitting import drawn, fit, smooth
@@ -81,12 +80,12 @@ fitted = Drive(result.parameters)
 
 # %%
 SHOWN = ("V_dz_plus", "G1_plus", "omega_plus", "Z8", "Z10", "Z13_plus", "Z16_plus")
-assessments = assess(result.stages)
+stages = result.stages
 true, inside = {}, []
 print("              truth   estimate     95 % from         to")
-for assessment in assessments:
-    problem = assessment.stage.problem
-    for unknown, each in zip(problem.unknowns, assessment.uncertainty.estimates, strict=True):
+for stage in stages:
+    problem = stage.problem
+    for unknown, each in zip(problem.unknowns, stage.uncertainty.estimates, strict=True):
         value = true_value(unknown, problem.model, truth.parameters)
         if value is None:  # the zero of a run's position
             continue
@@ -111,7 +110,7 @@ speeds = [
 ]
 for each in speeds:
     print(f"{each.experiment.run}: speed to {np.degrees(each.measures.rmse):.2f} deg/s rms")
-judged = verdict(assessments, predicted, planned=[stage.name for stage in setup.stages])
+judged = verdict(stages, predicted, planned=[stage.name for stage in setup.stages])
 print(judged.headline)
 
 # %% [markdown]

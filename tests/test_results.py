@@ -56,9 +56,8 @@ class Work(NamedTuple):
 def work(tmp_path_factory: pytest.TempPathFactory) -> Work:
     path = rig.write(rig.run("hoist", TESTS, seed=1), tmp_path_factory.mktemp("tests") / "logs")
     campaign = Campaign.from_toml(path)
-    hoist, runs = Drive.preset("hoist"), campaign.select(role="fit")
-    fitted = fit(hoist, campaign, TWO_STAGES)
-    judged = judge_fit(campaign, runs, hoist.parameters, TWO_STAGES, fitted)
+    fitted = fit(Drive.preset("hoist"), campaign, TWO_STAGES)
+    judged = judge_fit(campaign, fitted)
     return Work(campaign, fitted, judged)
 
 

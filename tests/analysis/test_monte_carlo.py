@@ -18,7 +18,7 @@ from swashplate.analysis import (
 )
 from swashplate.campaign import Campaign, rig
 from swashplate.errors import FileError
-from swashplate.identification.assessment import Judged, assess
+from swashplate.identification.assessment import Judged
 from swashplate.identification.drive_model import DriveModel
 from swashplate.identification.fitting import Fit, fit
 from swashplate.identification.setup import Free, Setup, load_setup
@@ -36,12 +36,13 @@ def test_draws_outside_the_bounds_are_drawn_again(hoist):
     model = DriveModel(hoist.parameters)
 
     def drawn(variance: float, count: int) -> Draws:
-        """From what the Monte Carlo reads of an assessment; Z18 is not determined."""
+        """From what the Monte Carlo reads of a stage; Z18 is not determined."""
         own = SimpleNamespace(matrix=np.diag([variance, 0.0]), determined=np.array([True, False]))
         problem = SimpleNamespace(unknowns=unknowns, model=model, uncertain=())
-        stage = SimpleNamespace(problem=problem, solution=SimpleNamespace(vector=unknowns.start))
-        known = SimpleNamespace(own=own, sampled=own, handed=(), fixed=np.zeros((2, 0)))
-        return drives([SimpleNamespace(stage=stage, uncertainty=known)], count, seed=1)
+        solution, name = SimpleNamespace(vector=unknowns.start), SimpleNamespace(name="pump")
+        known = SimpleNamespace(own=own, handed=(), fixed=np.zeros((2, 0)))
+        one = SimpleNamespace(stage=name, problem=problem, solution=solution, uncertainty=known)
+        return drives([one], count, seed=1)
 
     found = drawn(4e-4, 300)
     assert found.columns["Z10"].min() >= 12.396 * 0.98
@@ -117,7 +118,7 @@ def fit_and_folder(tmp_path_factory: pytest.TempPathFactory) -> tuple[Fit, Path]
     path = rig.write(virtual, place / "virtual")
     campaign = Campaign.from_toml(path)
     result = fit(Drive.preset("hoist").parameters, campaign.experiments, small_setup())
-    Judged(campaign, result, campaign.experiments).store(place / "fit.json")
+    Judged(campaign, result).store(place / "fit.json")
     return result, place
 
 
@@ -129,7 +130,7 @@ def test_a_stored_fit_gives_drives_of_its_quoted_errors(fit_and_folder):
     again, other = (stored_draws(fitted, draws=2, seed=seed).columns["Z10"] for seed in (1, 2))
     np.testing.assert_array_equal(again, columns["Z10"][:2])
     assert (other != again).all()
-    for each in assess(result.stages):
+    for each in result.stages:
         for estimate in each.uncertainty.estimates:
             if estimate.name in columns:
                 assert estimate.standard_error is not None
@@ -144,11 +145,11 @@ def test_a_stored_fit_gives_drives_of_its_quoted_errors(fit_and_folder):
     assert stop.std() == pytest.approx(8e-5 * result.drive["Z13"].value.plus, rel=0.15)
     assert np.corrcoef(columns["Z10"], stop)[0, 1] < -0.5
     # what the card's stage does not know moves the pump along, by the slopes that are quoted
-    card, pump = assess(result.stages)
+    card, pump = result.stages
     (handed,) = pump.uncertainty.handed
     joint = handed.slopes @ handed.covariance.matrix
     spread = np.outer(pump.uncertainty.quoted.standard_errors, handed.covariance.standard_errors)
-    names = card.stage.problem.unknowns.names
+    names = card.problem.unknowns.names
     drawn_correlations = [np.corrcoef(columns["Z10"], columns[name])[0, 1] for name in names]
     np.testing.assert_allclose(drawn_correlations, (joint / spread)[0], atol=0.12)
     assert np.abs((joint / spread)[0]).max() > 0.25  # more than 400 draws would show by chance

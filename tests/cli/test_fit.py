@@ -249,7 +249,7 @@ def fitted(held_out: Path, tmp_path: Path) -> Fit:
     found = fit(Drive.preset("hoist").parameters, runs, setup)
     (tmp_path / "fitted").mkdir()
     Drive(found.parameters).to_toml(tmp_path / "fitted" / "drive.toml")
-    Judged(campaign, found, runs, notes={"seed": "7"}).store(tmp_path / "fitted" / "fit.json")
+    Judged(campaign, found, notes={"seed": "7"}).store(tmp_path / "fitted" / "fit.json")
     return found
 
 

@@ -192,7 +192,7 @@ def fitted(tmp_path_factory):
     free = {"Z16": Free(relative=(0.5, 2.0))}
     setup = Setup(stages=(stage.model_copy(update={"free": free, "forces": None}),))
     result = fit(Drive.preset("luff").parameters, campaign.experiments, setup)
-    Judged(campaign, result, campaign.experiments).store(place / "fit.json")
+    Judged(campaign, result).store(place / "fit.json")
     result.drive.to_toml(place / "drive.toml")
     return place, result
 

@@ -1,7 +1,8 @@
 """What is written down rather than measured or fitted: runs, linearised fits, noise, a set-up."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -47,6 +48,36 @@ def run_of(
         made[key] = Channel(key, own, unit, at, each, weights, source, noise=noise)
     given = InputSignal(kind, UNITS.get(kind, "1"), time, values, hold, source)
     return Experiment(name, "hoist", name, role, start, None, given, made, maneuver)
+
+
+TIME = np.linspace(0.0, 4.0, 81)
+
+
+Formula = Callable[[Mapping[str, float], np.ndarray, float], np.ndarray]
+"""y from the values, y's time stamps and the last sample of the input."""
+
+
+def bench_run(name: str, level: float, y: np.ndarray, **more: object) -> Experiment:
+    """A run of another machine at an input level, with given samples of y."""
+    how = {"time": TIME, "kind": "other", "hold": "previous", **more}
+    return run_of(name, np.full(TIME.size, level), {"y": y}, **how)
+
+
+def model_of(formula: Formula) -> SimpleNamespace:
+    """A model without derivatives."""
+
+    def simulate(values: Mapping[str, float], run: Experiment) -> dict[str, np.ndarray]:
+        return {"y": formula(values, run["y"].time, run.input.values[-1])}
+
+    return SimpleNamespace(simulate=simulate)
+
+
+def risen(level: float, gain: float, lag: float, time: np.ndarray = TIME) -> np.ndarray:
+    """gain · level · (1 - exp(-t/lag))."""
+    return gain * level * (1.0 - np.exp(-time / lag))
+
+
+RISE = model_of(lambda values, time, level: risen(level, values["gain"], values["lag"], time))
 
 
 def unknowns_of(

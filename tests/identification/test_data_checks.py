@@ -98,7 +98,7 @@ REFUSED = {
     "no number": (
         (*GOOD, run("empty", held(8.0), lambda speed: np.full_like(speed, np.nan))),
         PUMP,
-        "empty: 'shaft_speed' is not finite in 2049 samples",
+        "empty: 'shaft_speed' is not finite in 2,049 samples",
     ),
     "one hole": (
         (run("holed", held(8.0), put(512, np.nan)),),
@@ -183,5 +183,5 @@ def test_the_odd_one_of_many_runs_is_found() -> None:
         speed = command * (2.0 if number == 77 else 0.5)
         channel: Channel = run_of("", command, {"shaft_speed": speed}, time=time)["shaft_speed"]
         found.append(Motion(f"run {number}", channel, time, speed, 0.5 * command))
-    (odd,) = contradictions({"speed": found})
+    (odd,) = contradictions("speed", found)
     assert odd.run == "run 77"

@@ -8,7 +8,6 @@ from tests.identification.given import run_of, unknowns_of
 
 from swashplate import Campaign, Drive, Experiment, InputError, maneuvers
 from swashplate.campaign import rig
-from swashplate.identification.assessment import assess
 from swashplate.identification.experiment_design import (
     MEMORY,
     Candidate,
@@ -16,7 +15,7 @@ from swashplate.identification.experiment_design import (
     Sensor,
     advise,
     bench,
-    best_for_each,
+    best_tests_table,
     default_sensors,
     in_turn,
     outlook,
@@ -103,8 +102,8 @@ def test_a_plan_by_hand() -> None:
     assert plan[0].after[0] == pytest.approx(101.0**-0.5)
     assert plan[2].before[0] == pytest.approx(101.0**-0.5)
     assert plan[2].after[0] == pytest.approx(182.0**-0.5)
-    best = best_for_each(advise(np.diag([1.0, 1.0]), candidates, variables))
-    assert {name: each.candidate for name, each in best.items()} == {"a": "a", "b": "b"}
+    best = best_tests_table(advise(np.diag([1.0, 1.0]), candidates, variables))
+    assert [(row.cells[0], row.cells[-1]) for row in best.rows] == [("a", "a"), ("b", "b")]
 
 
 def test_errors_are_those_of_least_squares_by_hand() -> None:
@@ -160,7 +159,7 @@ def test_what_is_known_is_what_a_fit_of_the_same_tests_knows(hoist_tests: Campai
     known = bench(found.parameters, setup, runs, fitted=True)
     now = np.sqrt(np.diag(np.linalg.inv(known.present.T @ known.present)))
     errors = {}
-    for stage in assess(found.stages):
+    for stage in found.stages:
         quoted = stage.uncertainty.quoted
         errors |= dict(zip(quoted.variables.names, quoted.standard_errors, strict=True))
     ratio = np.array([now[k] / errors[name] for k, name in enumerate(known.variables.names)])

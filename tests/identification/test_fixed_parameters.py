@@ -9,7 +9,7 @@ from tests.identification.test_own_model import NOISE, RANGES, RUNS, servo
 
 from swashplate import Campaign, Drive, ParameterError
 from swashplate.campaign import rig
-from swashplate.identification import ModelSetup, assess, fit
+from swashplate.identification import ModelSetup, fit
 from swashplate.identification.intervals import Handed, with_handed
 from swashplate.identification.lack_of_fit import lack_of_fit
 from swashplate.identification.noise import Covariance
@@ -39,7 +39,7 @@ def test_estimates_follow_a_fixed_number_as_in_a_fit_with_another(
 ) -> None:
     """Of both stages: tau acts on the pump's by itself and through the card's estimates."""
     published = Drive.preset("hoist")
-    found = assess(fit(published, campaign, stated(**DOUBTS)).stages)
+    found = fit(published, campaign, stated(**DOUBTS)).stages
     value = published.parameters.numbers[name]
     deviation *= value if name == "Z9" else 1.0
     step, ends = 0.05 * deviation, []
@@ -63,9 +63,7 @@ def test_estimates_follow_a_fixed_number_as_in_a_fit_with_another(
 
 def test_what_is_added_to_a_model_of_ones_own_is_that_of_other_fits() -> None:
     bare, doubted = (
-        assess(fit(ModelSetup(servo, ONE, noise=NOISE, fixed={"gain": 1.5}, **more), RUNS).stages)[
-            0
-        ]
+        fit(ModelSetup(servo, ONE, noise=NOISE, fixed={"gain": 1.5}, **more), RUNS).stages[0]
         for more in ({}, {"standard_uncertainty": {"gain": "4 %"}})
     )
     up, down = (
@@ -87,7 +85,7 @@ def test_residuals_within_the_doubt_are_no_lack_of_fit() -> None:
 
     def ratio(**more: dict[str, float | str]) -> float:
         setup = ModelSetup(servo, ONE, noise=NOISE, fixed={"gain": 1.54}, **more)
-        return lack_of_fit(assess(fit(setup, RUNS).stages)).ratios["place"]
+        return lack_of_fit(fit(setup, RUNS).stages).ratios["place"]
 
     assert ratio() > 1.2
     assert ratio(standard_uncertainty={"gain": "0.01 %"}) > 1.2

@@ -1,14 +1,13 @@
 """Intervals in the unknowns' own units, what leaves an unknown without one, and profiles."""
 
-from collections.abc import Callable, Mapping
 from dataclasses import replace
 
 import numpy as np
 import pytest
 from scipy.optimize import brentq, least_squares
-from tests.identification.given import linear_fit, unknowns_of
+from tests.identification.given import TIME, bench_run, linear_fit, model_of, unknowns_of
 
-from swashplate import DomainError, Experiment, InputError
+from swashplate import DomainError, InputError
 from swashplate.identification.intervals import estimates, reach, uncertainty
 from swashplate.identification.noise import Covariance
 from swashplate.identification.problem import LinearisedRun, Problem, linearised_fit
@@ -36,7 +35,7 @@ def test_intervals_by_hand() -> None:
     assert (positive.lower, positive.upper) == pytest.approx((1.351418, 2.959854), rel=1e-6)
     plain, positive = estimates(covariance(at_bound=[-1, 1]))
     assert (plain.status, positive.status) == ("at its lower bound", "at its upper bound")
-    assert plain[3:] == (None, None, None, None)
+    assert plain[3:] == (None, None, None)
 
 
 def test_an_interval_beyond_a_hundredfold_is_none() -> None:
@@ -135,9 +134,9 @@ def test_a_nonlinear_model_agrees_with_a_root_search() -> None:
     assert found.upper - best.x[1] > 1.05 * (best.x[1] - found.lower)
 
 
-def bowl() -> tuple:
+def bowl(index: int, value: float, start: np.ndarray) -> tuple[float, np.ndarray]:
     """One unknown, cost ½ u² beside a noise cost of 1."""
-    return lambda index, value, start: (1.0 + 0.5 * value**2, np.array([value]))
+    return 1.0 + 0.5 * value**2, np.array([value])
 
 
 LIMIT = 0.5
@@ -145,19 +144,19 @@ ZERO = np.zeros(1)
 
 
 def test_a_bound_leaves_a_side_open() -> None:
-    found = profile(bowl(), ZERO, 1.0, 0, LIMIT, 1.0, (-0.4, np.inf))
+    found = profile(bowl, ZERO, 1.0, 0, LIMIT, 1.0, (-0.4, np.inf))
     assert found.endings == ("bound", "crossed")
     assert found.lower is None
     assert found.upper == pytest.approx(1.0, rel=2e-3)
     assert found.points[0].number == -0.4
-    assert "Z17 reaches its bound" in found.sentences("Z17")[0]
+    assert "Z17 reaches its bound" in replace(found, name="Z17").sentences()[0]
 
 
 def test_the_domains_edge_ends_a_side() -> None:
     def edged(index: int, value: float, start: np.ndarray) -> tuple[float, np.ndarray]:
         if value > 0.5:
             raise DomainError("|sin φ| reaches 1.")
-        return 1.0 + 0.5 * value**2, np.array([value])
+        return bowl(index, value, start)
 
     found = profile(edged, ZERO, 1.0, 0, LIMIT, 1.0)
     assert found.endings == ("crossed", "domain")
@@ -173,7 +172,7 @@ def test_a_better_optimum_stops_it() -> None:
     assert found.better.cost < 1.0
     assert found.better.vector[1] == 7.0
     assert (found.lower, found.upper) == (None, None)
-    assert "met a better optimum" in found.sentences("Z9")[0]
+    assert "met a better optimum" in found.sentences()[0]
 
 
 def test_a_cost_that_is_lower_by_next_to_nothing_does_not_stop_it() -> None:
@@ -191,38 +190,28 @@ def test_a_cost_that_is_lower_by_next_to_nothing_does_not_stop_it() -> None:
 # --- where the cost does not rise as derivatives say ----------------------------------------------
 
 
-TIME = np.linspace(0.0, 4.0, 81)
+LIMITED = model_of(lambda values, time, _: np.minimum(values["gain"] * time, values["stop"]))
+"""The stop is told only where it is reached."""
 
 
-class Limited:
-    """y = min(gain · t, stop): the stop is told only where it is reached."""
-
-    def simulate(
-        self, values: Mapping[str, float], experiment: Experiment
-    ) -> Mapping[str, np.ndarray]:
-        return {"y": np.minimum(values["gain"] * experiment["y"].time, values["stop"])}
-
-
-def limited_problem(experiment: Callable[..., Experiment], y: np.ndarray) -> Problem:
+def limited_problem(y: np.ndarray) -> Problem:
     unknowns = Unknowns((Unknown("gain", 1.0, 0.1, 3.0), Unknown("stop", 3.0, 0.5, 20.0)))
-    return Problem(Limited(), (experiment("run", 1.0, y),), unknowns, ("y",), {"y": 0.1})
+    return Problem(LIMITED, (bench_run("run", 1.0, y),), unknowns, ("y",), {"y": 0.1})
 
 
-def test_a_stop_that_is_reached_has_both_ends(experiment: Callable[..., Experiment]) -> None:
+def test_a_stop_that_is_reached_has_both_ends() -> None:
     noise = 0.1 * np.random.default_rng(1).normal(size=TIME.size)
-    found = limited_problem(experiment, np.minimum(TIME, 2.5) + noise)
+    found = limited_problem(np.minimum(TIME, 2.5) + noise)
     best = solve(found).vector
     linearised = linearised_fit(found, best)
     assert not [*checked_ends(found, best, linearised, reach(uncertainty(linearised).own))]
 
 
-def test_a_stop_that_is_just_touched_has_no_upper_end(
-    experiment: Callable[..., Experiment],
-) -> None:
+def test_a_stop_that_is_just_touched_has_no_upper_end() -> None:
     """The truth never reaches it; the last sample happens to lie low, so that the fit touches."""
     noise = 0.02 * np.random.default_rng(2).normal(size=TIME.size)
     noise[-2:] = -0.012  # less than one standard deviation
-    found = limited_problem(experiment, TIME + noise)
+    found = limited_problem(TIME + noise)
     best = solve(found, found.unknowns.vector_of({"stop": 3.9})).vector
     values = found.unknowns.values(best)
     assert 3.9 < values["stop"] < 4.0

@@ -6,14 +6,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from tests.identification.given import bench_run
 
 from swashplate import Campaign, Drive
 from swashplate.campaign import rig
-from swashplate.campaign.experiment import Experiment
 from swashplate.identification import faults
-from swashplate.identification.assessment import Assessment, assess
 from swashplate.identification.faults import clipped_channels
-from swashplate.identification.fitting import fit
+from swashplate.identification.fitting import StageFit, fit
 from swashplate.identification.lack_of_fit import lack_of_fit
 from swashplate.identification.setup import load_setup
 from swashplate.identification.validation import predict
@@ -35,7 +34,7 @@ def fitted(
     drive: Drive | None = None,
     logs: Logs | None = None,
     each: tuple[float, ...] = (0.0,) * 5,
-) -> tuple[list[Assessment], Verdict]:
+) -> tuple[list[StageFit], Verdict]:
     """A slew campaign of five tests, each with a machine that much faster, and its judgement."""
     nominal = Drive.preset("slew")
     runs = {}
@@ -51,13 +50,13 @@ def fitted(
     path = rig.write(replace(made, runs=runs), folder / "virtual")
     campaign = Campaign.from_toml(path)
     result = fit(nominal.parameters, campaign.select(role="fit"), load_setup("slew"))
-    assessments = list(assess(result.stages))
+    stages = list(result.stages)
     predicted = predict(result.parameters, campaign.select(role="validate"))
-    return assessments, verdict(assessments, predicted)
+    return stages, verdict(stages, predicted)
 
 
 @pytest.fixture(scope="module")
-def sound(tmp_path_factory: pytest.TempPathFactory) -> tuple[list[Assessment], Verdict]:
+def sound(tmp_path_factory: pytest.TempPathFactory) -> tuple[list[StageFit], Verdict]:
     return fitted(tmp_path_factory.mktemp("sound"))
 
 
@@ -70,13 +69,13 @@ DRIFT = "drift of counts"
 
 
 def test_a_sound_campaign_passes_every_criterion(sound) -> None:
-    assessments, found = sound
+    stages, found = sound
     assert found.grade == "Usable", found.headline
     assert not failed(found)
-    assert lack_of_fit(assessments).ratios["counts"] == pytest.approx(1.0, abs=0.05)
+    assert lack_of_fit(stages).ratios["counts"] == pytest.approx(1.0, abs=0.05)
     assert found.validity.startswith("Holds for ramps, steps and sines of up to 0.1 Hz from -6 to")
     assert "never reached" in found.validity
-    moving = [e.error for e in lack_of_fit(assessments).scales if e.channel == "counts"]
+    moving = [e.scale for e in lack_of_fit(stages).runs if e.channel == "counts"]
     assert moving == pytest.approx([0.0] * 4, abs=3e-3)
 
 
@@ -91,9 +90,9 @@ def test_the_units_of_the_estimates_are_found_by_computation(sound) -> None:
 @pytest.mark.slow
 def test_an_estimate_at_its_bound_is_a_unit_like_a_fixed_one(tmp_path: Path) -> None:
     # Z8 could make up for a sixth of the supply pressure, and may go down to a half
-    assessments, found = fitted(tmp_path, Drive.preset("slew").scale(Z9=0.15))
-    assert "Z8" in assessments[-1].identifiability.at_bounds
-    assert {"Z8", "Z9"} <= set(lack_of_fit(assessments).units)
+    stages, found = fitted(tmp_path, Drive.preset("slew").scale(Z9=0.15))
+    assert "Z8" in stages[-1].identifiability.at_bounds
+    assert {"Z8", "Z9"} <= set(lack_of_fit(stages).units)
     assert found.grade == "Not usable"
     assert "Z8 by -" in found.headline
 
@@ -110,10 +109,10 @@ def test_late_stamps_of_the_command_are_the_fixed_delay(sound) -> None:
 def test_a_longer_delay_than_the_fixed_one_is_named(tmp_path: Path) -> None:
     nominal = Drive.preset("slew")
     tau = nominal.parameters.numbers["tau"]
-    assessments, found = fitted(tmp_path, nominal.replace(tau=tau + 0.02))
+    stages, found = fitted(tmp_path, nominal.replace(tau=tau + 0.02))
     assert found.grade == "Usable for prediction", found.headline
     assert {MISFIT, "time stamps of counts"} <= failed(found)
-    causes = {each.name: each for each in lack_of_fit(assessments).causes}
+    causes = {each.name: each for each in lack_of_fit(stages).causes}
     # after one step: the other estimates have moved to make up for a part of it
     assert causes["time stamps of counts"].size == pytest.approx(20.0, rel=0.2)
     assert "parameter values not to be trusted because residuals of counts are" in found.headline
@@ -124,37 +123,37 @@ def test_a_load_is_named(tmp_path: Path) -> None:
     nominal = Drive.preset("slew")
     lost = np.radians(0.08)
     loaded = nominal.replace(load_torque=3e4, motor_leakage=float(lost) / 3e4)
-    assessments, found = fitted(tmp_path, loaded)
+    stages, found = fitted(tmp_path, loaded)
     assert MISFIT in failed(found)
-    first = lack_of_fit(assessments).causes[0]
+    first = lack_of_fit(stages).causes[0]
     assert first.name == "load or leakage, as a loss of counts,"
     assert first.size == pytest.approx(0.08, rel=0.1)
 
 
 def test_a_drift_is_named_and_rules_out_the_use(tmp_path: Path) -> None:
-    assessments, found = fitted(tmp_path, each=(-0.04, -0.02, 0.0, 0.02, 0.04))
+    stages, found = fitted(tmp_path, each=(-0.04, -0.02, 0.0, 0.02, 0.04))
     assert found.grade == "Not usable"
     assert {MISFIT, DRIFT} <= failed(found)
     # 8 % over five runs, of which the fourth of five is held out
-    assert lack_of_fit(assessments).causes[0].name.startswith(DRIFT)
-    assert lack_of_fit(assessments).causes[0].size == pytest.approx(6.0, abs=2.0)
+    assert lack_of_fit(stages).causes[0].name.startswith(DRIFT)
+    assert lack_of_fit(stages).causes[0].size == pytest.approx(6.0, abs=2.0)
 
 
 def test_runs_that_differ_in_no_order_are_no_drift(tmp_path: Path) -> None:
-    assessments, found = fitted(tmp_path, each=(-0.04, 0.04, -0.03, 0.0, 0.04))
+    stages, found = fitted(tmp_path, each=(-0.04, 0.04, -0.03, 0.0, 0.04))
     assert MISFIT in failed(found)
     assert DRIFT not in failed(found)
-    assert not any(each.name.startswith(DRIFT) for each in lack_of_fit(assessments).causes)
+    assert not any(each.name.startswith(DRIFT) for each in lack_of_fit(stages).causes)
 
 
 def test_a_clipped_ammeter_is_found_with_the_limits_to_state(tmp_path: Path) -> None:
     def clip(columns: dict[str, np.ndarray]) -> None:
         columns["current"] = np.minimum(columns["current"], 0.2)
 
-    assessments, found = fitted(tmp_path, logs=clip)
+    stages, found = fitted(tmp_path, logs=clip)
     assert found.grade == "Not usable"
     assert "clipped channels" in failed(found)
-    said = lack_of_fit(assessments).clipped
+    said = lack_of_fit(stages).clipped
     assert len(said) == 1
     assert "'current' stands at exactly 0.2 A" in said[0]
     assert ", 0.2] in its channel" in said[0]
@@ -195,11 +194,11 @@ def test_a_counter_that_does_not_follow_is_no_stop_of_the_machine(tmp_path: Path
         kept = np.cumsum(np.clip(rate, -5000.0, 5000.0) * apart)
         columns["counts"] = np.floor(columns["counts"][0] + np.append(0.0, kept))
 
-    assessments, found = fitted(tmp_path, logs=lose)
+    stages, found = fitted(tmp_path, logs=lose)
     assert found.grade == "Not usable"
     assert "loss at the largest speeds of counts" in failed(found)
     assert "counts does not follow the largest speeds" in found.headline
-    assert lack_of_fit(assessments).causes[0].name == "loss at the largest speeds of counts"
+    assert lack_of_fit(stages).causes[0].name == "loss at the largest speeds of counts"
 
 
 @pytest.mark.slow
@@ -216,10 +215,10 @@ def test_a_scale_that_is_off_is_named_with_the_fixed_value_that_looks_like_it(
     # 3 % more counts are a shaft that is 3 % faster
     faster = Drive.preset("slew").scale(Z10=1.03)
     change = {"drive": faster} if name == "counts" else {"logs": off}
-    assessments, found = fitted(tmp_path, **change)
+    stages, found = fitted(tmp_path, **change)
     assert found.grade == "Usable for prediction", found.headline
     assert f"{said} by +" in found.headline
-    fault = lack_of_fit(assessments).fault(f"scale of {name}")
+    fault = lack_of_fit(stages).fault(f"scale of {name}")
     assert fault is not None
     # one step from where the estimates have made up for a part of it
     assert 2.0 < fault.size < 5.0
@@ -239,9 +238,9 @@ def test_lag_and_late_stamps_are_named_together(tmp_path: Path) -> None:
     def slow(columns: dict[str, np.ndarray]) -> None:
         columns["counts"] = np.floor(lagged(columns["time"], columns["counts"], 0.03))
 
-    assessments, found = fitted(tmp_path, logs=slow)
+    stages, found = fitted(tmp_path, logs=slow)
     assert MISFIT in failed(found)
-    misfit = lack_of_fit(assessments)
+    misfit = lack_of_fit(stages)
     causes = {each.name: each.size for each in misfit.causes}
     # a lag and a delay are the same to first order
     assert causes["lag of counts"] == pytest.approx(30.0, rel=0.1)
@@ -272,16 +271,16 @@ def test_a_run_of_another_machine_is_named(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("rounding", [0.001, 0.5])
-def test_a_rounded_channel_that_lags_is_not_clipped(experiment, rounding: float) -> None:
+def test_a_rounded_channel_that_lags_is_not_clipped(rounding: float) -> None:
     """It stands at its largest value through a pulse, and 0.3 s longer than that."""
     time = np.linspace(0.0, 4.0, 81)
     pulse = np.where((time > 0.5) & (time < 3.0), 5.0, 0.0) + 2.0 * np.sin(time) * (time >= 3.0)
     late = np.where((time > 0.8) & (time < 3.3), 4.0, 0.0) + np.sin(time - 0.3) * (time >= 3.3)
-    run: Experiment = experiment("pulse", 1.0, np.round(late / rounding) * rounding)
+    run = bench_run("pulse", 1.0, np.round(late / rounding) * rounding)
     run = replace(run, input=replace(run.input, values=pulse))
     assert clipped_channels([run]) == ()
-    assert clipped_channels([experiment("still", 1.0, np.zeros(81))]) == ()
-    cut: Experiment = experiment("cut", 1.0, np.minimum(3.0 * np.sin(time), 1.5))
+    assert clipped_channels([bench_run("still", 1.0, np.zeros(81))]) == ()
+    cut = bench_run("cut", 1.0, np.minimum(3.0 * np.sin(time), 1.5))
     cut = replace(cut, input=replace(cut.input, values=3.0 * np.sin(time)))
     (said,) = clipped_channels([cut])
     assert "'y' stands at exactly 1.5 1" in said
@@ -289,13 +288,13 @@ def test_a_rounded_channel_that_lags_is_not_clipped(experiment, rounding: float)
 
 @pytest.mark.parametrize("noise", [0.0, 0.02])
 @pytest.mark.parametrize("cut", [True, False])
-def test_a_channel_that_is_clipped_at_several_steps(experiment, noise: float, cut: bool) -> None:
+def test_a_channel_that_is_clipped_at_several_steps(noise: float, cut: bool) -> None:
     """Read in hundredths; cut at 1, or of a machine that stands at its stop there itself."""
     time, random, runs = np.linspace(0.0, 4.0, 81), np.random.default_rng(2), []
     for level in (0.5, 2.0, 4.0):
         rise = np.minimum(level * (1.0 - np.exp(-time / 0.2)), np.inf if cut else 1.0)
         read = np.round(rise + random.normal(0.0, noise, 81), 2)
-        runs.append(experiment(f"step {level}", level, np.minimum(read, 1.0) if cut else read))
+        runs.append(bench_run(f"step {level}", level, np.minimum(read, 1.0) if cut else read))
         command = np.where(time > 0.0, level, 0.0)
         runs[-1] = replace(runs[-1], input=replace(runs[-1].input, values=command))
     found = clipped_channels(runs)

@@ -27,7 +27,6 @@ from swashplate.identification import (
     Search,
     Unknown,
     Unknowns,
-    assess,
     fit,
     load_fit,
     predict,
@@ -307,13 +306,13 @@ def test_the_truth_is_found_judged_and_predicted() -> None:
     assert [each.name for each in stage.problem.experiments] == ["one", "two"]
     truth = {"gain": GAIN, "lag": LAG, "start.place (one)": 1.0, "start.place (two)": -2.0}
     assert stage.values == pytest.approx(truth, abs=0.02)
-    (assessment,) = assess(made.stages)
-    for estimate, value in zip(assessment.uncertainty.estimates, truth.values(), strict=True):
+    (stage,) = made.stages
+    for estimate, value in zip(stage.uncertainty.estimates, truth.values(), strict=True):
         assert estimate.lower < value < estimate.upper
     (quality,) = predict(made.parameters, HELD)
     assert quality.channel == "place"
     assert quality.measures.rmse == pytest.approx(0.01, rel=0.1)  # the noise, nothing else
-    assert verdict([assessment], [quality]).headline.startswith("Usable")
+    assert verdict([stage], [quality]).headline.startswith("Usable")
 
 
 class Table:
@@ -342,16 +341,14 @@ def test_a_name_that_begins_like_a_sensors_zero_is_the_models() -> None:
 def test_a_fit_comes_back_with_its_model_alone(tmp_path: Path) -> None:
     tests, path = campaign(*RUNS), tmp_path / "fit.json"
     made = fit(servo, tests, RANGES, noise=NOISE)
-    Judged(tests, made, RUNS).store(path)
+    Judged(tests, made).store(path)
     with pytest.raises(InputError, match="give that, with --model"):
         load_fit(path, tests)
     with pytest.raises(InputError, match="another model, or of other bounds"):
         load_fit(path, tests, model=ModelSetup(servo, {**RANGES, "lag": (0.1, 0.2, 3.0)}))
     again = load_fit(path, tests, model=ModelSetup(servo, RANGES, noise=NOISE)).result
     assert again.parameters.numbers == made.parameters.numbers
-    assert assess(again.stages)[0].uncertainty.estimates == (
-        assess(made.stages)[0].uncertainty.estimates
-    )
+    assert again.stages[0].uncertainty.estimates == (made.stages[0].uncertainty.estimates)
 
 
 def test_starts_of_other_steps_are_not_resumed(tmp_path: Path) -> None:
@@ -469,7 +466,7 @@ def limited(seed: int) -> Experiment:
 def test_what_a_model_leaves_out_is_not_called_an_error_of_the_sensor() -> None:
     slow = Model("slow", parameters=Slow, state=State, step=slow_step)
     made = fit(slow, campaign(*map(limited, range(40))), {"lag": (0.01, 0.1, 3.0)})
-    headline = verdict(assess(made.stages), predict(made.parameters, [limited(99)])).headline
+    headline = verdict(made.stages, predict(made.parameters, [limited(99)])).headline
     # the sensor's scale is right, and its noise is not stated
     assert "off by" not in headline
     assert "because the residuals show that the model leaves something out" in headline
@@ -486,7 +483,7 @@ def test_a_run_with_a_scale_of_its_own_is_named() -> None:
         for each, gain, own in zip(runs, gains, noise, strict=True)
     ]
     made = fit(OWN, campaign(*runs[:6]), {"lag": (0.05, 0.2, 2.0), "gain": (0.1, 1.0, 20.0)})
-    found = verdict(assess(made.stages), predict(made.parameters, runs[6:]))
+    found = verdict(made.stages, predict(made.parameters, runs[6:]))
     (failed,) = (e for e in found.criteria if e.name == "scale of a run of its own")
     assert failed.failure.startswith(
         "runs differ in scale from the others: position in run 2 by +1"

@@ -1,32 +1,23 @@
 """Priors count as much as residuals are worth, and robust losses have intervals that know it."""
 
-from collections.abc import Mapping
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 from scipy.optimize import least_squares
 from scipy.signal import lfilter
+from tests.identification.given import model_of, run_of
 
-from swashplate import Experiment, InputError
-from swashplate.campaign.experiment import Channel, InputSignal, Source
+from swashplate import InputError
 from swashplate.identification.intervals import estimates, prior_sentences, uncertainty, weighed
 from swashplate.identification.problem import Loss, Problem, influence, linearised_fit
 from swashplate.identification.solving import solve
 from swashplate.identification.unknowns import Prior, Unknown, Unknowns
 
 COUNT, MEMORY = 40_000, 0.95
-SOURCE = Source(Path("log.csv"), "y")
 
 
-class Level:
-    """y = level."""
-
-    def simulate(
-        self, values: Mapping[str, float], experiment: Experiment
-    ) -> Mapping[str, np.ndarray]:
-        return {"y": np.full(experiment["y"].time.size, values["level"])}
+LEVEL = model_of(lambda values, time, _: np.full(time.size, values["level"]))
 
 
 def problem(prior: Prior | None, *, memory: float, scale: float = 1.0) -> Problem:
@@ -34,11 +25,9 @@ def problem(prior: Prior | None, *, memory: float, scale: float = 1.0) -> Proble
     drawn = np.random.default_rng(5).normal(size=COUNT)
     noise = lfilter([np.sqrt(1.0 - memory**2)], [1.0, -memory], drawn)
     unknowns = Unknowns((Unknown("level", 1.0, 0.1, 9.0, prior=prior),))
-    time = 0.01 * np.arange(COUNT)
-    drive = InputSignal("other", "1", time, np.ones(COUNT), "previous", SOURCE)
-    channel = Channel("y", "other", "1", time, 2.0 + noise, np.ones(COUNT), SOURCE)
-    run = Experiment("run", "bench", "run", "fit", "rest", None, drive, {"y": channel})
-    return Problem(Level(), (run,), unknowns, ("y",), {"y": scale})
+    time, ones = 0.01 * np.arange(COUNT), np.ones(COUNT)
+    run = run_of("run", ones, {"y": 2.0 + noise}, time=time, kind="other", hold="previous")
+    return Problem(LEVEL, (run,), unknowns, ("y",), {"y": scale})
 
 
 def posterior(found: Problem, prior: Prior, memory: float) -> tuple[float, float]:

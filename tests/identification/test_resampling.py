@@ -1,19 +1,24 @@
 """Estimates from other noise and from other runs: bootstrap and cross-validation."""
 
-from collections.abc import Callable, Mapping
 from dataclasses import replace
 from math import ceil
-from pathlib import Path
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from tests.identification.given import TWO_STAGES, Backwards, first_order, linear_fit, unknowns_of
+from tests.identification.given import TIME as LINE_TIME
+from tests.identification.given import (
+    TWO_STAGES,
+    Backwards,
+    bench_run,
+    first_order,
+    linear_fit,
+    model_of,
+    unknowns_of,
+)
 
-from swashplate import Campaign, Channel, Drive, Experiment, InputError
-from swashplate.campaign.experiment import InputSignal, Source
-from swashplate.identification.assessment import Assessment
+from swashplate import Campaign, Drive, Experiment, InputError
 from swashplate.identification.fitting import StageFit, fit
 from swashplate.identification.noise import spectral_covariance
 from swashplate.identification.problem import LinearisedFit, LinearisedRun, Problem
@@ -36,7 +41,6 @@ from swashplate.parameters.files import load_preset
 N, RUNS = 2048, 4
 TIME = np.arange(N) / 512.0
 DESIGN = np.column_stack([1.0 - np.exp(-TIME / 0.3), np.sin(2.0 * TIME)])
-LINE_TIME = np.linspace(0.0, 4.0, 81)
 
 
 def regression(noise: np.ndarray) -> LinearisedFit:
@@ -71,27 +75,19 @@ def test_quantiles_by_hand() -> None:
         few.intervals()
 
 
-class Line:
-    """y = slope · t + level."""
-
-    def simulate(
-        self, values: Mapping[str, float], experiment: Experiment
-    ) -> Mapping[str, np.ndarray]:
-        return {"y": values["slope"] * experiment["y"].time + values["level"]}
-
-
 @pytest.fixture
-def assessed(experiment: Callable[..., Experiment]) -> Assessment:
+def assessed() -> StageFit:
     """A line fitted to four runs with white noise of 0.1."""
     rng = np.random.default_rng(7)
     runs = tuple(
-        experiment(f"run {k}", 1.0, 2.0 * LINE_TIME + 1.0 + 0.1 * rng.normal(size=81))
+        bench_run(f"run {k}", 1.0, 2.0 * LINE_TIME + 1.0 + 0.1 * rng.normal(size=81))
         for k in range(4)
     )
     unknowns = Unknowns((Unknown("slope", 1.5, 0.0, 4.0), Unknown("level", 0.5, -3.0, 3.0)))
-    problem = Problem(Line(), runs, unknowns, ("y",), {"y": 0.1})
+    line = model_of(lambda values, time, _: values["slope"] * time + values["level"])
+    problem = Problem(line, runs, unknowns, ("y",), {"y": 0.1})
     stage = Stage(name="line", part="chain", free={"J": Free(relative=(0.5, 2.0))})
-    return Assessment(StageFit(stage, problem, solve(problem), load_preset("neutral")))
+    return StageFit(stage, problem, solve(problem), load_preset("neutral"))
 
 
 def textbook() -> np.ndarray:
@@ -100,21 +96,21 @@ def textbook() -> np.ndarray:
     return 0.1 * np.sqrt(np.diag(np.linalg.inv(4.0 * design.T @ design)))
 
 
-def test_refits_scatter_as_the_textbook_says(assessed: Assessment) -> None:
+def test_refits_scatter_as_the_textbook_says(assessed: StageFit) -> None:
     found = bootstraps_of([assessed], 200, seed=3)["line"]
     assert found.failed == 0
     # 200 draws tell a standard deviation to 5 %, and the noise itself is known to 4 %
     np.testing.assert_allclose(found.values.std(axis=0), textbook(), rtol=0.2)
     np.testing.assert_allclose(
         found.values.mean(axis=0),
-        list(assessed.stage.values.values()),
+        list(assessed.values.values()),
         atol=float(4.0 * textbook().max() / np.sqrt(200.0)),
     )
     with pytest.raises(InputError, match="1 draws do not make a distribution"):
         bootstraps_of([assessed], 1)
 
 
-def test_draws_do_not_depend_on_the_order_in_which_they_are_done(assessed: Assessment) -> None:
+def test_draws_do_not_depend_on_the_order_in_which_they_are_done(assessed: StageFit) -> None:
     counts: list[int] = []
     forwards = bootstraps_of([assessed], 40, seed=3)["line"]
     backwards = bootstraps_of([assessed], 40, seed=3, executor=Backwards(), watch=counts.append)
@@ -124,7 +120,7 @@ def test_draws_do_not_depend_on_the_order_in_which_they_are_done(assessed: Asses
     assert not np.array_equal(forwards.vectors, other.vectors)
 
 
-def test_profiles_of_a_linear_model_are_its_intervals(assessed: Assessment) -> None:
+def test_profiles_of_a_linear_model_are_its_intervals(assessed: StageFit) -> None:
     found = profiles_of(assessed, executor=Backwards())
     assert list(found) == ["slope", "level"]
     variables = assessed.uncertainty.own.variables
@@ -135,16 +131,10 @@ def test_profiles_of_a_linear_model_are_its_intervals(assessed: Assessment) -> N
         np.testing.assert_allclose(ends, [estimate.lower, estimate.upper], rtol=2e-3)
 
 
-SOURCE = Source(Path("log.csv"), "column")
-
-
 def run_of(number: int, kind: str, low: float, high: float) -> Experiment:
-    time = np.linspace(0.0, 1.0, 11)
-    values = np.concatenate([np.zeros(5), [high, low], np.zeros(4)])
-    drive = InputSignal("voltage", "V", time, values, "previous", SOURCE)
-    channel = Channel("y", "other", "1", time, time, np.ones(11), SOURCE)
-    name = f"run {number}"
-    return Experiment(name, "hoist", name, "fit", "rest", None, drive, {"y": channel}, f"{kind} x")
+    values = np.where(np.arange(81) < 40, high, low)
+    run = bench_run(f"run {number}", 0.0, np.zeros(81), maneuver=f"{kind} x")
+    return replace(run, input=replace(run.input, values=values))
 
 
 KINDS = st.lists(

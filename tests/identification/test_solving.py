@@ -5,19 +5,13 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from math import log
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from tests.identification.given import RISE, TIME, bench_run, risen
 
-from swashplate import (
-    Campaign,
-    DomainError,
-    Drive,
-    Experiment,
-    FileError,
-    InputError,
-    ParameterError,
-)
+from swashplate import Campaign, DomainError, Drive, FileError, InputError, ParameterError
 from swashplate.executors import Processes, Serial, Threads
 from swashplate.identification.drive_model import stage_problem
 from swashplate.identification.model import Linearised
@@ -102,7 +96,6 @@ def test_what_is_refused(make, sentence: str) -> None:
 
 
 GAIN, LAG = 3.0, 0.7
-Make = Callable[..., Experiment]
 UNKNOWNS = Unknowns(
     (
         bounded("gain", 1.0, absolute=(0.1, 20.0), log=True),
@@ -112,22 +105,18 @@ UNKNOWNS = Unknowns(
 
 
 @pytest.fixture
-def problem(rise, experiment: Make, measured) -> Problem:
-    runs = tuple(
-        experiment(f"run {level}", level, measured(level, GAIN, LAG)) for level in (1.0, -2.0)
-    )
-    return Problem(rise, runs, UNKNOWNS, ("y",), {"y": 0.1})
+def problem() -> Problem:
+    runs = tuple(bench_run(f"run {u}", u, risen(u, GAIN, LAG)) for u in (1.0, -2.0))
+    return Problem(RISE, runs, UNKNOWNS, ("y",), {"y": 0.1})
 
 
-def test_residuals_are_weighted_and_scaled(rise, experiment: Make, measured) -> None:
-    run = experiment("run", 1.0, measured(1.0, GAIN, LAG) + 0.2, weight=4.0)
-    made = Problem(rise, (run,), UNKNOWNS, ("y",), {"y": 0.1})
+def test_residuals_are_weighted_and_scaled() -> None:
+    run = bench_run("run", 1.0, risen(1.0, GAIN, LAG) + 0.2, weight=4.0)
+    made = Problem(RISE, (run,), UNKNOWNS, ("y",), {"y": 0.1})
     vector = UNKNOWNS.vector_of({"gain": GAIN, "lag": LAG})
     residuals = made.evaluate(vector, compressed=False).residuals
     assert residuals == pytest.approx(np.full(81, -0.2 * 2.0 / 0.1))
-    assert made.cost(UNKNOWNS.vector_of({"gain": GAIN, "lag": LAG})) == pytest.approx(
-        0.5 * 81 * 16.0
-    )
+    assert made.cost(vector) == pytest.approx(0.5 * 81 * 16.0)
 
 
 def test_differences_stand_in_for_missing_derivatives(problem: Problem) -> None:
@@ -176,14 +165,12 @@ WRONG = {
 
 
 @pytest.mark.parametrize(("method", "change", "sentence"), WRONG.values(), ids=WRONG)
-def test_what_a_model_must_return_is_said(
-    rise, experiment: Make, method: str, change, sentence: str
-) -> None:
-    def wrong(self, values, experiment, *names):
-        return change(rise.simulate(values, experiment)["y"], np.zeros((81, 2)))
+def test_what_a_model_must_return_is_said(method: str, change, sentence: str) -> None:
+    def wrong(values, experiment, *names):
+        return change(RISE.simulate(values, experiment)["y"], np.zeros((81, 2)))
 
-    model = type("Wrong", (type(rise),), {method: wrong})()
-    made = Problem(model, (experiment("run", 1.0, np.ones(81)),), UNKNOWNS, ("y",), {"y": 0.1})
+    model = SimpleNamespace(**{"simulate": RISE.simulate, method: wrong})
+    made = Problem(model, (bench_run("run", 1.0, np.ones(81)),), UNKNOWNS, ("y",), {"y": 0.1})
     with pytest.raises(InputError, match=f"run: {method} .*{sentence}"):
         solve(made)
 
@@ -202,19 +189,30 @@ def test_interrupted_with_the_best_so_far(problem: Problem) -> None:
     assert "allow more with --evaluations" in spent.message
 
 
-def test_impossible_problems(rise, experiment: Make, measured) -> None:
-    run = experiment("run", 1.0, measured(1.0, GAIN, LAG))
-    with pytest.raises(InputError, match="at least one parameter"):
-        Problem(rise, (run,), Unknowns(()), ("y",), {"y": 0.1})
-    with pytest.raises(InputError, match="at least one experiment"):
-        Problem(rise, (), UNKNOWNS, ("y",), {"y": 0.1})
-    ignored = experiment("run", 1.0, measured(1.0, GAIN, LAG), weight=0.0)
-    with pytest.raises(InputError, match="No sample of y counts"):
-        Problem(rise, (ignored,), UNKNOWNS, ("y",), {"y": 0.1})
-    with pytest.raises(InputError, match="No experiment has a channel 'x'; there are y"):
-        noise_scales((run,), ("x",))
-    with pytest.raises(InputError, match="'y' never changes"):
-        noise_scales((experiment("flat", 1.0, np.zeros(81)),), ("y",))
+RUN = bench_run("run", 1.0, risen(1.0, GAIN, LAG))
+
+
+@pytest.mark.parametrize(
+    ("make", "sentence"),
+    [
+        (lambda: Problem(RISE, (RUN,), Unknowns(()), ("y",), {"y": 0.1}), "at least one parameter"),
+        (lambda: Problem(RISE, (), UNKNOWNS, ("y",), {"y": 0.1}), "at least one experiment"),
+        (
+            lambda: Problem(
+                RISE, (bench_run("run", 1.0, TIME, weight=0.0),), UNKNOWNS, ("y",), {"y": 0.1}
+            ),
+            "No sample of y counts",
+        ),
+        (lambda: noise_scales((RUN,), ("x",)), "No experiment has a channel 'x'; there are y"),
+        (
+            lambda: noise_scales((bench_run("flat", 1.0, np.zeros(81)),), ("y",)),
+            "'y' never changes",
+        ),
+    ],
+)
+def test_impossible_problems(make, sentence: str) -> None:
+    with pytest.raises(InputError, match=sentence):
+        make()
 
 
 def test_starts_are_spread_seeded_and_inside(problem: Problem) -> None:
@@ -250,18 +248,13 @@ def test_what_is_done_is_on_disk_and_is_not_done_again(problem: Problem, tmp_pat
         if done == 2:
             raise KeyboardInterrupt
 
-    first = solve_from(problem, starts, store=store, origin={"data": "x"}, watch=stop)
+    kept = {"store": store, "origin": {"data": "x"}}
+    first = solve_from(problem, starts, **kept, watch=stop)
     assert [each.number for each in first] == [0, 1]
     assert len(list(store.glob("start-*.json"))) == 2
     seen: list[int] = []
-    full = solve_from(
-        problem,
-        starts,
-        store=store,
-        origin={"data": "x"},
-        resume=True,
-        watch=lambda result, done: seen.append(result.number),
-    )
+    again = {**kept, "resume": True, "watch": lambda result, done: seen.append(result.number)}
+    full = solve_from(problem, starts, **again)
     assert seen == [2, 3, 4]
     whole = solve_from(problem, starts)
     np.testing.assert_array_equal([e.vector for e in full], [e.vector for e in whole])

@@ -13,7 +13,6 @@ from tests.identification.given import TWO_STAGES
 from swashplate import Campaign, Drive, FileError, InputError, ParameterError
 from swashplate.identification.assessment import (
     Judged,
-    StageProfile,
     fingerprint,
     load_fit,
 )
@@ -44,13 +43,13 @@ def fitted(campaign: Campaign) -> Fit:
 
 @pytest.fixture
 def path(campaign: Campaign, fitted: Fit, tmp_path: Path) -> Path:
-    Judged(campaign, fitted, campaign.experiments).store(tmp_path / "fit.json")
+    Judged(campaign, fitted).store(tmp_path / "fit.json")
     return tmp_path / "fit.json"
 
 
 def test_a_fit_comes_back_as_it_was(path: Path, campaign: Campaign, fitted: Fit) -> None:
     stored = load_fit(path, campaign)
-    assert stored.runs == campaign.experiments
+    assert stored.result.runs == campaign.experiments
     assert stored.result.setup == fitted.setup
     assert stored.result.nominal == fitted.nominal
     assert stored.result.parameters == fitted.parameters
@@ -74,24 +73,23 @@ def test_profiles_folds_and_notes_come_back(
     tmp_path: Path, campaign: Campaign, fitted: Fit
 ) -> None:
     points = tuple(Point(x, 3.0 + x * x, np.array([x, 0.5])) for x in (-0.1, 0.0, 0.1))
-    profile = Profile(0, 3.0, points, 1.0, -0.1, None, ("crossed", "bound"), points[0])
+    profile = Profile(0, 3.0, points, 1.0, -0.1, None, ("crossed", "bound"), points[0], "J", "card")
     held = {"current": Measures(10, 0.1, 0.5)}
     fold = Fold(0, ("a",), ("J",), held, True)
     folds = CrossValidation(3, 2, (fold,), held, {"current": "A"})
     path = tmp_path / "fit.json"
-    kept = [StageProfile("card", profile)]
-    runs = campaign.experiments
-    Judged(campaign, fitted, runs, profiles=kept, folds=folds, notes={"seed": "3"}).store(path)
+    kept = [profile]
+    Judged(campaign, fitted, profiles=kept, folds=folds, notes={"seed": "3"}).store(path)
     stored = load_fit(path, campaign)
     assert stored.folds == folds
     assert stored.notes == {"seed": "3"}
     (back,) = stored.profiles
-    assert back.stage == "card"
-    assert back.profile.rise == profile.rise
-    assert (back.profile.lower, back.profile.upper) == (-0.1, None)
-    assert [each.cost for each in back.profile.points] == [each.cost for each in points]
-    assert np.array_equal(back.profile.points[2].vector, points[2].vector)
-    assert back.profile.better is not None
+    assert (back.name, back.stage) == ("J", "card")
+    assert back.rise == profile.rise
+    assert (back.lower, back.upper) == (-0.1, None)
+    assert [each.cost for each in back.points] == [each.cost for each in points]
+    assert np.array_equal(back.points[2].vector, points[2].vector)
+    assert back.better is not None
 
 
 def test_the_file_is_json_that_others_read(path: Path) -> None:

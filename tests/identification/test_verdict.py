@@ -1,15 +1,13 @@
 """The verdict: what is hopeless is called that, what is good has numbers."""
 
-from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from tests.identification.given import RISE, TIME, bench_run, risen
 
-from swashplate import Drive, Experiment
-from swashplate.campaign.experiment import InputSignal
+from swashplate import Drive
 from swashplate.identification import Verdict, verdict
-from swashplate.identification.assessment import Assessment
 from swashplate.identification.fitting import StageFit
 from swashplate.identification.problem import Problem
 from swashplate.identification.setup import Stage
@@ -18,32 +16,23 @@ from swashplate.identification.unknowns import Unknown, Unknowns
 from swashplate.identification.validation import RunQuality, compared, part_of_range
 from swashplate.identification.verdict import Criterion
 
-TIME = np.linspace(0.0, 4.0, 81)
 WAVE = 10.0 * np.sin(2.0 * np.pi * TIME[:-1] / 4.0)
 WAVE = np.append(WAVE, 0.0)
 SWAP = np.where(np.arange(81) % 2, 1.0, -1.0)
 """Noise that has no relation to anything slow."""
 
-Make = Callable[..., RunQuality]
 
-
-@pytest.fixture
-def quality(experiment: Callable[..., Experiment]) -> Make:
+def quality(simulated: np.ndarray, name: str = "a", measured: np.ndarray = WAVE) -> RunQuality:
     """A wave of ±10 as measured, under an input of the same shape."""
-
-    def make(simulated: np.ndarray, name: str = "a", measured: np.ndarray = WAVE) -> RunQuality:
-        run = experiment(name, 1.0, measured)
-        drive = InputSignal("other", "1", TIME, WAVE, "previous", run.input.source)
-        return compared(replace(run, input=drive), "y", simulated)
-
-    return make
+    run = bench_run(name, 1.0, measured)
+    return compared(replace(run, input=replace(run.input, values=WAVE)), "y", simulated)
 
 
 def criterion(found: Verdict, name: str) -> Criterion:
     return next(each for each in found.criteria if each.name == name)
 
 
-def test_a_good_prediction_has_its_numbers(quality: Make) -> None:
+def test_a_good_prediction_has_its_numbers() -> None:
     found = verdict((), [quality(WAVE + 0.24 * SWAP)])
     # 0.24 of a range of 20
     assert found.headline == "Predicts y to 1.2 % of its range over 1 run."
@@ -51,7 +40,7 @@ def test_a_good_prediction_has_its_numbers(quality: Make) -> None:
     assert not found.sentences
 
 
-def test_the_range_is_that_of_all_runs(quality: Make) -> None:
+def test_the_range_is_that_of_all_runs() -> None:
     runs = [quality(WAVE + 0.3, "a"), quality(WAVE + 30.3, "b", WAVE + 30.0)]
     # from -10 to 40
     assert part_of_range(runs, "y") == pytest.approx(0.3 / 50.0)
@@ -69,16 +58,14 @@ def test_the_range_is_that_of_all_runs(quality: Make) -> None:
         (0.4, "misses at least half of the movement in the predicted runs (fit 40 %)"),
     ],
 )
-def test_a_drive_that_hardly_simulates_is_not_usable(
-    quality: Make, factor: float, words: str
-) -> None:
+def test_a_drive_that_hardly_simulates_is_not_usable(factor: float, words: str) -> None:
     found = verdict((), [quality(factor * WAVE)])
     assert not found.usable
     assert found.headline.startswith("Not usable: y ")
     assert words in found.headline
 
 
-def test_one_run_that_contradicts_the_others_is_named(quality: Make) -> None:
+def test_one_run_that_contradicts_the_others_is_named() -> None:
     runs = [quality(WAVE + 0.1 * SWAP, f"run {k}") for k in range(20)]
     assert criterion(verdict((), runs), "predicted runs worse than mean").state == "met"
     found = verdict((), [*runs, quality(-WAVE, "turned")])
@@ -88,7 +75,7 @@ def test_one_run_that_contradicts_the_others_is_named(quality: Make) -> None:
     assert "mean of the run: y in turned, which contradicts the other runs" in failed.failure
 
 
-def test_large_residuals_that_follow_the_input_are_a_model_error(quality: Make) -> None:
+def test_large_residuals_that_follow_the_input_are_a_model_error() -> None:
     found = verdict((), [quality(0.7 * WAVE)])
     assert not found.usable
     assert "the residuals of y follow the input and are 30 % of its movement" in found.headline
@@ -97,100 +84,91 @@ def test_large_residuals_that_follow_the_input_are_a_model_error(quality: Make) 
     assert "1 of 1 runs follow the input (correlation up to -1.00)" in small.sentences[-1]
 
 
-@pytest.fixture
-def stage(experiment: Callable[..., Experiment], rise, measured) -> Callable[..., StageFit]:
+def stage(
+    bounds: tuple[float, float] = (0.1, 10.0), lags: tuple[float, float] = (0.1, 5.0)
+) -> StageFit:
     """An exponential rise fitted to two runs, with ±0.02 that nothing explains."""
-
-    def make(
-        bounds: tuple[float, float] = (0.1, 10.0), lags: tuple[float, float] = (0.1, 5.0)
-    ) -> StageFit:
-        runs = tuple(
-            experiment(f"rise {level:g}", level, measured(level, 2.0, 0.8) + 0.02 * SWAP)
-            for level in (1.0, 2.0)
-        )
-        unknowns = Unknowns(
-            (
-                Unknown("gain", 0.5 * sum(bounds), *bounds),
-                Unknown("lag", 0.5 * sum(lags), *lags),
-            )
-        )
-        problem = Problem(rise, runs, unknowns, ("y",), {"y": 0.02})
-        given = Stage.model_validate(
-            {"name": "rise", "part": "chain", "free": {"Z1": {"relative": [0.5, 2.0]}}}
-        )
-        solution = solve(problem, problem.start)
-        return StageFit(given, problem, solution, Drive.preset("hoist").parameters)
-
-    return make
+    runs = tuple(
+        bench_run(f"rise {level:g}", level, risen(level, 2.0, 0.8) + 0.02 * SWAP)
+        for level in (1.0, 2.0)
+    )
+    gain = Unknown("gain", 0.5 * sum(bounds), *bounds)
+    lag = Unknown("lag", 0.5 * sum(lags), *lags)
+    problem = Problem(RISE, runs, Unknowns((gain, lag)), ("y",), {"y": 0.02})
+    given = Stage.model_validate(
+        {"name": "rise", "part": "chain", "free": {"Z1": {"relative": [0.5, 2.0]}}}
+    )
+    solution = solve(problem, problem.start)
+    return StageFit(given, problem, solution, Drive.preset("hoist").parameters)
 
 
-def held_out(experiment: Callable[..., Experiment], measured, error: np.ndarray) -> RunQuality:
-    truth = measured(1.5, 2.0, 0.8)
-    return compared(experiment("held", 1.5, truth + 0.02 * SWAP), "y", truth + error)
+def held_out(error: np.ndarray) -> RunQuality:
+    truth = risen(1.5, 2.0, 0.8)
+    return compared(bench_run("held", 1.5, truth + 0.02 * SWAP), "y", truth + error)
 
 
-def test_a_fit_that_carries_over_is_usable(experiment, measured, stage) -> None:
-    found = verdict([Assessment(stage())], [held_out(experiment, measured, 0.0 * TIME)])
+def test_a_fit_that_carries_over_is_usable() -> None:
+    found = verdict([stage()], [held_out(0.0 * TIME)])
     assert found.usable, found.headline
     # 0.02 of what 1.5 · 2 · (1 - exp(-5)) with the noise comes to
     assert found.headline == "Usable: predicts held-out y to 0.66 % of its range."
     assert not any("larger errors" in each for each in found.sentences)
 
 
-def test_what_is_required_decides(quality: Make) -> None:
+def test_what_is_required_decides() -> None:
     found = verdict((), [quality(WAVE + 0.24 * SWAP)], required=0.01)
     assert found.headline == "Not usable: predicts y to 1.2 % of its range only."
     assert criterion(found, "error / range, runs predicted").limit == "1 %"
 
 
-def test_a_fit_without_runs_held_out_says_so(stage) -> None:
-    found = verdict([Assessment(stage())], [])
+def test_a_fit_without_runs_held_out_says_so() -> None:
+    found = verdict([stage()], [])
     assert found.usable
     assert found.headline.endswith("no run was held out.")
     assert "no run was held out" in found.not_judged[0]
 
 
-def test_a_fit_that_does_not_carry_over_is_not_usable(experiment, measured, stage) -> None:
-    spoiled = 0.25 * np.std(measured(1.5, 2.0, 0.8)) * SWAP
-    found = verdict([Assessment(stage())], [held_out(experiment, measured, spoiled)])
+def test_a_fit_that_does_not_carry_over_is_not_usable() -> None:
+    spoiled = 0.25 * np.std(risen(1.5, 2.0, 0.8)) * SWAP
+    found = verdict([stage()], [held_out(spoiled)])
     assert not found.usable
     assert "times the RMSE of the fitted runs" in found.headline
     # ten times the noise, but small for the movement: usable all the same
-    slightly = verdict([Assessment(stage())], [held_out(experiment, measured, 0.08 * SWAP)])
+    slightly = verdict([stage()], [held_out(0.08 * SWAP)])
     assert slightly.usable
     assert any("larger errors on other tests" in each for each in slightly.sentences)
 
 
-def test_wide_intervals_ask_for_attention(stage) -> None:
-    assessment = Assessment(stage())
+def test_wide_intervals_ask_for_attention() -> None:
+    fitted = stage()
     # gain and lag are known to about a per cent
-    assert not any("not determined" in each for each in verdict([assessment], []).sentences)
-    known = assessment.uncertainty
+    assert not any("not determined" in each for each in verdict([fitted], []).sentences)
+    known = fitted.uncertainty
     own = replace(known.own, matrix=1e6 * known.own.matrix)
-    vars(assessment)["uncertainty"] = replace(known, own=own)
-    wide = verdict([assessment], []).sentences
+    vars(fitted)["uncertainty"] = replace(known, own=own)
+    wide = verdict([fitted], []).sentences
     assert "rise: not determined to within ±10 %: gain and lag." in wide
 
 
-def test_most_unknowns_at_bounds_is_hopeless(experiment, measured, stage) -> None:
+def test_most_unknowns_at_bounds_is_hopeless() -> None:
     fitted = stage(bounds=(0.1, 1.5), lags=(1.2, 5.0))
-    held = held_out(experiment, measured, 0.0 * TIME)
-    found = verdict([Assessment(fitted)], [held])
+    held = held_out(0.0 * TIME)
+    found = verdict([fitted], [held])
     assert not found.usable
     assert "2 of 2 parameters are at a bound or not determined" in found.headline
 
 
-def test_an_interrupted_fit_is_not_usable(experiment, measured, stage) -> None:
+def test_an_interrupted_fit_is_not_usable() -> None:
     whole = stage()
     cut = replace(whole, solution=replace(whole.solution, interrupted=True, converged=False))
-    held = held_out(experiment, measured, 0.0 * TIME)
-    found = verdict([Assessment(cut)], [held], planned=["rise", "brake"])
+    held = held_out(0.0 * TIME)
+    found = verdict([cut], [held], planned=["rise", "brake"])
     assert not found.usable
     assert "stage rise was interrupted" in found.headline
     assert "brake was never fitted" in found.headline
     unfinished = replace(
         whole, solution=replace(whole.solution, converged=False, message="too many evaluations")
     )
-    found = verdict([Assessment(unfinished)], [held])
+    found = verdict([unfinished], [held])
     assert not found.usable
     assert "did not converge (too many evaluations)" in found.headline

@@ -8,8 +8,7 @@ import pytest
 from swashplate import Drive
 from swashplate.campaign import rig
 from swashplate.campaign.campaign import Campaign
-from swashplate.identification.assessment import Assessment, assess
-from swashplate.identification.fitting import Fit, drawn, fit
+from swashplate.identification.fitting import Fit, StageFit, drawn, fit
 from swashplate.identification.setup import load_setup
 
 AXES = ("hoist", "slew", "luff")
@@ -34,9 +33,9 @@ def found(result: Fit) -> dict[str, float]:
     }
 
 
-def determined(assessment: Assessment) -> list[str]:
-    names = np.array(assessment.linearised.variables.names)
-    return list(names[assessment.linearised.determined])
+def determined(stage: StageFit) -> list[str]:
+    names = np.array(stage.linearised.variables.names)
+    return list(names[stage.linearised.determined])
 
 
 @pytest.mark.parametrize("joint", [False, True], ids=["staged", "joint"])
@@ -54,7 +53,7 @@ def test_the_truth_is_recovered(axis: str, seed: int, joint: bool, tmp_path: Pat
         forces = stage.problem.model.forces
         if forces is not None:
             expected |= forces.values(truth.parameters)
-    told = [name for each in assess(result.stages) for name in determined(each)]
+    told = [name for each in result.stages for name in determined(each)]
     # with seed 4 the slew drive does not reach its stop downwards, and the fit says so
     assert len(told) >= len(found(result)) - (1 if (axis, seed) == ("slew", 4) else 0)
     for name in told:

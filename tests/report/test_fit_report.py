@@ -14,7 +14,7 @@ import pytest
 
 from swashplate import Campaign, Drive, FileError, InputError, maneuvers
 from swashplate.campaign import rig
-from swashplate.identification.assessment import Judged, StageProfile
+from swashplate.identification.assessment import Judged
 from swashplate.identification.fitting import Fit, fit
 from swashplate.identification.profile import Point, Profile
 from swashplate.identification.resampling import CrossValidation, Fold
@@ -79,9 +79,9 @@ def judged(campaign: Campaign, fitted: Fit) -> Judged:
     """The fit with a profile, several starts and notes."""
     optimum = Point(0.0, 3.0, np.zeros(1))
     points = (Point(-0.1, 4.0, np.zeros(1)), optimum, Point(0.1, 4.5, np.zeros(1)))
-    profile = Profile(0, 3.0, points, 1.0, -0.1, 0.08, ("crossed", "crossed"), None)
-    profiles = [StageProfile("card", profile)]
-    return Judged(campaign, fitted, campaign.select(role="fit"), profiles=profiles, notes=NOTES)
+    name, ends = fitted.stages[0].problem.unknowns.names[0], ("crossed", "crossed")
+    profile = Profile(0, 3.0, points, 1.0, -0.1, 0.08, ends, None, name, "card")
+    return Judged(campaign, fitted, profiles=[profile], notes=NOTES)
 
 
 STARTS = tuple(
@@ -178,8 +178,8 @@ def number(text: str) -> float:
 
 def test_estimates_and_intervals_are_those_of_the_fit(read: Page, judged: Judged) -> None:
     rows = {row["name"]: row for row in read.rows("parameters")}
-    for assessment in judged.assessments:
-        for estimate in assessment.uncertainty.estimates:
+    for stage in judged.result.stages:
+        for estimate in stage.uncertainty.estimates:
             if estimate.name.startswith("offset"):
                 continue
             row = rows[estimate.name]
@@ -268,7 +268,7 @@ def test_samples_of_a_run_are_in_the_page(read: Page, fitted: Fit) -> None:
 
 def test_every_sample_can_be_had_as_a_table(tmp_path: Path, judged: Judged) -> None:
     path = tmp_path / "samples.parquet"
-    write_samples(shown_runs(judged.assessments, judged.predicted), path)
+    write_samples(shown_runs(judged.result.stages, judged.predicted), path)
     table = pl.read_parquet(path)
     assert {*table["channel"]} == {"current", "counts", "speed from counts"}
     held = next(each for each in judged.predicted if each.channel == "current")
@@ -334,7 +334,7 @@ def test_truth_stands_beside_the_estimates(write, judged: Judged, read: Page) ->
     row = next(row for row in page.rows("parameters") if row["name"] == "G1_plus")
     assert number(row["truth"]) == pytest.approx(0.051, rel=1e-4)
     estimate = next(
-        each for each in judged.assessments[0].uncertainty.estimates if each.name == "G1_plus"
+        each for each in judged.result.stages[0].uncertainty.estimates if each.name == "G1_plus"
     )
     assert row["holds"] == ("yes" if estimate.lower <= 0.051 <= estimate.upper else "no")
     fixed = {row["name"]: row for row in page.rows("held")}
@@ -344,7 +344,7 @@ def test_truth_stands_beside_the_estimates(write, judged: Judged, read: Page) ->
 def test_a_number_of_fixed_parameters_alone_says_so(campaign: Campaign) -> None:
     still = Drive.preset("hoist").replace(Z11=0.0, Z18=0.0)
     found = fit(still, campaign.select(role="fit"), SETUP)
-    table, _ = numbers_table(found.drive, found.assessments)
+    table, _ = numbers_table(found.drive, found.stages)
     rows = {line.strip().split("  ")[0]: line for line in str(table).splitlines()}
     assert "0 (fixed)" in rows["Creep at 0 V"]
     assert "±" in rows["Top speed at ±10 V"]
@@ -440,8 +440,8 @@ def test_a_page_that_cannot_be_written_leaves_the_old_one(
     with pytest.raises(FileError, match="cannot be written"):
         write_fit_report(judged, tmp_path / "none" / "fit.html")
     (tmp_path / "fit.html").write_text("old")
-    profile = StageProfile("brake", Profile(0, 1.0, (), 1.0, None, None, ("open", "open"), None))
-    with pytest.raises(InputError, match="'brake' belongs to no stage; there are card, pump"):
+    profile = Profile(0, 1.0, (), 1.0, None, None, ("open", "open"), None, "Z1", "brake")
+    with pytest.raises(InputError, match="no stage 'brake'; there are card, pump"):
         write(profiles=[profile])
     assert [each.read_text() for each in tmp_path.iterdir()] == ["old"]
 

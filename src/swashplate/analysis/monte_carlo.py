@@ -16,8 +16,9 @@ from swashplate.campaign import Campaign
 from swashplate.documents import read_text
 from swashplate.drive import Drive
 from swashplate.errors import DomainError, FileError, InputError, ParameterError
-from swashplate.identification.assessment import Assessment, assess, load_fit
+from swashplate.identification.assessment import load_fit
 from swashplate.identification.drive_model import DriveModel
+from swashplate.identification.fitting import StageFit
 from swashplate.parameters.parameter_set import ParameterSet
 from swashplate.parameters.rules import FULL_VOLTAGE
 from swashplate.results import Result
@@ -66,13 +67,13 @@ class Draws(Result):
         return tuple(said)
 
 
-def drives(assessments: Sequence[Assessment], draws: int = 200, seed: int = 0) -> Draws:
+def drives(stages: Sequence[StageFit], draws: int = 200, seed: int = 0) -> Draws:
     """Drives that a fit's tests allow, drawn from the errors of its estimates.
 
     Parameters
     ----------
-    assessments : sequence of Assessment
-        Of all stages of the fit, see `identification.assessment.assess`.
+    stages : sequence of StageFit
+        All stages of the fit.
     draws : int
         How many, at least 1.
     seed : int
@@ -81,7 +82,7 @@ def drives(assessments: Sequence[Assessment], draws: int = 200, seed: int = 0) -
     Raises
     ------
     InputError
-        If there is no assessment or no draw, or nearly all draws leave the model's domain.
+        If there is no stage or no draw, or nearly all draws leave the model's domain.
 
     Notes
     -----
@@ -90,13 +91,13 @@ def drives(assessments: Sequence[Assessment], draws: int = 200, seed: int = 0) -
     δ₂ = S δ₁ + ε₂ with independent normal ε, see `identification.intervals`. Fixed parameters with
     a standard uncertainty are drawn as well, and the estimates follow them.
     """
-    if not assessments:
-        raise InputError("A Monte Carlo needs the assessment of at least one stage.")
+    if not stages:
+        raise InputError("A Monte Carlo needs at least one stage of a fit.")
     if draws < 1:
         raise InputError(f"There must be at least one draw, not {draws}.")
     random, made, redrawn = np.random.default_rng(seed), list[Drive](), 0
     while len(made) < draws:
-        parameters = _drawn(assessments, random)
+        parameters = _drawn(stages, random)
         if parameters is not None:
             made.append(Drive(parameters))
             continue
@@ -109,18 +110,18 @@ def drives(assessments: Sequence[Assessment], draws: int = 200, seed: int = 0) -
             )
     fixed = tuple(
         unknown.name
-        for each in assessments
+        for each in stages
         for unknown, determined in zip(
-            each.stage.problem.unknowns, each.uncertainty.own.determined, strict=True
+            each.problem.unknowns, each.uncertainty.own.determined, strict=True
         )
         if not determined and unknown.run is None
     )
     return Draws(tuple(made), redrawn, fixed)
 
 
-def _drawn(assessments: Sequence[Assessment], random: np.random.Generator) -> ParameterSet | None:
+def _drawn(stages: Sequence[StageFit], random: np.random.Generator) -> ParameterSet | None:
     """A set with each stage's vector off by a drawn error, None outside bounds or domain."""
-    model, uncertain = assessments[0].stage.problem.model, assessments[0].stage.problem.uncertain
+    model, uncertain = stages[0].problem.model, stages[0].problem.uncertain
     assert isinstance(model, DriveModel)
     parameters = model.parameters
     # of the fixed numbers, in standard uncertainties
@@ -130,20 +131,20 @@ def _drawn(assessments: Sequence[Assessment], random: np.random.Generator) -> Pa
         for together, each in zip(uncertain, off.tolist(), strict=True)
         for name, size in together.items()
     }
-    errors = list[tuple[object, Array]]()  # of each stage, by the covariance that later ones name
+    errors = dict[str, Array]()  # of each stage, by its name
     try:
         if fixed:
             parameters = parameters.replace(fixed, parameters.options)
-        for each in assessments:
-            problem, known, own = each.stage.problem, each.uncertainty, each.uncertainty.own.matrix
+        for each in stages:
+            problem, known, own = each.problem, each.uncertainty, each.uncertainty.own.matrix
             assert isinstance(problem.model, DriveModel)
             error = random.multivariate_normal(
                 np.zeros(len(own)), own, check_valid="ignore", method="eigh"
             )
             for handed in known.handed:
-                error = error + handed.slopes @ next(e for c, e in errors if c is handed.covariance)
-            errors.append((known.sampled, error))
-            vector = each.stage.solution.vector + error + known.fixed @ off
+                error = error + handed.slopes @ errors[handed.stage]
+            errors[each.stage.name] = error
+            vector = each.solution.vector + error + known.fixed @ off
             low, high = problem.unknowns.bounds
             if ((vector < low) | (vector > high))[known.own.determined].any():
                 return None
@@ -207,7 +208,7 @@ def stored_draws(
                 f"The fit in {place} is that of another drive ({', '.join(other[:3])} differ): "
                 f"give the drive that it found, {place}."
             )
-    return drives(assess(fit.stages), draws, seed)
+    return drives(fit.stages, draws, seed)
 
 
 # --- bands ----------------------------------------------------------------------------------------

@@ -173,7 +173,7 @@ def fit(
 
         search = Search(starts, seed, executor, out / "starts", resume, ended) if starts else None
         fitted = partial(fit_runs, max_evaluations=evaluations, watch=watch)
-        result = fitted(nominal, runs, plan, loss=loss, search=search)
+        result = first = fitted(nominal, runs, plan, loss=loss, search=search)
         if joint and len(plan.stages) > 1 and not result.interrupted:
             # from where the stages ended: from afar a joint fit is often caught on its way
             result = fitted(result.parameters, runs, plan.joint())
@@ -187,10 +187,8 @@ def fit(
     with working("Judging") as status, clock.part("judging"):
         found = judge_fit(
             campaign,
-            runs,
-            nominal,
-            plan,
             result,
+            first=first,
             folds=folds,
             bootstrap=bootstrap,
             profiles=profile or (),
@@ -218,31 +216,31 @@ def _say_fit(found: Judged) -> None:
     """What was found, stage by stage, and how well each run is followed."""
     from swashplate.identification import tables
 
-    for run in found.runs:
+    for run in found.result.runs:
         for sentence in run.notes:
             say(f"- {run.name}: {sentence}.")
     for sentence in found.result.doubts:
         say(f"! {sentence}")
-    for each in found.assessments:
-        name, solution = each.stage.stage.name, each.stage.solution
+    for each in found.result.stages:
+        name, solution = each.stage.name, each.solution
         bootstrap = found.bootstraps.get(name)
         show(tables.estimates_table(each, bootstrap=bootstrap))
         say(f"{name}: {solution.message} after {solution.evaluations} evaluations.")
         drawn = () if bootstrap is None else bootstrap.sentences()
         bullets(each.identifiability.sentences(), each.uncertainty.sentences(), drawn)
-        bullets(each.stage.bounds_reached())
+        bullets(each.bounds_reached())
     if found.profiles:
         show(tables.profiles_table(found))
     for profile in found.profiles:
-        bullets(profile.profile.sentences(found.name_of(profile)))
+        bullets(profile.sentences())
     say(tables.fixed_line(found.result))
     note("\nRuns that were fitted")
-    show(*tables.runs_tables([quality for each in found.assessments for quality in each.runs]))
+    show(*tables.runs_tables([quality for each in found.result.stages for quality in each.runs]))
     if found.predicted:
         note("Runs that were held out and predicted")
         show(*tables.runs_tables(found.predicted))
     if found.folds is not None:
-        show(tables.folds_tables(found.folds, found.assessments)[0])
+        show(tables.folds_tables(found.folds, found.result.stages)[0])
         bullets(found.folds.sentences())
 
 
@@ -265,8 +263,8 @@ def _written(found: Judged, out: Path) -> list[str]:
         write_text(setup_text(found.result.setup), out / CONFIGURATION)
         lines = [f"Drive:     {out / DRIVE}", f"Settings:  {out / CONFIGURATION}"]
     tables = [
-        estimates_table(each, bootstrap=found.bootstraps.get(each.stage.stage.name), own=own)
-        for each in found.assessments
+        estimates_table(each, bootstrap=found.bootstraps.get(each.stage.name), own=own)
+        for each in found.result.stages
         for own in (False, True)
     ]
     joined(tables).write(out / "estimates.csv")
@@ -436,7 +434,7 @@ def report(
         verdict = found.verdict
     note(_reported(found, folder, true))
     files.write(pdf, "Printed", lambda to: print_report(folder / "report.html", to))
-    runs = shown_runs(found.assessments, found.predicted)
+    runs = shown_runs(found.result.stages, found.predicted)
     files.write(data, "Samples, in SI", lambda to: write_samples(runs, to))
     files.say()
     say(verdict.headline)
@@ -479,7 +477,7 @@ def demo(*, out: Path = Path("demo"), seed: int = 1) -> None:
         tests, start = campaign.select(role="fit"), campaign.drive("hoist").parameters
         result = fit(start, tests, setup)
         begin("computing intervals and verdict")
-        found = judge_fit(campaign, tests, start, setup, result, seed=seed)
+        found = judge_fit(campaign, result, seed=seed)
         verdict = found.verdict
         begin("writing the report")
         lines = [*_written(found, out), _reported(found, out, truth.parameters)]
@@ -491,7 +489,7 @@ def demo(*, out: Path = Path("demo"), seed: int = 1) -> None:
         figure = plot_channel(run.experiment[run.channel], run.simulated, title=title)
         save_figure(figure, out / "result.png")
     note(f"Campaign:  {path}")
-    made = [tables.estimates_table(e, truth=truth.parameters) for e in found.assessments]
+    made = [tables.estimates_table(e, truth=truth.parameters) for e in result.stages]
     show(*made)
     inside, counted = tables.truth_count(made)
     say(f"The truth lies within the 95 % interval for {inside} of {counted} parameters.")

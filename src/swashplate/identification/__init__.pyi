@@ -1,6 +1,4 @@
-from .assessment import Assessment as Assessment
 from .assessment import Judged as Judged
-from .assessment import assess as assess
 from .assessment import judge_fit as judge_fit
 from .assessment import load_fit as load_fit
 from .drive_model import DriveModel as DriveModel
@@ -10,6 +8,7 @@ from .experiment_design import bench as bench
 from .experiment_design import outlook as outlook
 from .fitting import Fit as Fit
 from .fitting import Search as Search
+from .fitting import StageFit as StageFit
 from .fitting import fit as fit
 from .identifiability import Identifiability as Identifiability
 from .intervals import Uncertainty as Uncertainty

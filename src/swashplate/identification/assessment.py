@@ -1,4 +1,4 @@
-"""Assessment of a fit, all that follows it, and its file."""
+"""A fit with all that is found out about it, and its file."""
 
 from __future__ import annotations
 
@@ -8,9 +8,8 @@ from dataclasses import dataclass, field, replace
 from datetime import date
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any
 
-import numpy as np
 from pydantic import BaseModel, ConfigDict
 
 from swashplate.__about__ import __version__
@@ -19,23 +18,10 @@ from swashplate.campaign.experiment import Experiment
 from swashplate.documents import read_json
 from swashplate.errors import FileError, InputError
 from swashplate.identification import tables
-from swashplate.identification.drive_model import (
-    Parameters,
-)
+from swashplate.identification.drive_model import Parameters
 from swashplate.identification.fitting import Fit, Solved, StageFit, fingerprint, staged
-from swashplate.identification.identifiability import Identifiability, identifiability
-from swashplate.identification.intervals import (
-    Handed,
-    Uncertainty,
-    prior_sentences,
-    reach,
-    released,
-    slopes_by_earlier,
-    slopes_by_fixed,
-    uncertainty,
-)
-from swashplate.identification.problem import LinearisedFit, Loss, Problem, linearised_fit
-from swashplate.identification.profile import Profile, checked_ends, profiles_of
+from swashplate.identification.problem import Loss, Problem
+from swashplate.identification.profile import Profile, profiles_of
 from swashplate.identification.resampling import (
     Bootstrap,
     CrossValidation,
@@ -45,8 +31,8 @@ from swashplate.identification.resampling import (
 from swashplate.identification.setup import ModelSetup, Setup, Stage
 from swashplate.identification.solving import Solution
 from swashplate.identification.unknowns import Unknown, Unknowns
-from swashplate.identification.validation import RunQuality, predict, run_qualities
-from swashplate.identification.verdict import LIMITS, REQUIRED, Verdict, verdict
+from swashplate.identification.validation import RunQuality, predict
+from swashplate.identification.verdict import REQUIRED, Verdict, verdict
 from swashplate.parameters.definitions import find
 from swashplate.parameters.files import dump_set, read_set
 from swashplate.parameters.parameter_set import Motion, ParameterSet
@@ -58,111 +44,33 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, eq=False)
-class Assessment(Result):
-    """What a stage's data tell of its unknowns, and how good the fit is."""
-
-    stage: StageFit
-    earlier: tuple[Assessment, ...] = ()
-    """Of the stages before, whose results this one takes for granted."""
-
-    def tables(self) -> list[Table]:
-        """Estimates with their intervals, then the errors of each run."""
-        return [tables.estimates_table(self), *tables.runs_tables(self.runs)]
-
-    @cached_property
-    def linearised(self) -> LinearisedFit:
-        """Residuals and derivatives at the optimum."""
-        solution = self.stage.solution
-        return linearised_fit(self.stage.problem, solution.vector, solution.loss)
-
-    @cached_property
-    def identifiability(self) -> Identifiability:
-        """Which unknowns the tests determine."""
-        fit, names = self.linearised, self.stage.problem.unknowns.names
-        fixed = {k: v for k, v in self.stage.parameters.numbers.items() if k not in names}
-        try:
-            quoted = self.uncertainty.quoted.matrix
-        except InputError:  # too few samples to tell the noise from
-            quoted = None
-        return identifiability(
-            fit.triangle, fit.variables, covariance=quoted, tolerance=fit.tolerance, fixed=fixed
-        )
-
-    @cached_property
-    def uncertainty(self) -> Uncertainty:
-        """Errors of the estimates, for coloured residuals, those of earlier stages taken in."""
-        problem, vector, handed = self.stage.problem, self.stage.solution.vector, []
-        fixed = slopes_by_fixed(self.stage, self.linearised)
-        for each in self.earlier:
-            slopes = slopes_by_earlier(self.stage, each.stage, self.linearised)
-            if slopes is not None:
-                handed.append(Handed(each.uncertainty.sampled, slopes))
-                # a fixed number acts on this stage by itself, and through what it does to others
-                fixed = fixed + slopes @ each.uncertainty.fixed
-        found = uncertainty(self.linearised, handed=handed, fixed=fixed)
-        found = replace(found, priors=prior_sentences(problem.unknowns, vector, found.quoted))
-        if not found.noisy:
-            return found
-        half, fit = reach(found.own), released(self.linearised)
-        first = [each.targets[0].startswith(tuple(LIMITS)) for each in problem.unknowns]
-        ends = checked_ends(problem, vector, fit, half, np.flatnonzero(first).tolist())
-        return replace(found, ends=tuple(ends))
-
-    @cached_property
-    def runs(self) -> tuple[RunQuality, ...]:
-        """Quality of each channel of each run that was fitted."""
-        return run_qualities(self.stage.problem, self.stage.solution.vector)
-
-
-def assess(stages: Sequence[StageFit]) -> tuple[Assessment, ...]:
-    """The assessment of each stage of a fit."""
-    made: list[Assessment] = []
-    for each in stages:
-        made.append(Assessment(each, tuple(made)))
-    return tuple(made)
-
-
-class StageProfile(NamedTuple):
-    """A profile, and the stage whose unknown it is of."""
-
-    stage: str
-    profile: Profile
-
-
-@dataclass(frozen=True, eq=False)
 class Judged(Result):
     """A fit, just made or stored, and all that is found out about it."""
 
     campaign: Campaign
     result: Fit
-    runs: Sequence[Experiment]
-    """Those that were fitted."""
     bootstraps: Mapping[str, Bootstrap] = field(default_factory=dict)
     """By stage."""
-    profiles: Sequence[StageProfile] = ()
+    profiles: Sequence[Profile] = ()
     folds: CrossValidation | None = None
     notes: Mapping[str, str] = field(default_factory=dict)
     """Versions, seed, campaign."""
     required: float = REQUIRED
     """Largest error of held-out runs over their range."""
 
-    @property
-    def assessments(self) -> tuple[Assessment, ...]:
-        """Of each stage."""
-        return self.result.assessments
-
     @cached_property
     def predicted(self) -> tuple[RunQuality, ...]:
         """Runs of the axis that were held out, predicted."""
-        names = {each.name for each in self.runs}
-        out = self.campaign.select(axis=self.runs[0].axis, role="validate")
+        runs = self.result.runs
+        names = {each.name for each in runs}
+        out = self.campaign.select(axis=runs[0].axis, role="validate")
         return predict(self.result.parameters, [each for each in out if each.name not in names])
 
     @cached_property
     def verdict(self) -> Verdict:
         """What it can be used for."""
         planned = [each.name for each in self.result.setup.stages]
-        return verdict(self.assessments, self.predicted, planned=planned, required=self.required)
+        return verdict(self.result.stages, self.predicted, planned=planned, required=self.required)
 
     def tables(self) -> list[Table]:
         """Criteria of the verdict, then the fit's tables and the errors of held-out runs."""
@@ -177,27 +85,17 @@ class Judged(Result):
         """The verdict's headline and all that it says."""
         return (self.verdict.headline, *self.verdict.sentences, *self.verdict.not_judged)
 
-    def name_of(self, profile: StageProfile) -> str:
-        """The unknown that a profile is of."""
-        stage = next(each for each in self.result.stages if each.stage.name == profile.stage)
-        return stage.problem.unknowns.names[profile.profile.index]
-
     def store(self, path: str | Path) -> None:
         """Write what `load_fit` reads and the report can be made from again, whole or not at all.
 
         Samples stay in the campaign; a fingerprint of each run is stored.
-
-        Raises
-        ------
-        FileError
-            If the file cannot be written.
         """
         start = self.result.nominal
         content = FitFile(
             swashplate=__version__,
-            axis=self.runs[0].axis,
+            axis=self.result.runs[0].axis,
             campaign=str(self.campaign.path),
-            runs={each.name: fingerprint(each) for each in self.runs},
+            runs={each.name: fingerprint(each) for each in self.result.runs},
             nominal=dict(start.numbers) if isinstance(start, ModelSetup) else dump_set(start),
             setup=self.result.setup,
             stages=tuple(
@@ -223,7 +121,7 @@ class Judged(Result):
         """
         found, nominal = self.result.drive.parameters, self.result.nominal
         assert isinstance(nominal, ParameterSet)
-        today, ends = f"{date.today():%d %b %Y}", _interval_words(self.assessments, found)
+        today, ends = f"{date.today():%d %b %Y}", _interval_words(self.result.stages, found)
         parameters = dict(found.parameters)
         for symbol, parameter in parameters.items():
             if symbol in ends:
@@ -237,7 +135,9 @@ class Judged(Result):
         title = f"{self.campaign.title}: fitted to {fitted} runs, {today}"
         if not self.verdict.usable:
             title += f". {self.verdict.headline.rstrip('.')}"
-        return replace(found, title=title, parameters=parameters, motion=motion_of(self.runs))
+        return replace(
+            found, title=title, parameters=parameters, motion=motion_of(self.result.runs)
+        )
 
 
 def motion_of(runs: Iterable[Experiment]) -> Motion:
@@ -251,21 +151,17 @@ def motion_of(runs: Iterable[Experiment]) -> Motion:
     return "rod" if units and units <= {"m", "m/s"} else "shaft"
 
 
-def _interval_words(assessments: Sequence[Assessment], found: ParameterSet) -> dict[str, list[str]]:
+def _interval_words(stages: Sequence[StageFit], found: ParameterSet) -> dict[str, list[str]]:
     """Intervals of the fitted parameters in words, by symbol."""
     words: dict[str, list[str]] = {}
-    for each in assessments:
-        unknowns = each.stage.problem.unknowns
+    for each in stages:
+        unknowns = each.problem.unknowns
         for estimate, unknown in zip(each.uncertainty.estimates, unknowns, strict=True):
             if unknown.run is None and unknown.name.startswith("force_"):
                 forces = ("Z19", "Z20", "Z21", "Z22")
                 words |= {symbol: ["from the fitted forces"] for symbol in forces}
             elif unknown.run is None:
-                low, high = estimate.lower, estimate.upper
-                ends: str = estimate.status
-                if low is not None or high is not None:
-                    ends = f"{'none below' if low is None else f'{low:.5g}'} to "
-                    ends += "none above" if high is None else f"{high:.5g}"
+                ends = " to ".join(filter(None, estimate.ends()))
                 for target in (each for each in unknown.targets if each in found.numbers):
                     side = target.rpartition("_")[2]
                     side = f"{side} " if side in ("plus", "minus") else ""
@@ -275,11 +171,9 @@ def _interval_words(assessments: Sequence[Assessment], found: ParameterSet) -> d
 
 def judge_fit(
     campaign: Campaign,
-    runs: Sequence[Experiment],
-    nominal: Parameters,
-    plan: Setup,
     result: Fit,
     *,
+    first: Fit | None = None,
     folds: int = 0,
     bootstrap: int = 0,
     profiles: Sequence[str] = (),
@@ -293,66 +187,53 @@ def judge_fit(
 
     Parameters
     ----------
-    campaign, runs, nominal, plan :
-        What was fitted, from where, and how.
-    result : Fit
-        What was found.
-    folds : int
-        Of the cross-validation; 0 for none.
-    bootstrap : int
-        Refits to new noise.
+    campaign, result :
+        What was fitted, and what was found.
+    first : Fit, optional
+        The fit in stages that a joint one went on from: folds begin where it did.
+    folds, bootstrap : int
+        Folds of the cross-validation, and refits to new noise; 0 for none.
     profiles : sequence of str
-        Unknowns by name, or ``"all"``.
+        Unknowns by name, or ``"all"``; an `InputError` for one that there is not.
     seed, executor, loss :
         Of the refits.
     required : float
         Largest error of held-out runs over their range. [1]
     watch : callable
         Is given in words how far the work is.
-
-    Raises
-    ------
-    InputError
-        If a profile of an unknown is wanted that there is not.
     """
-    assessments = result.assessments
-    known = [name for each in assessments for name in each.stage.problem.unknowns.names]
+    stages = result.stages
+    known = [name for each in stages for name in each.problem.unknowns.names]
     for name in profiles:
         if name != "all" and name not in known:
             machine = ", ".join(each for each in known if "(" not in each)
             raise InputError(f"There is no parameter '{name}'; there are {machine}.")
-    validated = bootstraps = None
+    how: dict[str, Any] = {"executor": executor, "seed": seed}
+    validated, bootstraps, made = None, {}, list[Profile]()
     if folds:
+        begun = result if first is None else first
         validated = cross_validate(
-            runs,
-            nominal,
-            plan,
+            begun.runs,
+            begun.nominal,
+            begun.setup,
             folds=folds,
             loss=loss,
             watch=lambda _, done: watch(f"{done} of {folds} folds"),
-            executor=executor,
-            seed=seed,
+            **how,
         )
     if bootstrap:
-        bootstraps = bootstraps_of(
-            assessments,
-            bootstrap,
-            watch=lambda done: watch(f"{done} of {bootstrap} fits to new noise"),
-            executor=executor,
-            seed=seed,
-        )
-    made = []
-    for each in assessments if profiles else ():
-        stage, own = each.stage.stage.name, each.stage.problem.unknowns.names
+        words = f"of {bootstrap} fits to new noise"
+        bootstraps = bootstraps_of(stages, bootstrap, watch=lambda n: watch(f"{n} {words}"), **how)
+    for each in stages if profiles else ():
 
-        def profiled(done: int, stage: str = stage) -> None:
+        def profiled(done: int, stage: str = each.stage.name) -> None:
             watch(f"{stage}: {done} profiles")
 
+        own = each.problem.unknowns.names
         names = None if "all" in profiles else [name for name in profiles if name in own]
-        found = profiles_of(each, names, executor=executor, watch=profiled)
-        made += [StageProfile(stage, one) for one in found.values()]
+        made += profiles_of(each, names, executor=executor, watch=profiled).values()
     notes = {**versions(), "seed": str(seed), "campaign": str(campaign.path)}
-    return Judged(campaign, result, runs, bootstraps or {}, made, validated, notes, required)
+    return Judged(campaign, result, bootstraps, made, validated, notes, required)
 
 
 def versions() -> dict[str, str]:
@@ -391,7 +272,7 @@ class FitFile(Entry):
     """What the fit began from: a drive's parameter file, or the numbers of a model of one's own."""
     setup: Setup
     stages: tuple[StoredStage, ...]
-    profiles: tuple[StageProfile, ...]
+    profiles: tuple[Profile, ...]
     folds: CrossValidation | None
     notes: dict[str, str]
 
@@ -408,21 +289,13 @@ def load_fit(
     Parameters
     ----------
     path : path
-        What `Judged.store` wrote.
+        What `Judged.store` wrote; a `FileError` if it is none, or was written by another version.
     campaign : Campaign
-        The tests that were fitted.
+        The tests that were fitted; an `InputError` names the run that is not as it was.
     model : ModelSetup, optional
         The model of one's own that was fitted; the file does not have it.
     threads : int, optional
         As of `fitting.fit`.
-
-    Raises
-    ------
-    FileError, ParameterError
-        If the file is none, or was written by another version.
-    InputError
-        If the campaign is not the one that was fitted, the sentence names the run; or the model is
-        not given, or another one.
     """
     file = read_json(path, FitFile, strict=False)
     if file.swashplate != __version__:
@@ -468,5 +341,6 @@ def load_fit(
         return replace(problem, unknowns=Unknowns(entry.unknowns)), entry.solution, entry.starts
 
     begun = file.setup.model_copy(update={"stages": file.setup.stages[: len(file.stages)]})
-    found = Fit(file.setup, nominal, staged(begun, nominal, experiments, stored, threads=threads))
-    return Judged(campaign, found, experiments, {}, file.profiles, file.folds, file.notes)
+    stages = staged(begun, nominal, experiments, stored, threads=threads)
+    found = Fit(file.setup, nominal, experiments, stages)
+    return Judged(campaign, found, {}, file.profiles, file.folds, file.notes)

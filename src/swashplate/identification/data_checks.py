@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import replace
 from functools import partial
 from itertools import chain
@@ -27,6 +27,7 @@ from swashplate.identification.problem import Loss, Problem
 from swashplate.identification.setup import ModelSetup
 from swashplate.parameters.parameter_set import ParameterSet
 from swashplate.parameters.rules import FULL_VOLTAGE
+from swashplate.tables import count
 
 Array = NDArray[np.float64]
 
@@ -84,7 +85,7 @@ def check_runs(experiments: Sequence[Experiment], nominal: ParameterSet) -> list
             still = [*_still(name, [each for each in ours if each.run not in idle])]
             seen = idle | {each.run for each in still}
             found += still
-            found += contradictions({name: [each for each in ours if each.run not in seen]})
+            found += contradictions(name, [each for each in ours if each.run not in seen])
     return sorted(found, key=lambda each: each.severity != "refuse")
 
 
@@ -124,20 +125,14 @@ def contradicting_runs(
     experiments: Sequence[Experiment], parameters: ParameterSet
 ) -> list[Finding]:
     """Runs whose sign or scale contradicts the others, beside a drive that was fitted to all."""
-    found = contradictions(motions(experiments, parameters))
+    of_channels = motions(experiments, parameters).items()
+    found = (each for name, ours in of_channels for each in contradictions(name, ours))
     return [each for each in found if each.run is not None]
 
 
 def refuse_unsound(findings: Sequence[Finding]) -> tuple[str, ...]:
-    """Sentences of what is only a warning.
-
-    Raises
-    ------
-    InputError
-        With the first finding that must be refused, and how many more there are.
-    """
-    refused = [each for each in findings if each.severity == "refuse"]
-    if refused:
+    """Sentences of what is only a warning; an `InputError` with the first that must be refused."""
+    if refused := _refused(findings):
         more = len(refused) - 1
         also = f" ({more} more finding{'s' if more > 1 else ''} of this weight.)" if more else ""
         raise InputError(refused[0].sentence + also)
@@ -146,15 +141,14 @@ def refuse_unsound(findings: Sequence[Finding]) -> tuple[str, ...]:
 
 def spike_findings(experiments: Sequence[Experiment], loss: Loss) -> list[Finding]:
     """Spikes, gross ones to be refused unless a robust loss takes their weight."""
-    found = []
-    for (run, name), (sentence, gross) in spiked(experiments).items():
-        make = refusal if gross and loss == "linear" else warning
-        found.append(make(run, name, f"{sentence}."))
-    return found
+    return [
+        (refusal if gross and loss == "linear" else warning)(run, name, f"{sentence}.")
+        for (run, name), (sentence, gross) in spiked(experiments).items()
+    ]
 
 
-def _refused(found: Sequence[Finding]) -> bool:
-    return any(each.severity == "refuse" for each in found)
+def _refused(found: Sequence[Finding]) -> list[Finding]:
+    return [each for each in found if each.severity == "refuse"]
 
 
 # --- samples and commands -------------------------------------------------------------------------
@@ -165,8 +159,9 @@ def _samples(experiment: Experiment, fitted: Collection[str]) -> Iterator[Findin
     run, signal = experiment.name, experiment.input
     bad = ~(np.isfinite(signal.values) & np.isfinite(signal.time))
     if signal.values.size < 2:
-        said = f"its input has {_count(signal.values.size)}; at least two are needed, and a run "
-        yield refusal(run, None, f"{run}: {said}with motion has hundreds.")
+        had = count(signal.values.size, "sample")
+        said = f"{run}: its input has {had}; at least two are needed, and a run with motion has "
+        yield refusal(run, None, f"{said}hundreds.")
         return
     if bad.any():
         said = f"{run}: its input is not finite at sample {int(np.argmax(bad))}; mend the log or "
@@ -178,16 +173,13 @@ def _samples(experiment: Experiment, fitted: Collection[str]) -> Iterator[Findin
             continue
         bad = used & ~(np.isfinite(channel.values) & np.isfinite(channel.time))
         if bad.any():
-            said = f"is not finite in {_count(int(np.count_nonzero(bad)))}, the first at "
+            had = count(int(np.count_nonzero(bad)), "sample")
+            said = f"{run}: '{name}' is not finite in {had}, the first at "
             said += f'{channel.time[np.argmax(bad)]:.6g} s; say missing = "drop", or ignore a '
-            yield refusal(run, name, f"{run}: '{name}' {said}window, the channel or the run.")
+            yield refusal(run, name, f"{said}window, the channel or the run.")
         elif samples < 2:
-            said = f"has {_count(samples)} that can count, which shows no motion; leave the run "
-            yield refusal(run, name, f"{run}: '{name}' {said}out with role = \"ignore\".")
-
-
-def _count(samples: int) -> str:
-    return f"{samples} sample{'' if samples == 1 else 's'}"
+            said = f"{run}: '{name}' has {count(samples, 'sample')} that can count, which shows no "
+            yield refusal(run, name, f'{said}motion; leave the run out with role = "ignore".')
 
 
 def _idle_commands(experiments: Sequence[Experiment], nominal: ParameterSet) -> list[Finding]:
@@ -293,9 +285,9 @@ def _still(name: str, ours: Sequence[Motion]) -> Iterator[Finding]:
             yield refusal(each.run, name, f"{where} {said}; {also}")
             continue
         frozen = (each.measured == 0.0) & (np.abs(each.simulated) > DEAD * fastest) & position
-        edges = np.flatnonzero(np.diff(np.concatenate([[False], frozen, [False]])))
+        edges = np.flatnonzero(np.diff(frozen, prepend=False, append=False))
         half = 0.5 * float(np.median(np.diff(each.time)))
-        for first, stop in zip(edges[::2], edges[1::2], strict=True):
+        for first, stop in edges.reshape(-1, 2):
             begin, end = each.time[first] - half, each.time[stop - 1] + half
             if end - begin > FROZEN:
                 said = f"stands still from {begin:.4g} to {end:.4g} s, though the drive should move"
@@ -304,12 +296,8 @@ def _still(name: str, ours: Sequence[Motion]) -> Iterator[Finding]:
                 break
 
 
-def contradictions(of_channels: Mapping[str, Sequence[Motion]]) -> list[Finding]:
+def contradictions(name: str, ours: Sequence[Motion]) -> Iterator[Finding]:
     """Runs whose sign or scale beside the drive cannot be right, or a channel's as a whole."""
-    return [each for name, ours in of_channels.items() for each in _contradictions(name, ours)]
-
-
-def _contradictions(name: str, ours: Sequence[Motion]) -> Iterator[Finding]:
     against = [turned(each.simulated, each.measured) for each in ours]
     if len(ours) > 1 and all(against):
         said = f"In all {len(ours)} runs '{name}' goes against the command: reverse it with "
@@ -342,7 +330,7 @@ def check_rank(where: str, problem: Problem) -> list[Finding]:
     """Fewer samples than unknowns, or unknowns on which nothing depends."""
     unknowns = problem.unknowns
     if problem.samples < len(unknowns):
-        said = f"{_count(problem.samples)} cannot determine {len(unknowns)} parameters; "
+        said = f"{count(problem.samples, 'sample')} cannot determine {len(unknowns)} parameters; "
         return [refusal(None, None, f"{where}: {said}record longer runs, or free less.")]
     exact = isinstance(problem.model, EquationModel)  # any other may take minutes
     if exact and not problem.evaluate(problem.start).jacobian.any():

@@ -67,12 +67,14 @@ OTHER_RATE = 0.01
 REST = 0.01
 """Share of the largest command below which it has no sign of its own. [1]"""
 REACHED = (
-    (Limit.SWASH_STOP, "swash_angle", "Z13"),
-    (Limit.ORIFICE, "orifice_opening", "Z16"),
-    (Limit.SPOOL, "", "Z14"),
-    (Limit.RELIEF, "", "Z15"),
+    (Limit.SWASH_STOP, "swash_angle", "Z13", "the swash plate's stop Z13"),
+    (Limit.ORIFICE, "orifice_opening", "Z16", "the orifices' limit Z16"),
+    (Limit.SPOOL, "", "Z14", "the spool's stop Z14"),
+    (Limit.RELIEF, "", "Z15", "the relief valve Z15"),
 )
-"""Limits, the signal whose sign says which side acts, and the parameter that sets them."""
+"""Limits, the signal whose sign says which side acts, the parameter that sets them, and words."""
+LIMITS = {symbol: words for _, _, symbol, words in sorted(REACHED, key=lambda each: each[2])}
+"""What a drive may never have reached in the fitted runs, by symbol."""
 
 # --- what drives an experiment --------------------------------------------------------------------
 
@@ -165,7 +167,7 @@ def simulated_run(experiment: Experiment, parameters: ParameterSet) -> Simulatio
 def limits_reached(experiment: Experiment, parameters: ParameterSet) -> set[str]:
     """Columns of the limits that act in a run, such as ``"Z16_plus"``, of Z13 to Z16."""
     run, found = simulated_run(experiment, parameters), set[str]()
-    for limit, signal, symbol in REACHED:
+    for limit, signal, symbol, _ in REACHED:
         acts = run.active(limit)
         sides = {"_plus": run[signal] > 0.0, "_minus": run[signal] < 0.0} if signal else {"": acts}
         found |= {symbol + side for side, there in sides.items() if (acts & there).any()}

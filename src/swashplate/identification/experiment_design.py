@@ -38,7 +38,7 @@ from swashplate.maneuvers import Maneuver, multisine, ramp, sine, stairs, step
 from swashplate.parameters.definitions import CATALOGUE, COLUMNS
 from swashplate.parameters.parameter_set import HasParameters, ParameterSet, set_of
 from swashplate.parameters.rules import FULL_VOLTAGE
-from swashplate.results import Result, short
+from swashplate.results import Result
 from swashplate.tables import Column, Table, listed
 
 Array = NDArray[np.float64]
@@ -79,16 +79,14 @@ class Outlook(Result):
     @cached_property
     def shares(self) -> dict[str, dict[str, float]]:
         """Part of what is known of an unknown, by name, from each run, its channels together."""
-        squares = dict.fromkeys((each.name for each in self.problem.experiments), 0.0)
-        squares |= {
-            name: sum(np.sum(r.jacobian**2, axis=0) for r in self.linearised.runs if r.name == name)
-            for name in squares
-        }
+        fit = self.linearised
+        squares = {each.name: np.zeros(len(fit.variables)) for each in self.problem.experiments}
+        for run in fit.runs:
+            squares[run.name] = squares[run.name] + np.sum(run.jacobian**2, axis=0)
         total = np.maximum(sum(squares.values()), 1e-300)
-        places = {name: self.linearised.variables.index(name) for name in self.names}
         return {
-            name: {run: float((own / total)[k]) for run, own in squares.items()}
-            for name, k in places.items()
+            name: {run: float(own[k] / total[k]) for run, own in squares.items()}
+            for name, k in ((name, fit.variables.index(name)) for name in self.names)
         }
 
     def effect(self, name: str) -> float:
@@ -147,21 +145,8 @@ def outlook(
 ) -> Outlook:
     """What runs can tell of a stage's unknowns, before any fit.
 
-    Parameters
-    ----------
-    stage : Stage
-        What is free and what is fitted.
-    nominal : ParameterSet or Drive
-        Nominal values; best those that `fitting.smooth` makes, as a fit takes them.
-    experiments : sequence of Experiment
-        The runs to fit.
-
-    Raises
-    ------
-    InputError, ParameterError
-        If runs and set-up do not fit each other, see `drive_model.stage_problem`.
-    DomainError
-        If the model does not hold at the nominal values.
+    At the nominal values, best those that `fitting.smooth` makes, as a fit takes them. Raises as
+    `drive_model.stage_problem`, and a `DomainError` if the model does not hold there.
     """
     problem = stage_problem(stage, set_of(nominal), experiments)
     return Outlook(stage, problem, linearised_fit(problem, problem.start))
@@ -188,7 +173,6 @@ class Sensor(NamedTuple):
     memory: float = MEMORY
     """Time for which one sample stands. [s]"""
     origin: str = "stated"
-    """Where the noise is known from, for people."""
 
     def deviation(self, step: float) -> float:
         """Of a sample every `step` [s], so that each counts as an independent one."""
@@ -248,26 +232,13 @@ def bench(
 ) -> Bench:
     """What is known of a drive before the next test.
 
-    Parameters
-    ----------
-    parameters : ParameterSet
-        The drive, best a fitted one.
-    setup : Setup
-        What is free; its stages are taken together, through the whole chain unless they all belong
-        to one part of it.
-    experiments : sequence of Experiment
-        Tests made so far; none for a fresh plan.
-    fitted : bool
-        Whether the drive is fitted to them: noise and its colour are then those of the residuals.
-        Else noise is as the campaign states it, correlated over `MEMORY`.
-    sensors : sequence of Sensor
-        Of a fresh plan; by default `default_sensors`.
+    The stages of `setup` are taken together, through the whole chain unless they all belong to one
+    part of it. Where the drive is `fitted` to the tests made so far, noise and its colour are those
+    of the residuals; else noise is as the campaign states it, correlated over `MEMORY`. Without
+    tests, a fresh plan, the `sensors` count, by default `default_sensors`.
 
-    Raises
-    ------
-    InputError
-        If no sensor tells of the stage's part of the drive; or a drive that is said to be fitted
-        leaves residuals that are zero, or too large to be noise.
+    An `InputError` says that no sensor tells of the stage's part of the drive, or that a drive that
+    is said to be fitted leaves residuals that are zero, or too large to be noise.
     """
     (stage,) = setup.joint().stages
     parts = {each.part for each in setup.stages}
@@ -284,32 +255,31 @@ def bench(
         variables = Unknowns(tuple(problem.unknowns[k] for k in machine))
         return Bench(parameters, stage, variables, prior[:, machine], tuple(own))
     problem = stage_problem(stage, parameters, experiments)
-    fit, known, scales = linearised_fit(problem, problem.start) if fitted else None, [], {}
+    fit, known = linearised_fit(problem, problem.start) if fitted else None, dict[str, Sensor]()
+    scales, machine = {}, _machine(problem)
     for name in problem.channels:
         channels = [each[name] for each in problem.experiments if name in each.channels]
         apart = float(np.median(np.concatenate([np.diff(each.time) for each in channels])))
         sensor = Sensor(channels[0].kind, problem.scales[name], origin="as in the campaign")
         if fit is not None:
-            largest = max(float(np.ptp(each.values)) for each in channels)
-            sensor = _of_residuals(fit, name, sensor, apart, largest, _machine(problem))
+            sensor = _of_residuals(fit, channels, sensor, apart, machine)
         # an independent sample every so often: the others are worth nothing
         scales[name] = sensor.deviation(apart)
-        known.append(sensor)
-    variables = Unknowns(tuple(problem.unknowns[k] for k in _machine(problem)))
-    kept = {sensor.kind: sensor for sensor in known}
+        known[sensor.kind] = sensor
+    variables = Unknowns(tuple(problem.unknowns[k] for k in machine))
     present = _machine_rows(replace(problem, scales=scales))
-    return Bench(parameters, stage, variables, present, tuple(kept.values()))
+    return Bench(parameters, stage, variables, present, tuple(known.values()))
 
 
 def _of_residuals(
     fit: LinearisedFit,
-    name: str,
+    channels: Sequence[Channel],
     stated: Sensor,
     step: float,
-    largest: float,
     machine: Sequence[int],
 ) -> Sensor:
     """A channel's sensor with the noise that the residuals of a fitted drive show."""
+    name, largest = channels[0].name, max(float(np.ptp(each.values)) for each in channels)
     left = []
     for run in (run for run in fit.runs if run.channel == name):
         # with free zeros and other unknowns of single runs fitted
@@ -361,11 +331,9 @@ NAMED = 4
 """Unknowns that a row of advice names."""
 
 
-class Candidate(NamedTuple):
+@dataclass(frozen=True, eq=False)
+class Candidate(Result):
     """A test that could be made."""
-
-    def __repr__(self) -> str:
-        return short(self)
 
     name: str
     derivatives: Array
@@ -399,16 +367,13 @@ class Advice(Result):
         new = (self.after <= KNOWN) & (self.before > KNOWN)
         return tuple(name for name, first in zip(self.names, new, strict=True) if first)
 
-    @property
-    def rank(self) -> tuple[int, int, float]:
-        """Least for the best: unknowns newly determined, combinations, D-gain."""
-        return -len(self.newly_determined), -self.ranks, -self.d_gain
-
 
 def advise(
     present: Array, candidates: Sequence[Candidate], variables: Unknowns
 ) -> tuple[Advice, ...]:
     """Rank candidate tests by what they would add.
+
+    Best first: most unknowns newly determined, most combinations, largest D-gain.
 
     Parameters
     ----------
@@ -416,26 +381,16 @@ def advise(
         What the tests made so far tell: derivatives of the weighted residuals over the deviation of
         an independent one; no rows if there are none.
     candidates : sequence of Candidate
-        Tests to choose from.
+        Tests to choose from; an `InputError` if there is none or its shape is wrong.
     variables : Unknowns
         The unknowns; those at a bound count as known.
-
-    Returns
-    -------
-    tuple of Advice
-        Best first: most unknowns newly determined, most combinations, largest D-gain.
-
-    Raises
-    ------
-    InputError
-        If there is no candidate, a shape is wrong, or a number is not finite.
     """
     if not candidates:
         raise InputError("There is no candidate to choose from.")
     for name, rows in (("the present", present), *((c.name, c.derivatives) for c in candidates)):
-        if rows.ndim != 2 or rows.shape[1] != variables.count or not np.isfinite(rows).all():
+        if rows.ndim != 2 or rows.shape[1] != len(variables) or not np.isfinite(rows).all():
             raise InputError(
-                f"{name}: derivatives by {variables.count} parameters are so many columns of "
+                f"{name}: derivatives by {len(variables)} parameters are so many columns of "
                 f"finite numbers, not {rows.shape}."
             )
     free, made = variables.free, []
@@ -451,7 +406,8 @@ def advise(
         d_gain = float(np.exp(0.5 * shrinking / max(now.shape[1], 1)))
         errors, ranks = (before[free], after[free]), then.shape[1] - now.shape[1]
         made.append(Advice(each.name, each.duration, names, *errors, ranks, d_gain))
-    return tuple(sorted(made, key=lambda each: each.rank))
+    made.sort(key=lambda each: (-len(each.newly_determined), -each.ranks, -each.d_gain))
+    return tuple(made)
 
 
 def in_turn(
@@ -470,19 +426,6 @@ def in_turn(
         taken = left.pop(best.candidate).derivatives
         present = triangular_factor(np.vstack([present, taken]))
     return tuple(chosen)
-
-
-def best_for_each(judged: Sequence[Advice]) -> dict[str, Advice]:
-    """For each unknown the candidate after which its standard error is least.
-
-    Unknowns that none would tell more of are left out.
-    """
-    best = {}
-    for k, name in enumerate(judged[0].names):
-        least = judged[int(np.argmin([each.after[k] for each in judged]))]
-        if least.after[k] < (1.0 - WORTH) * least.before[k]:
-            best[name] = least
-    return best
 
 
 def default_maneuvers() -> tuple[Maneuver, ...]:
@@ -540,12 +483,12 @@ def best_tests_table(judged: Sequence[Advice]) -> Table:
     """What is known of each unknown, and which test would tell most of it."""
     columns = (Column("parameter"), Column("error now", "s"), Column("then", "s"))
     made = Table("For each parameter", (*columns, Column("best test", wrap=True)))
-    best = best_for_each(judged)
     for k, name in enumerate(judged[0].names):
-        found, now = best.get(name), judged[0].before[k]
+        errors = np.array([each.after[k] for each in judged])
+        best, now = judged[int(np.argmin(errors))], judged[0].before[k]
         then, test = (now, "no further information")
-        if found is not None:
-            then, test = found.after[k], found.candidate
+        if best.after[k] < (1.0 - WORTH) * now:
+            then, test = best.after[k], best.candidate
         made.add(name, _error(now), _error(then), test)
     return made
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import degrees, inf, isfinite, sqrt
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,8 +14,11 @@ from scipy.linalg import solve_banded
 from swashplate.campaign.experiment import Channel, Experiment
 from swashplate.errors import DomainError
 from swashplate.identification.drive_model import CURRENTS, DriveModel
-from swashplate.identification.model import OFFSET, Model, simulated
+from swashplate.identification.model import Model, simulated
 from swashplate.tables import listed
+
+if TYPE_CHECKING:
+    from swashplate.identification.fitting import StageFit
 
 Array = NDArray[np.float64]
 
@@ -226,11 +229,10 @@ def of_command(
     if not isinstance(model, DriveModel) or model.part == "pump":
         return {}
     signal = experiment.input
-    plain = {k: v for k, v in values.items() if not k.startswith(OFFSET)}
     changed = ((1.0 - COMMAND_CHANGE) * signal.values, _lagged(signal.time, signal.values))
     try:
         before, less, later = (
-            simulated(model, plain, replace(experiment, input=replace(signal, values=x)))
+            simulated(model, values, replace(experiment, input=replace(signal, values=x)))
             for x in (signal.values, *changed)
         )
     except DomainError:
@@ -245,25 +247,18 @@ def of_command(
     }
 
 
-def late_command(
-    model: Model, targets: Mapping[str, float], tau: float | None, experiment: Experiment
-) -> Fault | None:
-    """Late stamps of the command beside a longer tau that is fixed, both by one sample, if alike.
-
-    `targets` are the values that the fit found for the experiment, by the model's names.
-    """
-    if not isinstance(model, DriveModel) or model.part == "pump" or tau is None or "tau" in targets:
+def late_command(stage: StageFit) -> Fault | None:
+    """Late stamps of the command, where they are the same as a fixed tau that is longer by them."""
+    model, experiment = stage.problem.model, stage.problem.experiments[0]
+    values = stage.problem.model_values(stage.solution.vector, 0)
+    if not isinstance(model, DriveModel) or model.part == "pump" or "tau" in values:
         return None
-    signal = experiment.input
+    signal, tau = experiment.input, model.parameters.numbers["tau"]
     step = float(np.median(np.diff(signal.time)))
     late = replace(signal, values=np.concatenate([signal.values[:1], signal.values[:-1]]))
-    values = {k: v for k, v in targets.items() if not k.startswith(OFFSET)}
     first = simulated(model, values, replace(experiment, input=late))
-    longer, plain = ({**values, "tau": tau + step}, values)
-    apart, moved = (
-        sum(float(np.sum((first[k] - other[k]) ** 2)) for k in first)
-        for other in (simulated(model, each, experiment) for each in (longer, plain))
-    )
+    others = (simulated(model, {**values, "tau": each}, experiment) for each in (tau + step, tau))
+    apart, moved = (sum(float(np.sum((first[k] - y[k]) ** 2)) for k in first) for y in others)
     outside = sqrt(apart / moved) if moved > 0.0 else inf
     if outside > SAME_STAMPS:
         return None
@@ -327,11 +322,10 @@ def _inputs_at(end: float, experiment: Experiment, name: str) -> list[tuple[floa
     left already.
     """
     channel, spans = experiment[name], list[tuple[float, float]]()
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], channel.values == end, [0]])))
-    for first, after in zip(edges[::2], edges[1::2], strict=True):
+    edges = np.flatnonzero(np.diff(channel.values == end, prepend=False, append=False))
+    for first, after in edges.reshape(-1, 2):
         if channel.time[after - 1] - channel.time[first] >= DWELLS:
-            stretch = channel.time[first : after - (after - first) // 4]
-            inputs = experiment.input.at(stretch)
+            inputs = experiment.input.at(channel.time[first : after - (after - first) // 4])
             spans.append((float(inputs.min()), float(inputs.max())))
     return spans
 

@@ -19,6 +19,7 @@ from swashplate.drive import Drive
 from swashplate.equations import Model as Equations
 from swashplate.errors import InputError
 from swashplate.executors import Executor, Serial
+from swashplate.identification import tables
 from swashplate.identification.data_checks import (
     check_model,
     check_rank,
@@ -35,18 +36,19 @@ from swashplate.identification.drive_model import (
     with_estimates,
 )
 from swashplate.identification.faults import measurement_error
-from swashplate.identification.intervals import weighed
+from swashplate.identification.identifiability import Identifiability, identifiability
+from swashplate.identification.intervals import Uncertainty, stage_uncertainty, weighed
 from swashplate.identification.model import EquationModel, Model, OwnModel
-from swashplate.identification.problem import Loss, Problem
+from swashplate.identification.problem import LinearisedFit, Loss, Problem, linearised_fit
 from swashplate.identification.setup import ModelSetup, Range, Setup, Stage
 from swashplate.identification.solving import Progress, Solution, sobol_starts, solve, solve_from
 from swashplate.identification.unknowns import Unknown
+from swashplate.identification.validation import RunQuality, run_qualities
 from swashplate.parameters.definitions import columns_of
 from swashplate.parameters.parameter_set import ParameterSet
 from swashplate.results import Result
 
 if TYPE_CHECKING:
-    from swashplate.identification.assessment import Assessment
     from swashplate.tables import Table
 
 P = TypeVar("P", bound=Parameters)
@@ -83,7 +85,7 @@ class Search:
 
 @dataclass(frozen=True, eq=False)
 class StageFit(Result):
-    """What one stage found."""
+    """What one stage found, what its data tell of its unknowns, and how good the fit is."""
 
     stage: Stage
     problem: Problem
@@ -92,11 +94,48 @@ class StageFit(Result):
     """The drive, or the model of one's own, with what was found."""
     starts: tuple[Solution, ...] = ()
     """How each start ended, where there was more than one."""
+    earlier: tuple[StageFit, ...] = field(default=(), repr=False)
+    """The stages before, whose results this one takes for granted."""
 
     @property
     def values(self) -> dict[str, float]:
         """The unknowns by name, in their units."""
         return self.problem.unknowns.values(self.solution.vector)
+
+    @property
+    def drive(self) -> Drive:
+        """The drive with what was found; an `InputError` if it is a model of one's own."""
+        if isinstance(self.parameters, ModelSetup):
+            raise InputError(f"{self.parameters.name} is a model of your own, no drive.")
+        return Drive(self.parameters)
+
+    @cached_property
+    def linearised(self) -> LinearisedFit:
+        """Residuals and derivatives at the optimum."""
+        return linearised_fit(self.problem, self.solution.vector, self.solution.loss)
+
+    @cached_property
+    def identifiability(self) -> Identifiability:
+        """Which unknowns the tests determine."""
+        fit, names = self.linearised, self.problem.unknowns.names
+        fixed = {k: v for k, v in self.parameters.numbers.items() if k not in names}
+        try:
+            quoted = self.uncertainty.quoted.matrix
+        except InputError:  # too few samples to tell the noise from
+            quoted = None
+        return identifiability(
+            fit.triangle, fit.variables, covariance=quoted, tolerance=fit.tolerance, fixed=fixed
+        )
+
+    @cached_property
+    def uncertainty(self) -> Uncertainty:
+        """Errors of the estimates; an `InputError` if there are no more samples than unknowns."""
+        return stage_uncertainty(self)
+
+    @cached_property
+    def runs(self) -> tuple[RunQuality, ...]:
+        """Quality of each channel of each run that was fitted."""
+        return run_qualities(self.problem, self.solution.vector)
 
     def bounds_reached(self) -> tuple[str, ...]:
         """Sentences on unknowns of the machine that ended at a bound, and what to do about it."""
@@ -108,12 +147,9 @@ class StageFit(Result):
             if each.run is None and side
         )
 
-    @property
-    def drive(self) -> Drive:
-        """The drive with what was found; an `InputError` if it is a model of one's own."""
-        if isinstance(self.parameters, ModelSetup):
-            raise InputError(f"{self.parameters.name} is a model of your own, no drive.")
-        return Drive(self.parameters)
+    def tables(self) -> list[Table]:
+        """Estimates with their intervals, then the errors of each run."""
+        return [tables.estimates_table(self), *tables.runs_tables(self.runs)]
 
 
 @dataclass(frozen=True, eq=False)
@@ -122,6 +158,8 @@ class Fit(Result):
 
     setup: Setup
     nominal: Parameters
+    runs: tuple[Experiment, ...] = field(repr=False)
+    """Those that were fitted."""
     stages: tuple[StageFit, ...]
     doubts: tuple[str, ...] = ()
     """What the runs lack, in sentences, where they could be fitted all the same."""
@@ -141,32 +179,31 @@ class Fit(Result):
         """Whether it was stopped before the last stage's optimum."""
         return self.stages[-1].solution.interrupted
 
-    @cached_property
-    def assessments(self) -> tuple[Assessment, ...]:
-        """What the data tell of each stage's unknowns, and how well the runs are followed."""
-        from swashplate.identification.assessment import assess
-
-        return assess(self.stages)
+    def stage(self, name: str) -> StageFit:
+        """The stage of a name; an `InputError` if there is none."""
+        for each in self.stages:
+            if each.stage.name == name:
+                return each
+        known = ", ".join(each.stage.name for each in self.stages)
+        raise InputError(f"The fit has no stage '{name}'; there are {known}.")
 
     def tables(self) -> list[Table]:
         """Estimates with their intervals, stage by stage, then the errors of each fitted run."""
-        from swashplate.identification.tables import estimates_table, runs_tables
-
-        runs = [quality for each in self.assessments for quality in each.runs]
-        return [*map(estimates_table, self.assessments), *runs_tables(runs)]
+        runs = [quality for each in self.stages for quality in each.runs]
+        return [*map(tables.estimates_table, self.stages), *tables.runs_tables(runs)]
 
     @property
     def sentences(self) -> tuple[str, ...]:
         """How each stage ended, what its estimates lack, and what stayed fixed."""
-        from swashplate.identification.tables import fixed_line
-
         said = list(self.doubts)
-        for each in self.assessments:
-            name, found = each.stage.stage.name, each.stage.solution
-            said.append(f"{name}: {found.message} after {found.evaluations} evaluations.")
+        for each in self.stages:
+            found = each.solution
+            said.append(
+                f"{each.stage.name}: {found.message} after {found.evaluations} evaluations."
+            )
             said += [*each.identifiability.sentences(), *each.uncertainty.sentences()]
-            said += each.stage.bounds_reached()
-        return (*said, fixed_line(self))
+            said += each.bounds_reached()
+        return (*said, tables.fixed_line(self))
 
 
 def fit(
@@ -248,7 +285,8 @@ def fit(
         limits: dict[str, Any] = {"tolerance": tolerance, "max_evaluations": max_evaluations}
         return _solved(stage, problem, partial(solve, loss=loss, watch=seen, **limits), search)
 
-    return Fit(free, nominal, staged(free, nominal, runs, solved, threads=threads), doubts)
+    stages = staged(free, nominal, runs, solved, threads=threads)
+    return Fit(free, nominal, tuple(runs), stages, doubts)
 
 
 def staged(
@@ -269,7 +307,7 @@ def staged(
         problem, solution, several = solved(stage, problem)
         parameters = with_estimates(parameters, problem, solution.vector)
         starts |= start_currents_of(problem, solution.vector)
-        stages.append(StageFit(stage, problem, solution, parameters, several))
+        stages.append(StageFit(stage, problem, solution, parameters, several, tuple(stages)))
         if solution.interrupted:
             break
     return tuple(stages)

@@ -21,7 +21,7 @@ from swashplate.results import Result
 from swashplate.tables import listed
 
 if TYPE_CHECKING:
-    from swashplate.identification.assessment import Assessment
+    from swashplate.identification.fitting import StageFit
 
 Array = NDArray[np.float64]
 Known = Mapping[str, float]
@@ -55,16 +55,13 @@ class Gauge:
         0 for what does not move, and throughout if a value that the gauge needs is neither among
         the unknowns nor among the `fixed` ones, by symbol.
         """
-        symbols, values = [symbol_of(name) for name in variables.names], variables.estimates
-        known = {**(fixed or {}), **dict(zip(symbols, values.tolist(), strict=True))}
-        pairs = zip(symbols, values.tolist(), strict=True)
+        symbols = [symbol_of(name) for name in variables.names]
+        pairs = [*zip(symbols, variables.estimates.tolist(), strict=True)]
+        known = {**(fixed or {}), **dict(pairs)}
         try:
-            slopes = [
-                self.moves[symbol](value, known) if symbol in self.moves else 0.0
-                for symbol, value in pairs
-            ]
+            slopes = [self.moves[s](v, known) if s in self.moves else 0.0 for s, v in pairs]
         except KeyError:
-            return np.zeros(variables.count)
+            return np.zeros(len(variables))
         return np.array(slopes) / variables.slopes
 
 
@@ -238,7 +235,7 @@ def identifiability(
     tolerance: float = TOLERANCE,
     fixed: Known | None = None,
 ) -> Identifiability:
-    """Judge what derivatives tell of the unknowns.
+    """Judge what derivatives tell of the unknowns; an `InputError` if one is not finite.
 
     Parameters
     ----------
@@ -250,21 +247,15 @@ def identifiability(
         Of the solver's vector, by which directions are weak; by default that of residuals that are
         independent and of variance 1.
     tolerance : float
-        Singular values below this part of the largest count as zero: 1e-10 for exact derivatives,
-        1e-6 for central differences.
+        See `problem.TOLERANCE`.
     fixed : mapping of str to float, optional
         Values of parameters that are no unknowns, by symbol; some gauges need them.
-
-    Raises
-    ------
-    InputError
-        If a derivative is not finite.
     """
     triangle, names = np.asarray(derivatives, dtype=np.float64), variables.names
     if not np.isfinite(triangle).all():
         column = int(np.argwhere(~np.isfinite(triangle))[0][1])
         raise InputError(f"The derivatives by {names[column]} are not all finite.")
-    if triangle.shape[0] > variables.count:
+    if triangle.shape[0] > len(variables):
         triangle = triangular_factor(triangle)
     lengths = np.linalg.norm(triangle, axis=0)
     # a column of mere rounding is none
@@ -346,12 +337,12 @@ def _fixing(places: list[int], vector: Array, null: Array, fixed: list[int]) -> 
     return None
 
 
-def weak_unknowns(assessment: Assessment) -> list[str]:
+def weak_unknowns(stage: StageFit) -> list[str]:
     """Unknowns of the machine with an interval wider than 10 % of the value, or without one."""
     try:
-        found = {each.name: each.relative_half_width for each in assessment.uncertainty.estimates}
+        found = {each.name: each.relative_half_width for each in stage.uncertainty.estimates}
     except InputError:
         found = {}
-    machine = [each.name for each in assessment.stage.problem.unknowns if each.run is None]
-    bounds = assessment.identifiability.at_bounds
+    machine = [each.name for each in stage.problem.unknowns if each.run is None]
+    bounds = stage.identifiability.at_bounds
     return [name for name in machine if found.get(name, inf) > WIDE and name not in bounds]

@@ -7,12 +7,12 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from math import inf, log
 from types import MappingProxyType
-from typing import TYPE_CHECKING, ClassVar, Literal, NamedTuple
+from typing import TYPE_CHECKING, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from swashplate.identification.drive_model import DriveModel
+from swashplate.identification.drive_model import LIMITS, DriveModel
 from swashplate.identification.model import Model
 from swashplate.identification.model import linearised as linearised_model
 from swashplate.identification.noise import (
@@ -26,14 +26,13 @@ from swashplate.identification.noise import (
     without_lines,
 )
 from swashplate.identification.problem import LinearisedFit, Problem, linearised_fit
-from swashplate.identification.profile import CheckedEnd
+from swashplate.identification.profile import CheckedEnd, checked_ends
 from swashplate.identification.unknowns import Unknowns
 from swashplate.results import Result, short
 from swashplate.tables import percent
 
 if TYPE_CHECKING:
     from swashplate.campaign.experiment import Experiment
-    from swashplate.identification.assessment import Assessment
     from swashplate.identification.fitting import StageFit
 
 Array = NDArray[np.float64]
@@ -45,8 +44,6 @@ Status = Literal[
     "no lower end",
     "no upper end",
 ]
-
-LEVEL = 0.95
 DECADES = 100.0
 """Factor each way from which an interval says nothing; for an unknown that is not logarithmic, half
 width in its scales."""
@@ -71,7 +68,13 @@ class Estimate(NamedTuple):
     """End of the interval; asymmetric about the value for a logarithmic unknown. None where there
     is no end."""
     upper: float | None
-    degrees_of_freedom: float | None
+
+    def ends(self, factor: float = 1.0) -> tuple[str, str]:
+        """Both ends in words, times a factor; the status where there is none."""
+        if self.lower is None and self.upper is None:
+            return self.status, ""
+        low = "none below" if self.lower is None else f"{factor * self.lower:.5g}"
+        return low, "none above" if self.upper is None else f"{factor * self.upper:.5g}"
 
     @property
     def relative_half_width(self) -> float:
@@ -83,26 +86,18 @@ class Estimate(NamedTuple):
 
 def reach(covariance: Covariance) -> Array:
     """(K,) half widths of the intervals in the solver's vector; 0 for unknowns without one."""
-    from scipy.special import stdtrit  # of scipy.stats, without its second to load
-
     known = covariance.determined & covariance.variables.free
-    quantiles = stdtrit(covariance.degrees_of_freedom, 0.5 + 0.5 * LEVEL)
-    half: Array = quantiles * np.where(known, covariance.standard_errors, 0.0)
+    half: Array = covariance.quantiles * np.where(known, covariance.standard_errors, 0.0)
     return half
 
 
 def estimates(
     covariance: Covariance, ends: Mapping[tuple[int, bool], float] = MappingProxyType({})
 ) -> tuple[Estimate, ...]:
-    """Estimates with 95 % intervals from a covariance.
+    """Estimates with 95 % intervals from a covariance of the solver's vector.
 
-    Parameters
-    ----------
-    covariance : Covariance
-        Of the solver's vector.
-    ends : mapping, optional
-        By unknown's number and side, True for the upper, distances of ends that differ from the
-        covariance's, in the solver's vector; inf where there is none.
+    `ends` are distances of ends that differ from the covariance's, in that vector, inf where there
+    is none, by the unknown's number and the side, True for the upper one.
 
     Notes
     -----
@@ -139,7 +134,6 @@ def estimates(
                 float(errors[k]) if status == "estimated" else None,
                 float(lower[k]) if told and not below else None,
                 float(upper[k]) if told and not above else None,
-                float(covariance.degrees_of_freedom[k]) if told else None,
             )
         )
     return tuple(made)
@@ -158,35 +152,23 @@ class Handed(NamedTuple):
     """Of the earlier stage's vector."""
     slopes: Array
     """(K, K_earlier) by how much the later stage's vector follows the earlier one's."""
+    stage: str = ""
+    """Name of the earlier stage."""
 
 
 def follows_card(stage: StageFit, earlier: StageFit) -> bool:
-    """Whether a stage takes the current from the card that an earlier one estimated."""
+    """Whether a stage takes the current from the card that an earlier one estimated.
+
+    Not where its current is measured, or where it frees the card itself.
+    """
     model, voltage = stage.problem.model, [e.input.kind for e in stage.problem.experiments]
     driven = stage.stage.current == "simulated" and "voltage" in voltage
     pump = isinstance(model, DriveModel) and model.part == "pump"
     return pump and driven and earlier.stage.part == "card"
 
 
-def slopes_by_earlier(
-    stage: StageFit, earlier: StageFit, linearised: LinearisedFit
-) -> Array | None:
-    """Derivatives of a stage's estimates by those of an earlier one.
-
-    Parameters
-    ----------
-    stage : StageFit
-        Pump and motor, driven by the current that the card makes.
-    earlier : StageFit
-        The card.
-    linearised : LinearisedFit
-        Of the later stage at its optimum.
-
-    Returns
-    -------
-    (K, K_earlier) array or None
-        None where the later stage takes nothing from the earlier one: its current is measured, or
-        it frees the same part itself.
+def slopes_by_earlier(stage: StageFit, earlier: StageFit) -> Array:
+    """(K, K_earlier) derivatives of a pump's estimates by those of the card that drives it.
 
     Notes
     -----
@@ -194,28 +176,23 @@ def slopes_by_earlier(
     second step of a two-step estimate (Murphy and Topel 1985). Gauss-Newton's approximation, as
     everywhere here: second derivatives times residuals are left out.
     """
-    if not follows_card(stage, earlier):
-        return None
     unknowns, vector = earlier.problem.unknowns, earlier.solution.vector
-    names = [name for each in unknowns if each.run is None for name in each.targets]
-    return _slopes(stage, linearised, names, unknowns.chain(vector, names, ""))
+    names = unknowns.machine_targets
+    return _slopes(stage, names, unknowns.chain(vector, names, ""))
 
 
-def slopes_by_fixed(stage: StageFit, linearised: LinearisedFit) -> Array:
+def slopes_by_fixed(stage: StageFit) -> Array:
     """(K, F) changes of a stage's estimates for a standard uncertainty of each fixed number."""
     uncertain = stage.problem.uncertain
     names = [name for together in uncertain for name in together]
     if not names:
-        return np.zeros((linearised.variables.count, 0))
+        return np.zeros((len(stage.linearised.variables), 0))
     deviations = np.array([[each.get(name, 0.0) for each in uncertain] for name in names])
-    return _slopes(stage, linearised, names, deviations)
+    return _slopes(stage, names, deviations)
 
 
 def source_of(stage: StageFit) -> Callable[[Experiment], Model]:
-    """The model that makes a run of a stage from its input, at the estimates.
-
-    That is the whole chain where the pump is driven by what the card makes of a voltage.
-    """
+    """The model of a run of a stage: the whole chain where the fitted card drives the pump."""
     model = stage.problem.model
     if not isinstance(model, DriveModel):
         return lambda experiment: model
@@ -227,12 +204,9 @@ def source_of(stage: StageFit) -> Callable[[Experiment], Model]:
     return lambda run: chain if by_card and run.input.kind == "voltage" else own
 
 
-def _slopes(stage: StageFit, linearised: LinearisedFit, names: Sequence[str], by: Array) -> Array:
-    """(K, F) derivatives of a stage's estimates by what moves numbers that it takes for granted.
-
-    `names` are those of the numbers, in the model; `by` (len(names), F) their own derivatives.
-    """
-    problem, vector = stage.problem, stage.solution.vector
+def _slopes(stage: StageFit, names: Sequence[str], by: Array) -> Array:
+    """(K, F) derivatives of a stage's estimates, from those (names, F) of the model's numbers."""
+    problem, vector, linearised = stage.problem, stage.solution.vector, stage.linearised
     products, source = np.zeros((linearised.rank, by.shape[1])), source_of(stage)
     rows = {(run.name, run.channel): run for run in linearised.runs}
     for number, experiment in enumerate(problem.experiments):
@@ -280,9 +254,6 @@ def with_handed(
 @dataclass(frozen=True, eq=False)
 class Uncertainty(Result):
     """Errors of a fit's estimates: those to quote, and what they rest on."""
-
-    level: ClassVar[float] = LEVEL
-    """Probability of the intervals."""
 
     own: Covariance
     """That of the stage's own noise."""
@@ -365,19 +336,9 @@ def uncertainty(
 ) -> Uncertainty:
     """Errors of a fit's estimates for coloured residuals.
 
-    Parameters
-    ----------
-    fit : LinearisedFit
-        The fit at its optimum.
-    handed : sequence of Handed, optional
-        What earlier stages do not know.
-    fixed : (K, F) array, optional
-        Changes of the solver's vector for a standard uncertainty of each fixed number.
-
-    Raises
-    ------
-    InputError
-        If there are no more samples than unknowns.
+    `handed` is what earlier stages do not know, `fixed` (K, F) are changes of the solver's vector
+    for a standard uncertainty of each fixed number. An `InputError` says that there are no more
+    samples than unknowns.
     """
     bounded, fit = fit.variables, released(fit)
     clean, lines = without_lines(fit)
@@ -388,6 +349,26 @@ def uncertainty(
     fixed = np.zeros((white.size, 0)) if fixed is None else fixed
     colours, noisy = noise_colours(clean), fit.squares > 0.0
     return Uncertainty(own, np.maximum(ratio, 1.0), colours, noisy, tuple(handed), fixed, lines)
+
+
+def stage_uncertainty(stage: StageFit) -> Uncertainty:
+    """Errors of a stage's estimates, what it takes for granted and checked ends taken in."""
+    problem, vector, handed = stage.problem, stage.solution.vector, []
+    fixed = slopes_by_fixed(stage)
+    for each in stage.earlier:
+        if follows_card(stage, each):
+            slopes = slopes_by_earlier(stage, each)
+            handed.append(Handed(each.uncertainty.sampled, slopes, each.stage.name))
+            # a fixed number acts on this stage by itself, and through what it does to others
+            fixed = fixed + slopes @ each.uncertainty.fixed
+    found = uncertainty(stage.linearised, handed=handed, fixed=fixed)
+    found = replace(found, priors=prior_sentences(problem.unknowns, vector, found.quoted))
+    if not found.noisy:
+        return found
+    half, fit = reach(found.own), released(stage.linearised)
+    first = [each.targets[0].startswith(tuple(LIMITS)) for each in problem.unknowns]
+    ends = checked_ends(problem, vector, fit, half, np.flatnonzero(first).tolist())
+    return replace(found, ends=tuple(ends))
 
 
 def released(fit: LinearisedFit) -> LinearisedFit:
@@ -406,19 +387,8 @@ def weighed(problem: Problem, vector: Array) -> Problem:
     worth one, data would outweigh a prior a hundred times too much. So a prior counts as often as
     that: by the ratio of its unknown's variance under the noise that the residuals show to its
     variance under the noise that the cost assumes, both from the data alone; by the median of the
-    others where the data alone do not determine the unknown.
-
-    Parameters
-    ----------
-    problem : Problem
-        What was fitted.
-    vector : (K,) array
-        The solver's vector, at or near the optimum.
-
-    Raises
-    ------
-    InputError
-        If there are no more samples than unknowns.
+    others where the data alone do not determine the unknown. `vector` (K,) is at or near the
+    optimum; an `InputError` says that there are no more samples than unknowns.
     """
     fit = linearised_fit(replace(problem, unknowns=problem.unknowns.with_worths(None)), vector)
     own, assumed = spectral_covariance(fit), np.sum(fit.whitening**2, axis=1)
@@ -451,13 +421,13 @@ def prior_sentences(unknowns: Unknowns, vector: Array, quoted: Covariance) -> tu
     return tuple(said)
 
 
-def open_unknowns(assessment: Assessment, experiments: Iterable[Experiment]) -> Iterator[str]:
+def open_unknowns(stage: StageFit, experiments: Iterable[Experiment]) -> Iterator[str]:
     """Unknowns without an interval on which the prediction of some runs depends.
 
     Only a prediction that leaves the directions which the fitted runs determine is open: of two
     unknowns of which the fit tells the product, it depends on the product alone.
     """
-    stage, found, fit = assessment.stage, assessment.uncertainty, assessment.linearised
+    found, fit = stage.uncertainty, stage.linearised
     model, unknowns, vector = stage.problem.model, stage.problem.unknowns, stage.solution.vector
     assert isinstance(model, DriveModel)
     pairs = zip(found.estimates, unknowns, strict=True)
@@ -473,8 +443,7 @@ def open_unknowns(assessment: Assessment, experiments: Iterable[Experiment]) -> 
     told = np.linalg.qr(lengths[:, None] * fit.whitening)[0]
     chain = DriveModel(stage.drive.parameters, "card" if model.part == "card" else "chain")
     chain = replace(chain, forces=model.forces)
-    targets = [t for u in unknowns if u.run is None for t in u.targets]
-    values = {t: v for t, v in unknowns.targets(vector, "").items() if t in targets}
+    targets, values = unknowns.machine_targets, unknowns.targets(vector, "")
     by_name = unknowns.chain(vector, targets, "")
     for experiment in experiments:
         if experiment.input.kind != "voltage" or not chain.signals_of(experiment):

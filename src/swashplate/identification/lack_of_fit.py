@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from math import inf, isfinite, sqrt
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -27,7 +27,7 @@ from swashplate.identification.problem import TOLERANCE, triangular_factor
 from swashplate.parameters.definitions import CATALOGUE, COLUMNS, columns_of
 
 if TYPE_CHECKING:
-    from swashplate.identification.assessment import Assessment
+    from swashplate.identification.fitting import StageFit
 
 Array = NDArray[np.float64]
 
@@ -44,26 +44,20 @@ FIXED_OFF = 0.1
 
 
 class ChannelFit(NamedTuple):
-    """Residuals of one channel of one run against its known measurement error."""
-
-    run: str
-    channel: str
-    ratio: float
-    """Root mean square of the residuals, estimates adjusted within their errors, over the error."""
-    samples: int
-
-
-class RunScale(NamedTuple):
-    """Scale that one channel seems to have in one run, beside that of all runs."""
+    """One channel of one run, estimates adjusted within their errors."""
 
     run: str
     channel: str
     place: float
     """Of the run among those of its stage, from -1/2 to 1/2."""
-    error: float
+    samples: int
+    ratio: float | None
+    """Root mean square of the residuals over the known measurement error: of counts, or noise that
+    is stated."""
+    scale: float
     """One-step estimate of its scale less 1, from what the fit leaves of this run alone. [1]"""
-    standard_error: float
-    """Of that, of independent noise; inf where nothing moves. [1]"""
+    scale_error: float
+    """Standard error of that, of independent noise; inf where nothing moves. [1]"""
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,7 +65,7 @@ class LackOfFit:
     """What a fit leaves unexplained, and what would explain it."""
 
     runs: tuple[ChannelFit, ...]
-    """Of the channels whose measurement error is known: counts, or noise that is stated."""
+    """Of each channel in each run."""
     faults: tuple[Fault, ...]
     """All that were looked at, those that explain most first."""
     units: tuple[str, ...]
@@ -79,16 +73,15 @@ class LackOfFit:
     them."""
     clipped: tuple[str, ...]
     """Sentences on channels that stand at an end of their instrument."""
-    scales: tuple[RunScale, ...] = ()
-    """Of each channel in each run."""
 
     @property
     def ratios(self) -> dict[str, float]:
         """Root mean square over all runs of each channel with a known error, over that error."""
         sums: dict[str, Array] = {}
         for each in self.runs:
-            own = np.array([each.samples * each.ratio**2, each.samples])
-            sums[each.channel] = sums.get(each.channel, np.zeros(2)) + own
+            if each.ratio is not None:
+                own = np.array([each.samples * each.ratio**2, each.samples])
+                sums[each.channel] = sums.get(each.channel, np.zeros(2)) + own
         return {name: sqrt(squares / samples) for name, (squares, samples) in sums.items()}
 
     @property
@@ -145,37 +138,30 @@ class _Block(NamedTuple):
         made[:, [*(places[key] for key in moving), -1]] = factor
         return made
 
-    def left(self, places: Mapping[Key, int], shift: Array) -> Array:
-        """(n,) residuals, estimates shifted by (K,)."""
+    def fit(self, places: Mapping[Key, int], shift: Array) -> ChannelFit:
+        """What is left of it with the estimates shifted by (K,)."""
         moved = [shift[places[k]] * each for k, each in self.columns.items() if not k[0]]
-        return self.residual - sum(moved, np.zeros(1))
-
-    def against_known(self, left: Array) -> Iterator[ChannelFit]:
-        """What is left (n,) over the known measurement error; none if it is unknown."""
+        left, ratio = self.residual - sum(moved, np.zeros(1)), None
         if error := measurement_error(self.channel):
             ratio = float(np.sqrt(np.mean((left / self.weight) ** 2))) / error
-            yield ChannelFit(self.run, self.channel.name, ratio, left.size)
-
-    def own_scale(self, left: Array) -> RunScale:
-        """Scale of the channel in this run alone, by what is left (n,)."""
         scale = self.columns[FAULT, faults.SCALE.words.format(self.channel.name)]
         if self.channel.is_position:
             # a position has a free zero
             scale = scale - self.weight * (self.weight @ scale) / (self.weight @ self.weight)
-        weight = float(scale @ scale)
-        own = float(scale @ left) / weight if weight > 0.0 else 0.0
-        error = 1.0 / sqrt(weight) if weight > 0.0 else inf
+        square = float(scale @ scale)
         # a reading that is larger than what is simulated leaves a negative residual
-        return RunScale(self.run, self.channel.name, self.place, -own, error)
+        own = -float(scale @ left) / square if square > 0.0 else 0.0
+        off = 1.0 / sqrt(square) if square > 0.0 else inf
+        return ChannelFit(self.run, self.channel.name, self.place, left.size, ratio, own, off)
 
 
-def lack_of_fit(assessments: Sequence[Assessment]) -> LackOfFit:
+def lack_of_fit(stages: Sequence[StageFit]) -> LackOfFit:
     """Test a fit for lack of fit, and look for causes.
 
     Parameters
     ----------
-    assessments : sequence of Assessment
-        Of all stages, in their order.
+    stages : sequence of StageFit
+        All stages, in their order.
 
     Notes
     -----
@@ -188,7 +174,7 @@ def lack_of_fit(assessments: Sequence[Assessment]) -> LackOfFit:
     are not laid to what an earlier one does not know exactly. All follows from the triangular
     factor of all derivatives.
     """
-    blocks = [block for each in assessments for block in _blocks(each, assessments)]
+    blocks = [block for each in stages for block in _blocks(each, stages)]
     keys = sorted(dict.fromkeys(k for each in blocks for k in each.columns), key=lambda k: k[0])
     places = {key: place for place, key in enumerate(keys)}
     names, kinds = [name for _, name in keys], {k: v for b in blocks for k, v in b.kinds.items()}
@@ -210,6 +196,8 @@ def lack_of_fit(assessments: Sequence[Assessment]) -> LackOfFit:
     replaced = np.abs(instead @ opened)[count:] * lengths[count:known, None]
     squares = float(left @ left)
     deviation = sqrt(squares / max(sum(each.residual.size for each in blocks) - count, 1))
+    shift = inverse @ residual
+    runs = tuple(block.fit(places, shift) for block in blocks)
     found = []
     for k in np.flatnonzero(lengths[count:-1] > 0.0) + count:
         kind, name, length = kinds[names[k]], names[k], lengths[k]
@@ -219,49 +207,40 @@ def lack_of_fit(assessments: Sequence[Assessment]) -> LackOfFit:
         most = replaced[:, k].max(initial=0.0)
         largest = np.argsort(-replaced[:, k])[:3]
         fixed = [constants[i] for i in largest if replaced[i, k] > 0.1 * most]
+        share = pull**2 / (along[k] ** 2 * squares) if told else 0.0
+        if kind is DRIFT:
+            share *= _in_order([each for each in runs if DRIFT.words.format(each.channel) == name])
         found.append(
             Fault(
                 kind,
                 name,
                 -kind.factor * pull / along[k] ** 2 if told else 0.0,
                 kind.factor * deviation / along[k] if told else inf,
-                pull**2 / (along[k] ** 2 * squares) if told else 0.0,
+                share,
                 along[k] / length,
                 tuple(dict.fromkeys(each.split(": ")[1] for each in order)),
                 kind.factor * deviation / apart[k] if apart[k] > SAME_DIRECTION * length else inf,
                 tuple(dict.fromkeys(COLUMNS.get(each, each) for each in fixed)),
             )
         )
-    shift = inverse @ residual
-    rest = [block.left(places, shift) for block in blocks]
-    scales = tuple(b.own_scale(r) for b, r in zip(blocks, rest, strict=True))
-    steady = {
-        DRIFT.words.format(name): _in_order([each for each in scales if each.channel == name])
-        for name in dict.fromkeys(each.channel for each in scales)
-    }
-    found = [
-        replace(each, share=each.share * steady[each.name]) if each.kind is DRIFT else each
-        for each in found
-    ]
-    runs = {run.name: run for each in assessments for run in each.stage.problem.experiments}
+    experiments = {run.name: run for each in stages for run in each.problem.experiments}
+    late = [fault for each in stages if (fault := faults.late_command(each))][:1]
     return LackOfFit(
-        tuple(f for b, r in zip(blocks, rest, strict=True) for f in b.against_known(r)),
-        (*sorted(found, key=lambda each: -each.share), *_late_commands(assessments)),
+        runs,
+        (*sorted(found, key=lambda each: -each.share), *late),
         _units(columns[:, :known], constants, found),
-        faults.clipped_channels(list(runs.values())),
-        scales,
+        faults.clipped_channels(list(experiments.values())),
     )
 
 
-def _in_order(scales: Sequence[RunScale]) -> float:
+def _in_order(runs: Sequence[ChannelFit]) -> float:
     """Part of the differences between the scales of runs that is a straight line over their order.
 
-    Freed of what a line explains by
-    chance (adjusted R², Draper and Smith 1998, section 5.1): a machine that differs between
-    maneuvers differs between runs too, in whatever order they stand.
+    Freed of what a line explains by chance (adjusted R², Draper and Smith 1998, section 5.1): a
+    machine that differs between maneuvers differs between runs too, in whatever order they stand.
     """
-    moving = [each for each in scales if isfinite(each.standard_error)]
-    rows = [(each.place, each.error, each.standard_error**-2) for each in moving]
+    moving = [each for each in runs if isfinite(each.scale_error)]
+    rows = [(each.place, each.scale, each.scale_error**-2) for each in moving]
     place, own, weight = np.reshape(rows, (-1, 3)).T
     if own.size < 3:
         return 1.0
@@ -273,26 +252,24 @@ def _in_order(scales: Sequence[RunScale]) -> float:
     return float(max(1.0 - (1.0 - line / total) * (own.size - 1) / (own.size - 2), 0.0))
 
 
-def _blocks(assessment: Assessment, assessments: Sequence[Assessment]) -> Iterator[_Block]:
+def _blocks(stage: StageFit, stages: Sequence[StageFit]) -> Iterator[_Block]:
     """One for each channel of each run of a stage: by its own and earlier estimates, by faults."""
-    stage, problem = assessment.stage, assessment.stage.problem
+    problem, linearised = stage.problem, stage.linearised
     vector, numbers, source = stage.solution.vector, stage.parameters.numbers, source_of(stage)
-    before = assessments[: assessments.index(assessment)]
-    earlier = [each for each in before if follows_card(stage, each.stage)]
+    earlier = [each for each in stage.earlier if follows_card(stage, each)]
     fixed = [name for together in problem.uncertain for name in together]
     if isinstance(problem.model, DriveModel):
         sources = [source(each) for each in problem.experiments]
         parts = {each.part for each in sources if isinstance(each, DriveModel)}
-        fixed = _constants(numbers, "chain" if "chain" in parts else parts.pop(), assessments)
-    runs = {(run.name, run.channel): run for run in assessment.linearised.runs}
-    noise, free = _noise_units(assessment), assessment.linearised.variables.free
+        fixed = _constants(numbers, "chain" if "chain" in parts else parts.pop(), stages)
+    runs = {(run.name, run.channel): run for run in linearised.runs}
+    noise, free = _noise_units(stage), linearised.variables.free
     fastest = {name: faults.fastest(name, problem.experiments) for name in problem.channels}
     for number, experiment in enumerate(problem.experiments):
         outputs, model = problem.outputs(vector, number), source(experiment)
         values = problem.model_values(vector, number)
         others = _by_others(model, values, experiment, numbers, fixed, earlier)
-        targets = problem.unknowns.targets(vector, experiment.name)
-        commanded = faults.of_command(model, targets, experiment)
+        commanded = faults.of_command(model, values, experiment)
         place = number / max(len(problem.experiments) - 1, 1) - 0.5
         for name, weights in problem.weights[number].items():
             run = runs.get((experiment.name, name))
@@ -331,18 +308,16 @@ def _blocks(assessment: Assessment, assessments: Sequence[Assessment]) -> Iterat
             )
 
 
-def _constants(
-    numbers: Mapping[str, float], part: str, assessments: Sequence[Assessment]
-) -> list[str]:
+def _constants(numbers: Mapping[str, float], part: str, stages: Sequence[StageFit]) -> list[str]:
     """Columns of the drive that no stage estimates and that are not zero or infinite.
 
     An estimate at a bound is as fixed as these: it stays there whatever else moves.
     """
-    problems = [each.stage.problem for each in assessments]
+    problems = [each.problem for each in stages]
     taken = {
         target
-        for each in assessments
-        for k, unknown in enumerate(each.stage.problem.unknowns)
+        for each in stages
+        for k, unknown in enumerate(each.problem.unknowns)
         if each.linearised.variables.free[k]
         for target in unknown.targets
     }
@@ -364,25 +339,22 @@ def _by_others(
     experiment: Experiment,
     numbers: Mapping[str, float],
     fixed: Sequence[str],
-    earlier: Sequence[Assessment],
+    earlier: Sequence[StageFit],
 ) -> dict[str, dict[Key, Array]]:
     """By channel, (m,) derivatives by earlier stages' estimates and fixed parameters' parts."""
-    targets = [
-        [t for u in each.stage.problem.unknowns if u.run is None for t in u.targets]
-        for each in earlier
-    ]
+    targets = [each.problem.unknowns.machine_targets for each in earlier]
     names = [*fixed, *(name for each in targets for name in each)]
     made: dict[str, dict[Key, Array]] = {}
     for channel, part in linearised(model, values, experiment, names).items() if names else ():
         columns: dict[Key, Array] = {}
         first = len(fixed)
         for each, own in zip(earlier, targets, strict=True):
-            stage, unknowns = each.stage, each.stage.problem.unknowns
+            unknowns = each.problem.unknowns
             by = part.by[:, first : first + len(own)]
-            by = by @ unknowns.chain(stage.solution.vector, own, "")
+            by = by @ unknowns.chain(each.solution.vector, own, "")
             first += len(own)
             columns |= {
-                (ESTIMATE, f"{stage.stage.name}: {unknown.name}"): by[:, k]
+                (ESTIMATE, f"{each.stage.name}: {unknown.name}"): by[:, k]
                 for k, unknown in enumerate(unknowns)
                 if unknown.run is None and each.linearised.variables.free[k]
             }
@@ -391,26 +363,13 @@ def _by_others(
     return made
 
 
-def _late_commands(assessments: Sequence[Assessment]) -> list[Fault]:
-    """Late stamps of the command, of the first stage in which they are the same as a longer tau."""
-    for each in assessments:
-        stage, problem = each.stage, each.stage.problem
-        if not any("tau" in unknown.targets for unknown in problem.unknowns):
-            first = problem.experiments[0]
-            targets = problem.unknowns.targets(stage.solution.vector, first.name)
-            tau = stage.parameters.numbers.get("tau")
-            if fault := faults.late_command(problem.model, targets, tau, first):
-                return [fault]
-    return []
-
-
-def _noise_units(assessment: Assessment) -> dict[str, float]:
+def _noise_units(stage: StageFit) -> dict[str, float]:
     """What a stage's residuals are divided by, by channel: noise that independent samples have.
 
     Where the measurement error is known, that; elsewhere the residuals themselves, with as many
     samples to one as their correlation says.
     """
-    problem, colours = assessment.stage.problem, assessment.uncertainty.colours
+    problem, colours = stage.problem, stage.uncertainty.colours
     units = {}
     for name in problem.channels:
         channel = next(each[name] for each in problem.experiments if name in each.channels)
@@ -418,7 +377,7 @@ def _noise_units(assessment: Assessment) -> dict[str, float]:
         if error is not None:
             units[name] = error / problem.scales[name]
             continue
-        left = [run.residual for run in assessment.linearised.runs if run.channel == name]
+        left = [run.residual for run in stage.linearised.runs if run.channel == name]
         squares = np.concatenate([np.zeros(0), *left]) ** 2
         inflation = max((each.inflation for each in colours if each.channel == name), default=1.0)
         units[name] = max(sqrt(squares.sum() / max(squares.size, 1) * inflation), 1e-300)

@@ -19,6 +19,10 @@ from swashplate.results import Result
 Array = NDArray[np.float64]
 
 
+LEVEL = 0.95
+"""Probability of the intervals."""
+
+
 @dataclass(frozen=True, eq=False)
 class Covariance(Result):
     """Covariance of the solver's vector under one assumption on the noise."""
@@ -36,6 +40,13 @@ class Covariance(Result):
         """(K,) of the solver's numbers; inf where undetermined, 0 for one at its bound."""
         known = self.determined | ~self.variables.free
         return np.where(known, np.sqrt(np.maximum(np.diag(self.matrix), 0.0)), np.inf)
+
+    @property
+    def quantiles(self) -> Array:
+        """(K,) half widths of the intervals in standard errors, Student's."""
+        from scipy.special import stdtrit  # of scipy.stats, without its second to load
+
+        return np.asarray(stdtrit(self.degrees_of_freedom, 0.5 + 0.5 * LEVEL))
 
     @property
     def correlation(self) -> Array:
@@ -184,11 +195,6 @@ class NoiseColour(Result):
         return f"Residuals of {self.channel} stay correlated over {during}: {worth}."
 
 
-def unweighted(run: LinearisedRun) -> Array:
-    """(n,) differences simulated less measured, without the weights if those are known."""
-    return run.residual if run.weight is None else run.residual / run.weight
-
-
 def noise_colours(fit: LinearisedFit) -> tuple[NoiseColour, ...]:
     """Colours of the residuals of each channel, pooled over its runs of one sampling step."""
     grids, groups = [grid_of(run.time) for run in fit.runs], list[list[int]]()
@@ -204,7 +210,7 @@ def noise_colours(fit: LinearisedFit) -> tuple[NoiseColour, ...]:
     colours = []
     for members in groups:
         longest = int(LONGEST * max(grids[k].size for k in members))
-        pairs = [pair_sums(unweighted(fit.runs[k]), grids[k], longest) for k in members]
+        pairs = [pair_sums(fit.runs[k].unweighted, grids[k], longest) for k in members]
         sums, counts = (np.sum(part, axis=0) for part in zip(*pairs, strict=True))
         autocovariance = sums / np.maximum(counts, 1.0)
         length = correlation_length(autocovariance, counts)
@@ -237,7 +243,7 @@ class _Spectrum:
     def __init__(self, run: LinearisedRun, whitening: Array) -> None:
         grid = grid_of(run.time)
         self.step, scale = grid.step, 1.0 / np.sqrt(grid.size)
-        directions, residual = run.jacobian @ whitening, unweighted(run)
+        directions, residual = run.jacobian @ whitening, run.unweighted
         weight = np.ones((1, 1)) if run.weight is None else run.weight[:, None]
         self.derivatives = scale * rfft(grid.spread(weight * directions), axis=0)
         """(F, rank) by which the noise enters the scores: with the weights twice."""
@@ -262,9 +268,10 @@ class _Sandwich:
 
     def __init__(self, fit: LinearisedFit) -> None:
         self.fit, self.spare = fit, fit.spare_samples  # refused where there are none
-        self.middle: Array = fit.whitening.T @ fit.prior_middle @ fit.whitening
+        prior = fit.prior @ fit.whitening
+        self.middle: Array = (prior.T * fit.prior_noise) @ prior
         self.total: Array = np.einsum("ki,ij,kj->k", fit.whitening, self.middle, fit.whitening)
-        self.squares: Array = np.zeros(fit.variables.count)
+        self.squares: Array = np.zeros(len(fit.variables))
 
     def add(self, middle: Array, parts: Array) -> None:
         """Add to the middle (rank, rank), and parts (n, K) of the variances, all independent."""
@@ -280,24 +287,13 @@ class _Sandwich:
         return covariance_of(self.fit, matrix, np.maximum(freedom, 1.0))
 
 
-def _spectra(fit: LinearisedFit) -> list[_Spectrum]:
-    return [_Spectrum(run, fit.whitening) for run in fit.runs]
-
-
 def spectral_covariance(
     fit: LinearisedFit, spectra: Sequence[_Spectrum] | None = None
 ) -> Covariance:
     """Covariance of the least-squares estimate under coloured noise, from its smoothed spectrum.
 
-    Parameters
-    ----------
-    fit : LinearisedFit
-        The fit. Its runs, and channels of a run, are taken as independent of each other.
-
-    Raises
-    ------
-    InputError
-        If there are no more samples than unknowns.
+    Runs, and channels of a run, are taken as independent of each other. An `InputError` says that
+    there are no more samples than unknowns.
 
     Notes
     -----
@@ -309,7 +305,7 @@ def spectral_covariance(
     of squares are divided by sums of 1 - h, as in HC2 of MacKinnon and White (1985). Degrees of
     freedom follow from the frequencies that an unknown's variance is an average over.
     """
-    sums, spectra = _Sandwich(fit), spectra or _spectra(fit)
+    sums, spectra = _Sandwich(fit), spectra or [_Spectrum(r, fit.whitening) for r in fit.runs]
     for channel in dict.fromkeys(run.channel for run in fit.runs):
         parts = [s for s, run in zip(spectra, fit.runs, strict=True) if run.channel == channel]
         order = np.argsort(np.concatenate([part.frequencies for part in parts]), kind="stable")
@@ -355,7 +351,7 @@ def band_score_covariance(
     each band and run.
     """
     sums = _Sandwich(fit)
-    for part in spectra or _spectra(fit):
+    for part in spectra or [_Spectrum(run, fit.whitening) for run in fit.runs]:
         products = part.derivatives.conj() * (part.twice * part.residual)[:, None]
         width = min(BAND, 0.5 / part.step / FEWEST_BANDS)
         band = (part.frequencies / width).astype(np.intp)
@@ -372,7 +368,7 @@ def coloured_noise_covariance(fit: LinearisedFit) -> Covariance:
     take in noise that is not, but are few. On the bench neither alone covers 93 to 97 % on every
     axis, both together do (docs/calibration.md).
     """
-    spectra = _spectra(fit)
+    spectra = [_Spectrum(run, fit.whitening) for run in fit.runs]
     first, second = spectral_covariance(fit, spectra), band_score_covariance(fit, spectra)
     known = first.determined & (first.standard_errors > 0.0)
     ratio = np.ones(known.size)
@@ -423,9 +419,9 @@ def without_lines(fit: LinearisedFit) -> tuple[LinearisedFit, tuple[SpectralLine
     runs, found = list(fit.runs), list[SpectralLine]()
     for channel in dict.fromkeys(run.channel for run in fit.runs):
         alike = [k for k, run in enumerate(fit.runs) if run.channel == channel]
-        whole = sum(float(np.sum(unweighted(runs[k]) ** 2)) for k in alike)
+        whole = sum(float(np.sum(runs[k].unweighted ** 2)) for k in alike)
         members = [k for k in alike if runs[k].time.size >= FEWEST]
-        left = {k: unweighted(runs[k]) for k in members}
+        left = {k: runs[k].unweighted for k in members}
         grids = [grid_of(runs[k].time) for k in members]
         for frequency in _frequencies([*left.values()], grids):
             taken = 0.0

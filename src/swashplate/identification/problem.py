@@ -251,14 +251,14 @@ def noise_scales(experiments: Sequence[Experiment], channels: Sequence[str]) -> 
             known = ", ".join(dict.fromkeys(c for each in experiments for c in each.channels))
             raise InputError(f"No experiment has a channel '{name}'; there are {known}.")
         stated = [each.noise for each in having if each.noise is not None]
-        # an ignored spike says nothing of the range
-        ranges = [float(np.ptp(each.values[each.used])) for each in having if each.used.any()]
-        scales[name] = 0.01 * max(ranges, default=0.0)
         if stated:
             scales[name] = float(np.sqrt(np.mean(np.square(stated))))
         elif step := having[0].resolution:
             # rounding leaves an error between -1/2 and 1/2 of a step
             scales[name] = step / np.sqrt(12.0)
+        else:  # an ignored spike says nothing of the range
+            ranges = [float(np.ptp(each.values[each.used])) for each in having if each.used.any()]
+            scales[name] = 0.01 * max(ranges, default=0.0)
         if scales[name] == 0.0:
             raise InputError(f"The channel '{name}' never changes: nothing can be fitted to it.")
     return scales
@@ -294,6 +294,11 @@ class LinearisedRun(NamedTuple):
     weight: Array | None = None
     """(n,) the factors w; None where all are alike. Samples of factor 0 are dropped."""
 
+    @property
+    def unweighted(self) -> Array:
+        """(n,) differences simulated less measured, without the weights if those are known."""
+        return self.residual if self.weight is None else self.residual / self.weight
+
 
 @dataclass(frozen=True, eq=False)
 class LinearisedFit(Result):
@@ -307,11 +312,6 @@ class LinearisedFit(Result):
     tolerance: float = TOLERANCE
     prior_noise: Array = field(default_factory=lambda: np.ones(0))
     """(p,) variance of each prior's residual, which counts as that many of the data's."""
-
-    @property
-    def prior_middle(self) -> Array:
-        """(K, K) covariance of the scores of the priors."""
-        return np.asarray((self.prior.T * self.prior_noise) @ self.prior)
 
     @property
     def samples(self) -> int:
@@ -335,7 +335,7 @@ class LinearisedFit(Result):
         return triangle
 
     @cached_property
-    def _decomposed(self) -> tuple[Array, NDArray[np.bool_]]:
+    def _inverse(self) -> tuple[Array, NDArray[np.bool_]]:
         return whitening(self.triangle, self.variables.free, self.tolerance)
 
     @property
@@ -344,12 +344,12 @@ class LinearisedFit(Result):
 
         The columns of J W are orthonormal. Rows of unknowns at a bound are 0: they are fixed there.
         """
-        return self._decomposed[0]
+        return self._inverse[0]
 
     @property
     def determined(self) -> NDArray[np.bool_]:
         """(K,) unknowns that are free and have no part in any null direction."""
-        return self._decomposed[1]
+        return self._inverse[1]
 
     @property
     def rank(self) -> int:
@@ -358,13 +358,7 @@ class LinearisedFit(Result):
 
     @property
     def spare_samples(self) -> int:
-        """Samples more than combinations determined.
-
-        Raises
-        ------
-        InputError
-            If there are none: then the residual tells nothing of the noise.
-        """
+        """Samples more than combinations determined; an `InputError` if there are none."""
         spare = self.samples - self.rank
         if spare < 1:
             had, wanted = count(self.samples, "sample"), count(self.rank, "parameter")
@@ -385,11 +379,8 @@ def whitening(
 ) -> tuple[Array, NDArray[np.bool_]]:
     """Inverse of (m, K) derivatives, or of their triangular factor, on what they determine.
 
-    Returns
-    -------
-    (K, rank) array, (K,) array of bool
-        W with W Wᵀ = (JᵀJ)⁻¹ on the unknowns that are `free`, and which unknowns are determined:
-        singular values of the column-scaled factor below `tolerance` of the largest count as zero.
+    W (K, rank) with W Wᵀ = (JᵀJ)⁻¹ on the unknowns that are `free`, and (K,) which are determined:
+    singular values of the column-scaled factor below `tolerance` of the largest count as zero.
     """
     if triangle.shape[0] > triangle.shape[1]:
         triangle = triangular_factor(triangle)
@@ -425,12 +416,8 @@ def linearised_fit(problem: Problem, vector: Array, loss: Loss = "linear") -> Li
 
     `loss` is what of each residual the fit summed. With a robust one each residual stands as ψ over
     the mean of ψ', by channel: the covariance of these is that of the estimates (Huber 1981,
-    equation 6.5), whatever their spectrum.
-
-    Raises
-    ------
-    InputError
-        If so many residuals lie in the tails of a robust loss that it has no optimum there.
+    equation 6.5), whatever their spectrum. An `InputError` says that so many residuals lie in the
+    tails of the loss that it has no optimum there.
     """
     runs = []
     for number, experiment in enumerate(problem.experiments):

@@ -18,7 +18,7 @@ from swashplate.identification.unknowns import Vector
 from swashplate.results import Result
 
 if TYPE_CHECKING:
-    from swashplate.identification.assessment import Assessment
+    from swashplate.identification.fitting import StageFit
 
 Array = NDArray[np.float64]
 
@@ -33,22 +33,14 @@ where the model no longer holds, or at a cost below the optimum's."""
 STRIDE = 0.35
 """Step aimed at, in the square root of the cost's rise over that of the threshold: three points
 a side on a parabola."""
-
 BETTER = 0.02
 """Part of the threshold by which a cost must lie below the optimum's to be a better optimum: a
 smaller difference moves the ends of an interval by less than 1 % of their distance."""
-
 CLOSE = 1e-3
 """Relative error in the root of the cost's rise at which a crossing counts as found."""
-
-FURTHEST = 300.0
-"""Largest distance looked at, in first steps."""
-
-MOST = 40
-"""Largest number of points a side."""
-
-HALVINGS = 6
-"""How often a step is halved at the edge of the model's domain."""
+FURTHEST, MOST, HALVINGS = 300.0, 40, 6
+"""Largest distance looked at, in first steps; most points a side; and how often a step is halved at
+the edge of the model's domain."""
 
 
 class Point(NamedTuple):
@@ -78,13 +70,17 @@ class Profile(Result):
     """Of the lower and the upper side."""
     better: Point | None
     """A better optimum that was met; the profile stopped there and its ends mean nothing."""
+    name: str = ""
+    """The unknown's."""
+    stage: str = ""
+    """That of the unknown."""
 
-    def sentences(self, name: str) -> tuple[str, ...]:
+    def sentences(self) -> tuple[str, ...]:
         """What stands in the way of an interval, if anything does."""
         if self.better is not None:
             return (
-                f"The profile of {name} met a better optimum, cost {self.better.cost:.6g} against "
-                f"{self.cost:.6g}: fit again from there.",
+                f"The profile of {self.name} met a better optimum, cost {self.better.cost:.6g} "
+                f"against {self.cost:.6g}: fit again from there.",
             )
         reasons: dict[Ending, str] = {
             "bound": "its bound",
@@ -92,8 +88,8 @@ class Profile(Result):
             "domain": "the edge of the model's domain",
         }
         return tuple(
-            f"{name} reaches {reasons[ending]} before the cost rises enough on its {side} side: no "
-            "end of the interval there."
+            f"{self.name} reaches {reasons[ending]} before the cost rises enough on its {side} "
+            "side: no end of the interval there."
             for side, ending in zip(("lower", "upper"), self.endings, strict=True)
             if ending in reasons
         )
@@ -111,22 +107,14 @@ def profile(
     """Profile of one unknown: outwards from the optimum both ways, each point from the last.
 
     The optimum is a vector (K,) with its half sum of squares; the interval ends where that has
-    risen by `rise`. `step`, positive, is about one standard error of the unknown's number in the
-    vector, `bounds` are those of the number. `minimise` may raise DomainError.
-
-    Raises
-    ------
-    InputError
-        If the step or the rise is not positive, or the optimum lies outside the bounds.
+    risen by `rise`, or an `InputError` says that this is not positive. `step`, positive, is about
+    one standard error of the unknown's number in the vector, `bounds` are those of the number.
+    `minimise` may raise DomainError.
     """
-    if not (step > 0.0 and np.isfinite(step)):
-        raise InputError(f"The first step of a profile, {step:g}, must be positive and finite.")
     if not rise > 0.0:
         raise InputError(
             "The residuals are exactly zero: there is no noise that a profile could weigh against."
         )
-    if not bounds[0] <= vector[index] <= bounds[1]:
-        raise InputError("The optimum of a profile lies outside the bounds of its parameter.")
     optimum = Point(float(vector[index]), cost, vector)
     lower = _side(minimise, optimum, index, rise, -step, bounds[0])
     upper = _Side([], "open")
@@ -373,7 +361,7 @@ def _unneeded(problem: Problem, vector: Array, index: int, cost: float, rise: fl
 
 
 def profiles_of(
-    assessment: Assessment,
+    stage: StageFit,
     names: Sequence[str] | None = None,
     *,
     executor: Executor | None = None,
@@ -381,13 +369,9 @@ def profiles_of(
 ) -> dict[str, Profile]:
     """Profile likelihoods of a stage's unknowns by name, in their order.
 
-    By default of all unknowns of the machine that have an interval. What earlier stages do not know
-    is not in them. `watch` is told how many are done.
-
-    Raises
-    ------
-    InputError
-        For a name that is none of the stage's unknowns.
+    By default of all unknowns of the machine that have an interval; an `InputError` for a name that
+    is none of the stage's. What earlier stages do not know is not in them. `watch` is told how many
+    are done.
 
     Notes
     -----
@@ -395,23 +379,21 @@ def profiles_of(
     that count as one independent sample: on a linear model exactly the estimate ± q standard
     errors.
     """
-    from scipy.special import stdtrit
-
-    problem, found, fit = assessment.stage.problem, assessment.uncertainty, assessment.linearised
-    variables, vector = found.own.variables, assessment.stage.solution.vector
+    problem, found, fit = stage.problem, stage.uncertainty, stage.linearised
+    variables, vector = found.own.variables, stage.solution.vector
     if names is None:
         known = zip(problem.unknowns, found.own.determined, strict=True)
         chosen = [k for k, (each, told) in enumerate(known) if each.run is None and told]
     else:
         chosen = sorted({variables.index(name) for name in names})
     cost = problem.cost(vector)
-    quantiles = stdtrit(found.own.degrees_of_freedom, 0.5 + 0.5 * found.level)
-    every = quantiles**2 * found.inflation * cost / fit.spare_samples
+    every = found.own.quantiles**2 * found.inflation * cost / fit.spare_samples
     rises = {k: float(every[k]) for k in chosen}
     shared = replace(problem, threads=1), vector, cost, rises, found.own.standard_errors
     made: dict[str, Profile] = {}
     for position, each in (executor or Serial()).run(_profiled, shared, chosen):
-        made[variables.names[chosen[position]]] = each
+        name = variables.names[chosen[position]]
+        made[name] = replace(each, name=name, stage=stage.stage.name)
         if watch is not None:
             watch(len(made))
     return {variables.names[k]: made[variables.names[k]] for k in chosen}

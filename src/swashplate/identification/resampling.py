@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING
+from itertools import chain
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,7 +22,7 @@ from swashplate.identification.drive_model import (
     start_currents_of,
 )
 from swashplate.identification.fitting import Search, StageFit, fit
-from swashplate.identification.noise import grid_of, noise_colours, unweighted, without_lines
+from swashplate.identification.noise import grid_of, noise_colours, without_lines
 from swashplate.identification.problem import LinearisedFit, Loss, Problem
 from swashplate.identification.setup import Setup
 from swashplate.identification.solving import NO_EFFECT, solve
@@ -30,9 +30,6 @@ from swashplate.identification.unknowns import Unknowns
 from swashplate.identification.validation import Measures, measures, predict, with_speeds
 from swashplate.parameters.parameter_set import ParameterSet
 from swashplate.results import Result
-
-if TYPE_CHECKING:
-    from swashplate.identification.assessment import Assessment
 
 Array = NDArray[np.float64]
 
@@ -136,10 +133,9 @@ def cross_validate(
     except KeyboardInterrupt:
         if not done:
             raise
-    ended = [done[place] for place in sorted(done)]
-    held = [each for _, of_fold in ended for each in of_fold]
+    made, of_folds = zip(*(done[place] for place in sorted(done)), strict=True)
+    held = list(chain.from_iterable(of_folds))
     units = {name: unit for name, unit, *_ in held}
-    made = tuple(fold for fold, _ in ended)
     return CrossValidation(seed, len(parts), made, _measured(held), units)
 
 
@@ -158,11 +154,6 @@ def deal(experiments: Sequence[Experiment], folds: int, seed: int) -> tuple[tupl
 
     Places of each fold's runs, increasing; folds differ by at most one run. The seed is that of the
     order within each kind.
-
-    Raises
-    ------
-    InputError
-        If there are fewer runs than folds, or fewer than 2 folds.
     """
     if folds < 2:
         raise InputError(f"Cross-validation needs at least 2 folds, not {folds}.")
@@ -219,19 +210,9 @@ def _fold(
 
 
 class NoiseDraws:
-    """Noise like a fit's, drawn run by run.
+    """Noise like a fit's, run by run; draw k of a seed is the same on any cores and in any order.
 
-    Parameters
-    ----------
-    fit : LinearisedFit
-        The fit.
-    seed : int
-        Of the draws. Draw k is the same on any number of cores and in any order.
-
-    Raises
-    ------
-    InputError
-        If there are no more samples than unknowns.
+    An `InputError` says that there are no more samples than unknowns.
 
     Notes
     -----
@@ -254,7 +235,7 @@ class NoiseDraws:
                 circle[size - lags + 1 :] = colour.correlation[:0:-1]
                 # negative parts of the spectrum are errors of the estimate
                 power = np.maximum(rfft(circle).real, 0.0)
-                variance = spare * np.mean(unweighted(fit.runs[m]) ** 2)
+                variance = spare * np.mean(fit.runs[m].unweighted ** 2)
                 amplitude = np.sqrt(variance * power / irfft(power, size)[0])
                 self._amplitudes[m] = amplitude, size
 
@@ -295,13 +276,7 @@ class Bootstrap(Result):
         return self.variables.to_values(self.vectors)
 
     def intervals(self) -> tuple[tuple[float, float] | None, ...]:
-        """Percentile intervals of 95 % in own units; None for what is fixed or undetermined.
-
-        Raises
-        ------
-        InputError
-            If too few draws reach their ends.
-        """
+        """Percentile intervals of 95 % in own units; None for what is fixed or undetermined."""
         draws = self.vectors.shape[0]
         if draws < FEWEST_DRAWS:
             raise InputError(
@@ -327,7 +302,7 @@ class Bootstrap(Result):
 
 
 def bootstraps_of(
-    assessments: Sequence[Assessment],
+    stages: Sequence[StageFit],
     draws: int = 1000,
     *,
     seed: int = 0,
@@ -346,12 +321,13 @@ def bootstraps_of(
     """
     if draws < 2:
         raise InputError(f"{draws} draws do not make a distribution; take 1000.")
+    fits = [without_lines(each.linearised)[0] for each in stages]
     shared = tuple(
         (
-            replace(each.stage, problem=replace(each.stage.problem, threads=1)),
-            NoiseDraws(without_lines(each.linearised)[0], seed=seed),
+            replace(each, problem=replace(each.problem, threads=1), earlier=()),
+            NoiseDraws(fit, seed=seed),
         )
-        for each in assessments
+        for each, fit in zip(stages, fits, strict=True)
     )
     found: dict[int, tuple[Array, ...] | None] = {}
     for number, vectors in (executor or Serial()).run(_refitted, shared, range(draws)):
@@ -361,12 +337,11 @@ def bootstraps_of(
     ended = [each for _, each in sorted(found.items()) if each is not None]
     if len(ended) < 2:
         raise InputError(f"{len(ended)} of {draws} refits ended; there is nothing to compare.")
-    made = {}
-    for place, (stage, noise) in enumerate(shared):
-        of_stage = np.array([each[place] for each in ended])
-        fit, failed = noise.fit, draws - len(ended)
-        made[stage.stage.name] = Bootstrap(fit.variables, of_stage, fit.determined, failed, seed)
-    return made
+    vectors, failed = map(np.array, zip(*ended, strict=True)), draws - len(ended)
+    return {
+        stage.stage.name: Bootstrap(fit.variables, of_stage, fit.determined, failed, seed)
+        for stage, fit, of_stage in zip(stages, fits, vectors, strict=True)
+    }
 
 
 def _refitted(
@@ -380,16 +355,12 @@ def _refitted(
         model = problem.model
         if card is not None and isinstance(model, DriveModel):
             # another card, whose current drives the pump where it did before
-            parameters, starts = card
-            currents = {
-                each.name: simulated_current(each, parameters, starts.get(each.name, {}))
-                for each in problem.experiments
-                if model.currents
-                and stage.stage.current == "simulated"
-                and each.input.kind == "voltage"
-            }
-            currents = {**model.currents, **currents}
-            model = DriveModel(parameters, model.part, currents, model.forces)
+            currents = dict(model.currents)
+            for each in problem.experiments if stage.stage.current == "simulated" else ():
+                if each.name in currents and each.input.kind == "voltage":
+                    start = card[1].get(each.name, {})
+                    currents[each.name] = simulated_current(each, card[0], start)
+            model = DriveModel(card[0], model.part, currents, model.forces)
             problem = replace(problem, model=model)
         try:
             solution = solve(problem, stage.solution.vector, tolerance=1e-7, max_evaluations=100)

@@ -230,11 +230,8 @@ class Setup(Entry):
     def joint(self) -> Setup:
         """The same unknowns, all at once through the whole chain.
 
-        Raises
-        ------
-        ParameterError
-            If two stages free the same parameter, or one is driven by a scaled current, which no
-            chain makes.
+        A `ParameterError` says that two stages free the same parameter, or that one is driven by a
+        scaled current, which no chain makes.
         """
         merged: dict[str, Any] = {"free": {}, "weights": {}, "weights_by_input": {}}
         for stage in self.stages:

@@ -12,7 +12,8 @@ from typing import TYPE_CHECKING
 from swashplate.errors import InputError
 from swashplate.identification.drive_model import START_PRESSURE, DriveModel, true_value
 from swashplate.identification.identifiability import GAUGES
-from swashplate.identification.intervals import LEVEL, Estimate
+from swashplate.identification.intervals import Estimate
+from swashplate.identification.noise import LEVEL
 from swashplate.identification.setup import ModelSetup
 from swashplate.identification.validation import ignored_windows, pooled, with_speeds
 from swashplate.parameters.definitions import CATALOGUE, COLUMNS
@@ -21,7 +22,7 @@ from swashplate.units import chosen_unit, display_unit
 
 if TYPE_CHECKING:
     from swashplate.campaign.experiment import Channel, Experiment
-    from swashplate.identification.assessment import Assessment, Judged
+    from swashplate.identification.assessment import Judged
     from swashplate.identification.fitting import Fit, StageFit
     from swashplate.identification.resampling import Bootstrap, CrossValidation
     from swashplate.identification.validation import Measures, RunQuality
@@ -31,26 +32,18 @@ if TYPE_CHECKING:
 
 
 def estimates_table(
-    assessment: Assessment,
+    stage: StageFit,
     *,
     truth: ParameterSet | None = None,
     bootstrap: Bootstrap | None = None,
     own: bool = False,
 ) -> Table:
-    """Estimates of a stage with their intervals.
+    """Estimates of a stage with their intervals, those of a bootstrap beside them.
 
-    Parameters
-    ----------
-    assessment : Assessment
-        Of the stage.
-    truth : ParameterSet, optional
-        Of virtual tests: what was simulated.
-    bootstrap : Bootstrap, optional
-        Whose intervals stand beside.
-    own : bool
-        Whether the unknowns of single runs are meant, instead of those of the machine.
+    `truth` is what virtual tests were simulated with; with `own` the unknowns of single runs are
+    meant, instead of those of the machine.
     """
-    stage, unknowns = assessment.stage, assessment.stage.problem.unknowns
+    unknowns = stage.problem.unknowns
     redrawn = None if bootstrap is None else bootstrap.intervals()
     known, drawn = "" if truth is None else "tpf", "tpf" if redrawn else ""
     ends = f"{100.0 * LEVEL:g} %"
@@ -76,25 +69,22 @@ def estimates_table(
         ),
         si=True,
     )
-    pairs = zip(unknowns, unknowns.names, _estimates(assessment), strict=True)
-    for k, (unknown, name, (_, value, status, error, low, high, _)) in enumerate(pairs):
+    pairs = zip(unknowns, _estimates(stage), strict=True)
+    for k, (unknown, estimate) in enumerate(pairs):
         if (unknown.run is None) == own:
             continue
+        name, value, status, error, low, high = estimate
         factor, true, holds = chosen_unit(unknown.unit).factor, None, ""
         if truth is not None:
             assert isinstance(stage.problem.model, DriveModel)
             true = true_value(unknown, stage.problem.model, truth)
-        shown = [f"{factor * each:.5g}" for each in (value, low or 0.0, high or 0.0)]
-        if low is None and high is None:
-            shown[1:] = [status, ""]
-        elif low is None or high is None:
-            shown[1 if low is None else 2] = f"none {'below' if low is None else 'above'}"
-        else:
-            shown = [*spread(factor * value, factor * low, factor * high)]
+        both = low is not None and high is not None
+        shown: Sequence[str] = (f"{factor * value:.5g}", *estimate.ends(factor))
+        if low is not None and high is not None:
+            shown = spread(factor * value, factor * low, factor * high)
         if true is not None and (low, high) != (None, None):
             inside = (-inf if low is None else low) <= true <= (inf if high is None else high)
             holds = "yes" if inside else "no"
-        both = low is not None and high is not None
         made.add(
             stage.stage.name,
             name,
@@ -123,24 +113,24 @@ def profiles_table(found: Judged) -> Table:
     lower, upper = (Column(f"{side} {ends}", ".5g", none=NONE) for side in ("lower", "upper"))
     columns = (Column("stage"), Column("parameter"), UNIT, Column("estimate", ".5g"), lower, upper)
     made = Table("Profile likelihoods", columns, si=True)
-    for given in found.profiles:
-        stage = next(each for each in found.result.stages if each.stage.name == given.stage)
-        unknown, one = stage.problem.unknowns.items[given.profile.index], given.profile
-        found_ends = (None, None) if one.better is not None else (one.lower, one.upper)
-        numbers = (float(stage.solution.vector[one.index]), *found_ends)
+    for one in found.profiles:
+        stage = found.result.stage(one.stage)
+        unknown = stage.problem.unknowns.items[one.index]
+        ends_found = (None, None) if one.better is not None else (one.lower, one.upper)
+        numbers = (float(stage.solution.vector[one.index]), *ends_found)
         values = (None if each is None else unknown.to_value(each) for each in numbers)
-        made.add(given.stage, found.name_of(given), *values, unit=unknown.unit)
+        made.add(one.stage, one.name, *values, unit=unknown.unit)
     return made
 
 
-def _estimates(assessment: Assessment) -> Sequence[Estimate]:
+def _estimates(stage: StageFit) -> Sequence[Estimate]:
     """The estimates, without intervals where too few samples tell the noise."""
     try:
-        return assessment.uncertainty.estimates
+        return stage.uncertainty.estimates
     except InputError:
-        point = assessment.stage.problem.unknowns.at(assessment.stage.solution.vector)
+        point = stage.problem.unknowns.at(stage.solution.vector)
         values = zip(point.names, point.estimates.tolist(), strict=True)
-        return [Estimate(name, value, "undetermined", *[None] * 4) for name, value in values]
+        return [Estimate(name, value, "undetermined", *[None] * 3) for name, value in values]
 
 
 def truth_count(tables: Sequence[Table]) -> tuple[int, int]:
@@ -267,7 +257,6 @@ def runs_tables(qualities: Sequence[RunQuality]) -> list[Table]:
                 UNIT,
                 Column("NRMSE", ".3g", "1", none="-", key="nrmse"),
                 Column("fit %", ".2f", "1", none="-", key="fit_percent"),
-                Column("R²", ".4f", "1", none="-", key="r_squared"),
                 Column("residuals_correlated_s", ".2g", "1", of="f"),
                 Column("correlation_with_input", "+.2f", "1", of="f"),
                 Column("correlation_band", ".2f", "1", of="f"),
@@ -296,7 +285,7 @@ def runs_tables(qualities: Sequence[RunQuality]) -> list[Table]:
 
 
 def _measures(found: Measures) -> tuple[float | None, ...]:
-    return found.samples, found.rmse, found.nrmse, found.fit_percent, found.r_squared
+    return found.samples, found.rmse, found.nrmse, found.fit_percent
 
 
 def start_words(experiment: Experiment) -> str:
@@ -320,9 +309,9 @@ def ignored_words(experiment: Experiment, channel: Channel) -> str:
 # --- cross-validation -----------------------------------------------------------------------------
 
 
-def folds_tables(found: CrossValidation, assessments: Sequence[Assessment]) -> list[Table]:
+def folds_tables(found: CrossValidation, stages: Sequence[StageFit]) -> list[Table]:
     """Errors held out beside those of the fit to all runs, and the folds."""
-    whole = pooled(with_speeds(each for stage in assessments for each in stage.runs))
+    whole = pooled(with_speeds(each for stage in stages for each in stage.runs))
     held_out = Table(
         "Cross-validation: each part predicted by a fit to the others",
         (
@@ -332,14 +321,13 @@ def folds_tables(found: CrossValidation, assessments: Sequence[Assessment]) -> l
             Column("RMSE fitted", ".3g", none=NONE),
             UNIT,
             Column("ratio", ".2f", "1", none=NONE),
-            Column("R²", ".5f", "1", none=NONE, of="pf"),
             Column("samples", ",d", "1", of="pf"),
         ),
     )
     for name, measures in found.measures.items():
         fitted = whole[name].rmse if name in whole else None
         ratio = measures.rmse / fitted if fitted else None
-        cells = (name, measures.fit_percent, measures.rmse, fitted, ratio, measures.r_squared)
+        cells = (name, measures.fit_percent, measures.rmse, fitted, ratio)
         held_out.add(*cells, measures.samples, unit=found.units[name])
     columns = (Column("fold", "d"), Column("held out", wrap=True), Column("fit to the others"))
     folds = Table("Folds", (*columns, Column("fit % of those held out")))

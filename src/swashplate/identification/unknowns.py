@@ -149,11 +149,6 @@ class Unknowns(Result):
     def __iter__(self) -> Iterator[Unknown]:
         return iter(self.items)
 
-    @property
-    def count(self) -> int:
-        """K."""
-        return len(self.items)
-
     @cached_property
     def names(self) -> tuple[str, ...]:
         """Names, with the experiment of those that belong to one: ``"offset counts (hoistr6)"``."""
@@ -230,10 +225,7 @@ class Unknowns(Result):
     @property
     def slopes(self) -> Array:
         """(K,) derivative of each value by its number in the vector."""
-        return self._slopes(self.vector)
-
-    def _slopes(self, vector: Array) -> Array:
-        return np.where(self.logarithmic, self.to_values(vector), self.scales)
+        return np.where(self.logarithmic, self.to_values(self.vector), self.scales)
 
     def to_values(self, vector: Array) -> Array:
         """(..., K) values of vectors; a logarithm beyond any float's becomes inf or 0."""
@@ -259,6 +251,11 @@ class Unknowns(Result):
         named = zip(self.names, self.items, strict=True)
         return self.to_vector(np.array([values.get(name, each.start) for name, each in named]))
 
+    @property
+    def machine_targets(self) -> list[str]:
+        """Names in the model that unknowns of no single run set."""
+        return [name for each in self.items if each.run is None for name in each.targets]
+
     def _places(self, run: str) -> dict[str, int]:
         """Names in the model that the unknowns of one experiment set, and whose number it is."""
         items = enumerate(self.items)
@@ -272,7 +269,7 @@ class Unknowns(Result):
     def chain(self, vector: Array, targets: Sequence[str], run: str) -> Array:
         """(len(targets), K) derivatives of the model's numbers by the vector."""
         matrix, places = np.zeros((len(targets), len(self.items))), self._places(run)
-        slopes = self._slopes(vector)
+        slopes = self.at(vector).slopes
         for row, place in enumerate(map(places.get, targets)):
             if place is not None:
                 matrix[row, place] = slopes[place]

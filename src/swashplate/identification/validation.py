@@ -88,16 +88,11 @@ def residual_test(
     Parameters
     ----------
     time : (n,) array
-        Stamps of the samples that count; gaps are respected. [s]
+        Stamps of the samples that count, at least 8; gaps are respected. [s]
     residual, command : (n,) arrays
         Simulated less measured, weights left out, and the input at the same stamps.
     longest : float
         Largest lag; at most a quarter of the run is looked at. [s]
-
-    Raises
-    ------
-    InputError
-        If there are fewer than 8 samples.
 
     Notes
     -----
@@ -155,26 +150,14 @@ class Measures(NamedTuple):
         """100 (1 - NRMSE); 100 is perfect, 0 no better than the measured mean. [%]"""
         return None if self.nrmse is None else 100.0 * (1.0 - self.nrmse)
 
-    @property
-    def r_squared(self) -> float | None:
-        """1 - NRMSE²."""
-        return None if self.nrmse is None else 1.0 - self.nrmse**2
-
 
 def measures(*runs: tuple[Array, Array, Array | None]) -> Measures:
     """Measures of one channel over one run, or over several, about the mean of all.
 
-    Parameters
-    ----------
-    *runs : (measured, simulated, weight)
-        (n,) samples in the channel's unit, and factors on the squared errors, None for none. Those
-        that are 0 say which samples do not count. The others weigh nothing here: a window of weight
-        ten would otherwise pass for the whole run.
-
-    Raises
-    ------
-    InputError
-        If no sample counts, or one that does is not finite.
+    Of each run (n,) samples measured and simulated, in the channel's unit, and factors on the
+    squared errors, None for none. Those that are 0 say which samples do not count. The others weigh
+    nothing here: a window of weight ten would otherwise pass for the whole run. An `InputError`
+    says that no sample counts, or one that does is not finite.
     """
     parts = []
     for values, simulated, weight in runs:
@@ -439,12 +422,8 @@ def following(qualities: Sequence[RunQuality], name: str) -> tuple[int, list[flo
 
 def ignored_windows(channel: Channel) -> tuple[tuple[float, float], ...]:
     """First and last instant of each stretch of a channel that does not count. [s]"""
-    out = np.concatenate([[False], ~channel.used, [False]])
-    edges = np.flatnonzero(out[1:] != out[:-1])
-    return tuple(
-        (float(channel.time[first]), float(channel.time[after - 1]))
-        for first, after in zip(edges[::2], edges[1::2], strict=True)
-    )
+    edges = np.flatnonzero(np.diff(~channel.used, prepend=False, append=False)).reshape(-1, 2)
+    return tuple((float(channel.time[a]), float(channel.time[b - 1])) for a, b in edges)
 
 
 class Side(NamedTuple):

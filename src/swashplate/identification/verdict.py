@@ -12,7 +12,7 @@ import numpy as np
 from swashplate.campaign.experiment import Experiment
 from swashplate.errors import DomainError, InputError
 from swashplate.identification.data_checks import contradicting_runs
-from swashplate.identification.drive_model import CURRENTS, DriveModel, limits_reached
+from swashplate.identification.drive_model import CURRENTS, LIMITS, DriveModel, limits_reached
 from swashplate.identification.faults import DRIFT, LOSS, Fault, measurement_error
 from swashplate.identification.identifiability import WIDE, weak_unknowns
 from swashplate.identification.intervals import open_unknowns
@@ -30,7 +30,7 @@ from swashplate.results import Result
 from swashplate.tables import Column, Table, listed
 
 if TYPE_CHECKING:
-    from swashplate.identification.assessment import Assessment
+    from swashplate.identification.fitting import StageFit
     from swashplate.identification.validation import RunQuality
 
 Grade = Literal["Usable", "Usable for prediction", "Not usable"]
@@ -68,13 +68,6 @@ FEWEST_RUNS = 4
 """Runs of which one can stand out."""
 SAME = 1e-6
 """Costs that differ by less than this part are the same optimum."""
-LIMITS: Mapping[str, str] = {
-    "Z13": "the swash plate's stop Z13",
-    "Z14": "the spool's stop Z14",
-    "Z15": "the relief valve Z15",
-    "Z16": "the orifices' limit Z16",
-}
-"""What a drive may never have reached in the fitted runs, by symbol."""
 
 
 class Criterion(NamedTuple):
@@ -143,7 +136,7 @@ class Verdict(Result):
 
 
 def verdict(
-    assessments: Sequence[Assessment],
+    stages: Sequence[StageFit],
     predicted: Sequence[RunQuality],
     *,
     planned: Sequence[str] = (),
@@ -151,45 +144,42 @@ def verdict(
 ) -> Verdict:
     """Judge a fit by what it found and by what it predicts, or a drive by what it predicts.
 
+    It is "Not usable" where a criterion on the use fails, "Usable for prediction" where only those
+    on the parameters' values do. A criterion that the data do not allow to judge rules out nothing,
+    and says what would be needed.
+
     Parameters
     ----------
-    assessments : sequence of Assessment
-        One for each stage of the fit; none for a drive that is only compared with runs.
+    stages : sequence of StageFit
+        Each stage of the fit; none for a drive that is only compared with runs.
     predicted : sequence of RunQuality
         Of runs that were held out of the fit, as `validation.predict` gives them.
     planned : sequence of str
         Names of all stages of the fit configuration, to tell those that were never begun.
     required : float
         Largest error of the runs predicted, over the range of each channel. [1]
-
-    Returns
-    -------
-    Verdict
-        "Not usable" where a criterion on the use fails, "Usable for prediction" where only those on
-        the parameters' values do. A criterion that the data do not allow to judge rules out
-        nothing, and says what would be needed.
     """
-    runs = [each for assessment in assessments for each in assessment.runs]
+    runs = [each for stage in stages for each in stage.runs]
     fitted = Side.of("fitted", runs)
-    out = Side.of("held-out" if assessments else "predicted", predicted)
-    criteria, misfit = [*_convergence(assessments, planned)], None
+    out = Side.of("held-out" if stages else "predicted", predicted)
+    criteria, misfit = [*_convergence(stages, planned)], None
     for side in (fitted, out):
         criteria += [_followed(side), _no_worse_than_mean(side)] if side.qualities else []
     criteria.append(_required_accuracy(out, required))
-    if assessments:
+    if stages:
         criteria += [
             _carried_over(fitted, out),
-            _consistent(assessments),
-            _determined(assessments),
-            _bounded_predictions(assessments, predicted),
+            _consistent(stages),
+            _determined(stages),
+            _bounded_predictions(stages, predicted),
         ]
         try:
-            misfit = lack_of_fit(assessments)
+            misfit = lack_of_fit(stages)
         except InputError as error:
             criteria.append(_open("lack of fit", f"{MISFIT:g}", str(error).rstrip(".")))
         else:
-            criteria += _fits(misfit, out if out.qualities else fitted, assessments)
-            criteria += [*_nothing_left_out(misfit, fitted), _alike(misfit, assessments)]
+            criteria += _fits(misfit, out if out.qualities else fitted, stages)
+            criteria += [*_nothing_left_out(misfit, fitted), _alike(misfit, stages)]
     criteria.append(_model_error(runs or predicted))
 
     unusable, untrusted = (
@@ -198,7 +188,7 @@ def verdict(
     )
     grade: Grade = "Usable for prediction" if untrusted else "Usable"
     grade = "Not usable" if unusable else grade
-    tested = {each.name: each for each in _fitted_runs(assessments)}
+    tested = {each.name: each for each in _fitted_runs(stages)}
     tested |= {each.experiment.name: each.experiment for each in out.qualities}
     assumed: list[str] = []
     if misfit is not None:
@@ -206,7 +196,7 @@ def verdict(
         assumed = [units] * bool(misfit.units) + [f"{e.assumption}." for e in misfit.assumed]
     if unusable:
         headline = f"Not usable: {unusable}."
-    elif not assessments:
+    elif not stages:
         number = len({each.experiment.name for each in out.qualities})
         headline = f"Predicts {out.accuracy} over {number} run{'s' if number > 1 else ''}."
     elif untrusted:
@@ -221,31 +211,30 @@ def verdict(
         headline,
         tuple(criteria),
         grade,
-        tuple(_remarks(assessments, fitted, out, runs or predicted, misfit)),
-        _validity(assessments, tested) if assessments else "",
+        tuple(_remarks(stages, fitted, out, runs or predicted, misfit)),
+        _validity(stages, tested) if stages else "",
         tuple(assumed),
     )
 
 
-def _fitted_runs(assessments: Sequence[Assessment]) -> list[Experiment]:
+def _fitted_runs(stages: Sequence[StageFit]) -> list[Experiment]:
     """The fitted runs of all stages, each once."""
-    return list({e.name: e for a in assessments for e in a.stage.problem.experiments}.values())
+    return list({e.name: e for a in stages for e in a.problem.experiments}.values())
 
 
-def starts_of(assessments: Sequence[Assessment]) -> dict[str, Sequence[Solution]]:
+def starts_of(stages: Sequence[StageFit]) -> dict[str, Sequence[Solution]]:
     """Starts by stage, of the stages that had several."""
-    stages = [each.stage for each in assessments]
     return {each.stage.name: each.starts for each in stages if len(each.starts) > 1}
 
 
 # --- criteria -------------------------------------------------------------------------------------
 
 
-def _convergence(assessments: Sequence[Assessment], planned: Sequence[str]) -> Iterator[Criterion]:
+def _convergence(stages: Sequence[StageFit], planned: Sequence[str]) -> Iterator[Criterion]:
     """That each stage came to its end."""
     why, done = "before the optimum neither values nor intervals are meaningful", []
-    for each in assessments:
-        name, solution = each.stage.stage.name, each.stage.solution
+    for each in stages:
+        name, solution = each.stage.name, each.solution
         state, failure = "converged", ""
         if solution.interrupted:
             state = "interrupted"
@@ -343,13 +332,13 @@ def _carried_over(fitted: Side, out: Side) -> Criterion:
     return Criterion(name, value, limit, why, "; ".join(clauses))
 
 
-def _consistent(assessments: Sequence[Assessment]) -> Criterion:
+def _consistent(stages: Sequence[StageFit]) -> Criterion:
     """That no run contradicts the others, by its sign or scale."""
-    name, last = "runs contradicting others", assessments[-1].stage
+    name, last = "runs contradicting others", stages[-1]
     if not isinstance(last.problem.model, DriveModel):
         why = "signs and scales of runs are compared through a drive, which this model is not"
         return _open(name, "0", why)
-    found = contradicting_runs(_fitted_runs(assessments), last.drive.parameters)
+    found = contradicting_runs(_fitted_runs(stages), last.drive.parameters)
     names, failure = list(dict.fromkeys(str(each.run) for each in found)), ""
     if found:
         said = found[0].sentence.rstrip(".")
@@ -358,11 +347,11 @@ def _consistent(assessments: Sequence[Assessment]) -> Criterion:
     return Criterion(name, f"{len(names)}", "0", why, failure)
 
 
-def _determined(assessments: Sequence[Assessment]) -> Criterion:
+def _determined(stages: Sequence[StageFit]) -> Criterion:
     """That most unknowns that all runs share have values of their own."""
     lost, total = 0, 0
-    for each in assessments:
-        shared = {unknown.name for unknown in each.stage.problem.unknowns if unknown.run is None}
+    for each in stages:
+        shared = {unknown.name for unknown in each.problem.unknowns if unknown.run is None}
         found = each.identifiability
         lost += len(shared & {*found.at_bounds, *found.to_fix})
         total += len(shared)
@@ -372,27 +361,26 @@ def _determined(assessments: Sequence[Assessment]) -> Criterion:
     return Criterion(name, value, f"{MOST:.0%}", why, failure)
 
 
-def _bounded_predictions(
-    assessments: Sequence[Assessment], predicted: Sequence[RunQuality]
-) -> Criterion:
+def _bounded_predictions(stages: Sequence[StageFit], predicted: Sequence[RunQuality]) -> Criterion:
     """That what is predicted depends on nothing that the fitted runs leave open."""
     name = "predictions left open"
-    if not predicted or not isinstance(assessments[-1].stage.problem.model, DriveModel):
+    if not predicted or not isinstance(stages[-1].problem.model, DriveModel):
         why = "the model is none of a drive" if predicted else "no run was held out"
         return _open(name, "none", why)
     runs = {each.experiment.name: each.experiment for each in predicted}.values()
-    found = dict.fromkeys(n for each in assessments for n in open_unknowns(each, runs))
+    found = dict.fromkeys(n for each in stages for n in open_unknowns(each, runs))
     names, why = listed(list(found)), "the prediction is then as uncertain as the parameter"
     failure = f"predictions depend on {names}, which the fitted runs leave open" if names else ""
     return Criterion(name, names or "none", "none", why, failure)
 
 
-def _fits(misfit: LackOfFit, side: Side, assessments: Sequence[Assessment]) -> Iterator[Criterion]:
+def _fits(misfit: LackOfFit, side: Side, stages: Sequence[StageFit]) -> Iterator[Criterion]:
     """That residuals are no larger than the known measurement error, and follow no fault."""
     likely, limit = f" (likely: {misfit.likely})" if misfit.likely else "", f"{MISFIT:g}"
     for name, ratio in misfit.ratios.items():
         error = max(side.parts.get(each) or 0.0 for each in (name, f"speed from {name}"))
-        worst = max((each for each in misfit.runs if each.channel == name), key=lambda e: e.ratio)
+        alike = [each for each in misfit.runs if each.channel == name]
+        worst = max(alike, key=lambda each: each.ratio or 0.0)
         words = f"residuals of {name} are {ratio:.3g} times their known measurement error, most in "
         yield Criterion(
             f"lack of fit of {name}",
@@ -402,8 +390,8 @@ def _fits(misfit: LackOfFit, side: Side, assessments: Sequence[Assessment]) -> I
             f"{words}{worst.run}{likely}" if ratio > MISFIT else "",
             "use" if ratio > MISFIT and error > MODEL_ERROR else "values",
         )
-    axis = _fitted_runs(assessments)[0].axis
-    for name in dict.fromkeys(name for each in assessments for name in each.stage.problem.channels):
+    axis = _fitted_runs(stages)[0].axis
+    for name in dict.fromkeys(name for each in stages for name in each.problem.channels):
         if name not in misfit.ratios:
             why = "its measurement error is not known: state its standard deviation at rest in the "
             why += f"campaign file, by a line noise = ... in [axes.{axis}.channels.{name}]"
@@ -489,20 +477,20 @@ def _nothing_left_out(misfit: LackOfFit, fitted: Side) -> Iterator[Criterion]:
         )
 
 
-def _alike(misfit: LackOfFit, assessments: Sequence[Assessment]) -> Criterion:
+def _alike(misfit: LackOfFit, stages: Sequence[StageFit]) -> Criterion:
     """That no run's motion has another scale than that of the others."""
-    kinds = {n: c.kind for run in _fitted_runs(assessments) for n, c in run.channels.items()}
+    kinds = {n: c.kind for run in _fitted_runs(stages) for n, c in run.channels.items()}
     found, judged = list[tuple[float, str]](), False
-    for name in dict.fromkeys(e.channel for e in misfit.scales if kinds[e.channel] not in CURRENTS):
-        alike = [e for e in misfit.scales if e.channel == name and isfinite(e.standard_error)]
+    for name in dict.fromkeys(e.channel for e in misfit.runs if kinds[e.channel] not in CURRENTS):
+        alike = [e for e in misfit.runs if e.channel == name and isfinite(e.scale_error)]
         if len(alike) < FEWEST_RUNS:
             continue
         judged = True
-        apart = np.array([each.error for each in alike])
+        apart = np.array([each.scale for each in alike])
         apart -= np.median(apart)
         usual = OUTLIES * float(np.median(np.abs(apart))) / 0.6745
         for each, own in zip(alike, apart.tolist(), strict=True):
-            if abs(own) > max(usual, each.standard_error):
+            if abs(own) > max(usual, each.scale_error):
                 found.append((100.0 * own, f"{name} in {each.run} by {100.0 * own:+.2g} %"))
     found.sort(key=lambda each: -abs(each[0]))
     off = [words for size, words in found if abs(size) > 100.0 * OWN_SCALE][:3]
@@ -544,7 +532,7 @@ def _model_error(qualities: Sequence[RunQuality]) -> Criterion:
 
 
 def _remarks(
-    assessments: Sequence[Assessment],
+    stages: Sequence[StageFit],
     fitted: Side,
     out: Side,
     own: Sequence[RunQuality],
@@ -560,9 +548,9 @@ def _remarks(
                 f"{name}: the RMSE of held-out runs is {ratio:.2f} times that of fitted runs: "
                 f"larger errors on other tests (limit {CARRIES_OVER:g})."
             )
-    for each in assessments:
+    for each in stages:
         if wide := weak_unknowns(each):
-            name = each.stage.stage.name
+            name = each.stage.name
             yield f"{name}: not determined to within ±{percent(WIDE)}: {listed(wide)}."
     yield from misfit.clipped if misfit is not None else ()
     for name in dict.fromkeys(each.channel for each in own):
@@ -573,7 +561,7 @@ def _remarks(
                 f"(correlation up to {max(related, key=abs):+.2f}): the model leaves out something "
                 "that the input causes."
             )
-    for stage, results in starts_of(assessments).items():
+    for stage, results in starts_of(stages).items():
         costs = np.array([each.cost for each in results])
         best = float(costs.min())
         alike = int(np.count_nonzero(costs <= best * (1.0 + SAME)))
@@ -598,13 +586,13 @@ def _maneuvers(tested: Mapping[str, Experiment]) -> str:
     return f"{listed(words)} from {low:.3g} to {high:.3g} {runs[0].input.unit}"
 
 
-def _validity(assessments: Sequence[Assessment], tested: Mapping[str, Experiment]) -> str:
+def _validity(stages: Sequence[StageFit], tested: Mapping[str, Experiment]) -> str:
     """What the fit holds for, and what of the drive the fitted runs never reach."""
-    said, stage = f"Holds for {_maneuvers(tested)}", assessments[-1].stage
+    said, stage = f"Holds for {_maneuvers(tested)}", stages[-1]
     if not isinstance(stage.problem.model, DriveModel):
         return f"{said}."
     try:
-        runs, parameters = _fitted_runs(assessments), stage.drive.parameters
+        runs, parameters = _fitted_runs(stages), stage.drive.parameters
         reached = {limit for each in runs for limit in limits_reached(each, parameters)}
     except (DomainError, InputError):
         return f"{said}."

@@ -43,7 +43,7 @@ def _polyline(x: Array, y: Array) -> Markup:
     return Markup('<polyline points="{}"/>').format(points)
 
 
-def profile_chart(profile: Profile, unknown: Unknown, name: str) -> Markup:
+def profile_chart(profile: Profile, unknown: Unknown) -> Markup:
     """The least cost over one unknown, above that of the optimum, and where the interval ends."""
     values = np.array([unknown.to_value(each.number) for each in profile.points])
     rises = np.array([each.cost - profile.cost for each in profile.points])
@@ -56,7 +56,7 @@ def profile_chart(profile: Profile, unknown: Unknown, name: str) -> Markup:
     across = left + 8.0 + (right - left - 16.0) * (values - first) / (last - first or 1.0)
     up, level = bottom - 6.0 - scale * (rises - low), bottom - 6.0 - scale * (profile.rise - low)
     point = Markup('<circle class="full" cx="{:.1f}" cy="{:.1f}" r="3"><title>{}</title></circle>')
-    words = f"{name} ({unknown.unit})" if unknown.unit else name
+    words = f"{profile.name} ({unknown.unit})" if unknown.unit else profile.name
     parts = [
         _line(left, top, left, bottom),
         _line(left, bottom, right, bottom),

@@ -16,10 +16,11 @@ from swashplate.campaign import Campaign, examine, quality_table
 from swashplate.drive import Drive
 from swashplate.errors import InputError
 from swashplate.identification import tables
-from swashplate.identification.assessment import Assessment, Judged, StageProfile, motion_of
+from swashplate.identification.assessment import Judged, motion_of
 from swashplate.identification.drive_model import Parameters
 from swashplate.identification.fitting import Fit, StageFit
 from swashplate.identification.identifiability import Identifiability
+from swashplate.identification.profile import Profile
 from swashplate.identification.resampling import CrossValidation
 from swashplate.identification.setup import ModelSetup
 from swashplate.identification.solving import Solution
@@ -75,8 +76,8 @@ def write_fit_report(found: Judged, path: str | Path, *, truth: ParameterSet | N
     The page holds what the eye can tell of every run, a few bytes a sample (`runs.run_data`): it
     grows with the number of runs, not with their length.
     """
-    fit, assessed = found.result, found.assessments
-    runs = shown_runs(assessed, found.predicted)
+    fit, stages = found.result, found.result.stages
+    runs = shown_runs(stages, found.predicted)
     held_out = sum(run.validates for run in runs)
     samples = sum(each.problem.samples for each in fit.stages)
     facts = (
@@ -91,14 +92,14 @@ def write_fit_report(found: Judged, path: str | Path, *, truth: ParameterSet | N
         if motion_of(run.experiment for run in runs) == "rod":
             show_rod()
         sections = [
-            summary_section(found.verdict, found.campaign, known, assessed, runs, head["findings"]),
+            summary_section(found.verdict, found.campaign, known, stages, runs, head["findings"]),
             *shared[:2],
             _live_section(fit, found.campaign, runs),
-            _parameter_section(fit, assessed, truth),
-            _identifiability_section(assessed),
+            _parameter_section(fit, stages, truth),
+            _identifiability_section(stages),
             _profile_section(fit, found.profiles),
-            _starts_section(starts_of(assessed)),
-            _folds_section(found.folds, assessed),
+            _starts_section(starts_of(stages)),
+            _folds_section(found.folds, stages),
             shared[2],
             _verdict_section(found.verdict, head["findings"]),
             shared[3],
@@ -251,9 +252,9 @@ def _agreement_section(runs: Sequence[ShownRun], findings: dict[str, list[int]])
     made = [t for role in get_args(Role) for t in tables.runs_tables(_qualities(runs, role))]
     words = (
         "RMSE is the root of the mean squared difference of the samples that count; NRMSE is RMSE "
-        "over the standard deviation of what was measured; fit % is 100 (1 − NRMSE); R² is "
-        "1 − NRMSE². Error / range is RMSE over the largest less the smallest value measured in "
-        "all runs of that role, as in the verdict."
+        "over the standard deviation of what was measured; fit % is 100 (1 − NRMSE). Error / range "
+        "is RMSE over the largest less the smallest value measured in all runs of that role, as in "
+        "the verdict."
     )
     measures = Block("table", joined(made), "agreement")
     blocks = [
@@ -395,10 +396,8 @@ def _verdict_section(judged: Verdict, findings: int) -> Section:
 # --- what the data tell ---------------------------------------------------------------------------
 
 
-def _parameter_section(
-    fit: Fit, assessments: Sequence[Assessment], truth: ParameterSet | None
-) -> Section:
-    made = [tables.estimates_table(each, truth=truth) for each in assessments]
+def _parameter_section(fit: Fit, stages: Sequence[StageFit], truth: ParameterSet | None) -> Section:
+    made = [tables.estimates_table(each, truth=truth) for each in stages]
     words = (
         "Change is from the nominal value. Intervals are for residuals that are correlated over "
         "time. A parameter at a bound has no symmetric interval. Parameter files have SI units."
@@ -412,7 +411,7 @@ def _parameter_section(
                 f"estimates. {inside} of {counted} intervals contain it."
             )
         )
-    for table, each in zip(made, assessments, strict=True):
+    for table, each in zip(made, stages, strict=True):
         blocks += [Block("heading", table.title, "h3"), Block("table", table, "parameters")]
         own = tables.estimates_table(each, own=True)
         if own.rows:
@@ -424,12 +423,12 @@ def _parameter_section(
     return Section("parameters", "Parameters", blocks)
 
 
-def _identifiability_section(assessments: Sequence[Assessment]) -> Section:
+def _identifiability_section(stages: Sequence[StageFit]) -> Section:
     blocks = []
-    for each in assessments:
+    for each in stages:
         found = each.identifiability
-        general = [unknown.run is None for unknown in each.stage.problem.unknowns]
-        blocks.append(Block("heading", f"Stage {each.stage.stage.name}", "h3"))
+        general = [unknown.run is None for unknown in each.problem.unknowns]
+        blocks.append(Block("heading", f"Stage {each.stage.name}", "h3"))
         blocks += listed_block(found.sentences())
         width = Column("half width", ".3g", "%", none="none")
         columns = (Column("direction"), width, Column("moves together"))
@@ -460,10 +459,10 @@ def _effects(found: Identifiability, shown: Sequence[bool]) -> list[Block]:
     return [Block("details", [Block("table", made, "effects")], "Sensitivity")]
 
 
-def _correlations(assessment: Assessment, general: Sequence[bool]) -> list[Block]:
+def _correlations(stage: StageFit, general: Sequence[bool]) -> list[Block]:
     """The estimates that move together most, if there are any."""
     try:
-        quoted = assessment.uncertainty.quoted
+        quoted = stage.uncertainty.quoted
     except InputError:  # the sentences above say why there are none
         return []
     kept = [k for k, own in enumerate(general) if own and quoted.determined[k]]
@@ -494,15 +493,13 @@ def _starts_section(several: Mapping[str, Sequence[Solution]]) -> Section:
     return Section("starts", "Starts", blocks)
 
 
-def _profile_section(fit: Fit, profiles: Sequence[StageProfile]) -> Section:
+def _profile_section(fit: Fit, profiles: Sequence[Profile]) -> Section:
     tiles = []
-    for given in profiles:
-        unknowns = _stage(fit, given.stage).problem.unknowns
-        index = given.profile.index
-        name = unknowns.names[index]
-        drawn = charts.profile_chart(given.profile, unknowns.items[index], name)
-        said = [text(words, "remark") for words in given.profile.sentences(name)]
-        tiles.append(Block("tile", [Block("figure", drawn, f"{name} ({given.stage})"), *said]))
+    for each in profiles:
+        unknown = fit.stage(each.stage).problem.unknowns.items[each.index]
+        said = [text(words, "remark") for words in each.sentences()]
+        drawn = Block("figure", charts.profile_chart(each, unknown), f"{each.name} ({each.stage})")
+        tiles.append(Block("tile", [drawn, *said]))
     words = (
         "The lowest cost with one parameter fixed, above that of the optimum; the dashed line ends "
         "the interval."
@@ -511,18 +508,10 @@ def _profile_section(fit: Fit, profiles: Sequence[StageProfile]) -> Section:
     return Section("profiles", "Profile likelihoods", blocks)
 
 
-def _stage(fit: Fit, name: str) -> StageFit:
-    for each in fit.stages:
-        if each.stage.name == name:
-            return each
-    known = ", ".join(each.stage.name for each in fit.stages)
-    raise InputError(f"The profile of stage '{name}' belongs to no stage; there are {known}.")
-
-
-def _folds_section(folds: CrossValidation | None, assessments: Sequence[Assessment]) -> Section:
+def _folds_section(folds: CrossValidation | None, stages: Sequence[StageFit]) -> Section:
     if folds is None:
         return Section("folds", "Cross-validation", [])
-    held_out, parts = tables.folds_tables(folds, assessments)
+    held_out, parts = tables.folds_tables(folds, stages)
     words = (
         f"The runs were dealt into {folds.planned} folds, kinds of test and directions apart (seed "
         f"{folds.seed}). Each fold was predicted from the command alone by a fit to the others "

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swashplate.campaign import Channel
-from swashplate.identification.assessment import Assessment
+from swashplate.identification.fitting import StageFit
 from swashplate.identification.tables import ignored_words, start_words
 from swashplate.identification.validation import RunQuality, ignored_windows, with_speeds
 from swashplate.report.lines import gap_rows, thinned
@@ -105,13 +105,13 @@ class ShownRun:
 
 
 def shown_runs(
-    assessments: Sequence[Assessment], validation: Sequence[RunQuality]
+    stages: Sequence[StageFit], validation: Sequence[RunQuality]
 ) -> tuple[ShownRun, ...]:
     """All runs, those that were fitted first, each with its channels in the order of the stages.
 
     A position is followed by its speed.
     """
-    found = [(each, a.stage.stage.name, False) for a in assessments for each in with_speeds(a.runs)]
+    found = [(each, a.stage.name, False) for a in stages for each in with_speeds(a.runs)]
     return _gathered(found + [(each, "", True) for each in with_speeds(validation)])
 
 
@@ -159,9 +159,9 @@ def run_words(quality: RunQuality) -> str:
     found, run = quality.measures, quality.experiment
     channel = run[quality.channel]
     parts = [f"RMSE {quantity(found.rmse, channel.unit)}"]
-    if found.fit_percent is not None and found.nrmse is not None and found.r_squared is not None:
+    if found.fit_percent is not None and found.nrmse is not None:
         parts.insert(0, f"fit {found.fit_percent:.2f} %")
-        parts += [f"NRMSE {found.nrmse:.3g}", f"R² {found.r_squared:.5f}"]
+        parts.append(f"NRMSE {found.nrmse:.3g}")
     parts.append(f"initial state {start_words(run)}")
     return " · ".join([*parts, f"ignored: {ignored_words(run, channel)}"])
 

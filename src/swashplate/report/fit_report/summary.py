@@ -14,7 +14,7 @@ from swashplate.analysis import dead_zone, drives, limit_shares
 from swashplate.campaign import Campaign
 from swashplate.drive import Drive
 from swashplate.errors import SwashplateError
-from swashplate.identification.assessment import Assessment
+from swashplate.identification.fitting import StageFit
 from swashplate.identification.identifiability import weak_unknowns
 from swashplate.identification.validation import (
     following,
@@ -82,20 +82,20 @@ def numbers_of(drive: Drive) -> Array:
     return made
 
 
-def numbers_table(drive: Drive, assessments: Sequence[Assessment]) -> tuple[Table, list[str]]:
+def numbers_table(drive: Drive, stages: Sequence[StageFit]) -> tuple[Table, list[str]]:
     """The numbers that matter, each with its 95 % interval, and what these leave out.
 
     Parameters
     ----------
     drive : Drive
         As fitted, or as it was held against runs.
-    assessments : sequence of Assessment
+    stages : sequence of StageFit
         Of the fit's stages; none for a drive of which no interval is known.
     """
     values, half, said = numbers_of(drive), np.full((6, 2), np.nan), list[str]()
-    if assessments:
+    if stages:
         try:
-            drawn = drives(assessments, DRAWS)
+            drawn = drives(stages, DRAWS)
             half = QUANTILE * np.std([numbers_of(each) for each in drawn.drives], axis=0)
             said += drawn.sentences()
         except SwashplateError as error:
@@ -197,7 +197,7 @@ def summary_section(
     judged: Verdict,
     campaign: Campaign,
     drive: Drive | None,
-    assessments: Sequence[Assessment],
+    stages: Sequence[StageFit],
     runs: Sequence[ShownRun],
     findings: int,
 ) -> Section:
@@ -210,7 +210,7 @@ def summary_section(
     if drive is not None:
         numbers.append(Block("heading", "Numbers that matter", "h3"))
         try:
-            table, said = numbers_table(drive, assessments)
+            table, said = numbers_table(drive, stages)
             numbers.append(Block("table", table, "numbers"))
         except SwashplateError as error:
             said = [f"This drive has none: {error}"]
@@ -218,11 +218,11 @@ def summary_section(
             "With 95 % intervals of the fit, rounded up, which do not cover what the model leaves "
             "out. Fixed: follows from parameters that were not fitted."
         )
-        numbers.append(text(" ".join([words, *said] if assessments else said), "remark"))
+        numbers.append(text(" ".join([words, *said] if stages else said), "remark"))
         limits.append(Block("heading", "What limits it", "h3"))
         limits += listed_block(_limits(drive))
     limits.append(Block("heading", "What to do next", "h3"))
-    limits += listed_block(_next(judged, campaign, assessments, runs, findings))
+    limits += listed_block(_next(judged, campaign, stages, runs, findings))
     shown.append(Block("pair", [Block("tile", each) for each in (numbers, limits) if each]))
     return Section("summary", "Summary", shown)
 
@@ -263,7 +263,7 @@ def _limits(drive: Drive) -> list[str]:
 def _next(
     judged: Verdict,
     campaign: Campaign,
-    assessments: Sequence[Assessment],
+    stages: Sequence[StageFit],
     runs: Sequence[ShownRun],
     findings: int,
 ) -> list[str | Markup]:
@@ -272,7 +272,7 @@ def _next(
     if findings:
         link = Markup('Look into the <a href="#data">{}</a> on the logs.')
         said.append(link.format(count(findings, "finding")))
-    weak = [name for each in assessments for name in weak_unknowns(each)]
+    weak = [name for each in stages for name in weak_unknowns(each)]
     if weak:
         code = Markup(
             "Not determined to within ±10 %: {}. The tests that would determine them are ranked by "
@@ -280,11 +280,11 @@ def _next(
         )
         named = listed(weak[:6]) if len(weak) <= 6 else f"{', '.join(weak[:6])} and others"
         said.append(code.format(named, campaign.path))
-    if assessments and not any(run.validates for run in runs):
+    if stages and not any(run.validates for run in runs):
         said.append('Hold a run out of the fit (role = "validate"): nothing was predicted yet.')
     if judged.usable:
         what = "Use the drive" if judged.grade == "Usable" else "Use the drive for prediction only"
         said.append(f"{what}. {judged.validity}" if judged.validity else f"{what}.")
-        if assessments:
+        if stages:
             said.append(Markup("Try it: <code>swashplate simulate drive.toml step:9</code>."))
     return said
