@@ -188,9 +188,7 @@ file = "{(DATA / "exp_data_1_3.csv").as_posix()}"
     found = guess_drive(Campaign.from_toml(tmp_path / "campaign.toml").experiments)
     assert found.unit == "m/s"
     assert found.fit_percent > 85.0
-    # lag and limit of acceleration share what they explain, in shares that the noise decides
-    assert found.lag < 0.2
-    assert min(found.acceleration) > 0.01
+    assert 0.05 < found.lag < 0.2
 
 
 def test_a_run_that_goes_the_other_way_is_named() -> None:

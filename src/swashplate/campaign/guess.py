@@ -32,6 +32,8 @@ Array = NDArray[np.float64]
 
 STEP = 0.005
 """Step of the march. [s]"""
+BEFORE = 10.0
+"""Time before a run for which its motion at first has lasted, longer than any delay. [s]"""
 WINDOW = 0.05
 """Time over which mean speeds are compared, or two samples where these are farther apart. [s]"""
 SHORTEST = 0.005
@@ -105,36 +107,32 @@ class Guess(NamedTuple):
 
 @kernel
 def march_guess(
-    command: Array, h: float, numbers: Array, share: float, edge: float, position: Array
+    target: Array, h: float, rise: float, fall: float, share: float, position: Array
 ) -> None:
-    """March the position behind dead zone, jump, gain, limits and lag.
+    """March the position behind a lag and limits of acceleration.
 
-    From a delayed command (n,) [V] with a step [s]; numbers (10,) are dead zones, gains, top
-    speeds, accelerations and jumps of plus and minus; `share` is that of the way to its target that
-    the speed takes in a step [1], `edge` the command over which a jump is complete [V]. `position`
-    (n,) is the output; its first sample gives the speed at first.
+    From mean targets (n - 1,) of steps [s], with the greatest rise and fall of the speed in a step
+    and the `share` of the way to its target that the speed takes in it [1]. `position` (n,) is the
+    output; its first sample gives the speed at first.
     """
     speed = position[0]
     position[0] = 0.0
-    for n in range(1, command.size):
-        u = command[n - 1]
-        target = 0.0
-        if u > numbers[0]:
-            beyond = u - numbers[0]
-            target = min(numbers[2] * beyond + numbers[8] * min(beyond / edge, 1.0), numbers[4])
-        elif -u > numbers[1]:
-            beyond = -u - numbers[1]
-            target = -min(numbers[3] * beyond + numbers[9] * min(beyond / edge, 1.0), numbers[5])
+    for n in range(1, position.size):
         last = speed
-        speed += min(max(share * (target - speed), -numbers[7] * h), numbers[6] * h)
+        speed += min(max(share * (target[n - 1] - speed), -fall), rise)
         position[n] = position[n - 1] + 0.5 * h * (last + speed)
 
 
 class _Run(NamedTuple):
-    """A run on the march's grid (n,), and mean speeds (m,) of windows that begin at edges (m,)."""
+    """A run: the march's grid (n,), its command (k,) and mean speeds (m,) of windows from edges."""
 
     time: Array
+    stamps: Array
+    """Those of the command, and the grid's last. [s]"""
     command: Array
+    """[V]"""
+    held: bool
+    """Whether the command is held between stamps, or a straight line."""
     start: float
     begins: Array
     width: float
@@ -144,16 +142,38 @@ class _Run(NamedTuple):
     """Mean speed of one count in a window; 0 of a channel that is no encoder. [unit]"""
 
 
+def _targets(run: _Run, numbers: Array) -> Array:
+    """Mean speeds (n - 1,) that a drive without lag and delay would have in the march's steps.
+
+    Numbers are dead zones, gains, top speeds, accelerations and jumps of plus and minus.
+    """
+    edge, ways = EDGE * float(np.abs(run.command).max()) or 1.0, list[Array]()
+    for way, sign in enumerate((1.0, -1.0)):
+        beyond = np.maximum(sign * run.command - numbers[way], 0.0)
+        faster = numbers[2 + way] * beyond + numbers[8 + way] * np.minimum(beyond / edge, 1.0)
+        ways.append(np.minimum(faster, numbers[4 + way]))
+    target = ways[0] - ways[1]
+    between = target[:-1] if run.held else 0.5 * (target[1:] + target[:-1])
+    area = np.concatenate([[0.0], np.cumsum(between * np.diff(run.stamps))])
+    means: Array = np.diff(np.interp(run.time, run.stamps, area)) / STEP
+    return means
+
+
 def _errors(runs: Sequence[_Run], numbers: Array) -> Array:
-    """Simulated less measured mean speeds of all runs; numbers (12,) end with lag and delay [s]."""
+    """Simulated less measured mean speeds of all runs.
+
+    Numbers (12,) are those of `_targets`, lag and delay [s].
+    """
     share, errors = float(1.0 - np.exp(-STEP / max(numbers[10], 1e-4))), list[Array]()
+    rise, fall = STEP * numbers[6:8]
     for run in runs:
-        position = np.empty(run.time.size)
-        position[0] = run.start
-        command = np.interp(run.time - numbers[11], run.time, run.command)
-        edge = EDGE * float(np.abs(run.command).max()) or 1.0
-        march_guess(command, STEP, numbers, share, edge, position)
-        errors.append(_mean_speeds(run.time, position, run.begins, run.width) - run.speeds)
+        position = np.full(run.time.size, run.start)
+        march_guess(_targets(run, numbers), STEP, rise, fall, share, position)
+        # what comes out is delayed, so that the march meets its steps alike whatever the delay:
+        # else errors had a minimum at every whole step
+        time = numbers[11] + np.append(run.time[0] - BEFORE, run.time)
+        position = np.append(-BEFORE * run.start, position)
+        errors.append(_mean_speeds(time, position, run.begins, run.width) - run.speeds)
     return np.concatenate(errors)
 
 
@@ -260,14 +280,16 @@ def _run(experiment: Experiment, channel: Channel) -> _Run:
         begins = begins[(begins >= time[gap + 1]) | (begins + 2.0 * width <= time[gap])]
     speeds = _mean_speeds(time, travelled, begins, width)
     grid = np.arange(drive.time[0], drive.time[-1] + STEP, STEP)
+    stamps, command = np.append(drive.time, grid[-1]), np.append(drive.values, drive.values[-1])
     start = 0.0 if experiment.start == "rest" or not speeds.size else float(speeds[0])
-    return _Run(grid, drive.at(grid), start, begins, width, speeds, coarse)
+    held = drive.interpolation == "previous"
+    return _Run(grid, stamps, command, held, start, begins, width, speeds, coarse)
 
 
 def _goes_with(run: _Run) -> bool:
     """Whether a motion goes with its command at any of the delays from which the search begins."""
     middle = run.begins + run.width
-    commands = (np.interp(middle - late, run.time, run.command) for late in DELAYS)
+    commands = (np.interp(middle - late, run.stamps, run.command) for late in DELAYS)
     return any(float(command @ run.speeds) >= 0.0 for command in commands)
 
 

@@ -43,6 +43,17 @@ FIXED_OFF = 0.1
 """Standard deviation by which a fixed parameter without a stated one may be off. [1]"""
 
 
+class Alone(NamedTuple):
+    """One-step estimate of a fault from what the fit leaves of one run alone."""
+
+    size: float
+    """[1], or s of late stamps."""
+    error: float
+    """Standard error, of independent noise; inf where nothing moves."""
+    share: float
+    """Part of the run's squares that it explains. [1]"""
+
+
 class ChannelFit(NamedTuple):
     """One channel of one run, estimates adjusted within their errors."""
 
@@ -54,10 +65,10 @@ class ChannelFit(NamedTuple):
     ratio: float | None
     """Root mean square of the residuals over the known measurement error: of counts, or noise that
     is stated."""
-    scale: float
-    """One-step estimate of its scale less 1, from what the fit leaves of this run alone. [1]"""
-    scale_error: float
-    """Standard error of that, of independent noise; inf where nothing moves. [1]"""
+    scale: Alone
+    """Of its scale less 1. [1]"""
+    late: Alone
+    """Of how late its stamps are. [s]"""
 
 
 @dataclass(frozen=True, eq=False)
@@ -144,15 +155,20 @@ class _Block(NamedTuple):
         left, ratio = self.residual - sum(moved, np.zeros(1)), None
         if error := measurement_error(self.channel):
             ratio = float(np.sqrt(np.mean((left / self.weight) ** 2))) / error
-        scale = self.columns[FAULT, faults.SCALE.words.format(self.channel.name)]
+        scale, late = (self._alone(kind, left) for kind in (faults.SCALE, faults.LATE))
+        return ChannelFit(self.run, self.channel.name, self.place, left.size, ratio, scale, late)
+
+    def _alone(self, kind: Kind, left: Array) -> Alone:
+        column = self.columns[FAULT, kind.words.format(self.channel.name)]
         if self.channel.is_position:
             # a position has a free zero
-            scale = scale - self.weight * (self.weight @ scale) / (self.weight @ self.weight)
-        square = float(scale @ scale)
+            column = column - self.weight * (self.weight @ column) / (self.weight @ self.weight)
+        square = float(column @ column)
+        if not square > 0.0:
+            return Alone(0.0, inf, 0.0)
         # a reading that is larger than what is simulated leaves a negative residual
-        own = -float(scale @ left) / square if square > 0.0 else 0.0
-        off = 1.0 / sqrt(square) if square > 0.0 else inf
-        return ChannelFit(self.run, self.channel.name, self.place, left.size, ratio, own, off)
+        size, squares = -float(column @ left) / square, float(left @ left)
+        return Alone(size, 1.0 / sqrt(square), size**2 * square / squares if squares else 0.0)
 
 
 def lack_of_fit(stages: Sequence[StageFit]) -> LackOfFit:
@@ -239,8 +255,8 @@ def _in_order(runs: Sequence[ChannelFit]) -> float:
     Freed of what a line explains by chance (adjusted R², Draper and Smith 1998, section 5.1): a
     machine that differs between maneuvers differs between runs too, in whatever order they stand.
     """
-    moving = [each for each in runs if isfinite(each.scale_error)]
-    rows = [(each.place, each.scale, each.scale_error**-2) for each in moving]
+    moving = [each for each in runs if isfinite(each.scale.error)]
+    rows = [(each.place, each.scale.size, each.scale.error**-2) for each in moving]
     place, own, weight = np.reshape(rows, (-1, 3)).T
     if own.size < 3:
         return 1.0

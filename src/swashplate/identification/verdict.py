@@ -16,7 +16,7 @@ from swashplate.identification.drive_model import CURRENTS, LIMITS, DriveModel, 
 from swashplate.identification.faults import DRIFT, LOSS, Fault, measurement_error
 from swashplate.identification.identifiability import WIDE, weak_unknowns
 from swashplate.identification.intervals import open_unknowns
-from swashplate.identification.lack_of_fit import LackOfFit, lack_of_fit
+from swashplate.identification.lack_of_fit import Alone, ChannelFit, LackOfFit, lack_of_fit
 from swashplate.identification.solving import Solution
 from swashplate.identification.validation import (
     FOLLOWS,
@@ -57,10 +57,12 @@ UNEXPLAINED = 0.003
 """The same where no measurement error is known: residuals beyond white noise over the range. Sound
 tachos and positions of simulated machines have 0 to 0.2 %; one run with a scale 15 % off, a load in
 half of the runs, play, or a drift of 9 % leave 0.4 to 1.9 %."""
-OWN_SCALE, OUTLIES = 0.02, 4.0
+OWN_SCALE, OWN_DELAY, OUTLIES, DOMINATES = 0.02, 0.01, 4.0, 0.5
 """Scale of one run's motion beside the median run's from which values are those of no machine, and
-how many robust standard deviations of all runs that is at least. Sound campaigns lie below 0.3 %,
-those where fixed parameters are 10 % off below 1 %; a run whose scale is 15 % off gave 12 %."""
+delay [s]; how many robust standard deviations of all runs that is at least, and which part of the
+run's residuals a delay explains: a slow ramp begins later by a dead zone's small error. Scales of
+sound campaigns lie below 0.3 %, those where fixed parameters are 10 % off below 1 %; a run whose
+scale is 15 % off gave 12 %."""
 DRIFTS, DRIFTS_AWAY = 0.01, 0.03
 """Change of a channel over the campaign from which values are those of a mean machine, and from
 which no one set of parameters holds."""
@@ -179,7 +181,7 @@ def verdict(
             criteria.append(_open("lack of fit", f"{MISFIT:g}", str(error).rstrip(".")))
         else:
             criteria += _fits(misfit, out if out.qualities else fitted, stages)
-            criteria += [*_nothing_left_out(misfit, fitted), _alike(misfit, stages)]
+            criteria += [*_nothing_left_out(misfit, fitted), *_alike(misfit, stages)]
     criteria.append(_model_error(runs or predicted))
 
     unusable, untrusted = (
@@ -464,9 +466,9 @@ def _nothing_left_out(misfit: LackOfFit, fitted: Side) -> Iterator[Criterion]:
         if kind in CURRENTS or name.removeprefix("speed from ") in misfit.ratios:
             continue
         part = beyond_noise(fitted.qualities, name)
-        likely = f"; likely: {misfit.likely}" if misfit.likely else ""
-        failure = "the residuals show that the model leaves something out "
-        failure += f"({percent(part)} of the range of {name} beyond white noise{likely})"
+        likely = f" (likely: {misfit.likely})" if misfit.likely else ""
+        failure = f"residuals of {name} have {percent(part)} of its range beyond white noise, "
+        failure += f"as the model leaves something out{likely}"
         yield Criterion(
             f"residuals beyond white noise, {name}",
             percent(part),
@@ -477,31 +479,51 @@ def _nothing_left_out(misfit: LackOfFit, fitted: Side) -> Iterator[Criterion]:
         )
 
 
-def _alike(misfit: LackOfFit, stages: Sequence[StageFit]) -> Criterion:
-    """That no run's motion has another scale than that of the others."""
+def _alike(misfit: LackOfFit, stages: Sequence[StageFit]) -> Iterator[Criterion]:
+    """That no run's motion has another scale than that of the others, or is late beside them."""
     kinds = {n: c.kind for run in _fitted_runs(stages) for n, c in run.channels.items()}
+    motions = [each for each in misfit.runs if kinds[each.channel] not in CURRENTS]
+    scales = [(each, each.scale) for each in motions]
+    why = "runs of one machine through one instrument have one scale"
+    yield _of_one_run("scale", scales, 100.0, "%", 100.0 * OWN_SCALE, why)
+    delays = [(each, each.late) for each in motions]
+    why = "runs of one machine and one logger have one delay"
+    yield _of_one_run("delay", delays, 1e3, "ms", 1e3 * OWN_DELAY, why, DOMINATES)
+
+
+def _of_one_run(
+    what: str,
+    motions: Sequence[tuple[ChannelFit, Alone]],
+    factor: float,
+    unit: str,
+    limit: float,
+    why: str,
+    share: float = 0.0,
+) -> Criterion:
+    """That no run stands out from the others of its channel by more than a limit [unit].
+
+    What explains less than `share` of the run's residuals is none.
+    """
     found, judged = list[tuple[float, str]](), False
-    for name in dict.fromkeys(e.channel for e in misfit.runs if kinds[e.channel] not in CURRENTS):
-        alike = [e for e in misfit.runs if e.channel == name and isfinite(e.scale_error)]
+    for name in dict.fromkeys(each.channel for each, _ in motions):
+        alike = [(e.run, own) for e, own in motions if e.channel == name and isfinite(own.error)]
         if len(alike) < FEWEST_RUNS:
             continue
         judged = True
-        apart = np.array([each.scale for each in alike])
+        apart = np.array([own.size for _, own in alike])
         apart -= np.median(apart)
         usual = OUTLIES * float(np.median(np.abs(apart))) / 0.6745
-        for each, own in zip(alike, apart.tolist(), strict=True):
-            if abs(own) > max(usual, each.scale_error):
-                found.append((100.0 * own, f"{name} in {each.run} by {100.0 * own:+.2g} %"))
+        for (run, own), off in zip(alike, apart.tolist(), strict=True):
+            if abs(off) > max(usual, own.error) and own.share >= share:
+                found.append((factor * off, f"{name} in {run} by {factor * off:+.2g} {unit}"))
     found.sort(key=lambda each: -abs(each[0]))
-    off = [words for size, words in found if abs(size) > 100.0 * OWN_SCALE][:3]
+    far = [words for size, words in found if abs(size) > limit][:3]
     return Criterion(
-        "scale of a run of its own",
-        f"{found[0][0]:+.2g} %" if found else "none" if judged else "-",
-        percent(OWN_SCALE),
-        "runs of one machine through one instrument have one scale"
-        if judged
-        else f"fewer than {FEWEST_RUNS} runs measure the same motion",
-        f"runs differ in scale from the others: {listed(off)}" if off else "",
+        f"{what} of a run of its own",
+        f"{found[0][0]:+.2g} {unit}" if found else "none" if judged else "-",
+        f"{limit:g} {unit}",
+        why if judged else f"fewer than {FEWEST_RUNS} runs measure the same motion",
+        f"runs differ in {what} from the others: {listed(far)}" if far else "",
         "values",
         judged,
     )
