@@ -469,7 +469,7 @@ def test_what_a_model_leaves_out_is_not_called_an_error_of_the_sensor() -> None:
     headline = verdict(made.stages, predict(made.parameters, [limited(99)])).headline
     # the sensor's scale is right, and its noise is not stated
     assert "off by" not in headline
-    assert "because residuals of position have " in headline
+    assert "because residuals of place have " in headline
     assert "beyond white noise, as the model leaves something out" in headline
 
 
@@ -495,3 +495,14 @@ def test_a_run_with_a_scale_or_a_delay_of_its_own_is_named(
     assert f"runs differ in {what} from the others: {said}" in found.headline
     other = "delay" if what == "scale" else "scale"
     assert f"{other} of a run of its own" not in [e.name for e in found.criteria if e.failure]
+
+
+def test_one_run_has_no_drift() -> None:
+    """It reads 30 % too much, which no unknown can take."""
+    only, other = trial("only"), trial("other")
+    larger = moved(only, 1.3 * only["position"].values, noise=0.01)
+    made = fit(OWN, campaign(larger), {"lag": (0.05, 0.2, 2.0), "gain": (1.49, 1.5, 1.51)})
+    found = verdict(made.stages, predict(made.parameters, [other]))
+    (drift,) = (each for each in found.criteria if each.name == "drift of position")
+    assert (drift.state, drift.value) == ("met", "not seen")
+    assert found.grade != "Usable"

@@ -249,7 +249,7 @@ def guess_drive(experiments: Sequence[Experiment]) -> Guess:
     return Guess(
         *(experiments[0].axis, unit, dead_zone, gain, jump, top_speed, acceleration),
         lag=float(found[10]),
-        delay=float(found[11]),
+        delay=round(float(found[11]), 6),
         command=command,
         speed=scale,
         fit_percent=100.0 * (1.0 - rms / float(np.std(speeds))),

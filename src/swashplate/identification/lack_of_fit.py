@@ -259,7 +259,7 @@ def _in_order(runs: Sequence[ChannelFit]) -> float:
     rows = [(each.place, each.scale.size, each.scale.error**-2) for each in moving]
     place, own, weight = np.reshape(rows, (-1, 3)).T
     if own.size < 3:
-        return 1.0
+        return float(own.size == 2)
     own, about = own - np.average(own, weights=weight), place - np.average(place, weights=weight)
     total, length = float(weight @ own**2), float(weight @ about**2)
     if not (total > 0.0 and length > 0.0):

@@ -430,7 +430,7 @@ def _is_wrong(fault: Fault, poor: bool) -> bool:
 
 def _drift(fault: Fault) -> Criterion:
     part, size = abs(fault.size) / 100.0, f"{fault.size:+.2g} {fault.kind.unit}"
-    drifts = part > DRIFTS and fault.significant and fault.explains
+    drifts = part > DRIFTS and fault.significant and fault.explains and fault.near
     return Criterion(
         fault.name.removesuffix(" over the campaign"),
         size if drifts or part <= DRIFTS else "not seen",
@@ -480,42 +480,45 @@ def _nothing_left_out(misfit: LackOfFit, fitted: Side) -> Iterator[Criterion]:
 
 
 def _alike(misfit: LackOfFit, stages: Sequence[StageFit]) -> Iterator[Criterion]:
-    """That no run's motion has another scale than that of the others, or is late beside them."""
+    """That no run's motion has another scale than that of the others, or is late beside them.
+
+    One step cannot tell a large delay from a scale: what explains more of the run's residuals
+    counts.
+    """
     kinds = {n: c.kind for run in _fitted_runs(stages) for n, c in run.channels.items()}
     motions = [each for each in misfit.runs if kinds[each.channel] not in CURRENTS]
-    scales = [(each, each.scale) for each in motions]
+    scales = [(each, each.scale, each.late.share) for each in motions]
     why = "runs of one machine through one instrument have one scale"
     yield _of_one_run("scale", scales, 100.0, "%", 100.0 * OWN_SCALE, why)
-    delays = [(each, each.late) for each in motions]
+    delays = [(each, each.late, max(each.scale.share, DOMINATES)) for each in motions]
     why = "runs of one machine and one logger have one delay"
-    yield _of_one_run("delay", delays, 1e3, "ms", 1e3 * OWN_DELAY, why, DOMINATES)
+    yield _of_one_run("delay", delays, 1e3, "ms", 1e3 * OWN_DELAY, why)
 
 
 def _of_one_run(
     what: str,
-    motions: Sequence[tuple[ChannelFit, Alone]],
+    motions: Sequence[tuple[ChannelFit, Alone, float]],
     factor: float,
     unit: str,
     limit: float,
     why: str,
-    share: float = 0.0,
 ) -> Criterion:
     """That no run stands out from the others of its channel by more than a limit [unit].
 
-    What explains less than `share` of the run's residuals is none.
+    Beside each run's own size is the share of residuals that it must explain.
     """
     found, judged = list[tuple[float, str]](), False
-    for name in dict.fromkeys(each.channel for each, _ in motions):
-        alike = [(e.run, own) for e, own in motions if e.channel == name and isfinite(own.error)]
+    for name in dict.fromkeys(each.channel for each, _, _ in motions):
+        alike = [each for each in motions if each[0].channel == name and isfinite(each[1].error)]
         if len(alike) < FEWEST_RUNS:
             continue
         judged = True
-        apart = np.array([own.size for _, own in alike])
+        apart = np.array([own.size for _, own, _ in alike])
         apart -= np.median(apart)
         usual = OUTLIES * float(np.median(np.abs(apart))) / 0.6745
-        for (run, own), off in zip(alike, apart.tolist(), strict=True):
-            if abs(off) > max(usual, own.error) and own.share >= share:
-                found.append((factor * off, f"{name} in {run} by {factor * off:+.2g} {unit}"))
+        for (run, own, least), off in zip(alike, (factor * apart).tolist(), strict=True):
+            if abs(off) > factor * max(usual, own.error) and own.share >= least:
+                found.append((off, f"{name} in {run.run} by {off:+.2g} {unit}"))
     found.sort(key=lambda each: -abs(each[0]))
     far = [words for size, words in found if abs(size) > limit][:3]
     return Criterion(
