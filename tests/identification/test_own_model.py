@@ -500,7 +500,9 @@ def test_a_run_with_a_scale_or_a_delay_of_its_own_is_named(
 def test_one_run_has_no_drift() -> None:
     """It reads 30 % too much, which no unknown can take."""
     only, other = trial("only"), trial("other")
-    larger = moved(only, 1.3 * only["position"].values, noise=0.01)
+    often = np.linspace(TIME[0], TIME[-1], 4000)
+    values = 1.3 * np.interp(often, TIME, only["position"].values)
+    larger = moved(only, values, time=often, weight=np.ones(often.size))
     made = fit(OWN, campaign(larger), {"lag": (0.05, 0.2, 2.0), "gain": (1.49, 1.5, 1.51)})
     found = verdict(made.stages, predict(made.parameters, [other]))
     (drift,) = (each for each in found.criteria if each.name == "drift of position")
