@@ -128,7 +128,7 @@ class _Run(NamedTuple):
 
     time: Array
     stamps: Array
-    """Those of the command, and the grid's last. [s]"""
+    """Those of the command, of a straight line the grid's as well. [s]"""
     command: Array
     """[V]"""
     held: bool
@@ -280,10 +280,11 @@ def _run(experiment: Experiment, channel: Channel) -> _Run:
         begins = begins[(begins >= time[gap + 1]) | (begins + 2.0 * width <= time[gap])]
     speeds = _mean_speeds(time, travelled, begins, width)
     grid = np.arange(drive.time[0], drive.time[-1] + STEP, STEP)
-    stamps, command = np.append(drive.time, grid[-1]), np.append(drive.values, drive.values[-1])
-    start = 0.0 if experiment.start == "rest" or not speeds.size else float(speeds[0])
     held = drive.interpolation == "previous"
-    return _Run(grid, stamps, command, held, start, begins, width, speeds, coarse)
+    # a straight line may cross a dead zone between two stamps
+    stamps = np.append(drive.time, grid[-1]) if held else np.union1d(drive.time, grid)
+    start = 0.0 if experiment.start == "rest" or not speeds.size else float(speeds[0])
+    return _Run(grid, stamps, drive.at(stamps), held, start, begins, width, speeds, coarse)
 
 
 def _goes_with(run: _Run) -> bool:
