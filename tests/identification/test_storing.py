@@ -78,18 +78,32 @@ def test_profiles_folds_and_notes_come_back(
     fold = Fold(0, ("a",), ("J",), held, True)
     folds = CrossValidation(3, 2, (fold,), held, {"current": "A"})
     path = tmp_path / "fit.json"
+    profile = replace(profile, name=fitted.stage("card").problem.unknowns.names[0])
     kept = [profile]
     Judged(campaign, fitted, profiles=kept, folds=folds, notes={"seed": "3"}).store(path)
     stored = load_fit(path, campaign)
     assert stored.folds == folds
     assert stored.notes == {"seed": "3"}
     (back,) = stored.profiles
-    assert (back.name, back.stage) == ("J", "card")
+    assert (back.name, back.stage) == (profile.name, "card")
     assert back.rise == profile.rise
     assert (back.lower, back.upper) == (-0.1, None)
     assert [each.cost for each in back.points] == [each.cost for each in points]
     assert np.array_equal(back.points[2].vector, points[2].vector)
     assert back.better is not None
+
+    # as files were before a profile had names of its own
+    content = json.loads(path.read_text("utf-8"))
+    (entry,) = content["profiles"]
+    del entry["name"]
+    content["profiles"] = [[entry.pop("stage"), entry]]
+    path.write_text(json.dumps(content), "utf-8")
+    (older,) = load_fit(path, campaign).profiles
+    assert (older.name, older.stage, older.rise) == (profile.name, "card", profile.rise)
+    entry["index"] = 99
+    path.write_text(json.dumps(content), "utf-8")
+    with pytest.raises(FileError, match="stage card has no parameter 100"):
+        load_fit(path, campaign)
 
 
 def test_the_file_is_json_that_others_read(path: Path) -> None:

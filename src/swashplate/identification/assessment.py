@@ -272,7 +272,8 @@ class FitFile(Entry):
     """What the fit began from: a drive's parameter file, or the numbers of a model of one's own."""
     setup: Setup
     stages: tuple[StoredStage, ...]
-    profiles: tuple[Profile, ...]
+    profiles: tuple[Profile | tuple[str, Profile], ...]
+    """Behind the name of their stage in older files, which do not name the unknown."""
     folds: CrossValidation | None
     notes: dict[str, str]
 
@@ -342,5 +343,11 @@ def load_fit(
 
     begun = file.setup.model_copy(update={"stages": file.setup.stages[: len(file.stages)]})
     stages = staged(begun, nominal, experiments, stored, threads=threads)
-    found = Fit(file.setup, nominal, experiments, stages)
-    return Judged(campaign, found, {}, file.profiles, file.folds, file.notes)
+    found, profiles = Fit(file.setup, nominal, experiments, stages), list[Profile]()
+    for each in file.profiles:
+        stage, profile = (each.stage, each) if isinstance(each, Profile) else each
+        names = found.stage(stage).problem.unknowns.names
+        if not 0 <= profile.index < len(names):
+            raise FileError(f"{path}: stage {stage} has no parameter {profile.index + 1}.")
+        profiles.append(replace(profile, stage=stage, name=names[profile.index]))
+    return Judged(campaign, found, {}, profiles, file.folds, file.notes)
