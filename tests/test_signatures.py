@@ -153,6 +153,12 @@ WRONG: list[tuple[Callable[..., Any], tuple[Any, ...], str]] = [
         "The supply_pressure falls to .* Pa, but must be above 0",
     ),
     (
+        lambda each: HOIST.simulate([1.0, 1.0], pump_speed=each),
+        (-1.0, [1.0, -0.1]),
+        "The pump_speed falls to -.*, but must be 0 or above",
+    ),
+    (lambda name: HOIST.renamed(name), ("", " ", None), "A drive's name is text, not"),
+    (
         lambda bias: HOIST.frequency_response([1.0], [1.0], bias=bias),
         ("a", None, nan),
         "The bias is .* but must be a finite number",

@@ -160,7 +160,9 @@ class Drive(Result):
         return Drive(with_equation(self.parameters, Replacement(old, new, parameters)))
 
     def renamed(self, name: str, title: str | None = None) -> Drive:
-        """The same drive under another name."""
+        """The same drive under another name, which is not empty, and perhaps another title."""
+        if not str(name or "").strip():
+            raise InputError(f"A drive's name is text, not {name!r}.")
         kept = self.parameters.title if title is None else title
         return Drive(replace(self.parameters, name=name, title=kept))
 

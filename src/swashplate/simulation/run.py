@@ -62,6 +62,11 @@ def drive_records(
             f"The supply_pressure falls to {low:g} Pa, but must be above 0: it is the supply less "
             "the static pressure."
         )
+    if (speed := found.get("pump_speed")) and not (low := speed.values.min()) >= 0.0:
+        raise InputError(
+            f"The pump_speed falls to {low:g}, but must be 0 or above: it is that of the prime "
+            "mover over the one that Z10 belongs to."
+        )
     return found
 
 
