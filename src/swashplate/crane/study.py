@@ -6,7 +6,7 @@ paired. Of a run only what is counted is kept.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, NamedTuple, Unpack
 
@@ -133,7 +133,10 @@ class Study(Result):
             from controllers and drives. By default the load hangs abeam on 27 m of rope.
         """
         laws = control if isinstance(control, Mapping) else {"": control}
-        sets = drives if isinstance(drives, Mapping) else {each: each for each in drives}
+        named = [drives] if isinstance(drives, str) else drives
+        if not isinstance(named, Iterable):
+            raise InputError(f"drives is {drives!r}, but must be a list of names, or a mapping.")
+        sets = named if isinstance(named, Mapping) else {each: each for each in named}
         if isinstance(seeds, int):
             raise InputError(f"seeds is {seeds}, but must be a sequence, as range({seeds}).")
         if not (laws and sets and seeds):
@@ -155,10 +158,15 @@ class Study(Result):
                 if isinstance(given, str):
                     check_names("There are no drives", [given], ACTUATED)
                     case = none.moved(control=stages, actuation=ACTUATED[given])
-                elif not given:
-                    raise InputError(f"The drives '{name}' are an empty list of cranes.")
                 else:
-                    cranes = (given,) if isinstance(given, Crane) else tuple(given)
+                    cranes: tuple[Any, ...] = (given,)
+                    if isinstance(given, Sequence):
+                        cranes = tuple(given)
+                    if not cranes or not all(isinstance(each, Crane) for each in cranes):
+                        raise InputError(
+                            f"The drives '{name}' are {given!r}, but must be a name, a crane or a "
+                            "list of cranes."
+                        )
                     case = none.moved(control=stages)._replace(cranes=cranes)
                 cases[f"{law}, {name}" if law else name] = case
         seaway = sea if isinstance(sea, Seaway) else Seaway(sea)
