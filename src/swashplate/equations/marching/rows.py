@@ -122,9 +122,10 @@ def dot(a: Array, b: Array, room: Array) -> float:
         room[i] = ((room[i] + room[i + 8]) + (room[i + 16] + room[i + 24])) + (
             (room[i + 32] + room[i + 40]) + (room[i + 48] + room[i + 56])
         )
-    return ((room[0] + room[1]) + (room[2] + room[3])) + (  # type: ignore[no-any-return]
+    total: float = ((room[0] + room[1]) + (room[2] + room[3])) + (
         (room[4] + room[5]) + (room[6] + room[7])
     )
+    return total
 
 
 @kernel

@@ -8,18 +8,16 @@ from datetime import date
 from importlib.resources import files
 from io import StringIO
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 from jinja2 import Environment, StrictUndefined
 from markupsafe import Markup
-from matplotlib import rc_context
-from matplotlib.figure import Figure
 
 from swashplate.crane import CraneRun, Judgment
 from swashplate.crane.stepper import RATE
 from swashplate.crane.study import NONE
 from swashplate.errors import DomainError, InputError
-from swashplate.report.figures.crane import plot_crane, plot_follow, plot_judgment, seaway_words
 from swashplate.report.fit_report.page import (
     Block,
     Section,
@@ -28,8 +26,12 @@ from swashplate.report.fit_report.page import (
     script_json,
     text,
 )
-from swashplate.report.fit_report.summary import Light, light
 from swashplate.tables import Table, count, listed, write_text
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from swashplate.report.fit_report.summary import Light
 
 # --- scene ----------------------------------------------------------------------------------------
 
@@ -126,6 +128,15 @@ def write_judgment(judgment: Judgment, path: str | Path) -> None:
     pose = {name: setup[name] for name in ("slew_deg", "boom_deg", "rope_m")}
     swings, differences, limits, *remedies = judgment.tables()
     verdict, *rests = judgment.sentences()
+    # a scene alone needs no figures
+    from swashplate.report.figures.crane import (
+        plot_crane,
+        plot_follow,
+        plot_judgment,
+        seaway_words,
+    )
+    from swashplate.report.fit_report.summary import light
+
     look: Light = "good" if judgment.passed else "bad"
     summary = [
         Block("verdict", (light(look, "works" if judgment.passed else "fails"), verdict), look),
@@ -177,6 +188,8 @@ def write_judgment(judgment: Judgment, path: str | Path) -> None:
 
 def _drawn(figure: Figure, caption: str) -> Block:
     """A figure as SVG within the page, as wide as there is room."""
+    from matplotlib import rc_context
+
     written = StringIO()
     with rc_context({"svg.hashsalt": "swashplate"}):
         figure.savefig(written, format="svg", metadata={"Date": None})
