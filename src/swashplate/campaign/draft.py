@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from swashplate.campaign.quality import ESTIMATED, has_sign, moves_at_first
 from swashplate.campaign.reading import read_run
 from swashplate.campaign.samples import rolls_over_at, turns_over
-from swashplate.campaign.schema import KINDS, CampaignFile, InputKind, conversion
+from swashplate.campaign.schema import KINDS, ROD, TURNS, CampaignFile, InputKind, conversion
 from swashplate.documents import parse_toml, toml_key, toml_string, validated
 from swashplate.errors import FileError, InputError
 from swashplate.logs import Column, Log, open_log
@@ -39,12 +39,12 @@ NO_ENCODER = "# No column looks like an encoder's counts"
 FIXME = "FIXME"
 """What the lines hold that say what the draft leaves out or open."""
 TIME = (
-    r"time|zeit|uhrzeit|zeitstempel|temps|stamp|timestamp|time stamp|datetime|date time|clock|t|"
-    r"seconds?|exp time"
+    r"time|zeit|uhrzeit|zeitstempel|temps|heure|tijd|tid|tiempo|tempo|stamp|timestamp|time stamp|"
+    r"datetime|date time|clock|t|seconds?|exp time"
 )
 """Names of columns of time stamps; those of signals are in `KINDS`."""
-ROD = r"(?:.* )?(?:ms|displacement|stroke|cylinder|rod|extension|hub|weg)"
-"""Names of positions that are a rod's and not a shaft's."""
+OF = "(?: (?:of|der|des|du|de|del|della|do|da|van|av) .*)?"
+"""What may follow in such a name: "Drehzahl der Trommel"."""
 INPUTS = get_args(InputKind)
 HALVES = {"current_plus", "current_minus"}
 MANY = 4
@@ -175,7 +175,7 @@ def _by_words(column: Column, name: str, unit: str | None) -> _Guess:
     matches = {
         kind: match
         for kind, each in KINDS.items()
-        if each.words and (match := re.fullmatch(rf"(?:(.*) )?(?:{each.words})", words))
+        if each.words and (match := re.fullmatch(rf"(?:(.*) )?(?:{each.words}){OF}", words))
     }
     marked = speed_unit(unit or "")
     kinds = (kind for kind, each in KINDS.items() if kind in matches or marked in each.marks)
@@ -186,7 +186,7 @@ def _by_words(column: Column, name: str, unit: str | None) -> _Guess:
 def _by_header(column: Column, kind: str | None) -> _Guess:
     """What a header says, of a kind if one is given; the unit may be the end of its name."""
     name = re.sub(r"[\[(].*[\])]", "", column.name).strip()
-    unit = column.unit or ("rpm" if re.search("rpm|drehzahl", name.lower()) else None)
+    unit = column.unit or ("rpm" if re.search(TURNS, name.lower()) else None)
     whole = _by_words(column, name, unit)
     stem, _, ending = name.rpartition("_")
     short = _by_words(column, stem, None)
@@ -342,7 +342,8 @@ def _signal_lines(each: _Guess, parts: Sequence[Array], counts_per_turn: float |
         lines.append(unknown if counts_per_turn is None else stated)
         lines.append("gear_ratio = 1.0    # turns of the encoder for one turn of the shaft")
     elif not each.in_header:
-        usual = "mm" if re.fullmatch(ROD, _words(each.name)) else (*known.units, "1")[0]
+        rod = re.fullmatch(rf"(?:.* )?(?:{ROD}){OF}", _words(each.name))
+        usual = "mm" if rod else (*known.units, "1")[0]
         usual = "deg" if each.rolls_over_at else usual
         why = "from its name" if each.unit else "guessed: the header gives none"
         lines.append(f"unit = {toml_string(each.unit or usual)}    # {why}")

@@ -47,27 +47,35 @@ class Kind(NamedTuple):
     """Units in a header that say it, whatever the name."""
 
 
+CURRENT = r"currents?|\w*strom|stroom|strøm|ström|courant|corriente|corrente"
+TURNS = r"rpm|\w*drehzahl|toerental|turtall|omdrejningstal|varvtal"
+ROD = r"ms|displacement|stroke|cylinder|rod|extension|hub|\w*weg"
+"""Names of columns, as `Kind.words`: of currents; of speeds in turns a minute, where no unit is
+given; of positions that are a rod's and not a shaft's."""
+
 # fmt: off
 KINDS: Mapping[str, Kind] = {
     "voltage": Kind(("V",), "", "the card's command, positive towards positive speed",
-        "volts?|voltage|u|spannung", ("V", "mV")),
+        r"volts?|voltage|u|\w*spannung|spanning|spenning|spænding|spänning|voltaje", ("V", "mV")),
     "current": Kind(("A",), "", "signed current that drives the pump without a card"),
     # by its name an input: channels are of this kind where somebody says so
     "other": Kind((), "", "anything else, kept in the unit that it is written in",
-        "cmd|command|duty|setpoint|valve|stick|joystick|stellgröße|stellgroesse|sollwert"),
+        "cmd|command|duty|setpoint|valve|stick|joystick|stellgröße|stellgroesse|sollwert|hebel|"
+        "consigne|consigna|manette|palanca|spak|pådrag"),
     "encoder_counts": Kind(("rad",), "shaft_position",
         "counts of an encoder; an angle from a free zero",
-        "counts?|encoder|enc|ticks|pulses", ("counts", "count")),
+        "counts?|encoder|enc|ticks|pulses|impulse|inkremente|impulsen|impulser|impulsions|pulsos",
+        ("counts", "count")),
     "current_plus": Kind(("A",), "current_positive",
         "current of the positive solenoid, a magnitude",
-        "(?:current|strom|i) (?:plus|positive|a|1|up)"),
+        f"(?:{CURRENT}|i) (?:plus|positive|a|1|up)"),
     "current_minus": Kind(("A",), "current_negative",
         "current of the negative solenoid, a magnitude",
-        "(?:current|strom|i) (?:minus|negative|b|2|down)"),
+        f"(?:{CURRENT}|i) (?:minus|negative|b|2|down)"),
     "signed_current": Kind(("A",), "current",
         "positive solenoid's current less the negative one's"),
     "rectified_current": Kind(("A",), "current_sum", "|I+| + |I-|, one ammeter around both leads",
-        "currents?|amps?|ammeter|strom|i", ("A", "mA")),
+        f"{CURRENT}|amps?|ammeter|i", ("A", "mA")),
     "stroker_pressure": Kind(("Pa",), "stroker_pressure",
         "stroking pressure about its equilibrium", "stroker pressure|delta p|dp|servo pressure"),
     "swash_angle": Kind(("rad",), "swash_angle",
@@ -76,10 +84,12 @@ KINDS: Mapping[str, Kind] = {
         "displacement of the spool, positive with the force", "spool position|spool"),
     "shaft_speed": Kind(("rad/s", "m/s"), "shaft_speed",
         "speed of the shaft, or of a cylinder's rod",
-        r"speed|rpm|omega|velocity|drehzahl|vitesse|n|n \w+",
+        rf"speed|omega|velocity|\w*geschwindigkeit|snelheid|hastighe[dt]|vitesse|velocidad|velocità|"
+        rf"{TURNS}|n|n \w+",
         ("rad/s", "deg/s", "rpm", "m/s", "mm/s")),
     "position": Kind(("rad", "m"), "shaft_position", "integral of the speed from a free zero",
-        "position|pos|angle|pos fb|ms|displacement|stroke|cylinder|rod|extension|hub|weg"),
+        r"position|pos|angle|pos fb|\w*winkel|hoek|vinkel|ángulo|angolo|posisjon|posición|"
+        rf"posizione|{ROD}"),
 }
 # fmt: on
 """Every kind of input and channel, by its name in a campaign file.

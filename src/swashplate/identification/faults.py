@@ -34,6 +34,11 @@ class Kind(NamedTuple):
     """Size that occurs without notice; inf for what is no fault of an instrument. [unit]"""
     also: str = ""
 
+    @property
+    def tolerated(self) -> float:
+        """Half of what is plausible: a third was exceeded in 5 of 500 sound campaigns. [unit]"""
+        return 0.5 * self.plausible
+
 
 SCALE = Kind("scale of {}", plausible=3.0)
 LATE = Kind("time stamps of {}", 1e3, "ms", 10.0, " (or a delay or lag that the model leaves out)")

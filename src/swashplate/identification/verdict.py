@@ -420,12 +420,12 @@ def _fits(misfit: LackOfFit, side: Side, stages: Sequence[StageFit]) -> Iterator
 
 
 def _is_wrong(fault: Fault, poor: bool) -> bool:
-    """Whether an instrument is off by more than a third of what occurs without notice.
+    """Whether an instrument is off by more than half of what occurs without notice.
 
     Where there is lack of fit, only a fault that explains it is told from what else is wrong.
     """
     told = fault.instrumental and fault.visible and fault.significant and fault.near
-    return told and abs(fault.size) > fault.kind.plausible / 3.0 and (fault.explains or not poor)
+    return told and abs(fault.size) > fault.kind.tolerated and (fault.explains or not poor)
 
 
 def _drift(fault: Fault) -> Criterion:
@@ -443,7 +443,7 @@ def _drift(fault: Fault) -> Criterion:
 
 def _of_instrument(fault: Fault, wrong: Sequence[Fault]) -> Criterion:
     """That an instrument's error is small; of several that seem wrong the likeliest one is."""
-    limit, size = fault.kind.plausible / 3.0, f"{fault.size:+.2g} {fault.kind.unit}"
+    limit, size = fault.kind.tolerated, f"{fault.size:+.2g} {fault.kind.unit}"
     first = fault in wrong[:1]
     value = size if first or abs(fault.size) <= limit else "not seen"
     return Criterion(
