@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple
@@ -23,6 +23,10 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
+SUDDEN, BESIDE, APART, RISE = 0.1, 0.1, 0.003, 1.0 / 512.0
+"""Part of a command's range by which it jumps between two samples, what it moves by beside that is
+less than this part of; their least distance [s], below which the instant is taken as logged; and
+the time that a jump takes, a step of the march. [s]"""
 VARIED = 8
 """Changes of an encoder's steps from which their common divisor is the decoder's."""
 
@@ -35,6 +39,17 @@ class Source(NamedTuple):
 
     def __str__(self) -> str:
         return f"{self.file.name}: column '{self.column}'"
+
+
+class Edge(NamedTuple):
+    """A jump of a command between two samples, at an instant that was not logged."""
+
+    place: int
+    """Of the last sample before it."""
+    middle: float
+    """Between both samples. [s]"""
+    apart: float
+    """Time between them. [s]"""
 
 
 class Encoder(NamedTuple):
@@ -78,6 +93,29 @@ class InputSignal(Result):
     def used(self) -> NDArray[np.bool_]:
         """(n,) whether a sample counts: all, because what is ignored is not read."""
         return np.ones(self.time.size, np.bool_)
+
+    @cached_property
+    def edges(self) -> tuple[Edge, ...]:
+        """Its jumps at instants that are not known: of a command that is held there are none."""
+        changes, apart = np.abs(np.diff(self.values)), np.diff(self.time)
+        beside = np.pad(changes, 1)
+        alone = np.maximum(beside[:-2], beside[2:]) < BESIDE * changes
+        sudden = (changes > SUDDEN * np.ptp(self.values)) & (apart > APART) & alone
+        if self.interpolation == "previous":
+            return ()
+        return tuple(
+            Edge(int(k), float(self.time[k] + 0.5 * apart[k]), float(apart[k]))
+            for k in np.flatnonzero(sudden)
+        )
+
+    def with_edges(self, late: Mapping[int, float]) -> InputSignal:
+        """The signal with edges, by their places, so much later than their middle. [s]"""
+        found = [(each, late[each.place]) for each in self.edges if each.place in late]
+        places = [each.place + 1 for each, _ in found for _ in range(2)]
+        rises = [e.middle + by + side * 0.5 * RISE for e, by in found for side in (-1.0, 1.0)]
+        values = [self.values[each.place + side] for each, _ in found for side in (0, 1)]
+        time = np.insert(self.time, places, rises)
+        return replace(self, time=time, values=np.insert(self.values, places, values))
 
     def at(self, time: Array) -> Array:
         """The input at other instants [s]; before the first stamp the first sample holds."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
+from math import sqrt
 from types import MappingProxyType
 from typing import Any, Literal
 
@@ -13,7 +14,7 @@ from numpy.typing import NDArray
 
 from swashplate.campaign import ChannelKind, applying, inside
 from swashplate.campaign.campaign import Campaign
-from swashplate.campaign.experiment import Experiment, InputSignal
+from swashplate.campaign.experiment import RISE, Edge, Experiment, InputSignal
 from swashplate.campaign.samples import signed_by_command
 from swashplate.campaign.schema import SIGNALS as SIGNALS
 from swashplate.drive import Drive
@@ -21,7 +22,7 @@ from swashplate.equations.marching.observation import Observation, ObservedRecor
 from swashplate.equations.marching.record import SLOWEST, SOURCE_RATE, Record, even_rate, record_of
 from swashplate.errors import DomainError, InputError, ParameterError
 from swashplate.executors import available_cores
-from swashplate.identification.model import OFFSET, Asked, EquationModel
+from swashplate.identification.model import EDGE, EDGE_STEP, OFFSET, Asked, EquationModel
 from swashplate.identification.problem import Problem, noise_scales
 from swashplate.identification.setup import (
     Forces,
@@ -32,7 +33,7 @@ from swashplate.identification.setup import (
     load_setup,
     setup_names,
 )
-from swashplate.identification.unknowns import Unknown, Unknowns, bounded
+from swashplate.identification.unknowns import Prior, Unknown, Unknowns, bounded
 from swashplate.parameters.definitions import SWITCHES, columns_of, find, is_column
 from swashplate.parameters.parameter_set import ParameterSet
 from swashplate.parameters.rules import FULL_VOLTAGE
@@ -217,6 +218,8 @@ class DriveModel(Result, EquationModel):
     """For the pump alone, signed currents by the experiments' names, if not as measured. [A]"""
     forces: Forces | None = None
     """The forces that stand for the solenoids' coefficients."""
+    starts: Starts = field(default_factory=dict)
+    """Currents at the first sample of simulated currents, see `simulated_current`."""
 
     def signals_of(self, experiment: Experiment) -> Mapping[str, str]:
         """Signal for each channel that this part of the drive gives."""
@@ -224,11 +227,19 @@ class DriveModel(Result, EquationModel):
         channels = experiment.channels.items()
         return {name: SIGNALS[each.kind] for name, each in channels if each.kind in kinds}
 
-    def driven(self, experiment: Experiment) -> tuple[str, Record, Mapping[str, Array]]:
-        """The experiment's voltage, or the current that drives the pump, measured if not given."""
+    def driven(
+        self, experiment: Experiment, values: Mapping[str, float] = MappingProxyType({})
+    ) -> tuple[str, Record, Mapping[str, Array]]:
+        """The experiment's voltage, or the current that drives the pump, measured if not given.
+
+        With the edges of the command where `values` say.
+        """
+        moved = with_edges(experiment, values)
         if self.part != "pump":
-            return "voltage", voltage_record(experiment), {}
+            return "voltage", voltage_record(moved), {}
         given = self.currents.get(experiment.name)
+        if moved is not experiment:
+            given = simulated_current(moved, self.parameters, self.starts.get(moved.name, {}))
         return "current", measured_current(experiment) if given is None else given, {}
 
     def ready(self, values: Mapping[str, float], experiment: Experiment, asked: Asked) -> Ready:
@@ -277,6 +288,29 @@ def _at(model: DriveModel, values: tuple[tuple[str, float], ...]) -> ParameterSe
         raise DomainError(str(error)) from None
 
 
+def with_edges(experiment: Experiment, values: Mapping[str, float]) -> Experiment:
+    """An experiment with the edges of its command where values say."""
+    command = experiment.input
+    late = {each.place: values[n] for each in command.edges if (n := _named(each)) in values}
+    return replace(experiment, input=command.with_edges(late)) if late else experiment
+
+
+def _named(edge: Edge) -> str:
+    return f"{EDGE}{edge.middle:.6g} s"
+
+
+def _edges(stage: Stage, run: Experiment, found: Mapping[str, Prior]) -> Iterator[Unknown]:
+    """Instants of a command's edges, anywhere between two samples or as an earlier stage found."""
+    if stage.part == "pump" and (stage.current == "measured" or run.input.kind != "voltage"):
+        return
+    for edge in run.input.edges:
+        name, most = _named(edge), 0.5 * (edge.apart - RISE) - 2.0 * EDGE_STEP
+        prior = found.get(f"{name} ({run.name})", Prior(0.0, edge.apart / sqrt(12.0)))
+        yield Unknown(
+            name, prior.mean, -most, most, "s", prior=prior, run=run.name, scale=edge.apart
+        )
+
+
 def kinds_of(part: str) -> tuple[ChannelKind, ...]:
     """Kinds of the channels that a part of the drive gives."""
     return tuple(k for k in SIGNALS if part == "chain" or (k in CURRENTS) == (part == "card"))
@@ -311,6 +345,7 @@ def stage_problem(
     threads: int | None = None,
     uncertain: Mapping[str, float | str] = MappingProxyType({}),
     starts: Starts = MappingProxyType({}),
+    edges: Mapping[str, Prior] = MappingProxyType({}),
 ) -> Problem:
     """The problem of a stage, over the runs that have a channel of it.
 
@@ -337,9 +372,13 @@ def stage_problem(
     begin = {column: each.start for each in free for column in each.targets if column in SWITCHES}
     on = parameters.options | {SWITCHES[column] for column in begin}
     begun = parameters.replace(begin, on) if begin else parameters
-    own = [unknown for each in runs for unknown in _of_a_run(stage, each, channels, parameters)]
+    own = [
+        unknown
+        for each in runs
+        for unknown in (*_of_a_run(stage, each, channels, parameters), *_edges(stage, each, edges))
+    ]
     return Problem(
-        DriveModel(begun, stage.part, currents, stage.forces),
+        DriveModel(begun, stage.part, currents, stage.forces, starts),
         tuple(_weighted(each, stage) for each in runs),
         Unknowns((*free, *own)),
         channels,

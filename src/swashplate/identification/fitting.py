@@ -38,11 +38,11 @@ from swashplate.identification.drive_model import (
 from swashplate.identification.faults import measurement_error
 from swashplate.identification.identifiability import Identifiability, identifiability
 from swashplate.identification.intervals import Uncertainty, stage_uncertainty, weighed
-from swashplate.identification.model import EquationModel, Model, OwnModel
+from swashplate.identification.model import EDGE, EquationModel, Model, OwnModel
 from swashplate.identification.problem import LinearisedFit, Loss, Problem, linearised_fit
 from swashplate.identification.setup import ModelSetup, Range, Setup, Stage
 from swashplate.identification.solving import Progress, Solution, sobol_starts, solve, solve_from
-from swashplate.identification.unknowns import Unknown
+from swashplate.identification.unknowns import Prior, Unknown
 from swashplate.identification.validation import RunQuality, run_qualities
 from swashplate.parameters.definitions import columns_of
 from swashplate.parameters.parameter_set import ParameterSet
@@ -299,10 +299,17 @@ def staged(
 ) -> tuple[StageFit, ...]:
     """The stages of a set-up, each from what the ones before found, until one is interrupted."""
     parameters, stages, starts = smooth(nominal), list[StageFit](), dict[str, Mapping[str, float]]()
+    edges = dict[str, Prior]()
     for stage in setup.stages:
         uncertain = setup.standard_uncertainty
         problem = stage_problem(
-            stage, parameters, runs, threads=threads, uncertain=uncertain, starts=starts
+            stage,
+            parameters,
+            runs,
+            threads=threads,
+            uncertain=uncertain,
+            starts=starts,
+            edges=edges,
         )
         problem, solution, several = solved(stage, problem)
         parameters = with_estimates(parameters, problem, solution.vector)
@@ -310,7 +317,19 @@ def staged(
         stages.append(StageFit(stage, problem, solution, parameters, several, tuple(stages)))
         if solution.interrupted:
             break
+        edges |= _edges_found(stages[-1]) if stage is not setup.stages[-1] else {}
     return tuple(stages)
+
+
+def _edges_found(stage: StageFit) -> dict[str, Prior]:
+    """What a stage found of the instants of edges, by the unknowns' names."""
+    unknowns = stage.problem.unknowns
+    own = [k for k, each in enumerate(unknowns) if each.name.startswith(EDGE)]
+    if not own:
+        return {}
+    values, quoted = unknowns.at(stage.solution.vector).estimates, stage.uncertainty.quoted
+    errors = quoted.standard_errors * unknowns.scales
+    return {unknowns.names[k]: Prior(float(values[k]), float(errors[k])) for k in own}
 
 
 def _solved(

@@ -402,11 +402,11 @@ def weighed(problem: Problem, vector: Array) -> Problem:
 
 
 def prior_sentences(unknowns: Unknowns, vector: Array, quoted: Covariance) -> tuple[str, ...]:
-    """What each prior adds, and how far from it the estimate lies."""
+    """What each prior of the machine adds, and how far from it the estimate lies."""
     said = []
     for unknown, number, error in zip(unknowns, vector, quoted.standard_errors, strict=True):
         prior = unknown.prior
-        if prior is None:
+        if prior is None or unknown.run is not None:
             continue
         scale = 1.0 if unknown.log else unknown.scale
         middle = log(prior.mean) if unknown.log else prior.mean

@@ -5,6 +5,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from types import MappingProxyType
 from typing import Any, NamedTuple, Protocol, TypeVar
 
 import numpy as np
@@ -25,6 +26,10 @@ from swashplate.simulation.residuals import Ready
 Array = NDArray[np.float64]
 OFFSET = "offset "
 """What the name of a channel's free zero begins with."""
+EDGE = "edge at "
+EDGE_STEP = 1e-4
+"""What the name of the instant of an edge of the command begins with, see `InputSignal.edges`, and
+the step of its differences. [s]"""
 
 
 class Model(Protocol):
@@ -179,7 +184,9 @@ class EquationModel(ABC):
         """Signal of the model for each channel that it gives."""
 
     @abstractmethod
-    def driven(self, experiment: Experiment) -> tuple[str, Record, Mapping[str, Array]]:
+    def driven(
+        self, experiment: Experiment, values: Mapping[str, float] = MappingProxyType({})
+    ) -> tuple[str, Record, Mapping[str, Array]]:
         """Signal that drives the model, its record, and other external signals on its grid."""
 
     @abstractmethod
@@ -202,8 +209,9 @@ class EquationModel(ABC):
         experiment: Experiment,
         weights: Mapping[str, Array] | None = None,
         offsets: Collection[str] = (),
+        values: Mapping[str, float] = MappingProxyType({}),
     ) -> ObservedRecord:
-        """An experiment as the march sees it.
+        """An experiment as the march sees it, with the edges of its command where `values` say.
 
         With factors (m,) on the residuals of the channels that count, against what was measured;
         without, all channels that the model gives, against zero. `offsets` are the names of the
@@ -216,24 +224,31 @@ class EquationModel(ABC):
             if weights is not None:
                 against = channel.values, weights[name]
             seen.append(Observation(signal, channel.time, *against, f"{OFFSET}{name}" in offsets))
-        by, record, others = self.driven(experiment)
+        by, record, others = self.driven(experiment, values)
         return ObservedRecord(record, seen, by, experiment.begins, others)
 
     def simulate(self, values: Mapping[str, float], experiment: Experiment) -> Mapping[str, Array]:
         """Simulate the measured channels; see `model.Model`."""
-        observed, signals = self.observed(experiment), enumerate(self.signals_of(experiment))
+        observed = self.observed(experiment, values=values)
+        signals = enumerate(self.signals_of(experiment))
         flat = self.ready(values, experiment, Asked(observed)).residuals(observed)
         return {name: flat[observed.rows_of(k)] for k, name in signals}
 
     def linearise(
         self, values: Mapping[str, float], experiment: Experiment, names: Sequence[str]
     ) -> Mapping[str, Linearised]:
-        """Simulate with derivatives; see `model.Model`."""
-        observed, (columns, chain) = self.observed(experiment), self.columns(names)
+        """Simulate with derivatives, those by edges by differences; see `model.Model`."""
+        observed, (columns, chain) = self.observed(experiment, values=values), self.columns(names)
         found = self.ready(values, experiment, Asked(observed, columns)).jacobian(observed)
         flat, by, rows = found.residuals, found.columns @ chain, observed.rows_of
         channels = enumerate(self.signals_of(experiment))
-        return {name: Linearised(flat[rows(k)], by[rows(k)]) for k, name in channels}
+        made = {name: Linearised(flat[rows(k)], by[rows(k)]) for k, name in channels}
+        for place, name in enumerate(names):
+            if name.startswith(EDGE):
+                later = self.simulate({**values, name: values[name] + EDGE_STEP}, experiment)
+                for channel, part in made.items():
+                    part.by[:, place] = (later[channel] - part.values) / EDGE_STEP
+        return made
 
 
 @dataclass(frozen=True, eq=False)
@@ -281,7 +296,9 @@ class OwnModel(Result, EquationModel):
             )
         return found
 
-    def driven(self, experiment: Experiment) -> tuple[str, Record, Mapping[str, Array]]:
+    def driven(
+        self, experiment: Experiment, values: Mapping[str, float] = MappingProxyType({})
+    ) -> tuple[str, Record, Mapping[str, Array]]:
         """The experiment's input on the grid, and external signals that are channels.
 
         Refused where stamps are uneven and no rate is said, or it is not clear which signal the

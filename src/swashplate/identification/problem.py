@@ -15,6 +15,7 @@ from swashplate.equations import Model as OfEquations
 from swashplate.equations.marching.observation import ObservedRecord
 from swashplate.errors import InputError
 from swashplate.identification.model import (
+    EDGE,
     OFFSET,
     Asked,
     EquationModel,
@@ -121,8 +122,9 @@ class Problem(Result):
         """
         key = vector.tobytes(), compressed
         if key not in self._last:
-            small = compressed and self._marched
-            parts = self._each(partial(self._reduced if small else self._full, vector))
+            small = self._reduced if compressed else self._full
+            ways = [small if each else self._full for each in self._marched]
+            parts = self._each(lambda number: ways[number](vector, number))
             priors = Evaluation(*self.unknowns.prior_rows(vector))
             residuals, jacobians = zip(*parts, priors, strict=True)
             self._last.clear()
@@ -135,7 +137,7 @@ class Problem(Result):
         return 0.5 * (sum(self._each(partial(self._squares, vector))) + float(priors @ priors))
 
     def _squares(self, vector: Array, number: int) -> float:
-        if self._marched:
+        if self._marched[number]:
             ready, observed = self._ready(vector, number)
             residuals = ready.residuals(observed)
             if np.isfinite(total := float(residuals @ residuals)):
@@ -195,10 +197,12 @@ class Problem(Result):
         jacobian += factor[:, len(asked) : -1] @ chain(zeros, experiment.name)
         return Evaluation(factor[:, -1], jacobian)
 
-    @property
-    def _marched(self) -> bool:
-        """Whether the march itself makes the residuals."""
-        return self.compare is None and isinstance(self.model, EquationModel)
+    @cached_property
+    def _marched(self) -> tuple[bool, ...]:
+        """Whether the march itself makes the residuals of each experiment."""
+        whole = self.compare is None and isinstance(self.model, EquationModel)
+        moved = {each.run for each in self.unknowns if each.name.startswith(EDGE)}
+        return tuple(whole and each.name not in moved for each in self.experiments)
 
     def _ready(self, vector: Array, number: int) -> tuple[Ready, ObservedRecord]:
         """The model with the numbers of one experiment, and this as the march sees it."""
