@@ -6,10 +6,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 from scipy.optimize import least_squares
+from tests.identification.given import virtual
 
-from swashplate import Drive
-from swashplate.campaign import rig
-from swashplate.campaign.campaign import Campaign
+from swashplate import Campaign, Drive
 from swashplate.equations.marching.observation import Observation, ObservedRecord
 from swashplate.equations.marching.record import record_of
 from swashplate.identification.fitting import Fit, StageFit, drawn, fit
@@ -21,13 +20,8 @@ AXES = ("hoist", "slew", "luff")
 
 
 def measured(axis: str, truth: Drive, path: Path) -> Campaign:
-    tests = rig.run(
-        axis,
-        severity="clean",
-        truth=truth,
-        channels=("rectified_current", "shaft_speed"),
-    )
-    return Campaign.from_toml(rig.write(tests, path))
+    channels = ("rectified_current", "shaft_speed")
+    return virtual(path, axis, severity="clean", truth=truth, channels=channels)
 
 
 def found(result: Fit) -> dict[str, float]:
@@ -50,7 +44,7 @@ def determined(stage: StageFit) -> list[str]:
 def test_the_truth_is_recovered(axis: str, seed: int, joint: bool, tmp_path: Path) -> None:
     setup = load_setup(axis)
     truth = drawn(Drive.preset(axis), setup, seed)
-    campaign = measured(axis, truth, tmp_path / "virtual")
+    campaign = measured(axis, truth, tmp_path)
     plan = setup.joint() if joint else setup
     # at 1e-14 the cost of slew, seed 4, 6e-15 already, creeps on along a stop that is not reached
     result = fit(campaign.drive(axis).parameters, campaign.experiments, plan, tolerance=1e-12)
@@ -70,8 +64,7 @@ def test_the_truth_is_recovered(axis: str, seed: int, joint: bool, tmp_path: Pat
 def test_counts_and_noise_leave_small_errors(tmp_path: Path) -> None:
     setup = load_setup("hoist")
     truth = drawn(Drive.preset("hoist"), setup, seed=5)
-    tests = rig.run("hoist", severity="realistic", truth=truth, seed=2)
-    campaign = Campaign.from_toml(rig.write(tests, tmp_path / "virtual"))
+    campaign = virtual(tmp_path, "hoist", severity="realistic", truth=truth, seed=2)
     result = fit(campaign.drive("hoist").parameters, campaign.select(role="fit"), setup)
     fitted, true = Drive(result.parameters), truth
     for volts in (-9.0, -6.5, -2.0, 2.0, 4.0, 9.0):
@@ -83,8 +76,7 @@ def test_a_stop_that_the_search_loses_is_found_again(seed: int, tmp_path: Path) 
     """From the published values a descent leaves these machines' stop, and finds none back."""
     axis, setup = "slew", load_setup("slew")
     truth = drawn(Drive.preset(axis), setup, seed)
-    tests = rig.run(axis, severity="realistic", truth=truth, seed=seed)
-    campaign = Campaign.from_toml(rig.write(tests, tmp_path))
+    campaign = virtual(tmp_path, axis, severity="realistic", truth=truth, seed=seed)
     values = fit(Drive.preset(axis), campaign, setup, threads=1).stages[-1].values
     for name in ("Z13_plus", "Z13_minus"):
         assert values[name] == pytest.approx(truth.parameters.numbers[name], rel=2e-3)
