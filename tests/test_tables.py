@@ -10,16 +10,7 @@ from hypothesis import strategies as st
 
 from swashplate import FileError, InputError
 from swashplate.parameters.definitions import CATALOGUE
-from swashplate.tables import (
-    UNIT,
-    Cell,
-    Column,
-    Table,
-    joined,
-    spread,
-    write_table,
-    write_whole,
-)
+from swashplate.tables import UNIT, Cell, Column, Table, joined, spread, write_table, write_whole
 from swashplate.units import chosen_unit, display_unit, shown_in, to_si, units_of_choice
 
 

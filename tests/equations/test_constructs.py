@@ -9,14 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from tests.equations.differences import compared
 
-from swashplate.equations import (
-    declared,
-    derive,
-    equation,
-    interpolate,
-    repeated,
-    root,
-)
+from swashplate.equations import declared, derive, equation, interpolate, repeated, root
 from swashplate.errors import EquationError
 
 pytestmark = pytest.mark.interpreted
@@ -211,10 +204,7 @@ def forwarding(x: float, y: float, o: Options) -> float:
 
 @pytest.mark.parametrize("damped", [OFF, ON])
 @pytest.mark.parametrize("doubled", [OFF, ON])
-def test_options_decide_what_there_is(
-    damped: bool | None,
-    doubled: bool | None,
-) -> None:
+def test_options_decide_what_there_is(damped: bool | None, doubled: bool | None) -> None:
     o = Options(damped, doubled)
     derived = check(optional, ("x", "y"), {"o": o, "extra": None}, x=0.7, y=1.3, o=o, extra=None)
     assert len(derived.entries) == (1 if damped is None else 2)

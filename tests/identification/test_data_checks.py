@@ -105,10 +105,7 @@ REFUSED = {
         "in 1 sample, the first at 1 s",
     ),
     "input": (
-        (
-            *GOOD,
-            replace(GOOD[0], input=replace(GOOD[0].input, values=put(3, np.inf)(held(8.0)))),
-        ),
+        (*GOOD, replace(GOOD[0], input=replace(GOOD[0].input, values=put(3, np.inf)(held(8.0))))),
         PUMP,
         "up: its input is not finite at sample 3",
     ),

@@ -146,9 +146,7 @@ def test_a_run_cut_out_of_a_rising_current_has_a_current_of_its_own(rate: float 
     assert 2.0 * found.solution.cost == pytest.approx(samples, abs=5.0 * np.sqrt(2.0 * samples))
 
 
-def test_a_bound_that_was_reached_is_said_with_the_entry_that_states_it(
-    campaign: Campaign,
-) -> None:
+def test_a_bound_that_was_reached_is_said_with_the_entry_that_states_it(campaign: Campaign) -> None:
     drive = Drive(smooth(campaign.drive("hoist").parameters)).scale(lim1=0.6)
     runs = campaign.select(role="fit")
     said = {}

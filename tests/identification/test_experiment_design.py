@@ -193,11 +193,7 @@ def test_runs_driven_by_a_current_are_counted() -> None:
 
 
 def looked(free: Mapping[str, Free], *runs: Experiment, **more: object) -> Outlook:
-    return outlook(
-        Stage(name="pump", part="pump", free=free, **more),
-        HOIST.parameters,
-        runs,
-    )
+    return outlook(Stage(name="pump", part="pump", free=free, **more), HOIST.parameters, runs)
 
 
 def test_before_a_fit_each_run_is_marked() -> None:

@@ -1,7 +1,6 @@
 """Spool, flow, oil, swash plate and motor (eqs. 6.11-6.59, 6.69), as printed and as used."""
 
 from collections.abc import Callable
-from dataclasses import replace
 from math import asin, cos, inf, sin, sqrt, tan
 from typing import NamedTuple
 
@@ -9,7 +8,7 @@ import numpy as np
 import pytest
 import sympy as sp
 
-from swashplate import Drive, PhysicalSet, maneuvers
+from swashplate import Drive, PhysicalSet
 from swashplate.equations.equation import interpreted
 from swashplate.equations.fields import made
 from swashplate.models import displacement_control, machine, pump, refinements
@@ -309,19 +308,6 @@ def test_erratum_09_fitted_arms_are_no_geometry() -> None:
     slew, luff = Drive.preset("slew"), Drive.preset("luff")
     assert luff["Z3"].value / slew["Z3"].value == pytest.approx(19.3, abs=0.05)
     assert luff["Z5"].value / slew["Z5"].value == pytest.approx(1.19, abs=0.005)
-
-
-@pytest.mark.parametrize(
-    ("test", "deg_s"), [("sine 9 V 0.1 Hz", 0.7), ("ramp +1 V/s", 0.7), ("step +9 V", 5.6)]
-)
-def test_erratum_13_what_the_root_changes_on_the_hoist(
-    hoist: Drive, test: str, deg_s: float
-) -> None:
-    """The right root with parameters that were fitted with the other one."""
-    right = Drive(replace(hoist.parameters, pressure_root="symmetric"))
-    voltage = maneuvers.source_tests("hoist")[test].sample(512.0)
-    change = right.simulate(voltage).shaft_speed - hoist.simulate(voltage).shaft_speed
-    assert np.rad2deg(np.abs(change).max()) == pytest.approx(deg_s, abs=0.05)
 
 
 def test_erratum_17_motor_constant_is_angle_per_volume() -> None:

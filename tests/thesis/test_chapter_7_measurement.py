@@ -5,12 +5,7 @@ import pytest
 from reproduction.speed_path import path_delay, simulated_speed, speed_of_angle
 
 from swashplate import Drive, maneuvers
-from swashplate.campaign import (
-    DIFFERENTIATOR,
-    LOW_PASS,
-    Encoder,
-    speed_from_angle,
-)
+from swashplate.campaign import DIFFERENTIATOR, LOW_PASS, Encoder, speed_from_angle
 
 H = 1.0 / 512.0
 HOIST_TURN = 400.0 * 120.0 / 19.0
