@@ -17,6 +17,7 @@ from swashplate.models.machine import Machine
 
 PUMP = made(Pump, Drive.preset("hoist").parameters.numbers)
 MACHINE = Machine(**PhysicalSet.preset("hoist").numbers)
+PUMPING = MACHINE.pumping_area * MACHINE.pumping_arm
 OPEN = dict.fromkeys(("spool_stroke", "orifice_opening_plus", "orifice_opening_minus"), inf)
 
 Formula = Callable[..., float]
@@ -156,9 +157,14 @@ ROWS = {
         lambda rise, *_: rise,
         (RISE, AREA, (5e4, 1e5), LEVER),
     ),
-    "eq_6_52_to_6_54_static_pressure": Row(
-        lambda K, C_g: of("static_pressure", motor_constant=K, load_torque=C_g),
+    "eq_6_52_and_6_53_pressure_that_holds_a_load": Row(
         lambda K, C_g: of("holding_pressure", 0.0, K * C_g),
+        lambda K, C_g: K * C_g * PUMPING / (MACHINE.piston_area * MACHINE.swash_arm),
+        ((100.0, 400.0), (-5e3, 5e3)),
+    ),
+    "eq_6_54_static_pressure": Row(
+        lambda K, C_g: of("static_pressure", motor_constant=K, load_torque=C_g),
+        lambda K, C_g: K * C_g * PUMPING / (MACHINE.piston_area * MACHINE.swash_arm),
         ((100.0, 400.0), (-5e3, 5e3)),
     ),
     "erratum_17_eq_6_39_to_6_41_work_of_the_motor": Row(
@@ -292,12 +298,10 @@ def test_eq_6_38_and_6_47_to_6_51_swash_plate_by_its_energies() -> None:
         (-2e5, 2e5), (-0.3, 0.3), (-50, 50), (-1e6, 1e6), (0.05, 0.1), (1e-3, 1e-2), (0.1, 0.5),
         (0, 300), (5e4, 1e5), (1e-3, 4e-3), (1e-7, 1e-5),
     ):  # fmt: skip
-        at_piston, angle, rate, across, arm, plate, piston, damping, spring, piston_area, moment = (
-            at
-        )
+        push, angle, rate, across, arm, plate, mass, damping, spring, piston_area, moment = at
         found = of(
-            "swash_acceleration", at_piston, tan(angle), rate, across, swash_arm=arm,
-            swash_inertia=plate, piston_mass=piston, piston_damping=damping, pumping_arm=1.0,
+            "swash_acceleration", push, tan(angle), rate, across, swash_arm=arm,
+            swash_inertia=plate, piston_mass=mass, piston_damping=damping, pumping_arm=1.0,
             return_spring_rate=spring, piston_area=piston_area, pumping_area=moment,
         )  # fmt: skip
         assert found == pytest.approx(expected(*at), rel=1e-9)
