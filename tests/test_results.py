@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import pytest
 from matplotlib.figure import Figure
-from tests.identification.given import TWO_STAGES
+from tests.identification.given import TWO_STAGES, virtual
 
 import swashplate
 from swashplate import Campaign, Drive, FullOrderDrive, InputError, Limit, SquaredError, maneuvers
@@ -28,16 +28,10 @@ from swashplate.analysis import (
     trial,
     what_if,
 )
-from swashplate.campaign import examine, guess_drive, rig
+from swashplate.campaign import examine, guess_drive
 from swashplate.crane import Crane, Seaway, Stick, TransferFunctions, control
 from swashplate.full_order import compare
-from swashplate.identification import (
-    Fit,
-    fit,
-    judge_fit,
-    outlook,
-    predict,
-)
+from swashplate.identification import Fit, fit, judge_fit, outlook, predict
 from swashplate.results import LONGEST
 
 API = Path(__file__).parents[1] / "docs" / "api.toml"
@@ -54,8 +48,7 @@ class Work(NamedTuple):
 
 @pytest.fixture(scope="module")
 def work(tmp_path_factory: pytest.TempPathFactory) -> Work:
-    path = rig.write(rig.run("hoist", TESTS, seed=1), tmp_path_factory.mktemp("tests") / "logs")
-    campaign = Campaign.from_toml(path)
+    campaign = virtual(tmp_path_factory.mktemp("tests"), "hoist", TESTS, seed=1)
     fitted = fit(Drive.preset("hoist"), campaign, TWO_STAGES)
     judged = judge_fit(campaign, fitted)
     return Work(campaign, fitted, judged)

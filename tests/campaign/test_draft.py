@@ -3,9 +3,11 @@
 import tomllib
 from pathlib import Path
 
+import numpy as np
 import pytest
+from tests.campaign.conftest import Drafted
 
-from swashplate import Campaign, InputError, ParameterError
+from swashplate import InputError, ParameterError
 from swashplate.campaign import draft_campaign as draft
 
 
@@ -52,16 +54,15 @@ def test_what_a_header_says(tmp_path: Path, header: str, kind: str | None) -> No
     assert (f"# Columns that are not used: {header}" in text) == (kind is None)
 
 
-def write_logs(folder: Path) -> list[Path]:
-    rows = [f"{k / 100},{4 if k > 20 else 0},{0.4 if k > 20 else 0},{7 * k}" for k in range(100)]
-    paths = [folder / f"run{number}.csv" for number in range(4)]
-    for path in paths:
-        path.write_text("\n".join(["time [s],voltage [V],current [A],counts", *rows]) + "\n")
-    return paths
-
-
-def test_a_draft_can_be_read(tmp_path: Path) -> None:
-    text = draft(write_logs(tmp_path), tmp_path, "hoist", 2526.3)
+def test_a_draft_can_be_read(drafted: Drafted) -> None:
+    row = np.arange(100.0)
+    on = 1.0 * (row > 20)
+    columns = {"time [s]": row / 100, "voltage [V]": 4 * on, "current [A]": 0.4 * on}
+    logs = {f"run{number}.csv": {**columns, "counts": 7 * row} for number in range(4)}
+    with pytest.raises(ParameterError, match="encoder_counts need counts_per_turn"):
+        drafted(logs, draft={"drive": "hoist"})
+    tests = drafted(logs, draft={"drive": "hoist", "counts_per_turn": 2526.3})
+    text = tests.path.read_text("utf-8")
     content = tomllib.loads(text)
     axis = content["axes"]["hoist"]
     assert axis["drive"] == "hoist"
@@ -70,17 +71,8 @@ def test_a_draft_can_be_read(tmp_path: Path) -> None:
     assert [run["role"] for run in content["runs"]] == ["fit", "fit", "fit", "validate"]
     assert "100 samples, 0.99 s at 100 Hz, step +4 V" in text
     assert axis["channels"]["encoder_counts"]["counts_per_turn"] == 2526.3
-    (tmp_path / "campaign.toml").write_text(text, "utf-8")
-    tests = Campaign.from_toml(tmp_path / "campaign.toml")
     assert tests["run2"].input.values[-1] == 4.0
     assert tests["run2"]["rectified_current"].values[-1] == pytest.approx(0.4)
-
-
-def test_what_cannot_be_guessed_is_left_open(tmp_path: Path) -> None:
-    text = draft(write_logs(tmp_path), tmp_path, "hoist")
-    (tmp_path / "campaign.toml").write_text(text, "utf-8")
-    with pytest.raises(ParameterError, match="encoder_counts need counts_per_turn"):
-        Campaign.from_toml(tmp_path / "campaign.toml")
 
 
 def test_an_axis_for_each_prefix_and_logs_without_some(tmp_path: Path) -> None:
@@ -95,22 +87,19 @@ def test_an_axis_for_each_prefix_and_logs_without_some(tmp_path: Path) -> None:
     assert content["runs"][1]["only"] == ["boom"]
 
 
-def test_a_log_without_a_command_leaves_a_line_to_fill_in(tmp_path: Path) -> None:
-    (tmp_path / "log.csv").write_text("time,current,Kanal 3\n0,1,2\n1,2,3\n", "utf-8")
-    text = draft([tmp_path / "log.csv"], tmp_path)
-    assert "column = \"FIXME\"    # which of 'time', 'current', 'Kanal 3' commands?" in text
-    (tmp_path / "campaign.toml").write_text(text, "utf-8")
+def test_a_log_without_a_command_leaves_a_line_to_fill_in(drafted: Drafted, tmp_path: Path) -> None:
+    logs = {"log.csv": {"time": [0.0, 1.0], "current": [1.0, 2.0], "Kanal 3": [2.0, 3.0]}}
     with pytest.raises(InputError, match="For the input: .* has no column 'FIXME'; it has 'time'"):
-        Campaign.from_toml(tmp_path / "campaign.toml")
+        drafted(logs)
+    text = (tmp_path / "campaign.toml").read_text("utf-8")
+    assert "column = \"FIXME\"    # which of 'time', 'current', 'Kanal 3' commands?" in text
     columns = {"Kanal 3": "voltage"}
-    text = draft([tmp_path / "log.csv"], tmp_path, columns=columns, units={"Kanal 3": "mV"})
-    (tmp_path / "campaign.toml").write_text(text, "utf-8")
-    drive = Campaign.from_toml(tmp_path / "campaign.toml")["log"].input
+    drive = drafted(logs, draft={"columns": columns, "units": {"Kanal 3": "mV"}})["log"].input
     assert (drive.kind, drive.values.tolist()) == ("voltage", [0.002, 0.003])
     with pytest.raises(InputError, match="No log has a column 'Kanal 4'"):
-        draft([tmp_path / "log.csv"], tmp_path, columns={"Kanal 4": "voltage"})
+        drafted(logs, draft={"columns": {"Kanal 4": "voltage"}})
     with pytest.raises(InputError, match="cannot be a 'volts': it is time, voltage"):
-        draft([tmp_path / "log.csv"], tmp_path, columns={"Kanal 3": "volts"})
+        drafted(logs, draft={"columns": {"Kanal 3": "volts"}})
     with pytest.raises(InputError, match="at least one log"):
         draft([], tmp_path)
 

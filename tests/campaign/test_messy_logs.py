@@ -1,26 +1,19 @@
 """Logs as people have them: each case was met by someone who tried the package as a new user."""
 
 import tomllib
-from collections.abc import Callable, Mapping
 from pathlib import Path
 
 import numpy as np
 import pytest
+from tests.campaign.conftest import BOTH, RATE, TIME, Columns, Drafted, write
 from tests.logs.writing import write_log
 
 from swashplate import Campaign, Drive, FileError, InputError, ParameterError
 from swashplate.campaign import campaign_findings, draft_campaign, examine, unsigned_currents
 from swashplate.identification.data_checks import beside_the_drives, check_runs, refuse_unsound
 
-RATE = 200.0
-TIME = np.arange(int(8.0 * RATE)) / RATE
-BOTH = 4.0 * (TIME > 1.0) - 8.0 * (TIME > 3.0) + 4.0 * (TIME > 5.0)
-"""A command of both signs: 4 V from 1 s to 3 s, -4 V to 5 s. [V]"""
 SINE = 5.0 * np.sin(2.0 * np.pi * 0.4 * TIME)
 PER_TURN = {"counts_per_turn": 1000.0}
-
-Columns = Mapping[str, np.ndarray | list[str]]
-Drafted = Callable[..., Campaign]
 
 
 def lagged(command: np.ndarray, lag: float = 0.1) -> np.ndarray:
@@ -30,40 +23,6 @@ def lagged(command: np.ndarray, lag: float = 0.1) -> np.ndarray:
         out[k] = state
         state += share * (each - state)
     return out
-
-
-def write(folder: Path, name: str, columns: Columns) -> Path:
-    """A CSV of columns by their names."""
-    rows = zip(*columns.values(), strict=True)
-    lines = [",".join(columns)] + [
-        ",".join(cell if isinstance(cell, str) else f"{cell:.9g}" for cell in row) for row in rows
-    ]
-    (folder / name).write_text("\n".join(lines) + "\n", "utf-8")
-    return folder / name
-
-
-@pytest.fixture
-def drafted(tmp_path: Path) -> Drafted:
-    """What the draft of logs, columns by file, is read as.
-
-    Columns given by keyword are those of one log, beside its time and a command of both signs.
-    """
-
-    def made(
-        logs: Mapping[str, Columns] | None = None,
-        keep: np.ndarray | slice = slice(None),
-        draft: Mapping[str, object] | None = None,
-        **columns: np.ndarray | list[str],
-    ) -> Campaign:
-        one = {"time": TIME, "voltage": BOTH} | columns
-        logs = logs or {"log.csv": {name: each[keep] for name, each in one.items()}}
-        paths = [write(tmp_path, *each) for each in logs.items()]
-        (tmp_path / "campaign.toml").write_text(
-            draft_campaign(paths, tmp_path, **(draft or {})), "utf-8"
-        )
-        return Campaign.from_toml(tmp_path / "campaign.toml")
-
-    return made
 
 
 def text_of(tests: Campaign) -> str:

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from tests.campaign.conftest import Drafted
 
 from swashplate import Campaign
 from swashplate.campaign import Quality, beyond_the_card, campaign_findings, examine
@@ -164,50 +165,39 @@ def test_equal_steps_are_a_constant_speed(campaign_folder: Path) -> None:
 
 # --- runs beside each other -----------------------------------------------------------------------
 
-TIME = np.arange(800) / 100.0
 
-
-def tacho(folder: Path, factors: dict[str, float], resolution: float = 0.0) -> Campaign:
+def tacho(drafted: Drafted, factors: dict[str, float], resolution: float = 1e-9) -> Campaign:
     """Steps of several volts on a machine of 20 1/min a volt, a factor on each log's reading."""
-    runs = []
+    time, logs = np.arange(800) / 100.0, {}
     for volts, (name, factor) in enumerate(factors.items(), 4):
-        command = volts * ((TIME > 1.0) & (TIME < 6.0))
-        speed = factor * 20.0 * np.convolve(command, np.ones(50) / 50.0)[: TIME.size]
-        speed = np.round(speed / resolution) * resolution if resolution else speed
-        rows = [f"{t:.2f},{u:g},{n:.6g}" for t, u, n in zip(TIME, command, speed, strict=True)]
-        (folder / f"{name}.csv").write_text("\n".join(["time,u,n", *rows]) + "\n", "utf-8")
-        runs.append(f'[[runs]]\nfile = "{name}.csv"\n')
-    (folder / "campaign.toml").write_text(
-        'title = "tacho"\n[axes.winch]\n'
-        'time = { column = "time", unit = "s" }\n'
-        '[axes.winch.input]\nkind = "voltage"\ncolumn = "u"\nunit = "V"\n'
-        'interpolation = "previous"\n'
-        '[axes.winch.channels.n]\nkind = "shaft_speed"\ncolumn = "n"\nunit = "1/min"\n'
-        + "".join(runs),
-        "utf-8",
-    )
-    return Campaign.from_toml(folder / "campaign.toml")
+        command = volts * ((time > 1.0) & (time < 6.0))
+        speed = factor * 20.0 * np.convolve(command, np.ones(50) / 50.0)[: time.size]
+        read = np.round(speed / resolution) * resolution
+        logs[f"{name}.csv"] = {"time": time, "voltage": command, "n [1/min]": read}
+    return drafted(logs)
 
 
 @pytest.mark.parametrize("factor", [2.0 * np.pi / 60.0, 60.0])
-def test_a_log_in_another_unit_is_named(tmp_path: Path, factor: float) -> None:
+def test_a_log_in_another_unit_is_named(drafted: Drafted, factor: float) -> None:
     """One log in rad/s, or in turns per hour, under a unit of 1/min."""
-    tests = tacho(tmp_path, {"a": 1.0, "b": 1.0, "odd": factor, "c": 1.0})
+    tests = tacho(drafted, {"a": 1.0, "b": 1.0, "odd": factor, "c": 1.0})
     (said,) = campaign_findings(tests)
-    assert said.startswith(f"odd: 'n' moves {factor:.3g} times as fast as in the other runs")
-    assert "check the unit of 'n' in this log" in said
+    assert said.startswith(
+        f"odd: 'shaft_speed' moves {factor:.3g} times as fast as in the other runs"
+    )
+    assert "check the unit of 'n [1/min]' in this log" in said
 
 
-def test_runs_of_one_machine_have_one_scale(tmp_path: Path) -> None:
-    assert campaign_findings(tacho(tmp_path, {"a": 1.0, "b": 1.3, "c": 0.8, "d": 1.0})) == ()
+def test_runs_of_one_machine_have_one_scale(drafted: Drafted) -> None:
+    assert campaign_findings(tacho(drafted, {"a": 1.0, "b": 1.3, "c": 0.8, "d": 1.0})) == ()
 
 
-def test_a_coarse_reading_is_named(tmp_path: Path) -> None:
-    coarse = tacho(tmp_path, {"a": 1.0}, resolution=5.0)
-    (found,) = (each for each in examine(coarse["a"]) if each.signal == "n")
+def test_a_coarse_reading_is_named(drafted: Drafted) -> None:
+    coarse = tacho(drafted, {"a": 1.0}, resolution=5.0)
+    (found,) = (each for each in examine(coarse["a"]) if each.signal == "shaft_speed")
     assert found.findings == (
         "reads in steps of 30 deg/s, 6.2 % of its range: smaller motions and dead zones cannot be "
         "told",
     )
-    fine = tacho(tmp_path, {"a": 1.0}, resolution=1.0)
+    fine = tacho(drafted, {"a": 1.0}, resolution=1.0)
     assert all(each.findings == () for each in examine(fine["a"]))

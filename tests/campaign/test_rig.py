@@ -42,9 +42,7 @@ def test_clean_logs_are_the_model_to_the_last_bit() -> None:
             columns["current"], model.current_positive + model.current_negative
         )
         np.testing.assert_allclose(
-            columns["counts"],
-            model.shaft_position / (2.0 * np.pi) * 2526.315789473684,
-            rtol=1e-14,
+            columns["counts"], model.shaft_position / (2.0 * np.pi) * 2526.315789473684, rtol=1e-14
         )
 
 

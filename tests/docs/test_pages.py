@@ -50,11 +50,7 @@ each_page = pytest.mark.parametrize("page", PAGES, ids=lambda path: str(path.rel
 
 BLOCK = re.compile(r"^```([^\n`]*)\n(.*?)^```[ \t]*$", re.MULTILINE | re.DOTALL)
 TARGETS = set(re.findall(r"^([.a-z-]+):.*##", (ROOT / "Makefile").read_text("utf-8"), re.MULTILINE))
-NOT_RUN = (
-    r"(cd|mkdir) \S+",
-    r"source \.venv/bin/activate",
-    r"dask (scheduler|worker) .*",
-)
+NOT_RUN = (r"(cd|mkdir) \S+", r"source \.venv/bin/activate", r"dask (scheduler|worker) .*")
 
 
 def blocks(text: str) -> list[tuple[str, str]]:

@@ -8,13 +8,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from swashplate import InputError
-from swashplate.equations import (
-    Model,
-    discretised,
-    equation,
-    sensitivities,
-    simulate,
-)
+from swashplate.equations import Model, discretised, equation, sensitivities, simulate
 
 RATE, SIZE = 50.0, 60
 TORQUE = np.where(np.arange(SIZE) > 15, 3.0, 0.0)

@@ -276,32 +276,17 @@ def test_an_option_that_is_false_is_off() -> None:
         simulate(made, Gain(1.0), {"command": np.ones(4)}, rate=1.0, given=Ways())
 
 
+@equation
+def implicit(p: Valve, h: float) -> Share:
+    return Share(1.0 - 1.0 / (1.0 + h / p.lag))
+
+
 def test_an_equation_of_a_model_is_replaced() -> None:
-    class Lag(NamedTuple):
-        time: float
-
-    class Out(NamedTuple):
-        out: float
-
-    @equation
-    def kept(time: float, h: float) -> float:
-        return exp(-h / time)
-
-    @equation
-    def follow(state: Out, command: float, p: Lag, h: float) -> Out:
-        a = kept(p.time, h)
-        return Out(a * state.out + (1.0 - a) * command)
-
-    @equation
-    def implicit(time: float, h: float) -> float:
-        return 1.0 / (1.0 + h / time)
-
-    lag = Model("lag", parameters=Lag, state=Out, step=follow)
-    other = replaced(lag, kept, implicit)
-    run = simulate(other, Lag(0.1), {"command": np.ones(5)}, 10.0)
-    np.testing.assert_allclose(run["out"], 1.0 - 0.5 ** np.arange(5), rtol=1e-15)
-    two = join("two", lag)
-    assert replaced(two, kept, implicit).parts[0] is not lag
+    other = replaced(valve, constants, implicit)
+    opening = simulate(other, P, {"command": np.ones(9)}, RATE, given=STROKE)["opening"]
+    # the delay of 3.3 samples is over
+    np.testing.assert_allclose((1.0 - opening[6:]) / (1.0 - opening[5:-1]), 1.0 / 1.2, rtol=1e-12)
+    assert replaced(join("two", valve), constants, implicit).parts[0] is not valve
 
 
 # --- what is refused ------------------------------------------------------------------------------

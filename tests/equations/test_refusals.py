@@ -21,10 +21,6 @@ class Two(NamedTuple):
     b: float = 1.0
 
 
-def plain(x: float) -> float:
-    return x
-
-
 @equation
 def fine(x: float) -> float:
     return x

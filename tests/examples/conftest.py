@@ -3,7 +3,6 @@
 import contextlib
 import importlib.util
 import io
-import re
 import runpy
 import sys
 from collections.abc import Callable, Iterator
@@ -12,10 +11,8 @@ from types import ModuleType
 from typing import Any, NamedTuple
 
 import pytest
-from tests.shown import check_shown
 
 ROOT = Path(__file__).parents[2]
-PAGE = ROOT / "docs" / "examples.md"
 
 
 class Run(NamedTuple):
@@ -60,15 +57,3 @@ def load_example() -> Iterator[Callable[[str], ModuleType]]:
             return module
 
         yield load
-
-
-@pytest.fixture
-def matches_page() -> Callable[[str, str], None]:
-    """What an example prints is what the page says, but for what another processor may round."""
-
-    def check(name: str, printed: str) -> None:
-        text = PAGE.read_text("utf-8")
-        (said,) = re.findall(rf"examples/{name}\.py\n.*?```text\n(.*?)```", text, re.DOTALL)
-        check_shown(said, printed, name, share=0.0)
-
-    return check

@@ -47,18 +47,6 @@ def free_run(actuator: ModuleType, opening: np.ndarray, rate: float = 1.0) -> np
     return simulate(actuator.actuator.model, numbers, {"u": opening}, rate)["p"]
 
 
-@pytest.mark.parametrize("opening", [1.0, -1.0])
-def test_at_rest_the_pressure_drives_the_load_against_its_drag(
-    actuator: ModuleType, opening: float
-) -> None:
-    pressure = free_run(actuator, np.full(2000, opening))[-1]
-    # by hand: p = b v at full opening, v = -0.87 * 3 sqrt(1 + p/ps) or 0.49 * 2.1 sqrt(1 - p/ps)
-    gain, full = (3.0, 0.87) if opening > 0.0 else (2.1, 0.49)
-    flow = gain * full * np.sqrt(1.0 - abs(pressure) / 12.8)
-    # the root is straight close to zero by 1e-3, which shifts it by less than a thousandth
-    assert pressure == pytest.approx(-np.sign(opening) * 1.24 * flow, rel=1e-3)
-
-
 def test_the_march_against_an_adaptive_solver(actuator: ModuleType) -> None:
     opening = 0.8 * np.sin(0.05 * np.arange(300)) + 0.3 * np.sin(0.21 * np.arange(300))
     grid = np.arange(300.0)

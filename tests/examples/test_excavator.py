@@ -26,35 +26,14 @@ def excavator(load_example: Callable[[str], ModuleType]) -> ModuleType:
     return load_example("excavator")
 
 
-def rod(
-    excavator: ModuleType, command: float, slope: float = 0.0, stops: tuple[float, ...] = ()
-) -> np.ndarray:
-    """Position under a constant command without lag or delay, from 0.1 m."""
-    p = excavator.Valve(0.0, 1e-6, 1.2, 1.0, 0.25, 0.02, 0.03, slope)
-    run = simulate(
-        excavator.valve,
-        p,
-        {"command": np.full(201, command)},
-        RATE,
-        given=excavator.Stroke(0.08, *stops),
-        begin={"position": 0.1},
-    )
-    return run["position"]
-
-
-def test_within_the_overlap_the_rod_stays(excavator: ModuleType) -> None:
-    for command in (1.2, -1.0):
-        assert (rod(excavator, command) == 0.1).all()
-
-
-def test_beyond_it_the_flow_saturates(excavator: ModuleType) -> None:
-    # by hand: 2 s at 20 mm/s (1 - exp(-0.5/0.25)), and back at 30 mm/s (1 - exp(-0.7/0.25))
-    for command, moved in (
-        (1.7, 0.04 * (1.0 - np.exp(-2.0))),
-        (-1.7, -0.06 * (1.0 - np.exp(-2.8))),
-    ):
-        position = rod(excavator, command)
-        assert position[200] - position[100] == pytest.approx(moved, rel=1e-9)
+def test_beyond_its_overlap_the_flow_saturates(excavator: ModuleType) -> None:
+    """By hand: 2 s at 20 mm/s (1 - exp(-0.5/0.25)), and back at 30 mm/s (1 - exp(-0.7/0.25))."""
+    p = excavator.Valve(0.0, 1e-6, 1.2, 1.0, 0.25, 0.02, 0.03, 0.0)
+    moves = {1.2: 0.0, -1.0: 0.0, 1.7: 0.04 * (1.0 - np.exp(-2.0))}
+    for command, moved in (moves | {-1.7: -0.06 * (1.0 - np.exp(-2.8))}).items():
+        record, stroke = {"command": np.full(201, command)}, excavator.Stroke(0.08)
+        run = simulate(excavator.valve, p, record, RATE, given=stroke, begin={"position": 0.1})
+        assert run["position"][200] - run["position"][100] == pytest.approx(moved, rel=1e-9)
 
 
 @logs

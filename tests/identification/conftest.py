@@ -1,9 +1,9 @@
 """A short campaign of virtual tests."""
 
 import pytest
+from tests.identification.given import virtual
 
 from swashplate import Campaign, Drive, maneuvers
-from swashplate.campaign import rig
 
 
 @pytest.fixture(scope="session")
@@ -12,8 +12,5 @@ def short_campaign(tmp_path_factory: pytest.TempPathFactory) -> Campaign:
     levels = (3.0, 4.0, 5.0, -4.0)
     commands = [maneuvers.step(level, start=0.5, stop=2.5, length=4.0) for level in levels]
     truth = Drive.preset("hoist").replace(J=(0.26, 0.31), Z10=13.0)
-    tests = rig.run("hoist", commands, seed=2, truth=truth, severity="clean")
-    path = rig.write(tests, tmp_path_factory.mktemp("rig") / "tests")
-    text = path.read_text("utf-8").replace('role = "validate"', 'role = "fit"')
-    path.write_text(text, "utf-8")
-    return Campaign.from_toml(path)
+    clean = {"seed": 2, "truth": truth, "severity": "clean"}
+    return virtual(tmp_path_factory.mktemp("rig"), "hoist", commands, **clean)

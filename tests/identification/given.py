@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.signal import lfilter
 
-from swashplate import Channel, Experiment
+from swashplate import Campaign, Channel, Experiment
+from swashplate.campaign import rig
 from swashplate.campaign.experiment import InputSignal, Source
 from swashplate.executors import Serial
 from swashplate.identification.problem import TOLERANCE, LinearisedFit, LinearisedRun
@@ -120,6 +121,11 @@ def first_order(
     """Noise of variance 1 with the autocorrelation ρ^|k| along the last axis."""
     drawn = rng.normal(size=(*size[:-1], size[-1] + warm))
     return lfilter([np.sqrt(1.0 - rho**2)], [1.0, -rho], drawn)[..., warm:]
+
+
+def virtual(folder: Path, *tests: object, **options: object) -> Campaign:
+    """Virtual tests, written into a folder and read again."""
+    return Campaign.from_toml(rig.write(rig.run(*tests, **options), folder / "virtual"))
 
 
 class Backwards(Serial):

@@ -5,10 +5,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from tests.identification.given import run_of
+from tests.identification.given import run_of, virtual
 
 from swashplate import Channel, Drive, Experiment, InputError, maneuvers
-from swashplate.campaign import Campaign, guess_drive, rig
+from swashplate.campaign import guess_drive
 from swashplate.identification.data_checks import (
     Finding,
     Motion,
@@ -51,8 +51,7 @@ def findings(*runs: Experiment) -> list[Finding]:
 
 @pytest.mark.parametrize("axis", ["hoist", "slew", "luff"])
 def test_the_sources_campaigns_are_sound(axis: str, tmp_path: Path) -> None:
-    tests = rig.run(axis, perturb=0.1, seed=3)
-    campaign = Campaign.from_toml(rig.write(tests, tmp_path / "virtual"))
+    campaign = virtual(tmp_path, axis, perturb=0.1, seed=3)
     nominal = smooth(campaign.drive(axis).parameters)
     assert check_runs(campaign.select(role="fit"), nominal) == []
     assert findings(*GOOD) == []
@@ -106,10 +105,7 @@ REFUSED = {
         "in 1 sample, the first at 1 s",
     ),
     "input": (
-        (
-            *GOOD,
-            replace(GOOD[0], input=replace(GOOD[0].input, values=put(3, np.inf)(held(8.0)))),
-        ),
+        (*GOOD, replace(GOOD[0], input=replace(GOOD[0].input, values=put(3, np.inf)(held(8.0))))),
         PUMP,
         "up: its input is not finite at sample 3",
     ),

@@ -4,10 +4,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from tests.identification.given import run_of
+from tests.identification.given import run_of, virtual
 
 from swashplate import Campaign, Drive, InputError
-from swashplate.campaign import rig
 from swashplate.identification.drive_model import (
     DriveModel,
     at_rate_of,
@@ -26,10 +25,8 @@ from swashplate.maneuvers import source_tests, step
 def campaign(tmp_path_factory: pytest.TempPathFactory) -> Campaign:
     tests = source_tests("hoist")
     chosen = {name: tests[name] for name in ("step +4 V", "sine 9 V 0.3 Hz", "ramp +1 V/s")}
-    virtual = rig.run(
-        "hoist", chosen, severity="clean", channels=("rectified_current", "shaft_speed")
-    )
-    return Campaign.from_toml(rig.write(virtual, tmp_path_factory.mktemp("t") / "virtual"))
+    what = {"severity": "clean", "channels": ("rectified_current", "shaft_speed")}
+    return virtual(tmp_path_factory.mktemp("t"), "hoist", chosen, **what)
 
 
 def test_the_sources_weights_of_the_pump(campaign: Campaign) -> None:
@@ -149,9 +146,7 @@ def test_a_run_cut_out_of_a_rising_current_has_a_current_of_its_own(rate: float 
     assert 2.0 * found.solution.cost == pytest.approx(samples, abs=5.0 * np.sqrt(2.0 * samples))
 
 
-def test_a_bound_that_was_reached_is_said_with_the_entry_that_states_it(
-    campaign: Campaign,
-) -> None:
+def test_a_bound_that_was_reached_is_said_with_the_entry_that_states_it(campaign: Campaign) -> None:
     drive = Drive(smooth(campaign.drive("hoist").parameters)).scale(lim1=0.6)
     runs = campaign.select(role="fit")
     said = {}

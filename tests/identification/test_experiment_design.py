@@ -4,10 +4,9 @@ from collections.abc import Mapping
 
 import numpy as np
 import pytest
-from tests.identification.given import run_of, unknowns_of
+from tests.identification.given import run_of, unknowns_of, virtual
 
 from swashplate import Campaign, Drive, Experiment, InputError, maneuvers
-from swashplate.campaign import rig
 from swashplate.identification.experiment_design import (
     MEMORY,
     Candidate,
@@ -76,8 +75,7 @@ SPEED = Sensor("shaft_speed", 0.01)
 @pytest.fixture(scope="module")
 def hoist_tests(tmp_path_factory: pytest.TempPathFactory) -> Campaign:
     """Kruse's tests of a hoist near the published one, with instruments."""
-    tests = rig.run("hoist", seed=4, perturb=0.02)
-    return Campaign.from_toml(rig.write(tests, tmp_path_factory.mktemp("rig") / "tests"))
+    return virtual(tmp_path_factory.mktemp("rig"), "hoist", seed=4, perturb=0.02)
 
 
 def setup(*names: str) -> Setup:
@@ -195,11 +193,7 @@ def test_runs_driven_by_a_current_are_counted() -> None:
 
 
 def looked(free: Mapping[str, Free], *runs: Experiment, **more: object) -> Outlook:
-    return outlook(
-        Stage(name="pump", part="pump", free=free, **more),
-        HOIST.parameters,
-        runs,
-    )
+    return outlook(Stage(name="pump", part="pump", free=free, **more), HOIST.parameters, runs)
 
 
 def test_before_a_fit_each_run_is_marked() -> None:

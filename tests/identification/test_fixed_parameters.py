@@ -4,11 +4,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from tests.identification.given import unknowns_of
+from tests.identification.given import unknowns_of, virtual
 from tests.identification.test_own_model import NOISE, RANGES, RUNS, servo
 
 from swashplate import Campaign, Drive, ParameterError
-from swashplate.campaign import rig
 from swashplate.identification import ModelSetup, fit
 from swashplate.identification.intervals import Handed, with_handed
 from swashplate.identification.lack_of_fit import lack_of_fit
@@ -28,8 +27,8 @@ def stated(**doubts: float | str) -> Setup:
 def campaign(tmp_path_factory: pytest.TempPathFactory) -> Campaign:
     tests = source_tests("hoist")
     names = ("step +4 V", "step -4 V", "step +9 V", "step -9 V", "sine 9 V 0.1 Hz")
-    virtual = rig.run("hoist", {name: tests[name] for name in names}, seed=3, perturb=0.05)
-    return Campaign.from_toml(rig.write(virtual, tmp_path_factory.mktemp("t") / "virtual"))
+    chosen = {name: tests[name] for name in names}
+    return virtual(tmp_path_factory.mktemp("t"), "hoist", chosen, seed=3, perturb=0.05)
 
 
 @pytest.mark.slow

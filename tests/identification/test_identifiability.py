@@ -60,10 +60,7 @@ def test_a_null_direction_is_written_by_name() -> None:
 def test_two_null_directions_come_apart() -> None:
     """Any mixture of two null directions is null too: the sparse ones are wanted."""
     found = judged(columns((1.0, 1.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0, -2.0)), "abcde")
-    assert {frozenset(each.changes) for each in found.null} == {
-        frozenset("ab"),
-        frozenset("de"),
-    }
+    assert {frozenset(each.changes) for each in found.null} == {frozenset("ab"), frozenset("de")}
     assert len({each.fix for each in found.null}) == 2
 
 

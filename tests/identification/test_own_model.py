@@ -95,9 +95,9 @@ def trial(name: str, load: Load = Load(), begin: float = 0.0, **channels: np.nda
 
 
 def moved(run: Experiment, values: np.ndarray, **more: object) -> Experiment:
-    """A run with another position."""
-    channel = replace(run["position"], values=values, **more)
-    return replace(run, channels={**run.channels, "position": channel})
+    """A run with other values of its first channel, its position."""
+    name, channel = next(iter(run.channels.items()))
+    return replace(run, channels={**run.channels, name: replace(channel, values=values, **more)})
 
 
 def problem(model: object, *runs: Experiment, free: tuple[Unknown, ...] = FREE, **more) -> Problem:
@@ -283,11 +283,9 @@ def run(name: str, seed: int, *, begin: float = 0.0, role: str = "fit") -> Exper
     time = np.arange(COUNT) / 50.0
     command = np.repeat(random.uniform(-1.0, 1.0, COUNT // 20), 20)
     supply = 1.0 + 0.2 * np.sin(0.9 * time + seed)
-    place, rows = begin, []
-    for u, s in zip(command, supply, strict=True):
-        rows.append(place)
-        place += (GAIN * u * s - place) / (50.0 * LAG)
-    channels = {"place": np.array(rows) + 0.01 * random.standard_normal(COUNT), "supply": supply}
+    given, how = {"command": command, "supply": supply}, {"interpolation": "previous"}
+    place = simulate(servo, Servo(GAIN, LAG), given, 50.0, begin={"place": begin}, **how)["place"]
+    channels = {"place": place + 0.01 * random.standard_normal(COUNT), "supply": supply}
     return run_of(name, command, channels, time=time, kind="other", hold="previous", role=role)
 
 
@@ -367,20 +365,15 @@ def test_what_a_range_means() -> None:
     assert ModelSetup(servo, {"lag": own}, fixed={"gain": 1.0}).free["lag"] is own
 
 
-def changed(experiment: Experiment, values: np.ndarray, name: str = "") -> Experiment:
-    place = replace(experiment["place"], values=values, noise=0.01)
-    channels = {**experiment.channels, "place": place}
-    return replace(experiment, name=name or experiment.name, channels=channels)
-
-
 def test_data_are_checked_before_the_search() -> None:
     first, second = RUNS
     holed = np.where(np.arange(COUNT) == 50, np.nan, first["place"].values)
     with pytest.raises(InputError, match="one: 'place' is not finite in 1 sample"):
-        fit(servo, [changed(first, holed), second], RANGES, noise=NOISE)
+        fit(servo, [moved(first, holed), second], RANGES, noise=NOISE)
     twice = fit(servo, [*RUNS, replace(first, name="copy")], RANGES, noise=NOISE)
     assert "copy has the samples of one" in twice.doubts[0]
-    still = fit(servo, [*RUNS, changed(first, np.zeros(COUNT), "still")], RANGES, noise=NOISE)
+    rest = replace(moved(first, np.zeros(COUNT), noise=0.01), name="still")
+    still = fit(servo, [*RUNS, rest], RANGES, noise=NOISE)
     assert "still: 'place' never changes" in still.doubts[0]
     idle = [replace(each, input=replace(each.input, values=np.zeros(COUNT))) for each in RUNS]
     with pytest.raises(InputError, match="servo: no run depends on any of gain"):
@@ -458,9 +451,7 @@ def limited(seed: int) -> Experiment:
     for u, s in zip(test.input.values, test["supply"].values, strict=True):
         rows.append(place)
         place += np.clip((GAIN * u * s - place) / 2.5, -0.05, 0.05)
-    measured = np.array(rows) + 1e-3 * np.random.default_rng(seed).normal(size=COUNT)
-    place_channel = replace(test["place"], values=measured)
-    return replace(test, channels={**test.channels, "place": place_channel})
+    return moved(test, np.array(rows) + 1e-3 * np.random.default_rng(seed).normal(size=COUNT))
 
 
 def test_what_a_model_leaves_out_is_not_called_an_error_of_the_sensor() -> None:

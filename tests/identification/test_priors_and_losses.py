@@ -5,8 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scipy.optimize import least_squares
-from scipy.signal import lfilter
-from tests.identification.given import model_of, run_of
+from tests.identification.given import first_order, model_of, run_of
 
 from swashplate import InputError
 from swashplate.identification.intervals import estimates, prior_sentences, uncertainty, weighed
@@ -22,8 +21,7 @@ LEVEL = model_of(lambda values, time, _: np.full(time.size, values["level"]))
 
 def problem(prior: Prior | None, *, memory: float, scale: float = 1.0) -> Problem:
     """A level of 2 under noise of variance 1 with this correlation from sample to sample."""
-    drawn = np.random.default_rng(5).normal(size=COUNT)
-    noise = lfilter([np.sqrt(1.0 - memory**2)], [1.0, -memory], drawn)
+    noise = first_order(memory, np.random.default_rng(5), (COUNT,))
     unknowns = Unknowns((Unknown("level", 1.0, 0.1, 9.0, prior=prior),))
     time, ones = 0.01 * np.arange(COUNT), np.ones(COUNT)
     run = run_of("run", ones, {"y": 2.0 + noise}, time=time, kind="other", hold="previous")

@@ -68,14 +68,6 @@ def test_priors() -> None:
     np.testing.assert_allclose(rows, [[8.0, 0.0, 0.0], [0.0, 0.0, 10.0]])
 
 
-def test_bounds_that_are_reached() -> None:
-    unknowns = Unknowns(
-        (bounded("a", 1.0, absolute=(0.0, 2.0)), bounded("b", 1.0, absolute=(0, 2)))
-    )
-    assert unknowns.at(np.array([0.0, 2.0 - 1e-9])).at_bound.tolist() == [-1, 1]
-    assert unknowns.at(np.array([0.1, 1.9])).at_bound.tolist() == [0, 0]
-
-
 @pytest.mark.parametrize(
     ("make", "sentence"),
     [
@@ -117,16 +109,6 @@ def test_residuals_are_weighted_and_scaled() -> None:
     residuals = made.evaluate(vector, compressed=False).residuals
     assert residuals == pytest.approx(np.full(81, -0.2 * 2.0 / 0.1))
     assert made.cost(vector) == pytest.approx(0.5 * 81 * 16.0)
-
-
-def test_differences_stand_in_for_missing_derivatives(problem: Problem) -> None:
-    vector = UNKNOWNS.vector_of({"gain": 2.0, "lag": 0.5})
-    found = problem.linearised(vector, 0)["y"].by
-    time = problem.experiments[0]["y"].time
-    decay = np.exp(-time / 0.5)
-    by_gain = (1.0 - decay) * 2.0 / 0.1  # by ln gain
-    by_lag = -2.0 * decay * time / 0.5**2 * 0.5 / 0.1  # by ln lag
-    np.testing.assert_allclose(found, np.column_stack([by_gain, by_lag]), rtol=1e-7, atol=1e-7)
 
 
 def test_the_truth_is_found(problem: Problem) -> None:
@@ -224,9 +206,7 @@ def test_starts_are_spread_seeded_and_inside(problem: Problem) -> None:
     assert not np.array_equal(starts[0], next(iter(sobol_starts(problem, 1, seed=6))))
 
 
-def test_threads_and_processes_give_the_same_as_one_after_another(
-    short_campaign: Campaign,
-) -> None:
+def test_threads_and_processes_give_the_same_as_one_after_another(short_campaign: Campaign) -> None:
     free = {name: Free(relative=(0.5, 2.0)) for name in ("J_plus", "G1_plus")}
     stage = Stage(name="card", part="card", free=free)
     nominal = Drive.preset("hoist").parameters

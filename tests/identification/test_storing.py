@@ -11,11 +11,7 @@ import pytest
 from tests.identification.given import TWO_STAGES
 
 from swashplate import Campaign, Drive, FileError, InputError, ParameterError
-from swashplate.identification.assessment import (
-    Judged,
-    fingerprint,
-    load_fit,
-)
+from swashplate.identification.assessment import Judged, fingerprint, load_fit
 from swashplate.identification.fitting import Fit, fit
 from swashplate.identification.profile import Point, Profile
 from swashplate.identification.resampling import CrossValidation, Fold

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from scipy.signal import lfilter
-from tests.identification.given import bench_run, first_order, run_of
+from tests.identification.given import bench_run, first_order, run_of, virtual
 
 from swashplate import Campaign, Drive, InputError, maneuvers
 from swashplate.campaign import rig
@@ -129,8 +129,8 @@ def test_constants_follow_nothing(residual: np.ndarray, command: np.ndarray) -> 
 
 @pytest.fixture(scope="module")
 def campaign(tmp_path_factory: pytest.TempPathFactory) -> Campaign:
-    tests = rig.run("hoist", [maneuvers.step(4.0)], seed=1, severity="clean")
-    return Campaign.from_toml(rig.write(tests, tmp_path_factory.mktemp("rig") / "tests"))
+    step = [maneuvers.step(4.0)]
+    return virtual(tmp_path_factory.mktemp("rig"), "hoist", step, seed=1, severity="clean")
 
 
 def test_a_prediction_is_the_simulation_of_the_command(campaign: Campaign) -> None:
@@ -197,8 +197,8 @@ def test_noise_of_a_position_is_no_error_of_the_speed_predicted(noise: float) ->
 def test_rounding_to_counts_is_no_error_of_the_speed_predicted(tmp_path: Path) -> None:
     """The drive that was simulated predicts an encoder of 60 counts a turn as well as one can."""
     hoist, rounded = Drive.preset("hoist"), replace(rig.SEVERITIES["clean"], encoder_step=1)
-    made = rig.run(hoist, [maneuvers.step(6.0)], instruments=rounded, counts_per_turn=60.0)
-    runs = Campaign.from_toml(rig.write(made, tmp_path / "tests")).select(axis="hoist")
+    tests, coarse = [maneuvers.step(6.0)], {"instruments": rounded, "counts_per_turn": 60.0}
+    runs = virtual(tmp_path, hoist, tests, **coarse).select(axis="hoist")
     (seen,) = (q for q in with_speeds(predict(hoist, runs)) if q.channel == "speed from counts")
     assert seen.measures.rmse > 0.02 * np.ptp(seen.simulated)
     assert part_of_range([seen], seen.channel) < 0.01

@@ -8,10 +8,6 @@ from tests.identification.given import run_of
 
 from swashplate import DomainError, FullOrderDrive, ParameterError
 from swashplate.campaign.experiment import Experiment
-from swashplate.equations.marching.jacobian import jacobian
-from swashplate.equations.marching.observation import Observation, ObservedRecord
-from swashplate.equations.marching.record import record_of
-from swashplate.full_order.drive import path_of
 from swashplate.identification.intervals import uncertainty
 from swashplate.identification.model import Linearised
 from swashplate.identification.problem import Problem, linearised_fit
@@ -49,15 +45,13 @@ class FiveStates:
     def linearise(
         self, values: Mapping[str, float], experiment: Experiment, names: Sequence[str]
     ) -> dict[str, Linearised]:
-        record = record_of(experiment.input.values, 512.0, what="voltage")
-        zeros = np.zeros(record.time.size)
-        channels = list(experiment.channels)
-        seen = [Observation(name, record.time, zeros) for name in channels]
-        observed = ObservedRecord(record, seen)
-        instance = self.at(values).instance(record.step, substeps=self.substeps)
-        found = jacobian(instance, observed, [path_of(name) for name in names])
-        rows = {name: observed.rows_of(k) for k, name in enumerate(channels)}
-        return {k: Linearised(found.residuals[r], found.columns[r]) for k, r in rows.items()}
+        full, command = self.at(values), experiment.input.values
+        found = full.simulate(command, substeps=self.substeps)
+        how = {"parameters": names, "substeps": self.substeps}
+        return {
+            name: Linearised(getattr(found, name), full.sensitivities(command, signal=name, **how))
+            for name in experiment.channels
+        }
 
 
 @pytest.mark.slow

@@ -7,10 +7,10 @@ it has one refinement or all.
 from pathlib import Path
 
 import pytest
+from tests.identification.given import virtual
 
-from swashplate import Drive, maneuvers
-from swashplate.campaign import ChannelKind, rig
-from swashplate.campaign.campaign import Campaign
+from swashplate import Campaign, Drive, maneuvers
+from swashplate.campaign import ChannelKind
 from swashplate.identification.fitting import StageFit, fit
 from swashplate.identification.setup import Free, Setup, Stage
 from swashplate.parameters import OPTIONS, REFINEMENTS
@@ -42,14 +42,8 @@ SWITCHED = ("solenoid_hysteresis", "cam_ripple_per_torque")
 
 
 def measured(truth: Drive, path: Path, channel: ChannelKind) -> Campaign:
-    tests = rig.run(
-        "hoist",
-        [maneuvers.step(4.0, stop=3.0, length=5.0), maneuvers.sine(4.0, 0.3, length=7.0)],
-        severity="clean",
-        truth=truth,
-        channels=(channel,),
-    )
-    return Campaign.from_toml(rig.write(tests, path))
+    tests = [maneuvers.step(4.0, stop=3.0, length=5.0), maneuvers.sine(4.0, 0.3, length=7.0)]
+    return virtual(path, "hoist", tests, severity="clean", truth=truth, channels=(channel,))
 
 
 def fitted(campaign: Campaign, start: Drive, stage: Stage) -> StageFit:
@@ -67,7 +61,7 @@ def test_all_refinements_are_recovered_at_once(tmp_path: Path) -> None:
     start = truth.scale(**{name: OFF.get(name, 1.15) for name in names})
     free = {name: Free(relative=(0.5, 2.0), log=True) for name in names}
     stage = Stage(name="drive", part="chain", free=free)
-    found = fitted(measured(truth, tmp_path / "virtual", "position"), start, stage)
+    found = fitted(measured(truth, tmp_path, "position"), start, stage)
     for name in names:
         assert found.values[name] == pytest.approx(truth[name].values[0], rel=1e-6), name
     assert found.parameters.refinements == truth.parameters.refinements
@@ -85,7 +79,7 @@ def test_what_is_on_is_found_from_beside_it_and_from_nothing(begin: str, tmp_pat
     start = truth.replace(**changes).scale(Z1=1.05)
     on = {"leakage"} if begin == "switched off" else {"leakage", "hysteresis", "ripple"}
     assert start.parameters.options == on
-    found = fitted(measured(truth, tmp_path / "virtual", "shaft_speed"), start, without_line())
+    found = fitted(measured(truth, tmp_path, "shaft_speed"), start, without_line())
     for name in REACH:
         assert found.values[name] == pytest.approx(WITHOUT_LINE[name], rel=1e-6), name
 
@@ -95,7 +89,7 @@ def test_what_is_not_there_goes_to_next_to_nothing(tmp_path: Path) -> None:
     """It stays on, at the least that its equations take: what is off has no derivative."""
     truth = Drive.preset("hoist").replace(**LOAD)
     start = Drive.preset("hoist").replace(**WITHOUT_LINE).scale(Z1=1.05, motor_leakage=1.15)
-    found = fitted(measured(truth, tmp_path / "virtual", "shaft_speed"), start, without_line())
+    found = fitted(measured(truth, tmp_path, "shaft_speed"), start, without_line())
     for name in SWITCHED:
         least = REFINEMENTS[name].least
         assert least is not None

@@ -8,7 +8,6 @@ from reproduction.source_errors import (
     SOURCE_RULES,
     ComparedRun,
     ErrorTable,
-    edges,
     error_table,
     error_tables,
     source_rules,
@@ -57,11 +56,6 @@ def test_the_settled_error_of_a_step() -> None:
     assert row.runs == 1
 
 
-def test_the_overshoot_counts_if_its_rule_is_off() -> None:
-    rules = [rule for rule in SOURCE_RULES if rule.name != "overshoot"]
-    assert percent(error_table("speed", [step()], rules=rules))["step"] == pytest.approx(30.0)
-
-
 def test_fast_sines_are_left_out_as_a_whole() -> None:
     table = error_table("speed", [sine(0.1), sine(0.3, simulated=np.zeros(TIME.size))])
     assert percent(table)["sine"] == pytest.approx(10.0)
@@ -75,16 +69,6 @@ def test_dither_is_averaged_over() -> None:
     run = step(simulated=1.02 * step().measured + dither)
     assert percent(error_table("speed", [run]))["step"] > 20.0
     assert percent(error_table("speed", [run], average=0.2))["step"] == pytest.approx(2.0, abs=0.01)
-
-
-PULSE = np.where((TIME >= 1.0) & (TIME < 6.0), 1.0, 0.0)
-
-
-def test_edges_of_a_step_and_of_a_ramp() -> None:
-    np.testing.assert_allclose(edges(step()), [1.0, 6.0])
-    ramp = step(kind="ramp", command=np.clip(TIME - 1.0, 0.0, None))
-    np.testing.assert_allclose(edges(ramp), [1.1])
-    assert edges(step(command=np.zeros(TIME.size))).size == 0
 
 
 def test_the_table_of_a_channel() -> None:
@@ -116,6 +100,7 @@ def test_the_table_of_a_channel() -> None:
     assert slew.rows[0].percent is None
 
 
+PULSE = np.where((TIME >= 1.0) & (TIME < 6.0), 1.0, 0.0)
 EDGES = ((TIME > 0.95) & (TIME < 2.95)) | ((TIME > 5.95) & (TIME < 7.95))
 NONE, ALL = np.zeros(TIME.size, dtype=bool), np.ones(TIME.size, dtype=bool)
 LATE = 30.0 * PULSE + 70.0 * PULSE * (TIME > 3.0)

@@ -1,13 +1,14 @@
-"""Kruse's numbers: static table, limits, accelerations, settled speeds, scaling symmetries.
+"""Kruse's numbers: static table, limits, accelerations, settled speeds, and the published tables.
 
 The expected values are those of the model description, worked out from the published parameters
-apart from this code, and good to the digits given.
+apart from this code, and good to the digits given. The tables' text: tests/reproduction.
 """
 
 import numpy as np
 import pytest
 
 from swashplate import Drive, maneuvers
+from swashplate.parameters import CATALOGUE
 
 STATIC = {
     # volts: hoist+ A, deg/s; hoist-; slew+; slew-
@@ -83,23 +84,50 @@ def test_every_maneuver_settles_where_the_static_curve_says(name: str) -> None:
                 )
 
 
-def test_gauges_change_nothing(axis: Drive) -> None:
-    """Model description, section 7: three exact freedoms, below 1e-12."""
-    Z = axis.parameters.numbers
-    voltage = maneuvers.step(9.0).sample(512.0)
-    speed = axis.simulate(voltage).shaft_speed
-    for k in (1.7, 0.6):
-        both = ("_plus", "_minus")
-        pressure = {
-            "Z1": Z["Z1"] / k,
-            "Z8": Z["Z8"] * k**0.5,
-            "Z9": k * Z["Z9"],
-            "Z15": k * Z["Z15"],
-        }
-        length = {"Z5": k * Z["Z5"], "Z4": k * k * Z["Z4"], "Z8": Z["Z8"] / k}
-        length |= {name: k * Z[name] for name in ("Z14", "Z16_plus", "Z16_minus", "Z18")}
-        force = {"Z4": k * k * Z["Z4"]}
-        force |= {f"Z{n}{s}": k * Z[f"Z{n}{s}"] for n in (19, 20, 21, 22) for s in both}
-        for gauge in (pressure, length, force):
-            same = axis.replace(**gauge).simulate(voltage).shaft_speed
-            np.testing.assert_allclose(same, speed, atol=1e-12 * np.abs(speed).max())
+# --- the published tables -------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", ["hoist", "slew", "luff"])
+def test_tables_4_1_to_4_4_and_7_2_to_8_3_are_the_packaged_sets(
+    name: str, source_parameters: dict
+) -> None:
+    pump = source_parameters["pump_motor"][name]
+    card = source_parameters["control_card"][pump["control_card"]]
+    drive = Drive.preset(name)
+    assert drive.parameters.card == pump["control_card"]
+    facts = {key: value for key, value in {**card, **pump}.items() if key in drive.parameters}
+    assert set(facts) == set(drive.parameters)
+    for symbol, fact in facts.items():
+        parameter = drive[symbol]
+        assert parameter.unit == source_parameters["units"][symbol]
+        assert list(parameter.values) == (fact if isinstance(fact, list) else [fact]), symbol
+        assert parameter.source.startswith("table")
+
+
+@pytest.mark.parametrize(
+    ("name", "symbol", "values", "status"),
+    [
+        # a few cells by hand, for a checkout without the tables
+        ("hoist", "Z1", (4.6441e-07,), "fitted"),
+        ("hoist", "Z16", (1.1634e-04, 1.5126e-04), "fitted"),
+        ("hoist", "Z22", (0.0, -54.153), "fitted"),
+        ("hoist", "lim2", (2.2615, 2.6483), "fitted"),
+        ("hoist", "tau", (0.014,), "assumed"),
+        ("slew", "V_dz", (0.090948, 0.088321), "fitted"),
+        ("slew", "C", (4.8368, 4.8368), "fitted"),
+        ("slew", "Z14", (3.6461e-03,), "inactive"),
+        ("luff", "Z15", (4.5768e08,), "approximate"),
+        ("luff", "Z13", (0.059489, 0.07282), "assumed"),
+        ("luff", "Z1", (2.9459e-07,), "approximate"),
+    ],
+)
+def test_cells_and_how_they_were_found(
+    name: str, symbol: str, values: tuple[float, ...], status: str
+) -> None:
+    found = Drive.preset(name)[symbol]
+    assert (found.values, found.status) == (values, status)
+
+
+def test_erratum_05_units_of_g2_and_g3() -> None:
+    """Table 8.1 prints A/V for both; 3.3 needs A/V² and A/V³."""
+    assert (CATALOGUE["G2"].unit, CATALOGUE["G3"].unit) == ("A/V^2", "A/V^3")

@@ -1,10 +1,69 @@
-"""The card's cost and tables (chapter 4), and solenoids on the bench (chapter 5)."""
+"""Control card, its cost and tables (chapters 3 and 4), solenoids on the bench (chapter 5)."""
 
 import numpy as np
 import pytest
 
 from swashplate import Drive, maneuvers
+from swashplate.equations.model import place
+from swashplate.models.card import card
 from swashplate.simulation.batch import SquaredError
+
+H = 1.0 / 512.0
+
+HOIST = {
+    "V_dz": 0.12663, "J": 0.27473, "G1": 0.049315, "G2": 0.00081975, "G3": -4.5317e-05,
+    "zeta": 0.71887, "omega": 56.253, "lim1": 2.2841, "lim2": 2.2615, "I_t1": 0.33628,
+    "I_t2": 0.13724, "a": 19.131, "tau": 0.014,
+}  # fmt: skip
+"""Positive channel of tables 4.1 and 4.2."""
+
+
+def settled(volts: float, p: dict[str, float]) -> float:
+    """Eq. 3.3 beyond the dead zone."""
+    d = volts - p["V_dz"]
+    return p["J"] + p["G1"] * d + p["G2"] * d**2 + p["G3"] * d**3
+
+
+def test_eq_3_4_delay_is_no_whole_number_of_samples(hoist: Drive) -> None:
+    """14 ms are 7.168 samples; a delay longer by three samples moves the current by three."""
+    delay = place(card.tap("at"), 0.014, H)
+    assert delay.whole + delay.fraction == pytest.approx(0.014 * 512.0, rel=1e-12)
+    voltage = maneuvers.sine(6.0, 0.3, length=8.0).sample(512.0)
+    early, late = (hoist.replace(tau=0.014 + k * H).simulate(voltage).current for k in (0, 3))
+    np.testing.assert_allclose(late[3:], early[:-3], atol=1e-12)
+    assert np.all(early[: 512 + 7] == 0.0)
+
+
+def test_erratum_02_and_erratum_03_steady_level(hoist: Drive) -> None:
+    """3.8 as printed, a rate integrated: a 9 V step stays at 0.37 A instead of 0.745 A.
+
+    3.7, with ω on the right in place of ω², would settle at 1/ω of it.
+    """
+    voltage = np.where(np.arange(1024) < 51, 0.0, 9.0)
+    limited = hoist.simulate(voltage).current
+    free = hoist.replace(I_t1=np.inf, lim1=np.inf).simulate(voltage).current
+    output, rate = 0.0, 0.0
+    for n in range(1, free.size):
+        slope = (free[n] - free[n - 1]) / H
+        rate = min(slope, HOIST["lim1"]) if free[n] > HOIST["I_t1"] else slope
+        output += rate * H
+    assert output == pytest.approx(0.37, abs=0.01)
+    assert settled(9.0, HOIST) == pytest.approx(0.7452, abs=5e-5)
+    for ends in (limited[-1], free[-1]):
+        assert ends == pytest.approx(settled(9.0, HOIST), rel=1e-6)
+
+
+def test_erratum_07_slew_card_does_not_overshoot() -> None:
+    """ζ = 1.4157: both roots of its filter are real, and no step passes its settled current."""
+    slew = Drive.preset("slew")
+    assert min(slew["zeta"].values) > 1.0
+    for volts in (2.0, 4.0, 6.5, 9.0):
+        run = slew.simulate(maneuvers.step(volts).sample(512.0))
+        assert run.current.max() <= slew.steady_current(volts) + 1e-9
+    hoist = Drive.preset("hoist").replace(lim1=np.inf, I_t1=np.inf)
+    run = hoist.simulate(maneuvers.step(4.0).sample(512.0))
+    assert run.current.max() > 1.02 * hoist.steady_current(4.0)
+
 
 HOIST_MINUS = {"V_dz": 0.097857, "J": 0.2951, "G1": 0.054706, "G2": 0.00042879, "G3": -9.7369e-05}
 
@@ -36,13 +95,11 @@ def test_ammeter_reads_the_sum_of_both_magnitudes(hoist: Drive) -> None:
 @pytest.mark.parametrize("volts", [1.0, 4.0, 6.5, 9.0])
 def test_erratum_05_negative_channel_takes_magnitudes(hoist: Drive, volts: float) -> None:
     """3.3 with table 4.3's own signs would keep the even power's: 13 mA off at -4 V."""
-    p = HOIST_MINUS
-    d = volts - p["V_dz"]
-    magnitude = p["J"] + p["G1"] * d + p["G2"] * d**2 + p["G3"] * d**3
+    magnitude = settled(volts, HOIST_MINUS)
     assert hoist.steady_current(-volts) == pytest.approx(-magnitude, rel=1e-12)
-    literal = -p["J"] - p["G1"] * d + p["G2"] * d**2 - p["G3"] * d**3
-    assert literal + magnitude == pytest.approx(2.0 * p["G2"] * d**2, rel=1e-12)
+    turned = {each: -HOIST_MINUS[each] for each in ("J", "G1", "G3")}
     if volts == 4.0:
+        literal = settled(volts, HOIST_MINUS | turned)
         assert literal + magnitude == pytest.approx(0.013, abs=0.0005)
 
 
