@@ -12,6 +12,7 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager
 from functools import partial
+from importlib import import_module
 from math import ceil, prod
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -98,12 +99,15 @@ def _form_of(reader: str, path: Path) -> str:
     return "MATLAB 5" if head[126:128] in (b"IM", b"MI") else "MATLAB 4"
 
 
-def _missing(path: Path, library: str, extra: str) -> FileError:
-    """What to say where a library is not installed that this format needs."""
-    return FileError(
-        f"{path} needs the library {library}, which is not installed: "
-        f"pip install 'swashplate[{extra}]'."
-    )
+def _library(path: Path, name: str, extra: str) -> Any:
+    """A library that only this format needs."""
+    try:
+        return import_module(name.lower())
+    except ImportError:
+        raise FileError(
+            f"{path} needs the library {name}, which is not installed: "
+            f"pip install 'swashplate[{extra}]'."
+        ) from None
 
 
 # --- Parquet --------------------------------------------------------------------------------------
@@ -293,12 +297,8 @@ class _Refusal(logging.Handler):
 @contextmanager
 def _tdms(path: Path) -> Iterator[Iterable[_Item]]:
     """npTDMS on a file; an index beside it, which may belong to another, is not used."""
-    try:
-        import nptdms
-        from nptdms.log import log_manager
-    except ImportError:
-        raise _missing(path, "npTDMS", "tdms") from None
-    log_manager.console_handler.setLevel(logging.CRITICAL)
+    nptdms = _library(path, "npTDMS", "tdms")
+    nptdms.log.log_manager.console_handler.setLevel(logging.CRITICAL)
     logger, refusal = logging.getLogger("nptdms"), _Refusal()
     logger.addHandler(refusal)
     try:
@@ -356,11 +356,7 @@ _LEFT_OUT = "it holds text or bytes"
 
 @contextmanager
 def _mdf(path: Path) -> Iterator[Iterable[_Item]]:
-    try:
-        import asammdf
-    except ImportError:
-        raise _missing(path, "asammdf", "mdf") from None
-    with asammdf.MDF(path) as mdf:
+    with _library(path, "asammdf", "mdf").MDF(path) as mdf:
         yield _mdf_items(mdf)
 
 
