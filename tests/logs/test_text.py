@@ -2,6 +2,7 @@
 
 import math
 
+import numpy as np
 import pytest
 
 from swashplate import FileError, InputError
@@ -99,6 +100,11 @@ def test_missing_and_infinite_numbers(text):
     log = text("time,u\n" + "".join(f"{i},{word}\n" for i, word in enumerate(words)) + "11,1\n")
     numbers = log.read(["u"])["u"]
     assert [math.isnan(number) for number in numbers] == [True] * len(words) + [False]
+    words = ["1", "", "n/a", "inf", "--", "-Infinity", " "]  # no mark of a comment among them
+    log = text("time,u,n\n" + "".join(f"{i},{word},{word}\n" for i, word in enumerate(words)))
+    expected = [1.0, math.nan, math.nan, math.inf, math.nan, -math.inf, math.nan]
+    for numbers in log.read(["u", "n"]).values():
+        np.testing.assert_array_equal(numbers, expected)
     log = text("time,u\n0,inf\n1,-Infinity\n2,1.#INF\n3,-1.#INF\n4,1\n")
     assert log.read(["u"])["u"].tolist() == [math.inf, -math.inf, math.inf, -math.inf, 1.0]
 

@@ -183,7 +183,7 @@ class _Table:
         clocks: dict[int, _Clock],
     ) -> Array:
         """A column of a piece, before which there are `count` rows."""
-        text, kind, decimal = cells.str.strip_chars(), "number", self.layout.decimal
+        text, kind, decimal = cells.str.strip_chars().fill_null(""), "number", self.layout.decimal
         found = clocks[position].seconds(text) if position in clocks else _numbers_of(text, decimal)
         if count == 0 and isinstance(found, int) and (form := date_form(text[found])):
             clocks[position] = _Clock(form)
