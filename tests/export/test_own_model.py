@@ -124,6 +124,8 @@ tank = Model(
 )
 NUMBERS, AROUND, RATE = Tank(0.5, 0.8, 0.033, 0.01), Around(1.5), 50.0
 PUMPED = 0.3 + 0.4 * np.sin(np.arange(400) / 9.0)
+INPUTS = {"pumped": PUMPED, "outside": 0.1 + 0.05 * np.cos(np.arange(400) / 30.0)}
+NAMES = ("head", "steps", "level", "flow", "drained")
 
 
 def exported(model: Model, compiled: Any, rate: float, **numbers: Any) -> InC:
@@ -137,18 +139,16 @@ def exported(model: Model, compiled: Any, rate: float, **numbers: Any) -> InC:
 def test_roots_tables_loops_and_options_have_the_bits_of_the_march(
     options: Ways, compiled: Any
 ) -> None:
-    inputs = {"pumped": PUMPED, "outside": 0.1 + 0.05 * np.cos(np.arange(400) / 30.0)}
-    run = simulate(tank, NUMBERS, inputs, RATE, options=options, given=AROUND)
+    run = simulate(tank, NUMBERS, INPUTS, RATE, options=options, given=AROUND)
     model = exported(tank, compiled, RATE, parameters=NUMBERS, given=AROUND)
     for name in ("rough", "stepped"):
         number = model.number("_option", name)
         assert model.set_option(number, getattr(options, name) is not None) == 0
-    names = ("head", "steps", "level", "flow", "drained")
-    outside, places = model.number("_input", "outside"), [model.number("_output", n) for n in names]
+    outside, places = model.number("_input", "outside"), [model.number("_output", n) for n in NAMES]
     for n in range(PUMPED.size):
-        assert model.set_input(outside, float(inputs["outside"][n])) == 0
+        assert model.set_input(outside, float(INPUTS["outside"][n])) == 0
         assert model.step(float(PUMPED[n])) == 0
-        assert [model.output(place) for place in places] == [run[name][n] for name in names]
+        assert [model.output(place) for place in places] == [run[name][n] for name in NAMES]
     assert np.ptp(run["level"]) > 0.1
 
 
@@ -231,8 +231,6 @@ def test_limits_are_bits(compiled: Any) -> None:
 
 # --- FMU and WebAssembly --------------------------------------------------------------------------
 
-INPUTS = {"pumped": PUMPED, "outside": 0.1 + 0.05 * np.cos(np.arange(400) / 30.0)}
-NAMES = ("head", "steps", "level", "flow", "drained")
 FINE = 64.0
 """Rate whose times are binary, so that an importer interpolates no input. [Hz]"""
 

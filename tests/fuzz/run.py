@@ -63,7 +63,7 @@ def damaged(content: bytes, others: list[bytes], random: np.random.Generator) ->
 
 def written(random: np.random.Generator) -> bytes:
     """Text that looks like a log, in some dialect, with cells of all kinds."""
-    cells = [*CELLS, *(repr(each) for each in random.normal(size=8)), "7", "-3"]
+    cells = [*CELLS, *map(repr, random.normal(size=8).tolist()), "7", "-3"]
     delimiter = random.choice([",", ";", "\t", " ", "  ", "|", ", "])
     end = random.choice(["\n", "\r\n", "\r", "\n\n", "\n# comment\n"])
     rows = random.integers(12)

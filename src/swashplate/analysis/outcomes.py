@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from difflib import get_close_matches
 from functools import cached_property
@@ -259,16 +259,21 @@ def rms_difference(speed: Array, other: Array) -> float:
     return float(np.sqrt(np.mean((speed - other) ** 2)))
 
 
+def meant(name: str, known: Iterable[str]) -> str:
+    """A hint at the known name that an unknown one is like, empty if it is like none."""
+    close = get_close_matches(name, known, n=1)
+    return f" (did you mean {close[0]}?)" if close else ""
+
+
 def find_outcomes(names: Sequence[str]) -> tuple[Outcome, ...]:
     """Outcomes by name; an unknown name, or none at all, is refused in an `InputError`."""
     if not names:
         raise InputError(f"Name at least one outcome: {', '.join(OUTCOMES)}.")
     for name in names:
         if name not in OUTCOMES:
-            close = get_close_matches(name, OUTCOMES, n=1)
-            hint = f" (did you mean {close[0]}?)" if close else ""
             raise InputError(
-                f"There is no outcome '{name}'{hint}; the outcomes are {', '.join(OUTCOMES)}."
+                f"There is no outcome '{name}'{meant(name, OUTCOMES)}; the outcomes are "
+                f"{', '.join(OUTCOMES)}."
             )
     return tuple(OUTCOMES[name] for name in dict.fromkeys(names))
 

@@ -248,17 +248,8 @@ ALONG = 32  # Points along a single factor's range.
 def smallest_change(slack: Slack, low: Array, high: Array) -> Array | None:
     """Factors with the least Σ (factor - 1)² of those that satisfy, None if none was found.
 
-    Parameters
-    ----------
-    slack : callable
-        The inequalities, as `Slack`.
-    low, high : (L,) array
-        Range of each factor, 1 within.
-
-    Returns
-    -------
-    (L,) array or None
-        Satisfies exactly: the last step is a bisection that ends on the right side.
+    Each is between its `low` and `high`, (L,) both, with 1 within. They satisfy exactly: the last
+    step is a bisection that ends on the right side.
 
     Notes
     -----

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from difflib import get_close_matches
 from math import isnan
 from typing import TYPE_CHECKING
 
@@ -16,6 +15,7 @@ from swashplate.analysis.outcomes import (
     Outcome,
     Trial,
     find_outcomes,
+    meant,
     outcome_matrix,
 )
 from swashplate.drive import Drive
@@ -88,8 +88,7 @@ def find_lever(name: str) -> Mapping[str, float]:
         return LEVERS[name]
     if name in CATALOGUE or name in COLUMNS or name in REFINEMENTS:
         return {name: 1.0}
-    close = get_close_matches(name, [*LEVERS, *CATALOGUE, *COLUMNS], n=1)
-    hint = f" (did you mean {close[0]}?)" if close else ""
+    hint = meant(name, [*LEVERS, *CATALOGUE, *COLUMNS])
     raise InputError(
         f"There is no lever '{name}'{hint}; the levers are {', '.join(MACHINE)}, those with two "
         "directions also as e.g. orifice_plus, and every parameter by its symbol."
@@ -223,8 +222,6 @@ class WhatIf(Result):
 
         With the `bands` of both, of the same outcomes, each number has half of its interval.
         """
-        rows = [(f"top speed, {way}", "rad/s") for way in ("positive", "negative")]
-        rows += [(each.words, each.unit) for each in self.outcomes]
         values = [
             np.array([*each.speed_limits, *each.values]) for each in (self.before, self.after)
         ]
@@ -237,10 +234,11 @@ class WhatIf(Result):
                 cells.append(bands[name].half_widths)
         change = values[1] / np.where(values[0] == 0.0, np.nan, values[0]) - 1.0
         made = Table("", (Column(""), *columns, Column("change", "+z.1%"), UNIT))
-        for k, (words, unit) in enumerate(rows):
-            spec = {"s": "z.3f", "1": "z.2%"}.get(unit, "")
-            row = (float(each[k]) for each in (*cells, change))
-            made.add(words, *row, unit="" if unit == "1" else unit, spec=spec)
+        rows = np.array([*cells, change]).T.tolist()
+        for way, row in zip(("positive", "negative"), rows, strict=False):
+            made.add(f"top speed, {way}", *row, unit="rad/s")
+        for outcome, row in zip(self.outcomes, rows[2:], strict=True):
+            outcome.add_to(made, row)
         return made
 
 

@@ -269,6 +269,7 @@ def compiled(made: Sources, platform: Platform) -> bytes:
         written(made.texts, folder)
         written(fmi_headers(), folder)
         units = sorted(name for name in made.texts if name.endswith(".c") and name != "wasm.c")
+        compilers = [[*_zig(target), "-s"] for target in platform.targets]
         if not has_zig():
             if platform is not this_machine() or not shutil.which("cc"):
                 raise InputError(
@@ -276,10 +277,14 @@ def compiled(made: Sources, platform: Platform) -> bytes:
                     "(pip install 'swashplate[binaries]'), or choose the platform of this machine "
                     "and have a C compiler there."
                 )
-            out = f"{NAME}{platform.ending}"
-            _run(["cc", *_options(platform), "-o", out, *units, "-lm"], folder)
-            return (folder / out).read_bytes()
-        parts = [_by_zig(platform, target, units, folder) for target in platform.targets]
+            compilers = [["cc"]]
+        # the libraries name themselves: one name for all, and the same bytes each time
+        out = f"{NAME}{platform.ending}"
+        more = ["-Wl,-install_name,@rpath/" + out] if platform.ending == ".dylib" else ["-lm"]
+        parts = []
+        for compiler in compilers:
+            _run([*compiler, *_options(platform), "-o", out, *units, *more], folder)
+            parts.append((folder / out).read_bytes())
     return parts[0] if len(parts) == 1 else universal(parts)
 
 
@@ -330,14 +335,6 @@ def _options(platform: Platform) -> list[str]:
 
 def _zig(target: str) -> list[str]:
     return [sys.executable, "-m", "ziglang", "cc", "-target", target]
-
-
-def _by_zig(platform: Platform, target: str, units: Sequence[str], folder: Path) -> bytes:
-    # the libraries name themselves: one name for all, and the same bytes each time
-    out = f"{NAME}{platform.ending}"
-    more = ["-Wl,-install_name,@rpath/" + out] if platform.ending == ".dylib" else ["-lm"]
-    _run([*_zig(target), *_options(platform), "-s", "-o", out, *units, *more], folder)
-    return (folder / out).read_bytes()
 
 
 def _run(command: Sequence[str], folder: Path) -> None:

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from math import isfinite
-from typing import Literal, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 from swashplate.equations.c_source import Exported, c_name, literal
 from swashplate.equations.fields import Declared, declared_by
@@ -138,21 +138,21 @@ def variables(
     """
     r = references
     parameters = exported.named("parameters")
-    starts = {name: values[1 + k] for k, (_, _, name) in enumerate(parameters)}
+    starts = {name: min(values[1 + k], NONE) for k, (_, _, name) in enumerate(parameters)}
     defaults = defaults_of(exported)
-    found: list[Variable] = []
-    for i, name in enumerate((*exported.signals, *exported.measured)):
-        start = min(starts[defaults[name]], NONE) if name in defaults else 0.0
-        said = words.get(name, Words(f"input {name}"))
-        found.append(
-            Variable(name, r.INPUT + i, "input", "continuous", said.meaning, said.unit, start)
-        )
-    for i, name in enumerate(exported.names):
-        said, direct = words.get(name, Words(f"output {name}")), feedthrough[name]
-        found.append(
-            Variable(name, r.OUTPUT + i, "output", "continuous", said.meaning, said.unit,
-                     feedthrough=direct)
-        )  # fmt: skip
+
+    def signal(name: str, number: int, kind: Literal["input", "output"], **more: Any) -> Variable:
+        said = words.get(name, Words(f"{kind} {name}"))
+        return Variable(name, number, kind, "continuous", said.meaning, said.unit, **more)
+
+    found = [
+        signal(name, number, "input", start=starts[defaults[name]] if name in defaults else 0.0)
+        for number, name in enumerate((*exported.signals, *exported.measured), r.INPUT)
+    ]
+    found += [
+        signal(name, number, "output", feedthrough=feedthrough[name])
+        for number, name in enumerate(exported.names, r.OUTPUT)
+    ]
     taken = {each.name for each in found}
     declared = {
         (i, path): each
@@ -211,10 +211,7 @@ def _parameter(name: str, reference: int, known: Declared, path: str, value: flo
         meaning += f"; {NONE:g} for none"
         upper = NONE
     unit = definition.unit or "1"
-    start = min(value, NONE)
-    return Variable(
-        name, reference, "parameter", "tunable", meaning, unit, start, lower, upper
-    )  # fmt: skip
+    return Variable(name, reference, "parameter", "tunable", meaning, unit, value, lower, upper)
 
 
 def c_header(exported: Exported, layout: int, references: References) -> str:

@@ -21,7 +21,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
-from typing import IO, TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, Any, cast
 from weakref import finalize
 
 import numpy as np
@@ -41,13 +41,7 @@ _START = "import sys; sys.path[:] = {path!r}; from swashplate.logs.apart import 
 
 
 def open_apart(reader: str, path: Path) -> Log:
-    """Look into a file by `swashplate.logs.binary.look`, in the other process.
-
-    Raises
-    ------
-    FileError
-        As the reader does; or if the file ended the process, or took too long.
-    """
+    """Look into a file by `swashplate.logs.binary.look`, in the other process."""
 
     def ask(*what: Any) -> tuple[dict[str, Any], list[Array]]:
         return _Other.ask(path, [reader, str(path.absolute()), str(path), *what])
@@ -55,7 +49,7 @@ def open_apart(reader: str, path: Path) -> Log:
     def load(positions: Sequence[int], first: int = 0, last: int | None = None) -> list[Array]:
         return ask([*positions], first, last)[1]
 
-    found = ask(None, 0, None)[0]
+    found = ask()[0]
     columns = tuple(Column(*column) for column in found["columns"])
     return Log(path, found["format"], columns, load, found["left_out"], tuple(found["lengths"]))
 
@@ -67,26 +61,27 @@ class _Other:
     running: _Other | None = None
 
     def __init__(self) -> None:
-        self._errors = tempfile.TemporaryFile()  # noqa: SIM115 - closed in _ended
-        # what libraries leave behind of a damaged file goes with the process
+        # what it says of an error, and what libraries leave behind of a damaged file
         self._scratch = tempfile.TemporaryDirectory(ignore_cleanup_errors=True)
+        self._said = Path(self._scratch.name) / "errors"
         threads = min(4, os.cpu_count() or 1)  # each takes a share of the memory that it may have
-        self._process = subprocess.Popen(
-            [sys.executable, "-c", _START.format(path=sys.path)],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            stderr=self._errors,
-            env={
-                **os.environ,
-                **dict.fromkeys(("TMPDIR", "TEMP", "TMP"), self._scratch.name),
-                "POLARS_MAX_THREADS": str(threads),
-                "RUST_BACKTRACE": "0",
-                # a block is read with little ahead of it, and given back before the next
-                "POLARS_ROW_GROUP_PREFETCH_SIZE": "2",
-                "_RJEM_MALLOC_CONF": "dirty_decay_ms:0,muzzy_decay_ms:0",
-            },
-        )
-        self._end = finalize(self, _ended, self._process, self._errors, self._scratch)
+        with self._said.open("wb") as errors:
+            self._process = subprocess.Popen(
+                [sys.executable, "-c", _START.format(path=sys.path)],
+                stdin=subprocess.PIPE,
+                stdout=subprocess.PIPE,
+                stderr=errors,
+                env={
+                    **os.environ,
+                    **dict.fromkeys(("TMPDIR", "TEMP", "TMP"), self._scratch.name),
+                    "POLARS_MAX_THREADS": str(threads),
+                    "RUST_BACKTRACE": "0",
+                    # a block is read with little ahead of it, and given back before the next
+                    "POLARS_ROW_GROUP_PREFETCH_SIZE": "2",
+                    "_RJEM_MALLOC_CONF": "dirty_decay_ms:0,muzzy_decay_ms:0",
+                },
+            )
+        self._end = finalize(self, _ended, self._process, self._scratch)
 
     @classmethod
     def ask(cls, path: Path, question: Sequence[Any]) -> tuple[dict[str, Any], list[Array]]:
@@ -133,8 +128,7 @@ class _Other:
         read = [source.readinto(each.view(np.uint8).data) == each.nbytes for each in arrays]
         if not answer or not all(read):
             self._process.wait()
-            self._errors.seek(0)
-            lines = self._errors.read()[-2000:].decode("utf-8", "replace").split("\n")
+            lines = self._said.read_bytes()[-2000:].decode("utf-8", "replace").split("\n")
             last = next((line for line in reversed(lines) if line[:1].isalpha()), "")
             reason = printable(last).strip().rstrip(".")[:200]
             why = f": {reason}" if reason else ""
@@ -142,11 +136,7 @@ class _Other:
         return answer, arrays
 
 
-def _ended(
-    process: subprocess.Popen[bytes],
-    errors: IO[bytes],
-    scratch: tempfile.TemporaryDirectory[str],
-) -> None:
+def _ended(process: subprocess.Popen[bytes], scratch: tempfile.TemporaryDirectory[str]) -> None:
     for pipe in (process.stdin, process.stdout):
         if pipe is not None:
             with suppress(BrokenPipeError):  # a question that was never read
@@ -156,7 +146,6 @@ def _ended(
     except subprocess.TimeoutExpired:
         process.kill()
         process.wait()
-    errors.close()
     scratch.cleanup()
 
 
@@ -172,19 +161,8 @@ def in_parts(log: Log, names: Sequence[str]) -> Log:
     """A log whose rows can be read in parts if it is long; a short one as it is.
 
     A long text log is converted to Parquet once, piece after piece: ``log.csv.parquet`` beside it
-    holds the columns asked for, and serves until the log changes. Other formats are as they are.
-
-    Parameters
-    ----------
-    log : Log
-        As `open_log` gives it.
-    names : sequence of str
-        Columns that will be read, as in `Log.find`.
-
-    Raises
-    ------
-    FileError
-        If a cell holds no number, or the table cannot be written.
+    holds the columns of these names (as in `Log.find`), and serves until the log changes. Other
+    formats are as they are.
     """
     import polars as pl
 
@@ -255,21 +233,12 @@ def serve() -> None:
     answers = os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)  # what libraries print must not get between the answers
     warnings.simplefilter("ignore")
-    last: tuple[object, Log] | None = None
     for line in sys.stdin.buffer:
-        reader, name, shown, positions, *rows = json.loads(line)
-        path, arrays, answer = Path(name), list[Array](), dict[str, Any]()
+        reader, name, shown, *wanted = json.loads(line)
+        answer, arrays = dict[str, Any](), list[Array]()
         try:
-            _limit_memory(path)
-            known = (reader, path, path.stat().st_mtime_ns, path.stat().st_size)
-            if last is None or last[0] != known:
-                last = None
-                last = known, look(reader, path)
-            log = last[1]
-            arrays = [*log.load(positions, *rows)] if positions is not None else []
-            answer = {
-                key: getattr(log, key) for key in ("format", "columns", "left_out", "lengths")
-            }
+            _limit_memory(Path(name))
+            answer, arrays = look(reader, Path(name), *wanted)
         except (KeyboardInterrupt, SystemExit):
             raise
         except BaseException as error:
@@ -277,11 +246,10 @@ def serve() -> None:
             what = str(error)
             if not isinstance(error, SwashplateError):
                 what = (
-                    f"{path} cannot be read as {reader}, it is damaged or of another kind: "
+                    f"{name} cannot be read as {reader}, it is damaged or of another kind: "
                     f"{said(error)}."
                 )
             answer = {"error": what.replace(name, shown), "kind": type(error).__name__}
-            arrays = []
         answer["sizes"] = [array.size for array in arrays]
         answers.write(json.dumps(answer).encode() + b"\n")
         for array in arrays:

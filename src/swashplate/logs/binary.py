@@ -1,6 +1,6 @@
 """Logs in binary formats: thin layers over Polars, SciPy, h5py, npTDMS and asammdf.
 
-A format is a row of `FORMATS`: how a file is opened, what it holds, how a column is read. What a
+A format is a row of `FORMATS`: a context in which a file is open and says what it holds. What a
 library reads from a damaged file without a word is refused here: variables, blocks and channels
 that were cut off. All of it runs in a process of its own, see `swashplate.logs.apart`.
 """
@@ -9,8 +9,10 @@ from __future__ import annotations
 
 import logging
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import AbstractContextManager, contextmanager, nullcontext
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import AbstractContextManager, contextmanager
+from functools import partial
+from importlib import import_module
 from math import ceil, prod
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -18,7 +20,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from swashplate.errors import FileError
-from swashplate.logs.log import Array, Column, Log, check_kind, printable, said, split_unit
+from swashplate.logs.log import Array, check_kind, printable, said, split_unit
 
 
 class _Item(NamedTuple):
@@ -28,56 +30,41 @@ class _Item(NamedTuple):
     reason: str = ""
     unit: str | None = None
     rows: int = 0
-    key: Any = None
-    """Where it is in the file."""
+    read: Any = None
+    """Gives the numbers from a row to before a last one (None: the end), while the file is open."""
 
 
-class _Format(NamedTuple):
-    """How files of a format are read."""
+def look(
+    reader: str, path: Path, wanted: Sequence[int] = (), first: int = 0, last: int | None = None
+) -> tuple[dict[str, Any], list[Array]]:
+    """What a file holds, as `Log` has it, and the columns at some places, from a row to a last one.
 
-    opened: Callable[[Path], AbstractContextManager[Any]]
-    items: Callable[[Any], Iterator[_Item]]
-    """What an opened file holds."""
-    column: Callable[[Any, Any, int, int | None], Any]
-    """Numbers of an opened file by a key, from a row to before a last one (None: to the end)."""
-    what: str = "columns"
-
-
-def look(reader: str, path: Path) -> Log:
-    """Look into a file as one of the formats of `swashplate.logs.log.ENDINGS` but text.
-
-    Raises
-    ------
-    FileError
-        If it is of another kind, has no columns of numbers, or needs a library that is not
-        installed. Of a damaged file whatever its library raises.
+    The reader is one of `swashplate.logs.log.ENDINGS`, but text. Of a damaged file it raises
+    whatever its library does.
     """
     form = _form_of(reader, path)
-    opened, items_of, column, what = FORMATS[form]
-    with opened(path) as file:
-        items = list(items_of(file))
-    kept = [each for each in items if not each.reason]
-    left_out = {each.name: each.reason for each in items if each.reason}
-    if not kept:
-        why = "".join(f"; '{each}': {reason}" for each, reason in left_out.items())[:300]
-        raise FileError(f"{path} has no {what} of numbers{printable(why)}.")
-
-    def load(positions: Sequence[int], first: int = 0, last: int | None = None) -> list[Array]:
+    opened, what = FORMATS[form]
+    with opened(path) as held:
+        items = list(held)
+        kept = [each for each in items if not each.reason]
+        left_out = {each.name: each.reason for each in items if each.reason}
+        if not kept:
+            why = "".join(f"; '{each}': {reason}" for each, reason in left_out.items())[:300]
+            raise FileError(f"{path} has no {what} of numbers{printable(why)}.")
         arrays = []
-        with opened(path) as file:
-            for item in (kept[position] for position in positions):
-                numbers = np.asarray(column(file, item.key, first, last), np.float64).ravel()
-                claimed = len(range(item.rows)[first:last])
-                if numbers.size != claimed:
-                    raise FileError(
-                        f"{path}: '{item.name}' has {numbers.size} numbers where it claims "
-                        f"{claimed}; the file was cut off or is damaged."
-                    )
-                arrays.append(numbers)
-        return arrays
-
-    columns = tuple(Column(each.name, each.unit) for each in kept)
-    return Log(path, form, columns, load, left_out, tuple(each.rows for each in kept))
+        for item in (kept[place] for place in wanted):
+            numbers = np.asarray(item.read(first, last), np.float64).ravel()
+            claimed = len(range(item.rows)[first:last])
+            if numbers.size != claimed:
+                raise FileError(
+                    f"{path}: '{item.name}' has {numbers.size} numbers where it claims {claimed}; "
+                    "the file was cut off or is damaged."
+                )
+            arrays.append(numbers)
+    lengths = [each.rows for each in kept]
+    columns = [(each.name, each.unit) for each in kept]
+    found = {"format": form, "columns": columns, "left_out": left_out, "lengths": lengths}
+    return found, arrays
 
 
 _LARGEST = 256 << 20
@@ -112,39 +99,47 @@ def _form_of(reader: str, path: Path) -> str:
     return "MATLAB 5" if head[126:128] in (b"IM", b"MI") else "MATLAB 4"
 
 
-def _missing(path: Path, library: str, extra: str) -> FileError:
-    """What to say where a library is not installed that this format needs."""
-    return FileError(
-        f"{path} needs the library {library}, which is not installed: "
-        f"pip install 'swashplate[{extra}]'."
-    )
+def _library(path: Path, name: str, extra: str) -> Any:
+    """A library that only this format needs."""
+    try:
+        return import_module(name.lower())
+    except ImportError:
+        raise FileError(
+            f"{path} needs the library {name}, which is not installed: "
+            f"pip install 'swashplate[{extra}]'."
+        ) from None
 
 
 # --- Parquet --------------------------------------------------------------------------------------
 
 
-def _parquet(path: Path) -> AbstractContextManager[Any]:
+@contextmanager
+def _parquet(path: Path) -> Iterator[Iterable[_Item]]:
     import polars as pl
 
-    return nullcontext(pl.scan_parquet(path))
+    stored = pl.scan_parquet(path)
+    rows, kinds = int(stored.select(pl.len()).collect().item()), stored.collect_schema()
+    dated = {name for name, kind in kinds.items() if kind.is_temporal()}
+    numbers = dated | {
+        name for name, kind in kinds.items() if kind.is_numeric() or kind == pl.Boolean
+    }
+    yield (
+        _Item(
+            name,
+            "" if name in numbers else f"it is of the type {kind}",
+            "s" if name in dated else split_unit(name)[1],
+            rows,
+            partial(_parquet_rows, stored.select(name)),
+        )
+        for name, kind in kinds.items()
+    )
 
 
-def _parquet_items(stored: Any) -> Iterator[_Item]:
-    import polars as pl
-
-    rows = int(stored.select(pl.len()).collect().item())
-    for name, kind in stored.collect_schema().items():
-        unit = "s" if kind.is_temporal() else split_unit(name)[1]
-        numbers = kind.is_numeric() or kind.is_temporal() or kind == pl.Boolean
-        yield _Item(name, "" if numbers else f"it is of the type {kind}", unit, rows, name)
-
-
-def _parquet_column(stored: Any, name: str, first: int, last: int | None) -> Any:
+def _parquet_rows(column: Any, first: int, last: int | None) -> Any:
     """Numbers; dates and times as seconds since the first of the column, durations as seconds."""
     import polars as pl
 
-    stored = stored.select(name)
-    cells = stored.slice(first, None if last is None else last - first).collect()[name]
+    cells = column.slice(first, None if last is None else last - first).collect().to_series()
     if not cells.dtype.is_temporal():
         return cells.cast(pl.Float64).to_numpy()
     zero = 0
@@ -154,7 +149,7 @@ def _parquet_column(stored: Any, name: str, first: int, last: int | None) -> Any
         ticks = cells.cast(pl.Int64)
     else:
         ticks = cells.cast(pl.Datetime("ns")).dt.epoch("ns")
-        begin = stored.drop_nulls().head(1).collect()[name].cast(pl.Datetime("ns"))
+        begin = column.drop_nulls().head(1).collect().to_series().cast(pl.Datetime("ns"))
         zero = next(iter(begin.dt.epoch("ns")), 0)
     # subtracted as integers: a double of nanoseconds since 1970 would be 256 ns coarse
     return ((ticks - zero).cast(pl.Float64) / 1e9).to_numpy()
@@ -169,13 +164,14 @@ _OBJECTS = 100_000  # in one file
 
 
 def _signals(
-    name: str, array: str, shape: tuple[int, ...], kind: str, units: Sequence[str], form: str
+    name: str, array: Any, form: str, units: Sequence[str] = (), reverse: bool = False
 ) -> Iterator[_Item]:
-    """Vectors of an array of a shape in its own language's order; the longer dimension is time.
+    """Vectors of an array, the longer dimension being time.
 
-    Their keys are the array's place, the dimension along which a vector is chosen, None of an array
-    that is one, and its number along it. `form` is ``"({})"`` of MATLAB, ``"[{}]"`` of HDF5.
+    `form` is how its language writes an index: ``"({})"`` of MATLAB, which counts from 1,
+    ``"[{}]"`` of HDF5. In `reverse` its dimensions are stored the other way round.
     """
+    shape, kind = array.shape[::-1] if reverse else array.shape, array.dtype.kind
     reason = "" if kind in "iufb" else _KINDS.get(kind, "it is no array of numbers")
     reason = reason or ("it is empty" if 0 in shape else "")
     if not reason and len(shape) > 2:
@@ -189,128 +185,103 @@ def _signals(
         yield _Item(name, reason)
         return
     given = list(units) if len(units) == count else [*units[:1], split_unit(name)[1]][:1] * count
-    first = int(form[0] == "(")  # MATLAB counts from 1
     for i in range(count):
-        place = "" if axis is None else form.format(("{},:", ":,{}")[axis].format(i + first))
-        yield _Item(name + place, "", given[i], max(shape, default=1), (array, axis, i))
+        place, along = "", None
+        if axis is not None:
+            place = form.format(("{},:", ":,{}")[axis].format(i + (form[0] == "(")))
+            along = 1 - axis if reverse else axis
+        rows = max(shape, default=1)
+        yield _Item(name + place, "", given[i], rows, partial(_vector, array, along, i))
+
+
+def _vector(array: Any, axis: int | None, number: int, first: int, last: int | None) -> Any:
+    """A vector of an array of NumPy or HDF5, along an axis by its number; None: it is one."""
+    rows = slice(first, last)
+    if not isinstance(array, np.ndarray):
+        _check_stored(array)
+    if axis is not None:
+        return array[(rows, number) if axis else (number, rows)]
+    # a vector of n by 1 or 1 by n, or a single number
+    return array[tuple(rows if size > 1 else 0 for size in array.shape) if array.size > 1 else ...]
 
 
 @contextmanager
-def _matlab(path: Path) -> Iterator[Any]:
+def _matlab(path: Path) -> Iterator[Iterable[_Item]]:
     """Arrays by the names of the variables and, of structures, of their fields."""
     from scipy.io import loadmat
 
-    def of(called: str, value: Any) -> Iterator[tuple[str, Any]]:
+    def items(name: str, value: Any) -> Iterator[_Item]:
         if isinstance(value, dict):
             for field, inner in value.items():
-                yield from of(f"{called}.{printable(field)}", inner)
+                yield from items(f"{name}.{printable(field)}", inner)
         else:
-            yield called, np.asarray(value)
+            yield from _signals(name, np.asarray(value), "({})")
 
     variables = loadmat(path, appendmat=False, simplify_cells=True).items()
     named = (each for each in variables if not each[0].startswith("__"))
-    yield dict(pair for name, content in named for pair in of(printable(name), content))
-
-
-def _matlab_items(arrays: Mapping[str, Any]) -> Iterator[_Item]:
-    for name, value in arrays.items():
-        yield from _signals(name, name, value.shape, value.dtype.kind, (), "({})")
-
-
-def _matlab_column(arrays: Mapping[str, Any], key: Any, first: int, last: int | None) -> Any:
-    name, axis, number = key
-    vector = arrays[name] if axis is None else np.take(arrays[name], number, axis=axis)
-    return np.ravel(vector)[first:last]
+    yield (item for name, value in named for item in items(printable(name), value))
 
 
 @contextmanager
-def _hdf5(path: Path) -> Iterator[Any]:
-    import h5py
-
-    with h5py.File(path, "r", locking=False) as file:
-        yield file
-
-
-def _datasets(file: Any) -> Iterator[Any]:
+def _hdf5(path: Path, *, matlab: bool = False) -> Iterator[Iterable[_Item]]:
     """All datasets, each once; neither soft nor external links are followed."""
     import h5py
 
-    names: list[str] = []
-    file.visit(names.append)
-    if len(names) > _OBJECTS:
-        raise ValueError(f"it has {len(names)} objects, more than the {_OBJECTS} that are read")
-    found = map(file.get, names)
-    yield from (each for each in found if isinstance(each, h5py.Dataset))
+    with h5py.File(path, "r", locking=False) as file:
+        names: list[str] = []
+        file.visit(names.append)
+        if len(names) > _OBJECTS:
+            raise ValueError(f"it has {len(names)} objects, more than the {_OBJECTS} that are read")
+        found = (each for each in map(file.get, names) if isinstance(each, h5py.Dataset))
+        items = _matlab73_items if matlab else _hdf5_items
+        yield (item for dataset in found for item in items(dataset))
 
 
-def _hdf5_signals(name: str, dataset: Any, form: str) -> Iterator[_Item]:
+def _hdf5_items(dataset: Any, name: str | None = None, form: str = "[{}]") -> Iterator[_Item]:
+    name = f"/{dataset.name.lstrip('/')}" if name is None else name
     reason = "" if dataset.shape else "it is a single value"
     try:
         if dataset.is_virtual or dataset.external:
             reason = reason or "its numbers are in other files"
         given: Any = next((dataset.attrs[key] for key in _UNITS if key in dataset.attrs), [])
         units = [_text(each) for each in np.ravel(given).tolist()]
-        shape = dataset.shape[::-1] if form == "({})" else dataset.shape
-        found = list(_signals(name, dataset.name, shape, dataset.dtype.kind, units, form))
+        found = list(_signals(name, dataset, form, units, reverse=form == "({})"))
         yield from [_Item(name, reason)] if reason else found
     except (TypeError, ValueError) as error:  # a type that NumPy does not have
         yield _Item(name, said(error))
 
 
-def _hdf5_items(file: Any) -> Iterator[_Item]:
-    for dataset in _datasets(file):
-        yield from _hdf5_signals(f"/{dataset.name.lstrip('/')}", dataset, "[{}]")
-
-
-def _matlab73_items(file: Any) -> Iterator[_Item]:
+def _matlab73_items(dataset: Any) -> Iterator[_Item]:
     """Of MATLAB 7.3, whose dimensions are stored the other way round."""
-    for dataset in _datasets(file):
-        name = dataset.name.strip("/").replace("/", ".")
-        kind = _text(dataset.attrs.get("MATLAB_class", "double"))
-        numbers = kind in ("single", "logical", "double") or kind.lstrip("u").startswith("int")
-        if name.startswith("#"):
-            continue  # what cells and objects refer to
-        if "MATLAB_object_decode" in dataset.attrs or not numbers:
-            yield _Item(name, f"it is a MATLAB {kind}")
-        elif dataset.attrs.get("MATLAB_empty", 0):
-            yield _Item(name, "it is empty")
-        else:
-            for each in _hdf5_signals(name, dataset, "({})"):
-                if each.key and each.key[1] is not None:
-                    array, axis, number = each.key
-                    each = each._replace(key=(array, 1 - axis, number))
-                yield each
+    name = dataset.name.strip("/").replace("/", ".")
+    kind = _text(dataset.attrs.get("MATLAB_class", "double"))
+    numbers = kind in ("single", "logical", "double") or kind.lstrip("u").startswith("int")
+    if name.startswith("#"):
+        return  # what cells and objects refer to
+    if "MATLAB_object_decode" in dataset.attrs or not numbers:
+        yield _Item(name, f"it is a MATLAB {kind}")
+    elif dataset.attrs.get("MATLAB_empty", 0):
+        yield _Item(name, "it is empty")
+    else:
+        yield from _hdf5_items(dataset, name, "({})")
 
 
 def _text(value: object) -> str:
     return value.decode("utf-8", "replace") if isinstance(value, bytes) else str(value)
 
 
-def _hdf5_column(file: Any, key: Any, first: int, last: int | None) -> Any:
-    array, axis, number = key
-    dataset, rows = file[array], slice(first, last)
-    # HDF5 would give zeros for numbers that are claimed but were never stored
-    if dataset.id.get_storage_size() == 0:
-        raise ValueError(
-            f"'{dataset.name}' claims {prod(dataset.shape)} numbers, but none is stored"
-        )
+def _check_stored(dataset: Any) -> None:
+    """Refuse numbers that are claimed but were never stored: HDF5 would give zeros for them."""
+    name, shape, stored = dataset.name, dataset.shape, dataset.id
+    if stored.get_storage_size() == 0:
+        raise ValueError(f"'{name}' claims {prod(shape)} numbers, but none is stored")
     if dataset.chunks is not None:
-        sides = zip(dataset.shape, dataset.chunks, strict=True)
-        expected, count = (
-            prod(ceil(size / side) for size, side in sides),
-            dataset.id.get_num_chunks(),
-        )
+        count = stored.get_num_chunks()
+        expected = prod(ceil(size / side) for size, side in zip(shape, dataset.chunks, strict=True))
         if count != expected:
             raise ValueError(
-                f"'{dataset.name}' has only {count} of its {expected} blocks, the others were "
-                "never written"
+                f"'{name}' has only {count} of its {expected} blocks, the others were never written"
             )
-    if axis is not None:
-        return dataset[(rows, number) if axis else (number, rows)]
-    # a vector of n by 1 or 1 by n
-    return dataset[
-        tuple(rows if size > 1 else 0 for size in dataset.shape) if dataset.size > 1 else ...
-    ]
 
 
 # --- TDMS -----------------------------------------------------------------------------------------
@@ -324,19 +295,15 @@ class _Refusal(logging.Handler):
 
 
 @contextmanager
-def _tdms(path: Path) -> Iterator[Any]:
+def _tdms(path: Path) -> Iterator[Iterable[_Item]]:
     """npTDMS on a file; an index beside it, which may belong to another, is not used."""
-    try:
-        import nptdms
-        from nptdms.log import log_manager
-    except ImportError:
-        raise _missing(path, "npTDMS", "tdms") from None
-    log_manager.console_handler.setLevel(logging.CRITICAL)
+    nptdms = _library(path, "npTDMS", "tdms")
+    nptdms.log.log_manager.console_handler.setLevel(logging.CRITICAL)
     logger, refusal = logging.getLogger("nptdms"), _Refusal()
     logger.addHandler(refusal)
     try:
         with path.open("rb") as file, nptdms.TdmsFile.open(file) as opened:
-            yield opened
+            yield _tdms_items(opened)
     finally:
         logger.removeHandler(refusal)
 
@@ -351,34 +318,32 @@ def _tdms_items(file: Any) -> Iterator[_Item]:
         clocks, names = dict[tuple[float, float, int], str](), set[str]()
         for channel in group.channels():
             kind, rows, given = channel.dtype.kind, len(channel), channel.properties
+            name = prefix + channel.name
             names.add(channel.name)
             if rows == 0 or kind not in "iufbM":
-                yield _Item(
-                    prefix + channel.name, _KINDS.get(kind, _KINDS["S"]) if rows else "it is empty"
-                )
+                yield _Item(name, _KINDS.get(kind, _KINDS["S"]) if rows else "it is empty")
                 continue
             unit = "s" if kind == "M" else given.get("unit_string") or split_unit(channel.name)[1]
-            key = group.name, channel.name, None
-            yield _Item(prefix + channel.name, "", str(unit) if unit else None, rows, key)
+            yield _Item(name, "", str(unit) if unit else None, rows, partial(_tdms_rows, channel))
             step, begin = given.get("wf_increment"), given.get("wf_start_offset", 0.0)
             if isinstance(step, float) and step > 0.0 and isinstance(begin, float):
                 clocks.setdefault((begin, step, rows), channel.name)
-        for clock, name in clocks.items():
-            called = "time" if len(clocks) == 1 else f"{name} time"
+        for clock, channel_name in clocks.items():
+            called = "time" if len(clocks) == 1 else f"{channel_name} time"
             if called not in names:
-                yield _Item(prefix + called, "", "s", clock[2], (group.name, name, clock))
+                yield _Item(prefix + called, "", "s", clock[2], partial(_stamps, *clock))
 
 
-def _tdms_column(file: Any, key: Any, first: int, last: int | None) -> Any:
-    group, name, clock = key
-    channel = file[group][name]
-    rows = range(len(channel))[first:last]
-    if clock is not None:
-        return clock[0] + clock[1] * np.arange(rows.start, rows.stop, dtype=np.float64)
-    numbers = np.asarray(channel.read_data(first, len(rows)))
+def _tdms_rows(channel: Any, first: int, last: int | None) -> Any:
+    numbers = np.asarray(channel.read_data(first, len(range(len(channel))[first:last])))
     if numbers.dtype.kind == "M":  # seconds since the first
         numbers = (numbers - channel.read_data(0, 1)[0]) / np.timedelta64(1, "s")
     return numbers
+
+
+def _stamps(begin: float, step: float, size: int, first: int, last: int | None) -> Array:
+    rows = range(size)[first:last]
+    return begin + step * np.arange(rows.start, rows.stop, dtype=np.float64)
 
 
 # --- MDF ------------------------------------------------------------------------------------------
@@ -389,13 +354,10 @@ _VARIABLE = (1, 5)  # channels whose samples differ in length
 _LEFT_OUT = "it holds text or bytes"
 
 
-def _mdf(path: Path) -> AbstractContextManager[Any]:
-    try:
-        import asammdf
-    except ImportError:
-        raise _missing(path, "asammdf", "mdf") from None
-    opened: AbstractContextManager[Any] = asammdf.MDF(path)
-    return opened
+@contextmanager
+def _mdf(path: Path) -> Iterator[Iterable[_Item]]:
+    with _library(path, "asammdf", "mdf").MDF(path) as mdf:
+        yield _mdf_items(mdf)
 
 
 def _mdf_items(mdf: Any) -> Iterator[_Item]:
@@ -411,17 +373,17 @@ def _mdf_items(mdf: Any) -> Iterator[_Item]:
         prefix = f"{called}/" if called and counts[called] == 1 else f"group {number}/"
         prefix = "" if len(named) == 1 else prefix
         for place, channel in enumerate(group.channels):
-            conversion = channel.conversion
+            conversion, name = channel.conversion, channel.name
             texts = conversion is not None and conversion.conversion_type in _TEXTS
             numeric = channel.data_type in _NUMBERS and channel.channel_type not in _VARIABLE
             reason = _LEFT_OUT if texts or not numeric else "" if rows else "it is empty"
-            unit = channel.unit or getattr(conversion, "unit", "") or split_unit(channel.name)[1]
-            yield _Item(prefix + channel.name, reason, unit or None, rows, (number, place))
+            unit = channel.unit or getattr(conversion, "unit", "") or split_unit(name)[1]
+            read = partial(_mdf_rows, mdf, number, place)
+            yield _Item(prefix + name, reason, unit or None, rows, read)
 
 
-def _mdf_column(mdf: Any, key: Any, first: int, last: int | None) -> Any:
+def _mdf_rows(mdf: Any, group: int, place: int, first: int, last: int | None) -> Any:
     """Numbers; samples that the file marks as invalid are NaN."""
-    group, place = key
     rows = range(mdf.groups[group].channel_group.cycles_nr)[first:last]
     # invalid samples would be cut out otherwise
     samples, invalid = mdf.get(
@@ -440,13 +402,13 @@ def _mdf_column(mdf: Any, key: Any, first: int, last: int | None) -> Any:
     return numbers
 
 
-FORMATS: Mapping[str, _Format] = {
-    "Parquet": _Format(_parquet, _parquet_items, _parquet_column),
-    "MATLAB 4": _Format(_matlab, _matlab_items, _matlab_column, "vectors"),
-    "MATLAB 5": _Format(_matlab, _matlab_items, _matlab_column, "vectors"),
-    "MATLAB 7.3": _Format(_hdf5, _matlab73_items, _hdf5_column),
-    "HDF5": _Format(_hdf5, _hdf5_items, _hdf5_column),
-    "TDMS": _Format(_tdms, _tdms_items, _tdms_column, "channels"),
-    "MDF 4": _Format(_mdf, _mdf_items, _mdf_column, "channels"),
+FORMATS: dict[str, tuple[Callable[[Path], AbstractContextManager[Iterable[_Item]]], str]] = {
+    "Parquet": (_parquet, "columns"),
+    "MATLAB 4": (_matlab, "vectors"),
+    "MATLAB 5": (_matlab, "vectors"),
+    "MATLAB 7.3": (partial(_hdf5, matlab=True), "columns"),
+    "HDF5": (_hdf5, "columns"),
+    "TDMS": (_tdms, "channels"),
+    "MDF 4": (_mdf, "channels"),
 }
-"""How files of each format are read."""
+"""What opens a file of each format and says what it holds, and a word for that."""

@@ -119,11 +119,6 @@ def encoding_of(path: Path, given: str | None) -> tuple[str, int]:
     return name, len(mark)
 
 
-def is_comment(line: str, marks: tuple[str, ...]) -> bool:
-    """Whether a line begins with one of the marks."""
-    return bool(marks) and line.lstrip().startswith(marks)
-
-
 # --- cells ----------------------------------------------------------------------------------------
 
 _EXPONENT = r"(?:[eE][+-]?\d+)?"
@@ -201,15 +196,16 @@ class Layout(NamedTuple):
         point = "comma" if self.decimal == "," else "point"
         return f"{_NAMES.get(self.delimiter, repr(self.delimiter))}, decimal {point}"
 
-    def cells(self, line: str) -> list[str]:
-        """Cells of a line, stripped."""
-        if self.delimiter == " ":
+    def cells(self, line: str, *, strict: bool = False) -> list[str]:
+        """Cells of a line, stripped; `strict` refuses misplaced quotes in a `csv.Error`."""
+        mark = self.delimiter
+        if mark == " ":
             line = line.replace("\t", " ").strip()
-        parts = line.split() if self.delimiter == " " else line.split(self.delimiter)
         if '"' in line:
-            with suppress(csv.Error, StopIteration):
-                parts = next(csv.reader([line], delimiter=self.delimiter, skipinitialspace=True))
-        return [cell.strip() for cell in parts]
+            quoted = csv.reader([line], delimiter=mark, skipinitialspace=True, strict=strict)
+            with suppress(StopIteration, *[] if strict else [csv.Error]):
+                return [cell.strip() for cell in next(quoted)]
+        return [cell.strip() for cell in (line.split() if mark == " " else line.split(mark))]
 
     def names(self, line: str) -> list[str]:
         """Cells of a header; where spaces delimit, the one before a unit does not."""
@@ -237,12 +233,8 @@ class Layout(NamedTuple):
 def find_layout(lines: Sequence[str], options: TextOptions, path: Path) -> Layout:
     """Delimiter and decimal sign under which a sample of lines makes most sense as rows of numbers.
 
-    Comments and blank lines must not be among the lines; header lines may.
-
-    Raises
-    ------
-    FileError
-        If there are no rows of numbers, or if two readings are as good as each other.
+    Comments and blank lines must not be among the lines; header lines may. Two readings that are as
+    good as each other are refused.
     """
     quoted = any('"' in line for line in lines)
     given = {key: getattr(options, key) for key in ("delimiter", "decimal")}
@@ -331,20 +323,14 @@ _Units = list[str | None]
 def read_heading(
     head: Sequence[str], layout: Layout, options: TextOptions, path: Path
 ) -> tuple[tuple[Column, ...], int]:
-    """Columns by the first lines of a file, and the line of the first row; the first line is 1.
-
-    Raises
-    ------
-    FileError
-        If there is no row of numbers, or the header has another number of fields than the rows.
-    """
+    """Columns by the first lines of a file, and the line of the first row; the first line is 1."""
     numbered = [each for each in enumerate(head, 1) if not layout.is_blank(each[1])]
     marks = "|".join(map(re.escape, options.marks))
     # comments without their marks, as NumPy writes names into one
     comments = {
         number: re.sub(rf"^\s*(?:{marks})", "", line)
         for number, line in numbered
-        if is_comment(line, options.marks)
+        if line.lstrip().startswith(options.marks)
     }
     plain = [each for each in numbered if each[0] not in comments]
     names: list[str] = []

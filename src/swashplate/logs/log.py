@@ -182,13 +182,7 @@ _KINDS = {
 
 
 def check_kind(path: Path, *expected: str) -> None:
-    """Refuse a file whose first bytes are those of another kind, and say of which.
-
-    Parameters
-    ----------
-    expected : str
-        Kinds that are right, by name; a file of no known kind passes.
-    """
+    """Refuse a file whose first bytes are those of a known kind but the `expected` ones."""
     with path.open("rb") as file:
         first = file.read(32)
     for magic, kind in _KINDS.items():
@@ -377,10 +371,7 @@ def _last(name: str) -> str:
 def check_stamps(log: Log, column: str, stamps: Array) -> None:
     """Refuse time stamps (n,) of a column that are missing, not finite, or do not increase.
 
-    Raises
-    ------
-    FileError
-        The sentence names file, column and data row; the first row is 1.
+    The sentence names file, column and data row; the first row is 1.
     """
     _check_finite(log, column, stamps)
     late = np.flatnonzero(np.diff(stamps) <= 0.0)
@@ -400,13 +391,7 @@ SHORTEST, LONGEST = 1e-6, 1e10
 
 
 def check_duration(log: Log, source: str, time: Array) -> Array:
-    """Increasing time stamps [s], which must span what a record may last.
-
-    Raises
-    ------
-    FileError
-        The sentence names the file, and the source as it is given.
-    """
+    """Increasing time stamps [s] by some source, refused unless they span what a record lasts."""
     span = float(time[-1]) - float(time[0]) if time.size > 1 else 1.0
     if not SHORTEST < span < LONGEST:
         raise FileError(

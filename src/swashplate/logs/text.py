@@ -8,11 +8,10 @@ from __future__ import annotations
 
 import csv
 import io
-import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -26,7 +25,6 @@ from swashplate.logs.dialect import (
     date_form,
     encoding_of,
     find_layout,
-    is_comment,
     is_number,
     read_heading,
     shown,
@@ -46,28 +44,19 @@ _SAMPLED = 1 << 20  # letters of them: fewer lines where there are thousands of 
 
 
 def open_text(path: Path, options: TextOptions | None = None) -> Log:
-    """Look into a text file: encoding, delimiter, decimal sign, names, units, comments.
-
-    Delimiter and decimal sign are those under which most rows have the same number of fields and
-    most of their characters are in numbers.
-
-    Raises
-    ------
-    FileError
-        If it is no text, has no rows of numbers, or can be read in more than one way: `TextOptions`
-        must say then.
-    """
+    """Look into a text file: encoding, delimiter, decimal sign, names, units, comments."""
     options = options or TextOptions()
     encoding, skipped = encoding_of(path, options.encoding)
     head = next(_pieces(path, encoding, skipped), "").split("\n")[:-1]
     size = sum(map(len, head)) + len(head)
-    filled = [line for line in head if line.strip() and not is_comment(line, options.marks)]
+    marks = options.marks
+    filled = [line for line in head if line.strip() and not line.lstrip().startswith(marks)]
     if not filled:
         raise FileError(f"{path} has no rows of numbers, only comments and empty lines.")
     some = max(4, min(_SAMPLE, _SAMPLED * len(head) // size))
     layout = find_layout(filled[:some] + filled[some :: 1 + len(filled) // some], options, path)
     columns, first = read_heading(head[:_HEAD], layout, options, path)
-    table = _Table(path, encoding, skipped, layout, columns, first, options.marks)
+    table = _Table(path, encoding, skipped, layout, columns, first, marks)
 
     def load(positions: Sequence[int], begin: int = 0, end: int | None = None) -> list[Array]:
         pieces = list(table.read(positions)) or [[np.empty(0)] * len(positions)]
@@ -81,13 +70,7 @@ def open_text(path: Path, options: TextOptions | None = None) -> Log:
 
 
 def _pieces(path: Path, encoding: str, skipped: int) -> Iterator[str]:
-    """A text file in pieces of whole lines, every line ended by a line feed.
-
-    Raises
-    ------
-    FileError
-        For bytes that are no such text, or an endless line.
-    """
+    """A text file in pieces of whole lines, every line ended by a line feed."""
     # UTF-8 is a guess from the first bytes, and a letter of a comment further down no number
     errors = "replace" if encoding == "utf-8" else "strict"
     with path.open("rb") as raw:
@@ -112,15 +95,6 @@ def _pieces(path: Path, encoding: str, skipped: int) -> Iterator[str]:
 
 # --- rows -----------------------------------------------------------------------------------------
 
-_SEPARATOR = "\x1f"  # delimits cells whose quotes were taken off: no text has it
-
-
-class _NoNumber(NamedTuple):
-    """The first cell of a column that holds no number, and its row in the piece, from 0."""
-
-    row: int
-    cell: str
-
 
 @dataclass(frozen=True)
 class _Table:
@@ -135,153 +109,109 @@ class _Table:
     marks: tuple[str, ...]
 
     def read(self, positions: Sequence[int]) -> Iterator[list[Array]]:
-        """Columns at these positions, piece after piece, in the file's units.
-
-        Raises
-        ------
-        FileError
-            For a row of too many or too few fields, a cell that holds no number, a NUL byte.
-        """
+        """Columns at these positions, piece after piece, in the file's units."""
         begin, count, clocks = 1, 0, dict[int, _Clock]()
         for piece in _pieces(self.path, self.encoding, self.skipped):
-            end, header = begin + piece.count("\n"), max(self.first - begin, 0)
-            lines: Sequence[int] = range(begin + header, end)
-            numbers = [each for each in positions if each not in clocks]
-            cells = self._plain_cells(piece.split("\n", header)[-1], len(lines), numbers)
-            if cells is None:
-                rows = self._rows(piece, begin)
-                cells, lines = self._cells(rows, count), rows["line"].to_list()
-            begin = end
+            lines, cells = self._at_once(piece, begin) or self._line_by_line(piece, begin, count)
+            begin += piece.count("\n")
             if lines:
                 yield [
-                    self._numbers(cells[f"field_{each}"], lines, each, count, clocks)
+                    self._numbers(cells[str(each)], lines, each, count, clocks)
                     for each in positions
                 ]
             count += len(lines)
 
-    def _plain_cells(
-        self, text: str, lines: int, numbers: Sequence[int]
-    ) -> polars.DataFrame | None:
-        """Cells of lines that are rows, of plain numbers in the columns `numbers`; None if not."""
+    def _at_once(self, piece: str, begin: int) -> tuple[Sequence[int], polars.DataFrame] | None:
+        """Numbers of a piece's lines, and their cells; None if some may be no plain rows."""
         import polars as pl
 
-        delimiter, width, comma = self.layout.delimiter, self.layout.width, self.layout.decimal
-        # a point may mark thousands where commas are decimal
-        special = ('"', "\0", *self.marks, *("." if comma == "," else ""))
-        if delimiter == " " or lines < 1 or any(each in text for each in special):
+        text = piece.split("\n", max(self.first - begin, 0))[-1]
+        delimiter, width = self.layout.delimiter, self.layout.width
+        if not text or any(each in text for each in ('"', "\0", *self.marks)):
             return None
-        kinds = [pl.Float64 if i in numbers else pl.String for i in range(width)]
+        if delimiter == " ":
+            text, delimiter = "\n".join("\t".join(row.split()) for row in text.split("\n")), "\t"
         try:
             cells = pl.read_csv(
                 text.encode(),
                 has_header=False,
                 separator=delimiter,
                 quote_char=None,
-                decimal_comma=comma == ",",
-                schema={f"field_{i}": kind for i, kind in enumerate(kinds)},
+                schema={str(place): pl.String for place in range(width)},
             )
         except pl.exceptions.PolarsError:
             return None
         # Polars refuses a row of too many fields, and fills one of too few, or a blank one
         filled = cells[:, -1].null_count() == 0
-        return cells if filled or text.count(delimiter) == lines * (width - 1) else None
+        if not filled and text.count(delimiter) != len(cells) * (width - 1):
+            return None
+        return range(max(begin, self.first), max(begin, self.first) + len(cells)), cells
 
-    def _rows(self, piece: str, begin: int) -> polars.DataFrame:
-        """Lines of a piece that are rows, with their numbers; `begin` is that of the first line."""
+    def _line_by_line(
+        self, piece: str, begin: int, count: int
+    ) -> tuple[Sequence[int], polars.DataFrame]:
+        """Numbers of the lines of a piece that are rows, and their cells; `count` are before."""
         import polars as pl
 
-        texts = pl.Series("text", [piece[:-1]]).str.split("\n").explode()
-        lines = pl.DataFrame([texts]).with_row_index("line", begin)
-        return lines.filter((pl.col("line") >= self.first) & self._holds_a_row())
-
-    def _holds_a_row(self) -> polars.Expr:
-        """Whether a line is neither comment nor blank; one of nothing but tabs has empty cells."""
-        import polars as pl
-
-        text = pl.col("text").str.strip_chars()
-        filled = text != ""
-        if self.layout.delimiter == "\t":
-            filled |= pl.col("text").str.count_matches("\t") == self.layout.width - 1
-        comment = "|".join(map(re.escape, self.marks))
-        return filled & ~text.str.contains(f"^(?:{comment})") if comment else filled
-
-    def _cells(self, rows: polars.DataFrame, count: int) -> polars.DataFrame:
-        """Rows taken apart into ``field_0``, ``field_1`` ..., before which there are `count`."""
-        import polars as pl
-
-        texts, delimiter, width = rows["text"], self.layout.delimiter, self.layout.width
-
-        def place(row: int) -> str:
-            return f"data row {count + row + 1} (line {rows['line'][row]})"
-
-        nul = texts.str.contains("\0", literal=True)
-        if nul.any():
-            where = place(int(nul.arg_max() or 0))
-            raise FileError(f"{self.path} has a NUL byte in {where}; it is damaged.")
-        if delimiter == " ":
-            texts, delimiter = texts.str.strip_chars().str.replace_all("[ \t]+", "\t"), "\t"
-        if texts.str.contains('"', literal=True).any():
-            unquoted = []
-            for row, text in enumerate(texts):
-                quoted = csv.reader([text], delimiter=delimiter, skipinitialspace=True, strict=True)
-                try:
-                    unquoted.append(_SEPARATOR.join(next(quoted)))
-                except csv.Error as error:
-                    said = printable(str(error))
-                    raise FileError(
-                        f"{self.path} has misplaced quotes in {place(row)}: {said}."
-                    ) from None
-            texts, delimiter = pl.Series(unquoted, dtype=pl.String), _SEPARATOR
-        cells = texts.str.split_exact(delimiter, width).struct.unnest()
-        wrong = cells[f"field_{width - 1}"].is_null() | cells[f"field_{width}"].is_not_null()
-        if wrong.any():
-            row = int(wrong.arg_max() or 0)
-            has = len(texts[row].split(delimiter))
-            raise FileError(
-                f"{self.path}: {place(row)} has {has} field{'s' * (has > 1)} instead of {width}."
-            )
-        return cells
+        lines, rows = list[int](), list[list[str]]()
+        for line, text in enumerate(piece.split("\n")[:-1], begin):
+            comment = text.lstrip().startswith(self.marks)
+            if line < self.first or comment or self.layout.is_blank(text):
+                continue
+            place = f"data row {count + len(rows) + 1} (line {line})"
+            if "\0" in text:
+                raise FileError(f"{self.path} has a NUL byte in {place}; it is damaged.")
+            try:
+                cells = self.layout.cells(text, strict=True)
+            except csv.Error as error:
+                why = f"{place}: {printable(str(error))}"
+                raise FileError(f"{self.path} has misplaced quotes in {why}.") from None
+            if len(cells) != self.layout.width:
+                has = f"{len(cells)} field{'s' * (len(cells) > 1)} instead of {self.layout.width}"
+                raise FileError(f"{self.path}: {place} has {has}.")
+            lines.append(line)
+            rows.append(cells)
+        names = [str(place) for place in range(self.layout.width)]
+        return lines, pl.DataFrame(rows, dict.fromkeys(names, pl.String), orient="row")
 
     def _numbers(
         self,
-        texts: polars.Series,
+        cells: polars.Series,
         lines: Sequence[int],
         position: int,
         count: int,
         clocks: dict[int, _Clock],
     ) -> Array:
         """A column of a piece, before which there are `count` rows."""
-        if texts.dtype.is_float():
-            return texts.to_numpy()
-        found, kind = _numbers_of(texts, self.layout.decimal), "number"
-        if count == 0 and isinstance(found, _NoNumber):
-            form = date_form(found.cell.strip())
-            clocks |= {position: _Clock(form)} if form else {}
-        if position in clocks:
-            found, kind = clocks[position].seconds(texts), "date like the first one"
-        if isinstance(found, _NoNumber):
-            other = "," if self.layout.decimal == "." else "."
-            if kind == "number" and is_number(found.cell.strip(), other):
+        text, kind, decimal = cells.str.strip_chars().fill_null(""), "number", self.layout.decimal
+        found = clocks[position].seconds(text) if position in clocks else _numbers_of(text, decimal)
+        if count == 0 and isinstance(found, int) and (form := date_form(text[found])):
+            clocks[position] = _Clock(form)
+            found = clocks[position].seconds(text)
+        if isinstance(found, int):
+            other = "," if decimal == "." else "."
+            if position in clocks:
+                kind = "date like the first one"
+            elif is_number(text[found], other):
                 kind += f" with a decimal {'comma' if other == '.' else 'point'}"
             raise FileError(
                 f"{self.path}: column '{self.columns[position].name}' holds "
-                f"'{shown(found.cell)}', which is no {kind}, in data row "
-                f"{count + found.row + 1} (line {lines[found.row]})."
+                f"'{shown(text[found])}', which is no {kind}, in data row {count + found + 1} "
+                f"(line {lines[found]})."
             )
         return found
 
 
-def _numbers_of(cells: polars.Series, decimal: str) -> Array | _NoNumber:
-    """Numbers of a column of text, an empty cell as NaN; or the first cell that holds none."""
+def _numbers_of(text: polars.Series, decimal: str) -> Array | int:
+    """Numbers of a column, an empty cell as NaN; or the place of the first cell that holds none."""
     import polars as pl
 
-    text = cells.str.strip_chars()
     plain = text
     if decimal == ",":
         # so that 1.234 is not taken for a number: it may be one thousand in this notation
         plain = text.str.replace_all(".", "?", literal=True).str.replace(",", ".", literal=True)
     numbers = plain.cast(pl.Float64, strict=False)
-    unread = numbers.is_null() & text.is_not_null() & (text != "")
+    unread = numbers.is_null() & (text != "")
     if not unread.any():
         return numbers.to_numpy()
     bare = text.str.strip_chars_start(SIGNS).str.to_lowercase()
@@ -290,8 +220,7 @@ def _numbers_of(cells: polars.Series, decimal: str) -> Array | _NoNumber:
     missing = bare.is_in(NOT_A_NUMBER) | ((bare == "") & (text.str.len_chars() > 1))
     wrong = unread & ~(missing | infinite)
     if wrong.any():
-        row = int(wrong.arg_max() or 0)
-        return _NoNumber(row, str(cells[row]))
+        return int(wrong.arg_max() or 0)
     values: Array = numbers.to_numpy(writable=True)
     endless = (unread & infinite).to_numpy()
     values[endless] = np.where(text.str.starts_with("-").to_numpy()[endless], -np.inf, np.inf)
@@ -315,22 +244,20 @@ class _Clock:
         self.first: int | None = None  # stamp [µs]
         self.last = self.ahead = 0  # the stamp before, and days passed since the first [µs]
 
-    def seconds(self, cells: polars.Series) -> Array | _NoNumber:
-        """Seconds since the column's first stamp, or the first cell of another form."""
+    def seconds(self, text: polars.Series) -> Array | int:
+        """Seconds since the column's first stamp, or the place of the first cell that is none."""
         import polars as pl
 
-        text = cells.str.strip_chars()
         text = text.set(text == "", None)
         plain = text.str.replace(",", ".", literal=True)  # of the fraction
         plain = plain if self.dated else "1970-01-01 " + plain
         found = plain.str.to_datetime(self.form, time_unit="us", strict=False)
         wrong = found.is_null() & text.is_not_null()
         if wrong.any():
-            row = int(wrong.arg_max() or 0)
-            return _NoNumber(row, str(cells[row]))
+            return int(wrong.arg_max() or 0)
         stamps = found.cast(pl.Int64)
         if stamps.null_count() == len(stamps):
-            return np.full(len(cells), np.nan)
+            return np.full(len(text), np.nan)
         if self.first is None:
             self.first = self.last = int(stamps.drop_nulls()[0])
         whole = stamps.fill_null(strategy="forward").fill_null(self.last).to_numpy()
