@@ -378,7 +378,7 @@ def stage_problem(
         for unknown in (*_of_a_run(stage, each, channels, parameters), *_edges(stage, each, edges))
     ]
     return Problem(
-        DriveModel(begun, stage.part, currents, stage.forces, starts),
+        DriveModel(begun, stage.part, currents, stage.forces, dict(starts)),
         tuple(_weighted(each, stage) for each in runs),
         Unknowns((*free, *own)),
         channels,
