@@ -9,7 +9,7 @@ import sympy as sp
 from swashplate import Drive
 from swashplate.equations import derive
 from swashplate.equations.fields import made
-from swashplate.models.displacement_control import Pump, pressure_rate, spool_balance
+from swashplate.models.displacement_control import Pump, Stroking, pressure_rate, spool_balance
 
 d1, d3, d4, k_f, A_s, k_r, C_o, B, V = sp.symbols("d1 d3 d4 k_f A_s k_r C_o B V", positive=True)
 F, plate, rise, x, Delta, P0 = sp.symbols("F alpha_sw delta_P x_eff Delta_P P0", real=True)
@@ -117,10 +117,9 @@ def test_slopes_away_from_rest(points: Callable, hoist: Drive) -> None:
         assert found == pytest.approx(derived(force, sine, square, arm), rel=1e-9)
     rates = (rise, x, Z[6], Z[8], Z[9])
     derived = sp.lambdify(rates, [sp.diff(RATE, each) for each in rates])
-    oil = derive(
-        pressure_rate, by=("pressure", "opening", "Z6", "Z8", "Z9"), options={"symmetric": None}
-    )
+    by = ("pressure", "opening", "p.Z6", "p.Z8", "p.Z9")
+    oil = derive(pressure_rate, by=by, options={"symmetric": None})
     assert oil.entries == tuple((0, n) for n in range(5))
     for at in points((-6e5, 6e5), (-2e-4, 2e-4), (0.05, 15), (5e5, 2e6), (8e6, 3e7)):
-        found = oil.python(*at[:3], 0.0, *at[3:], None)[1:]
+        found = oil.python(*at[:2], Stroking(at[2], 0.0, *at[3:]), None)[1:]
         assert found == pytest.approx(derived(*at), rel=1e-12)

@@ -14,7 +14,7 @@ from swashplate.equations.fields import made
 from swashplate.full_order import QUANTITIES, FullOrderDrive, PhysicalSet
 from swashplate.models import displacement_control as control
 from swashplate.models import machine
-from swashplate.models.displacement_control import Pump
+from swashplate.models.displacement_control import Pump, Stroking
 from swashplate.models.machine import Machine
 from swashplate.parameters import CATALOGUE
 
@@ -124,9 +124,9 @@ def test_eq_6_62_to_6_68_lumps_of_the_pressure(points: Callable) -> None:
     names = ["piston_area", "bulk_modulus", "oil_volume", "return_spring_rate"]
     names += ["valve_flow_gain", "piston_leakage", "supply_pressure"]
     quantities = [n[each] for each in names]
-    Z6, Z7, Z8, Z9 = (lumps[f"Z{each}"] for each in (6, 7, 8, 9))
+    stroking = Stroking(*(lumps[name] for name in Stroking._fields))
     for pressure, opening in points((-6e5, 6e5), (-2e-4, 2e-4)):
-        found = pressure_rate(pressure, opening, Z6, Z7, Z8, Z9, None)
+        found = pressure_rate(pressure, opening, stroking, None)
         assert found == pytest.approx(derived(pressure, opening, *quantities), rel=1e-9)
 
 
