@@ -8,6 +8,7 @@ from scipy.integrate import solve_ivp
 from swashplate.models.displacement_control import (
     Pump,
     PumpConstants,
+    Stroking,
     arm_sine,
     orifice_opening,
     plate_motion,
@@ -36,7 +37,7 @@ def slope(t: float, state: Array, current: Array, h: float, pump: Pump, k: PumpC
     free = spool_balance(solenoid_force(i, solenoids_of(pump)), arm_sine(p, pump), pump)
     opening = orifice_opening(free, pump)
     Z6 = plate_motion(p, pump, k)
-    rate = pressure_rate(p, opening, Z6, pump.Z7, pump.Z8, pump.Z9, None)
+    rate = pressure_rate(p, opening, Stroking(Z6, pump.Z7, pump.Z8, pump.Z9), None)
     if (p >= k.upper and rate > 0.0) or (p <= k.lower and rate < 0.0):
         return 0.0
     return rate

@@ -32,7 +32,7 @@ SLOW = 25
 H = 1.0 / 512.0
 
 IMPLICIT = {
-    "tight_step": {"Z7"},
+    "tight_step": {"p.Z7"},
     "pump_step": {"p.Z7"},
     "unloaded_leakage": {"Z12"},
     "flow_speed": {"k.Z12"},
@@ -117,8 +117,6 @@ RANGES = {
 OWN_RANGES: dict[str, dict[str, tuple[float, float]]] = {
     "refinements.held_back": {"before": (-3e-5, 3e-5), "width": (1e-6, 1e-5)},
     "refinements.magnetising_current": {"current": (0.0, 0.02), "previous": (0.0, 0.02)},
-    "channel.remaining_decay": {"previous": (0.25, 0.3), "fallen": (0.0, 0.05)},
-    "channel.taken_over": {"previous": (0.0, 0.1), "target": (0.6, 0.8)},
     "channel.current_acceleration": {"rate": (-0.05, 0.05)},
     "library.arctangent": {"tangent": (-4.0, 4.0)},
     "machine.mixture_modulus": {"pressure": (2e5, 1e7)},

@@ -20,7 +20,7 @@ OPTIONS: dict[str, Any] = dict.fromkeys(("literal", "split", "steep", "symmetric
 CASES = [
     (pump.pump_sample, ("state.pressure", "inputs.current", "p"), PumpOptions()),
     (control.spool_balance, ("force", "arm_sine", "p.Z4", "p.Z5", "p.Z18"), None),
-    (control.leaky_step, ("pressure", "opening", "Z6", "Z7", "Z8", "Z9"), None),
+    (control.leaky_step, ("pressure", "opening", "p"), None),
     (card.card_sample, ("state", "p"), CardOptions()),
 ]
 
@@ -64,7 +64,7 @@ from swashplate.equations import derive
 from swashplate.models import displacement_control as control
 from swashplate.models import pump
 cases = [
-    (control.leaky_step, ("opening", "Z6", "Z7", "Z8", "Z9"), {"symmetric": None}),
+    (control.leaky_step, ("opening", "p"), {"symmetric": None}),
     (control.spool_balance, ("p.Z5", "p.Z4", "force"), {}),
     (pump.pump_step, ("state", "p"), {"options": control.PumpOptions()}),
 ]

@@ -6,24 +6,6 @@ static double lesser_of(double a, double b) { return b < a ? b : a; }
 static double greater_of(double a, double b) { return b > a ? b : a; }
 
 
-/* Output after a step in which it passes I_t1 on the way to `target` and then rises by lim1.
- *
- * The way to I_t1 counts as straight, as steep as from `previous` to `target` in one step. [A]
- */
-static double taken_over(double target, double previous, double I_t1, double lim1, double h)
-{
-    return I_t1 + lim1 * h * (target - I_t1) / (target - previous);
-}
-
-/* What the rest of a step leaves of I_t2, where the output passes it on the way to `fallen`.
- *
- * Both the way there and the decay count as straight within the step. [1]
- */
-static double remaining_decay(double previous, double fallen, double I_t2, double decay)
-{
-    return decay + (previous - I_t2) / (previous - fallen) * (1.0 - decay);
-}
-
 /* A value, or zero where it has faded below 1e-30; the derivatives take no notice. */
 static double faded(double value)
 {
@@ -48,7 +30,7 @@ static double limited_current(double target, double previous, double steady,
         if (!split || previous >= p->I_t1) {
             return lesser_of(greater_of(previous, p->I_t1) + p->lim1 * h, target);
         }
-        return lesser_of(taken_over(target, previous, p->I_t1, p->lim1, h), target);
+        return lesser_of(p->I_t1 + p->lim1 * h * (target - p->I_t1) / (target - previous), target);
     }
     double left;
     if (previous > p->I_t2) {
@@ -56,7 +38,7 @@ static double limited_current(double target, double previous, double steady,
         if (!split || fallen >= p->I_t2) {
             return fallen;
         }
-        left = p->I_t2 * remaining_decay(previous, fallen, p->I_t2, decay);
+        left = p->I_t2 * (decay + (previous - p->I_t2) / (previous - fallen) * (1.0 - decay));
         return steady == 0.0 ? left : greater_of(left, target);
     }
     left = faded(previous * decay);

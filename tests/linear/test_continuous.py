@@ -12,15 +12,6 @@ import scipy.signal
 
 from swashplate import DomainError, Drive, InputError
 
-
-def test_the_closed_form_of_the_hoist_s_lag(hoist: Drive) -> None:
-    # (1 + Z6)/(Z1 Z3 Z5 Z8 √(Z9/2)) and the gain Z10 Z5/(Z3 √Z4) by Kruse's numbers
-    model = hoist.replace(Z18=0.0).linearize(current=0.0, input="solenoid_force")
-    tau = 1.073926 / (4.6441e-7 * 0.62542 * 0.0079568 * 1651400.0 * np.sqrt(10743000.0 / 2.0))
-    assert model.time_constant == pytest.approx(tau, rel=1e-12)
-    assert model.gain == pytest.approx(12.396 * 0.0079568 / (0.62542 * np.sqrt(0.053604)))
-
-
 VARIANTS = {
     "published": {},
     "leaky": {"Z7": 0.8},

@@ -17,7 +17,7 @@ from swashplate.equations.library import (
     soft_threshold,
 )
 from swashplate.models import displacement_control as control
-from swashplate.models.displacement_control import Pump
+from swashplate.models.displacement_control import Pump, Stroking
 
 H = 1.0 / 512.0
 interpreted = pytest.mark.interpreted
@@ -69,9 +69,9 @@ def test_effective_current_is_beyond_a_symmetric_dead_zone(i: float, Z17: float)
 @pytest.mark.parametrize("symmetric", [None, True])
 @pytest.mark.parametrize("opening", [1.5e-4, -1.5e-4])
 def test_tight_step_integrates_the_rate_exactly(opening: float, symmetric: bool | None) -> None:
-    args = (0.1, 0.0, 1.6e6, 1.0e7)
+    stroking = Stroking(0.1, 0.0, 1.6e6, 1.0e7)
     solution = solve_ivp(
-        lambda _, p: [control.pressure_rate(p[0], opening, *args, symmetric)],
+        lambda _, p: [control.pressure_rate(p[0], opening, stroking, symmetric)],
         (0.0, 20 * H),
         [4e5],
         rtol=1e-11,
@@ -79,33 +79,33 @@ def test_tight_step_integrates_the_rate_exactly(opening: float, symmetric: bool 
     )
     p = 4e5
     for _ in range(20):
-        p = control.tight_step(p, opening, *args, H, symmetric)
+        p = control.tight_step(p, opening, stroking, H, symmetric)
     assert p == pytest.approx(solution.y[0, -1], rel=1e-9)
 
 
 @interpreted
 @pytest.mark.parametrize("symmetric", [None, True])
 def test_leaky_step_integrates_the_rate(symmetric: bool | None) -> None:
-    args = (0.1, 2.0, 1.6e6, 1.0e7)
+    stroking = Stroking(0.1, 2.0, 1.6e6, 1.0e7)
     solution = solve_ivp(
-        lambda _, p: [control.pressure_rate(p[0], -1e-4, *args, symmetric)],
+        lambda _, p: [control.pressure_rate(p[0], -1e-4, stroking, symmetric)],
         (0.0, H),
         [4e5],
         rtol=1e-12,
         atol=1e-4,
     )
-    p = control.leaky_step(4e5, -1e-4, *args, H, symmetric)
+    p = control.leaky_step(4e5, -1e-4, stroking, H, symmetric)
     assert p == pytest.approx(solution.y[0, -1], rel=1e-10)
 
 
 @interpreted
 def test_pressure_cannot_be_pumped_beyond_the_supply() -> None:
-    p = 0.0
+    p, stroking = 0.0, Stroking(0.0, 0.0, 1e6, 1e6)
     for _ in range(5):
-        p = control.tight_step(p, 1.0, 0.0, 0.0, 1e6, 1e6, H, None)
+        p = control.tight_step(p, 1.0, stroking, H, None)
     assert p == 1e6
     for _ in range(5):
-        p = control.tight_step(p, -1.0, 0.0, 0.0, 1e6, 1e6, H, True)
+        p = control.tight_step(p, -1.0, stroking, H, True)
     assert p == -1e6
 
 

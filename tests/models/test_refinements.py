@@ -5,6 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
+from swashplate.models.displacement_control import Pump
 from swashplate.models.refinements import (
     damping_factor,
     held_back,
@@ -91,7 +92,7 @@ def test_it_solves_the_plates_equation() -> None:
 # --- line -----------------------------------------------------------------------------------------
 
 K, LEAK, J, LOAD = 1e6, 1e-6, 5e3, 3e4
-H = 1.0 / 512.0
+LINE = Pump(*[0.0] * 28, line_stiffness=K, motor_leakage=LEAK, load_inertia=J)
 STATES = st.tuples(st.floats(-1e5, 1e5), st.floats(-4.0, 4.0))
 
 
@@ -107,7 +108,7 @@ def test_it_solves_its_equations() -> None:
     expected = solve_ivp(rates, (0.0, 1.0), [0.0, 0.0], rtol=1e-10, atol=1e-8).y[:, -1]
     state = (0.0, 0.0)
     for _ in range(4096):
-        state = line_step(*state, 2.0, LOAD, K, LEAK, J, 1.0 / 4096.0)
+        state = line_step(*state, 2.0, LOAD, LINE, 1.0 / 4096.0)
     assert state == pytest.approx(tuple(expected), rel=2e-4)
 
 
@@ -115,7 +116,7 @@ def test_it_solves_its_equations() -> None:
 def test_left_alone_it_never_gains_energy(
     state: tuple[float, float], leakage: float, step: float
 ) -> None:
-    after = line_step(*state, 0.0, 0.0, K, leakage, J, step)
+    after = line_step(*state, 0.0, 0.0, LINE._replace(motor_leakage=leakage), step)
     middle = 0.5 * (state[0] + after[0])
     lost = step * leakage * middle**2
     assert energy(*after) == pytest.approx(energy(*state) - lost, rel=1e-9, abs=1e-9)

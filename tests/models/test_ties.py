@@ -10,7 +10,7 @@ from swashplate.equations.library import faded, small_arctangent, soft_threshold
 from swashplate.models import channel as single
 from swashplate.models import displacement_control as control
 from swashplate.models.channel import Channel
-from swashplate.models.displacement_control import Pump
+from swashplate.models.displacement_control import Pump, Stroking
 
 pytestmark = pytest.mark.interpreted
 
@@ -52,7 +52,7 @@ ZONES = (
 LIMITED = (single.limited_current, ("target", "previous"))
 LIMITS = channel(lim1=2.0, lim2=2.0, I_t1=0.25, I_t2=0.125)
 CARD = channel(V_dz=0.5, J=0.3, G1=0.1)
-NO_HEAD = (1e6, 1e-4, 0.1, 0.0, 1e6, 1e6)
+NO_HEAD = (1e6, 1e-4, Stroking(0.1, 0.0, 1e6, 1e6))
 
 TIES: list[tuple[tuple[Any, tuple[str, ...]], tuple, dict, tuple[float, ...]]] = [
     # edges of a dead zone belong to it; without one, zero belongs to the positive side
@@ -104,7 +104,7 @@ TIES: list[tuple[tuple[Any, tuple[str, ...]], tuple, dict, tuple[float, ...]]] =
     # at δP = Z9 the root's slope is infinite; it counts as none
     *(
         (
-            (control.pressure_rate, ("pressure", "Z9")),
+            (control.pressure_rate, ("pressure", "p.Z9")),
             (*NO_HEAD, symmetric),
             {"symmetric": symmetric},
             (0.0, 0.0),
@@ -158,8 +158,8 @@ def test_leakage_that_is_zero_has_a_derivative() -> None:
     """The step without leakage declares what leakage would do to it: that of Runge-Kutta at 0."""
     h = 1.0 / 512.0
     for pressure, opening in ((3e5, 1e-4), (-2e5, -1.5e-4), (1e5, 2e-5)):
-        arguments = (pressure, opening, 0.07, 0.0, 1.65e6, 1.07e7, h)
-        (tight,) = partials(control.tight_step, ("Z7",), *arguments, None, symmetric=None)
-        (leaky,) = partials(control.leaky_step, ("Z7",), *arguments, None, symmetric=None)
+        arguments = (pressure, opening, Stroking(0.07, 0.0, 1.65e6, 1.07e7), h)
+        (tight,) = partials(control.tight_step, ("p.Z7",), *arguments, None, symmetric=None)
+        (leaky,) = partials(control.leaky_step, ("p.Z7",), *arguments, None, symmetric=None)
         assert tight == pytest.approx(leaky, rel=1e-3)
         assert tight != 0.0

@@ -115,22 +115,3 @@ def test_the_cards_filter_is_the_recursion_where_a_rate_says_so(
     assert "rate = 512.0" in text
     (tmp_path / "set.toml").write_text(text.replace("rate = 512.0\n", ""), "utf-8")
     assert Drive.from_toml(tmp_path / "set.toml").parameters.rate is None
-
-
-@pytest.mark.parametrize(
-    ("entry", "sentence"),
-    [
-        ('Z1 = { value = 1.0, unit = "1/Pa" }', r"\[refinements\] has no parameter 'Z1'"),
-        ('spool_friction = { value = 1.0, unit = "m" }', "spool_friction"),
-        ('spool_friction = { value = [0.1, 0.2], unit = "N" }', "has one value, not a plus and"),
-        ('friction = { value = 1.0, unit = "N" }', "no parameter 'friction'"),
-    ],
-)
-def test_wrong_entries_are_named(hoist: Drive, tmp_path: Path, entry: str, sentence: str) -> None:
-    hoist.to_toml(tmp_path / "set.toml")
-    text = (tmp_path / "set.toml").read_text("utf-8") + f"\n[refinements]\n{entry}\n"
-    (tmp_path / "set.toml").write_text(text, "utf-8")
-    with pytest.raises(ParameterError, match=sentence) as caught:
-        Drive.from_toml(tmp_path / "set.toml")
-    assert "set.toml" in str(caught.value)
-    assert "\n" not in str(caught.value)

@@ -123,6 +123,7 @@ control_card = "rexroth_mdsd_1k_2x_2"
 
 [pump_motor]
 """
+REFINED = "[refinements]\n"
 
 
 @pytest.fixture
@@ -171,6 +172,11 @@ def test_users_units_are_converted(lines: dict[str, str], tmp_path: Path) -> Non
         ("Z1", 'Z1 = { value = 1e-7, unit = "1/Pa", status = "good" }', "pump_motor.Z1.status"),
         ("Z9", 'Z9 = { value = 1e7, unit = "Pa", bounds = [1e6, 2e6] }', "outside its bounds"),
         ("Z1", "Z1 = = 3", "is not TOML"),
+        # a table behind the pump's
+        ("", REFINED + 'Z1 = { value = 1.0, unit = "1/Pa" }', r"\[refinements\] has no .* 'Z1'"),
+        ("", REFINED + 'spool_friction = { value = 1.0, unit = "m" }', "spool_friction"),
+        ("", REFINED + 'spool_friction = { value = [0.1, 0.2], unit = "N" }', "has one value, not"),
+        ("", REFINED + 'friction = { value = 1.0, unit = "N" }', "no parameter 'friction'"),
     ],
 )
 def test_files_with_errors(

@@ -7,11 +7,11 @@ A parameter is defined once, on the field that holds its value:
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import Enum
 from functools import cache
 from math import inf, isfinite
-from typing import Any, Final, NamedTuple, TypeGuard, get_type_hints
+from typing import Any, Final, TypeGuard, get_type_hints
 
 import numpy as np
 
@@ -55,10 +55,28 @@ class Definition:
     """Quantities of the machine that it stands for."""
     source: str = ""
     """Number of Kruse's equation."""
+    symbol: str = ""
+    """Its symbol: the name of the field that declares it, without the direction."""
+    fields: tuple[str, ...] = ()
+    """Dotted names of its values: one, or those of both directions, plus first."""
+    block: str = ""
+    """Table of a parameter file that it stands in."""
 
     def __post_init__(self) -> None:
         if self.above is not None:
             object.__setattr__(self, "lower", self.above)
+
+    @property
+    def directional(self) -> bool:
+        """Whether it has a value for each direction."""
+        return len(self.fields) == 2
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """Names of its values by themselves: ``Z1``, or ``Z16_plus`` and ``Z16_minus``."""
+        if self.directional:
+            return (f"{self.symbol}_plus", f"{self.symbol}_minus")
+        return (self.symbol,)
 
     def holds(self, values: Any) -> Any:
         """Whether a value, or each of an array, lies in the range; what is no number does not."""
@@ -94,24 +112,8 @@ MINUS = Direction.MINUS
 """On a field ``Z16_minus``: the definition stands on ``Z16_plus``."""
 
 
-class Declared(NamedTuple):
-    """A parameter as a model's named tuple declares it."""
-
-    symbol: str
-    definition: Definition
-    fields: tuple[str, ...]
-    """Dotted names of its values: one, or those of both directions, plus first."""
-
-    @property
-    def columns(self) -> tuple[str, ...]:
-        """Names of its values by themselves: ``Z1``, or ``Z16_plus`` and ``Z16_minus``."""
-        if len(self.fields) == 1:
-            return (self.symbol,)
-        return (f"{self.symbol}_plus", f"{self.symbol}_minus")
-
-
-def declared_by(parameters: Any) -> Iterator[Declared]:
-    """Parameters that a named tuple declares, in its order.
+def declared_by(parameters: Any) -> Iterator[Definition]:
+    """Parameters that a named tuple declares, in its order, with their symbols and fields.
 
     Parameters
     ----------
@@ -129,7 +131,7 @@ def declared_by(parameters: Any) -> Iterator[Declared]:
             prefixes = ("plus", "minus") if directed else (name,)
             for each in declared_by(hint) if prefixes[0] == name else ():
                 paths = tuple(f"{prefix}.{path}" for prefix in prefixes for path in each.fields)
-                yield each._replace(fields=paths)
+                yield replace(each, fields=paths)
             continue
         definition: Any = next(iter(getattr(hint, "__metadata__", ())), Definition(name, ""))
         if definition is MINUS:
@@ -137,18 +139,18 @@ def declared_by(parameters: Any) -> Iterator[Declared]:
         symbol = name.removesuffix("_plus")
         minus = f"{symbol}_minus"
         if symbol != name and MINUS in getattr(hints.get(minus), "__metadata__", ()):
-            yield Declared(symbol, definition, (name, minus))
+            yield replace(definition, symbol=symbol, fields=(name, minus))
         else:
-            yield Declared(name, definition, (name,))
+            yield replace(definition, symbol=name, fields=(name,))
 
 
 def ranges_of(kind: Any) -> dict[str, Definition]:
     """Definitions with a range that a named tuple declares, by dotted path."""
     return {
-        path: each.definition
+        path: each
         for each in declared_by(kind)
         for path in each.fields
-        if each.definition.range != Definition("", "").range
+        if each.range != Definition("", "").range
     }
 
 

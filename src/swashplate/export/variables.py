@@ -13,8 +13,8 @@ from math import isfinite
 from typing import Any, Literal, NamedTuple
 
 from swashplate.equations.c_source import Exported, c_name, literal
-from swashplate.equations.fields import Declared, declared_by
-from swashplate.linear.model import UNITS
+from swashplate.equations.fields import Definition, declared_by
+from swashplate.simulation.result import CHAIN, MEASURED, MOTOR
 
 Causality = Literal["input", "output", "parameter", "independent"]
 Variability = Literal["continuous", "tunable", "fixed"]
@@ -52,32 +52,8 @@ class Words(NamedTuple):
     """Its name outside the model, where it has another there."""
 
 
-_SIGNALS = {
-    "voltage": "command of the card within ±10 V, positive towards positive speed",
-    "pump_speed": "speed of the prime mover, relative to that of Z10",
-    "load_torque": "static torque of the load at the shaft, positive against positive speed",
-    "supply_pressure": "supply pressure less static pressure; until it is set, Z9 counts",
-    "current_positive": "current of the solenoid towards positive speed, never negative",
-    "current_negative": "current of the other solenoid, never negative",
-    "current": "signed current, positive solenoid's less the negative one's",
-    "solenoid_force": "net force of both solenoids on the spool",
-    "spool_position": "displacement of the spool, within its stroke",
-    "orifice_opening": "effective opening, what the orifices leave of the spool's displacement",
-    "stroker_pressure": "stroking pressure about its equilibrium",
-    "swash_angle": "angle of the swash plate",
-    "shaft_speed": "speed of the shaft, of the turret for slew",
-    "shaft_position": "integral of the speed, zero at the start",
-    "motor_torque": "torque that the motor bears, positive where it drives to positive speed",
-    "motor_pressure_drop": "pressure drop over the motor, 0 where motor_constant is not known",
-}
-_UNITS = {
-    **UNITS,
-    "current_positive": UNITS["current"],
-    "current_negative": UNITS["current"],
-    "shaft_position": "rad",
-}
 DRIVE_WORDS: dict[str, Words] = {
-    **{name: Words(meaning, _UNITS[name]) for name, meaning in _SIGNALS.items()},
+    **{name: Words(said, unit) for name, (unit, said) in {**CHAIN, **MOTOR, **MEASURED}.items()},
     "literal": Words("literal sign of the card's Coulomb term", name="literal_coulomb_sign"),
     "split": Words("the card's limits take over within a step", name="split_card_switch"),
     "symmetric": Words(
@@ -113,11 +89,11 @@ def words_of(exported: Exported) -> dict[str, Words]:
     for part in exported.model.parts:
         for kind in (part.state, part.signals):
             for each, path in _declared(kind) if kind is not None else ():
-                found[path] = Words(each.definition.name, each.definition.unit or "1")
+                found[path] = Words(each.name, each.unit or "1")
     return found
 
 
-def _declared(kind: type) -> Iterator[tuple[Declared, str]]:
+def _declared(kind: type) -> Iterator[tuple[Definition, str]]:
     """What a named tuple declares, by the path of each value."""
     for each in declared_by(kind):
         yield from ((each, path) for path in each.fields)
@@ -199,12 +175,13 @@ def defaults_of(exported: Exported) -> dict[str, str]:
     }
 
 
-def _parameter(name: str, reference: int, known: Declared, path: str, value: float) -> Variable:
+def _parameter(
+    name: str, reference: int, definition: Definition, path: str, value: float
+) -> Variable:
     """A parameter's value as a variable that may change while the model runs."""
-    definition = known.definition
     meaning = definition.name
-    if len(known.fields) > 1:
-        meaning += f", {'plus' if path == known.fields[0] else 'minus'} direction"
+    if definition.directional:
+        meaning += f", {'plus' if path == definition.fields[0] else 'minus'} direction"
     lower = definition.lower if isfinite(definition.lower) else None
     upper = definition.upper if isfinite(definition.upper) else None
     if upper is None and definition.can_be_off:

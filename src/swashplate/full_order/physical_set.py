@@ -18,11 +18,10 @@ import numpy as np
 
 from swashplate.documents import parse_toml, validated
 from swashplate.equations.equation import interpreted
-from swashplate.equations.fields import Flag, declared_by
+from swashplate.equations.fields import Definition, Flag, declared_by
 from swashplate.errors import ParameterError
 from swashplate.models import machine as equations
 from swashplate.models.machine import Machine
-from swashplate.parameters.definitions import Definition, definition_of
 from swashplate.parameters.files import AXES, Entry, FilePart, parameter_of
 from swashplate.parameters.files import load_preset as load_parameters
 from swashplate.parameters.parameter_set import (
@@ -40,9 +39,7 @@ from swashplate.parameters.rules import Broken, Rule, applied, range_rule, refus
 from swashplate.tables import Column, Table
 from swashplate.units import chosen_unit, unit_text
 
-QUANTITIES: Mapping[str, Definition] = {
-    each.symbol: definition_of(each, "physical") for each in declared_by(Machine)
-}
+QUANTITIES: Mapping[str, Definition] = {each.symbol: each for each in declared_by(Machine)}
 """Quantities by name, from the spool to the load."""
 IN_PLACE_OF: Mapping[str, str] = {
     "feedback_arm_inertia": "spool_frequency",
@@ -58,7 +55,6 @@ CHOICES: Mapping[str, Definition] = {
         0.0,
         above=above,
         symbol=f"{part}_{what}",
-        block="physical",
     )
     for part, words in (("spool", "spool"), ("swash", "swash plate at held pressure"))
     for what, meaning, unit, above in (

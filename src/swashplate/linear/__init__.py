@@ -12,7 +12,6 @@ from swashplate.linear.frequency_response import FrequencyResponse as FrequencyR
 from swashplate.linear.frequency_response import response_table as response_table
 from swashplate.linear.frequency_response import sweep as sweep
 from swashplate.linear.model import LINEAR_MODEL as LINEAR_MODEL
-from swashplate.linear.model import UNITS as UNITS
 from swashplate.linear.model import LinearModel as LinearModel
 from swashplate.linear.model import LoopMargins as LoopMargins
 from swashplate.linear.model import loop_margins as loop_margins

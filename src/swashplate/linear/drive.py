@@ -25,7 +25,7 @@ from swashplate.equations.marching.record import (
 from swashplate.equations.marching.run import Instance, called
 from swashplate.errors import DomainError, InputError
 from swashplate.linear.discrete import recurrence
-from swashplate.linear.model import UNITS, LinearModel, Matrices, with_line
+from swashplate.linear.model import LinearModel, Matrices, with_line
 from swashplate.models.card import Card
 from swashplate.models.displacement_control import moment_sine, solenoid_force
 from swashplate.models.pump import overpowered
@@ -38,6 +38,7 @@ from swashplate.simulation.instance import (
     models_of,
     without_ripple,
 )
+from swashplate.simulation.result import UNITS
 from swashplate.simulation.run import steady_states
 from swashplate.tables import UNIT, Cell, Column, Table
 from swashplate.units import display_unit

@@ -30,7 +30,6 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
-Counts = NDArray[np.int64]
 SWEPT_OUTPUTS = OUTPUTS[:7]  # Without the motor's.
 SLOWEST_CYCLE = 1e-3  # Lowest frequency. [Hz]
 FEWEST_STEPS, MOST_STEPS = 8, 1_000_000
@@ -67,8 +66,6 @@ class FrequencyResponse(Tabular):
     0 where nothing moves. [1]"""
     mean: Array
     """Mean of the output, (a, f)."""
-    cycles: Counts
-    """Cycles until the answer repeated itself, (a, f)."""
 
     def __repr__(self) -> str:
         return (
@@ -107,7 +104,7 @@ class FrequencyResponse(Tabular):
             "amplitude": np.repeat(self.amplitudes, shape[1]),
             "frequency": np.tile(self.frequencies, shape[0]),
         }
-        for name in ("gain", "phase", "distortion", "mean", "cycles"):
+        for name in ("gain", "phase", "distortion", "mean"):
             columns[name] = getattr(self, name).ravel()
         return pl.DataFrame(columns).with_columns(pl.col("phase").fill_nan(None))
 
@@ -153,7 +150,7 @@ def sweep(
         raise InputError(f"Bias and amplitude reach {largest:g} V, but the card takes ±10 V.")
 
     ratio = np.zeros((a.size, f.size), dtype=np.complex128)
-    distortion, mean, cycles = np.zeros((3, a.size, f.size))
+    distortion, mean = np.zeros((2, a.size, f.size))
     instance = without_ripple(instance_of(parameters, input == "voltage"))
     size = _size(instance.parts[1].p, output)
     for j, frequency in enumerate(f.tolist()):
@@ -180,17 +177,15 @@ def sweep(
                         "simulation."
                     )
                 count *= 2
-            ratio[i, j], cycles[i, j] = last / amplitude, count
+            ratio[i, j] = last / amplitude
     if not ratio.any():
         raise DomainError(
             f"{parameters.name}: nothing moves about {bias:g} {'V' if input == 'voltage' else 'A'} "
             f"with amplitudes up to {a.max():g}: all stay in a dead zone or at a stop; take larger "
             "ones or another bias."
         )
-    return FrequencyResponse(
-        *(parameters.name, input, output, float(bias), f, a, ratio, distortion, mean),
-        cycles.astype(np.int64),
-    )
+    name = parameters.name
+    return FrequencyResponse(name, input, output, float(bias), f, a, ratio, distortion, mean)
 
 
 def _cycles(

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from swashplate.errors import DomainError, InputError
+from swashplate.simulation.result import UNITS
 from swashplate.tables import Form, ending, write_text
 
 if TYPE_CHECKING:
@@ -28,25 +29,6 @@ INTEGRATES = 3e-8
 
 Two that integrate one after the other are found some 1e-8 apart."""
 
-UNITS = {
-    "voltage": "V",
-    "current": "A",
-    "current_rate": "A/s",
-    "solenoid_force": "N",
-    "spool_position": "m",
-    "spool_deflection": "m",
-    "orifice_opening": "m",
-    "stroker_pressure": "Pa",
-    "plate_pressure": "Pa",
-    "swash_angle": "rad",
-    "shaft_speed": "rad/s",
-    "motor_torque": "N m",
-    "motor_pressure_drop": "Pa",
-    "load_torque": "N m",
-    "pump_speed": "1",
-    "supply_pressure": "Pa",
-}
-"""SI unit of each input, output and state of a drive's continuous model."""
 LINEAR_MODEL = Form("a linear model", (".toml", ".json"))
 
 

@@ -158,12 +158,6 @@ def card_rates(state: CardState, voltage: float, p: Card, options: CardOptions) 
 
 
 @equation
-def card_rest(p: Card, k: CardConstants, options: CardOptions, inputs: CardInputs) -> CardState:
-    """State of a card that has never seen a command."""
-    return CardState(Filter(0.0, 0.0, 0.0), Filter(0.0, 0.0, 0.0))
-
-
-@equation
 def card_settled(inputs: CardInputs, p: Card, k: CardConstants, options: CardOptions) -> CardState:
     """State that a card settles at under a constant command, the newest that it sees."""
     voltage = inputs.at.s[0]
@@ -215,7 +209,6 @@ card = Model(
     step=card_step,
     sample=card_sample,
     constants=card_constants,
-    rest=card_rest,
     settled=card_settled,
     inputs=CardInputs,
     taps={

@@ -145,34 +145,6 @@ def jump_share(
     )
 
 
-@declared(jump_share)
-def _jump_share(
-    newest: float, middle: float, oldest: float, fraction: float, threshold: float
-) -> tuple[float, float, float, float, float]:
-    # the interval slides back as the fraction grows: it gains what its old end sees and loses what
-    # its new end sees; where the command rests exactly at the threshold nothing changes
-    first = interpolated(middle, oldest, fraction)
-    last = interpolated(newest, middle, fraction)
-    by_fraction = (1.0 if first > threshold else 0.0) - (1.0 if last > threshold else 0.0)
-    crosses_old = (first > threshold) != (middle > threshold)
-    crosses_new = (middle > threshold) != (last > threshold)
-    per_volt_old = fraction / abs(middle - first) if crosses_old else 0.0
-    per_volt_new = (1.0 - fraction) / abs(last - middle) if crosses_new else 0.0
-    # a share moves with both ends of its part, each by how near it lies to the crossing
-    at_old = (threshold - first) / (middle - first) if crosses_old else 0.0
-    at_new = (threshold - middle) / (last - middle) if crosses_new else 0.0
-    by_first = per_volt_old * (1.0 - at_old)
-    by_middle = per_volt_old * at_old + per_volt_new * (1.0 - at_new)
-    by_last = per_volt_new * at_new
-    return (
-        by_last * (1.0 - fraction),
-        by_middle + by_first * (1.0 - fraction) + by_last * fraction,
-        by_first * fraction,
-        by_fraction,
-        -per_volt_old - per_volt_new,
-    )
-
-
 @equation
 def steady_current(command: float, share: float, p: Channel) -> float:
     """Current that a channel settles at, of the delayed command in its direction [V].
@@ -369,24 +341,6 @@ def exact_filter(s: Filter, begins: float, ends: float, k: ChannelConstants) -> 
 
 
 @equation
-def remaining_decay(previous: float, fallen: float, I_t2: float, decay: float) -> float:
-    """What the rest of a step leaves of I_t2, where the output passes it on the way to `fallen`.
-
-    Both the way there and the decay count as straight within the step. [1]
-    """
-    return decay + (previous - I_t2) / (previous - fallen) * (1.0 - decay)
-
-
-@equation
-def taken_over(target: float, previous: float, I_t1: float, lim1: float, h: float) -> float:
-    """Output after a step in which it passes I_t1 on the way to `target` and then rises by lim1.
-
-    The way to I_t1 counts as straight, as steep as from `previous` to `target` in one step. [A]
-    """
-    return I_t1 + lim1 * h * (target - I_t1) / (target - previous)
-
-
-@equation
 def limited_current(
     target: float, previous: float, steady: float, p: Channel, decay: float, h: float, split: Flag
 ) -> float:
@@ -403,12 +357,14 @@ def limited_current(
             return target
         if split is None or previous >= p.I_t1:
             return min(max(previous, p.I_t1) + p.lim1 * h, target)
-        return min(taken_over(target, previous, p.I_t1, p.lim1, h), target)
+        # the way to I_t1 counts as straight, what is left of the step is lim1's
+        return min(p.I_t1 + p.lim1 * h * (target - p.I_t1) / (target - previous), target)
     if previous > p.I_t2:
         fallen = max(previous - p.lim2 * h, 0.0, target)
         if split is None or fallen >= p.I_t2:
             return fallen
-        left = p.I_t2 * remaining_decay(previous, fallen, p.I_t2, decay)
+        # both the way to I_t2 and the decay that is left of the step count as straight
+        left = p.I_t2 * (decay + (previous - p.I_t2) / (previous - fallen) * (1.0 - decay))
         return left if steady == 0.0 else max(left, target)
     left = faded(previous * decay)
     return left if steady == 0.0 else max(left, target)

@@ -134,6 +134,15 @@ class Solenoids(NamedTuple):
     Z22_minus: float
 
 
+class Stroking(NamedTuple):
+    """Parameters of the stroking piston at a sample, those of `Pump` by the same names."""
+
+    Z6: float  # 0 where the plate does not move with the pressure.
+    Z7: float
+    Z8: float
+    Z9: float  # Or the supply pressure that was measured.
+
+
 class PumpOptions(NamedTuple):
     """Forms of the pump."""
 
@@ -145,7 +154,7 @@ class PumpOptions(NamedTuple):
     hysteresis: Flag = OFF  # Hysteresis of the solenoids, see `magnetising_current`.
     ripple: Flag = OFF  # Ripple of the cam ring, see `rippled_angle`.
     damping: Flag = OFF  # Damping of the swash plate, see `plate_follows`.
-    leakage: Flag = OFF  # Leakage of the motor under load, see `static_leakage`.
+    leakage: Flag = OFF  # Leakage of the motor under load, see `load_leakage`.
     line: Flag = OFF  # Line and inertia, see `line_step`.
     own: Flag = OFF  # An equation is the user's own: the steady state is searched for.
 
@@ -303,15 +312,13 @@ def _head_root(head: float) -> float:
 
 
 @equation
-def pressure_rate(
-    pressure: float, opening: float, Z6: float, Z7: float, Z8: float, Z9: float, symmetric: Flag
-) -> float:
+def pressure_rate(pressure: float, opening: float, p: Stroking, symmetric: Flag) -> float:
     """Rate of the stroking pressure δP under the opening x_eff [m]. [Pa/s]
 
-    Kruse eq. 6.67 with the leakage of eq. 6.64; Z6 is 0 at a stop.
+    Kruse eq. 6.67 with the leakage of eq. 6.64.
     """
-    head, _ = flow_head(pressure, opening, Z9, symmetric)
-    return (Z8 * head_root(head) * opening - Z7 * pressure) / (1.0 + Z6)
+    head, _ = flow_head(pressure, opening, p.Z9, symmetric)
+    return (p.Z8 * head_root(head) * opening - p.Z7 * pressure) / (1.0 + p.Z6)
 
 
 @equation
@@ -326,45 +333,29 @@ def pumped(pressure: float, opening: float, gain: float, root: float, sign: floa
 
 
 @equation
-def tight_step(
-    pressure: float,
-    opening: float,
-    Z6: float,
-    Z7: float,
-    Z8: float,
-    Z9: float,
-    h: float,
-    symmetric: Flag,
-) -> float:
+def tight_step(pressure: float, opening: float, p: Stroking, h: float, symmetric: Flag) -> float:
     """Pressure one step later without leakage, integrated exactly at constant opening. [Pa]
 
     With r = √((Z9 - σδP)/2) the equation reads r' = -σ Z8 x_eff / (4 (1 + Z6)), so that δP is a
     parabola in time until the head is used up. Z7 counts as zero; it is there for the derivative
     by it.
     """
-    head, sign = flow_head(pressure, opening, Z9, symmetric)
-    gain = 0.25 * Z8 * h / (1.0 + Z6)
+    head, sign = flow_head(pressure, opening, p.Z9, symmetric)
+    gain = 0.25 * p.Z8 * h / (1.0 + p.Z6)
     r = sqrt(head)
-    return sign * Z9 if sign * gain * opening > r else pumped(pressure, opening, gain, r, sign)
+    return sign * p.Z9 if sign * gain * opening > r else pumped(pressure, opening, gain, r, sign)
 
 
 @declared(tight_step)
 def _tight_step(
-    pressure: float,
-    opening: float,
-    Z6: float,
-    Z7: float,
-    Z8: float,
-    Z9: float,
-    h: float,
-    symmetric: Flag,
+    pressure: float, opening: float, p: Stroking, h: float, symmetric: Flag
 ) -> tuple[float, float, float, float, float, float, float]:
     # that by Z7 is the one at Z7 = 0: the leakage's rate along the parabola, carried to the end of
     # the step and integrated by the trapezoidal rule
-    head, sign = flow_head(pressure, opening, Z9, symmetric)
+    head, sign = flow_head(pressure, opening, p.Z9, symmetric)
     r = sqrt(head)
-    inverse = 1.0 / (1.0 + Z6)
-    gain = 0.25 * Z8 * h / (1.0 + Z6)
+    inverse = 1.0 / (1.0 + p.Z6)
+    gain = 0.25 * p.Z8 * h / (1.0 + p.Z6)
     if sign * gain * opening > r:
         return 0.0, 0.0, 0.0, 0.0, 0.0, sign, 0.0
     half_inverse = 0.5 / r if head > 0.0 else 0.0
@@ -375,31 +366,22 @@ def _tight_step(
     return (
         1.0 - sign * by_root * (0.5 * half_inverse),
         4.0 * gain * r_end,
-        -by_gain * (0.25 * Z8 * h * (inverse * inverse)),
+        -by_gain * (0.25 * p.Z8 * h * (inverse * inverse)),
         -0.5 * h * inverse * leaked,
         by_gain * (0.25 * h * inverse),
         by_root * (0.5 * half_inverse),
-        by_gain * (0.25 * Z8 * inverse),
+        by_gain * (0.25 * p.Z8 * inverse),
     )
 
 
 @equation
-def leaky_step(
-    pressure: float,
-    opening: float,
-    Z6: float,
-    Z7: float,
-    Z8: float,
-    Z9: float,
-    h: float,
-    symmetric: Flag,
-) -> float:
+def leaky_step(pressure: float, opening: float, p: Stroking, h: float, symmetric: Flag) -> float:
     """Pressure one step later with leakage: Runge-Kutta of fourth order, opening constant. [Pa]"""
     half = 0.5 * h
-    k1 = pressure_rate(pressure, opening, Z6, Z7, Z8, Z9, symmetric)
-    k2 = pressure_rate(pressure + half * k1, opening, Z6, Z7, Z8, Z9, symmetric)
-    k3 = pressure_rate(pressure + half * k2, opening, Z6, Z7, Z8, Z9, symmetric)
-    k4 = pressure_rate(pressure + h * k3, opening, Z6, Z7, Z8, Z9, symmetric)
+    k1 = pressure_rate(pressure, opening, p, symmetric)
+    k2 = pressure_rate(pressure + half * k1, opening, p, symmetric)
+    k3 = pressure_rate(pressure + half * k2, opening, p, symmetric)
+    k4 = pressure_rate(pressure + h * k3, opening, p, symmetric)
     return pressure + h / 6.0 * (k1 + 2.0 * (k2 + k3) + k4)
 
 
@@ -483,4 +465,4 @@ def leaked_pressure(
 def pressure_gain(pressure: float, force: float, Z9: float, p: Pump, options: PumpOptions) -> float:
     """Rate of the stroking pressure under a force; it falls with the pressure. [Pa/s]"""
     opening = orifice_opening(spool_balance(force, arm_sine(pressure, p), p), p)
-    return pressure_rate(pressure, opening, p.Z6, p.Z7, p.Z8, Z9, options.symmetric)
+    return pressure_rate(pressure, opening, Stroking(p.Z6, p.Z7, p.Z8, Z9), options.symmetric)

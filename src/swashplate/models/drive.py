@@ -19,24 +19,15 @@ from swashplate.models.pump import (
 
 
 @equation
-def signed_current(current_positive: float, current_negative: float) -> float:
-    """Current of the positive channel less that of the negative one. [A]"""
-    return current_positive - current_negative
-
-
-@equation
 def current_sum(current_positive: float, current_negative: float) -> float:
     """What an ammeter around both leads reads. [A]"""
     return current_positive + current_negative
 
 
-drive = join(
-    "drive",
-    card,
-    pump,
-    links={"current": signed_current, "current_sum": current_sum},
-    integrals={"shaft_position": "shaft_speed"},
-)
+AMMETER = {"current_sum": current_sum}
+POSITION = {"shaft_position": "shaft_speed"}
+
+drive = join("drive", card, pump, links=AMMETER, integrals=POSITION)
 
 
 class Source(NamedTuple):
@@ -61,19 +52,13 @@ def forgotten(state: Nothing) -> Nothing:
 
 source = Model("source", parameters=Source, state=Nothing, step=forgotten, sample=current_sample)
 
-pump_drive = join(
-    "pump_drive",
-    source,
-    pump,
-    links={"current_sum": current_sum},
-    integrals={"shaft_position": "shaft_speed"},
-)
+pump_drive = join("pump_drive", source, pump, links=AMMETER, integrals=POSITION)
 """Pump and motor behind a signed current."""
 
 
 flowing_pump = replace(pump, step=pump_rates, parts=())
 flowing_drive, flowing_pump_drive = (
-    join(name, before, flowing_pump, links={"current_sum": current_sum})
+    join(name, before, flowing_pump, links=AMMETER)
     for name, before in (("drive", flowing_card), ("pump_drive", source))
 )
 """Both in continuous time: rates in place of the step, and no delay."""

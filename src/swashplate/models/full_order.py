@@ -21,7 +21,7 @@ from swashplate.equations.loops import repeated, root
 from swashplate.equations.model import Model, join
 from swashplate.models.card import card
 from swashplate.models.displacement_control import Solenoids, solenoid_force
-from swashplate.models.drive import current_sum, signed_current, source
+from swashplate.models.drive import AMMETER, POSITION, source
 from swashplate.models.machine import (
     Machine,
     balanced_spool,
@@ -321,20 +321,8 @@ plant = Model(
 )
 """Solenoids and machine behind a signed current."""
 
-full_drive = join(
-    "full_drive",
-    card,
-    plant,
-    links={"current": signed_current, "current_sum": current_sum},
-    integrals={"shaft_position": "shaft_speed"},
-)
+full_drive = join("full_drive", card, plant, links=AMMETER, integrals=POSITION)
 """The drive with five states behind a voltage."""
 
-full_machine = join(
-    "full_machine",
-    source,
-    plant,
-    links={"current_sum": current_sum},
-    integrals={"shaft_position": "shaft_speed"},
-)
+full_machine = join("full_machine", source, plant, links=AMMETER, integrals=POSITION)
 """The same without a card, behind a signed current."""

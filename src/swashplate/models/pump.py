@@ -5,7 +5,7 @@ swash plate, and with it the flow to the motor. The refinements (`swashplate.mod
 stand in the same sample and the same step; an option that is off leaves nothing of them.
 """
 
-from math import sqrt
+from math import exp, sqrt
 from typing import NamedTuple
 
 from swashplate.equations.equation import equation
@@ -15,6 +15,7 @@ from swashplate.models.displacement_control import (
     Pump,
     PumpConstants,
     PumpOptions,
+    Stroking,
     arm_sine,
     closed_pressure,
     leaked_pressure,
@@ -35,9 +36,7 @@ from swashplate.models.displacement_control import (
     tight_step,
 )
 from swashplate.models.refinements import (
-    accelerating_leakage,
     damping_factor,
-    dither_factor,
     friction_width,
     held_back,
     line_rates,
@@ -47,9 +46,7 @@ from swashplate.models.refinements import (
     motor_pressure_drop,
     plate_follows,
     plate_pressure_rate,
-    ripple_depth,
     rippled_angle,
-    static_leakage,
     stiff_line_torque,
     unloaded_leakage,
 )
@@ -139,7 +136,8 @@ def flow_speed(
     Z11 = p.Z11
     lost = 0.0
     if options.leakage is not None and options.line is None:
-        Z11 = p.Z11 + static_leakage(p.motor_leakage, inputs.load_torque)
+        # a load that hangs on the hoist slows hoisting and speeds lowering up (eq. 6.70)
+        Z11 = p.Z11 + p.motor_leakage * inputs.load_torque
         lost = load_leakage(tangent, rate, k.Z12 * inputs.pump_speed)
     elif options.loaded is not None:
         lost = load_leakage(tangent, rate, k.Z12 * inputs.pump_speed)
@@ -157,12 +155,12 @@ def pump_constants(p: Pump, h: float, options: PumpOptions) -> PumpConstants:
     lower_stop, upper_stop, lower, upper = pressure_limits(p)
     Z12 = p.Z12
     if options.leakage is not None and options.line is None:
-        Z12 = p.Z12 + accelerating_leakage(p.motor_leakage, p.load_inertia, p.Z10)
+        Z12 = p.Z12 + p.motor_leakage * p.load_inertia * p.Z10  # eq. 6.70
     width = 0.0
     dither = 0.0
     if options.friction is not None:
         width = friction_width(p.spool_friction, p.Z4, p.Z5)
-        dither = dither_factor(p.dither_time, h)
+        dither = exp(-h / p.dither_time)
     damping = 0.0
     if options.damping is not None:
         damping = damping_factor(p.swash_damping, p.Z6, h)
@@ -198,9 +196,8 @@ def pump_sample(
     tangent = swash_tangent(plate, p)
     angle = swash_angle(tangent, p, options.steep)
     if options.damping is None:
-        rising = pressure_rate(
-            plate, opening, p.Z6, p.Z7, p.Z8, inputs.supply_pressure, options.symmetric
-        )
+        stroking = Stroking(p.Z6, p.Z7, p.Z8, inputs.supply_pressure)
+        rising = pressure_rate(plate, opening, stroking, options.symmetric)
     else:
         rising = plate_pressure_rate(state.pressure, plate, p.swash_damping)
     rate = plate_rate(plate, rising, p, k)
@@ -209,7 +206,7 @@ def pump_sample(
     if options.ripple is not None:
         # the shaft's angle at this sample, as far as its speed so far tells
         ahead = state.shaft_angle + h * state.speed
-        depth = ripple_depth(p.cam_ripple, p.cam_ripple_per_torque, inputs.load_torque)
+        depth = p.cam_ripple + p.cam_ripple_per_torque * abs(inputs.load_torque)
         effective = rippled_angle(angle, ahead, depth, p.cam_cycles, p.cam_phase)
     flow = flow_speed(effective, tangent, rate, inputs, p, k, options)
 
@@ -227,9 +224,7 @@ def pump_sample(
             state.speed,
             0.5 * (state.flow_speed + flow),
             0.5 * (state.load_torque + inputs.load_torque),
-            p.line_stiffness,
-            p.motor_leakage,
-            p.load_inertia,
+            p,
             h,
         )
     turned = 0.0
@@ -267,13 +262,13 @@ def pump_step(
 ) -> PumpState:
     """The pump from a sample to the next."""
     opening = signals.orifice_opening
-    Z9 = inputs.supply_pressure
     # a damped plate takes its oil as it turns, not as the pressure rises
     Z6 = plate_motion(state.pressure, p, k) if options.damping is None else 0.0
+    stroking = Stroking(Z6, p.Z7, p.Z8, inputs.supply_pressure)
     if options.leaky is None:
-        free = tight_step(state.pressure, opening, Z6, p.Z7, p.Z8, Z9, h, options.symmetric)
+        free = tight_step(state.pressure, opening, stroking, h, options.symmetric)
     else:
-        free = leaky_step(state.pressure, opening, Z6, p.Z7, p.Z8, Z9, h, options.symmetric)
+        free = leaky_step(state.pressure, opening, stroking, h, options.symmetric)
     plate = 0.0
     if options.damping is not None:
         free, follower = plate_follows(free, state.plate_pressure, p.Z6, k.damping_factor)
@@ -310,15 +305,8 @@ def pump_rates(
     x_b and by the state's deflection d, which dither lets go.
     """
     Z6 = plate_motion(state.pressure, p, k) if options.damping is None else 0.0
-    rising = pressure_rate(
-        state.pressure,
-        signals.orifice_opening,
-        Z6,
-        p.Z7,
-        p.Z8,
-        inputs.supply_pressure,
-        options.symmetric,
-    )
+    stroking = Stroking(Z6, p.Z7, p.Z8, inputs.supply_pressure)
+    rising = pressure_rate(state.pressure, signals.orifice_opening, stroking, options.symmetric)
     plate = 0.0
     if options.damping is not None:
         plate = plate_pressure_rate(state.pressure, state.plate_pressure, p.swash_damping)
@@ -330,13 +318,7 @@ def pump_rates(
     accelerating = 0.0
     if options.line is not None:
         charging, accelerating = line_rates(
-            state.torque,
-            state.speed,
-            signals.flow_speed,
-            inputs.load_torque,
-            p.line_stiffness,
-            p.motor_leakage,
-            p.load_inertia,
+            state.torque, state.speed, signals.flow_speed, inputs.load_torque, p
         )
     return PumpState(
         pressure=rising,

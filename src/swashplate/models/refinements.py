@@ -16,7 +16,8 @@ friction holds it, and goes on to its balance as the dither lets go.
 Hysteresis of the solenoids: the force lags behind the current, however slowly it moves.
 
 Ripple of the motor's cam ring: displacement that varies with the shaft's angle. Kruse saw 5.5
-cycles a turn of the drum, the larger the heavier the load (sections 1.2 and 9, figures 9.2, 9.3).
+cycles a turn of the drum, the larger the heavier the load (sections 1.2 and 9, figures 9.2, 9.3):
+the displacement varies by ε = ε0 + ε1 |C_g|.
 
 Damping of the swash plate: it turns towards its equilibrium instead of standing there. With a
 damping moment c α' in eq. 6.55 and T = c/(k_r d4²),
@@ -27,7 +28,7 @@ The plate's place is written as the pressure p at which it would stand still, ta
 T p' = δP - p. Whatever the plate has yet to turn has not yet taken its oil: δP + Z6 p is the oil in
 the cylinder, which the plate's motion does not change.
 
-Leakage of the motor under load: Z11 and Z12 from what they stand for (eq. 6.70).
+Leakage of the motor under load: Z11 = K_mL C_g and Z12 = K_mL C_i Z10 (eq. 6.70).
 
 Line between pump and motor: oil that is compressed and an inertia that has to be turned,
 
@@ -42,24 +43,16 @@ from math import exp, sin, sqrt
 
 from swashplate.equations.derivatives import declared
 from swashplate.equations.equation import equation
-
-
-@equation
-def spring_stiffness(Z4: float, Z5: float) -> float:
-    """Stiffness of the feedback spring at the spool, √Z4/Z5², of small motion (eq. 6.72). [N/m]"""
-    return sqrt(Z4) / (Z5 * Z5)
+from swashplate.models.displacement_control import Pump
 
 
 @equation
 def friction_width(spool_friction: float, Z4: float, Z5: float) -> float:
-    """Distance w = F_s/k from its balance by which friction can hold the spool. [m]"""
-    return spool_friction / spring_stiffness(Z4, Z5)
+    """Distance w = F_s/k from its balance by which friction can hold the spool. [m]
 
-
-@equation
-def dither_factor(dither_time: float, h: float) -> float:
-    """What dither leaves of a friction in one step, exp(-h/T); 1 without dither."""
-    return exp(-h / dither_time)
+    k = √Z4/Z5² is the feedback spring's stiffness at the spool, of small motion (eq. 6.72).
+    """
+    return spool_friction / (sqrt(Z4) / (Z5 * Z5))
 
 
 @equation
@@ -88,12 +81,6 @@ def magnetising_current(current: float, previous: float, solenoid_hysteresis: fl
     it.
     """
     return min(max(previous, current - solenoid_hysteresis), current + solenoid_hysteresis)
-
-
-@equation
-def ripple_depth(cam_ripple: float, cam_ripple_per_torque: float, load_torque: float) -> float:
-    """Relative variation of the displacement, ε = ε0 + ε1 |C_g|. [1]"""
-    return cam_ripple + cam_ripple_per_torque * abs(load_torque)
 
 
 @equation
@@ -136,22 +123,6 @@ def plate_pressure_rate(pressure: float, plate_pressure: float, swash_damping: f
 
 
 @equation
-def static_leakage(motor_leakage: float, load_torque: float) -> float:
-    """Speed K_mL C_g lost to a static load, the Z11 of eq. 6.70. [rad/s]
-
-    C_g of gravity at the shaft is positive against positive speed: a load that hangs on the hoist
-    slows hoisting and speeds lowering up.
-    """
-    return motor_leakage * load_torque
-
-
-@equation
-def accelerating_leakage(motor_leakage: float, load_inertia: float, Z10: float) -> float:
-    """Share K_mL C_i Z10 of cos α dα/dt lost to an accelerating load, the Z12 of eq. 6.70. [1]"""
-    return motor_leakage * load_inertia * Z10
-
-
-@equation
 def load_leakage(tangent: float, swash_rate: float, Z12: float) -> float:
     """Speed lost to leakage while the load accelerates. [rad/s]
 
@@ -191,14 +162,7 @@ def motor_pressure_drop(torque: float, motor_constant: float) -> float:
 
 @equation
 def line_step(
-    torque: float,
-    speed: float,
-    flow_speed: float,
-    load_torque: float,
-    line_stiffness: float,
-    motor_leakage: float,
-    load_inertia: float,
-    h: float,
+    torque: float, speed: float, flow_speed: float, load_torque: float, p: Pump, h: float
 ) -> tuple[float, float]:
     """Torque [N m] and speed [rad/s] of the motor one step later, by the implicit midpoint rule.
 
@@ -208,30 +172,24 @@ def line_step(
     h √(k/J) is well below 1: at 512 samples a second, up to some 20 Hz.
     """
     half = 0.5 * h
-    kick = half / load_inertia
-    charge = half * line_stiffness
+    kick = half / p.load_inertia
+    charge = half * p.line_stiffness
     # both unknowns at the middle of the step
     middle = (torque + charge * (flow_speed - speed + kick * load_torque)) / (
-        1.0 + charge * (motor_leakage + kick)
+        1.0 + charge * (p.motor_leakage + kick)
     )
     return 2.0 * middle - torque, speed + 2.0 * kick * (middle - load_torque)
 
 
 @equation
 def line_rates(
-    torque: float,
-    speed: float,
-    flow_speed: float,
-    load_torque: float,
-    line_stiffness: float,
-    motor_leakage: float,
-    load_inertia: float,
+    torque: float, speed: float, flow_speed: float, load_torque: float, p: Pump
 ) -> tuple[float, float]:
     """Rates of the motor's torque and speed, of which `line_step` is the discrete form.
 
     T' = k (Ω_0 - Ω - K_mL T) [N m/s], Ω' = (T - C_g)/J [rad/s²].
     """
     return (
-        line_stiffness * (flow_speed - speed - motor_leakage * torque),
-        (torque - load_torque) / load_inertia,
+        p.line_stiffness * (flow_speed - speed - p.motor_leakage * torque),
+        (torque - load_torque) / p.load_inertia,
     )

@@ -8,52 +8,30 @@ A definition stands once, on the field of `swashplate.models.card.Card` or
 """
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, fields, replace
+from dataclasses import replace
 from difflib import get_close_matches
 from typing import Literal
 
-from swashplate.equations.fields import Declared, declared_by
-from swashplate.equations.fields import Definition as Meaning
+from swashplate.equations.fields import Definition as Definition
+from swashplate.equations.fields import declared_by
 from swashplate.errors import ParameterError
 from swashplate.models.card import Card
 from swashplate.models.displacement_control import Pump
 
-Block = Literal["control_card", "pump_motor", "refinements", "physical"]
+Block = Literal["control_card", "pump_motor", "refinements"]
 
 INPUTS = ("pump_speed",)
 """Fields of the models that no set has: what drives the machine, not what it is."""
 
 
-@dataclass(frozen=True, kw_only=True)
-class Definition(Meaning):
-    """What a parameter is, whatever its value, and where a set has it."""
-
-    symbol: str
-    block: Block
-    directional: bool = False
-
-    @property
-    def columns(self) -> tuple[str, ...]:
-        """Names of its values: one, or one for each direction."""
-        if self.directional:
-            return (f"{self.symbol}_plus", f"{self.symbol}_minus")
-        return (self.symbol,)
-
-
-def definition_of(each: Declared, block: Block) -> Definition:
-    """What a model declares, with where a set has it."""
-    meaning = {field.name: getattr(each.definition, field.name) for field in fields(Meaning)}
-    return Definition(**meaning, symbol=each.symbol, block=block, directional=len(each.fields) == 2)
-
-
 def _collected() -> Iterator[Definition]:
     """All parameters in the order of Kruse's tables, the refinements last."""
     for each in declared_by(Card):
-        yield definition_of(each, "control_card")
+        yield replace(each, block="control_card")
     for each in declared_by(Pump):
         if each.symbol not in INPUTS:
-            optional = each.definition.default is not None
-            yield definition_of(each, "refinements" if optional else "pump_motor")
+            optional = each.default is not None
+            yield replace(each, block="refinements" if optional else "pump_motor")
 
 
 _ALL = tuple(_collected())
@@ -106,12 +84,12 @@ def declare(kind: type) -> None:
     """
     for each in declared_by(kind):
         default = kind._field_defaults.get(each.symbol)  # type: ignore[attr-defined]
-        if len(each.fields) != 1 or default is None or not each.definition.unit:
+        if each.directional or default is None or not each.unit:
             raise ParameterError(
                 f"{kind.__name__}.{each.symbol} needs a Definition with a unit, one value and a "
                 "default."
             )
-        made = replace(definition_of(each, "refinements"), default=default)
+        made = replace(each, block="refinements", default=default)
         known = (CATALOGUE | REFINEMENTS | OWN).get(each.symbol, made)
         if known != made:
             raise ParameterError(

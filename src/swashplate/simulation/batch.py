@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import Any, Unpack
@@ -208,11 +208,6 @@ class _Sets:
     output: str
     cost: SquaredError | None
     to: str | Path | None
-    place: Array | None = field(default=None, repr=False)  # (m, n), within this process
-
-    def __getstate__(self) -> dict[str, Any]:
-        """Without what other processes have no use for."""
-        return {k: v for k, v in self.__dict__.items() if k != "compared"} | {"place": None}
 
     @property
     def record(self) -> Record:
@@ -265,7 +260,7 @@ def _march(shared: _Sets, blocks: Sequence[Block]) -> list[tuple[dict[int, float
     """March blocks of sets; their outputs go into one file if into any.
 
     Of each block the worst margins of the sets that failed, and of those that have them, costs or
-    outputs: none where these are in their place already.
+    outputs: none where these are in a file.
     """
     made, record, keep = [], shared.record, shared.cost is None
     measured, weight = shared.compared
@@ -283,9 +278,6 @@ def _march(shared: _Sets, blocks: Sequence[Block]) -> list[tuple[dict[int, float
         values[~good] = np.nan if keep else np.inf
         if keep and shared.to is not None:
             table |= {str(number): row for number, row in zip(sets, values, strict=True)}
-            values = values[:0]
-        elif shared.place is not None:
-            shared.place[sets] = values
             values = values[:0]
         failed = dict(zip(sets[~good].tolist(), worst[~good].tolist(), strict=True))
         made.append((failed, sets[: len(values)], values))
@@ -318,9 +310,7 @@ def _run(
         several = max(SAMPLES_A_FILE // (samples * LANES), 1)
     elif keep:
         values = _outputs(count, samples)
-        shared = replace(shared, place=values)
     items = [blocks[k : k + several] for k in range(0, len(blocks), several)]
-    # each block writes its own sets' places, so the result does not depend on who is first
     for _, made in (executor or Threads()).run(_march, shared, items):
         for failed, sets, found in made:
             for number, worst in failed.items():

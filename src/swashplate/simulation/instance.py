@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from swashplate.equations.equation import interpreted
-from swashplate.equations.fields import floats_of
+from swashplate.equations.fields import declared_by
 from swashplate.equations.marching.run import Instance, Part
 from swashplate.equations.model import Model
 from swashplate.equations.replacement import Replacement, again, uses
@@ -42,9 +42,10 @@ MOST_SUBSTEPS = 1000
 
 
 PATHS = {
-    **{path: f"pump.{path}" for path in floats_of(Pump)},
-    **{f"{name}_{side}": f"card.{side}.{name}" for side in SIDES for name in Channel._fields},
-    "tau": "card.tau",
+    column: f"{part}.{path}"
+    for part, kind in (("pump", Pump), ("card", Card))
+    for each in declared_by(kind)
+    for column, path in zip(each.columns, each.fields, strict=True)
 }
 """Path in the model of every column such as ``Z16_plus``."""
 START = "start."
@@ -91,8 +92,7 @@ def with_equation(parameters: ParameterSet, made: Replacement) -> ParameterSet:
         raise InputError(
             f"{plain(made.old).__name__} is no equation of the drive: swashplate.models.card, "
             "swashplate.models.channel, swashplate.models.displacement_control, "
-            "swashplate.models.pump and "
-            "swashplate.models.refinements have those."
+            "swashplate.models.pump and swashplate.models.refinements have those."
         )
     if made.parameters is not None and not uses(models.pump_drive, made.old):
         raise InputError(

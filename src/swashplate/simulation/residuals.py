@@ -175,15 +175,12 @@ class Sensitivities(Result):
     """(n, k) derivatives of the positive channel's current. [A/...]"""
     current_negative = Named()
     """(n, k) derivatives of the negative channel's current, a magnitude. [A/...]"""
+    current = Named()
+    """(n, k) derivatives of the signed current. [A/...]"""
     shaft_speed = Named()
     """(n, k) derivatives of the speed. [(rad/s)/...]"""
     shaft_position = Named()
     """(n, k) derivatives of the position. [rad/...]"""
-
-    @property
-    def current(self) -> Array:
-        """(n, k) derivatives of the signed current. [A/...]"""
-        return self.current_positive - self.current_negative
 
 
 def sensitivities(

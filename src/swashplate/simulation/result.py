@@ -22,21 +22,32 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 Flags = NDArray[np.uint8]
 
-SIGNALS = (
-    "voltage",
-    "current",
-    "current_positive",
-    "current_negative",
-    "solenoid_force",
-    "spool_position",
-    "orifice_opening",
-    "stroker_pressure",
-    "swash_angle",
-    "shaft_speed",
-    "shaft_position",
-)
-"""Signals of a simulation in the order of the chain."""
-MOTOR = ("motor_torque", "motor_pressure_drop")
+CHAIN = {
+    "voltage": ("V", "command of the card within ±10 V, positive towards positive speed"),
+    "current": ("A", "signed current, positive solenoid's less the negative one's"),
+    "current_positive": ("A", "current of the solenoid towards positive speed, never negative"),
+    "current_negative": ("A", "current of the other solenoid, never negative"),
+    "solenoid_force": ("N", "net force of both solenoids on the spool"),
+    "spool_position": ("m", "displacement of the spool, within its stroke"),
+    "orifice_opening": ("m", "effective opening, what the orifices leave of the displacement"),
+    "stroker_pressure": ("Pa", "stroking pressure about its equilibrium"),
+    "swash_angle": ("rad", "angle of the swash plate"),
+    "shaft_speed": ("rad/s", "speed of the shaft, of the turret for slew"),
+    "shaft_position": ("rad", "integral of the speed, zero at the start"),
+}
+"""SI unit and meaning of each signal of a simulation, in the order of the chain."""
+MOTOR = {
+    "motor_torque": ("N m", "torque of the motor, positive where it drives to positive speed"),
+    "motor_pressure_drop": ("Pa", "drop over the motor, 0 where motor_constant is not known"),
+}
+MEASURED = {
+    "load_torque": ("N m", "static torque of the load, positive against positive speed"),
+    "pump_speed": ("1", "speed of the prime mover, relative to that of Z10"),
+    "supply_pressure": ("Pa", "supply pressure less static pressure; until it is set, Z9 counts"),
+}
+"""The same of what may be measured beside the command."""
+UNITS = {name: unit for name, (unit, _) in {**CHAIN, **MOTOR, **MEASURED}.items()}
+SIGNALS = tuple(CHAIN)
 OUTPUTS = ("current_sum", *SIGNALS[1:], *MOTOR)
 """Signals that can be observed, or returned and compared by a batch."""
 KEPT = ("current", "current_positive", "current_negative", "stroker_pressure", "shaft_speed")
@@ -95,8 +106,8 @@ class Simulation(Run):
     def names(self) -> tuple[str, ...]:
         """The signals that it has: `SIGNALS`, with refinements the motor's, behind ``"time"``."""
         there = SIGNALS if self.driven_by == "voltage" else SIGNALS[1:]
-        motor = MOTOR if self.pump.motor_constant > 0.0 else MOTOR[:1] if self.refined else ()
-        return ("time", *there, *motor)
+        known = 2 if self.pump.motor_constant > 0.0 else 1 if self.refined else 0
+        return ("time", *there, *tuple(MOTOR)[:known])
 
     @property
     def pump(self) -> Pump:

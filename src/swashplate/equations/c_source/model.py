@@ -107,8 +107,8 @@ class Exported:
         found: dict[tuple[int, str], list[str]] = {}
         for i, part in enumerate(self.model.parts):
             for each in declared_by(part.parameters):
-                if each.definition.switch:
-                    found.setdefault((i, each.definition.switch), []).extend(each.fields)
+                if each.switch:
+                    found.setdefault((i, each.switch), []).extend(each.fields)
         return {key: paths for key, paths in found.items() if key in self.options}
 
     @cached_property
@@ -421,7 +421,7 @@ class Writer:
         definitions: dict[tuple[int, str], Definition] = {}
         for i, part in enumerate(self.model.parts):
             for each in declared_by(part.parameters):
-                definitions |= {(i, path): each.definition for path in each.fields}
+                definitions |= {(i, path): each for path in each.fields}
         for i, path, name in self.e.named("parameters"):
             place = f"{self.e.members[i]}.{path_of(path)}"
             yield name, place, definitions.get((i, path), Definition(name, ""))

@@ -11,7 +11,7 @@ from matplotlib.ticker import FuncFormatter, LogLocator, MultipleLocator, NullFo
 from numpy.typing import NDArray
 
 from swashplate.errors import InputError
-from swashplate.linear import UNITS, FrequencyResponse, LinearDrive
+from swashplate.linear import FrequencyResponse, LinearDrive
 from swashplate.report.style import (
     FAINT,
     GREY,
@@ -23,6 +23,7 @@ from swashplate.report.style import (
     strokes,
     write,
 )
+from swashplate.simulation.result import UNITS
 from swashplate.units import DisplayUnit, display_unit
 
 Array = NDArray[np.float64]

@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 from swashplate.equations import Run
 from swashplate.errors import InputError
 from swashplate.full_order import Comparison
-from swashplate.linear import UNITS
 from swashplate.report.lines import (
     NARROW,
     SHADES,
@@ -44,7 +43,7 @@ from swashplate.report.style import (
     write,
     zero_line,
 )
-from swashplate.simulation.result import Limit, Simulation
+from swashplate.simulation.result import UNITS, Limit, Simulation
 from swashplate.units import display_unit
 
 Flags = NDArray[np.int8]
@@ -52,9 +51,6 @@ Stops = tuple[float, float]
 SIGNAL_UNITS = {
     **UNITS,
     "time": "s",
-    "current_positive": "A",
-    "current_negative": "A",
-    "shaft_position": "rad",
     "spool_velocity": "m/s",
     "swash_rate": "rad/s",
     "valve_flow": "m^3/s",
