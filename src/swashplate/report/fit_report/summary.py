@@ -148,8 +148,8 @@ def run_error(run: ShownRun, runs: Sequence[ShownRun]) -> float:
 
     Infinite where nothing moves.
     """
-    own = run.judged.quality
-    judged = [each.judged.quality for each in runs if each.role == run.role]
+    own = run.judged
+    judged = [each.judged for each in runs if each.role == run.role]
     reach = range_of([each for each in judged if each.channel == own.channel])
     return pooled([own], without_noise=True)[own.channel].rmse / reach if reach > 0.0 else np.inf
 
@@ -164,7 +164,7 @@ def run_lights(runs: Sequence[ShownRun], findings: dict[str, list[int]]) -> list
     findings : dict of str to list of int
         Findings on the data, by the name of their run.
     """
-    fitted = [each.quality for run in runs if not run.validates for each in run.channels]
+    fitted = [each.quality for run in runs if run.role == "fit" for each in run.channels]
     fitted = fitted or [each.quality for run in runs for each in run.channels]
     whole = pooled(fitted, without_noise=True)
     made = list[tuple[Light, str]]()
@@ -229,11 +229,11 @@ def summary_section(
 
 def _curves(runs: Sequence[ShownRun], virtual: bool) -> Iterable[Block]:
     """The runs that are predicted best and worst, of those held out if there are any."""
-    held = [k for k, run in enumerate(runs) if run.validates]
+    held = [k for k, run in enumerate(runs) if run.role == "validate"]
     chosen = sorted(held or range(len(runs)), key=lambda k: run_error(runs[k], runs))
     ends = {"Best": chosen[0], "Worst": chosen[-1]} if len(chosen) > 1 else {"The": chosen[0]}
     for which, k in ends.items():
-        kind = "held-out run" if held else "run" if runs[k].validates else "fitted run"
+        kind = "held-out run" if held else "run" if runs[k].role == "validate" else "fitted run"
         part = run_error(runs[k], runs)
         error = "never moves" if part == np.inf else f"error {percent(part)} of the range"
         content = {
@@ -280,7 +280,7 @@ def _next(
         )
         named = listed(weak[:6]) if len(weak) <= 6 else f"{', '.join(weak[:6])} and others"
         said.append(code.format(named, campaign.path))
-    if stages and not any(run.validates for run in runs):
+    if stages and not any(run.role == "validate" for run in runs):
         said.append('Hold a run out of the fit (role = "validate"): nothing was predicted yet.')
     if judged.usable:
         what = "Use the drive" if judged.grade == "Usable" else "Use the drive for prediction only"

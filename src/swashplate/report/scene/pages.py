@@ -4,14 +4,11 @@ from __future__ import annotations
 
 from base64 import b64encode
 from collections.abc import Mapping
-from datetime import date
-from importlib.resources import files
 from io import StringIO
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-from jinja2 import Environment, StrictUndefined
 from markupsafe import Markup
 
 from swashplate.crane import CraneRun, Judgment
@@ -23,6 +20,7 @@ from swashplate.report.fit_report.page import (
     Section,
     listed_block,
     page,
+    rendered,
     script_json,
     text,
 )
@@ -74,20 +72,14 @@ def write_scene(runs: CraneRun | Mapping[str, CraneRun], path: str | Path) -> No
             for name, run in named.items()
         ],
     }
-    css, js, template = (
-        files("swashplate.report.scene").joinpath(f"scene.{each}").read_text("utf-8")
-        for each in ("css", "js", "html")
-    )
-    environment = Environment(
-        autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
-    )
-    made = environment.from_string(template).render(
+    made = rendered(
+        "scene/scene.html",
+        ("scene.js",),
+        ("scene.css",),
         title=first.crane.title,
         names=list(named),
         assumed=first.crane.assumed,
         data=script_json(content),
-        css=Markup(css),
-        js=Markup(js),
     )
     write_text(made, path)
 
@@ -174,16 +166,14 @@ def write_judgment(judgment: Judgment, path: str | Path) -> None:
         Section("example", "One of the seaways", example),
         Section("basis", "What it rests on", [*listed_block(basis), geometry, text(ASSUMED)]),
     ]
-    content = {
-        "what": "Crane",
-        "title": crane.title or crane.name,
-        "facts": f"{seaway_words(study.sea)} · {count(len(study.seeds), 'seaway')} · "
+    made = page(
+        sections,
+        what="Crane",
+        title=crane.title or crane.name,
+        facts=f"{seaway_words(study.sea)} · {count(len(study.seeds), 'seaway')} · "
         f"{count(len(judgment.names) - 1, 'variant')} beside no control",
-        "virtual": False,
-        "date": f"{date.today():%d %B %Y}",
-        "run_data": [],
-    }
-    write_text(page([each for each in sections if each.blocks], content), path)
+    )
+    write_text(made, path)
 
 
 def _drawn(figure: Figure, caption: str) -> Block:
