@@ -282,13 +282,7 @@ PRINTED = Form("a printed report", (".pdf",))
 
 
 def ending(path: str | Path, form: Form) -> str:
-    """Ending of a path in small letters, with its dot.
-
-    Raises
-    ------
-    FileError
-        If the form has no such ending.
-    """
+    """Ending of a path in small letters, with its dot; a `FileError` if the form has it not."""
     suffix = Path(path).suffix
     if form.endings and suffix.lower() not in form.endings:
         known = " or ".join(filter(None, (", ".join(form.endings[:-1]), form.endings[-1])))
@@ -297,16 +291,9 @@ def ending(path: str | Path, form: Form) -> str:
 
 
 def check_place(path: str | Path) -> None:
-    """See to it that a file can be where it shall be, as far as that shows beforehand.
-
-    Raises
-    ------
-    FileError
-        If its folder does not exist, or a folder has its name.
-    """
-    target = Path(path)
+    """See to it that a file can be where it shall be, as far as that shows beforehand."""
+    target, reason = Path(path), None
     folder = target.parent
-    reason = None
     try:
         if not folder.exists():
             reason = f"folder {folder} does not exist"
@@ -323,13 +310,7 @@ def check_place(path: str | Path) -> None:
 
 
 def made_folder(folder: Path) -> Path:
-    """A folder, made where it is missing.
-
-    Raises
-    ------
-    FileError
-        If it cannot be made.
-    """
+    """A folder, made where it is missing."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
@@ -338,13 +319,7 @@ def made_folder(folder: Path) -> Path:
 
 
 def check_folder(folder: Path) -> None:
-    """See to it, before long work, that a folder can be made and written to; nothing is made yet.
-
-    Raises
-    ------
-    FileError
-        If it cannot.
-    """
+    """See to it, before long work, that a folder can be made and written to; none is made yet."""
     there = next(each for each in (folder.absolute(), *folder.absolute().parents) if each.exists())
     if not there.is_dir():
         raise FileError(f"{folder} cannot be made: {there} is no folder.")
@@ -352,15 +327,8 @@ def check_folder(folder: Path) -> None:
         raise FileError(f"{folder} cannot be written to: {there} is read-only or another user's.")
 
 
-def write_whole(path: str | Path, write: Callable[[Path], None]) -> None:
-    """Have a file written beside its place and renamed when it is complete.
-
-    Parameters
-    ----------
-    path : path
-        Where the file shall be.
-    write : callable
-        Writes the file at the path that it is given, which has the same ending.
+def write_whole(path: str | Path, write: Callable[[Path], object]) -> None:
+    """Have a file written at a path beside its place, and renamed when it is complete.
 
     Raises
     ------
@@ -405,20 +373,12 @@ def _of_the_disk(error: BaseException) -> str | None:
 
 def write_bytes(content: bytes, path: str | Path) -> None:
     """Write bytes, whole or not at all."""
-
-    def write(beside: Path) -> None:
-        beside.write_bytes(content)
-
-    write_whole(path, write)
+    write_whole(path, lambda beside: beside.write_bytes(content))
 
 
 def write_text(text: str, path: str | Path) -> None:
     """Write UTF-8 text, whole or not at all."""
-
-    def write(beside: Path) -> None:
-        beside.write_text(text, "utf-8")
-
-    write_whole(path, write)
+    write_whole(path, lambda beside: beside.write_text(text, "utf-8"))
 
 
 def write_table(table: polars.DataFrame, path: str | Path) -> None:

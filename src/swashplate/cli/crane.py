@@ -240,7 +240,10 @@ def run(
         tables = run_tables(runs)
     save(out, "All signals, in SI", runs[first].write)
     draw(plot, "plot_crane", runs)
-    save(scene, "Scene", lambda path: _pages().write_scene(runs, path))
+    if scene is not None:
+        from swashplate.report.scene import write_scene
+
+        save(scene, "Scene", lambda path: write_scene(runs, path))
     _end(crane, tables)
 
 
@@ -276,8 +279,11 @@ def judge(
 
         more["executor"] = Dask(dask)
     found: Judgment = study.through(study.chosen.judge, **more)
-    page = out is not None and out.suffix.lower() == ".html"
-    write = (lambda path: _pages().write_judgment(found, path)) if page else found.write
+    write = found.write
+    if out is not None and out.suffix.lower() == ".html":
+        from swashplate.report.scene import write_judgment
+
+        write = partial(write_judgment, found)
     save(out, "Verdict", write)
     draw(plot, "plot_judgment", found)
     _end(study.chosen, found.tables(), *found.sentences()[1:])
@@ -411,13 +417,6 @@ def _end(crane: Crane, tables: Iterable[Table], *said: str) -> None:
     show(*tables)
     for sentence in said:
         say(sentence)
-
-
-def _pages() -> Any:
-    """Writers of pages, which take a while to import."""
-    from swashplate.report import scene
-
-    return scene
 
 
 command(app, "show")(show_crane)

@@ -285,10 +285,7 @@ def _reported(found: Judged, out: Path, truth: ParameterSet | None = None) -> st
 def _say_verdict(verdict: Verdict) -> None:
     """Print criteria, range of validity, what is assumed, and the headline.
 
-    Raises
-    ------
-    Exit
-        With code 1 if what was judged is not usable.
+    Ends with code 1 if what was judged is not usable.
     """
     show(verdict.table())
     bullets(verdict.not_judged)

@@ -11,6 +11,7 @@ from pathlib import Path
 from markupsafe import Markup
 
 from swashplate.campaign import Campaign, examine, quality_table
+from swashplate.campaign.schema import Weight
 from swashplate.drive import Drive
 from swashplate.errors import InputError
 from swashplate.identification import tables
@@ -27,7 +28,7 @@ from swashplate.identification.verdict import Verdict, starts_of, verdict
 from swashplate.parameters.parameter_set import ParameterSet
 from swashplate.report.fit_report import charts
 from swashplate.report.fit_report.live import can_run, live_page, run_of
-from swashplate.report.fit_report.page import Block, Section, listed_block, page, text
+from swashplate.report.fit_report.page import Block, Section, listed_block, page, text, titled
 from swashplate.report.fit_report.runs import ShownRun, run_data, run_words, shown_runs
 from swashplate.report.fit_report.summary import light, run_error, run_lights, summary_section
 from swashplate.tables import NONE, Cell, Column, Table, count, ended, joined, listed, write_text
@@ -337,16 +338,14 @@ def _stage_words(fit: StageFit) -> list[str]:
     return words
 
 
-def _window(weight: object) -> str:
-    given = {key: value for key, value in vars(weight).items() if value not in (None, "")}
-    factor, start, stop = given.pop("factor"), given.get("start"), given.get("stop")
+def _window(weight: Weight) -> str:
     when = "all of the run"
-    if start is not None or stop is not None:
-        first = "the start" if start is None else f"{start:g} s"
-        when = f"{first} to {'the end' if stop is None else f'{stop:g} s'}"
-    where = f" in '{given['maneuver']}'" if "maneuver" in given else ""
-    why = f" ({given['why']})" if "why" in given else ""
-    return f"{factor:g} on {when}{where}{why}"
+    if weight.start is not None or weight.stop is not None:
+        first = "the start" if weight.start is None else f"{weight.start:g} s"
+        when = f"{first} to {'the end' if weight.stop is None else f'{weight.stop:g} s'}"
+    where = f" in '{weight.maneuver}'" if weight.maneuver else ""
+    why = f" ({weight.why})" if weight.why else ""
+    return f"{weight.factor:g} on {when}{where}{why}"
 
 
 # --- verdict --------------------------------------------------------------------------------------
@@ -354,19 +353,16 @@ def _window(weight: object) -> str:
 
 def _verdict_section(judged: Verdict, findings: int) -> Section:
     """The judgements, what each rests on, and the criteria."""
-    said: list[tuple[str, str, Sequence[str]]] = []
-    said.append(("Remarks", "look", judged.sentences))
-    said.append(("Not judged", "look", judged.not_judged))
-    said.append(("Range of validity", "plain", (judged.validity,) if judged.validity else ()))
-    said.append(("Assumed, cannot be checked", "plain", judged.assumed))
-    if findings:
-        words = f"{count(findings, 'finding')} on the campaign's data: see the section on them."
-        said.append(("Data", "look", (words,)))
-    blocks = [Block("terms", said, "verdict")]
-    if judged.criteria:
-        made = judged.table()
-        blocks += [Block("heading", made.title, "h3"), Block("table", made, "criteria")]
-    return Section("verdict", "Verdict in detail", blocks)
+    words = f"{count(findings, 'finding')} on the campaign's data: see the section on them."
+    said = [
+        ("Remarks", "look", judged.sentences),
+        ("Not judged", "look", judged.not_judged),
+        ("Range of validity", "plain", [judged.validity] if judged.validity else []),
+        ("Assumed, cannot be checked", "plain", judged.assumed),
+        ("Data", "look", [words] if findings else []),
+    ]
+    criteria = titled(judged.table(), "criteria") if judged.criteria else []
+    return Section("verdict", "Verdict in detail", [Block("terms", said, "verdict"), *criteria])
 
 
 # --- what the data tell ---------------------------------------------------------------------------
@@ -388,14 +384,13 @@ def _parameter_section(fit: Fit, stages: Sequence[StageFit], truth: ParameterSet
             )
         )
     for table, each in zip(made, stages, strict=True):
-        blocks += [Block("heading", table.title, "h3"), Block("table", table, "parameters")]
+        blocks += titled(table, "parameters")
         own = tables.estimates_table(each, own=True)
         if own.rows:
             summary = f"{count(len(own.rows), 'parameter')} of single runs"
             blocks.append(Block("details", [Block("table", own, "parameters")], summary))
     fixed = tables.fixed_table(fit, truth)
-    if fixed.rows:
-        blocks += [Block("heading", fixed.title, "h3"), Block("table", fixed, "held")]
+    blocks += titled(fixed, "held") if fixed.rows else []
     return Section("parameters", "Parameters", blocks)
 
 
@@ -430,7 +425,7 @@ def _effects(found: Identifiability, shown: Sequence[bool]) -> list[Block]:
     """How much all weighted residuals change for 1 % of each parameter, the largest first."""
     made = Table("", (Column("parameter"), Column("change of the residuals for 1 %", ".3g")))
     pairs = zip(found.sensitivity, found.variables.names, shown, strict=True)
-    for effect, name in sorted((float(e), name) for e, name, own in pairs if own)[::-1]:
+    for effect, name in sorted(((float(e), name) for e, name, own in pairs if own), reverse=True):
         made.add(name, effect)
     return [Block("details", [Block("table", made, "effects")], "Sensitivity")]
 
@@ -444,13 +439,11 @@ def _correlations(stage: StageFit, general: Sequence[bool]) -> list[Block]:
     kept = [k for k, own in enumerate(general) if own and quoted.determined[k]]
     names, values = quoted.variables.names, quoted.correlation
     pairs = [(float(values[i, j]), names[i], names[j]) for i in kept for j in kept if i < j]
-    blocks, made = [], Table("", (Column("parameter"), Column("with"), Column("r", "+.3f")))
+    made = Table("", (Column("parameter"), Column("with"), Column("r", "+.3f")))
     for value, name, other in sorted(pairs, key=lambda pair: -abs(pair[0]))[:MOST_PAIRS]:
         made.add(name, other, value)
-    if made.rows:
-        drawing = [Block("table", made, "correlations")]
-        blocks.append(Block("details", drawing, "Strongest correlations of the estimates"))
-    return blocks
+    shown = Block("table", made, "correlations")
+    return [Block("details", [shown], "Strongest correlations of the estimates")] * bool(made.rows)
 
 
 def _starts_section(several: Mapping[str, Sequence[Solution]]) -> Section:

@@ -54,6 +54,12 @@ def listed_block(sentences: Sequence[str]) -> list[Block]:
     return [Block("list", sentences)] if sentences else []
 
 
+def titled(table: Table, look: str = "") -> list[Block]:
+    """A table under its title, its caption a remark."""
+    remark = [text(table.caption, "remark")] if table.caption else []
+    return [Block("heading", table.title, "h3"), Block("table", table, look), *remark]
+
+
 def page(
     sections: Sequence[Section],
     *,
@@ -162,13 +168,7 @@ PATIENCE = 180.0
 
 
 def find_browser() -> str:
-    """Path of a Chromium, which prints pages.
-
-    Raises
-    ------
-    FileError
-        If none is found.
-    """
+    """Path of a Chromium, which prints pages; a `FileError` where there is none."""
     found = next((place for each in BROWSERS if (place := which(each)) is not None), None)
     if found is None:
         raise FileError(
@@ -181,12 +181,7 @@ def find_browser() -> str:
 def print_report(page: str | Path, path: str | Path) -> None:
     """Print a report's page as PDF, whole or not at all, by a Chromium without a window.
 
-    Parameters
-    ----------
-    page : path
-        As `write_fit_report` writes it.
-    path : path
-        The PDF, which replaces an older one.
+    The PDF replaces an older one.
 
     Raises
     ------

@@ -181,11 +181,8 @@ def run_data(run: ShownRun) -> dict[str, Any]:
 
     Ignored samples that would press the others flat are left out, and lines are broken there and
     at gaps. What was measured is left to the page: simulated less residual. Of runs of more than
-    `MOST_ROWS` rows those are kept that show each signal as all of them would.
-
-    Notes
-    -----
-    Signals are rounded to 1/65,535 of their range, residuals to 1/16 of their rms.
+    `MOST_ROWS` rows those are kept that show each signal as all of them would. Signals are rounded
+    to 1/65,535 of their range, residuals to 1/16 of their rms.
     """
     drive = run.experiment.input
     return {
@@ -231,21 +228,12 @@ def _signals(
 
 
 def packed(values: Array, step: float | None = None) -> dict[str, Any]:
-    """Numbers as whole multiples of a step, differenced, deflated and in base64.
+    """Finite numbers as whole multiples of a step, differenced, deflated and in base64.
 
-    Parameters
-    ----------
-    values : (n,) array
-        Finite numbers.
-    step : float, optional
-        What they are rounded to; at least 2⁻²⁸ of their range, by default 1/65,535 of it.
-
-    Returns
-    -------
-    dict
-        ``size``, ``zero`` and ``step``: value = zero + step · number. ``order``: how many times the
-        numbers were differenced. ``code``: 0, -1, 1, -2 ... as 0, 1, 2, 3 ... of four bytes each,
-        the lowest bytes of all numbers first.
+    ``size``, ``zero`` and ``step``: value = zero + step · number; the step is at least 2⁻²⁸ of
+    their range, by default 1/65,535 of it. ``order``: how many times the numbers were differenced.
+    ``code``: 0, -1, 1, -2 ... as 0, 1, 2, 3 ... of four bytes each, the lowest bytes of all numbers
+    first.
     """
     zero = float(np.median(values)) if values.size else 0.0
     reach = float(np.ptp(values)) if values.size else 0.0

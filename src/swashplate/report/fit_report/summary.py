@@ -85,12 +85,7 @@ def numbers_of(drive: Drive) -> Array:
 def numbers_table(drive: Drive, stages: Sequence[StageFit]) -> tuple[Table, list[str]]:
     """The numbers that matter, each with its 95 % interval, and what these leave out.
 
-    Parameters
-    ----------
-    drive : Drive
-        As fitted, or as it was held against runs.
-    stages : sequence of StageFit
-        Of the fit's stages; none for a drive of which no interval is known.
+    Without stages of a fit there are no intervals.
     """
     values, half, said = numbers_of(drive), np.full((6, 2), np.nan), list[str]()
     if stages:
@@ -157,12 +152,7 @@ def run_error(run: ShownRun, runs: Sequence[ShownRun]) -> float:
 def run_lights(runs: Sequence[ShownRun], findings: dict[str, list[int]]) -> list[tuple[Light, str]]:
     """For each run its light and why, from its errors beside those of all runs that are fitted.
 
-    Parameters
-    ----------
-    runs : sequence of ShownRun
-        Fitted and held out.
-    findings : dict of str to list of int
-        Findings on the data, by the name of their run.
+    Findings on the data are by the name of their run.
     """
     fitted = [each.quality for run in runs if run.role == "fit" for each in run.channels]
     fitted = fitted or [each.quality for run in runs for each in run.channels]

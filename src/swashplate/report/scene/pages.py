@@ -23,8 +23,9 @@ from swashplate.report.fit_report.page import (
     rendered,
     script_json,
     text,
+    titled,
 )
-from swashplate.tables import Table, count, listed, write_text
+from swashplate.tables import count, listed, write_text
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -133,7 +134,7 @@ def write_judgment(judgment: Judgment, path: str | Path) -> None:
     summary = [
         Block("verdict", (light(look, "works" if judgment.passed else "fails"), verdict), look),
         _drawn(plot_judgment(judgment), "Swing of each variant in each seaway"),
-        *_tables(*remedies),
+        *(block for each in remedies for block in titled(each)),
     ]
     if judgment.tried and judgment.remedies:  # else the verdict says so
         summary.append(text(f"Tried, and not enough: {listed(judgment.tried)}.", "remark"))
@@ -142,7 +143,7 @@ def write_judgment(judgment: Judgment, path: str | Path) -> None:
         periods = np.linspace(4.0, 14.0, 21)
         seas = [study.sea.sea] if study.sea and isinstance(study.sea.sea, str) else []
         followable = plot_follow(crane.follow(periods, seas=seas, seaway=study.sea, **pose))
-        limiting = [text(LIMITS_IN_WORDS), _drawn(followable, FOLLOWED), *_tables(limits)]
+        limiting = [text(LIMITS_IN_WORDS), _drawn(followable, FOLLOWED), *titled(limits)]
     try:
         runs = {name: judgment.run(name, judgment.typical) for name in (NONE, judged)}
         caption = f"Seaway {judgment.typical}, in which '{judged}' swings as in half of all seaways"
@@ -161,7 +162,7 @@ def write_judgment(judgment: Judgment, path: str | Path) -> None:
     geometry = Block("details", [Block("table", crane.table())], "Geometry, with its sources")
     sections = [
         Section("summary", "Summary", [*summary, *listed_block(rests)]),
-        Section("swing", "Swing", [text(IN_WORDS), *_tables(swings, differences)]),
+        Section("swing", "Swing", [text(IN_WORDS), *titled(swings), *titled(differences)]),
         Section("limits", "Limits of the drives", limiting),
         Section("example", "One of the seaways", example),
         Section("basis", "What it rests on", [*listed_block(basis), geometry, text(ASSUMED)]),
@@ -187,11 +188,3 @@ def _drawn(figure: Figure, caption: str) -> Block:
     drawn = drawn[drawn.index("<svg") :]
     look = '<svg class="chart" style="min-width: 600px"'
     return Block("figure", Markup(drawn.replace("<svg", look, 1)), caption)
-
-
-def _tables(*tables: Table) -> list[Block]:
-    made = []
-    for each in tables:
-        made += [Block("heading", each.title, "h3"), Block("table", each)]
-        made += [text(each.caption, "remark")] if each.caption else []
-    return made
