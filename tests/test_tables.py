@@ -164,7 +164,12 @@ def stumbling(*_: object) -> None:
         raise AttributeError("a library's clean-up") from None
 
 
-@pytest.mark.parametrize("write", [no_room, stumbling])
+def half_written(beside: Path) -> None:
+    beside.write_text("half")
+    raise OSError(28, "No space left on device")
+
+
+@pytest.mark.parametrize("write", [no_room, stumbling, half_written])
 def test_a_full_disk_is_a_sentence(tmp_path: Path, write: Callable[..., None]) -> None:
     (tmp_path / "a.csv").write_text("old")
     with pytest.raises(FileError, match=r"a\.csv cannot be written: No space left on device\."):

@@ -29,10 +29,7 @@ _DEEP = re.compile(rf"(?<![\w-])(?:[\w-]+\s*\.\s*){{{DEEPEST}}}")
 def read_text(path: str | Path) -> str:
     """The text of a UTF-8 file, without the byte-order mark that some editors begin it with.
 
-    Raises
-    ------
-    FileError
-        If there is none, it cannot be read, or is no ordinary file of up to 268 MB.
+    A `FileError` if there is none, it cannot be read, or is no ordinary file of up to 64 MB.
     """
     place = Path(path)
     try:
@@ -43,7 +40,6 @@ def read_text(path: str | Path) -> str:
             raise FileError(f"{path} is no ordinary file.")
         if found.st_size > LARGEST:
             raise FileError(f"{path} has more than {LARGEST // 2**20} MB: it is not such a text.")
-        # Windows' Notepad writes a byte order mark, which is no part of the text
         return place.read_text("utf-8-sig")
     except FileError:
         raise
@@ -61,11 +57,8 @@ def read_text(path: str | Path) -> str:
 def parse_toml(text: str, origin: str) -> dict[str, Any]:
     """The tables of a TOML text; `origin` names it in errors.
 
-    Raises
-    ------
-    FileError
-        If it is not TOML, with line and column, or has what nobody writes: keys or tables nested a
-        hundred deep, numbers of thousands of digits, control characters in a text.
+    A `FileError` if it is not TOML, with line and column, or has what nobody writes: keys or tables
+    nested a hundred deep, numbers of thousands of digits, control characters in a text.
     """
     try:
         if _DEEP.search(text):
@@ -92,9 +85,7 @@ def _check_texts(found: Any, origin: str) -> None:
                     f"{origin} has the control character {ord(each):#04x} in the text {found!r:.60}"
                 )
     elif isinstance(found, dict | list):
-        for name in found if isinstance(found, dict) else ():
-            _check_texts(name, origin)
-        for each in found.values() if isinstance(found, dict) else found:
+        for each in (*found, *found.values()) if isinstance(found, dict) else found:
             _check_texts(each, origin)
 
 
@@ -111,10 +102,7 @@ def toml_string(text: str) -> str:
 def validated(content: Any, model: type[Model], origin: str) -> Model:
     """Content checked against a schema.
 
-    Raises
-    ------
-    ParameterError
-        For the first entry that is wrong; the sentence names it and says what would be right.
+    A `ParameterError` names the first entry that is wrong and says what would be right.
     """
     from pydantic import ValidationError
 
@@ -128,12 +116,7 @@ def validated(content: Any, model: type[Model], origin: str) -> Model:
 def read_json(path: str | Path, model: type[Model], *, strict: bool = True) -> Model:
     """A JSON file checked against a schema; strictly, a text is no number, not even `"12"`.
 
-    Raises
-    ------
-    FileError
-        If it cannot be read or is not JSON.
-    ParameterError
-        For the first entry that is wrong; the sentence names it and says what would be right.
+    A `FileError` if it cannot be read or is not JSON, else an error as of `validated`.
     """
     from pydantic import ValidationError
 

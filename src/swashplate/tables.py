@@ -29,7 +29,8 @@ class Form(NamedTuple):
 
     what: str
     """In words, with an article: ``"a table"``."""
-    endings: tuple[str, ...]
+    endings: tuple[str, ...] = ()
+    """Any, if there are none."""
 
 
 class Cell(NamedTuple):
@@ -58,13 +59,18 @@ class Column:
     key: str = ""
     """Its name in a file, if that is another."""
 
+    @property
+    def pure(self) -> bool:
+        """Whether its numbers are not in their row's unit."""
+        return bool(self.unit) or self.spec.endswith("%")
+
 
 UNIT = Column("unit")
 """The column of the rows' own units."""
 
 
 class Row(NamedTuple):
-    """Values of a row, one a column without that of the unit."""
+    """Values of a row, one a column."""
 
     cells: tuple[Any, ...]
     unit: str
@@ -101,17 +107,15 @@ class Table:
         """Add a row; see `Row`. NaN counts as no number."""
         count = sum(each is not UNIT for each in self.columns)
         assert len(cells) == count, f"{len(cells)} cells for {count} columns of {self.title}"
-        self.rows.append(Row(cells, unit, spec, look, section or total, total))
+        given = iter(cells)
+        every = tuple(unit if each is UNIT else next(given) for each in self.columns)
+        self.rows.append(Row(every, unit, spec, look, section or total, total))
 
     def of(self, place: str) -> Table:
         """The table with the columns of a place: ``"t"`` terminal, ``"p"`` page, ``"f"`` file."""
-        kept = [place in each.of for each in self.columns if each is not UNIT]
-        rows = [
-            row._replace(cells=tuple(c for c, keep in zip(row.cells, kept, strict=True) if keep))
-            for row in self.rows
-        ]
-        columns = [each for each in self.columns if each is UNIT or place in each.of]
-        return Table(self.title, columns, self.caption, rows, self.si)
+        kept = [k for k, each in enumerate(self.columns) if place in each.of]
+        rows = [row._replace(cells=tuple(row.cells[k] for k in kept)) for row in self.rows]
+        return Table(self.title, [self.columns[k] for k in kept], self.caption, rows, self.si)
 
     def heads(self) -> list[str]:
         """The columns' names with their units, for people."""
@@ -122,26 +126,18 @@ class Table:
 
     def texts(self, row: Row) -> list[str]:
         """A row's cells as words for people."""
-        own = [each for each in self.columns if each is not UNIT]
-        pairs = [
-            (column, value)
-            for column, value in zip(own, row.cells, strict=True)
-            if not column.unit and not column.spec.endswith("%")
-        ]
+        pairs = list(zip(self.columns, row.cells, strict=True))
+        own = [(column, value) for column, value in pairs if not (column is UNIT or column.pure)]
         # numbers of fixed decimals keep the large unit: 0.0450 A, but 45 mA
-        fixed = any((row.spec or each.spec).endswith("f") for each, _ in pairs if each.spec)
-        size = float("inf") if fixed else largest([value for _, value in pairs])
+        fixed = any((row.spec or each.spec).endswith("f") for each, _ in own if each.spec)
+        size = float("inf") if fixed else largest([value for _, value in own])
         shown = chosen_unit(row.unit) if self.si else display_unit(row.unit, size)
         texts = []
-        cells = iter(row.cells)
-        for column in self.columns:
-            if column is UNIT:
-                texts.append(shown.name)
-                continue
+        for column, value in pairs:
             unit = display_unit(column.unit) if column.unit else shown
-            pure = column.unit or column.spec.endswith("%")
-            spec = column.spec if pure else row.spec or column.spec
-            texts.append(_text(next(cells), spec, column, unit.factor))
+            spec = column.spec if column.pure else row.spec or column.spec
+            is_unit = column is UNIT
+            texts.append(shown.name if is_unit else _text(value, spec, column, unit.factor))
         return texts
 
     def to_polars(self) -> polars.DataFrame:
@@ -149,16 +145,12 @@ class Table:
         import polars as pl
 
         made = self.of("f")
-        names = [each.key or each.name for each in made.columns if each is not UNIT]
-        records = []
-        for row in (each for each in made.rows if not each.total):
-            values = [each.value if isinstance(each, Cell) else each for each in row.cells]
-            record = dict(zip(names, map(_number, values), strict=True))
-            if UNIT in made.columns:
-                place = list(made.columns).index(UNIT)
-                pairs = [*record.items()]
-                record = dict([*pairs[:place], ("unit", row.unit), *pairs[place:]])
-            records.append(record)
+        names = [each.key or each.name for each in made.columns]
+        records = [
+            dict(zip(names, map(_number, row.cells), strict=True))
+            for row in made.rows
+            if not row.total
+        ]
         return pl.DataFrame(records, infer_schema_length=None)
 
     def write(self, path: str | Path) -> None:
@@ -200,6 +192,7 @@ def largest(cells: Sequence[Any]) -> float:
 
 
 def _number(value: Any) -> Any:
+    value = value.value if isinstance(value, Cell) else value
     return None if isinstance(value, float) and isnan(value) else value
 
 
@@ -285,34 +278,22 @@ def count(number: int, what: str, several: str = "") -> str:
 TABLE = Form("a table", (".csv", ".parquet"))
 FIGURE = Form("a figure", (".png", ".svg", ".pdf"))
 PAGE = Form("a page", (".html",))
+PRINTED = Form("a printed report", (".pdf",))
 
 
 def ending(path: str | Path, form: Form) -> str:
-    """Ending of a path in small letters, with its dot.
-
-    Raises
-    ------
-    FileError
-        If the form has no such ending.
-    """
+    """Ending of a path in small letters, with its dot; a `FileError` if the form has it not."""
     suffix = Path(path).suffix
-    if suffix.lower() not in form.endings:
+    if form.endings and suffix.lower() not in form.endings:
         known = " or ".join(filter(None, (", ".join(form.endings[:-1]), form.endings[-1])))
         raise FileError(f"{path} ends in '{suffix}'; {form.what} is written as {known}.")
     return suffix.lower()
 
 
 def check_place(path: str | Path) -> None:
-    """See to it that a file can be where it shall be, as far as that shows beforehand.
-
-    Raises
-    ------
-    FileError
-        If its folder does not exist, or a folder has its name.
-    """
-    target = Path(path)
+    """See to it that a file can be where it shall be, as far as that shows beforehand."""
+    target, reason = Path(path), None
     folder = target.parent
-    reason = None
     try:
         if not folder.exists():
             reason = f"folder {folder} does not exist"
@@ -329,13 +310,7 @@ def check_place(path: str | Path) -> None:
 
 
 def made_folder(folder: Path) -> Path:
-    """A folder, made where it is missing.
-
-    Raises
-    ------
-    FileError
-        If it cannot be made.
-    """
+    """A folder, made where it is missing."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
@@ -344,13 +319,7 @@ def made_folder(folder: Path) -> Path:
 
 
 def check_folder(folder: Path) -> None:
-    """See to it, before long work, that a folder can be made and written to; nothing is made yet.
-
-    Raises
-    ------
-    FileError
-        If it cannot.
-    """
+    """See to it, before long work, that a folder can be made and written to; none is made yet."""
     there = next(each for each in (folder.absolute(), *folder.absolute().parents) if each.exists())
     if not there.is_dir():
         raise FileError(f"{folder} cannot be made: {there} is no folder.")
@@ -358,15 +327,8 @@ def check_folder(folder: Path) -> None:
         raise FileError(f"{folder} cannot be written to: {there} is read-only or another user's.")
 
 
-def write_whole(path: str | Path, write: Callable[[Path], None]) -> None:
-    """Have a file written beside its place and renamed when it is complete.
-
-    Parameters
-    ----------
-    path : path
-        Where the file shall be.
-    write : callable
-        Writes the file at the path that it is given, which has the same ending.
+def write_whole(path: str | Path, write: Callable[[Path], object]) -> None:
+    """Have a file written at a path beside its place, and renamed when it is complete.
 
     Raises
     ------
@@ -411,20 +373,12 @@ def _of_the_disk(error: BaseException) -> str | None:
 
 def write_bytes(content: bytes, path: str | Path) -> None:
     """Write bytes, whole or not at all."""
-
-    def write(beside: Path) -> None:
-        beside.write_bytes(content)
-
-    write_whole(path, write)
+    write_whole(path, lambda beside: beside.write_bytes(content))
 
 
 def write_text(text: str, path: str | Path) -> None:
     """Write UTF-8 text, whole or not at all."""
-
-    def write(beside: Path) -> None:
-        beside.write_text(text, "utf-8")
-
-    write_whole(path, write)
+    write_whole(path, lambda beside: beside.write_text(text, "utf-8"))
 
 
 def write_table(table: polars.DataFrame, path: str | Path) -> None:

@@ -54,18 +54,10 @@ def speed_unit(unit: str) -> str:
 
 
 def to_si(value: float, unit: str, si: str, what: str) -> float:
-    """Convert a value to the SI unit that the model computes in.
+    """A value in a unit such as ``"bar"``, in the SI unit that the model computes in.
 
-    An angular frequency in Hz, 1/min or another of a nameplate's turns counts each as 2π.
-
-    Parameters
-    ----------
-    value : float
-        A number in `unit`.
-    unit, si : str
-        Unit that it comes in and unit wanted, e.g. ``"bar"`` and ``"Pa"``. ``"1"`` is no unit.
-    what : str
-        What the value is, for the error's sentence.
+    An angular frequency in Hz, 1/min or another of a nameplate's turns counts each as 2π; ``"1"``
+    is no unit. `what` the value is stands in the error's sentence.
 
     Raises
     ------
@@ -193,15 +185,10 @@ _chosen: ContextVar[Mapping[str, DisplayUnit]] = ContextVar(
 
 
 def units_of_choice(words: Sequence[str], drum: float | None = None) -> dict[str, DisplayUnit]:
-    """The units that someone names, by the SI unit that each is shown for.
+    """The units that someone names, ``"rpm"`` or ``"bar"``, by the SI unit each is shown for.
 
-    Parameters
-    ----------
-    words : sequence of str
-        Such as ``"rpm"``, ``"bar"`` and ``"mm"``. Of a drum's rope also ``"m/min"`` and ``"m/s"``
-        stand for the shaft's speed.
-    drum : float, optional
-        Diameter of the drum on the shaft. [m]
+    With the diameter of a drum on the shaft [m], ``"m/min"`` and ``"m/s"`` of its rope stand for
+    the shaft's speed.
 
     Raises
     ------
@@ -259,15 +246,10 @@ def show_rod() -> None:
 
 
 def display_unit(si: str, largest: float = float("inf")) -> DisplayUnit:
-    """Unit to show a quantity in: the one chosen, else the usual one.
+    """Unit to show a quantity in, by its largest magnitude [SI]: the one chosen, else the usual.
 
-    Parameters
-    ----------
-    si : str
-        SI unit. Compounds such as ``"rad/s/V"`` and ``"V/(rad/s)"`` follow the speed's; an unknown
-        one is shown as it is, with its exponents raised.
-    largest : float
-        Largest magnitude of what is shown, in SI.
+    Compounds such as ``"rad/s/V"`` and ``"V/(rad/s)"`` follow the speed's; an unknown one is shown
+    as it is, with its exponents raised.
     """
     if si in _chosen.get():
         return _chosen.get()[si]

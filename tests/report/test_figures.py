@@ -101,26 +101,10 @@ def test_a_figure_is_written_whole_and_the_same_each_time(
     assert sorted(tmp_path.iterdir()) == [first, second]
 
 
-def test_a_file_that_cannot_be_written_is_said_and_the_older_one_stays(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    figure, path = Figure(), tmp_path / "figure.png"
-    for name in ("figure.jpg", "figure", "figure.svgz"):
-        with pytest.raises(FileError, match=r"a figure is written as \.png, \.svg or \.pdf"):
-            save_figure(figure, tmp_path / name)
-    with pytest.raises(FileError, match="cannot be written"):
-        save_figure(figure, tmp_path / "none" / "figure.png")
-    path.write_bytes(b"older")
-
-    def full(target: Path, **_: object) -> None:
-        target.write_bytes(b"half a pic")
-        raise OSError(28, "No space left on device")
-
-    monkeypatch.setattr(figure, "savefig", full)
-    with pytest.raises(FileError, match="No space left"):
-        save_figure(figure, path)
-    assert path.read_bytes() == b"older"
-    assert list(tmp_path.iterdir()) == [path]
+@pytest.mark.parametrize("name", ["figure.jpg", "figure", "figure.svgz"])
+def test_a_figure_of_another_ending_is_refused(tmp_path: Path, name: str) -> None:
+    with pytest.raises(FileError, match=r"a figure is written as \.png, \.svg or \.pdf"):
+        save_figure(Figure(), tmp_path / name)
 
 
 def test_plotting_touches_no_global_state() -> None:

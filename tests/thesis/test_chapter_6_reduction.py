@@ -81,7 +81,7 @@ def test_eq_6_61_to_6_68_and_erratum_15_the_plate_follows_the_pressure(changes: 
     )
     for rise, opening in ((5e5, 2e-4), (-5e5, 1e-4), (2e5, -2e-4), (0.0, -1e-4)):
         rate = interpreted(control.pressure_rate)(
-            rise, opening, *(Z[f"Z{n}"] for n in (6, 7, 8, 9)), None
+            rise, opening, control.Stroking(*(Z[f"Z{n}"] for n in (6, 7, 8, 9))), None
         )
         pressure, tangent = static(p) + rise, Z["Z1"] * rise
         turning = interpreted(control.swash_rate)(tangent, rate, Z["Z1"])
@@ -170,7 +170,7 @@ def test_eq_6_72_to_6_74_and_erratum_23_slopes_at_rest(hoist: Drive) -> None:
     assert (plate, sine) == pytest.approx((p.Z1, p.Z3 * p.Z1))
     rate = derive(
         control.pressure_rate, by=("pressure", "opening"), options={"symmetric": None}
-    ).python(0.0, 0.0, p.Z6, 0.0, p.Z8, p.Z9, None)[1:]
+    ).python(0.0, 0.0, control.Stroking(p.Z6, 0.0, p.Z8, p.Z9), None)[1:]
     assert rate == pytest.approx((0.0, p.Z8 * sqrt(p.Z9 / 2.0) / (1.0 + p.Z6)))
 
 

@@ -23,10 +23,10 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-SUDDEN, BESIDE, APART, RISE = 0.1, 0.1, 0.003, 1.0 / 512.0
-"""Part of a command's range by which it jumps between two samples, what it moves by beside that is
-less than this part of; their least distance [s], below which the instant is taken as logged; and
-the time that a jump takes, a step of the march. [s]"""
+SUDDEN, BESIDE, APART, RISE = 0.1, 0.1, 0.003, 3.0 / 512.0
+"""Part of a command's range by which it jumps between two samples, and part of the jump that it
+moves by at most beside it; the samples' least distance [s], below which the jump is taken as it is
+logged; and the time that a jump takes, three steps of the march. [s]"""
 VARIED = 8
 """Changes of an encoder's steps from which their common divisor is the decoder's."""
 
@@ -109,13 +109,22 @@ class InputSignal(Result):
         )
 
     def with_edges(self, late: Mapping[int, float]) -> InputSignal:
-        """The signal with edges, by their places, so much later than their middle. [s]"""
-        found = [(each, late[each.place]) for each in self.edges if each.place in late]
-        places = [each.place + 1 for each, _ in found for _ in range(2)]
-        rises = [e.middle + by + side * 0.5 * RISE for e, by in found for side in (-1.0, 1.0)]
-        values = [self.values[each.place + side] for each, _ in found for side in (0, 1)]
-        time = np.insert(self.time, places, rises)
-        return replace(self, time=time, values=np.insert(self.values, places, values))
+        """The signal with edges, by their places, so much later than their middle [s].
+
+        Rounded off over `RISE`, so that a simulation is a smooth function of the instant.
+        """
+        found = [
+            (each, each.middle + late[each.place]) for each in self.edges if each.place in late
+        ]
+        steps = [instant + RISE * np.linspace(-0.5, 0.5, 9) for _, instant in found]
+        time = np.unique(np.concatenate([self.time, *steps]))
+        values = self.at(time)
+        for each, instant in found:
+            near = np.abs(time - each.middle) <= 0.5 * each.apart + RISE
+            first, last = self.values[each.place], self.values[each.place + 1]
+            done = np.clip((time[near] - instant) / RISE + 0.5, 0.0, 1.0)
+            values[near] = first + (last - first) * done**2 * (3.0 - 2.0 * done)
+        return replace(self, time=time, values=values)
 
     def at(self, time: Array) -> Array:
         """The input at other instants [s]; before the first stamp the first sample holds."""

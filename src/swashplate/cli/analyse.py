@@ -16,13 +16,14 @@ from swashplate.cli.options import (
     FigureFile,
     Interpolation,
     Sampling,
+    SetFile,
     Simulating,
     TableFile,
     option,
 )
-from swashplate.cli.terminal import Outputs, bullets, note, say, show, working
+from swashplate.cli.terminal import bullets, check_output, draw, note, save, say, show, working
 from swashplate.errors import InputError
-from swashplate.tables import FIGURE, TABLE, joined, quantity
+from swashplate.tables import joined, quantity
 
 LEVEL, SPAN = 0.95, (0.9, 1.1)
 """Of bands, and the factors of a lever that names none."""
@@ -68,15 +69,14 @@ def limits(
     from swashplate.analysis.capability import envelope
     from swashplate.analysis.limits import limit_shares
 
-    files = Outputs((out, TABLE), (plot, FIGURE))
     if command is None:
         with working("Measuring"):
             found = envelope(drive.chosen)
-        files.write(out, "Envelope, in SI", found.write)
-        files.draw(plot, "plot_envelope", found)
+        save(out, "Envelope, in SI", found.write)
+        draw(plot, "plot_envelope", found)
         drive.note(f"{drive.title}: what it can do")
         show(found.table())
-        return files.say()
+        return
     with working("Simulating"):
         name, run = words.simulated(drive.chosen, command, sampling)
         shares = limit_shares(
@@ -87,8 +87,8 @@ def limits(
             start=sampling.start,
         )
     title = f"{drive.title}, {name}"
-    files.write(out, "Shares of each limit, in SI", shares.write)
-    files.draw(plot, "plot_limit_timeline", run, wanted=shares.wanted, title=title)
+    save(out, "Shares of each limit, in SI", shares.write)
+    draw(plot, "plot_limit_timeline", run, wanted=shares.wanted, title=title)
     error = quantity(shares.error, "rad/s", spec=".3f")
     drive.note(f"{title}: {error} rms from a drive without limits")
     acting = shares.table(acting=True)
@@ -96,7 +96,6 @@ def limits(
         show(acting)
     for sentence in shares.sentences():
         say(sentence)
-    files.say()
 
 
 def _list_levers(asked: bool) -> None:
@@ -115,7 +114,7 @@ def whatif(
     uncertainty: Path | None = None,
     campaign: Path | None = None,
     plot: FigureFile = None,
-    out: Path | None = None,
+    out: SetFile = None,
     levers: Annotated[
         bool, option("List the levers and end.", "--levers", callback=_list_levers, is_eager=True)
     ] = False,
@@ -133,7 +132,6 @@ def whatif(
           --levers), or on a parameter: Z16_plus=1.2. May be repeated.
       maneuver NAME|FILE: Command for both: a maneuver such as step:9 or "step +9 V", or a log.
       uncertainty DIR: Folder that 'fit' wrote: bands from the errors of its estimates.
-      out SET.toml: Write the changed drive as a parameter file.
       campaign CAMPAIGN.toml: The campaign of that fit, if it is not where it was.
 
     For example:
@@ -146,7 +144,6 @@ def whatif(
     from swashplate.analysis import monte_carlo
     from swashplate.analysis.whatif import AS_IS, CHANGED, what_if
 
-    files = Outputs((out, None), (plot, FIGURE))
     moved = words.factors_of(factors)
     choice = DriveChoice(drive)
     with working("Simulating"):
@@ -166,17 +163,16 @@ def whatif(
                     f"{quantity(width, 'rad/s', spec='.3g')} wide, at {when:.3g} s."
                 )
             said += draws.sentences()
-    files.write(out, "Changed drive", result.after.drive.to_toml)
+    save(out, "Changed drive", result.after.drive.to_toml)
     title = f"{choice.title}, {name}"
     changes = ", ".join(f"{name} x {factor:g}" for name, factor in moved.items())
-    files.draw(plot, "plot_whatif", result, bands=bands, title=f"{title}: {changes}")
+    draw(plot, "plot_whatif", result, bands=bands, title=f"{title}: {changes}")
     note(title)
     before, after = (each.drive.parameters for each in (result.before, result.after))
     for line in words.changes_between(before, after):
         note(line)
     show(result.table(bands))
     bullets(result.sentences(), said)
-    files.say()
 
 
 def size(
@@ -188,7 +184,7 @@ def size(
     maneuver: str | None = None,
     direction: Direction = "both",
     levers: list[str] | None = None,
-    out: Path | None = None,
+    out: SetFile = None,
 ) -> None:
     """Find the smallest change that meets what is required.
 
@@ -203,7 +199,6 @@ def size(
       maneuver NAME: What is to be followed: the speed in proportion to this maneuver's voltage, at
           the ratio of the drive as it is. Each candidate is commanded in proportion to it, at its
           own ratio.
-      out SET.toml: Write the changed drive as a parameter file.
       direction: Where speed and acceleration are required.
 
     For example:
@@ -214,7 +209,6 @@ def size(
     from swashplate.analysis import sizing
     from swashplate.analysis.outcomes import proportional_speed, trial
 
-    files = Outputs((out, None))
     if (tracking_deg_s is None) != (maneuver is None):
         raise InputError("--tracking-deg-s and --maneuver belong together: give both or neither.")
     given = (speed_deg_s, acceleration_deg_s2, tracking_deg_s)
@@ -228,7 +222,7 @@ def size(
             wanted = proportional_speed(drive.chosen, voltage, limited=False)
             follow = trial(drive.chosen, voltage, wanted=wanted)
         found = sizing.size(drive.chosen, required, ranges, follow=follow)
-    files.write(out, "Changed drive", found.drive.to_toml)
+    save(out, "Changed drive", found.drive.to_toml)
     drive.note(drive.title)
     show(*found.tables())
     if found.change == 0.0:
@@ -238,7 +232,6 @@ def size(
         scales = [word for each in moved for word in ("--scale", each)]
         said = shlex.join(["swashplate", "whatif", drive.drive, *scales])
         note(f"See it over a command: {said}")
-    files.say()
 
 
 def sensitivity(
@@ -265,18 +258,16 @@ def sensitivity(
     """
     from swashplate.analysis import one_at_a_time
 
-    files = Outputs((out, TABLE), (plot, FIGURE))
     with working("Simulating"):
         name, trial = words.trial_of(drive.chosen, maneuver, sampling)
         ranges = words.ranges_of(levers or (*PULLED, "plussing"), SPAN)
         found = one_at_a_time(drive.chosen, ranges, trial, outcomes=tuple(outcomes or OUTCOMES))
     title = f"{drive.title}, {name}"
-    files.write(out, "All numbers, in SI", joined(found.tables(every=True)).write)
-    files.draw(plot, "plot_tornado", found, title=f"{title}: each lever by itself")
+    save(out, "All numbers, in SI", joined(found.tables(every=True)).write)
+    draw(plot, "plot_tornado", found, title=f"{title}: each lever by itself")
     drive.note(title)
     show(*found.tables())
     bullets(dict.fromkeys(found.sentences))
-    files.say()
 
 
 def compensate(
@@ -311,7 +302,7 @@ def compensate(
     """
     from swashplate.analysis import compensation
 
-    files = Outputs((out, compensation.INVERSE_MAP), (plot, FIGURE))
+    check_output(out, compensation.INVERSE_MAP)
     with working("Inverting"):
         found, bought = compensation.inverse_map(drive.chosen, points), None
         tables = found.tables([radians(each) for each in speeds_deg_s or ()])
@@ -320,11 +311,10 @@ def compensate(
             wanted = compensation.wanted_of_stick(found, run["voltage"])
             bought = compensation.improvement(drive.chosen, wanted, run.record.rate, inverse=found)
             tables.append(replace(bought.table(), title=f"Error of the speed under {name}"))
-    files.write(out, "Inverse map, in SI", found.write)
-    files.draw(plot, "plot_compensation", found, bought)
+    save(out, "Inverse map, in SI", found.write)
+    draw(plot, "plot_compensation", found, bought)
     drive.note(f"{drive.title}: voltage for a wanted speed")
     show(*tables)
-    files.say()
 
 
 # --- other models of a drive ----------------------------------------------------------------------
@@ -366,7 +356,7 @@ def linearize(
     """
     from swashplate.linear import LINEAR_MODEL, model_tables
 
-    files = Outputs((out, LINEAR_MODEL))
+    check_output(out, LINEAR_MODEL)
     if (at is None) == (current is None):
         raise InputError(
             "A drive is linearised at a voltage or a current: give one of --at and --current."
@@ -378,7 +368,7 @@ def linearize(
         if sample_time is not None:
             model = model.discrete(sample_time, interpolation)
         tables = model_tables(model, frequency, None if loop_gain is None else degrees(loop_gain))
-    files.write(out, "Model, in SI", model.write)
+    save(out, "Model, in SI", model.write)
     kind = "" if model.sample_time is None else f", sampled at {model.sample_time:g} s"
     drive.note(f"{drive.title}, small motions of the {model.input.replace('_', ' ')}{kind}")
     for switch in model.operating_point.one_sided:
@@ -387,7 +377,6 @@ def linearize(
     if model.input == "voltage" and model.parameters.numbers[coulomb] > 0.0:
         note("The card's Coulomb term C, which only motions below 0.01 A/s see, is left out.")
     show(*tables)
-    files.say()
 
 
 def bode(
@@ -428,7 +417,6 @@ def bode(
 
     from swashplate.linear import response_table
 
-    files = Outputs((out, TABLE), (plot, FIGURE))
     if not 2 <= points <= MOST_POINTS:
         raise InputError(f"--points is {points}, but must be 2 to {MOST_POINTS}.")
     if not (isfinite(lowest) and isfinite(highest) and 0.0 < lowest < highest):
@@ -440,13 +428,12 @@ def bode(
         grid = np.union1d(np.geomspace(lowest, highest, points), [frequency])
         response = drive.chosen.frequency_response(grid, amplitudes or AMPLITUDES, bias=bias)
         made = response_table(response, frequency)
-    files.write(out, "Gain, phase and distortion, in SI", response.write)
-    files.draw(plot, "plot_bode", response, linear=linear, mark=frequency)
+    save(out, "Gain, phase and distortion, in SI", response.write)
+    draw(plot, "plot_bode", response, linear=linear, mark=frequency)
     span = f"{grid.size} frequencies from {grid[0]:g} to {grid[-1]:g} Hz"
     drive.note(f"{drive.title}, sines about {bias:g} V: {span}")
     note(f"At {frequency:g} Hz:")
     show(made)
-    files.say()
 
 
 def full_order(
@@ -484,7 +471,6 @@ def full_order(
     from swashplate import full_order as full
     from swashplate.full_order import physical_set
 
-    files = Outputs((out, TABLE), (plot, FIGURE))
     if command is None and plot is not None:
         raise InputError("--plot draws one run; name a maneuver or a log, such as step:9.")
     given = words.physical_values(physical or ())
@@ -496,16 +482,16 @@ def full_order(
     with working("Simulating"):
         if command is None:
             found = full.validity(whole, sampling.rate)
-            files.write(out, "Table", found.write)
+            save(out, "Table", found.write)
             title, said = drive.title, f"{len(found.rows)} maneuvers"
         else:
             name, run = words.simulated(whole.drive, command, sampling)
             both = full.compare(whole, run, start=sampling.start)
             found = full.validity_table(whole.physical.name, [(name, both)])
             title = f"{drive.title}, {name}"
-            files.write(out, "All signals, in SI", both.write)
+            save(out, "All signals, in SI", both.write)
             drawn = f"{title}, five states against one"
-            files.draw(plot, "plot_full_order", both, title=drawn)
+            draw(plot, "plot_full_order", both, title=drawn)
             said = f"{both.time.size} samples at {sampling.rate:g} Hz"
     drive.note(f"{title}, five states against one: {said}")
     if chosen.parameters.refinements:
@@ -513,4 +499,3 @@ def full_order(
         note(f"Left out of both models, which do not know refinements: {listed}.")
     show(*tables, found)
     say(full.validity_verdict(found))
-    files.say()

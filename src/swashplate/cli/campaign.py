@@ -12,9 +12,20 @@ import typer
 
 from swashplate.cli import words
 from swashplate.cli.options import AxisName, DriveChoice, TableFile, command
-from swashplate.cli.terminal import FORCED, Outputs, bullets, check_free, note, say, show, working
+from swashplate.cli.terminal import (
+    FORCED,
+    bullets,
+    check_free,
+    check_output,
+    draw,
+    note,
+    save,
+    say,
+    show,
+    working,
+)
 from swashplate.errors import InputError
-from swashplate.tables import FIGURE, TABLE, Column, Table, count, ended, joined, write_text
+from swashplate.tables import FIGURE, Column, Table, count, ended, joined, write_text
 
 LEGEND = (
     "jitter and longest gap in ms; clip: % of the samples at the ends of the instrument's range;\n"
@@ -71,7 +82,7 @@ def init(
     from swashplate.campaign.draft import FIXME, NO_ENCODER, UNUSED, draft_campaign
 
     target = out or logs[0].parent / "campaign.toml"
-    Outputs((target, None))
+    check_output(target)
     file = None if drive is None else words.drive_file(drive)
     if file is not None:  # a drive as a campaign file names it
         place, root = file.resolve(), target.parent.resolve()
@@ -147,7 +158,7 @@ def check(path: Path = CAMPAIGN, *, strict: bool = False) -> None:
 def plot(
     path: Path = CAMPAIGN,
     *,
-    out: Path = Path("campaign.png"),
+    out: Annotated[Path, FIGURE] = Path("campaign.png"),
     run: str | None = None,
     channel: str | None = None,
     begin: float | None = None,
@@ -175,7 +186,6 @@ def plot(
     from swashplate.identification.drive_model import SIGNALS
     from swashplate.report.figures import plot_campaign
 
-    files = Outputs((out, FIGURE))
     with working(f"Reading {path}"):
         campaign = Campaign.from_toml(path)
     channels = () if run is None else campaign[run].channels
@@ -192,15 +202,14 @@ def plot(
             simulated = next((each.simulated for each in found if each.channel == channel), None)
         window = words.window_of(shown.time, begin, end)
         how = {"window": window, "title": f"{run}, {channel}"}
-        files.draw(out, "plot_channel", shown, simulated, **how)
+        draw(out, "plot_channel", shown, simulated, **how)
     else:
         title = campaign.title + " (virtual)" * campaign.virtual
         figures = plot_campaign(campaign.experiments, title=title)
         several = [out.with_stem(f"{out.stem}-{k}") for k in range(1, len(figures) + 1)]
         check_free(*several)
         for path, figure in zip([out] if len(figures) == 1 else several, figures, strict=True):
-            files.draw(path, figure)
-    files.say()
+            draw(path, figure)
 
 
 def schema() -> None:
@@ -346,7 +355,6 @@ def excitation(
     from swashplate.identification.experiment_design import outlook
     from swashplate.identification.fitting import smooth
 
-    files = Outputs((out, TABLE))
     with working(f"Reading {path}"):
         _, runs, plan, drive = words.fit_of(path, axis, setup, begin)
     with working("Simulating"):
@@ -354,7 +362,7 @@ def excitation(
         looks = [outlook(stage, smooth(drive), runs) for stage in plan.stages]
     names = [each.name for each in runs]
     shown = [look.table(names) for look in looks]
-    files.write(out, "Table", joined(shown).write)
+    save(out, "Table", joined(shown).write)
     for sentence in doubts:
         say(f"! {sentence}")
     for look, table in zip(looks, shown, strict=True):
@@ -367,7 +375,6 @@ def excitation(
     say(INFORMATION)
     if all(look.identifiability.complete for look in looks):
         note("The fit configuration can stay as it is.")
-    files.say()
 
 
 def advise(
@@ -406,7 +413,6 @@ def advise(
     from swashplate.identification.fitting import smooth
     from swashplate.identification.setup import load_setup
 
-    files = Outputs((out, TABLE))
     tested = words.file_kind(Path(word)) == "campaign"
     fitted = words.drive_file(drive or word) if drive or not tested else None
     with working("Judging tests"):
@@ -428,7 +434,7 @@ def advise(
         at_hand = [bench.candidate(each) for each in trials.values()]
         ranked = design.advise(bench.present, at_hand, bench.variables)
         in_turn = design.in_turn(bench.present, at_hand, bench.variables, tests)
-    files.write(out, "Table", design.advice_table("", ranked).write)
+    save(out, "Table", design.advice_table("", ranked).write)
     show(design.advice_table("Tests", ranked[:top]))
     if in_turn:
         title = "A plan, each test chosen in addition to those before it"
@@ -446,4 +452,3 @@ def advise(
         "of the drive; '-' is not determined (100 % and more). 'better' is by how much what is "
         "known already would be known better, on the mean."
     )
-    files.say()

@@ -6,21 +6,20 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from swashplate.cli.options import FigureFile, TableFile, command
-from swashplate.cli.terminal import Outputs, long_work, note, say, show, side, working
+from swashplate.cli.terminal import draw, long_work, note, save, say, say_saved, show, side, working
 from swashplate.cli.words import pairs_of
 from swashplate.errors import InputError
-from swashplate.tables import FIGURE, TABLE, Form, Table
+from swashplate.tables import PAGE, Form, Table
 
 if TYPE_CHECKING:
     from swashplate.crane import Crane, Judgment, Seaway, Sweep
     from swashplate.crane.control import Control
 
-PAGE = Form("a page", (".html",))
 VERDICT = Form("a verdict", (".html", ".csv", ".parquet"))
 START, AXES = ("slew_deg", "boom_deg", "rope_m"), ("hoist", "slew", "luff")
 
@@ -191,7 +190,7 @@ def run(
     brake: bool = True,
     out: TableFile = None,
     plot: FigureFile = None,
-    scene: Path | None = None,
+    scene: Annotated[Path | None, PAGE] = None,
 ) -> None:
     r"""Run a crane, once or with several variants of control and drives.
 
@@ -223,7 +222,6 @@ def run(
       swashplate crane run tg3637 --sea ss3,90,1 --at slew_deg=90 --at rope_m=27 \
           --variant inverse --variant inverse:feedback=0.2+ship+clip
     """
-    files = Outputs((out, TABLE), (plot, FIGURE), (scene, PAGE))
     runs, first = {}, ""
     if out is not None and len(variant or ()) > 1:
         raise InputError("--out writes one run's signals: take one --variant.")
@@ -240,10 +238,13 @@ def run(
             how: dict[str, Any] = {"actuation": actuation, "control": control_of(law)}
             runs[first] = crane.simulate(stick, sea=seaway, brake=brake, **how, **placed.pose)
         tables = run_tables(runs)
-    files.write(out, "All signals, in SI", runs[first].write)
-    files.draw(plot, "plot_crane", runs)
-    files.write(scene, "Scene", lambda path: _pages().write_scene(runs, path))
-    _end(files, crane, tables)
+    save(out, "All signals, in SI", runs[first].write)
+    draw(plot, "plot_crane", runs)
+    if scene is not None:
+        from swashplate.report.scene import write_scene
+
+        save(scene, "Scene", lambda path: write_scene(runs, path))
+    _end(crane, tables)
 
 
 def judge(
@@ -252,7 +253,7 @@ def judge(
     allowed: float = 5.0,
     remedies: bool = True,
     dask: str | None = None,
-    out: Path | None = None,
+    out: Annotated[Path | None, VERDICT] = None,
     plot: FigureFile = None,
 ) -> None:
     """Judge control on a crane's drives over many seaways.
@@ -272,18 +273,21 @@ def judge(
       swashplate crane judge tg3637 --scale luff.orifice=3 --out judge.html
       swashplate crane judge tg3637 --drive luff=fitted --drives identified,drawn
     """
-    files = Outputs((out, VERDICT), (plot, FIGURE))
     more: dict[str, Any] = {"allowed": allowed / 100.0, "remedies": remedies}
     if dask is not None:
         from swashplate.executors import Dask
 
         more["executor"] = Dask(dask)
     found: Judgment = study.through(study.chosen.judge, **more)
-    page = out is not None and out.suffix.lower() == ".html"
-    write = (lambda path: _pages().write_judgment(found, path)) if page else found.write
-    files.write(out, "Verdict", write)
-    files.draw(plot, "plot_judgment", found)
-    _end(files, study.chosen, found.tables(), *found.sentences()[1:])
+    write = found.write
+    if out is not None and out.suffix.lower() == ".html":
+        from swashplate.report.scene import write_judgment
+
+        write = partial(write_judgment, found)
+    save(out, "Verdict", write)
+    draw(plot, "plot_judgment", found)
+    _end(study.chosen, found.tables(), *found.sentences()[1:])
+    say_saved()
     if not found.passed:
         side.print(f"Fails: {found.verdict()}")
         raise typer.Exit(1)
@@ -306,14 +310,13 @@ def follow(
       swashplate crane follow tg3637 --plot follow.png
       swashplate crane follow tg3637 --sea ss3 --at boom_deg=60
     """
-    files = Outputs((out, TABLE), (plot, FIGURE))
     with working("Simulating"):
         seaway = placed.seaway(sea or ["ss3"], "ss3,90")
         names: dict[str, Any] = {"seas": (sea[0].split(",")[0],)} if sea else {}
         found = placed.chosen.follow(seaway=seaway, **names, **placed.pose)
-    files.write(out, "Amplitudes, in SI", found.tables()[0].write)
-    files.draw(plot, "plot_follow", found)
-    _end(files, placed.chosen, found.tables())
+    save(out, "Amplitudes, in SI", found.tables()[0].write)
+    draw(plot, "plot_follow", found)
+    _end(placed.chosen, found.tables())
 
 
 def sweep(
@@ -342,14 +345,13 @@ def sweep(
       swashplate crane sweep tg3637 orifice --points 1,1.5,2,3 --plot orifice.png
       swashplate crane sweep tg3637 stick --control zv-joint --plot stick.png
     """
-    files = Outputs((out, TABLE), (plot, FIGURE))
     more: dict[str, Any] = {}
     if points is not None:
         more["points"] = [_number(f"--points {points}", each) for each in points.split(",")]
     found: Sweep = study.through(study.chosen.sweep, over, **more)
-    files.write(out, "Swing, in SI", found.tables()[0].write)
-    files.draw(plot, "plot_sweep", found)
-    _end(files, study.chosen, found.tables())
+    save(out, "Swing, in SI", found.tables()[0].write)
+    draw(plot, "plot_sweep", found)
+    _end(study.chosen, found.tables())
 
 
 def sectors(
@@ -409,20 +411,12 @@ def _number(what: str, text: str) -> float:
         raise InputError(f"{what}: '{text}' is no number.") from None
 
 
-def _end(files: Outputs, crane: Crane, tables: Iterable[Table], *said: str) -> None:
-    """Print title, tables and sentences, and what was written."""
+def _end(crane: Crane, tables: Iterable[Table], *said: str) -> None:
+    """Print title, tables and sentences."""
     note(crane.title)
     show(*tables)
     for sentence in said:
         say(sentence)
-    files.say()
-
-
-def _pages() -> Any:
-    """Writers of pages, which take a while to import."""
-    from swashplate.report import scene
-
-    return scene
 
 
 command(app, "show")(show_crane)

@@ -6,13 +6,13 @@ import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Literal
+from typing import Annotated, Literal
 
 from swashplate.cli.options import AxisName, DriveChoice
-from swashplate.cli.terminal import Outputs, check_free, note, working
+from swashplate.cli.terminal import check_free, note, save, working
 from swashplate.cli.words import campaign_of, drive_file, maneuver_of
 from swashplate.errors import InputError
-from swashplate.tables import PAGE, Form, check_folder, check_place, ending
+from swashplate.tables import PAGE, Form, check_folder
 
 FMU = Form("an FMU", (".fmu",))
 WASM = Form("WebAssembly", (".wasm",))
@@ -21,9 +21,9 @@ WASM = Form("WebAssembly", (".wasm",))
 def export(
     drive: DriveChoice,
     *,
-    fmu: Path | None = None,
+    fmu: Annotated[Path | None, FMU] = None,
     c: Path | None = None,
-    wasm: Path | None = None,
+    wasm: Annotated[Path | None, WASM] = None,
     fmi: Literal["2", "2.0", "3", "3.0"] = "2.0",
     step: float | None = None,
     platforms: str | None = None,
@@ -57,7 +57,6 @@ def export(
         raise InputError("--compile compiles the C source; name its folder with --c DIR.")
     if fmu is None and platforms is not None:
         raise InputError("--platforms is of an FMU; name it with --fmu FILE.fmu.")
-    files = Outputs((fmu, FMU), (wasm, WASM))
     if c is not None:
         check_folder(c)
         check_free(c)
@@ -70,7 +69,7 @@ def export(
         with said():
             if fmu is not None:
                 version: Literal["2.0", "3.0"] = "2.0" if fmi.startswith("2") else "3.0"
-                files.write(
+                save(
                     fmu,
                     f"FMU {version}",
                     lambda path: exporting.fmu(
@@ -85,13 +84,10 @@ def export(
                 for made in written:
                     note(f"C: {made}")
             if wasm is not None:
-                files.write(
-                    wasm, "WebAssembly", lambda path: exporting.wasm(chosen, path, step=own)
-                )
+                save(wasm, "WebAssembly", lambda path: exporting.wasm(chosen, path, step=own))
     drive.warn()
     for line in drive.changes:
         note(line)
-    files.say()
 
 
 @contextmanager
@@ -110,7 +106,7 @@ def live(
     *,
     axis: AxisName = None,
     maneuver: str | None = None,
-    out: Path = Path("live.html"),
+    out: Annotated[Path, PAGE] = Path("live.html"),
 ) -> None:
     """Write a page in which the drive runs, with sliders for its parameters.
 
@@ -130,9 +126,6 @@ def live(
     """
     if (path is None) == (maneuver is None):
         raise InputError("Name a campaign, or a maneuver with --maneuver; one of them.")
-    ending(out, PAGE)
-    check_place(out)
-    check_free(out)
     with working("Writing the page"):
         from swashplate.report.fit_report import write_live_page
 

@@ -14,19 +14,20 @@ import typer
 from swashplate.cli import words
 from swashplate.cli.options import AxisName, Required, option
 from swashplate.cli.terminal import (
-    Outputs,
     bullets,
     check_free,
     long_work,
     note,
+    save,
     say,
+    say_saved,
     show,
     side,
     working,
 )
 from swashplate.cli.words import CONFIGURATION, DRIVE, NUMBERS
 from swashplate.errors import InputError
-from swashplate.tables import TABLE, Form, check_folder, joined, made_folder, write_text
+from swashplate.tables import PRINTED, TABLE, check_folder, joined, made_folder, write_text
 
 if TYPE_CHECKING:
     from swashplate.identification.assessment import Judged
@@ -284,10 +285,7 @@ def _reported(found: Judged, out: Path, truth: ParameterSet | None = None) -> st
 def _say_verdict(verdict: Verdict) -> None:
     """Print criteria, range of validity, what is assumed, and the headline.
 
-    Raises
-    ------
-    Exit
-        With code 1 if what was judged is not usable.
+    Ends with code 1 if what was judged is not usable.
     """
     show(verdict.table())
     bullets(verdict.not_judged)
@@ -379,8 +377,8 @@ def report(
     path: Path = CAMPAIGN,
     *,
     model: Path | None = None,
-    pdf: Path | None = None,
-    data: Path | None = None,
+    pdf: Annotated[Path | None, PRINTED] = None,
+    data: Annotated[Path | None, TABLE] = None,
     truth: str | None = None,
 ) -> None:
     """Write the report of a fit again, from what the fit stored.
@@ -405,7 +403,6 @@ def report(
     from swashplate.identification.setup import ModelSetup
     from swashplate.report.fit_report import find_browser, print_report, shown_runs, write_samples
 
-    files = Outputs((data, TABLE), (pdf, Form("a printed report", (".pdf",))))
     if pdf is not None:
         find_browser()
     folder = fitted if fitted.is_dir() else fitted.parent
@@ -433,10 +430,10 @@ def report(
     with working("Judging"):
         verdict = found.verdict
     note(_reported(found, folder, true))
-    files.write(pdf, "Printed", lambda to: print_report(folder / "report.html", to))
+    save(pdf, "Printed", lambda to: print_report(folder / "report.html", to))
     runs = shown_runs(found.result.stages, found.predicted)
-    files.write(data, "Samples, in SI", lambda to: write_samples(runs, to))
-    files.say()
+    save(data, "Samples, in SI", lambda to: write_samples(runs, to))
+    say_saved()
     say(verdict.headline)
 
 

@@ -12,11 +12,13 @@ from collections.abc import Callable, Mapping
 from dataclasses import MISSING, dataclass, field, fields, is_dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal, get_origin, get_type_hints
+from typing import TYPE_CHECKING, Annotated, Any, Literal, get_type_hints
 
 import typer
+from typer.models import ParameterInfo
 
-from swashplate.cli.terminal import FORCED, note
+from swashplate.cli.terminal import FORCED, SAVED, check_output, note, say_saved
+from swashplate.tables import FIGURE, TABLE, Form
 from swashplate.units import show_rod, shown_in
 
 if TYPE_CHECKING:
@@ -40,9 +42,18 @@ AxisName = Annotated[
     str | None, option("The axis, where the campaign has several.", metavar="NAME")
 ]
 TableFile = Annotated[
-    Path | None, option("Write all numbers, in SI, to a .csv or .parquet file.", metavar="FILE")
+    Path | None,
+    option("Write all numbers, in SI, to a .csv or .parquet file.", metavar="FILE"),
+    TABLE,
 ]
-FigureFile = Annotated[Path | None, option("Draw a figure: .png, .svg or .pdf.", metavar="FILE")]
+FigureFile = Annotated[
+    Path | None, option("Draw a figure: .png, .svg or .pdf.", metavar="FILE"), FIGURE
+]
+SetFile = Annotated[
+    Path | None,
+    option("Write the changed drive as a parameter file.", metavar="SET.toml"),
+    Form("a parameter file"),
+]
 Required = Annotated[float, option("Largest error of held-out runs, in % of their range.", min=0.0)]
 
 SHARED = """
@@ -164,9 +175,8 @@ class ShownUnits:
 
 _ENTRY = re.compile(r"^  (\w+)((?: --[\w/-]+)*) ?([A-Z\[]\S*)?: (.*(?:\n   .*)*)", re.MULTILINE)
 """An entry of a docstring's options."""
-WRITTEN = {"out", "plot", "write", "pdf", "fmu", "c", "wasm"}
-"""Parameters of commands that write files, and so replace older ones with --force alone."""
-
+FOLDERS = {"out", "c"}
+"""Parameters of commands that write folders; those of files have a form."""
 UNITLESS = {"axes", "doctor", "init", "schema"}
 """Commands that show no quantity."""
 
@@ -179,7 +189,7 @@ def command(
     Its docstring ends with "Options:", an entry for each parameter that no shared type here
     describes: name, flag if it has another, metavar, colon, help; a group's docstring may end so,
     too. Parameters before the ``*`` are arguments. Examples stand behind them, and are shown below
-    the options.
+    the options. A parameter whose type has a `Form` is a file, which must be free beforehand.
     """
 
     def register(function: Callable[..., None]) -> Callable[..., None]:
@@ -189,6 +199,12 @@ def command(
         hints = get_type_hints(function, include_extras=True)
         given = inspect.signature(function).parameters.values()
         groups = {each.name: hints[each.name] for each in given if is_dataclass(hints[each.name])}
+        forms = {
+            name: form
+            for name, hint in hints.items()
+            for form in getattr(hint, "__metadata__", ())
+            if isinstance(form, Form)
+        }
         kinds = [kind for group in groups.values() for kind in group.__mro__[::-1]]
         shared = [inspect.cleandoc(each.__doc__ or "").partition("Options:\n")[2] for each in kinds]
         found = _ENTRY.finditer("\n".join([SHARED, *shared, entries]))
@@ -197,17 +213,21 @@ def command(
         for each in given:
             own = [each.replace(annotation=hints[each.name])]
             flat += _spread(groups[each.name]) if each.name in groups else own
-        flat += _spread(Replacing) if WRITTEN & {each.name for each in given} else []
+        flat += _spread(Replacing) if forms or FOLDERS & {each.name for each in given} else []
         flat += _spread(ShownUnits) if name not in UNITLESS else []
         flat = [_described(each, said) for each in flat]
 
         def run(**words: Any) -> None:
             units, drum = words.pop("units", ""), words.pop("drum", None)
             FORCED.set(words.pop("force", False))
+            SAVED.set([])
+            for name, form in forms.items():
+                check_output(words[name], form)
             for name, group in groups.items():
                 words[name] = group(**{each.name: words.pop(each.name) for each in _spread(group)})
             with shown_in([each.strip() for each in units.split(",") if each.strip()], drum):
                 function(**words)
+            say_saved()
 
         run.__doc__ = text
         run.__wrapped__ = function  # type: ignore[attr-defined]
@@ -223,7 +243,8 @@ def command(
 def _described(given: inspect.Parameter, entries: Mapping[str, re.Match[str]]) -> inspect.Parameter:
     """A parameter as Typer reads it, from its entry unless its type describes it."""
     kind, own = given.annotation, entries.get(given.name)
-    if own is not None and get_origin(kind) is not Annotated:
+    told = any(isinstance(each, ParameterInfo) for each in getattr(kind, "__metadata__", ()))
+    if own is not None and not told:
         flags, metavar, words = own[2].split(), own[3], " ".join(own[4].split())
         flags = flags or ([f"--{given.name}"] if kind is bool else [])
         least = {"min": 0} if kind is int else {}

@@ -9,9 +9,9 @@ import typer
 
 from swashplate.cli import words
 from swashplate.cli.options import DriveChoice, FigureFile, Sampling, Simulating, TableFile
-from swashplate.cli.terminal import Outputs, note, say, show, working
+from swashplate.cli.terminal import draw, note, save, say, show, working
 from swashplate.documents import parse_toml
-from swashplate.tables import FIGURE, TABLE, Column, Table, quantity, write_table
+from swashplate.tables import Column, Table, quantity, write_table
 
 
 def simulate(
@@ -41,19 +41,17 @@ def simulate(
       swashplate simulate hoist sine:6.5,0.1 --set Z16_plus=0.12mm --out sine.csv
       swashplate simulate mine.toml log.csv --interpolation previous --out run.csv
     """
-    files = Outputs((out, TABLE), (plot, FIGURE))
     with working("Simulating"):
         from swashplate.analysis.outcomes import run_tables
 
         name, run = words.simulated(drive.chosen, command, sampling)
         tables, title = run_tables(run), f"{drive.title}, {name}"
-    files.write(out, "All signals, in SI", run.write)
+    save(out, "All signals, in SI", run.write)
     window = words.window_of(run.time, begin, end)
-    files.draw(plot, "plot_simulation", run, window=window, title=title)
+    draw(plot, "plot_simulation", run, window=window, title=title)
     duration = f"{run.time[-1] - run.time[0]:.6g} s"
     drive.note(f"{title}: {run.time.size} samples at {sampling.rate:g} Hz, {duration}")
     show(*tables)
-    files.say()
 
 
 def compare(
@@ -79,7 +77,6 @@ def compare(
       swashplate compare hoist luff
       swashplate compare hoist mine.toml --maneuver sine:6.5,0.1 --plot both.png
     """
-    files = Outputs((out, TABLE), (plot, FIGURE))
     with working("Simulating"):
         from swashplate.analysis.outcomes import rms_difference, side_by_side
 
@@ -101,12 +98,11 @@ def compare(
         run, speeds = runs[labels[0]], {f"shaft_speed {k}": e.shaft_speed for k, e in runs.items()}
         write_table(pl.DataFrame({"time": run.time, "voltage": run.voltage, **speeds}), path)
 
-    files.write(out, "Voltage and both speeds, in SI", write)
-    files.draw(plot, "plot_comparison", runs, title=title)
+    save(out, "Voltage and both speeds, in SI", write)
+    draw(plot, "plot_comparison", runs, title=title)
     note(title)
     show(made)
     note(f"rms difference of the speeds: {quantity(rms, 'rad/s', spec='.2f')}")
-    files.say()
 
 
 def axes() -> None:

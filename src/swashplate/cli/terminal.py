@@ -19,6 +19,9 @@ from swashplate.tables import UNIT, Form, Table, check_place, ending
 
 FORCED: ContextVar[bool] = ContextVar("FORCED", default=False)
 """Whether older files may be replaced: --force."""
+SAVED: ContextVar[list[str]] = ContextVar("SAVED")
+"""Lines on the files that a command wrote."""
+ANY = Form("a file")
 BETWEEN = 2
 """Characters between two columns."""
 NARROW = "\N{NO-BREAK SPACE}%"
@@ -164,62 +167,42 @@ def long_work(text: str, steps: int = 0) -> Iterator[Callable[..., None]]:
 
 
 def check_free(*paths: Path) -> None:
-    """Refuse to replace a file, or to mix with what a folder holds, unless --force says so.
-
-    Raises
-    ------
-    FileError
-        For the first that is there.
-    """
+    """Refuse to replace a file, or to mix with what a folder holds, unless --force says so."""
     for path in () if FORCED.get() else paths:
         if path.is_file() or (path.is_dir() and any(path.iterdir())):
             what = "is not empty" if path.is_dir() else "exists already"
             raise FileError(f"{path} {what}; name another place, or replace it with --force.")
 
 
-class Outputs:
-    """Files of a command: refused before anything is computed, and named when all is printed."""
+def check_output(path: Path | None, form: Form = ANY) -> None:
+    """Refuse a file that cannot or must not be written, before anything is computed."""
+    if path is not None:
+        ending(path, form)
+        check_place(path)
+        check_free(path)
 
-    def __init__(self, *wanted: tuple[Path | None, Form | None]) -> None:
-        """See to it that all can be written, so that none is left of a command that fails.
 
-        Parameters
-        ----------
-        *wanted : (path or None, Form or None)
-            What was asked for, and the endings that it may have; None for any.
+def save(path: Path | None, what: str, write: Callable[[Path], object]) -> None:
+    """Write a file, if it was asked for; `say_saved` names it."""
+    if path is not None:
+        with working(f"Writing {path}"):
+            write(path)
+        SAVED.get().append(f"{what}: {path}")
 
-        Raises
-        ------
-        FileError
-            For a wrong ending, a folder that does not exist, a folder in the file's place, or a
-            file that is there already, unless --force is given.
-        """
-        for path, form in wanted:
-            if path is not None and form is not None:
-                ending(path, form)
-            if path is not None:
-                check_place(path)
-                check_free(path)
-        self._lines: list[str] = []
 
-    def write(self, path: Path | None, what: str, write: Callable[[Path], object]) -> None:
-        """Write a file, if it was asked for."""
-        if path is not None:
-            with working(f"Writing {path}"):
-                write(path)
-            self._lines.append(f"{what}: {path}")
+def draw(path: Path | None, figure: Any, *shown: Any, **how: Any) -> None:
+    """Save a figure, or one of `swashplate.report.figures` by its name, if it was asked for."""
+    if path is not None:
+        with working(f"Drawing {path}"):
+            from swashplate.report import figures
 
-    def draw(self, path: Path | None, figure: Any, *shown: Any, **how: Any) -> None:
-        """Save a figure, or one of `swashplate.report.figures` by its name, if asked for."""
-        if path is not None:
-            with working(f"Drawing {path}"):
-                from swashplate.report import figures
+            made = getattr(figures, figure)(*shown, **how) if shown else figure
+            figures.save_figure(made, path)
+        SAVED.get().append(f"Figure: {path}")
 
-                made = getattr(figures, figure)(*shown, **how) if shown else figure
-                figures.save_figure(made, path)
-            self._lines.append(f"Figure: {path}")
 
-    def say(self) -> None:
-        """Print what was written."""
-        for line in self._lines:
-            note(line)
+def say_saved() -> None:
+    """Name the files that were written; a command's end does it, where it was not done before."""
+    for line in SAVED.get():
+        note(line)
+    SAVED.set([])

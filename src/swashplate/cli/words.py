@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Collection, Iterable, Sequence
 from dataclasses import replace
 from difflib import get_close_matches
 from math import isfinite
@@ -37,8 +37,12 @@ SURPRISING = 1000.0
 
 # --- files and what they are ----------------------------------------------------------------------
 
-_NAMES = {"log": "a log", "campaign": "a campaign", "drive": "a drive"}
-_NAMES["setup"] = "a fit configuration"
+_NAMES = {
+    "log": "a log",
+    "campaign": "a campaign",
+    "drive": "a drive",
+    "setup": "a fit configuration",
+}
 _MARKS = {"runs": "campaign", "stages": "setup", "control_card": "drive", "pump_motor": "drive"}
 _INSTEAD = {
     ("log", "campaign"): "make a campaign of it with 'swashplate campaign init {}'",
@@ -64,13 +68,7 @@ def file_kind(path: Path) -> str:
 
 
 def check_kind(path: Path, wanted: str) -> None:
-    """Refuse a file that is plainly of another kind than the one wanted.
-
-    Raises
-    ------
-    InputError
-        If it is; the sentence says what it is, and where such a file goes.
-    """
+    """Refuse a file that is plainly of another kind than wanted; say where such a file goes."""
     kind = file_kind(path)
     instead = _INSTEAD.get((kind, wanted))
     if path.is_file() and instead is not None:
@@ -120,11 +118,6 @@ def drive_file(word: str) -> Path | None:
 
     A folder means the drive.toml that 'fit' wrote into it; a packaged name goes before a folder of
     that name, which can be written ``./hoist``.
-
-    Raises
-    ------
-    InputError
-        If it is none of these, or a folder without a drive.
     """
     from swashplate.parameters.files import preset_names
 
@@ -155,13 +148,7 @@ def parameters_of(word: str) -> ParameterSet:
 
 
 def model_parameters_of(folder: str, file: Path, runs: Sequence[Experiment]) -> ModelSetup:
-    """A model of one's own with the numbers that a fit wrote into its folder.
-
-    Raises
-    ------
-    InputError
-        If the folder has none of this model.
-    """
+    """A model of one's own with the numbers that a fit wrote into its folder."""
     from swashplate.identification.setup import ModelSetup
 
     setup = ModelSetup.from_file(file)
@@ -178,51 +165,40 @@ def model_parameters_of(folder: str, file: Path, runs: Sequence[Experiment]) -> 
 
 # --- changes and levers ---------------------------------------------------------------------------
 
-Reader = Callable[[str, list[float], str], Any]
-"""Makes a value of name, numbers and unit: None where they are not what it reads."""
 
+def assigned(
+    option: str,
+    words: Iterable[str],
+    example: str,
+    known: Callable[[str], Any],
+    counts: Collection[int] = (1, 2),
+    *,
+    units: bool = False,
+) -> dict[str, Any]:
+    """What words such as ``Z16=1.2e-4/1.5e-4`` or ``Z16=0.12mm`` say, by name, each given once.
 
-def assigned(option: str, words: Iterable[str], example: str, read: Reader) -> dict[str, Any]:
-    """What words such as ``Z16=1.2e-4/1.5e-4`` or ``Z16=0.12mm`` say, by name, each given once."""
+    `known` gives a name's definition or raises, `counts` are how many numbers it may have; `units`
+    may follow them, which are then turned into SI.
+    """
+    from swashplate.units import to_si
+
     found: dict[str, Any] = {}
     for word in words:
-        name, equals, given = (part.strip() for part in word.partition("="))
-        match = _VALUE.fullmatch(given) if equals else None
-        value = None
+        name, _, given = (part.strip() for part in word.partition("="))
+        match = _VALUE.fullmatch(given)
+        definition, numbers, unit = None, list[float](), ""
         if match is not None:
-            numbers = [float(number) for number in match.group(1, 2) if number]
-            value = read(name, numbers, (match[3] or "").strip())
-        if value is None:
+            definition, unit = known(name), (match[3] or "").strip()
+            numbers = [float(each) for each in match.group(1, 2) if each]
+        if len(numbers) not in counts or (unit and not units):
             raise InputError(f"{option} cannot read '{word}'; write it as {example}.")
         if name in found:
             raise InputError(f"{option} gives {name} twice; give it once.")
-        found[name] = value
+        if unit and definition is not None:
+            what = f"{name} ({definition.name})"
+            numbers = [to_si(each, unit, definition.unit, what) for each in numbers]
+        found[name] = numbers[0] if len(numbers) == 1 else (numbers[0], numbers[1])
     return found
-
-
-def _measured(known: Callable[[str], Any]) -> Reader:
-    """Reads one number or two, in SI or with a unit, of what is known by a name."""
-    from swashplate.units import to_si
-
-    def read(name: str, numbers: list[float], unit: str) -> Change:
-        found = known(name)
-        what = f"{name} ({found.name})"
-        si = [to_si(each, unit, found.unit, what) if unit else each for each in numbers]
-        return si[0] if len(si) == 1 else (si[0], si[1])
-
-    return read
-
-
-def _factors(known: Callable[[str], Any], *counts: int) -> Reader:
-    """Reads so many numbers without a unit, if the name is known."""
-
-    def read(name: str, numbers: list[float], unit: str) -> Change | None:
-        known(name)
-        if unit or len(numbers) not in counts:
-            return None
-        return numbers[0] if len(numbers) == 1 else (numbers[0], numbers[1])
-
-    return read
 
 
 def drive_of(word: str, values: Sequence[str] = (), factors: Sequence[str] = ()) -> Drive:
@@ -236,17 +212,14 @@ def drive_of(word: str, values: Sequence[str] = (), factors: Sequence[str] = ())
             raise InputError(words)
         return find(name)
 
-    def scaled(name: str, numbers: list[float], unit: str) -> Any:
-        if _is_lever(name):
-            return _factors(str, 1)(name, numbers, unit)
-        return _factors(find, 1, 2)(name, numbers, unit)
-
     set_as = "Z16=1.2e-4, Z16=1.2e-4/1.5e-4 (plus/minus) or Z16_plus=0.12mm"
     scaled_as = "Z16=1.5, Z16=1.5/1.2 (plus/minus) or orifice=1.5"
-    chosen = assigned("--set", values, set_as, _measured(valued))
-    changes = assigned("--scale", factors, scaled_as, scaled)
-    levers = {name: changes.pop(name) for name in [*changes] if _is_lever(name)}
-    drive = Drive(parameters_of(word)).replace(**chosen).scale(**changes)
+    pulling = [word for word in factors if _is_lever(word.partition("=")[0].strip())]
+    scaling = [word for word in factors if word not in pulling]
+    chosen = assigned("--set", values, set_as, valued, units=True)
+    levers = assigned("--scale", pulling, scaled_as, str, (1,))
+    drive = Drive(parameters_of(word)).replace(**chosen)
+    drive = drive.scale(**assigned("--scale", scaling, scaled_as, find))
     if levers:
         from swashplate.analysis.whatif import pulled
 
@@ -269,14 +242,14 @@ def physical_values(words: Sequence[str]) -> dict[str, Change]:
     from swashplate.full_order.physical_set import chosen_quantity
 
     example = "oil_volume=1e-4 or oil_volume=100cm^3"
-    return assigned("--physical", words, example, _measured(chosen_quantity))
+    return assigned("--physical", words, example, chosen_quantity, units=True)
 
 
 def factors_of(words: Sequence[str]) -> dict[str, float]:
     """Factors by lever or parameter from words such as ``orifice=1.5``."""
     from swashplate.analysis.whatif import find_lever
 
-    return assigned("--scale", words, "orifice=1.5", _factors(find_lever, 1))
+    return assigned("--scale", words, "orifice=1.5", find_lever, (1,))
 
 
 def ranges_of(words: Sequence[str], usual: Range) -> dict[str, Range]:
@@ -284,22 +257,22 @@ def ranges_of(words: Sequence[str], usual: Range) -> dict[str, Range]:
     from swashplate.analysis.whatif import find_lever
 
     whole = [word if "=" in word else f"{word}={usual[0]}/{usual[1]}" for word in words]
-    return assigned("--lever", whole, "pump or pump=0.8/1.5", _factors(find_lever, 2))
+    return assigned("--lever", whole, "pump or pump=0.8/1.5", find_lever, (2,))
 
 
 def pairs_of(
     option: str, given: Sequence[str] | None, example: str, *, often: bool = False
 ) -> list[tuple[str, str]]:
     """What stands before and behind the equals sign of each; the first is given once, or often."""
-    seen = set[str]()
+    pairs = list[tuple[str, str]]()
     for each in given or ():
-        name, equals, _ = each.partition("=")
+        name, equals, value = each.partition("=")
         if not equals:
             raise InputError(f"{option} {each} has no equals sign: write {option} {example}.")
-        if name in seen and not often:
+        if name in dict(pairs) and not often:
             raise InputError(f"{option} {name}=... is given twice; give it once.")
-        seen.add(name)
-    return [(each.partition("=")[0], each.partition("=")[2]) for each in given or ()]
+        pairs.append((name, value))
+    return pairs
 
 
 def changes_between(before: ParameterSet, after: ParameterSet) -> list[str]:

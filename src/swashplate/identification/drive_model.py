@@ -22,7 +22,7 @@ from swashplate.equations.marching.observation import Observation, ObservedRecor
 from swashplate.equations.marching.record import SLOWEST, SOURCE_RATE, Record, even_rate, record_of
 from swashplate.errors import DomainError, InputError, ParameterError
 from swashplate.executors import available_cores
-from swashplate.identification.model import EDGE, EDGE_STEP, OFFSET, Asked, EquationModel
+from swashplate.identification.model import EDGE, OFFSET, Asked, EquationModel
 from swashplate.identification.problem import Problem, noise_scales
 from swashplate.identification.setup import (
     Forces,
@@ -304,7 +304,7 @@ def _edges(stage: Stage, run: Experiment, found: Mapping[str, Prior]) -> Iterato
     if stage.part == "pump" and (stage.current == "measured" or run.input.kind != "voltage"):
         return
     for edge in run.input.edges:
-        name, most = _named(edge), 0.5 * (edge.apart - RISE) - 2.0 * EDGE_STEP
+        name, most = _named(edge), 0.5 * (edge.apart + RISE)
         prior = found.get(f"{name} ({run.name})", Prior(0.0, edge.apart / sqrt(12.0)))
         yield Unknown(
             name, prior.mean, -most, most, "s", prior=prior, run=run.name, scale=edge.apart

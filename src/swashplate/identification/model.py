@@ -27,7 +27,7 @@ Array = NDArray[np.float64]
 OFFSET = "offset "
 """What the name of a channel's free zero begins with."""
 EDGE = "edge at "
-EDGE_STEP = 1e-4
+EDGE_STEP = 1e-5
 """What the name of the instant of an edge of the command begins with, see `InputSignal.edges`, and
 the step of its differences. [s]"""
 

@@ -135,7 +135,7 @@ def _estimates(stage: StageFit) -> Sequence[Estimate]:
 
 def truth_count(tables: Sequence[Table]) -> tuple[int, int]:
     """How many intervals of tables with a truth contain it, and of how many."""
-    names = [each.name for each in tables[0].columns if each is not UNIT]
+    names = [each.name for each in tables[0].columns]
     said = [row.cells[names.index("holds")] for table in tables for row in table.rows]
     return said.count("yes"), said.count("yes") + said.count("no")
 

@@ -2,24 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from swashplate.errors import InputError
-from swashplate.report.style import (
-    GREY,
-    LINE,
-    THIN,
-    VERMILION,
-    Dashes,
-    MarginLabel,
-    dress,
-    label_margin,
-    zero_line,
-)
+from swashplate.report.style import LINE, VERMILION, Dashes
 from swashplate.simulation.result import Limit
 
 if TYPE_CHECKING:
@@ -52,22 +41,7 @@ def fit_time(ax: Axes, *times: Array) -> None:
 
 
 def rows_within(time: Array, window: tuple[float, float] | None, what: str) -> slice:
-    """Rows of stamps within a window, its ends included; all without one.
-
-    Parameters
-    ----------
-    time : (n,) array
-        Increasing stamps. [s]
-    window : (float, float) or None
-        First and last instant. [s]
-    what : str
-        The signal, for the error's sentence.
-
-    Raises
-    ------
-    InputError
-        If fewer than two stamps lie within it.
-    """
+    """Rows of stamps [s] within a window, its ends included, two at least; all without one."""
     if window is None:
         return slice(0, time.size)
     first = int(np.searchsorted(time, window[0], side="left"))
@@ -90,23 +64,12 @@ def gap_rows(time: Array) -> Rows:
 
 
 def thinned(time: Array, values: Array, breaks: Rows, columns: int = COLUMNS) -> Rows:
-    """Rows that show a signal as all of its samples would.
+    """Rows that show a signal as all of its samples would, broken after some rows.
 
-    Parameters
-    ----------
-    time, values : (n,) arrays
-        Increasing stamps [s], and samples.
-    breaks : (k,) array
-        Rows after which the line is broken.
-    columns : int
-        Number of equal stretches of time.
-
-    Returns
-    -------
-    (m,) array
-        Of up to twice as many samples as columns every row. Of more, the rows of the lowest and
-        the highest sample of each column on either side of each break, and the first and the last
-        row before and after each break: every point drawn is a sample, and no extreme is lost.
+    Of up to twice as many samples as columns, which are equal stretches of time, every row. Of
+    more, the rows of the lowest and the highest sample of each column on either side of each break,
+    and the first and the last row before and after each break: every point drawn is a sample, and
+    no extreme is lost.
     """
     if time.size <= 2 * columns:
         return np.arange(time.size)
@@ -157,24 +120,10 @@ def draw(
     label: str | None = None,
     columns: int = COLUMNS,
 ) -> None:
-    """Draw a signal: no line across a gap, a dot where a sample is alone.
+    """Draw a signal over stamps [s]: no line across a gap, a dot where a sample is alone.
 
-    A long signal is drawn by its extremes (`thinned`).
-
-    Parameters
-    ----------
-    ax : Axes
-        Where to.
-    time, values : (n,) arrays
-        Stamps [s] and samples in the panel's unit.
-    color : str
-        Of the line.
-    held : bool
-        Draw a staircase: each sample holds up to the next.
-    dashes, width, zorder, label :
-        Of the line.
-    columns : int
-        Stretches of time of which a long line keeps the extremes.
+    A long signal is drawn by its extremes in so many columns (`thinned`). If it is held, each
+    sample stays up to the next.
     """
     breaks = gap_rows(time)
     if values.size > LONG:
@@ -295,78 +244,3 @@ GAP_MARK: dict[str, Any] = {
     "color": VERMILION,
     "label": "gap in the stamps",
 }
-
-# --- panels with names in the margin --------------------------------------------------------------
-
-WIDE, NARROW = 1.9, 0.9
-"""Widths of two lines that lie on one another for long. [pt]"""
-
-_NEAR = 0.3
-"""A line that marks a limit is shown if the signal goes at least this share of the way to it."""
-
-
-class Trace(NamedTuple):
-    """A signal of a panel, in the panel's unit; its name if there is more than one."""
-
-    values: Array
-    color: str
-    name: str = ""
-    width: float = LINE
-
-
-class Mark(NamedTuple):
-    """A level that the signal should be compared with, in the panel's unit."""
-
-    level: float
-    words: str
-
-
-def fill_panel(
-    ax: Axes,
-    label: str,
-    time: Array,
-    traces: Sequence[Trace],
-    marks: Sequence[Mark] = (),
-    *,
-    height: float,
-    least: float = 0.0,
-) -> None:
-    """Draw signals over time, from zero on, with the marks that they come near to.
-
-    Parameters
-    ----------
-    ax : Axes
-        Where.
-    label : str
-        Of the ordinate, with its unit.
-    time : (n,) array
-        [s]
-    traces, marks : sequences
-        What to draw, in the unit of the label.
-    height : float
-        Of the panel. [inch]
-    least : float
-        Range that is shown at least, so that rounding looks like nothing.
-    """
-    dress(ax, label)
-    zero_line(ax)
-    low = min(float(trace.values.min()) for trace in traces)
-    high = max(float(trace.values.max()) for trace in traces)
-    near = [mark for mark in marks if _within_reach(mark.level, low, high)]
-    low, high = min(low, *(m.level for m in near), 0.0), max(high, *(m.level for m in near), 0.0)
-    spare = max(0.09 * (high - low), 0.5 * (least - (high - low))) or 1.0
-    ax.set_ylim(low - spare, high + spare)
-    labels = []
-    for mark in near:
-        ax.axhline(mark.level, color=GREY, linewidth=THIN, dashes=(5.0, 3.0), zorder=1.5)
-        labels.append(MarginLabel(mark.level, mark.words, GREY))
-    for trace in traces:
-        draw(ax, time, trace.values, trace.color, width=trace.width)
-        if trace.name:
-            labels.append(MarginLabel(float(trace.values[-1]), trace.name, trace.color))
-    label_margin(ax, labels, height)
-
-
-def _within_reach(level: float, low: float, high: float) -> bool:
-    reached = high if level > 0.0 else -low
-    return level != 0.0 and reached >= _NEAR * abs(level)

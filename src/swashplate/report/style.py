@@ -88,26 +88,28 @@ def new_figure(
 
 
 def sheet(
-    heights: Sequence[float], title: str, *, legend: Sequence[Artist] = (), lines: int = 0
+    heights: Sequence[float],
+    title: str,
+    labels: Sequence[str] = (),
+    below: str = "",
+    *,
+    legend: Sequence[Artist] = (),
+    lines: int = 0,
 ) -> tuple[Figure, list[Axes]]:
-    """A figure of panels over one abscissa, with a title and a legend.
+    """A figure of panels over one abscissa, dressed: labels of ordinates and of what is below.
 
-    Parameters
-    ----------
-    heights : sequence of float
-        Of the panels, from the top. [inch]
-    title : str
-        At the top.
-    legend : sequence of Artist
-        Handles of what stands above the first panel.
-    lines : int
-        Lines of words above the first panel besides.
+    Heights [inch] are from the top. Above the first panel stand the handles of a legend, and so
+    many lines of words besides.
     """
     rows = lines + (legend_rows(legend) if legend else 0)
     inside = sum(heights) + GAP * (len(heights) - 1)
     figure = new_figure(WIDTH, HEAD + ROW * rows + inside + FOOT)
     ratios = {"height_ratios": heights}
     axes = list(figure.subplots(len(heights), sharex=True, squeeze=False, gridspec_kw=ratios)[:, 0])
+    for ax, label in zip(axes, [*labels, *[""] * len(axes)], strict=False):
+        dress(ax, label)
+    if below:
+        label_below(axes[-1], below)
     write_title(figure, title)
     if legend:
         put_legend(axes[0], legend)
@@ -300,10 +302,9 @@ _METADATA: dict[str, dict[str, None]] = {
 
 
 def save_figure(figure: Figure, path: str | Path) -> None:
-    """Write a figure as PNG, SVG or PDF, by the path's ending.
+    """Write a figure as PNG, SVG or PDF, by the path's ending: whole or not at all.
 
-    The file appears whole or not at all: it is written beside and renamed. The same figure gives
-    the same bytes.
+    The same figure gives the same bytes.
 
     Raises
     ------

@@ -1,4 +1,7 @@
-"""The figures, by name: `matplotlib.figure.Figure` objects in the units that people read."""
+"""The figures, by name: `matplotlib.figure.Figure` objects in the units that people read.
+
+A ``title`` stands in the place of the words that say what is shown.
+"""
 
 import lazy_loader
 

@@ -57,7 +57,6 @@ from swashplate.report.style import (
     Stroke,
     dress,
     handle,
-    label_below,
     new_figure,
     put_legend,
     sheet,
@@ -95,8 +94,6 @@ def plot_envelope(envelope: Envelope, *, title: str | None = None) -> Figure:
     ----------
     envelope : Envelope
         What to show.
-    title : str, optional
-        By default it says what is shown.
     """
     curves = (*envelope.accelerating, envelope.released)
     volts = f"{FULL_VOLTAGE:g} V"
@@ -105,9 +102,9 @@ def plot_envelope(envelope: Envelope, *, title: str | None = None) -> Figure:
     drawn = {by for curve in curves for by in curve.by}
     legend += [handle(WORDS[by], INK, d, LINE) for by, d in DASHES.items() if by in drawn]
     words = f"{envelope.name}: acceleration that each speed allows" if title is None else title
-    figure, (ax,) = sheet([3.8], words, legend=legend)
     speed, acceleration = display_unit("rad/s"), display_unit("rad/s^2")
-    dress(ax, acceleration.label("acceleration"), speed.label("speed"))
+    labels = acceleration.label("acceleration"), speed.label("speed")
+    figure, (ax,) = sheet([3.8], words, labels[:1], labels[1], legend=legend)
     zero_line(ax, upright=True)
     low, high = (speed.factor * way.top_speed for way in (envelope.minus, envelope.plus))
     span = (high - low) or 1.0
@@ -180,8 +177,6 @@ def plot_limit_timeline(
         What to show.
     wanted : (n,) array_like, optional
         The speed of a drive without limits, or another wanted one, to draw dashed. [rad/s]
-    title : str, optional
-        By default the name of the drive.
 
     Raises
     ------
@@ -198,12 +193,11 @@ def plot_limit_timeline(
     if asked is not None:
         legend.append(handle("without limits", GREY, "dashed"))
     heights = [1.1, 2.2, 0.27 * max(len(acting), 1)]
-    figure, axes = sheet(heights, run.name if title is None else title, legend=legend)
+    labels = ("current (A)" if run.voltage is None else "voltage (V)", unit.label("speed"))
+    words = run.name if title is None else title
+    figure, axes = sheet(heights, words, labels, "time (s)", legend=legend)
     command, speed, rows = axes
-    volts = run.voltage
-    dress(command, "current (A)" if volts is None else "voltage (V)")
-    draw(command, run.time, run.current if volts is None else volts, INK)
-    dress(speed, unit.label("speed"))
+    draw(command, run.time, run.current if run.voltage is None else run.voltage, INK)
     if asked is not None:
         draw(speed, run.time, unit.factor * asked, GREY, dashes="dashed")
     draw(speed, run.time, unit.factor * run.shaft_speed, BLUE)
@@ -211,12 +205,10 @@ def plot_limit_timeline(
         zero_line(ax)
     _bars(rows, run, acting)
     fit_time(rows, run.time)
-    label_below(rows, "time (s)")
     return figure
 
 
 def _bars(ax: Axes, run: Simulation, acting: list[Limit]) -> None:
-    dress(ax)
     count = len(acting)
     ax.set_ylim(max(count, 1) - 0.5, -0.5)
     ax.set_yticks(range(count), [SHADES[limit].name for limit in acting])
@@ -263,8 +255,6 @@ def plot_whatif(
     bands : mapping of str to Bands, optional
         By variant (``"as it is"``, ``"changed"``) the band that its speed lies in; a panel more
         shows it enlarged, about its median.
-    title : str, optional
-        By default it says what was moved.
     """
     alone = [name for name in result.variants if name not in (AS_IS, CHANGED)][:MOST_ALONE]
     colors = (GREEN, PURPLE, ORANGE, SKY, FAINT)
@@ -276,11 +266,11 @@ def plot_whatif(
     moved = ", ".join(f"{name} x {factor:g}" for name, factor in result.factors.items())
     words = f"{result.before.drive.name}: {moved}" if title is None else title
     heights = [1.2, 2.8, 1.8, 1.3] if bands else [1.2, 2.8, 1.8]
-    figure, axes = sheet(heights, words, legend=legend)
     speed, acceleration = display_unit("rad/s"), display_unit("rad/s^2")
-    labels = ("voltage (V)", speed.label("shaft speed"), acceleration.label("acceleration"))
-    for ax, label in zip(axes, (*labels, speed.label("about the median")), strict=False):
-        dress(ax, label)
+    labels = ["voltage (V)", speed.label("shaft speed"), acceleration.label("acceleration")]
+    labels.append(speed.label("about the median"))
+    figure, axes = sheet(heights, words, labels, "time (s)", legend=legend)
+    for ax in axes:
         zero_line(ax)
     time = result.before.run.time
     draw(axes[0], time, result.trial.voltage, INK, zorder=3.0)
@@ -297,7 +287,6 @@ def plot_whatif(
         draw(axes[1], time, speed.factor * found, look.color, dashes=look.dashes, zorder=order)
         draw(axes[2], middle, rising, look.color, dashes=look.dashes, zorder=order)
     fit_time(axes[-1], time)
-    label_below(axes[-1], "time (s)")
     return figure
 
 
@@ -334,8 +323,6 @@ def plot_tornado(result: OneAtATime, *, title: str | None = None) -> Figure:
     ----------
     result : OneAtATime
         See `analysis.one_at_a_time`.
-    title : str, optional
-        By default it says what is shown.
 
     Raises
     ------
@@ -406,8 +393,6 @@ def plot_compensation(
         The map.
     improvement : Improvement, optional
         Runs to show below: the speeds and their errors.
-    title : str, optional
-        By default it says what is shown.
     """
     heights = [MAP] if improvement is None else [MAP, RUNS, RUNS]
     figure = new_figure(WIDTH, HEAD + ROW + sum(heights) + 2.0 * FOOT)

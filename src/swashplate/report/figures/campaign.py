@@ -305,8 +305,6 @@ def plot_channel(
         channel than a position stands measured less simulated, on the scale of what counts.
     window : (float, float), optional
         First and last instant to show [s]. Everything is computed from the whole record.
-    title : str, optional
-        By default the channel's name.
 
     Raises
     ------
@@ -333,10 +331,14 @@ def plot_channel(
     elif simulated is not None:
         lower.append((time, values - simulated[rows], INK, THIN))
         below, si = "measured less simulated", channel.unit
-    heights = [2.4, 2.2] if lower else [3.2]
-    figure, axes = sheet(heights, channel.name if title is None else title, legend=legend)
     unit = display_unit(channel.unit, float(np.abs(values).max()))
-    dress(axes[0], unit.label(channel.kind.replace("_", " ").replace("encoder counts", "angle")))
+    labels = [unit.label(channel.kind.replace("_", " ").replace("encoder counts", "angle"))]
+    if lower:
+        scale = lower[-1][1] if channel.is_position or not used.any() else lower[-1][1][used]
+        small = display_unit(si, float(np.abs(scale).max()))
+        labels.append(small.label(below))
+    heights, words = [2.4, 2.2] if lower else [3.2], channel.name if title is None else title
+    figure, axes = sheet(heights, words, labels, "time (s)", legend=legend)
     how: dict[str, Any] = {"held": channel.is_position, "width": THIN, "zorder": 2.5}
     counted = values[used] if used.any() else values
     room = 0.12 * float(np.ptp(counted)) or 1.0 / unit.factor
@@ -350,17 +352,13 @@ def plot_channel(
         )
         counts.yaxis.set_major_locator(MaxNLocator(6, steps=[1, 2, 5, 10], integer=True))
     if lower:
-        scale = lower[-1][1] if channel.is_position or not used.any() else lower[-1][1][used]
-        unit = display_unit(si, float(np.abs(scale).max()))
-        dress(axes[1], unit.label(below))
-        margin = 0.12 * float(np.ptp(scale)) or 1.0 / unit.factor
-        axes[1].set_ylim(unit.factor * (scale.min() - margin), unit.factor * (scale.max() + margin))
+        room = 0.12 * float(np.ptp(scale)) or 1.0 / small.factor
+        axes[1].set_ylim(small.factor * (scale.min() - room), small.factor * (scale.max() + room))
         zero_line(axes[1])
         for when, what, color, width in lower:
-            draw(axes[1], when, unit.factor * what, color, width=width)
+            draw(axes[1], when, small.factor * what, color, width=width)
     for ax in axes:
         shade(ax, stretches(time, ~used), IGNORED)
         mark_gaps(ax, time)
     axes[-1].set_xlim(float(time[0]), float(time[-1]))
-    label_below(axes[-1], "time (s)")
     return figure

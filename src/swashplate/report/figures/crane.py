@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -54,11 +54,16 @@ def remark(ax: Axes, *said: str, rows: int = 0, right: bool = False) -> None:
 
 
 def _panels(
-    heights: list[float], title: str, looks: Mapping[str, style.Stroke], *said: str
+    heights: list[float],
+    labels: Sequence[str],
+    below: str,
+    title: str,
+    looks: Mapping[str, style.Stroke],
+    *said: str,
 ) -> tuple[Figure, list[Axes]]:
     """Panels with a legend of lines, where there are several, and a remark."""
     legend = [style.handle(name, *look) for name, look in looks.items()] if len(looks) > 1 else []
-    figure, axes = style.sheet(heights, title, legend=legend, lines=1)
+    figure, axes = style.sheet(heights, title, labels, below, legend=legend, lines=1)
     remark(axes[0], *said, rows=style.legend_rows(legend) if legend else 0)
     return figure, axes
 
@@ -102,10 +107,11 @@ def plot_crane(
     shown += [("swing_deg", "in sea (deg)", 1.5, dict(sea))] if sea else []
     heights = [height for _, _, height, _ in shown]
     heights += [0.17 * 2 * len(driven) + 0.25] if driven else []
+    labels = [label for _, label, _, _ in shown] + ["limits"] * bool(driven)
     back = "grey line: the stick is back at zero" if first.stick_end > 0.0 else ""
-    figure, axes = _panels(heights, title or first.crane.title, looks, back, assumed(first.crane))
-    for ax, (signal, label, _, lines) in zip(axes, shown, strict=False):
-        style.dress(ax, label)
+    said, title = (back, assumed(first.crane)), title or first.crane.title
+    figure, axes = _panels(heights, labels, "time (s)", title, looks, *said)
+    for ax, (signal, _, _, lines) in zip(axes, shown, strict=False):
         for name, run in lines.items():
             draw(ax, run.time, getattr(run, signal), looks[name].color, dashes=looks[name].dashes)
         if signal == "swing_deg":
@@ -116,7 +122,6 @@ def plot_crane(
         fit_time(ax, first.time)
         if first.stick_end > 0.0:
             ax.axvline(first.stick_end, color=style.FAINT, linewidth=0.8, zorder=1.0)
-    style.label_below(axes[-1], "time (s)")
     return figure
 
 
@@ -130,12 +135,10 @@ def _acting(ax: Axes, runs: Mapping[str, CraneRun], looks: Mapping[str, style.St
             bars = [(start, end - start) for start, end in spans]
             color = SHADES[limit].color
             ax.broken_barh(bars, (row - 0.36, 0.72), facecolors=color, edgecolor="none")
-    style.dress(ax)
     ax.grid(False, axis="y")
     ax.set_yticks(range(len(rows)), [axis for _, axis in rows], fontsize=style.SMALL)
     for (name, _), text in zip(rows, ax.get_yticklabels(), strict=True):
         text.set_color(looks[name].color if len(runs) > 1 else style.INK)
-    ax.set_ylabel("limits", fontsize=style.NORMAL, color=style.INK)
     style.put_legend(ax, [shade_handle(SHADES[limit]) for limit in ACTING])
 
 
@@ -175,7 +178,8 @@ def plot_sweep(result: Sweep, *, limit_deg: float = 3.0, title: str = "") -> Fig
     if result.over == "bearing":
         return _polar(result, words, looks, *said)
     stick = result.over == "stick"
-    figure, (ax, *ends) = _panels([2.7, 1.4] if stick else [3.0], words, looks, *said)
+    heights, labels = ([2.7, 1.4] if stick else [3.0]), (label, "slew reached (deg)")
+    figure, (ax, *ends) = _panels(heights, labels, below, words, looks, *said)
     values, shares = np.degrees(result.values), 100.0 * result.below(limit_deg)
     for k, (color, dashes) in enumerate(looks.values()):
         how: dict[str, Any] = {"color": color, "linestyle": dashes, "linewidth": 1.4}
@@ -189,13 +193,11 @@ def plot_sweep(result: Sweep, *, limit_deg: float = 3.0, title: str = "") -> Fig
             middle, low, high = np.maximum(found, LEAST).T
             ax.fill_between(points, low, high, color=color, alpha=0.15, linewidth=0.0)
             ax.plot(points, middle, **how)
-    style.dress(ax, label)
     if result.over == "height":
         ax.set_ylim(0.0, 100.0)
         ax.set_xlim(left=0.0)
     elif stick:
         _logarithmic(ax, LEAST, 1.3 * float(np.nanmax(values[..., 1])))
-        style.dress(ends[0], "slew reached (deg)")
     else:
         mean = values[..., 0].mean(axis=0)
         low = max(LEAST, 0.5 * float(np.nanmin(mean)))
@@ -203,7 +205,6 @@ def plot_sweep(result: Sweep, *, limit_deg: float = 3.0, title: str = "") -> Fig
         ax.axvline(1.0, color=style.FAINT, linewidth=0.8, zorder=1.0)
         style.write(ax, "as built", (1.0, low), (4.0, 4.0), coords="data", color=style.GREY)
         ax.set_xlim(points[0], points[-1])
-    style.label_below(ends[0] if ends else ax, below)
     return figure
 
 
@@ -253,7 +254,8 @@ def plot_follow(result: Followable, *, title: str = "") -> Figure:
     looks = style.strokes(("hoist, up", "slew, across the boom", "luff, along the boom"))
     said = f"boom at {result.boom_deg:.0f}°; points: what holding the tip asks of the luff"
     words = title or "What the axes can follow"
-    figure, (ax,) = _panels([3.3], words, looks, said, assumed(result.crane))
+    labels = ("amplitude (m)",), "period (s)"
+    figure, (ax,) = _panels([3.3], *labels, words, looks, said, assumed(result.crane))
     for (color, dashes), values in zip(looks.values(), result.amplitude.T, strict=True):
         ax.plot(result.periods, values, color=color, linestyle=dashes, linewidth=1.4)
     box = {"facecolor": "white", "edgecolor": "none", "pad": 0.6}
@@ -261,11 +263,9 @@ def plot_follow(result: Followable, *, title: str = "") -> Figure:
         place = each.period, each.amplitude[2]
         ax.plot(*place, "D", color=style.INK, ms=4.5)
         style.write(ax, name, place, (6.0, -3.0), coords="data", bbox=box)
-    style.dress(ax, "amplitude (m)")
     every = [*result.amplitude.ravel(), *(each.amplitude[2] for each in result.seas.values())]
     _logarithmic(ax, 0.8 * min(every), 1.25 * max(every))
     ax.set_xlim(result.periods[0], result.periods[-1])
-    style.label_below(ax, "period (s)")
     return figure
 
 
@@ -273,7 +273,8 @@ def plot_judgment(result: Judgment, *, title: str = "") -> Figure:
     """Figure of a judgment: swing of every variant in every seaway, and what limits its drives."""
     names, study = list(reversed(result.names)), result.study
     words = title or f"Swing in {count(len(study.seeds), 'seaway')}"
-    figure, (ax,) = style.sheet([0.42 * len(names) + 0.3], words, lines=1)
+    below = "swing, RMS of a seaway (deg)"
+    figure, (ax,) = style.sheet([0.42 * len(names) + 0.3], words, below=below, lines=1)
     said = "bars: mean with its 95 % interval"
     remark(ax, seaway_words(study.sea), said, assumed(study.crane), right=True)
     random = np.random.default_rng(0)
@@ -291,10 +292,8 @@ def plot_judgment(result: Judgment, *, title: str = "") -> Figure:
         ax.vlines(mean.value, row - 0.3, row + 0.3, color=style.INK, linewidth=1.6)
         worse = f"\nworse than none: {100.0 * share:.0f} %" if name in result.names[1:] else ""
         labels.append(name + worse)
-    style.dress(ax)
     ax.grid(False, axis="y")
     ax.set_yticks(range(len(names)), labels, fontsize=style.NORMAL)
     ax.set_ylim(-0.6, len(names) - 0.4)
     ax.set_xlim(0.0, 1.05 * edge)
-    style.label_below(ax, "swing, RMS of a seaway (deg)")
     return figure

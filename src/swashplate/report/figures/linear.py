@@ -16,15 +16,13 @@ from swashplate.report.style import (
     FAINT,
     GREY,
     LINE,
-    dress,
     handle,
-    label_below,
     sheet,
     strokes,
     write,
 )
 from swashplate.simulation.result import UNITS
-from swashplate.units import DisplayUnit, display_unit
+from swashplate.units import display_unit
 
 Array = NDArray[np.float64]
 
@@ -56,8 +54,6 @@ def plot_bode(
         Its first output is drawn dashed, for comparison.
     mark : float, optional
         A frequency to mark. [Hz]
-    title : str, optional
-        By default it says what is shown.
 
     Raises
     ------
@@ -79,8 +75,11 @@ def plot_bode(
         legend.append(handle(f"small motions about {where}", GREY, "dashed"))
     output = WORDS.get(response.output, response.output.replace("_", " "))
     words = f"{response.name}: {response.input} to {output}, sines about {response.bias:g} {unit}"
-    figure, axes = sheet([2.3, 2.3, 1.3], words if title is None else title, legend=legend)
     shown = display_unit(UNITS[response.output], float(response.gain.max()))
+    by = f"({shown.name})" if "/" in shown.name else shown.name or "1"
+    labels = f"gain ({by}/{unit})", "phase (deg)", "distortion (%)"
+    words = words if title is None else title
+    figure, axes = sheet([2.3, 2.3, 1.3], words, labels, "frequency (Hz)", legend=legend)
     swept = shown.factor * response.gain, np.degrees(response.phase), 100.0 * response.distortion
     marker = "o" if response.frequencies.size == 1 else None
     for ax, rows in zip(axes, swept, strict=True):
@@ -96,7 +95,7 @@ def plot_bode(
         small = (shown.factor * np.abs(ratio), np.degrees(np.unwrap(np.angle(ratio))))
         for ax, row in zip(axes, small, strict=False):
             ax.plot(fine, row, color=GREY, linestyle="dashed", linewidth=LINE, zorder=1.8)
-    _scale(axes, response, shown)
+    _scale(axes, response)
     if mark is not None and response.frequencies[0] <= mark <= response.frequencies[-1]:
         for ax in axes:
             ax.axvline(mark, color=FAINT, linewidth=1.0, zorder=1.3)
@@ -105,13 +104,8 @@ def plot_bode(
     return figure
 
 
-def _scale(axes: list[Axes], response: FrequencyResponse, shown: DisplayUnit) -> None:
+def _scale(axes: list[Axes], response: FrequencyResponse) -> None:
     gain, phase, distortion = axes
-    unit = UNITS[response.input]
-    by = f"({shown.name})/{unit}" if "/" in shown.name else f"{shown.name or '1'}/{unit}"
-    dress(gain, f"gain ({by})")
-    dress(phase, "phase (deg)")
-    dress(distortion, "distortion (%)")
     for ax in axes:
         ax.set_xscale("log")
     gain.set_yscale("log")
@@ -127,7 +121,6 @@ def _scale(axes: list[Axes], response: FrequencyResponse, shown: DisplayUnit) ->
     step = next((each for each in STEPS if (high - low) / each <= MOST_STEPS), STEPS[-1])
     phase.yaxis.set_major_locator(MultipleLocator(step))
     distortion.set_ylim(0.0, max(1.05 * 100.0 * float(response.distortion.max()), 1e-3))
-    label_below(distortion, "frequency (Hz)")
 
 
 def _number(ax: Axes, which: str, span: float) -> None:

@@ -15,14 +15,9 @@ from swashplate.equations import Run
 from swashplate.errors import InputError
 from swashplate.full_order import Comparison
 from swashplate.report.lines import (
-    NARROW,
     SHADES,
-    WIDE,
     Array,
-    Mark,
-    Trace,
     draw,
-    fill_panel,
     fit_time,
     rows_within,
     shade,
@@ -31,11 +26,15 @@ from swashplate.report.lines import (
 )
 from swashplate.report.style import (
     BLUE,
+    GREY,
     INK,
+    LINE,
+    NORMAL,
+    THIN,
     VERMILION,
-    dress,
+    MarginLabel,
     handle,
-    label_below,
+    label_margin,
     new_figure,
     sheet,
     signed,
@@ -58,7 +57,28 @@ SIGNAL_UNITS = {
 }
 """SI unit of each signal of a run."""
 
+WIDE, NARROW = 1.9, 0.9
+"""Widths of two lines that lie on one another for long. [pt]"""
+NEAR = 0.3
+"""A line that marks a limit is shown if the signal goes at least this share of the way to it."""
+
 # --- one simulation -------------------------------------------------------------------------------
+
+
+class Trace(NamedTuple):
+    """A signal of a panel; its name if there is more than one."""
+
+    values: Array
+    color: str
+    name: str = ""
+    width: float = LINE
+
+
+class Mark(NamedTuple):
+    """A level that the signal should be compared with."""
+
+    level: float
+    words: str
 
 
 class Panel(NamedTuple):
@@ -89,8 +109,6 @@ def plot_simulation(
         What to show. Voltage has a panel only if the simulation was driven by one.
     window : (float, float), optional
         First and last instant to show [s].
-    title : str, optional
-        By default the name of the parameter set.
 
     Raises
     ------
@@ -181,8 +199,6 @@ def plot_full_order(found: Comparison, *, title: str | None = None) -> Figure:
     ----------
     found : Comparison
         What `swashplate.full_order.compare` found. Limits that hold are shaded.
-    title : str, optional
-        By default the name of the physical set.
     """
     full = found.full
     machine = full.plant.machine
@@ -243,26 +259,39 @@ def _chain(panels: Sequence[Panel], time: Array, title: str, rows: slice = slice
     """The panels one under another, with a legend of the limits that act anywhere."""
     acting = {limit for panel in panels for limit, spans in panel.limits if spans.size}
     legend = [shade_handle(SHADES[limit]) for limit in Limit if limit in acting]
-    figure, axes = sheet([panel.height for panel in panels], title, legend=legend)
+    figure, axes = sheet([each.height for each in panels], title, below="time (s)", legend=legend)
     for ax, panel in zip(axes, panels, strict=True):
         for limit, spans in panel.limits:
             shade(ax, spans, SHADES[limit])
-        largest = max(float(np.abs(trace.values[rows]).max()) for trace in panel.traces)
-        # an angle within the machine stays in degrees, whatever the shaft's is shown in
-        unit = display_unit(panel.si, max(largest, panel.least) or inf)
-        name, factor = ("deg", float(np.degrees(1.0))) if panel.si == "swash" else unit
-        fill_panel(
-            ax,
-            f"{panel.words}\n({name})",
-            time[rows],
-            [each._replace(values=factor * each.values[rows]) for each in panel.traces],
-            [each._replace(level=factor * each.level) for each in panel.marks],
-            height=panel.height,
-            least=factor * panel.least,
-        )
+        _fill(ax, panel, time[rows], rows)
     fit_time(axes[-1], time[rows])
-    label_below(axes[-1], "time (s)")
     return figure
+
+
+def _fill(ax: Axes, panel: Panel, time: Array, rows: slice) -> None:
+    """Draw signals over time, from zero on, with the marks that they come near to."""
+    largest = max(float(np.abs(each.values[rows]).max()) for each in panel.traces)
+    unit = display_unit(panel.si, max(largest, panel.least) or inf)
+    # an angle within the machine stays in degrees, whatever the shaft's is shown in
+    name, factor = ("deg", float(np.degrees(1.0))) if panel.si == "swash" else unit
+    ax.set_ylabel(f"{panel.words}\n({name})", fontsize=NORMAL, color=INK)
+    zero_line(ax)
+    shown = [factor * each.values[rows] for each in panel.traces]
+    low, high = min(float(each.min()) for each in shown), max(float(each.max()) for each in shown)
+    labels = []
+    for level, words in ((factor * each.level, each.words) for each in panel.marks):
+        if level and (high if level > 0.0 else -low) >= NEAR * abs(level):
+            ax.axhline(level, color=GREY, linewidth=THIN, dashes=(5.0, 3.0), zorder=1.5)
+            labels.append(MarginLabel(level, words, GREY))
+    ends = [0.0, low, high, *(each.height for each in labels)]
+    span = max(ends) - min(ends)
+    spare = max(0.09 * span, 0.5 * (factor * panel.least - span)) or 1.0
+    ax.set_ylim(min(ends) - spare, max(ends) + spare)
+    for trace, values in zip(panel.traces, shown, strict=True):
+        draw(ax, time, values, trace.color, width=trace.width)
+        if trace.name:
+            labels.append(MarginLabel(float(values[-1]), trace.name, trace.color))
+    label_margin(ax, labels, panel.height)
 
 
 # --- several simulations of one command -----------------------------------------------------------
@@ -276,8 +305,6 @@ def plot_comparison(simulations: Mapping[str, Simulation], *, title: str | None 
     simulations : mapping
         Name to simulation. The first is what the others are compared with. A command that is not
         the first one's is drawn in the colour of its simulation.
-    title : str, optional
-        By default it says what is shown.
 
     Raises
     ------
@@ -290,11 +317,11 @@ def plot_comparison(simulations: Mapping[str, Simulation], *, title: str | None 
     words = "Shaft speed under the same command" if title is None else title
     legend = [handle(name, *look) for name, look in looks.items()]
     heights = [1.2, 2.6, 1.6] if len(simulations) > 1 else [1.2, 2.6]
-    figure, axes = sheet(heights, words, legend=legend)
     volts = all(each.voltage is not None for each in simulations.values())
-    labels = ("voltage (V)" if volts else "current (A)", speed.label("shaft speed"))
-    for ax, label in zip(axes, (*labels, speed.label("difference")), strict=False):
-        dress(ax, label)
+    labels = ["voltage (V)" if volts else "current (A)", speed.label("shaft speed")]
+    labels.append(speed.label("difference"))
+    figure, axes = sheet(heights, words, labels, "time (s)", legend=legend)
+    for ax in axes:
         zero_line(ax)
     (reference, first), *_ = simulations.items()
     commands = [
@@ -317,5 +344,4 @@ def plot_comparison(simulations: Mapping[str, Simulation], *, title: str | None 
         said = f"speed less that of {reference}"
         write(axes[2], said, (0.0, 1.0), color=looks[reference].color)
     fit_time(axes[-1], *(each.time for each in simulations.values()))
-    label_below(axes[-1], "time (s)")
     return figure

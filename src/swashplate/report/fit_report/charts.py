@@ -77,17 +77,7 @@ def profile_chart(profile: Profile, unknown: Unknown) -> Markup:
 
 
 def lags_chart(lags: Array, values: Array, band: float, words: str) -> Markup:
-    """A correlation over the lag, with the band of what has none.
-
-    Parameters
-    ----------
-    lags, values : (n,) arrays
-        Increasing lags [s], and correlations.
-    band : float
-        Half its width.
-    words : str
-        What it shows.
-    """
+    """A correlation over the lag [s], with the band of what has none, by half its width."""
     wide, tall, edge = 230.0, 64.0, 4.0
     low, high = min(-band, float(values.min()), -0.1), max(band, float(values.max()), 0.1)
 

@@ -5,14 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import replace
-from datetime import date
 from math import inf
 from pathlib import Path
-from typing import Any, Literal, get_args
 
 from markupsafe import Markup
 
 from swashplate.campaign import Campaign, examine, quality_table
+from swashplate.campaign.schema import Weight
 from swashplate.drive import Drive
 from swashplate.errors import InputError
 from swashplate.identification import tables
@@ -28,22 +27,16 @@ from swashplate.identification.validation import RunQuality, percent
 from swashplate.identification.verdict import Verdict, starts_of, verdict
 from swashplate.parameters.parameter_set import ParameterSet
 from swashplate.report.fit_report import charts
-from swashplate.report.fit_report.live import can_run, live_page
-from swashplate.report.fit_report.page import Block, Section, listed_block, page, text
-from swashplate.report.fit_report.runs import (
-    ShownRun,
-    predicted_runs,
-    run_data,
-    run_words,
-    shown_runs,
-)
+from swashplate.report.fit_report.live import can_run, live_page, run_of
+from swashplate.report.fit_report.page import Block, Section, listed_block, page, text, titled
+from swashplate.report.fit_report.runs import ShownRun, run_data, run_words, shown_runs
 from swashplate.report.fit_report.summary import light, run_error, run_lights, summary_section
 from swashplate.tables import NONE, Cell, Column, Table, count, ended, joined, listed, write_text
 from swashplate.units import chosen_unit, show_rod, shown_in, unit_text
 
-Role = Literal["fit", "validate"]
 MOST_PAIRS = 12
 """Correlations that are listed."""
+NO_FINDINGS = "The check of the logs finds nothing to look into."
 _PARTS = {
     "card": "the control card alone, from the command to the currents",
     "pump": "pump and motor, driven by the current",
@@ -78,35 +71,25 @@ def write_fit_report(found: Judged, path: str | Path, *, truth: ParameterSet | N
     """
     fit, stages = found.result, found.result.stages
     runs = shown_runs(stages, found.predicted)
-    held_out = sum(run.validates for run in runs)
-    samples = sum(each.problem.samples for each in fit.stages)
+    held_out = sum(run.role == "validate" for run in runs)
     facts = (
-        f"{count(len(fit.stages), 'stage')}: {', '.join(each.stage.name for each in fit.stages)} · "
+        f"{count(len(stages), 'stage')}: {', '.join(each.stage.name for each in stages)} · "
         f"{count(len(runs) - held_out, 'run')} fitted, {held_out} held out · "
-        f"{count(samples, 'sample')} that count"
+        f"{count(sum(each.problem.samples for each in stages), 'sample')} that count"
     )
-    drive = fit.parameters
-    known = Drive(drive) if isinstance(drive, ParameterSet) else None
-    head, shared = _shared(found.campaign, runs, fit.nominal)
     with _units_of_people():
         if motion_of(run.experiment for run in runs) == "rod":
             show_rod()
-        sections = [
-            summary_section(found.verdict, found.campaign, known, stages, runs, head["findings"]),
-            *shared[:2],
+        own = [
             _live_section(fit, found.campaign, runs),
             _parameter_section(fit, stages, truth),
             _identifiability_section(stages),
             _profile_section(fit, found.profiles),
             _starts_section(starts_of(stages)),
             _folds_section(found.folds, stages),
-            shared[2],
-            _verdict_section(found.verdict, head["findings"]),
-            shared[3],
-            _setup_section(found.campaign, fit.nominal, fit.setup.title, found.notes, fit.stages),
         ]
-        content = {**head, "what": "Fit", "facts": f"{head['drive']} · {facts}"}
-        made = page([each for each in sections if each.blocks], content)
+        setup = _setup_section(found.campaign, fit.nominal, fit.setup.title, found.notes, stages)
+        made = _page("Fit", facts, found.campaign, fit, runs, found.verdict, setup, own)
     write_text(made, path)
 
 
@@ -141,26 +124,15 @@ def write_validation_report(
     FileError
         If the file cannot be written.
     """
-    runs = predicted_runs(predicted)
-    found = judged if judged is not None else verdict((), predicted)
+    runs = shown_runs((), predicted)
     samples = sum(each.measures.samples for each in predicted)
-    head, shared = _shared(campaign, runs, drive)
-    known = Drive(drive) if isinstance(drive, ParameterSet) else None
     facts = (
-        f"{head['drive']} · {count(len(runs), 'run')} predicted from the command alone · "
+        f"{count(len(runs), 'run')} predicted from the command alone · "
         f"{count(samples, 'sample')} that count"
     )
-    sections = [
-        summary_section(found, campaign, known, (), runs, head["findings"]),
-        *shared[:3],
-        _verdict_section(found, head["findings"]),
-        shared[3],
-        _setup_section(campaign, drive, "", notes, ()),
-    ]
-    write_text(page(sections, {**head, "what": "Validation", "facts": facts}), path)
-
-
-# --- what every page has --------------------------------------------------------------------------
+    found = judged if judged is not None else verdict((), predicted)
+    setup = _setup_section(campaign, drive, "", notes or {}, ())
+    write_text(_page("Validation", facts, campaign, drive, runs, found, setup), path)
 
 
 def _units_of_people() -> AbstractContextManager[None]:
@@ -169,62 +141,61 @@ def _units_of_people() -> AbstractContextManager[None]:
     return shown_in([unit for si, unit in usual.items() if chosen_unit(si).name == unit_text(si)])
 
 
-def _shared(
-    campaign: Campaign, runs: Sequence[ShownRun], drive: Parameters
-) -> tuple[dict[str, Any], list[Section]]:
-    """Head of a page, and its sections on runs, curves, residuals and data."""
+def _page(
+    what: str,
+    facts: str,
+    campaign: Campaign,
+    found: Fit | Parameters,
+    runs: Sequence[ShownRun],
+    judged: Verdict,
+    setup: Section,
+    own: Sequence[Section] = (),
+) -> str:
+    """A page of a fit, which has sections of its own, or of a drive held against runs."""
+    stages = found.stages if isinstance(found, Fit) else ()
+    drive, nominal = (found.parameters, found.nominal) if isinstance(found, Fit) else (found, found)
+    named = f"{'Model' if isinstance(nominal, ModelSetup) else 'Drive'} {nominal.name}"
+    if isinstance(nominal, ParameterSet) and nominal.title:
+        named += f" ({nominal.title})"
     axes = {run.experiment.axis for run in runs}
     examined = {each: examine(each) for each in campaign if each.axis in axes}
-    found = [
+    said = [
         (run.name, ended(f"{run.name}, {each.signal}: {words}"))
         for run, qualities in examined.items()
         for each in qualities
         for words in each.findings
     ]
     findings: dict[str, list[int]] = {}
-    for number, (name, _) in enumerate(found, start=1):
+    for number, (name, _) in enumerate(said, start=1):
         findings.setdefault(name, []).append(number)
-    words = f"Drive {drive.name}"
-    if isinstance(drive, ModelSetup):
-        words = f"Model {drive.name}"
-    elif drive.title:
-        words += f" ({drive.title})"
-    head = {
-        "title": campaign.title,
-        "virtual": campaign.virtual,
-        "drive": words,
-        "date": f"{date.today():%d %B %Y}",
-        "findings": len(found),
-        "run_data": [run_data(run) for run in runs],
-    }
     quality = joined([quality_table(each, of_run) for each, of_run in examined.items()])
-    said = "The check of the logs finds nothing to look into."
-    numbered = [
-        Markup('<span id="finding-{}">{}</span>').format(number, sentence)
-        for number, (_, sentence) in enumerate(found, start=1)
-    ]
-    data = [
-        text(f"{count(len(found), 'finding')}:" if found else said),
-        *listed_block(numbered),
-        Block("details", [Block("table", quality, "data")], count(len(quality.rows), "signal")),
-    ]
+    known = Drive(drive) if isinstance(drive, ParameterSet) else None
     sections = [
+        summary_section(judged, campaign, known, stages, runs, len(said)),
         _agreement_section(runs, findings),
         _curves_section(runs, campaign.virtual),
+        *own,
         _residual_section(runs),
-        Section("data", "Data quality", data),
+        _verdict_section(judged, len(said)),
+        _data_section([sentence for _, sentence in said], quality),
+        setup,
     ]
-    return head, sections
+    return page(
+        sections,
+        what=what,
+        title=campaign.title,
+        facts=f"{named} · {facts}",
+        virtual=campaign.virtual,
+        run_data=map(run_data, runs),
+    )
 
 
-def _qualities(runs: Sequence[ShownRun], role: Role | None = None) -> list[RunQuality]:
-    """Of all runs, or of those of a role, each with the role that it has in the report."""
-    return [
-        replace(each.quality, experiment=replace(each.quality.experiment, role=run.role))
-        for run in runs
-        if role in (None, run.role)
-        for each in run.channels
-    ]
+# --- runs -----------------------------------------------------------------------------------------
+
+
+def _qualities(runs: Sequence[ShownRun], role: str = "") -> list[RunQuality]:
+    """Of all runs, or of those of a role."""
+    return [each.quality for run in runs if role in ("", run.role) for each in run.channels]
 
 
 def _agreement_section(runs: Sequence[ShownRun], findings: dict[str, list[int]]) -> Section:
@@ -243,13 +214,13 @@ def _agreement_section(runs: Sequence[ShownRun], findings: dict[str, list[int]])
             to_curves,
             run.role,
             run.experiment.maneuver,
-            run.judged.quality.channel,
+            run.judged.channel,
             None if part == inf else Cell(part, percent(part)),
             why,
             links,
             look=look != "good",
         )
-    made = [t for role in get_args(Role) for t in tables.runs_tables(_qualities(runs, role))]
+    made = [t for role in ("fit", "validate") for t in tables.runs_tables(_qualities(runs, role))]
     words = (
         "RMSE is the root of the mean squared difference of the samples that count; NRMSE is RMSE "
         "over the standard deviation of what was measured; fit % is 100 (1 − NRMSE). Error / range "
@@ -272,13 +243,8 @@ def _curves_section(runs: Sequence[ShownRun], virtual: bool) -> Section:
     )
     blocks = [text(words, "screen")]
     for number, run in enumerate(runs):
-        content = {
-            "number": number,
-            "run": run,
-            "maneuver": run.experiment.maneuver,
-            "measures": [(each.quality.channel, run_words(each.quality)) for each in run.channels],
-            "measured": measured,
-        }
+        measures = [(each.quality.channel, run_words(each.quality)) for each in run.channels]
+        content = {"number": number, "run": run, "measures": measures, "measured": measured}
         blocks.append(Block("run", content))
     return Section("runs", "Curves", blocks)
 
@@ -294,10 +260,10 @@ def _live_section(fit: Fit, campaign: Campaign, runs: Sequence[ShownRun]) -> Sec
             same = symbol in before and before[symbol].values == each.values
             moved[symbol] = replace(each, status="fixed" if same else "fitted")
         drive = replace(drive, parameters=moved)
-        out = [run for run in runs if run.validates] or list(runs)
+        out = [run for run in runs if run.role == "validate"] or runs
         worst = max(out, key=lambda run: run_error(run, runs)).experiment
         if can_run(drive, worst):
-            made = live_page(drive, [worst], campaign.title, campaign.virtual, "drive.toml")
+            made = live_page(drive, [run_of(worst)], campaign.title, campaign.virtual, "drive.toml")
             words = f"Sliders for every parameter beside {worst.name}"
             blocks = [Block("live", made, words)]
     return Section("live", "Try other values", blocks)
@@ -320,11 +286,22 @@ def _residual_section(runs: Sequence[ShownRun]) -> Section:
     return Section("residuals", "Residuals", [text(words), Block("table", made, "residuals")])
 
 
+def _data_section(findings: Sequence[str], quality: Table) -> Section:
+    """What the check of the logs finds, and the quality of every signal."""
+    said = f"{count(len(findings), 'finding')}:" if findings else NO_FINDINGS
+    numbered = [
+        Markup('<span id="finding-{}">{}</span>').format(number, sentence)
+        for number, sentence in enumerate(findings, start=1)
+    ]
+    shown = Block("details", [Block("table", quality, "data")], count(len(quality.rows), "signal"))
+    return Section("data", "Data quality", [text(said), *listed_block(numbered), shown])
+
+
 def _setup_section(
     campaign: Campaign,
     drive: Parameters,
     title: str,
-    notes: Mapping[str, str] | None,
+    notes: Mapping[str, str],
     stages: Sequence[StageFit],
 ) -> Section:
     made = Table("", (Column(""), Column("")))
@@ -335,7 +312,7 @@ def _setup_section(
         made.add("drive", f"{drive.name}, card {drive.card}" if drive.card else drive.name)
     if title:
         made.add("fit configuration", title)
-    for key, words in (notes or {}).items():
+    for key, words in notes.items():
         if key != "campaign":
             made.add(key, words)
     blocks = [Block("table", made, "notes")]
@@ -361,16 +338,14 @@ def _stage_words(fit: StageFit) -> list[str]:
     return words
 
 
-def _window(weight: object) -> str:
-    given = {key: value for key, value in vars(weight).items() if value not in (None, "")}
-    factor, start, stop = given.pop("factor"), given.get("start"), given.get("stop")
+def _window(weight: Weight) -> str:
     when = "all of the run"
-    if start is not None or stop is not None:
-        first = "the start" if start is None else f"{start:g} s"
-        when = f"{first} to {'the end' if stop is None else f'{stop:g} s'}"
-    where = f" in '{given['maneuver']}'" if "maneuver" in given else ""
-    why = f" ({given['why']})" if "why" in given else ""
-    return f"{factor:g} on {when}{where}{why}"
+    if weight.start is not None or weight.stop is not None:
+        first = "the start" if weight.start is None else f"{weight.start:g} s"
+        when = f"{first} to {'the end' if weight.stop is None else f'{weight.stop:g} s'}"
+    where = f" in '{weight.maneuver}'" if weight.maneuver else ""
+    why = f" ({weight.why})" if weight.why else ""
+    return f"{weight.factor:g} on {when}{where}{why}"
 
 
 # --- verdict --------------------------------------------------------------------------------------
@@ -378,19 +353,16 @@ def _window(weight: object) -> str:
 
 def _verdict_section(judged: Verdict, findings: int) -> Section:
     """The judgements, what each rests on, and the criteria."""
-    said: list[tuple[str, str, Sequence[str]]] = []
-    said.append(("Remarks", "look", judged.sentences))
-    said.append(("Not judged", "look", judged.not_judged))
-    said.append(("Range of validity", "plain", (judged.validity,) if judged.validity else ()))
-    said.append(("Assumed, cannot be checked", "plain", judged.assumed))
-    if findings:
-        words = f"{count(findings, 'finding')} on the campaign's data: see the section on them."
-        said.append(("Data", "look", (words,)))
-    blocks = [Block("terms", said, "verdict")]
-    if judged.criteria:
-        made = judged.table()
-        blocks += [Block("heading", made.title, "h3"), Block("table", made, "criteria")]
-    return Section("verdict", "Verdict in detail", blocks)
+    words = f"{count(findings, 'finding')} on the campaign's data: see the section on them."
+    said = [
+        ("Remarks", "look", judged.sentences),
+        ("Not judged", "look", judged.not_judged),
+        ("Range of validity", "plain", [judged.validity] if judged.validity else []),
+        ("Assumed, cannot be checked", "plain", judged.assumed),
+        ("Data", "look", [words] if findings else []),
+    ]
+    criteria = titled(judged.table(), "criteria") if judged.criteria else []
+    return Section("verdict", "Verdict in detail", [Block("terms", said, "verdict"), *criteria])
 
 
 # --- what the data tell ---------------------------------------------------------------------------
@@ -412,14 +384,13 @@ def _parameter_section(fit: Fit, stages: Sequence[StageFit], truth: ParameterSet
             )
         )
     for table, each in zip(made, stages, strict=True):
-        blocks += [Block("heading", table.title, "h3"), Block("table", table, "parameters")]
+        blocks += titled(table, "parameters")
         own = tables.estimates_table(each, own=True)
         if own.rows:
             summary = f"{count(len(own.rows), 'parameter')} of single runs"
             blocks.append(Block("details", [Block("table", own, "parameters")], summary))
     fixed = tables.fixed_table(fit, truth)
-    if fixed.rows:
-        blocks += [Block("heading", fixed.title, "h3"), Block("table", fixed, "held")]
+    blocks += titled(fixed, "held") if fixed.rows else []
     return Section("parameters", "Parameters", blocks)
 
 
@@ -454,7 +425,7 @@ def _effects(found: Identifiability, shown: Sequence[bool]) -> list[Block]:
     """How much all weighted residuals change for 1 % of each parameter, the largest first."""
     made = Table("", (Column("parameter"), Column("change of the residuals for 1 %", ".3g")))
     pairs = zip(found.sensitivity, found.variables.names, shown, strict=True)
-    for effect, name in sorted((float(e), name) for e, name, own in pairs if own)[::-1]:
+    for effect, name in sorted(((float(e), name) for e, name, own in pairs if own), reverse=True):
         made.add(name, effect)
     return [Block("details", [Block("table", made, "effects")], "Sensitivity")]
 
@@ -468,13 +439,11 @@ def _correlations(stage: StageFit, general: Sequence[bool]) -> list[Block]:
     kept = [k for k, own in enumerate(general) if own and quoted.determined[k]]
     names, values = quoted.variables.names, quoted.correlation
     pairs = [(float(values[i, j]), names[i], names[j]) for i in kept for j in kept if i < j]
-    blocks, made = [], Table("", (Column("parameter"), Column("with"), Column("r", "+.3f")))
+    made = Table("", (Column("parameter"), Column("with"), Column("r", "+.3f")))
     for value, name, other in sorted(pairs, key=lambda pair: -abs(pair[0]))[:MOST_PAIRS]:
         made.add(name, other, value)
-    if made.rows:
-        drawing = [Block("table", made, "correlations")]
-        blocks.append(Block("details", drawing, "Strongest correlations of the estimates"))
-    return blocks
+    shown = Block("table", made, "correlations")
+    return [Block("details", [shown], "Strongest correlations of the estimates")] * bool(made.rows)
 
 
 def _starts_section(several: Mapping[str, Sequence[Solution]]) -> Section:

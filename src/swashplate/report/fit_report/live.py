@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from base64 import b64encode
 from collections.abc import Iterable, Sequence
-from datetime import date
 from math import isfinite
 from pathlib import Path
 from typing import Any
@@ -25,7 +24,7 @@ from swashplate.identification.drive_model import SIGNALS, at_rate_of, voltage_r
 from swashplate.identification.validation import ignored_windows
 from swashplate.maneuvers import Maneuver
 from swashplate.parameters.parameter_set import HasParameters, Parameter, ParameterSet, set_of
-from swashplate.report.fit_report.page import rendered, resource, script_json
+from swashplate.report.fit_report.page import rendered, script_json
 from swashplate.report.fit_report.runs import packed
 from swashplate.report.lines import SHADES, gap_rows
 from swashplate.report.style import in_lines
@@ -102,11 +101,12 @@ def write_live_page(
         left = [each.name for each in tests if each.input.kind != "voltage"]
         if left:
             said += (f"Left out, driven by something else than a voltage: {listed(left)}.",)
-        made = live_page(parameters, driven, campaign.title, campaign.virtual, name)
+        runs = [run_of(each) for each in driven]
+        made = live_page(parameters, runs, campaign.title, campaign.virtual, name)
     elif command is not None:
         record, said = record_of(command.sample(rate), rate, what="voltage"), ()
         run = {**_record(record), "name": command.name, "role": "", "channels": []}
-        made = _page(parameters, [run], parameters.title or parameters.name, False, name)
+        made = live_page(parameters, [run], parameters.title or parameters.name, False, name)
     else:
         raise InputError("A live page needs the runs of a campaign, or a command to simulate.")
     write_text(made, path)
@@ -114,23 +114,9 @@ def write_live_page(
 
 
 def live_page(
-    parameters: ParameterSet,
-    experiments: Sequence[Experiment],
-    title: str,
-    virtual: bool,
-    name: str,
+    parameters: ParameterSet, runs: Sequence[dict[str, Any]], title: str, virtual: bool, name: str
 ) -> str:
-    """HTML of a live page beside runs that a voltage drives; see `write_live_page`."""
-    return _page(parameters, [_run(each) for each in experiments], title, virtual, name)
-
-
-def _page(
-    parameters: ParameterSet,
-    runs: Sequence[dict[str, Any]],
-    title: str,
-    virtual: bool,
-    name: str,
-) -> str:
+    """HTML of a live page beside runs of `run_of`; see `write_live_page`."""
     if parameters.equations:
         raise InputError(
             f"{parameters.name} has an equation of its own, which the WebAssembly of the package "
@@ -138,11 +124,12 @@ def _page(
         )
     exported = exported_drive()
     limits = [(1 << k, Limit[name.upper()]) for k, (_, name) in enumerate(exported.limits)]
-    values = parameters_of(parameters)
+    numbers = values_of(Drive(parameters), runs[0]["step"])
+    values = _parameters(parameters)
     before = "as fitted" if any(each["main"] for each in values) else "as it is"
     content = {
         "wasm": b64encode(packaged(WASM)).decode("ascii"),
-        "values": _doubles(values_of(Drive(parameters), runs[0]["step"])),
+        "values": b64encode(numbers.astype("<f8").tobytes()).decode("ascii"),
         "parameters": values,
         "levers": _levers(values),
         "outputs": [{"name": each, "number": k} for k, each in enumerate(exported.names)],
@@ -156,9 +143,10 @@ def _page(
         f".stack .{_word(limit)} {{ fill: {SHADES[limit].color}; }}\n" for _, limit in limits
     )
     return rendered(
-        "live.html",
+        "fit_report/live.html",
         ("curves.js", "live.js"),
-        resource("live.css") + colours,
+        ("page.css", "live.css"),
+        colours,
         data=script_json(content),
         title=title,
         drive=parameters.title or parameters.name,
@@ -167,7 +155,6 @@ def _page(
         fitted=before == "as fitted",
         before=before,
         limits=[(SHADES[limit].name, SHADES[limit].color) for limit in SHADES],
-        date=f"{date.today():%d %B %Y}",
         file=name,
     )
 
@@ -181,26 +168,28 @@ def can_run(parameters: ParameterSet, experiment: Experiment) -> bool:
 # --- parameters and levers ------------------------------------------------------------------------
 
 
-def parameters_of(parameters: ParameterSet) -> list[dict[str, Any]]:
+def _parameters(parameters: ParameterSet) -> list[dict[str, Any]]:
     """Every value of a set: its number in C, its words, and the ends of its slider."""
     names = [name for _, _, name in exported_drive().named("parameters")]
-    numbers = {name: k for k, name in enumerate(names)}
     made = []
     for parameter in parameters.values():
-        definition = parameter.definition
-        sides = ("", "") if len(definition.columns) == 1 else (", positive", ", negative")
-        for column, side, value in zip(definition.columns, sides, parameter.values, strict=False):
-            if column not in numbers:
+        known = parameter.definition
+        # mm, bar and degrees; SI for the others
+        unit = DisplayUnit(unit_text(known.unit), 1.0)
+        if known.unit in ("m", "Pa", "rad"):
+            unit = display_unit(known.unit, 1e5 if known.unit == "Pa" else 0.0)
+        sides = ("",) if len(known.columns) == 1 else (", positive", ", negative")
+        for column, side, value in zip(known.columns, sides, parameter.values, strict=False):
+            if column not in names:
                 continue  # of an equation of one's own
-            unit = _unit(definition.unit)
             made.append(
                 {
-                    "number": numbers[column],
+                    "number": names.index(column),
                     "symbol": parameter.symbol,
                     "column": column,
-                    "block": definition.block,
-                    "words": f"{definition.name}{side}",
-                    "si": definition.unit,
+                    "block": known.block,
+                    "words": f"{known.name}{side}",
+                    "si": known.unit,
                     "unit": unit.name,
                     "factor": unit.factor,
                     "value": value if isfinite(value) else 1e30,
@@ -209,15 +198,6 @@ def parameters_of(parameters: ParameterSet) -> list[dict[str, Any]]:
                 }
             )
     return made
-
-
-def _unit(si: str) -> DisplayUnit:
-    """Unit of people for a parameter: mm, bar and degrees; SI for the others."""
-    return (
-        display_unit(si, 1e5 if si == "Pa" else 0.0)
-        if si in ("m", "Pa", "rad")
-        else (DisplayUnit(unit_text(si), 1.0))
-    )
 
 
 def slider(parameter: Parameter, value: float) -> tuple[float, float] | None:
@@ -253,11 +233,11 @@ def _levers(values: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
 # --- runs -----------------------------------------------------------------------------------------
 
 
-def _run(experiment: Experiment) -> dict[str, Any]:
-    record = voltage_record(experiment)
+def run_of(experiment: Experiment) -> dict[str, Any]:
+    """A run that a voltage drives, with its channels that a drive simulates."""
     channels = [_channel(each) for each in _comparable(experiment.channels.values())]
     return {
-        **_record(record),
+        **_record(voltage_record(experiment)),
         "name": experiment.name,
         "role": experiment.role,
         "steady": experiment.begins == "steady",
@@ -317,9 +297,8 @@ def _shown(signal: str, name: str = "", unit: str = "", size: float = 0.0) -> di
     """A signal's panel: label, unit of people, limits that are shaded behind it."""
     unit = unit or {"current": "A", "shaft_speed": "rad/s"}[signal]
     shown = display_unit(unit, size)
-    words = name or signal.replace("_", " ")
     electric = "current" in signal
-    shaded = [_word(each) for each in Limit if bool(each & BEFORE_CURRENT) == electric]
+    words = name or signal.replace("_", " ")
     return {
         "signal": signal,
         "name": words,
@@ -327,14 +306,10 @@ def _shown(signal: str, name: str = "", unit: str = "", size: float = 0.0) -> di
         "factor": shown.factor,
         "label": in_lines(shown.label(words), 24),
         "residual": in_lines(shown.label("residual"), 14),
-        "shaded": shaded,
+        "shaded": [_word(each) for each in Limit if bool(each & BEFORE_CURRENT) == electric],
     }
 
 
 def _word(limit: Limit) -> str:
     """A limit's name as a class of the page."""
     return str(limit.name).lower().replace("_", "-")
-
-
-def _doubles(values: Array) -> str:
-    return b64encode(np.ascontiguousarray(values, "<f8").tobytes()).decode("ascii")

@@ -5,9 +5,10 @@ from __future__ import annotations
 import json
 import os
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
+from datetime import date
 from importlib.resources import files
 from pathlib import Path
 from shutil import which
@@ -19,7 +20,7 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup, escape
 
 from swashplate.errors import FileError
-from swashplate.tables import UNIT, Form, Row, Table, ending, write_whole
+from swashplate.tables import PRINTED, UNIT, Column, Row, Table, ending, write_whole
 
 _RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
@@ -53,39 +54,57 @@ def listed_block(sentences: Sequence[str]) -> list[Block]:
     return [Block("list", sentences)] if sentences else []
 
 
-def page(sections: Sequence[Section], content: Mapping[str, Any]) -> str:
-    """HTML of a report's page."""
+def titled(table: Table, look: str = "") -> list[Block]:
+    """A table under its title, its caption a remark."""
+    remark = [text(table.caption, "remark")] if table.caption else []
+    return [Block("heading", table.title, "h3"), Block("table", table, look), *remark]
+
+
+def page(
+    sections: Sequence[Section],
+    *,
+    what: str,
+    title: str,
+    facts: str,
+    virtual: bool = False,
+    run_data: Iterable[Mapping[str, Any]] = (),
+) -> str:
+    """HTML of a report's page; sections without blocks are left out."""
     return rendered(
-        "page.html",
+        "fit_report/page.html",
         ("curves.js", "page.js"),
-        **{**content, "run_data": map(script_json, content["run_data"])},
-        sections=sections,
+        ("page.css",),
+        sections=[each for each in sections if each.blocks],
+        what=what,
+        title=title,
+        facts=facts,
+        virtual=virtual,
+        run_data=map(script_json, run_data),
     )
 
 
-def rendered(template: str, scripts: Sequence[str], looks: str = "", **content: Any) -> str:
-    """HTML of a template of this folder, with its scripts in a scope of their own and its looks."""
+def rendered(
+    template: str, scripts: Sequence[str], looks: Sequence[str], more: str = "", **content: Any
+) -> str:
+    """HTML of a template, with scripts in a scope of their own and looks from its folder."""
     environment = Environment(
-        loader=PackageLoader("swashplate.report.fit_report", ""),
+        loader=PackageLoader("swashplate.report", ""),
         autoescape=True,
         undefined=StrictUndefined,
         trim_blocks=True,
         lstrip_blocks=True,
     )
     environment.globals["html_table"] = html_table
-    code = "\n".join(resource(name) for name in scripts)
+    folder = files("swashplate.report") / template.partition("/")[0]
+    code, css = ([(folder / each).read_text("utf-8") for each in of] for of in (scripts, looks))
     made: str = environment.get_template(template).render(
         content,
-        css=Markup(resource("page.css") + looks),
-        js=Markup('"use strict";\n(() => {\n' + code + "})();"),
+        css=Markup("".join(css) + more),
+        js=Markup('"use strict";\n(() => {\n' + "\n".join(code) + "})();"),
+        date=f"{date.today():%d %B %Y}",
     )
     # control characters of a name, and what turns the direction of writing, are no part of HTML
     return re.sub("[\x00-\x08\x0b-\x1f\x7f-\x9f\u202a-\u202e\u2066-\u2069]", "\ufffd", made)
-
-
-def resource(name: str) -> str:
-    """A file of this folder."""
-    return files("swashplate.report.fit_report").joinpath(name).read_text("utf-8")
 
 
 def html_table(table: Table, look: str = "") -> Markup:
@@ -93,10 +112,8 @@ def html_table(table: Table, look: str = "") -> Markup:
     shown = table.of("p")
     parts = [f'<table class="{escape(look)}"><thead><tr>']
     for column, head in zip(shown.columns, shown.heads(), strict=True):
-        if column.name == "meaning":
-            continue
-        name = escape("unit" if column is UNIT else head)
-        parts.append(f'<th class="{"n" if column.spec else ""}">{name}</th>')
+        if column.name != "meaning":
+            parts.append(f'<th class="{"n" if column.spec else ""}">{escape(head)}</th>')
     parts.append("</tr></thead><tbody>")
     parts += [_html_row(shown, row) for row in shown.rows]
     return Markup("".join([*parts, "</tbody></table>"]))
@@ -106,32 +123,29 @@ def _html_row(table: Table, row: Row) -> str:
     # every piece is escaped where it is put in: Markup's own formatting takes ten times as long
     classes = " ".join(w for w, on in (("look", row.look), ("total", row.total)) if on)
     parts = [f'<tr class="{classes}">' if classes else "<tr>"]
-    raw, meaning, first = iter(row.cells), "", True
-    cells = list(zip(table.texts(row), table.columns, strict=True))
-    for cell, column in cells:
-        value = cell if column is UNIT else next(raw)
+    cells = list(zip(table.columns, row.cells, table.texts(row), strict=True))
+    meaning = next((words for column, _, words in cells if column.name == "meaning"), "")
+    for place, (column, value, words) in enumerate(cells):
         if column.name == "meaning":
             continue
-        shown = value if isinstance(value, Markup) else escape(cell)
-        if column.spec and not isinstance(value, Markup):
-            shown = escape(typeset(cell))
+        shown = value if isinstance(value, Markup) else escape(typeset(words, column))
         if column.name == "role":
-            shown = Markup('<span class="badge {0}">{0}</span>').format(cell)
-        if first:
-            meaning = next((words for words, each in cells if each.name == "meaning"), "")
+            shown = Markup('<span class="badge {0}">{0}</span>').format(words)
+        if place == 0:
             symbol = f'{escape(meaning)} <span class="symbol">{shown}</span>' if meaning else shown
             look = ' class="n"' if column.spec else ""
             parts.append(f'<th scope="row"{look}>{symbol}</th>')
         else:
-            missed = " miss" if column.name == "holds" and cell == "no" else ""
+            missed = " miss" if column.name == "holds" and words == "no" else ""
             look = "unit" if column is UNIT else f"n{missed}" if column.spec else missed.strip()
             parts.append(f'<td class="{look}">{shown}</td>' if look else f"<td>{shown}</td>")
-        first = False
     return "".join([*parts, "</tr>\n"])
 
 
-def typeset(words: str) -> str:
-    """Numbers as print shows them: a true minus, and powers of ten raised."""
+def typeset(words: str, column: Column) -> str:
+    """Numbers of a column as print shows them: a true minus, and powers of ten raised."""
+    if not column.spec:
+        return words
 
     def power(match: re.Match[str]) -> str:
         return f" ·10{str(int(match[1])).translate(_RAISED)}"
@@ -154,13 +168,7 @@ PATIENCE = 180.0
 
 
 def find_browser() -> str:
-    """Path of a Chromium, which prints pages.
-
-    Raises
-    ------
-    FileError
-        If none is found.
-    """
+    """Path of a Chromium, which prints pages; a `FileError` where there is none."""
     found = next((place for each in BROWSERS if (place := which(each)) is not None), None)
     if found is None:
         raise FileError(
@@ -173,12 +181,7 @@ def find_browser() -> str:
 def print_report(page: str | Path, path: str | Path) -> None:
     """Print a report's page as PDF, whole or not at all, by a Chromium without a window.
 
-    Parameters
-    ----------
-    page : path
-        As `write_fit_report` writes it.
-    path : path
-        The PDF, which replaces an older one.
+    The PDF replaces an older one.
 
     Raises
     ------
@@ -186,7 +189,7 @@ def print_report(page: str | Path, path: str | Path) -> None:
         If there is no Chromium, it prints nothing, or the file cannot be written or does not end
         in ``.pdf``.
     """
-    ending(path, Form("a printed report", (".pdf",)))
+    ending(path, PRINTED)
     browser, address = find_browser(), Path(page).absolute().as_uri()
 
     def write(beside: Path) -> None:

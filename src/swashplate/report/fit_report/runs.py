@@ -4,15 +4,15 @@ from __future__ import annotations
 
 from base64 import b64encode
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 from zlib import compress
 
 import numpy as np
 from numpy.typing import NDArray
 
-from swashplate.campaign import Channel
+from swashplate.campaign import Channel, Experiment
 from swashplate.identification.fitting import StageFit
 from swashplate.identification.tables import ignored_words, start_words
 from swashplate.identification.validation import RunQuality, ignored_windows, with_speeds
@@ -35,7 +35,7 @@ LETTERS = {"input": 13, "overlay": 24, "residual": 14}
 
 @dataclass(frozen=True, eq=False)
 class Shown:
-    """One channel of a run, and the stage that fits it."""
+    """One channel of a run, the stage that fits it, and the units it is shown in."""
 
     quality: RunQuality
     stage: str
@@ -56,91 +56,66 @@ class ShownRun:
     """One run with all of its channels that are simulated."""
 
     name: str
-    validates: bool
-    """Whether it was held out of the fit."""
+    role: str
+    """Whether it was fitted, ``"fit"``, or held out, ``"validate"``."""
     channels: tuple[Shown, ...]
 
     @property
-    def experiment(self) -> Any:
-        """The run, with the speeds that were made of its positions."""
+    def experiment(self) -> Experiment:
+        """The run in its role here, with the speeds that were made of its positions."""
         return self.channels[0].quality.experiment
 
     @property
-    def role(self) -> Literal["fit", "validate"]:
-        """Whether it was fitted or held out."""
-        return "validate" if self.validates else "fit"
-
-    @property
-    def judged(self) -> Shown:
+    def judged(self) -> RunQuality:
         """The channel that it is judged by: the last, of a position its speed."""
-        return self.channels[-1]
+        return self.channels[-1].quality
 
     @property
     def labels(self) -> list[Any]:
         """Labels of the panels in lines: of the input, then of each channel and its residual."""
         names = [each.quality.channel for each in self.channels]
         several = len({each.stage for each in self.channels}) > 1
-        made: list[Any] = [in_lines(self.input_label, LETTERS["input"])]
+        kind = self.experiment.input.kind
+        first = self.input_unit.label("input" if kind == "other" else kind)
+        made: list[Any] = [in_lines(first, LETTERS["input"])]
         for each, name in zip(self.channels, names, strict=True):
             words = f"{name}, {each.stage}" if names.count(name) > 1 and several else name
-            made.append(
-                (
-                    in_lines(each.unit.label(words), LETTERS["overlay"]),
-                    in_lines(each.small.label("residual"), LETTERS["residual"]),
-                )
-            )
+            signal = in_lines(each.unit.label(words), LETTERS["overlay"])
+            made.append((signal, in_lines(each.small.label("residual"), LETTERS["residual"])))
         return made
 
     @property
     def input_unit(self) -> DisplayUnit:
         """Unit that its input is shown in."""
-        drive = self.experiment.input
-        return display_unit(drive.unit, float(np.abs(drive.values).max(initial=0.0)))
-
-    @property
-    def input_label(self) -> str:
-        """Label of its input's panel."""
-        kind = self.experiment.input.kind
-        return self.input_unit.label(kind if kind != "other" else "input")
+        return display_unit(self.experiment.input.unit, _largest(self.experiment.input.values))
 
 
-def shown_runs(
-    stages: Sequence[StageFit], validation: Sequence[RunQuality]
-) -> tuple[ShownRun, ...]:
-    """All runs, those that were fitted first, each with its channels in the order of the stages.
+def shown_runs(stages: Sequence[StageFit], predicted: Sequence[RunQuality]) -> tuple[ShownRun, ...]:
+    """All runs, those of the stages first, each with its channels in the order of the stages.
 
     A position is followed by its speed.
     """
-    found = [(each, a.stage.name, False) for a in stages for each in with_speeds(a.runs)]
-    return _gathered(found + [(each, "", True) for each in with_speeds(validation)])
-
-
-def predicted_runs(predicted: Sequence[RunQuality]) -> tuple[ShownRun, ...]:
-    """Runs that a drive was held against, those with the role 'validate' marked as such."""
-    return _gathered(
-        [(each, "", each.experiment.role == "validate") for each in with_speeds(predicted)]
-    )
-
-
-def _gathered(found: Sequence[tuple[RunQuality, str, bool]]) -> tuple[ShownRun, ...]:
-    """Run by run, from qualities with their stage and whether they were held out."""
-    units = {}
-    for name in dict.fromkeys(each.channel for each, _, _ in found):
-        alike = [each for each, _, _ in found if each.channel == name]
+    found = [
+        (replace(each, experiment=replace(each.experiment, role="fit")), stage.stage.name)
+        for stage in stages
+        for each in with_speeds(stage.runs)
+    ]
+    found += [(each, "") for each in with_speeds(predicted)]
+    units, runs = {}, dict[tuple[str, str], list[Shown]]()
+    for name in {each.channel for each, _ in found}:
+        alike = [each for each, _ in found if each.channel == name]
         channels = [each.experiment[name] for each in alike]
-        largest = max(float(np.abs(each.values).max(initial=0.0)) for each in channels)
-        residual = max(float(np.abs(each.residual).max(initial=0.0)) for each in alike)
-        si = channels[0].unit
-        units[name] = (display_unit(si, largest), display_unit(si, residual))
-    runs = []
-    for held, name in dict.fromkeys((held, each.experiment.name) for each, _, held in found):
-        channels_of = tuple(
-            Shown(each, stage, *units[each.channel])
-            for each, stage, out in found
-            if out == held and each.experiment.name == name
-        )
-        runs.append(ShownRun(name, held, channels_of))
-    return tuple(runs)
+        largest = max(_largest(each.values) for each in channels)
+        residual = max(_largest(each.residual) for each in alike)
+        units[name] = [display_unit(channels[0].unit, size) for size in (largest, residual)]
+    for each, stage in found:
+        of_run = runs.setdefault((each.experiment.name, each.experiment.role), [])
+        of_run.append(Shown(each, stage, *units[each.channel]))
+    return tuple(ShownRun(*key, tuple(channels)) for key, channels in runs.items())
+
+
+def _largest(values: Array) -> float:
+    return float(np.abs(values).max(initial=0.0))
 
 
 def off_scale(channel: Channel, values: Array) -> Mask:
@@ -182,13 +157,19 @@ def write_samples(runs: Sequence[ShownRun], path: str | Path) -> None:
     parts = []
     for run in runs:
         for each in run.channels:
-            channel, simulated = each.channel, each.quality.simulated
-            arrays = {"time": channel.time, "measured": channel.values, "simulated": simulated}
-            names = {"run": run.name, "role": run.role, "stage": each.stage}
-            names |= {"channel": each.quality.channel, "unit": channel.unit}
-            columns = [pl.lit(words).alias(name) for name, words in names.items()]
-            made = pl.DataFrame({**arrays, "weight": channel.weight})
-            parts.append(made.select(*columns, pl.all()))
+            channel, quality = each.channel, each.quality
+            columns = {
+                "run": run.name,
+                "role": run.role,
+                "stage": each.stage,
+                "channel": quality.channel,
+                "unit": channel.unit,
+                "time": channel.time,
+                "measured": channel.values,
+                "simulated": quality.simulated,
+                "weight": channel.weight,
+            }
+            parts.append(pl.DataFrame(columns))
     write_table(pl.concat(parts), path)
 
 
@@ -200,11 +181,8 @@ def run_data(run: ShownRun) -> dict[str, Any]:
 
     Ignored samples that would press the others flat are left out, and lines are broken there and
     at gaps. What was measured is left to the page: simulated less residual. Of runs of more than
-    `MOST_ROWS` rows those are kept that show each signal as all of them would.
-
-    Notes
-    -----
-    Signals are rounded to 1/65,535 of their range, residuals to 1/16 of their rms.
+    `MOST_ROWS` rows those are kept that show each signal as all of them would. Signals are rounded
+    to 1/65,535 of their range, residuals to 1/16 of their rms.
     """
     drive = run.experiment.input
     return {
@@ -250,21 +228,12 @@ def _signals(
 
 
 def packed(values: Array, step: float | None = None) -> dict[str, Any]:
-    """Numbers as whole multiples of a step, differenced, deflated and in base64.
+    """Finite numbers as whole multiples of a step, differenced, deflated and in base64.
 
-    Parameters
-    ----------
-    values : (n,) array
-        Finite numbers.
-    step : float, optional
-        What they are rounded to; at least 2⁻²⁸ of their range, by default 1/65,535 of it.
-
-    Returns
-    -------
-    dict
-        ``size``, ``zero`` and ``step``: value = zero + step · number. ``order``: how many times the
-        numbers were differenced. ``code``: 0, -1, 1, -2 ... as 0, 1, 2, 3 ... of four bytes each,
-        the lowest bytes of all numbers first.
+    ``size``, ``zero`` and ``step``: value = zero + step · number; the step is at least 2⁻²⁸ of
+    their range, by default 1/65,535 of it. ``order``: how many times the numbers were differenced.
+    ``code``: 0, -1, 1, -2 ... as 0, 1, 2, 3 ... of four bytes each, the lowest bytes of all numbers
+    first.
     """
     zero = float(np.median(values)) if values.size else 0.0
     reach = float(np.ptp(values)) if values.size else 0.0

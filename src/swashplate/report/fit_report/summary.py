@@ -85,12 +85,7 @@ def numbers_of(drive: Drive) -> Array:
 def numbers_table(drive: Drive, stages: Sequence[StageFit]) -> tuple[Table, list[str]]:
     """The numbers that matter, each with its 95 % interval, and what these leave out.
 
-    Parameters
-    ----------
-    drive : Drive
-        As fitted, or as it was held against runs.
-    stages : sequence of StageFit
-        Of the fit's stages; none for a drive of which no interval is known.
+    Without stages of a fit there are no intervals.
     """
     values, half, said = numbers_of(drive), np.full((6, 2), np.nan), list[str]()
     if stages:
@@ -148,8 +143,8 @@ def run_error(run: ShownRun, runs: Sequence[ShownRun]) -> float:
 
     Infinite where nothing moves.
     """
-    own = run.judged.quality
-    judged = [each.judged.quality for each in runs if each.role == run.role]
+    own = run.judged
+    judged = [each.judged for each in runs if each.role == run.role]
     reach = range_of([each for each in judged if each.channel == own.channel])
     return pooled([own], without_noise=True)[own.channel].rmse / reach if reach > 0.0 else np.inf
 
@@ -157,14 +152,9 @@ def run_error(run: ShownRun, runs: Sequence[ShownRun]) -> float:
 def run_lights(runs: Sequence[ShownRun], findings: dict[str, list[int]]) -> list[tuple[Light, str]]:
     """For each run its light and why, from its errors beside those of all runs that are fitted.
 
-    Parameters
-    ----------
-    runs : sequence of ShownRun
-        Fitted and held out.
-    findings : dict of str to list of int
-        Findings on the data, by the name of their run.
+    Findings on the data are by the name of their run.
     """
-    fitted = [each.quality for run in runs if not run.validates for each in run.channels]
+    fitted = [each.quality for run in runs if run.role == "fit" for each in run.channels]
     fitted = fitted or [each.quality for run in runs for each in run.channels]
     whole = pooled(fitted, without_noise=True)
     made = list[tuple[Light, str]]()
@@ -229,11 +219,11 @@ def summary_section(
 
 def _curves(runs: Sequence[ShownRun], virtual: bool) -> Iterable[Block]:
     """The runs that are predicted best and worst, of those held out if there are any."""
-    held = [k for k, run in enumerate(runs) if run.validates]
+    held = [k for k, run in enumerate(runs) if run.role == "validate"]
     chosen = sorted(held or range(len(runs)), key=lambda k: run_error(runs[k], runs))
     ends = {"Best": chosen[0], "Worst": chosen[-1]} if len(chosen) > 1 else {"The": chosen[0]}
     for which, k in ends.items():
-        kind = "held-out run" if held else "run" if runs[k].validates else "fitted run"
+        kind = "held-out run" if held else "run" if runs[k].role == "validate" else "fitted run"
         part = run_error(runs[k], runs)
         error = "never moves" if part == np.inf else f"error {percent(part)} of the range"
         content = {
@@ -280,7 +270,7 @@ def _next(
         )
         named = listed(weak[:6]) if len(weak) <= 6 else f"{', '.join(weak[:6])} and others"
         said.append(code.format(named, campaign.path))
-    if stages and not any(run.validates for run in runs):
+    if stages and not any(run.role == "validate" for run in runs):
         said.append('Hold a run out of the fit (role = "validate"): nothing was predicted yet.')
     if judged.usable:
         what = "Use the drive" if judged.grade == "Usable" else "Use the drive for prediction only"

@@ -4,14 +4,11 @@ from __future__ import annotations
 
 from base64 import b64encode
 from collections.abc import Mapping
-from datetime import date
-from importlib.resources import files
 from io import StringIO
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-from jinja2 import Environment, StrictUndefined
 from markupsafe import Markup
 
 from swashplate.crane import CraneRun, Judgment
@@ -23,10 +20,12 @@ from swashplate.report.fit_report.page import (
     Section,
     listed_block,
     page,
+    rendered,
     script_json,
     text,
+    titled,
 )
-from swashplate.tables import Table, count, listed, write_text
+from swashplate.tables import count, listed, write_text
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -74,20 +73,14 @@ def write_scene(runs: CraneRun | Mapping[str, CraneRun], path: str | Path) -> No
             for name, run in named.items()
         ],
     }
-    css, js, template = (
-        files("swashplate.report.scene").joinpath(f"scene.{each}").read_text("utf-8")
-        for each in ("css", "js", "html")
-    )
-    environment = Environment(
-        autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
-    )
-    made = environment.from_string(template).render(
+    made = rendered(
+        "scene/scene.html",
+        ("scene.js",),
+        ("scene.css",),
         title=first.crane.title,
         names=list(named),
         assumed=first.crane.assumed,
         data=script_json(content),
-        css=Markup(css),
-        js=Markup(js),
     )
     write_text(made, path)
 
@@ -141,7 +134,7 @@ def write_judgment(judgment: Judgment, path: str | Path) -> None:
     summary = [
         Block("verdict", (light(look, "works" if judgment.passed else "fails"), verdict), look),
         _drawn(plot_judgment(judgment), "Swing of each variant in each seaway"),
-        *_tables(*remedies),
+        *(block for each in remedies for block in titled(each)),
     ]
     if judgment.tried and judgment.remedies:  # else the verdict says so
         summary.append(text(f"Tried, and not enough: {listed(judgment.tried)}.", "remark"))
@@ -150,7 +143,7 @@ def write_judgment(judgment: Judgment, path: str | Path) -> None:
         periods = np.linspace(4.0, 14.0, 21)
         seas = [study.sea.sea] if study.sea and isinstance(study.sea.sea, str) else []
         followable = plot_follow(crane.follow(periods, seas=seas, seaway=study.sea, **pose))
-        limiting = [text(LIMITS_IN_WORDS), _drawn(followable, FOLLOWED), *_tables(limits)]
+        limiting = [text(LIMITS_IN_WORDS), _drawn(followable, FOLLOWED), *titled(limits)]
     try:
         runs = {name: judgment.run(name, judgment.typical) for name in (NONE, judged)}
         caption = f"Seaway {judgment.typical}, in which '{judged}' swings as in half of all seaways"
@@ -169,21 +162,19 @@ def write_judgment(judgment: Judgment, path: str | Path) -> None:
     geometry = Block("details", [Block("table", crane.table())], "Geometry, with its sources")
     sections = [
         Section("summary", "Summary", [*summary, *listed_block(rests)]),
-        Section("swing", "Swing", [text(IN_WORDS), *_tables(swings, differences)]),
+        Section("swing", "Swing", [text(IN_WORDS), *titled(swings), *titled(differences)]),
         Section("limits", "Limits of the drives", limiting),
         Section("example", "One of the seaways", example),
         Section("basis", "What it rests on", [*listed_block(basis), geometry, text(ASSUMED)]),
     ]
-    content = {
-        "what": "Crane",
-        "title": crane.title or crane.name,
-        "facts": f"{seaway_words(study.sea)} · {count(len(study.seeds), 'seaway')} · "
+    made = page(
+        sections,
+        what="Crane",
+        title=crane.title or crane.name,
+        facts=f"{seaway_words(study.sea)} · {count(len(study.seeds), 'seaway')} · "
         f"{count(len(judgment.names) - 1, 'variant')} beside no control",
-        "virtual": False,
-        "date": f"{date.today():%d %B %Y}",
-        "run_data": [],
-    }
-    write_text(page([each for each in sections if each.blocks], content), path)
+    )
+    write_text(made, path)
 
 
 def _drawn(figure: Figure, caption: str) -> Block:
@@ -197,11 +188,3 @@ def _drawn(figure: Figure, caption: str) -> Block:
     drawn = drawn[drawn.index("<svg") :]
     look = '<svg class="chart" style="min-width: 600px"'
     return Block("figure", Markup(drawn.replace("<svg", look, 1)), caption)
-
-
-def _tables(*tables: Table) -> list[Block]:
-    made = []
-    for each in tables:
-        made += [Block("heading", each.title, "h3"), Block("table", each)]
-        made += [text(each.caption, "remark")] if each.caption else []
-    return made
