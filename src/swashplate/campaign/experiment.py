@@ -121,9 +121,11 @@ class InputSignal(Result):
         values = self.at(time)
         for each, instant in found:
             near = np.abs(time - each.middle) <= 0.5 * each.apart + RISE
-            first, last = self.values[each.place], self.values[each.place + 1]
+            earlier, later = self.time[each.place : each.place + 2]
+            before = self.at(np.minimum(time[near], earlier))
             done = np.clip((time[near] - instant) / RISE + 0.5, 0.0, 1.0)
-            values[near] = first + (last - first) * done**2 * (3.0 - 2.0 * done)
+            jump = self.at(np.maximum(time[near], later)) - before
+            values[near] = before + jump * done**2 * (3.0 - 2.0 * done)
         return replace(self, time=time, values=values)
 
     def at(self, time: Array) -> Array:
