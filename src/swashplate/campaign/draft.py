@@ -307,7 +307,7 @@ def _axis_lines(
     for table, each in signals:
         tables[table] = _signal_lines(each, parts[each.name], counts_per_turn)
         tables[table] += [clocks[each.name]] * (clocks[each.name] not in ("", main))
-    held = 'interpolation = "previous"    # guessed: held between samples; or "linear"'
+    held = 'interpolation = "previous"    # guessed: by the controller; of another logger "linear"'
     tables["input"] += [held, *(f"# another input? '{each.name}'" for each in axis.inputs[1:])]
     lines = [f"[axes.{toml_key(name)}]", own, main, start, ""]
     for table, entries in tables.items():

@@ -47,6 +47,7 @@ from swashplate.identification.validation import RunQuality, run_qualities
 from swashplate.parameters.definitions import columns_of
 from swashplate.parameters.parameter_set import ParameterSet
 from swashplate.results import Result
+from swashplate.tables import count
 
 if TYPE_CHECKING:
     from swashplate.tables import Table
@@ -203,6 +204,12 @@ class Fit(Result):
             )
             said += [*each.identifiability.sentences(), *each.uncertainty.sentences()]
             said += each.bounds_reached()
+        edges = {each for stage in self.stages for each in stage.problem.unknowns.names}
+        number = sum(each.startswith(EDGE) for each in edges)
+        if number:
+            said.append(
+                f"Commands jump {count(number, 'time')} between two samples: when is estimated."
+            )
         return (*said, tables.fixed_line(self))
 
 

@@ -13,6 +13,7 @@ from swashplate.errors import InputError
 from swashplate.identification.drive_model import START_PRESSURE, DriveModel, true_value
 from swashplate.identification.identifiability import GAUGES
 from swashplate.identification.intervals import Estimate
+from swashplate.identification.model import EDGE
 from swashplate.identification.noise import LEVEL
 from swashplate.identification.setup import ModelSetup
 from swashplate.identification.validation import ignored_windows, pooled, with_speeds
@@ -146,6 +147,8 @@ def meaning_of(name: str, stage: StageFit | None = None) -> str:
     side = name.rpartition("_")[2]
     if kind == "offset":
         return f"free zero of {channel}"
+    if name.startswith(EDGE):
+        return "instant of the command's jump, after the middle of both samples"
     if stage is not None and stage.stage.part == "model":
         return "number of the state at the first sample" if name.startswith("start.") else ""
     if name == START_PRESSURE:
