@@ -141,8 +141,14 @@ def draft_campaign(
         among = f" among {left}" if left else ""
         lines += [f"{NO_ENCODER}{among}; counts_per_turn = {counts_per_turn:.12g} is left out", ""]
     text, runs = "\n".join(lines), list[_Run]()
+    stems = [log.path.stem for log in opened]
     for log, read in zip(opened, numbers, strict=True):
-        runs.append(_run(log, read, axes, folder, text))
+        made = _run(log, read, axes, folder, text)
+        if stems.count(log.path.stem) > 1:
+            # logs of one name in several folders, or formats
+            near = log.path.resolve().parent.name, log.path.name
+            made.more.insert(0, f"name = {toml_string('/'.join(near))}")
+        runs.append(made)
     held_back = _held_back([each for each in runs if each.role == '"fit"'])
     for each in runs:
         role = '"validate"' if each is held_back else each.role

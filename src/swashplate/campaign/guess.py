@@ -17,6 +17,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from swashplate.campaign.campaign import Campaign
 from swashplate.campaign.experiment import Channel, Experiment
 from swashplate.campaign.quality import spiked
 from swashplate.campaign.samples import interpolate_counts
@@ -187,8 +188,10 @@ def _mean_speeds(time: Array, position: Array, begins: Array, width: float) -> A
     return np.asarray((last - 2.0 * middle + first) / width**2)
 
 
-def guess_drive(experiments: Sequence[Experiment]) -> Guess:
+def guess_drive(tests: Campaign | Sequence[Experiment]) -> Guess:
     """First guess from the runs of one axis, by their commands and their speeds or positions.
+
+    Of a campaign from those with the role ``"fit"``.
 
     Runs need a voltage as input and a channel of the kind shaft_speed, position or encoder_counts;
     what is ignored does not count.
@@ -199,6 +202,7 @@ def guess_drive(experiments: Sequence[Experiment]) -> Guess:
         If no run has such a channel, the input is no voltage, the speed of a run or of all goes
         against the command, a channel has gross spikes, or too little moves.
     """
+    experiments = tests.select(role="fit") if isinstance(tests, Campaign) else tuple(tests)
     runs, unit, spoilt = list[_Run](), "", spiked(experiments)
     reversed_runs = list[tuple[str, str]]()
     kinds: tuple[ChannelKind, ...] = ("shaft_speed", "encoder_counts", "position")

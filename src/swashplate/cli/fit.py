@@ -326,6 +326,7 @@ def validate(
     """
     from swashplate.identification import tables
     from swashplate.identification.assessment import versions
+    from swashplate.identification.data_checks import refuse_unsound, spike_findings
     from swashplate.identification.validation import predict, with_speeds
     from swashplate.identification.verdict import verdict
 
@@ -343,6 +344,7 @@ def validate(
             "another one is asked for with --role."
         )
     with working("Predicting"):
+        refuse_unsound(spike_findings(runs, "linear"))
         if model is not None:
             parameters = words.model_parameters_of(drive, model, runs)
         assert parameters is not None

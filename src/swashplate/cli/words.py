@@ -94,8 +94,11 @@ def campaign_of(path: Path, axis: str | None = None) -> tuple[Campaign, str]:
 
 
 def runs_to_fit(campaign: Campaign, axis: str) -> tuple[Experiment, ...]:
-    """The runs of an axis with the role 'fit', at least one."""
+    """The runs of an axis with the role 'fit', at least one; gross spikes of others are refused."""
+    from swashplate.identification.data_checks import refuse_unsound, spike_findings
+
     runs = campaign.select(axis=axis, role="fit")
+    refuse_unsound(spike_findings(campaign.select(axis=axis, role="validate"), "linear"))
     if not runs:
         raise InputError(f"{campaign.path}: no run of the axis '{axis}' has the role 'fit'.")
     return tuple(runs)

@@ -272,6 +272,8 @@ def fit(
         raise InputError("There is no run to fit.")
     nominal = model.parameters if isinstance(model, Drive) else model
     doubts = refuse_unsound(spike_findings(runs, loss))
+    if isinstance(tests, Campaign):
+        doubts += refuse_unsound(spike_findings(tests.select(role="validate"), "linear"))
     if not isinstance(nominal, ParameterSet):
         if not isinstance(nominal, ModelSetup):
             entries = free if isinstance(free, Mapping) else {}

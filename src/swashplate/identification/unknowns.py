@@ -28,7 +28,7 @@ def _numbers(content: object) -> Array:
 
 Vector = Annotated[Array, PlainValidator(_numbers), PlainSerializer(np.ndarray.tolist)]
 """The numbers that a solver moves, (K,); in a file a list."""
-AT_BOUND = 1e-6
+AT_BOUND = 1e-4
 """Part of the reach between the bounds within which a number is at one of them."""
 
 

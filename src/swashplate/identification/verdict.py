@@ -66,6 +66,8 @@ scale is 15 % off gave 12 %."""
 DRIFTS, DRIFTS_AWAY = 0.01, 0.03
 """Change of a channel over the campaign from which values are those of a mean machine, and from
 which no one set of parameters holds."""
+ALONE = " of a run of its own"
+"""How the names of criteria on single runs end."""
 FEWEST_RUNS = 4
 """Runs of which one can stand out."""
 SAME = 1e-6
@@ -163,7 +165,16 @@ def verdict(
     """
     runs = [each for stage in stages for each in stage.runs]
     fitted = Side.of("fitted", runs)
-    out = Side.of("held-out" if stages else "predicted", predicted)
+    fitted_to = {name for each in stages for name in each.problem.channels}
+    # a current that no stage was fitted to is that of an amplifier that nobody identified
+    asked = [
+        each
+        for each in predicted
+        if not stages
+        or each.channel in fitted_to
+        or each.experiment[each.channel].kind not in CURRENTS
+    ]
+    out = Side.of("held-out" if stages else "predicted", asked)
     criteria, misfit = [*_convergence(stages, planned)], None
     for side in (fitted, out):
         criteria += [_followed(side), _no_worse_than_mean(side)] if side.qualities else []
@@ -197,7 +208,8 @@ def verdict(
         units = f"The estimates are in units of the fixed {listed(misfit.units)}."
         assumed = [units] * bool(misfit.units) + [f"{e.assumption}." for e in misfit.assumed]
     if unusable:
-        headline = f"Not usable: {unusable}."
+        alone = [each.failure for each in criteria if each.failure and each.name.endswith(ALONE)]
+        headline = f"Not usable: {'; '.join([unusable, *alone])}."
     elif not stages:
         number = len({each.experiment.name for each in out.qualities})
         headline = f"Predicts {out.accuracy} over {number} run{'s' if number > 1 else ''}."
@@ -522,7 +534,7 @@ def _of_one_run(
     found.sort(key=lambda each: -abs(each[0]))
     far = [words for size, words in found if abs(size) > limit][:3]
     return Criterion(
-        f"{what} of a run of its own",
+        f"{what}{ALONE}",
         f"{found[0][0]:+.2g} {unit}" if found else "none" if judged else "-",
         f"{limit:g} {unit}",
         why if judged else f"fewer than {FEWEST_RUNS} runs measure the same motion",
