@@ -4,7 +4,7 @@ import pytest
 
 from swashplate import InputError
 from swashplate.parameters.definitions import CATALOGUE
-from swashplate.units import to_si
+from swashplate.units import si_exponents, to_si
 
 
 @pytest.mark.parametrize(
@@ -29,6 +29,12 @@ def test_every_unit_of_the_catalogue_is_understood() -> None:
     for definition in CATALOGUE.values():
         hundredth = f"percent * {definition.unit}" if definition.unit != "1" else "percent"
         assert to_si(1.0, hundredth, definition.unit, definition.symbol) == pytest.approx(0.01)
+
+
+@pytest.mark.parametrize("unit", ["m2", "foo", "bit", "m/", "sqrt(Pa)", "bar"])
+def test_units_that_are_no_whole_powers_of_base_units_have_none(unit: str) -> None:
+    assert si_exponents("N m") == {"kg": 1, "m": 2, "s": -2}
+    assert si_exponents(unit) is None
 
 
 def test_wrong_and_unknown_units() -> None:
