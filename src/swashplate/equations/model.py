@@ -502,7 +502,8 @@ def discretised(
     method : {"euler", "heun", "midpoint", "rk4"}
         Explicit Runge-Kutta method, of order 1, 2, 2 and 4.
     substeps : int
-        Steps of the method from one sample to the next, of equal length.
+        Steps of the method from one sample to the next, of equal length. They are written out, so
+        that many take long to compile; those of `simulate` and `OwnModel` do not.
     project : equation, optional
         Of the same arguments: the state within its bounds, such as end stops, done to the state at
         the end of each sub-step.
