@@ -409,6 +409,15 @@ def returned(state: Flow, level: float) -> Flow:
     return Flow(state.flow + level)
 
 
+class Load(NamedTuple):
+    load_torque: float
+
+
+@equation
+def pulled(state: Load, shaft_speed: float) -> Load:
+    return Load(shaft_speed)
+
+
 @equation
 def doubled(level: float) -> float:
     return 2.0 * level
@@ -466,9 +475,12 @@ TANK, PUMP = Model("tank", Outlet, Fill, filled), Model("pump", Outlet, Flow, re
 FED = Model("tank", Outlet, Fill, filled, taps={"flow": Tap("inflow")})
 LATE = "needs 'level', which is known only behind tank: put tank before pump"
 LOOP = "a loop must be one model, or be closed sample by sample"
+LOAD = Model("load", Outlet, Load, pulled)
 JOINED = {
     "order": ((PUMP, FED), {}, f"Model x: pump {LATE}"),
     "loop": ((TANK, PUMP), {}, f"tank needs 'flow', which is known only behind pump: {LOOP}"),
+    "load": ((LOAD, *pump_drive.parts), {}, "load needs 'shaft_speed', .* behind pump: a loop"),
+    "drive": ((*pump_drive.parts, LOAD), {}, "pump needs 'load_torque', .* behind load: a loop"),
     "link": ((TANK,), {"flow": doubled}, f"tank needs 'flow', .* behind tank: {LOOP}"),
     "text": ((TANK, "pump"), {}, "Model x is joined of models, not of 'pump'"),
 }

@@ -332,10 +332,14 @@ def _wrong(model: Model) -> Iterator[str]:
 def _own_names(model: Model) -> Iterator[tuple[str, str]]:
     """Names of a single model's states, signals and integrals, with what they are in."""
     yield from ((name, "the integrals") for name in model.integrals)
-    # the package's pump keeps its last load torque, and its sources pass their current on
-    if not model.state.__module__.startswith("swashplate."):
+    if not _packaged(model):
         for type_ in filter(None, (model.state, model.signals)):
             yield from ((name, type_.__name__) for name in floats_of(type_))
+
+
+def _packaged(model: Model) -> bool:
+    """Whether a single model is the package's: some pass an input on, or keep it, by its name."""
+    return bool(model.state.__module__.startswith("swashplate."))
 
 
 def _no_floats(type_: type[Any]) -> Iterator[tuple[str, str]]:
@@ -421,7 +425,7 @@ def _too_late(model: Model) -> Iterator[str]:
         signal, part = model.parts[i].tap(name).signal, model.parts[i].name
         link, source = model.links.get(signal), _source(model.parts[i + 1 :], signal)
         after = link.after if link else i + 1 + source.part if source else -1
-        passed_on = signal in model.parts[i].signal_names
+        passed_on = signal in model.parts[i].signal_names and _packaged(model.parts[after])
         if after < i or passed_on or model.link_of(i, name) is not None:
             continue
         giver = model.parts[after].name
