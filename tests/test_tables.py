@@ -11,7 +11,14 @@ from hypothesis import strategies as st
 from swashplate import FileError, InputError
 from swashplate.parameters.definitions import CATALOGUE
 from swashplate.tables import UNIT, Cell, Column, Table, joined, spread, write_table, write_whole
-from swashplate.units import chosen_unit, display_unit, shown_in, to_si, units_of_choice
+from swashplate.units import (
+    chosen_unit,
+    display_unit,
+    shown_in,
+    si_exponents,
+    to_si,
+    units_of_choice,
+)
 
 
 @pytest.fixture
@@ -210,6 +217,12 @@ def test_every_unit_of_the_catalogue_is_understood() -> None:
     for definition in CATALOGUE.values():
         hundredth = f"percent * {definition.unit}" if definition.unit != "1" else "percent"
         assert to_si(1.0, hundredth, definition.unit, definition.symbol) == pytest.approx(0.01)
+
+
+@pytest.mark.parametrize("unit", ["m2", "foo", "bit", "m/", "sqrt(Pa)", "bar"])
+def test_units_that_are_no_whole_powers_of_base_units_have_none(unit: str) -> None:
+    assert si_exponents("N m") == {"kg": 1, "m": 2, "s": -2}
+    assert si_exponents(unit) is None
 
 
 def test_wrong_and_unknown_units() -> None:

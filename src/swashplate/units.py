@@ -33,6 +33,17 @@ LONGEST = 80
 _POWER = re.compile(r"(?:\*\*|\^)\s*\(?\s*[+-]?\d{1,2}(?:[./]\d{1,3})?\s*\)?(?!\s*(?:\*\*|\^|\d))")
 """A power as a unit has it: a plain number, no power of a power."""
 
+_UNREADABLE = (
+    ArithmeticError,
+    AssertionError,
+    AttributeError,
+    RecursionError,
+    TokenError,
+    TypeError,
+    ValueError,
+)
+"""What Pint's parser meets unreadable text with."""
+
 
 def _written_out(unit: str) -> str:
     return unit.replace("sqrt(Pa)", "Pa^0.5")
@@ -80,7 +91,6 @@ def to_si(value: float, unit: str, si: str, what: str) -> float:
         # for pint a hertz is one a second, and so is a radian a second
         return 2.0 * pi * to_si(value, unit, "Hz", what)
     from pint import DimensionalityError, UndefinedUnitError
-    from pint.errors import DefinitionSyntaxError
 
     registry, wanted = _registry(), "rad/s or rpm" if si == "rad/s" else si
     try:
@@ -94,17 +104,7 @@ def to_si(value: float, unit: str, si: str, what: str) -> float:
             f"{what} is given in '{unit}', which does not measure the same as {si}; "
             f"give it in {wanted}."
         ) from None
-    except (
-        ArithmeticError,
-        DefinitionSyntaxError,
-        AssertionError,
-        AttributeError,
-        RecursionError,
-        TokenError,
-        TypeError,
-        ValueError,
-    ):
-        # pint's parser meets unreadable text with any of these
+    except _UNREADABLE:
         raise InputError(
             f"{what} has the unreadable unit '{shown}'; give it in {wanted}."
         ) from None
@@ -133,12 +133,15 @@ _BASE = {
 def si_exponents(unit: str) -> dict[str, int] | None:
     """Exponents of the base units that an SI unit is made of, ``"N m"`` → kg 1, m 2, s -2.
 
-    None where one is a fraction, as of √Pa.
+    None where one is a fraction, as of √Pa, or where Pint does not know the unit or its base.
     """
-    base = _registry().parse_units(_written_out(unit).replace("^", "**"))
-    factor, root = _registry().get_base_units(base)
+    try:
+        base = _registry().parse_units(_written_out(unit).replace("^", "**"))
+        factor, root = _registry().get_base_units(base)
+    except _UNREADABLE:
+        return None
     powers = {str(name): float(power) for name, power in root._units.items()}
-    if factor != 1.0 or not all(power.is_integer() for power in powers.values()):
+    if factor != 1.0 or not all(n.is_integer() and k in _BASE for k, n in powers.items()):
         return None
     found = {_BASE[name]: int(power) for name, power in powers.items()}
     return {name: found[name] for name in _BASE.values() if name in found}

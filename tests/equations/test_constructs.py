@@ -1,7 +1,7 @@
 """Every construct that an equation may use: value and derivatives against differences."""
 
 import math
-from math import acos, asin, atan2, cos, exp, floor, hypot, log, sin, sqrt, tan
+from math import acos, asin, atan2, cos, exp, floor, hypot, log, sin, sqrt, tan, tanh
 from typing import Any, NamedTuple
 
 import pytest
@@ -100,7 +100,7 @@ def test_statements() -> None:
 def functions(x: float, y: float) -> tuple[float, float]:
     first = sqrt(x) + exp(-x) * log(y) + sin(x * y) - cos(x) / tan(y) + math.atan(x)
     second = asin(x / 2.0) * acos(y / 3.0) + atan2(y, x) + hypot(x, 2.0 * y) + floor(x) * y
-    return first, second
+    return first - tanh(x * y), second
 
 
 @equation

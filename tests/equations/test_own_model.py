@@ -370,6 +370,44 @@ def bare(state: Fill) -> float:
     return state.level
 
 
+@equation
+def mixed(state: Fill, level: float) -> Fill:
+    return Fill(state.level + level)
+
+
+@equation
+def still(state: Fill) -> Fill:
+    return state
+
+
+class Flow(NamedTuple):
+    flow: float
+
+
+@equation
+def passed_on(flow: float) -> Flow:
+    return Flow(2.0 * flow)
+
+
+@equation
+def returned(state: Flow, level: float) -> Flow:
+    return Flow(state.flow + level)
+
+
+class Load(NamedTuple):
+    load_torque: float
+
+
+@equation
+def pulled(state: Load, shaft_speed: float) -> Load:
+    return Load(shaft_speed)
+
+
+@equation
+def doubled(level: float) -> float:
+    return 2.0 * level
+
+
 WIDE = Outlet(1.0)
 
 
@@ -400,6 +438,14 @@ REFUSED = {
         {"taps": {"flow": Tap("flow", "width")}, "p": Outlet(-0.1)},
         "tank: width is -0.1 s, but a delay is at least 0",
     ),
+    "input and state": (
+        {"step": mixed},
+        "Model tank: 'level' is both an input and in Fill: rename",
+    ),
+    "tap and state": ({"taps": {"flow": Tap("level")}}, "'level' is both an input and in Fill"),
+    "input and signal": ({"sample": passed_on}, "'flow' is both an input and in Flow: rename one"),
+    "time": ({"integrals": {"time": "level"}}, "'time' is in the integrals, but means the time st"),
+    "no input": ({"step": still}, "tank has no input 'flow'; it has none"),
     "no delay": ({"taps": {"flow": Tap("flow", "width")}, "p": Outlet(np.nan)}, "width is nan s"),
 }
 
@@ -408,6 +454,42 @@ REFUSED = {
 def test_a_model_that_cannot_be_marched_is_refused(options: dict[str, Any], sentence: str) -> None:
     with pytest.raises(InputError, match=sentence):
         run(**options)
+
+
+TANK, PUMP = Model("tank", Outlet, Fill, filled), Model("pump", Outlet, Flow, returned)
+FED = Model("tank", Outlet, Fill, filled, taps={"flow": Tap("inflow")})
+LATE = "needs 'level', which is known only behind tank: put tank before pump"
+LOOP = "a loop must be one model, or be closed sample by sample"
+LOAD = Model("load", Outlet, Load, pulled)
+JOINED = {
+    "order": ((PUMP, FED), {}, f"Model x: pump {LATE}"),
+    "loop": ((TANK, PUMP), {}, f"tank needs 'flow', which is known only behind pump: {LOOP}"),
+    "load": ((LOAD, *pump_drive.parts), {}, "load needs 'shaft_speed', .* behind pump: a loop"),
+    "drive": ((*pump_drive.parts, LOAD), {}, "pump needs 'load_torque', .* behind load: a loop"),
+    "link": ((TANK,), {"flow": doubled}, f"tank needs 'flow', .* behind tank: {LOOP}"),
+    "text": ((TANK, "pump"), {}, "Model x is joined of models, not of 'pump'"),
+}
+
+
+@pytest.mark.parametrize(("parts", "links", "sentence"), JOINED.values(), ids=JOINED)
+def test_models_that_cannot_be_in_series_are_refused(parts, links, sentence: str) -> None:
+    with pytest.raises(InputError, match=sentence):
+        join("x", *parts, links=links)
+
+
+def test_a_part_of_a_joined_model_is_named_in_its_numbers() -> None:
+    whole = join("whole", FED, PUMP)
+    with pytest.raises(InputError, match=r"whole are its parameters\(tank=..., pump=...\)"):
+        simulate(whole, WIDE, {"inflow": np.ones(5)}, 1.0)
+
+
+def test_a_derivative_that_overflows_is_named() -> None:
+    tank = Model("tank", Outlet, Fill, growing)
+    columns = {"parameters": ["width", "start.level"], "begin": {"level": 0.0}}
+    with pytest.raises(DomainError, match=r"of level by start\.level is inf at sample 2"):
+        sensitivities(tank, WIDE, {"flow": np.zeros(5)}, 1.0, output="level", **columns)
+    with pytest.raises(InputError, match="no limit 'full'; there are none"):
+        simulate(tank, WIDE, {"flow": np.zeros(5)}, 1.0).active("full")
 
 
 @pytest.mark.parametrize("value", ['"high"', "1j", "[flow]"])

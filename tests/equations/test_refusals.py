@@ -85,6 +85,7 @@ REFUSED = {
     "y = x(1.0)": ("a call of the argument x", "by their names"),
     "y = t.count(x)": ("the method count", "made anew"),
     "y = fine(*t)": ("with *", "write the elements out"),
+    "y = f(x, t)": ("a call of itself", "literal range"),
     "return": ("a return of nothing", "return a value"),
 }
 
@@ -127,7 +128,6 @@ DERIVED = {
     "if x > 0.0: z = 1.0\n    y = z": ("z without a value on some way", "on every way"),
     "if x > 0.0: z = t\n    else: z = x\n    y = x": ("z of two structures", "same kind"),
     "if t > x: y = 2.0": ("a comparison of a tuple", "compare its elements"),
-    "y = f(x, t)": ("a call of itself", "literal range"),
     "y = root(x, 0.0, 1.0)": ("root of something else", "name of an @equation"),
     "y = root(fine, 0.0, 1.0, x)": ("root of fine with other", "the unknown and the rest"),
     "y = repeated(fine, 3.0, t)": ("repeated of fine with other arguments", "the rest"),
@@ -161,6 +161,15 @@ def test_a_notebooks_cell_is_a_source() -> None:
     text = "@equation\ndef f(x: float) -> float:\n    return x * x\n"
     f = defined(text, "/tmp/ipykernel_123/456.py")
     assert derive(f, "x").python(3.0) == (9.0, 6.0)
+
+
+def test_two_equations_that_call_each_other_are_refused() -> None:
+    f = defined(
+        "@equation\ndef g(x: float) -> float:\n    return f(x)\n\n"
+        "@equation\ndef f(x: float) -> float:\n    return g(x)\n"
+    )
+    with pytest.raises(EquationError, match="a call of itself in f"):
+        derive(f, "x")
 
 
 def test_a_plain_function_is_no_equation() -> None:

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from swashplate import Drive, export
+from swashplate.models.drive import pump_drive
 from swashplate.simulation.run import Sample
 
 fmpy = pytest.importorskip("fmpy")
@@ -488,3 +489,5 @@ def test_comparison_refuses_what_it_cannot_run(hoist, tmp_path):
     path = export.fmu(hoist, tmp_path / "drive.fmu")
     with pytest.raises(ValueError, match="two samples"):
         export.compare(path, hoist, [1.0])
+    with pytest.raises(ValueError, match="with a drive, not with Model"):
+        export.compare(path, pump_drive, command(10))

@@ -2,7 +2,7 @@
 
 import shutil
 import subprocess
-from math import floor
+from math import floor, tanh
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -164,7 +164,7 @@ class Motion(NamedTuple):
 
 @equation
 def oil_rates(state: Motion, flow: float, p: Oil) -> Motion:
-    return Motion(p.stiffness * (flow - state.speed), state.pressure - p.drag * state.speed)
+    return Motion(p.stiffness * (flow - state.speed), state.pressure - p.drag * tanh(state.speed))
 
 
 class Lag(NamedTuple):

@@ -73,6 +73,7 @@ def test_priors() -> None:
     [
         (lambda: bounded("Z2", 0.0, relative=(0.5, 2.0)), "Z2 is nominally 0.*absolute bounds"),
         (lambda: bounded("a", 5.0, absolute=(0.0, 2.0)), "begins at 5, outside its bounds 0 and 2"),
+        (lambda: Unknown("a", np.nan, 0.0, 2.0), "from another value; 'swashplate guess' reads"),
         (lambda: bounded("a", 1.0, absolute=(2.0, 0.0)), "lower one first"),
         (lambda: bounded("a", 1.0, absolute=(0.0, 2.0), log=True), "above 0"),
         (lambda: bounded("a", 1.0, absolute=(0.0, 2.0), prior=Prior(1.0, 0.0)), "positive"),

@@ -314,6 +314,7 @@ FUNCTIONS: dict[str, Callable[[Node, Node, Callable[[Node], Node]], Node]] = {
     "cos": lambda a, value, over: negative(make("sin", a)),
     "tan": lambda a, value, over: ex.plus(ONE, make("*", value, value)),
     "atan": lambda a, value, over: ex.inverse(ex.plus(ONE, make("*", a, a))),
+    "tanh": lambda a, value, over: minus(ONE, make("*", value, value)),
     "asin": lambda a, value, over: _arc(a, over),
     "acos": lambda a, value, over: negative(_arc(a, over)),
 }

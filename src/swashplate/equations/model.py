@@ -321,6 +321,25 @@ def _wrong(model: Model) -> Iterator[str]:
     for name in [path for paths in model.free_start.values() for path in paths]:
         if name not in states:
             yield f"{says}free_start names '{name}', but the state has {', '.join(states)}."
+    inputs = {model.tap(name).signal for name in known}
+    for name, where in _own_names(model):
+        if name in inputs:
+            yield f"{says}'{name}' is both an input and in {where}: rename one of them."
+        if name == "time":
+            yield f"{says}'time' is in {where}, but means the time stamps: rename it."
+
+
+def _own_names(model: Model) -> Iterator[tuple[str, str]]:
+    """Names of a single model's states, signals and integrals, with what they are in."""
+    yield from ((name, "the integrals") for name in model.integrals)
+    if not _packaged(model):
+        for type_ in filter(None, (model.state, model.signals)):
+            yield from ((name, type_.__name__) for name in floats_of(type_))
+
+
+def _packaged(model: Model) -> bool:
+    """Whether a single model is the package's: some pass an input on, or keep it, by its name."""
+    return bool(model.state.__module__.startswith("swashplate."))
 
 
 def _no_floats(type_: type[Any]) -> Iterator[tuple[str, str]]:
@@ -358,12 +377,16 @@ def join(
     Raises
     ------
     InputError
-        If two parts have one name, or an equation asks for a signal that there is not.
+        If two parts have one name, an equation asks for a signal that there is not, or a part for
+        one that is only known behind it.
 
     Notes
     -----
     A signal must be known before it is needed: loops without delay between parts are not possible.
     """
+    for part in parts:
+        if not isinstance(part, Model):
+            raise InputError(f"Model {name} is joined of models, not of {part!r}.")
     single = tuple(inner for part in parts for inner in part.parts)
     names = [part.name for part in single]
     if len(set(names)) != len(names):
@@ -384,7 +407,35 @@ def join(
         return NamedTuple(f"{name.title()}{attribute.title()}", present)
 
     kinds = {each: gathered(each) for each in ("parameters", "state", "options", "given")}
-    return Model(name, step=single[0].step, parts=single, links=linked, **kinds, **changes)
+    made = Model(name, step=single[0].step, parts=single, links=linked, **kinds, **changes)
+    for wrong in _too_late(made):
+        raise InputError(wrong)
+    return made
+
+
+def _too_late(model: Model) -> Iterator[str]:
+    """What a part of a joined model would take from outside, although it is known behind it."""
+    before = [set[int]() for _ in model.parts]
+    asked = [(i, name) for i, part in enumerate(model.parts) for name in part.input_types]
+    for i, name in asked:
+        known = model.link_of(i, name)
+        for each in known.sources if known else ():
+            before[i] |= {each.part, *before[each.part]}
+    for i, name in asked:
+        signal, part = model.parts[i].tap(name).signal, model.parts[i].name
+        link, source = model.links.get(signal), _source(model.parts[i + 1 :], signal)
+        after = link.after if link else i + 1 + source.part if source else -1
+        passed_on = signal in model.parts[i].signal_names and _packaged(model.parts[after])
+        if after < i or passed_on or model.link_of(i, name) is not None:
+            continue
+        giver = model.parts[after].name
+        instead = f"put {giver} before {part}"
+        if i in {after, *before[after]}:
+            instead = "a loop must be one model, or be closed sample by sample with steppers"
+        yield (
+            f"Model {model.name}: {part} needs '{signal}', which is known only behind {giver}: "
+            f"{instead}."
+        )
 
 
 def _source(parts: Sequence[Model], signal: str) -> Source | None:
@@ -455,7 +506,8 @@ def discretised(
     method : {"euler", "heun", "midpoint", "rk4"}
         Explicit Runge-Kutta method, of order 1, 2, 2 and 4.
     substeps : int
-        Steps of the method from one sample to the next, of equal length.
+        Steps of the method from one sample to the next, of equal length. They are written out, so
+        that many take long to compile; those of `simulate` and `OwnModel` do not.
     project : equation, optional
         Of the same arguments: the state within its bounds, such as end stops, done to the state at
         the end of each sub-step.

@@ -298,6 +298,8 @@ def _check(source: Parsed) -> None:
         if isinstance(each, ast.Subscript) and not _is_index(each.slice, counters):
             refuse(each, "an index that is no whole number", "write the number, as in s[0]")
         if isinstance(each, ast.Call) and each not in ranges:
+            if isinstance(each.func, ast.Name) and each.func.id == source.node.name:
+                refuse(each, "a call of itself", "write a loop over a literal range")
             _check_call(source, each)
     if not _returns(body):
         refuse(node, "an end without return", "return a value on every way")

@@ -392,10 +392,16 @@ def compare(path: str | Path, drive: Drive, voltage: ArrayLike) -> Comparison:
     Raises
     ------
     InputError
-        If FMPy is not installed, the command is none, or the FMU fails.
+        For a model of one's own, or if FMPy is not installed, the command is none, or the FMU
+        fails.
     FileError
         If the file is no FMU.
     """
+    if not isinstance(drive, Drive):
+        raise InputError(
+            f"An FMU is compared with a drive, not with {drive!r}; run that of a model of one's "
+            "own with FMPy, beside simulate."
+        )
     try:
         import fmpy
     except ImportError:

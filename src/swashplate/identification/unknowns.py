@@ -75,10 +75,10 @@ class Unknown:
                 "first, are needed."
             )
         if not low <= self.start <= high:
-            hint = "" if isfinite(self.start) else ", as 'swashplate guess' reads one off the logs"
+            hint = "; 'swashplate guess' reads those of a drive off its logs"
             raise ParameterError(
-                f"{name} begins at {self.start:g}, outside its bounds {low:g} and {high:g}; give "
-                f"the drive that the fit begins from another value{hint}."
+                f"{name} begins at {self.start:g}, outside its bounds {low:g} and {high:g}; let "
+                f"the fit begin from another value{'' if isfinite(self.start) else hint}."
             )
         if self.log and low <= 0.0:
             raise ParameterError(

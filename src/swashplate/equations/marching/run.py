@@ -150,7 +150,8 @@ class Instance:
         known = self.model.external
         for signal in signals:
             if signal not in known:
-                raise InputError(f"{self.name} has no input '{signal}'; it has {', '.join(known)}.")
+                has = ", ".join(known) or "none"
+                raise InputError(f"{self.name} has no input '{signal}'; it has {has}.")
         for i, part in enumerate(self.model.parts):
             for name in part.input_types:
                 signal = part.tap(name).signal
@@ -289,8 +290,13 @@ def instance_of(model: Model, p: Any, *, options: Any = None, given: Any = None)
                     raise InputError(f"Model {part.name} has no {what}, but is passed {number!r}.")
                 continue
             if not isinstance(number, kind):
+                whole = ""
+                if len(model.parts) > 1:
+                    fields = ", ".join(f"{each}=..." for each in getattr(model, what)._fields)
+                    whole = f": those of {model.name} are its {what}({fields})"
                 raise InputError(
-                    f"Model {part.name}: its {what} must be a {kind.__name__}, not {number!r}."
+                    f"Model {part.name}: its {what} must be a {kind.__name__}, not {number!r}"
+                    f"{whole}."
                 )
             if what == "options" and any(each not in (None, True, False) for each in number):
                 raise InputError(
@@ -368,9 +374,8 @@ def begun(instance: Instance, started: Started, begin: Mapping[str, float]) -> A
     known = state_paths(instance.model) if begin else ()
     for path, value in begin.items():
         if path not in known:
-            raise InputError(
-                f"{instance.name} has no state '{path}' to start from; it has {', '.join(known)}."
-            )
+            has = ", ".join(known) or "none"
+            raise InputError(f"{instance.name} has no state '{path}' to start from; it has {has}.")
         if not is_real(value) or not np.isfinite(value):
             raise InputError(f"{path} begins at {value!r}, but must be a finite number.")
         states[known.index(path)] = value

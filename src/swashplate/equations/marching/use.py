@@ -36,7 +36,7 @@ from swashplate.equations.marching.run import (
 )
 from swashplate.equations.marching.stepping import CompiledStep, Machine
 from swashplate.equations.model import Model, parameter_paths
-from swashplate.errors import InputError
+from swashplate.errors import DomainError, InputError
 from swashplate.results import Tabular
 
 if TYPE_CHECKING:
@@ -201,7 +201,8 @@ class Run(Tabular):
         """
         limits = self.instance.model.limit_bits
         if limit not in limits:
-            raise InputError(f"There is no limit '{limit}'; there are {', '.join(limits)}.")
+            known = ", ".join(limits) or "none"
+            raise InputError(f"There is no limit '{limit}'; there are {known}.")
         part, bit = limits[limit]
         if f"limits {part}" not in self.found:
             self._march_again(self.later)
@@ -224,7 +225,8 @@ def inputs_of(
     check_mapping("inputs", inputs)
     instance.check_inputs(inputs)
     if not inputs:
-        raise InputError(f"{instance.name} needs a record of {', '.join(instance.model.external)}.")
+        wanted = ", ".join(instance.model.external) or "an input, but its equations take none"
+        raise InputError(f"{instance.name} needs a record of {wanted}.")
     return on_grid(inputs, rate, **sampling)
 
 
@@ -306,6 +308,13 @@ def sensitivities(
     parameters : sequence of str, optional
         Paths of parameters, or ``start.`` with the path of a state that `begin` names; by default
         all parameters.
+
+    Raises
+    ------
+    InputError
+        For inputs, numbers or names that do not fit the model.
+    DomainError
+        If the model leaves its domain, or a number or a derivative overflows.
     """
     instance = instance_of(model, p, options=options, given=given)
     records = inputs_of(instance, inputs, rate, **sampling)
@@ -315,12 +324,21 @@ def sensitivities(
     if unknown:
         raise InputError(
             f"{model.name} has no parameter '{unknown[0]}'; it has "
-            f"{', '.join(parameter_paths(model))}."
+            f"{', '.join(parameter_paths(model)) or 'none'}."
         )
     (first, record), *others = records.items()
     rest = {name: each.values for name, each in others}
     observed = every_sample(record, output, first, start, rest)
-    return jacobian(instance, observed, columns, Own(begin or {})).columns
+    found = jacobian(instance, observed, columns, Own(begin or {})).columns
+    bad = ~np.isfinite(found)
+    if bad.any():
+        sample = int(np.argmax(bad.any(axis=1)))
+        column = int(np.argmax(bad[sample]))
+        raise DomainError(
+            f"{instance.name}: the derivative of {output} by {columns[column]} is "
+            f"{found[sample, column]} at sample {sample}: check the size of the parameters."
+        )
+    return found
 
 
 # --- one sample at a time -------------------------------------------------------------------------
