@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from tests.campaign.conftest import Drafted
 
-from swashplate import InputError, ParameterError
+from swashplate import Campaign, InputError, ParameterError
 from swashplate.campaign import draft_campaign as draft
 
 
@@ -39,6 +39,7 @@ from swashplate.campaign import draft_campaign as draft
         ("Drehzahl der Trommel", "shaft_speed"),
         ("Hebel", "other"),
         ("Impulse", "encoder_counts"),
+        ("Drehgeber", "encoder_counts"),
         ("oil temperature [degC]", None),
     ],
 )
@@ -73,6 +74,16 @@ def test_a_draft_can_be_read(drafted: Drafted) -> None:
     assert axis["channels"]["encoder_counts"]["counts_per_turn"] == 2526.3
     assert tests["run2"].input.values[-1] == 4.0
     assert tests["run2"]["rectified_current"].values[-1] == pytest.approx(0.4)
+
+
+def test_logs_of_one_name_are_told_apart_by_their_folders(tmp_path: Path) -> None:
+    logs = [tmp_path / day / "run.csv" for day in ("monday", "tuesday")]
+    for each in logs:
+        each.parent.mkdir()
+        each.write_text("t,voltage [V],speed [rpm]\n0,0,0\n0.1,0,0\n0.2,4,9\n", "utf-8")
+    path = tmp_path / "campaign.toml"
+    path.write_text(draft(logs, tmp_path), "utf-8")
+    assert [each.run for each in Campaign.from_toml(path)] == ["monday/run.csv", "tuesday/run.csv"]
 
 
 def test_an_axis_for_each_prefix_and_logs_without_some(tmp_path: Path) -> None:

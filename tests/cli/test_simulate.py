@@ -187,3 +187,5 @@ def test_a_packaged_name_goes_before_a_folder(done, refused, tmp_path):
     (tmp_path / "hoist" / "drive.TOML").write_text(done("show", "slew", "--toml"), "utf-8")
     assert done("show", "hoist/drive.TOML") == done("show", "slew") != done("show", "hoist")
     assert "There is no drive.toml in ./hoist: give a folder" in refused("limits", "./hoist")
+    Path("hoist/parameters.toml").touch()
+    assert "./hoist is the fit of a model of your own" in refused("limits", "./hoist")

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from tests.identification.given import run_of, virtual
 
-from swashplate import Channel, Drive, Experiment, InputError, maneuvers
+from swashplate import Campaign, Channel, Drive, Experiment, InputError, maneuvers
 from swashplate.campaign import guess_drive
 from swashplate.identification.data_checks import (
     Finding,
@@ -147,6 +147,9 @@ def test_a_gross_spike_is_refused_with_the_line_that_leaves_it_out() -> None:
         fit(NOMINAL, spoilt, PUMP)
     with pytest.raises(InputError, match="1 spike"):
         guess_drive(spoilt)
+    held_out = (*GOOD, replace(spoilt[-1], role="validate"))
+    with pytest.raises(InputError, match="1 spike"):
+        fit(NOMINAL, Campaign(Path("campaign.toml"), "", False, {}, held_out), PUMP)
     found = fit(NOMINAL, spoilt, PUMP, loss="soft_l1")
     assert any("1 spike" in each for each in found.doubts)
     assert found.parameters.numbers["Z10"] == pytest.approx(TRUTH.parameters.numbers["Z10"], 0.01)

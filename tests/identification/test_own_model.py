@@ -484,6 +484,9 @@ def test_a_run_with_a_scale_or_a_delay_of_its_own_is_named(
     made = fit(OWN, campaign(*runs[:6]), {"lag": (0.05, 0.2, 2.0), "gain": (0.1, 1.0, 20.0)})
     found = verdict(made.stages, predict(made.parameters, runs[6:]))
     assert f"runs differ in {what} from the others: {said}" in found.headline
+    tight = verdict(made.stages, predict(made.parameters, runs[6:]), required=1e-6)
+    assert "Not usable" in tight.headline
+    assert said in tight.headline
     other = "delay" if what == "scale" else "scale"
     assert f"{other} of a run of its own" not in [e.name for e in found.criteria if e.failure]
 

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from tests.identification.given import RISE, TIME, bench_run, risen
+from tests.identification.given import RISE, TIME, bench_run, risen, run_of
 
 from swashplate import Drive
 from swashplate.identification import Verdict, verdict
@@ -113,6 +113,14 @@ def test_a_fit_that_carries_over_is_usable() -> None:
     # 0.02 of what 1.5 · 2 · (1 - exp(-5)) with the noise comes to
     assert found.headline == "Usable: predicts held-out y to 0.66 % of its range."
     assert not any("larger errors" in each for each in found.sentences)
+
+
+def test_a_current_that_was_not_fitted_is_not_judged() -> None:
+    run = run_of("held", WAVE, {"rectified_current": WAVE}, time=TIME)
+    current = compared(run, "rectified_current", 0.0 * WAVE)
+    held = held_out(0.0 * TIME)
+    assert verdict([stage()], [held, current]).headline == verdict([stage()], [held]).headline
+    assert "rectified_current" in verdict((), [current]).headline
 
 
 def test_what_is_required_decides() -> None:

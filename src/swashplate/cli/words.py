@@ -129,6 +129,11 @@ def drive_file(word: str) -> Path | None:
         return None
     if place.is_dir():
         if not (place / DRIVE).is_file():
+            if (place / NUMBERS).is_file():
+                raise InputError(
+                    f"{word} is the fit of a model of your own: give its file by --model where the "
+                    "command has that option; simulate and export it from Python."
+                )
             raise InputError(
                 f"There is no {DRIVE} in {word}: give a folder that 'swashplate fit' wrote, or a "
                 "parameter file."

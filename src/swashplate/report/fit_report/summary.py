@@ -263,18 +263,21 @@ def _next(
         link = Markup('Look into the <a href="#data">{}</a> on the logs.')
         said.append(link.format(count(findings, "finding")))
     weak = [name for each in stages for name in weak_unknowns(each)]
-    if weak:
+    thing = "model" if any(each.stage.part == "model" for each in stages) else "drive"
+    named = listed(weak[:6]) if len(weak) <= 6 else f"{', '.join(weak[:6])} and others"
+    if weak and thing == "model":
+        said.append(f"Not determined to within ±10 %: {named}. Add tests that move them.")
+    elif weak:
         code = Markup(
             "Not determined to within ±10 %: {}. The tests that would determine them are ranked by "
             "<code>swashplate advise {} --drive drive.toml --setup setup.toml</code>."
         )
-        named = listed(weak[:6]) if len(weak) <= 6 else f"{', '.join(weak[:6])} and others"
         said.append(code.format(named, campaign.path))
     if stages and not any(run.role == "validate" for run in runs):
         said.append('Hold a run out of the fit (role = "validate"): nothing was predicted yet.')
     if judged.usable:
-        what = "Use the drive" if judged.grade == "Usable" else "Use the drive for prediction only"
+        what = f"Use the {thing}{' for prediction only' * (judged.grade != 'Usable')}"
         said.append(f"{what}. {judged.validity}" if judged.validity else f"{what}.")
-        if stages:
+        if stages and thing == "drive":
             said.append(Markup("Try it: <code>swashplate simulate drive.toml step:9</code>."))
     return said
