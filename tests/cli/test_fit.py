@@ -254,7 +254,7 @@ def fitted(held_out: Path, tmp_path: Path) -> Fit:
 
 
 def test_the_report_is_written_again(done: Words, fitted: Fit, tmp_path: Path) -> None:
-    said = done("report", "fitted", CAMPAIGN, "--truth", "virtual/truth")
+    said = done("report", "fitted", "--truth", "virtual/truth")  # the campaign is that of the fit
     assert "Report:    fitted/report.html" in said
     assert "Usable: predicts held-out speed from counts to 0." in said
     page = (tmp_path / "fitted" / "report.html").read_text("utf-8")

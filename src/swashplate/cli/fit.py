@@ -376,7 +376,7 @@ def validate(
 
 def report(
     fitted: Path,
-    path: Path = CAMPAIGN,
+    path: Path | None = None,
     *,
     model: Path | None = None,
     pdf: Annotated[Path | None, PRINTED] = None,
@@ -390,6 +390,7 @@ def report(
 
     Options:
       fitted FITTED: The folder that 'fit' wrote, or its drive.toml.
+      path PATH: The campaign that was fitted; where 'fit' found it, if omitted.
       pdf FILE: Print the report to this PDF as well, by Chromium.
       data FILE: Write all samples, measured and simulated, as one table: .csv or .parquet.
       truth TRUTH: Of virtual tests: the folder or parameter file of what was simulated, to stand
@@ -401,7 +402,8 @@ def report(
       swashplate report fitted virtual/campaign.toml --pdf report.pdf
     """
     from swashplate.campaign import Campaign
-    from swashplate.identification.assessment import load_fit
+    from swashplate.documents import read_json
+    from swashplate.identification.assessment import FitFile, load_fit
     from swashplate.identification.setup import ModelSetup
     from swashplate.report.fit_report import find_browser, print_report, shown_runs, write_samples
 
@@ -409,13 +411,14 @@ def report(
         find_browser()
     folder = fitted if fitted.is_dir() else fitted.parent
     place = folder / STORED
-    with working(f"Reading {path}"):
+    with working(f"Reading {place}"):
         if not place.is_file():
             raise InputError(
                 f"There is no {STORED} in {folder}: give a folder that 'swashplate fit' wrote, or "
                 "judge a drive alone with 'swashplate validate'."
             )
         true = None if truth is None else words.parameters_of(truth)
+        path = path or Path(read_json(place, FitFile, strict=False).campaign)
         campaign = Campaign.from_toml(path)
         if true is not None and not campaign.virtual:
             raise InputError(f"{path} is not virtual: nobody knows its truth, leave out --truth.")

@@ -322,6 +322,8 @@ def _wrong(model: Model) -> Iterator[str]:
         if name not in states:
             yield f"{says}free_start names '{name}', but the state has {', '.join(states)}."
     inputs = {model.tap(name).signal for name in known}
+    if "time" in inputs:
+        yield f"{says}an input cannot be called 'time', as the time stamps are: rename it."
     for name, where in _own_names(model):
         if name in inputs:
             yield f"{says}'{name}' is both an input and in {where}: rename one of them."
