@@ -61,6 +61,8 @@ START_PRESSURE = "start_pressure"
 """Name of δP at the first sample, where it is an unknown of the experiment."""
 START_CURRENTS = ("start_current_plus", "start_current_minus")
 """Names of a channel's current at the first sample, where it is an unknown of the experiment."""
+MOST_EDGES = 60
+"""Jumps of commands whose instants are estimated; more are taken halfway between their samples."""
 LARGEST_START_PRESSURE = 4e6
 """Bound of a free pressure at the start where the set-up gives none. [Pa]"""
 OTHER_RATE = 0.01
@@ -372,15 +374,12 @@ def stage_problem(
     begin = {column: each.start for each in free for column in each.targets if column in SWITCHES}
     on = parameters.options | {SWITCHES[column] for column in begin}
     begun = parameters.replace(begin, on) if begin else parameters
-    own = [
-        unknown
-        for each in runs
-        for unknown in (*_of_a_run(stage, each, channels, parameters), *_edges(stage, each, edges))
-    ]
+    own = [unknown for each in runs for unknown in _of_a_run(stage, each, channels, parameters)]
+    jumps = [unknown for each in runs for unknown in _edges(stage, each, edges)]
     return Problem(
         DriveModel(begun, stage.part, currents, stage.forces, dict(starts)),
         tuple(_weighted(each, stage) for each in runs),
-        Unknowns((*free, *own)),
+        Unknowns((*free, *own, *(jumps if len(jumps) <= MOST_EDGES else ()))),
         channels,
         noise_scales(runs, channels),
         uncertain=tuple(

@@ -204,12 +204,10 @@ class Fit(Result):
             )
             said += [*each.identifiability.sentences(), *each.uncertainty.sentences()]
             said += each.bounds_reached()
-        edges = {each for stage in self.stages for each in stage.problem.unknowns.names}
-        number = sum(each.startswith(EDGE) for each in edges)
-        if number:
-            said.append(
-                f"Commands jump {count(number, 'time')} between two samples: when is estimated."
-            )
+        names = {each for stage in self.stages for each in stage.problem.unknowns.names}
+        if jumps := sum(each.startswith(EDGE) for each in names):
+            many = count(jumps, "time")
+            said.append(f"Commands jump {many} between two samples: when is estimated.")
         return (*said, tables.fixed_line(self))
 
 
@@ -337,8 +335,15 @@ def _edges_found(stage: StageFit) -> dict[str, Prior]:
     if not own:
         return {}
     values, quoted = unknowns.at(stage.solution.vector).estimates, stage.uncertainty.quoted
-    errors = quoted.standard_errors * unknowns.scales
-    return {unknowns.names[k]: Prior(float(values[k]), float(errors[k])) for k in own}
+    found, errors = dict[str, Prior](), quoted.standard_errors * unknowns.scales
+    for k in own:
+        known = unknowns[k].prior
+        assert known is not None
+        error = min(float(errors[k]), known.deviation)
+        found[unknowns.names[k]] = Prior(
+            float(values[k]), error if error > 0.0 else known.deviation
+        )
+    return found
 
 
 def _solved(

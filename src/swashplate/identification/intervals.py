@@ -197,7 +197,7 @@ def source_of(stage: StageFit) -> Callable[[Experiment], Model]:
     if not isinstance(model, DriveModel):
         return lambda experiment: model
     own, chain = (
-        DriveModel(stage.drive.parameters, part, model.currents, model.forces)
+        replace(model, parameters=stage.drive.parameters, part=part)
         for part in (model.part, "chain")
     )
     by_card = model.part == "pump" and stage.stage.current == "simulated"

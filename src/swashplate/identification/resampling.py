@@ -360,7 +360,7 @@ def _refitted(
                 if each.name in currents and each.input.kind == "voltage":
                     start = card[1].get(each.name, {})
                     currents[each.name] = simulated_current(each, card[0], start)
-            model = DriveModel(card[0], model.part, currents, model.forces)
+            model = DriveModel(card[0], model.part, currents, model.forces, card[1])
             problem = replace(problem, model=model)
         try:
             solution = solve(problem, stage.solution.vector, tolerance=1e-7, max_evaluations=100)
