@@ -443,7 +443,7 @@ REFUSED = {
         "Model tank: 'level' is both an input and in Fill: rename",
     ),
     "tap and state": ({"taps": {"flow": Tap("level")}}, "'level' is both an input and in Fill"),
-    "time": ({"taps": {"flow": Tap("time")}}, "an input cannot be called 'time'"),
+    "input time": ({"taps": {"flow": Tap("time")}}, "an input cannot be called 'time'"),
     "input and signal": ({"sample": passed_on}, "'flow' is both an input and in Flow: rename one"),
     "time": ({"integrals": {"time": "level"}}, "'time' is in the integrals, but means the time st"),
     "no input": ({"step": still}, "tank has no input 'flow'; it has none"),

@@ -97,12 +97,12 @@ class InputSignal(Result):
     @cached_property
     def edges(self) -> tuple[Edge, ...]:
         """Its jumps at instants that are not known: of a command that is held there are none."""
+        if self.interpolation == "previous":
+            return ()
         changes, apart = np.abs(np.diff(self.values)), np.diff(self.time)
         beside = np.pad(changes, 1)
         alone = np.maximum(beside[:-2], beside[2:]) < BESIDE * changes
         sudden = (changes > SUDDEN * np.ptp(self.values)) & (apart > APART) & alone
-        if self.interpolation == "previous":
-            return ()
         return tuple(
             Edge(int(k), float(self.time[k] + 0.5 * apart[k]), float(apart[k]))
             for k in np.flatnonzero(sudden)
