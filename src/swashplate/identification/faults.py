@@ -13,7 +13,7 @@ from scipy.linalg import solve_banded
 
 from swashplate.campaign.experiment import Channel, Experiment
 from swashplate.errors import DomainError
-from swashplate.identification.drive_model import CURRENTS, DriveModel
+from swashplate.identification.drive_model import CURRENTS, DriveModel, with_edges
 from swashplate.identification.model import Model, simulated
 from swashplate.tables import listed
 
@@ -233,6 +233,8 @@ def of_command(
     """By channel, the effects of a scale error and of a lag of the command, by differences."""
     if not isinstance(model, DriveModel) or model.part == "pump":
         return {}
+    # a slower command has no jumps, whose instants the values would say
+    experiment = with_edges(experiment, values)
     signal = experiment.input
     changed = ((1.0 - COMMAND_CHANGE) * signal.values, _lagged(signal.time, signal.values))
     try:
@@ -254,8 +256,10 @@ def of_command(
 
 def late_command(stage: StageFit) -> Fault | None:
     """Late stamps of the command, where they are the same as a fixed tau that is longer by them."""
-    model, experiment = stage.problem.model, stage.problem.experiments[0]
-    values = stage.problem.model_values(stage.solution.vector, 0)
+    model, runs = stage.problem.model, stage.problem.experiments
+    # instants of jumps belong to single samples
+    number = next((k for k, each in enumerate(runs) if not each.input.edges), 0)
+    experiment, values = runs[number], stage.problem.model_values(stage.solution.vector, number)
     if not isinstance(model, DriveModel) or model.part == "pump" or "tau" in values:
         return None
     signal, tau = experiment.input, model.parameters.numbers["tau"]

@@ -66,8 +66,6 @@ scale is 15 % off gave 12 %."""
 DRIFTS, DRIFTS_AWAY = 0.01, 0.03
 """Change of a channel over the campaign from which values are those of a mean machine, and from
 which no one set of parameters holds."""
-ALONE = " of a run of its own"
-"""How the names of criteria on single runs end."""
 FEWEST_RUNS = 4
 """Runs of which one can stand out."""
 SAME = 1e-6
@@ -175,7 +173,7 @@ def verdict(
         or each.experiment[each.channel].kind not in CURRENTS
     ]
     out = Side.of("held-out" if stages else "predicted", asked)
-    criteria, misfit = [*_convergence(stages, planned)], None
+    criteria, misfit, alone = [*_convergence(stages, planned)], None, list[Criterion]()
     for side in (fitted, out):
         criteria += [_followed(side), _no_worse_than_mean(side)] if side.qualities else []
     criteria.append(_required_accuracy(out, required))
@@ -192,7 +190,8 @@ def verdict(
             criteria.append(_open("lack of fit", f"{MISFIT:g}", str(error).rstrip(".")))
         else:
             criteria += _fits(misfit, out if out.qualities else fitted, stages)
-            criteria += [*_nothing_left_out(misfit, fitted), *_alike(misfit, stages)]
+            alone += _alike(misfit, stages)
+            criteria += [*_nothing_left_out(misfit, fitted), *alone]
     criteria.append(_model_error(runs or predicted))
 
     unusable, untrusted = (
@@ -208,8 +207,7 @@ def verdict(
         units = f"The estimates are in units of the fixed {listed(misfit.units)}."
         assumed = [units] * bool(misfit.units) + [f"{e.assumption}." for e in misfit.assumed]
     if unusable:
-        alone = [each.failure for each in criteria if each.failure and each.name.endswith(ALONE)]
-        headline = f"Not usable: {'; '.join([unusable, *alone])}."
+        headline = f"Not usable: {'; '.join([unusable, *(e.failure for e in alone if e.failure)])}."
     elif not stages:
         number = len({each.experiment.name for each in out.qualities})
         headline = f"Predicts {out.accuracy} over {number} run{'s' if number > 1 else ''}."
@@ -534,7 +532,7 @@ def _of_one_run(
     found.sort(key=lambda each: -abs(each[0]))
     far = [words for size, words in found if abs(size) > limit][:3]
     return Criterion(
-        f"{what}{ALONE}",
+        f"{what} of a run of its own",
         f"{found[0][0]:+.2g} {unit}" if found else "none" if judged else "-",
         f"{limit:g} {unit}",
         why if judged else f"fewer than {FEWEST_RUNS} runs measure the same motion",
