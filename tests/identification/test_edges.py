@@ -8,7 +8,7 @@ from tests.identification.given import TWO_STAGES, run_of
 
 from swashplate import Campaign, Drive, Experiment
 from swashplate.campaign.experiment import InputSignal
-from swashplate.identification import fit
+from swashplate.identification import fit, predict
 
 
 def command(rate: float, *levels: float, hold: str = "linear", noise: float = 0.0) -> InputSignal:
@@ -80,3 +80,16 @@ def test_a_slow_log_of_steps_is_fitted_as_well_as_a_fast_one(short_campaign: Cam
             instants.append(edge.middle + own[name])
     # all at 0.5 s and 2.5 s of the commands, and all with the same rounding off
     assert np.diff(np.reshape(instants, (-1, 2)), axis=0) == pytest.approx(0.0, abs=3e-4)
+
+
+@pytest.mark.parametrize("first", [0, 2])
+def test_a_slow_log_is_predicted_as_well_as_a_fast_one(
+    short_campaign: Campaign, first: int
+) -> None:
+    """By the true drive, of which these logs have no noise; with jumps halfway it is far off."""
+    truth = Drive.preset("hoist").replace(J=(0.26, 0.31), Z10=13.0)
+    for run in short_campaign.experiments:
+        found = {each.channel: each for each in predict(truth, [thinned(run, first)])}
+        rounding = run["counts"].resolution / np.sqrt(12.0)
+        assert found["counts"].measures.rmse < 0.2 * rounding
+        assert found["current"].measures.rmse < 4e-4

@@ -24,6 +24,7 @@ from swashplate.campaign.samples import interpolate_counts
 from swashplate.campaign.schema import ChannelKind
 from swashplate.drive import Drive
 from swashplate.equations.cache import kernel
+from swashplate.equations.equation import inlined
 from swashplate.errors import InputError
 from swashplate.parameters.parameter_set import ParameterSet, set_of
 from swashplate.results import short
@@ -106,22 +107,43 @@ class Guess(NamedTuple):
     """100 (1 - error's RMS over the mean speeds' standard deviation). [%]"""
 
 
+@inlined
+def _speed_at(command: float, numbers: Array, edge: float) -> float:
+    """Speed that a drive without lag, delay and limits of acceleration has at a command."""
+    speed = 0.0
+    for way in range(2):
+        sign = 1.0 - 2.0 * way
+        beyond = max(sign * command - numbers[way], 0.0)
+        faster = numbers[2 + way] * beyond + numbers[8 + way] * min(beyond / edge, 1.0)
+        speed += sign * min(faster, numbers[4 + way])
+    return speed
+
+
 @kernel
 def march_guess(
-    target: Array, h: float, rise: float, fall: float, share: float, position: Array
-) -> None:
-    """March the position behind a lag and limits of acceleration.
+    stamps: Array, command: Array, held: bool, edge: float, numbers: Array, h: float,
+    position: Array,
+) -> None:  # fmt: skip
+    """March the position of a drive without delay, in steps from the command's first stamp.
 
-    From mean targets (n - 1,) of steps [s], with the greatest rise and fall of the speed in a step
-    and the `share` of the way to its target that the speed takes in it [1]. `position` (n,) is the
-    output; its first sample gives the speed at first.
+    `numbers` (11,) are dead zones, gains, top speeds, accelerations and jumps of plus and minus,
+    and the lag [s]. A `held` command's steps may lie between its stamps (k,), a straight line's are
+    among them. `position` (n,) is the output; its first sample gives the speed at first.
     """
-    speed = position[0]
+    share, speed, last = 1.0 - np.exp(-h / max(numbers[10], 1e-4)), position[0], stamps.size - 1
+    here, now, k = _speed_at(command[0], numbers, edge), stamps[0], 0
     position[0] = 0.0
     for n in range(1, position.size):
-        last = speed
-        speed += min(max(share * (target[n - 1] - speed), -fall), rise)
-        position[n] = position[n - 1] + 0.5 * h * (last + speed)
+        # the mean of what drives the step, exactly: dead zones are crossed between two steps
+        end, area = stamps[0] + n * h, 0.0
+        while k < last and stamps[k + 1] <= end:
+            following = _speed_at(command[k + 1], numbers, edge)
+            area += (stamps[k + 1] - now) * (here if held else 0.5 * (here + following))
+            here, now, k = following, stamps[k + 1], k + 1
+        area += (end - now) * here
+        now, before = end, speed
+        speed += min(max(share * (area / h - speed), -h * numbers[7]), h * numbers[6])
+        position[n] = position[n - 1] + 0.5 * h * (before + speed)
 
 
 class _Run(NamedTuple):
@@ -143,33 +165,16 @@ class _Run(NamedTuple):
     """Mean speed of one count in a window; 0 of a channel that is no encoder. [unit]"""
 
 
-def _targets(run: _Run, numbers: Array) -> Array:
-    """Mean speeds (n - 1,) that a drive without lag and delay would have in the march's steps.
-
-    Numbers are dead zones, gains, top speeds, accelerations and jumps of plus and minus.
-    """
-    edge, ways = EDGE * float(np.abs(run.command).max()) or 1.0, list[Array]()
-    for way, sign in enumerate((1.0, -1.0)):
-        beyond = np.maximum(sign * run.command - numbers[way], 0.0)
-        faster = numbers[2 + way] * beyond + numbers[8 + way] * np.minimum(beyond / edge, 1.0)
-        ways.append(np.minimum(faster, numbers[4 + way]))
-    target = ways[0] - ways[1]
-    between = target[:-1] if run.held else 0.5 * (target[1:] + target[:-1])
-    area = np.concatenate([[0.0], np.cumsum(between * np.diff(run.stamps))])
-    means: Array = np.diff(np.interp(run.time, run.stamps, area)) / STEP
-    return means
-
-
 def _errors(runs: Sequence[_Run], numbers: Array) -> Array:
     """Simulated less measured mean speeds of all runs.
 
-    Numbers (12,) are those of `_targets`, lag and delay [s].
+    Numbers (12,) are those of `march_guess`, and the delay [s].
     """
-    share, errors = float(1.0 - np.exp(-STEP / max(numbers[10], 1e-4))), list[Array]()
-    rise, fall = STEP * numbers[6:8]
+    errors = list[Array]()
     for run in runs:
+        edge = EDGE * float(np.abs(run.command).max()) or 1.0
         position = np.full(run.time.size, run.start)
-        march_guess(_targets(run, numbers), STEP, rise, fall, share, position)
+        march_guess(run.stamps, run.command, run.held, edge, numbers[:11], STEP, position)
         # what comes out is delayed, so that the march meets its steps alike whatever the delay:
         # else errors had a minimum at every whole step
         time = numbers[11] + np.append(run.time[0] - BEFORE, run.time)
@@ -283,7 +288,7 @@ def _run(experiment: Experiment, channel: Channel) -> _Run:
     for gap in np.flatnonzero(np.diff(time) > 3.0 * interval):
         begins = begins[(begins >= time[gap + 1]) | (begins + 2.0 * width <= time[gap])]
     speeds = _mean_speeds(time, travelled, begins, width)
-    grid = np.arange(drive.time[0], drive.time[-1] + STEP, STEP)
+    grid = drive.time[0] + STEP * np.arange(np.ceil((drive.time[-1] - drive.time[0]) / STEP) + 1.0)
     held = drive.interpolation == "previous"
     # a straight line may cross a dead zone between two stamps
     stamps = np.append(drive.time, grid[-1]) if held else np.union1d(drive.time, grid)
@@ -323,19 +328,21 @@ def _searched(runs: Sequence[_Run], speeds: Array, size: Array, scale: float) ->
         gain, last = np.exp(whole[2:4]) * steepness, [np.exp(whole[4]), whole[5]]
         return np.concatenate([whole[:2] * size, gain, limits, whole[10:12] * scale, last])
 
+    def descended(start: Array, evaluations: int) -> tuple[float, Array]:
+        low, high, typical = (each[: start.size] for each in (LOWEST, HIGHEST, TYPICAL))
+        solution = least_squares(
+            lambda vector: _errors(runs, numbers_of(vector)) / scale,
+            np.clip(start, low + 1e-6, high - 1e-6),
+            bounds=(low, high),
+            x_scale=typical,
+            **{"loss": "soft_l1", "f_scale": 0.05, "diff_step": 1e-3, "max_nfev": evaluations},
+        )
+        return float(solution.cost), solution.x
+
     def best(starts: Iterable[Array]) -> tuple[float, Array]:
-        found = []
-        for start in starts:
-            low, high, typical = (each[: start.size] for each in (LOWEST, HIGHEST, TYPICAL))
-            solution = least_squares(
-                lambda vector: _errors(runs, numbers_of(vector)) / scale,
-                np.clip(start, low + 1e-6, high - 1e-6),
-                bounds=(low, high),
-                x_scale=typical,
-                **{"loss": "soft_l1", "f_scale": 0.05, "diff_step": 1e-3, "max_nfev": 60},
-            )
-            found.append((float(solution.cost), solution.x))
-        return min(found, key=lambda each: each[0])
+        """Of many starts a few steps each, and only the best of them to their ends."""
+        begun = sorted((descended(each, 12) for each in starts), key=lambda each: each[0])
+        return min((descended(each, 60) for _, each in begun[:3]), key=lambda each: each[0])
 
     candidates: list[tuple[float, Array, Array]] = []
     for lag, delay, share in product(LAGS, DELAYS, DEAD_ZONES):
@@ -354,9 +361,18 @@ def _searched(runs: Sequence[_Run], speeds: Array, size: Array, scale: float) ->
             "The speed goes against the command: reverse it with sign = -1 in its channel."
         )
     _, plain = best(start for _, start, _ in candidates[:3])
-    steeper = plain + np.array([0.0, 0.0, 0.7, 0.7, -0.7, 0.0])
+    # a slow rise may be a lag or a limited acceleration, and less speed than a straight line has a
+    # larger dead zone or a top speed: from each of them the search ends at another minimum
     pull = log(0.7) - plain[4]
-    cost, whole = best(np.array([*each, 0.0, 0.0, pull, pull]) for each in (plain, steeper))
+    moves = [
+        *product((0.0,), (0.0, 0.7), (0.0, -1.5, -3.0)),
+        *product((0.2,), (0.0, 0.7), (-1.5,)),
+    ]
+    cost, whole = best(
+        np.concatenate([plain + np.repeat([wider, steeper, quicker, 0.0], [2, 2, 1, 1]), limits])
+        for limits in [[0.0, 0.0, pull, pull]]
+        for wider, steeper, quicker in moves
+    )
     # the same line behind a larger dead zone
     back = tried * size.max() / np.maximum(size, size.max() * ONE_WAY) / np.exp(whole[2:4])
     smaller, jumping = best(

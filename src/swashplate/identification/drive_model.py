@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from swashplate.campaign import ChannelKind, applying, inside
 from swashplate.campaign.campaign import Campaign
-from swashplate.campaign.experiment import RISE, Edge, Experiment, InputSignal
+from swashplate.campaign.experiment import RISE, Channel, Edge, Experiment, InputSignal
 from swashplate.campaign.samples import signed_by_command
 from swashplate.campaign.schema import SIGNALS as SIGNALS
 from swashplate.drive import Drive
@@ -301,16 +301,48 @@ def _named(edge: Edge) -> str:
     return f"{EDGE}{edge.middle:.6g} s"
 
 
-def _edges(stage: Stage, run: Experiment, found: Mapping[str, Prior]) -> Iterator[Unknown]:
-    """Instants of a command's edges, anywhere between two samples or as an earlier stage found."""
-    if stage.part == "pump" and (stage.current == "measured" or run.input.kind != "voltage"):
-        return
-    for edge in run.input.edges:
+def _edges(run: Experiment, found: Mapping[str, Prior]) -> list[Unknown]:
+    """Instants of a voltage's edges, anywhere between two samples or as an earlier stage found."""
+    unknowns = list[Unknown]()
+    for edge in run.input.edges if run.input.kind == "voltage" else ():
         name, most = _named(edge), 0.5 * (edge.apart + RISE)
         prior = found.get(f"{name} ({run.name})", Prior(0.0, edge.apart / sqrt(12.0)))
-        yield Unknown(
-            name, prior.mean, -most, most, "s", prior=prior, run=run.name, scale=edge.apart
-        )
+        own: Any = {"prior": prior, "run": run.name, "scale": edge.apart}
+        unknowns.append(Unknown(name, prior.mean, -most, most, "s", **own))
+    return unknowns
+
+
+def edges_problem(parameters: ParameterSet, run: Experiment) -> Problem | None:
+    """The problem of the instants of a command's edges in a run that is predicted.
+
+    One unit of residual is what the prediction errs by with all of them halfway, so that a drive
+    that is wrong says little of them. None where there are no edges, or too many.
+    """
+    model, edges = DriveModel(parameters), _edges(run, {})
+    if not 0 < len(edges) <= MOST_EDGES:
+        return None
+    scales, zeros = dict[str, float](), list[Unknown]()
+    for name, simulated in model.simulate({}, run).items():
+        channel = run[name]
+        errors, weight = channel.values - simulated, np.sqrt(channel.weight)
+        if not channel.used.any():
+            continue
+        if channel.is_position:
+            errors -= np.average(errors, weights=channel.weight)
+            zeros.append(_free_zero(name, channel, run))
+        scales[name] = float(np.linalg.norm(weight * errors) / np.linalg.norm(weight))
+    scales = {name: scale for name, scale in scales.items() if scale > 0.0}
+    if not scales:
+        return None
+    zeros = [each for each in zeros if each.name.removeprefix(OFFSET) in scales]
+    return Problem(model, (run,), Unknowns((*zeros, *edges)), tuple(scales), scales)
+
+
+def _free_zero(name: str, channel: Channel, run: Experiment) -> Unknown:
+    """Zero of a position, with bounds far enough both ways never to be reached."""
+    first, reach = float(channel.values[0]), 1.0 + 10.0 * float(np.ptp(channel.values))
+    ends = first - reach, first + reach
+    return Unknown(f"{OFFSET}{name}", first, *ends, channel.unit, run=run.name)
 
 
 def kinds_of(part: str) -> tuple[ChannelKind, ...]:
@@ -375,7 +407,8 @@ def stage_problem(
     on = parameters.options | {SWITCHES[column] for column in begin}
     begun = parameters.replace(begin, on) if begin else parameters
     own = [unknown for each in runs for unknown in _of_a_run(stage, each, channels, parameters)]
-    jumps = [unknown for each in runs for unknown in _edges(stage, each, edges)]
+    simulated = stage.part != "pump" or stage.current != "measured"
+    jumps = [unknown for each in runs if simulated for unknown in _edges(each, edges)]
     return Problem(
         DriveModel(begun, stage.part, currents, stage.forces, dict(starts)),
         tuple(_weighted(each, stage) for each in runs),
@@ -481,10 +514,7 @@ def _of_a_run(
     run, estimated = experiment.name, experiment.start == "estimated"
     for name, channel in own.items():
         if channel.is_position:
-            # far enough both ways never to be reached
-            first, reach = float(channel.values[0]), 1.0 + 10.0 * float(np.ptp(channel.values))
-            ends = first - reach, first + reach
-            yield Unknown(f"{OFFSET}{name}", first, *ends, channel.unit, run=run)
+            yield _free_zero(name, channel, experiment)
     if stage.part != "card" and (stage.start_pressure is not None or estimated):
         most = stage.start_pressure or LARGEST_START_PRESSURE
         yield Unknown(START_PRESSURE, 0.0, -most, most, "Pa", run=run)

@@ -13,10 +13,11 @@ from scipy.fft import irfft, next_fast_len, rfft
 from swashplate.campaign.experiment import Channel, Experiment
 from swashplate.campaign.speed import DIFFERENTIATOR, speed_from_angle, speed_of
 from swashplate.errors import InputError
-from swashplate.identification.drive_model import SIGNALS, DriveModel, Parameters
+from swashplate.identification.drive_model import SIGNALS, DriveModel, Parameters, edges_problem
 from swashplate.identification.noise import LONGEST, Grid, correlation_length, grid_of, pair_sums
 from swashplate.identification.problem import Problem
 from swashplate.identification.setup import ModelSetup
+from swashplate.identification.solving import solve
 from swashplate.parameters.parameter_set import HasParameters, set_of
 from swashplate.results import Result
 from swashplate.tables import listed
@@ -237,7 +238,8 @@ def predict(
     Returns
     -------
     tuple of RunQuality
-        One for each run and channel. The free zero of a position is the one that fits best.
+        One for each run and channel. The free zero of a position is the one that fits best; so are,
+        within their sample, the instants of a voltage's edges (`InputSignal.edges`).
 
     Raises
     ------
@@ -259,7 +261,9 @@ def predict(
         if not any(channel.kind in SIGNALS for channel in each.channels.values()):
             raise InputError(f"{each.name} has no channel that a drive has.")
         own = DriveModel(parameters, "pump" if each.input.kind == "current" else "chain")
-        for name, simulated in own.simulate({}, each).items():
+        edges = edges_problem(parameters, each)
+        instants = edges.model_values(solve(edges).vector, 0) if edges is not None else {}
+        for name, simulated in own.simulate(instants, each).items():
             channel = each[name]
             if not channel.used.any():
                 continue
