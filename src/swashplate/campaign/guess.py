@@ -363,14 +363,13 @@ def _searched(runs: Sequence[_Run], speeds: Array, size: Array, scale: float) ->
     _, plain = best(start for _, start, _ in candidates[:3])
     # a slow rise may be a lag or a limited acceleration, and less speed than a straight line has a
     # larger dead zone or a top speed: from each of them the search ends at another minimum
-    pull = log(0.7) - plain[4]
+    limits = [0.0, 0.0, *[log(0.7) - plain[4]] * 2]
     moves = [
         *product((0.0,), (0.0, 0.7), (0.0, -1.5, -3.0)),
         *product((0.2,), (0.0, 0.7), (-1.5,)),
     ]
     cost, whole = best(
         np.concatenate([plain + np.repeat([wider, steeper, quicker, 0.0], [2, 2, 1, 1]), limits])
-        for limits in [[0.0, 0.0, pull, pull]]
         for wider, steeper, quicker in moves
     )
     # the same line behind a larger dead zone
