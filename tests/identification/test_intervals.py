@@ -225,3 +225,31 @@ def test_a_stop_that_is_just_touched_has_no_upper_end() -> None:
     assert stop.upper is None
     assert stop.lower is not None
     assert stop.lower < values["stop"]
+
+
+def test_an_end_beyond_its_bound_is_looked_for_where_the_cost_tells_more() -> None:
+    """The square of what bends the line: next to nothing moves there, and very much farther off."""
+    bent = model_of(lambda values, time, _: values["gain"] * time + values["bend"] ** 2 * time**2)
+    noise = 0.02 * np.random.default_rng(3).normal(size=TIME.size)
+    unknowns = Unknowns((Unknown("gain", 1.0, 0.1, 3.0), Unknown("bend", 0.05, -1.0, 1.0)))
+    run = bench_run("run", 1.0, TIME + 0.02**2 * TIME**2 + noise)
+    found = Problem(bent, (run,), unknowns, ("y",), {"y": 0.02})
+    best = solve(found).vector
+    linearised = linearised_fit(found, best)
+    half = reach(uncertainty(linearised).own)
+    assert half[1] > 1.0  # beyond both bounds
+
+    def risen(bend: float) -> float:
+        """Of the cost, with the gain that is then best, over that of the interval's end."""
+        left = (run["y"].values - bend**2 * TIME**2) / 0.02
+        left -= TIME * (TIME @ left) / (TIME @ TIME)
+        inverse = linearised.whitening @ linearised.whitening.T
+        return (0.5 * left @ left - found.cost(best)) / (0.5 * half[1] ** 2 / inverse[1, 1]) - 1.0
+
+    ends = {end.upper: end.distance for end in checked_ends(found, best, linearised, half)}
+    scale = found.unknowns.items[1].scale
+    distances = (
+        brentq(risen, 0.0, 1.0) - scale * best[1],
+        scale * best[1] - brentq(risen, -1.0, 0.0),
+    )
+    assert (scale * ends[True], scale * ends[False]) == pytest.approx(distances, rel=5e-3)

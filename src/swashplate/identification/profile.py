@@ -249,8 +249,8 @@ SHALLOW = 0.25
 MOST_POINTS = 8
 """Most points of the profile on such a side."""
 LEAST_STEP = 1e-3
-"""First step of that profile, in parts of the bounds: where the derivative is that of a switch that
-one sample just passes, the linearised interval is next to nothing."""
+"""First step of that profile at least, in parts of the bounds: where the derivative is that of a
+switch that one sample just passes, the linearised interval is next to nothing."""
 TRIES, LOOK = 20, 4
 """Evaluations of a fit without a limit, and after how many it is seen whether it gets there."""
 HOPELESS = 100.0
@@ -293,6 +293,9 @@ def checked_ends(
     other unknowns moved along as linear theory says. Where it has risen by less than a quarter of
     what it should, the profile is followed on that side, to a true end or to none.
 
+    So it is where an end lies beyond a bound at which the cost has risen by more than it should: an
+    unknown that next to nothing moves here may well be told farther off.
+
     A level that a drive keeps may be a stop, or the balance of its forces: two optima far apart. So
     each limit is also put out of the way, at its upper bound, and all else fitted again; if that
     costs less than the interval's end would, the data do not need the limit, and it has no upper
@@ -318,10 +321,12 @@ def checked_ends(
                 risen = problem.cost(end) - cost
             except DomainError:
                 continue  # beyond the model's domain nothing is possible
-            if risen >= SHALLOW * rise:
+            room = abs(float(bound - vector[index]))
+            if risen >= SHALLOW * rise and not (risen > rise and reach[index] > room > 0.0):
                 continue
             optimum = Point(float(vector[index]), cost, vector)
-            step = sign * max(float(reach[index]), LEAST_STEP * float(high[index] - low[index]))
+            least = LEAST_STEP * float(high[index] - low[index])
+            step = sign * max(min(float(reach[index]), room), least)
             side = _side(minimise, optimum, index, rise, step, float(bound), MOST_POINTS)
             distance = np.inf if side.end is None else abs(side.end - optimum.number)
             better = None if side.better is None else side.better.cost
