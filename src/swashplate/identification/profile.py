@@ -322,13 +322,16 @@ def checked_ends(
             except DomainError:
                 continue  # beyond the model's domain nothing is possible
             room = abs(float(bound - vector[index]))
-            if risen >= SHALLOW * rise and not (risen > rise and reach[index] > room > 0.0):
+            shallow = risen < SHALLOW * rise
+            if not (shallow or (risen > rise and reach[index] > room > 0.0)):
                 continue
             optimum = Point(float(vector[index]), cost, vector)
             least = LEAST_STEP * float(high[index] - low[index])
             step = sign * max(min(float(reach[index]), room), least)
             side = _side(minimise, optimum, index, rise, step, float(bound), MOST_POINTS)
             distance = np.inf if side.end is None else abs(side.end - optimum.number)
+            if not shallow and side.end is None:
+                continue  # the others make up for it: the linearised end holds
             better = None if side.better is None else side.better.cost
             yield CheckedEnd(index, sign > 0.0, float(distance), better)
 
