@@ -32,8 +32,8 @@ const wait = setInterval(() => {
   made.channels = live.figure.showing.shown.map((each) => each.name);
   const acts = (bit) => acting.map((each) => (each & bit ? 1 : 0));
   made.limits = Object.fromEntries(limits.map(([bit, name]) => [name, acts(bit)]));
-  act("Orifice", 0.75);
-  made.factor = live.factors.get("orifice");
+  act("LEVER"[0].toUpperCase() + "LEVER".slice(1), 0.75);
+  made.factor = live.factors.get("LEVER");
   made.moved = [...live.latest.signals.shaft_speed];
   made.errors = live.latest.errors;
   made.toml = document.getElementById("toml").textContent;
@@ -46,10 +46,12 @@ const wait = setInterval(() => {
 </script></body>"""
 
 
-def acted(page: Path, tmp_path: Path, browsed) -> dict:
-    """What a browser makes of a page whose orifice slider is moved, and then reset."""
+def acted(page: Path, tmp_path: Path, browsed, lever: str = "orifice") -> dict:
+    """What a browser makes of a page of which one lever's slider is moved, and then reset."""
     tried = tmp_path / "tried.html"
-    tried.write_text(page.read_text("utf-8").replace("</body>", ACTS), "utf-8")
+    tried.write_text(
+        page.read_text("utf-8").replace("</body>", ACTS.replace("LEVER", lever)), "utf-8"
+    )
     found = re.search(r'<pre id="made">(.*?)</pre>', browsed(tried, ""), re.DOTALL)
     assert found is not None
     return json.loads(html.unescape(found[1]))
@@ -112,11 +114,24 @@ def test_what_cannot_be_shown_is_refused(tests: Campaign, tmp_path: Path) -> Non
     assert not page.exists()
 
 
+def test_a_lever_of_a_parameter_without_directions_counts_once(tmp_path: Path, browsed) -> None:
+    drive, command, page = Drive.preset("hoist"), parse("step:9"), tmp_path / "live.html"
+    write_live_page(drive, page, command=command)
+    made = acted(page, tmp_path, browsed, "pump")
+    voltage = command.sample(512.0).astype(np.float32).astype(float)
+    moved = drive.scale(Z10=made["factor"]).simulate(voltage, 512.0).shaft_speed
+    assert np.abs(moved - made["first"]).max() > 0.1
+    np.testing.assert_allclose(made["moved"], moved, rtol=0.0, atol=1e-11)
+
+
 def test_the_page_is_small_and_asks_for_nothing(tests: Campaign, tmp_path: Path) -> None:
     page = tmp_path / "live.html"
     write_live_page(Drive.preset("hoist"), page, command=parse("step:9"))
     text = page.read_text("utf-8")
     content = json.loads(re.search(r'id="live">(.*?)</script>', text)[1])
     assert len(text) - len(content["wasm"]) < 60_000
+    # each lever moves each of its numbers once
+    for lever in content["levers"]:
+        assert len({number for number, _ in lever["moves"]}) == len(lever["moves"]), lever["name"]
     for asks in (r"""(src|href)=["'](?!data:|#)""", r"url\(", r"fetch\(", "XMLHttp", r"import\("):
         assert not re.search(asks, text), asks

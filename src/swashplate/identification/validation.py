@@ -13,12 +13,18 @@ from scipy.fft import irfft, next_fast_len, rfft
 from swashplate.campaign.experiment import Channel, Experiment
 from swashplate.campaign.speed import DIFFERENTIATOR, speed_from_angle, speed_of
 from swashplate.errors import InputError
-from swashplate.identification.drive_model import SIGNALS, DriveModel, Parameters, edges_problem
+from swashplate.identification.drive_model import (
+    SIGNALS,
+    DriveModel,
+    Parameters,
+    edges_problem,
+    with_edges,
+)
 from swashplate.identification.noise import LONGEST, Grid, correlation_length, grid_of, pair_sums
 from swashplate.identification.problem import Problem
 from swashplate.identification.setup import ModelSetup
 from swashplate.identification.solving import solve
-from swashplate.parameters.parameter_set import HasParameters, set_of
+from swashplate.parameters.parameter_set import HasParameters, ParameterSet, set_of
 from swashplate.results import Result
 from swashplate.tables import listed
 
@@ -261,9 +267,7 @@ def predict(
         if not any(channel.kind in SIGNALS for channel in each.channels.values()):
             raise InputError(f"{each.name} has no channel that a drive has.")
         own = DriveModel(parameters, "pump" if each.input.kind == "current" else "chain")
-        edges = edges_problem(parameters, each)
-        instants = edges.model_values(solve(edges).vector, 0) if edges is not None else {}
-        for name, simulated in own.simulate(instants, each).items():
+        for name, simulated in own.simulate({}, at_instants(parameters, each)).items():
             channel = each[name]
             if not channel.used.any():
                 continue
@@ -272,6 +276,14 @@ def predict(
                 zero = np.average(channel.values - simulated, weights=channel.weight)
             made.append(compared(each, name, simulated + zero))
     return tuple(made)
+
+
+def at_instants(parameters: ParameterSet, experiment: Experiment) -> Experiment:
+    """An experiment with the edges of its command where they fit a drive best."""
+    edges = edges_problem(parameters, experiment)
+    if edges is None:
+        return experiment
+    return with_edges(experiment, edges.model_values(solve(edges).vector, 0))
 
 
 def with_speeds(qualities: Iterable[RunQuality]) -> tuple[RunQuality, ...]:

@@ -23,7 +23,7 @@ from swashplate.identification.profile import Profile
 from swashplate.identification.resampling import CrossValidation
 from swashplate.identification.setup import ModelSetup
 from swashplate.identification.solving import Solution
-from swashplate.identification.validation import RunQuality, percent
+from swashplate.identification.validation import RunQuality, at_instants, percent
 from swashplate.identification.verdict import Verdict, starts_of, verdict
 from swashplate.parameters.parameter_set import ParameterSet
 from swashplate.report.fit_report import charts
@@ -263,7 +263,8 @@ def _live_section(fit: Fit, campaign: Campaign, runs: Sequence[ShownRun]) -> Sec
         out = [run for run in runs if run.role == "validate"] or runs
         worst = max(out, key=lambda run: run_error(run, runs)).experiment
         if can_run(drive, worst):
-            made = live_page(drive, [run_of(worst)], campaign.title, campaign.virtual, "drive.toml")
+            shown = run_of(at_instants(drive, worst))
+            made = live_page(drive, [shown], campaign.title, campaign.virtual, "drive.toml")
             words = f"Sliders for every parameter beside {worst.name}"
             blocks = [Block("live", made, words)]
     return Section("live", "Try other values", blocks)

@@ -21,7 +21,7 @@ from swashplate.errors import InputError
 from swashplate.export import exported_drive, values_of
 from swashplate.export.libraries import WASM, packaged
 from swashplate.identification.drive_model import SIGNALS, at_rate_of, voltage_record
-from swashplate.identification.validation import ignored_windows
+from swashplate.identification.validation import at_instants, ignored_windows
 from swashplate.maneuvers import Maneuver
 from swashplate.parameters.parameter_set import HasParameters, Parameter, ParameterSet, set_of
 from swashplate.report.fit_report.page import rendered, script_json
@@ -101,7 +101,7 @@ def write_live_page(
         left = [each.name for each in tests if each.input.kind != "voltage"]
         if left:
             said += (f"Left out, driven by something else than a voltage: {listed(left)}.",)
-        runs = [run_of(each) for each in driven]
+        runs = [run_of(at_instants(parameters, each)) for each in driven]
         made = live_page(parameters, runs, campaign.title, campaign.virtual, name)
     elif command is not None:
         record, said = record_of(command.sample(rate), rate, what="voltage"), ()
@@ -220,7 +220,7 @@ def _levers(values: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
         moves = [
             (each["number"], powers[key])
             for each in values
-            for key in (each["symbol"], each["column"])
+            for key in {each["symbol"], each["column"]}  # the same without directions
             if key in powers and each["value"] not in (0.0, 1e30)
         ]
         if moves:
