@@ -50,6 +50,17 @@ def test_a_single_limit_has_all_of_the_error(limit: str, changes: dict[str, floa
     assert found.error == pytest.approx(rms(expected), rel=1e-9)
 
 
+def test_a_prime_mover_that_droops_has_all_of_the_error() -> None:
+    drive, speed = Drive.preset("neutral"), 1.0 - 0.2 * (np.abs(SINE) > 5.0)
+    found = limit_shares(drive, SINE, pump_speed=speed)
+    assert found.first is not None
+    assert found.first.limit == "pump speed"
+    assert found.first.error == pytest.approx(0.0, abs=1e-12)
+    drooping = drive.simulate(SINE, pump_speed=speed).shaft_speed
+    assert found.error == pytest.approx(rms(drooping - drive.simulate(SINE).shaft_speed), rel=1e-9)
+    assert found.error > 0.01
+
+
 @pytest.mark.parametrize(
     ("name", "command", "limit"),
     [

@@ -114,6 +114,29 @@ def test_a_record_is_simulated(done, name):
     np.testing.assert_allclose(written, expected.shaft_speed, atol=1e-12)
 
 
+def test_what_was_measured_beside_the_voltage_counts(done, refused):
+    time = np.arange(2561) / 512.0
+    voltage, speed, supply = 9.0 * np.sin(time), 1.0 - 0.1 * np.sin(time) ** 2, 95.0 + np.cos(time)
+    columns = {"time": time, "voltage": voltage, "n": speed, "p [bar]": supply}
+    pl.DataFrame(columns).write_csv("log.csv")
+    words = ("hoist", "log.csv", "--interpolation", "linear", "--measured", "pump_speed=n")
+    words = (*words, "--measured", "supply_pressure=p")
+    done("simulate", *words, "--out", "run.parquet")
+    given = {"pump_speed": speed, "supply_pressure": 1e5 * supply}
+    expected = Drive.preset("hoist").simulate(voltage, **given)
+    written = pl.read_parquet("run.parquet")["shaft_speed"]
+    np.testing.assert_allclose(written, expected.shaft_speed, atol=1e-12)
+    assert "pump speed" in done("limits", *words)
+    slower = done("simulate", "hoist", "step:9", "--measured", "pump_speed=0.8")
+    assert "156.80" in slower  # 0.8 times 196.00 deg/s, at the plate's stop
+    for wrong, said in (
+        ("pump_speed=n", "a maneuver has no columns, so give a number in SI"),
+        ("speed=1", "write NAME=COLUMN, once for each of load_torque, pump_speed"),
+        ("supply_pressure=-3", "falls to -3, but must be 1 Pa or above"),
+    ):
+        assert said in refused("simulate", "hoist", "step:9", "--measured", wrong)
+
+
 @pytest.mark.parametrize(
     ("text", "said"),
     [

@@ -439,7 +439,7 @@ def test_damaged_files_make_no_instance(made, hoist, tmp_path):
     resource = folder / "resources" / "drive.bin"
     good = resource.read_bytes()
     wrong = [b"", good[:-1], good + b"\0", b"X" + good[1:], good[:12] + b"\x01" + good[13:]]
-    wrong.append(good[:24] + b"{0" + good[26:])  # another token
+    wrong.append(good[:25] + bytes([good[25] ^ 1]) + good[26:])  # another token
     wrong.append(good[:16] + b"12345678" + good[24:])  # another layout
     wrong.append(good[:96] + np.array([np.nan]).tobytes() + good[104:])  # V_dz_plus
     for content in wrong:

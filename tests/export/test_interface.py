@@ -164,6 +164,12 @@ def test_inputs_set_and_cleared(hoist: Drive, in_c: Any) -> None:
     model.run(COMMAND[:300], NAMES)
     plain.run(COMMAND[:300], NAMES)
     assert outputs(model) != outputs(plain)
+    # what no prime mover and no supply has is refused, and nothing changes
+    supply = model.number("_input", "supply_pressure")
+    assert model.set_input(speed, 0.0) == OK
+    assert model.set_input(speed, -0.1) == BAD_VALUE
+    assert model.set_input(supply, 0.0) == BAD_VALUE
+    assert model.set_input(supply, -5e6) == BAD_VALUE
     assert model.clear_input(speed) == OK
     one, two = model.run(COMMAND[300:], NAMES), plain.run(COMMAND[300:], NAMES)
     assert (one["shaft_speed"] == two["shaft_speed"]).all()

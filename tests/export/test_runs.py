@@ -46,7 +46,8 @@ class Case(NamedTuple):
     def drive(self) -> Drive:
         drive = Drive.preset(self.preset).replace(**self.changes)
         drive = Drive(replace(drive.parameters, **self.forms))
-        drive = drive.at_every_rate() if self.exact else drive
+        # the recursion is for one rate alone
+        drive = drive.at_every_rate() if self.exact or self.rate != 512.0 else drive
         return drive.replace(**self.late)
 
     def command(self, size: int = 2500) -> np.ndarray:

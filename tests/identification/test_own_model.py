@@ -187,6 +187,26 @@ def test_sub_steps_of_a_fit_are_those_of_a_simulation(hold) -> None:
         problem(OwnModel(coarse, substeps=0), run).cost(Unknowns(FREE).start)
 
 
+@equation
+def pushed(state: Rod, command: float, load: float, p: Valve, h: float) -> Rod:
+    return Rod(load, state.position + h * (p.gain * command - load))
+
+
+@pytest.mark.parametrize("hold", ["previous", "linear"])
+def test_a_channel_that_is_an_input_is_what_its_campaign_says_between_samples(hold) -> None:
+    model, slow = Model("pushed", Valve, Rod, pushed), slice(None, None, 5)
+    load = np.cos(3.0 * TIME[slow])
+    run = run_of("a", COMMAND, {"position": TIME, "load": load}, time=TIME, kind="other")
+    measured = replace(run["load"], time=TIME[slow], interpolation=hold)
+    run = replace(run, channels={**run.channels, "load": measured})
+    held = np.repeat(load, 5)[: TIME.size]
+    between = held if hold == "previous" else np.interp(TIME, TIME[slow], load)
+    inputs = {"command": COMMAND, "load": between}
+    expected = simulate(model, TRUTH, inputs, RATE)["position"]
+    made = OwnModel(model).simulate(TRUTH._asdict(), run)["position"]
+    assert made == pytest.approx(expected, abs=1e-12)
+
+
 def windowed(channel: Channel, rows: np.ndarray) -> np.ndarray:
     """Motion since the beginning of each two seconds."""
     windows = channel.time // 2.0

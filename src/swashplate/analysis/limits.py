@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from math import atan, inf
 from typing import TYPE_CHECKING, Unpack
 
@@ -42,6 +42,17 @@ class Removal(Result):
     component: str  # What would have to change in the machine.
     flag: Limit | None  # How a simulation marks it, None for what acts always or is not marked.
     changes: dict[str, Change]  # What takes it away, SI.
+    # Measured input without which it is away.
+    signal: str = field(default="", kw_only=True)
+
+
+MEASURED = (
+    Removal("pump speed", "prime mover: less droop (pump_speed)", None, {}, signal="pump_speed"),
+    Removal(
+        "supply", "charge pump: less sag (supply_pressure)", None, {}, signal="supply_pressure"
+    ),
+)
+"""What measured inputs take away from a drive; a load is not the machine's."""
 
 
 def removals(drive: Drive) -> list[Removal]:
@@ -199,20 +210,30 @@ def limit_shares(
     A counterfactual: one limit is taken away (the dead zone's V_dz and as much of Z17 as the card's
     jump does not cover, lim1 and lim2, I_t2, tau, Z16, Z14, Z13, Z15, Z18), the command is
     simulated again and compared with the same wanted speed. That, by default, still has the lags of
-    the card's filter and of the valve, so that only the limits make an error.
+    the card's filter and of the valve, so that only the limits make an error. A measured pump speed
+    or supply pressure is a limit, too: away, the set's own stands in its place.
     """
-    run = drive.simulate(voltage, rate, start=start, **given)
+    return shares_of(drive, drive.simulate(voltage, rate, start=start, **given), start, wanted)
+
+
+def shares_of(
+    drive: Drive, run: Simulation, start: Start, wanted: ArrayLike | None = None
+) -> LimitShares:
+    """Shares of each limit in a run of a drive; see `limit_shares`."""
 
     def speed_without(*limits: Removal) -> Array | str:
         """Speed over the same command, or why there is none."""
         changes = {name: value for each in limits for name, value in each.changes.items()}
+        left = {each.signal for each in limits}
+        records = {name: each for name, each in run.records.items() if name not in left}
         try:
             other = drive.replace(**changes).parameters
-            return simulate_drive(other, run.records, start).shaft_speed
+            return simulate_drive(other, records, start).shaft_speed
         except SwashplateError as refusal:
             return str(refusal)
 
-    present, removed, unlimited = removals(drive), list[Removal](), drive
+    present = removals(drive) + [each for each in MEASURED if each.signal in run.records]
+    removed, unlimited = list[Removal](), drive
     for each in present:  # as many at once as the model's domain allows
         try:
             unlimited = unlimited.replace(**each.changes)

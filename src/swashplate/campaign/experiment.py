@@ -130,10 +130,7 @@ class InputSignal(Result):
 
     def at(self, time: Array) -> Array:
         """The input at other instants [s]; before the first stamp the first sample holds."""
-        if self.interpolation == "linear":
-            return np.interp(time, self.time, self.values)
-        held = np.searchsorted(self.time, time, side="right") - 1
-        return self.values[np.maximum(held, 0)]
+        return _between(self, time)
 
 
 @dataclass(frozen=True, eq=False)
@@ -164,6 +161,8 @@ class Channel(Result):
     """Size of the unit in which the campaign file states it, in `unit`."""
     rolls_over_at: float | None = None
     """Reading after which a position begins anew, in `unit`; it is unwrapped."""
+    interpolation: Literal["previous", "linear"] = "linear"
+    """What it is between two stamps, where a model takes it as an input."""
 
     @property
     def used(self) -> NDArray[np.bool_]:
@@ -190,6 +189,17 @@ class Channel(Result):
     def is_position(self) -> bool:
         """Whether it is an integral of the speed, with a free zero."""
         return self.kind in ("position", "encoder_counts")
+
+    def at(self, time: Array) -> Array:
+        """Its readings at other instants [s]; before the first stamp the first one holds."""
+        return _between(self, time)
+
+
+def _between(signal: InputSignal | Channel, time: Array) -> Array:
+    if signal.interpolation == "linear":
+        return np.interp(time, signal.time, signal.values)
+    held = np.searchsorted(signal.time, time, side="right") - 1
+    return signal.values[np.maximum(held, 0)]
 
 
 @dataclass(frozen=True, eq=False)

@@ -258,6 +258,7 @@ def _experiments(
             **{**parts, "weight": values, "noise": noise, "encoder": encoder, "counts": counts},
             stated=factor,
             rolls_over_at=None if size is None or encoder is not None else factor * size,
+            interpolation=entry.interpolation,
         )
         for row in ambiguous_gaps(time, values, factor * size) if size is not None else ():
             cuts[float(time[row])] = (

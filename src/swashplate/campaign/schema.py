@@ -278,6 +278,9 @@ class Channel(Signal):
     noise: Positive | None = Field(
         None, description="Standard deviation of its noise in `unit`: the weight among channels."
     )
+    interpolation: Literal["previous", "linear"] = Field(
+        "linear", description="Between two samples, where a model of your own takes it as an input."
+    )
     weight: NotNegative = Field(1.0, description="Factor on its squared errors.")
     weights: tuple[Weight, ...] = Field((), description="Windows that count more or less.")
     weight_by_input: tuple[tuple[NotNegative, NotNegative], ...] = Field(

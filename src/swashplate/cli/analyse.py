@@ -67,7 +67,7 @@ def limits(
       swashplate limits mine.toml log.csv --interpolation previous --out shares.csv
     """
     from swashplate.analysis.capability import envelope
-    from swashplate.analysis.limits import limit_shares
+    from swashplate.analysis.limits import shares_of
 
     if command is None:
         with working("Measuring"):
@@ -79,13 +79,7 @@ def limits(
         return
     with working("Simulating"):
         name, run = words.simulated(drive.chosen, command, sampling)
-        shares = limit_shares(
-            drive.chosen,
-            run["voltage"],
-            run.record.rate,
-            interpolation=sampling.interpolation,
-            start=sampling.start,
-        )
+        shares = shares_of(drive.chosen, run, sampling.start)
     title = f"{drive.title}, {name}"
     save(out, "Shares of each limit, in SI", shares.write)
     draw(plot, "plot_limit_timeline", run, wanted=shares.wanted, title=title)

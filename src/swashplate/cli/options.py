@@ -59,6 +59,8 @@ Required = Annotated[float, option("Largest error of held-out runs, in % of thei
 SHARED = """
   begin --from AXIS|SET.toml: Begin at this drive instead of the campaign's.
   clip: Clip a voltage beyond ±10 V instead of refusing it.
+  measured NAME=COLUMN: A column of FILE, or a number in SI, for pump_speed (1 at the speed of Z10),
+      load_torque or supply_pressure. May be repeated.
   column NAME: Column of the voltage in FILE.
   command MANEUVER|FILE: A maneuver such as step:9 or "step +9 V", or a log with columns of time and
       voltage: text such as .csv, .parquet, .mat, .h5, .tdms or .mf4; a column may carry its unit:
@@ -140,6 +142,7 @@ class Sampling:
     column: str = "voltage"
     start: Start = field(default="rest", init=False)
     clip: bool = field(default=False, init=False)
+    measured: list[str] | None = field(default=None, init=False)
 
     def __post_init__(self) -> None:
         """Refuse a rate out of range, before anything is sampled."""
@@ -154,6 +157,7 @@ class Simulating(Sampling):
 
     start: Start = "rest"
     clip: bool = False
+    measured: list[str] | None = None
 
 
 @dataclass(frozen=True)

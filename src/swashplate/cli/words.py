@@ -360,12 +360,35 @@ def simulated(drive: Drive, command: str, options: Sampling) -> tuple[str, Simul
             )
         name, where, values, time = Path(command).name, f"{command}: ", series.values, series.time
     between, start, clip = options.interpolation, options.start, options.clip
+    given = _measured(command if where else "", options)
     try:
         return name, drive.simulate(
-            values, options.rate, time=time, interpolation=between, start=start, clip=clip
+            values, options.rate, time=time, interpolation=between, start=start, clip=clip, **given
         )
     except InputError as error:
         raise InputError(f"{where}{error}") from None
+
+
+def _measured(log: str, options: Sampling) -> dict[str, Any]:
+    """Inputs beside the voltage by name: a column of a log, or a number."""
+    from swashplate.logs import read_series
+    from swashplate.simulation.result import MEASURED
+
+    found = dict[str, Any]()
+    for word in options.measured or ():
+        name, _, said = (part.strip() for part in word.partition("="))
+        if name not in MEASURED or not said or name in found:
+            known = ", ".join(MEASURED)
+            raise InputError(f"--measured {word}: write NAME=COLUMN, once for each of {known}.")
+        try:
+            found[name] = float(said)
+        except ValueError:
+            if not log:
+                must = "a maneuver has no columns, so give a number in SI"
+                raise InputError(f"--measured {word}: {must}.") from None
+            unit = MEASURED[name][0]
+            found[name] = read_series(log, said, unit, time_column=options.time_column).values
+    return found
 
 
 def window_of(time: Array, begin: float | None, end: float | None) -> tuple[float, float] | None:

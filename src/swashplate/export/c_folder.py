@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass
 from importlib.resources import files
@@ -27,7 +28,7 @@ from swashplate.models.card import stable_step
 from swashplate.models.displacement_control import steep_stops
 from swashplate.parameters.rules import FULL_VOLTAGE
 from swashplate.simulation.instance import check_filter_stability, instance_of, models_of
-from swashplate.simulation.run import Sample
+from swashplate.simulation.run import LEAST, Sample
 from swashplate.tables import write_text
 
 Array = NDArray[np.float64]
@@ -53,6 +54,7 @@ def exported_drive(drive: Drive | None = None) -> Exported:
         parameters=columns,
         outputs=(*Sample._fields[1:], "motor_torque", "motor_pressure_drop"),
         bounds={"voltage": FULL_VOLTAGE},
+        least={name: least for name, (least, _) in LEAST.items()},
         stable={0: stable_step},
         follows={(1, "steep"): steep_stops},
         internal=frozenset({"own"}),
@@ -145,7 +147,8 @@ def content_of(
 ) -> Content:
     """What is exported of a drive, or of a model of one's own with its numbers.
 
-    Functions of the latter begin with `prefix`; the other arguments are those of `c`.
+    Functions of the latter begin with `prefix`; the other arguments are those of `c`. A drive's
+    recursion for another rate becomes its equation, with a warning.
 
     Raises
     ------
@@ -156,8 +159,16 @@ def content_of(
     if isinstance(what, Drive):
         if not step <= LONGEST_STEP:
             raise InputError(
-                f"The step is {step:g} s, but must be above 0 and at most 1/{SOURCE_RATE:g} s; "
-                "the steps of an FMU's master may be longer."
+                f"The step is {step:g} s, but must be above 0 and at most 1/{SOURCE_RATE:g} s; an "
+                "FMU's master may take longer ones, a program several steps of C at a time."
+            )
+        rate = what.parameters.rate
+        if rate is not None and abs(rate * step - 1.0) > 1e-9:
+            what = what.at_every_rate()
+            warnings.warn(
+                f"{what.name}: the card's filter is a recursion for {rate:g} Hz; for a step of "
+                f"{step:g} s the differential equation with the same poles takes its place.",
+                stacklevel=3,
             )
         check_filter_stability(what.parameters, step)
         exported, instance = exported_drive(what), instance_of(what.parameters, True)
@@ -216,6 +227,11 @@ def c(
         If the step is none, or the filter of the drive is unstable at it.
     FileError
         If the folder cannot be written.
+
+    Warns
+    -----
+    UserWarning
+        Where the recursion of the card's filter was converted to another step.
     """
     own = c_name(what.name) if isinstance(what, Model) else "swp"
     content = content_of(

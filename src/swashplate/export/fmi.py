@@ -23,7 +23,6 @@ from swashplate.__about__ import __version__
 from swashplate.drive import Drive
 from swashplate.equations.c_source import feedthrough, newest
 from swashplate.equations.fields import value_at
-from swashplate.equations.marching.record import check_rate
 from swashplate.equations.model import Model
 from swashplate.errors import FileError, InputError
 from swashplate.export.c_folder import LONGEST_STEP, Content, content_of
@@ -36,7 +35,7 @@ from swashplate.export.libraries import (
     packaged,
     sources,
 )
-from swashplate.export.variables import NONE, Variable, variables
+from swashplate.export.variables import LONGEST_LINE, NONE, Variable, variables
 from swashplate.results import Result
 from swashplate.tables import UNIT, Column, Table, write_bytes
 from swashplate.units import si_exponents, to_si
@@ -45,8 +44,6 @@ Version = Literal["2.0", "3.0"]
 Array = NDArray[np.float64]
 
 MAGIC, RESOURCE_VERSION, TOKEN_LENGTH = b"SWPDRIVE", 1, 64
-LONGEST_LINE = 1020
-"""Steps that the delay line of the libraries can hold."""
 DISPLAYED = {"rad": ("deg",), "rad/s": ("deg/s", "rpm"), "Pa": ("bar",), "m": ("mm",), "s": ("ms",)}
 """Units that people read, offered beside SI ones."""
 WHOLE = "fmu.c"
@@ -124,17 +121,7 @@ def fmu(
 
 
 def exportable(what: Drive | Model, step: float, **numbers: Any) -> Content:
-    """What runs at a step: a drive's recursion for another rate becomes its equation."""
-    check_rate(step, "step", "s")
-    if isinstance(what, Drive):
-        rate = what.parameters.rate
-        if rate is not None and abs(rate * step - 1.0) > 1e-9 and 0.0 < step <= LONGEST_STEP:
-            what = what.at_every_rate()
-            warnings.warn(
-                f"{what.name}: the card's filter is a recursion for {rate:g} Hz; for a step of "
-                f"{step:g} s the differential equation with the same poles takes its place.",
-                stacklevel=3,
-            )
+    """What runs at a step, its delays checked; see `content_of`."""
     content = content_of(what, step, **numbers)
     for i, _, _, tap in content.exported.taps:
         delay = value_at(content.instance.parts[i].p, tap.delay) if tap.delay else 0.0

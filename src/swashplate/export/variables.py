@@ -8,7 +8,7 @@ come from their definitions, a drive's signals from its samples.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import isfinite
 from typing import Any, Literal, NamedTuple
 
@@ -61,6 +61,10 @@ DRIVE_WORDS: dict[str, Words] = {
     ),
 }
 """Signals of a drive, and options that can be set before a run, by the model's names."""
+
+
+LONGEST_LINE = 1020
+"""Steps that the delay line of the libraries can hold."""
 
 
 @dataclass(frozen=True)
@@ -122,7 +126,13 @@ def variables(
         return Variable(name, number, kind, "continuous", said.meaning, said.unit, **more)
 
     found = [
-        signal(name, number, "input", start=starts[defaults[name]] if name in defaults else 0.0)
+        signal(
+            name,
+            number,
+            "input",
+            start=starts[defaults[name]] if name in defaults else 0.0,
+            lower=exported.least.get(name),
+        )
         for number, name in enumerate((*exported.signals, *exported.measured), r.INPUT)
     ]
     found += [
@@ -135,12 +145,17 @@ def variables(
         for i, part in enumerate(exported.model.parts)
         for each, path in _declared(part.parameters)
     }
+    delays = {(part, tap.delay) for part, _, _, tap in exported.taps}
     for i, (part_number, path, name) in enumerate(parameters):
         if defaults.get(name) == name:  # an input of that name has its value
             continue
         known = f"{name}_parameter" if name in taken else name
         made = declared[part_number, path]
-        found.append(_parameter(known, r.PARAMETER + i, made, path, starts[name]))
+        variable = _parameter(known, r.PARAMETER + i, made, path, starts[name])
+        if (part_number, path) in delays:
+            most = LONGEST_LINE * values[0]
+            variable = replace(variable, upper=min(variable.upper or most, most))
+        found.append(variable)
     longest = exported.longest if isfinite(exported.longest) else None
     meaning = "step of the model's own grid, whatever the master's steps are"
     found.append(

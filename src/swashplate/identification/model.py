@@ -330,7 +330,7 @@ class OwnModel(Result, EquationModel):
             substeps=self.substeps,
         )[left[0]]
         record = replace(record, start=float(command.time[0]))
-        return left[0], record, {c.name: np.interp(record.points, c.time, c.values) for c in others}
+        return left[0], record, {each.name: each.at(record.points) for each in others}
 
     def ready(self, values: Mapping[str, float], experiment: Experiment, asked: Asked) -> Ready:
         """The model with numbers; a name that is not known, or no value of one, is refused."""

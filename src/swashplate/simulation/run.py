@@ -32,6 +32,14 @@ from swashplate.simulation.instance import (
 from swashplate.simulation.result import Simulation
 
 Array = NDArray[np.float64]
+LEAST: Mapping[str, tuple[float, str]] = {
+    "supply_pressure": (1.0, "1 Pa or above: it is the supply less the static pressure"),
+    "pump_speed": (
+        0.0,
+        "0 or above: it is that of the prime mover over the one that Z10 belongs to",
+    ),
+}
+"""Least values of measured inputs, and what they must be in words."""
 
 
 def drive_records(
@@ -57,16 +65,9 @@ def drive_records(
     found = on_grid(inputs, rate, time=time, interpolation=between, substeps=steps)
     if driver == "voltage":
         found["voltage"] = check_voltage(found["voltage"], clip)
-    if (supply := found.get("supply_pressure")) and not (low := supply.values.min()) > 0.0:
-        raise InputError(
-            f"The supply_pressure falls to {low:g} Pa, but must be above 0: it is the supply less "
-            "the static pressure."
-        )
-    if (speed := found.get("pump_speed")) and not (low := speed.values.min()) >= 0.0:
-        raise InputError(
-            f"The pump_speed falls to {low:g}, but must be 0 or above: it is that of the prime "
-            "mover over the one that Z10 belongs to."
-        )
+    for name, (least, must) in LEAST.items():
+        if name in found and not (low := found[name].values.min()) >= least:
+            raise InputError(f"The {name} falls to {low:g}, but must be {must}.")
     return found
 
 

@@ -221,6 +221,8 @@ class _Interface(Writer):
         lines.append("static const unsigned option_places[] = {")
         lines += [f"    offsetof({e.type}, {place})," for place in options] or ["    0,"]
         lines += ["};", ""]
+        least = [literal(e.least.get(name, -inf)) for name in e.measured] or ["0.0"]
+        lines += [f"static const double least_inputs[] = {{{', '.join(least)}}};", ""]
         for word, names in (
             ("parameter", [name for name, _, _ in self.rows]),
             ("output", e.names),

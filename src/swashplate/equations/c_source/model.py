@@ -52,6 +52,8 @@ class Exported:
     """Signals that can be read; by default all."""
     bounds: Mapping[str, float] = field(default_factory=dict)
     """Largest magnitude of an input."""
+    least: Mapping[str, float] = field(default_factory=dict)
+    """Least value of a measured input."""
     stable: Mapping[int, Equation] = field(default_factory=dict)
     """By part: margin above 0 where its equations bear the step, of ``p, h, options``."""
     follows: Mapping[tuple[int, str], Equation] = field(default_factory=dict)
