@@ -168,9 +168,7 @@ class ShownUnits:
     """Units that tables and figures are shown in."""
 
     units: str = ""
-    drum: Annotated[
-        float | None, option("Diameter of the drum on the shaft.", metavar="M", min=0.0)
-    ] = None
+    drum: Annotated[float | None, option("Diameter of the drum on the shaft.", metavar="M")] = None
 
 
 _ENTRY = re.compile(r"^  (\w+)((?: --[\w/-]+)*) ?([A-Z\[]\S*)?: (.*(?:\n   .*)*)", re.MULTILINE)

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from swashplate.errors import InputError
 from swashplate.linear import FrequencyResponse, LinearDrive
+from swashplate.report.figures.simulation import SIGNAL_UNITS
 from swashplate.report.style import (
     FAINT,
     GREY,
@@ -75,7 +76,7 @@ def plot_bode(
         legend.append(handle(f"small motions about {where}", GREY, "dashed"))
     output = WORDS.get(response.output, response.output.replace("_", " "))
     words = f"{response.name}: {response.input} to {output}, sines about {response.bias:g} {unit}"
-    shown = display_unit(UNITS[response.output], float(response.gain.max()))
+    shown = display_unit(SIGNAL_UNITS[response.output], float(response.gain.max()))
     by = f"({shown.name})" if "/" in shown.name else shown.name or "1"
     labels = f"gain ({by}/{unit})", "phase (deg)", "distortion (%)"
     words = words if title is None else title
