@@ -289,8 +289,8 @@ def outcome_matrix(speed: Array, trial: Trial, outcomes: Sequence[Outcome]) -> A
 # --- runs in words --------------------------------------------------------------------------------
 
 
-def time_share(run: Simulation, limit: Limit) -> float:
-    """Share of a record's samples at which a limit acts, 0 to 1.
+def held_back(run: Simulation, limit: Limit) -> NDArray[np.bool_]:
+    """(n,) samples at which a limit acts.
 
     Of the dead zone only samples with a command other than 0 count: at rest nothing is asked that
     it could hold back.
@@ -299,7 +299,18 @@ def time_share(run: Simulation, limit: Limit) -> float:
     if limit == Limit.DEAD_ZONE:
         command = run.current if run.voltage is None else run.voltage
         acts = acts & (command != 0.0)
-    return float(acts.mean())
+    return acts
+
+
+def time_share(run: Simulation, limit: Limit) -> float:
+    """Share of a record's samples at which a limit acts, 0 to 1; see `held_back`."""
+    return float(held_back(run, limit).mean())
+
+
+def share_cell(share: float | None) -> Cell:
+    """A share of time as people read it."""
+    words = "" if share is None else f"{100.0 * share:.1f} %" if share else "never"
+    return Cell(share, words)
 
 
 def run_tables(run: Simulation) -> tuple[Table, Table]:
@@ -319,7 +330,7 @@ def run_tables(run: Simulation) -> tuple[Table, Table]:
     held = Table("", (Column("Limit"), Column("share of time", ".1%")))
     for limit in Limit:
         words = str(limit.name).lower().replace("_", " ")
-        held.add(words, time_share(run, limit) or Cell(0.0, "never"))
+        held.add(words, share_cell(time_share(run, limit)))
     return did, held
 
 

@@ -45,7 +45,7 @@ def plot_bode(
 ) -> Figure:
     """Figure of gain, phase and distortion over the frequency, a line for each amplitude.
 
-    Lines end where nothing moves any more.
+    Lines end where nothing moves any more, which is said at the foot of the gain.
 
     Parameters
     ----------
@@ -97,6 +97,8 @@ def plot_bode(
         for ax, row in zip(axes, small, strict=False):
             ax.plot(fine, row, color=GREY, linestyle="dashed", linewidth=LINE, zorder=1.8)
     _scale(axes, response)
+    # the lines are at the top there
+    write(axes[0], "\n".join(response.still()), (0.0, 0.0), (4.0, 4.0), color=GREY, va="bottom")
     if mark is not None and response.frequencies[0] <= mark <= response.frequencies[-1]:
         for ax in axes:
             ax.axvline(mark, color=FAINT, linewidth=1.0, zorder=1.3)
