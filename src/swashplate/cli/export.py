@@ -65,6 +65,11 @@ def export(
 
         chosen = drive.chosen
         own = exporting.LONGEST_STEP if step is None else step
+        if c is not None and own > exporting.LONGEST_STEP:
+            raise InputError(
+                f"--step is {own:g} s, but must be at most {exporting.LONGEST_STEP:g} s; where "
+                "your controller samples more slowly, call swp_step several times a sample."
+            )
         names = None if platforms is None else [each.strip() for each in platforms.split(",")]
         with said():
             if fmu is not None:

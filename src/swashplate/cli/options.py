@@ -52,7 +52,7 @@ FigureFile = Annotated[
 SetFile = Annotated[
     Path | None,
     option("Write the changed drive as a parameter file.", metavar="SET.toml"),
-    Form("a parameter file"),
+    Form("a parameter file", (".toml",)),
 ]
 Required = Annotated[float, option("Largest error of held-out runs, in % of their range.", min=0.0)]
 
