@@ -12,11 +12,14 @@ from swashplate import FileError, InputError
 from swashplate.parameters.definitions import CATALOGUE
 from swashplate.tables import UNIT, Cell, Column, Table, joined, spread, write_table, write_whole
 from swashplate.units import (
+    PLATE_RATE,
+    SHAFT_ANGLE,
     chosen_unit,
     display_unit,
     shown_in,
     si_exponents,
     to_si,
+    unit_text,
     units_of_choice,
 )
 
@@ -81,12 +84,19 @@ def test_parameters_are_in_si_unless_a_unit_is_chosen() -> None:
     [
         (["rpm"], None, "rad/s", "rpm", 9.5492966),
         (["1/min"], None, "rad/s^2", "rpm/s", 9.5492966),
-        (["rpm"], None, "rad/s/V", "(rpm)/V", 9.5492966),
-        (["rpm"], None, "rad", "turns", 0.15915494),
+        (["rpm"], None, "rad/s/V", "rpm/V", 9.5492966),
+        (["rpm"], None, "V/(rad/s)", "V/rpm", 0.10471976),
+        (["m/min"], 0.4, "rad/s/V", "(m/min)/V", 12.0),
+        (["rpm"], None, SHAFT_ANGLE, "turns", 0.15915494),
         (["m/min"], 0.4, "rad/s", "m/min", 12.0),
-        (["m/min"], 0.4, "rad", "m", 0.2),
+        (["m/min"], 0.4, SHAFT_ANGLE, "m", 0.2),
+        (["rpm", "deg"], None, SHAFT_ANGLE, "deg", 57.29578),
         (["bar", "mm"], None, "Pa", "bar", 1e-5),
         (["rad/s"], None, "V/(rad/s)", "V/(rad/s)", 1.0),
+        # what is not the shaft's stays as it is
+        (["m/min"], 0.4, "rad", "deg", 57.29578),
+        (["rpm"], None, PLATE_RATE, "deg/s", 57.29578),
+        (["rpm", "rad"], None, "rad", "rad", 1.0),
     ],
 )
 def test_units_of_choice(words, drum, si, name, factor) -> None:
@@ -95,14 +105,36 @@ def test_units_of_choice(words, drum, si, name, factor) -> None:
     assert shown.name == name
     assert shown.factor == pytest.approx(factor)
     assert display_unit("rad/s").name == "deg/s"
+    assert display_unit(SHAFT_ANGLE).name == "deg"
 
 
-def test_units_that_no_table_shows() -> None:
-    with pytest.raises(InputError, match="needs the drum's diameter"):
-        units_of_choice(["m/min"])
-    with pytest.raises(InputError, match="No table shows a quantity in 'kelvin'"):
-        units_of_choice(["kelvin"])
-    assert chosen_unit("Pa") == ("Pa", 1.0)
+@pytest.mark.parametrize(
+    ("words", "drum", "said"),
+    [
+        (["m/min"], None, "needs the drum's diameter"),
+        (["m/min"], 0.0, "diameter must be above 0 m, not 0"),
+        (["kelvin"], None, "No table shows a quantity in 'kelvin'"),
+        (["rpm", "deg/s"], None, "two units of one quantity, rpm and deg/s"),
+        (["bar", "MPa"], None, "two units of one quantity, bar and MPa"),
+    ],
+)
+def test_units_that_are_refused(words, drum, said) -> None:
+    with pytest.raises(InputError, match=said):
+        units_of_choice(words, drum)
+
+
+@pytest.mark.parametrize("si", ["rad", "rad/s", "rad/s^2", "Pa"])
+def test_a_parameter_keeps_its_unit_whatever_the_shaft_is_shown_in(si: str) -> None:
+    with shown_in(["rpm"]):
+        assert chosen_unit(si) == (unit_text(si), 1.0)
+
+
+def test_a_file_knows_no_unit_but_si() -> None:
+    made = Table("", (Column("what"), Column("", ".1f"), UNIT))
+    made.add("position", 6.2831853, unit=SHAFT_ANGLE)
+    assert made.to_polars()["unit"].to_list() == ["rad"]
+    with shown_in(["rpm"]):
+        assert made.texts(made.rows[0]) == ["position", "1.0", "turns"]
 
 
 @pytest.mark.parametrize(

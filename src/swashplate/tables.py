@@ -18,7 +18,7 @@ from secrets import token_hex
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from swashplate.errors import FileError
-from swashplate.units import chosen_unit, display_unit
+from swashplate.units import SHAFT_ANGLE, chosen_unit, display_unit
 
 if TYPE_CHECKING:
     import polars
@@ -48,8 +48,8 @@ class Column:
     spec: str = ""
     """Of numbers, as of `format`: ``".2f"``, ``".3g"``, ``".1%"``. Empty: words."""
     unit: str = ""
-    """SI unit of its numbers, which people get converted and named behind the name; ``"1"`` for
-    pure numbers in rows that have a unit of their own."""
+    """Unit of its numbers as of `display_unit`, which people get converted and named behind the
+    name; ``"1"`` for pure numbers in rows that have a unit of their own."""
     none: str = ""
     """What stands for no number."""
     wrap: bool = False
@@ -74,7 +74,7 @@ class Row(NamedTuple):
 
     cells: tuple[Any, ...]
     unit: str
-    """SI unit of all its numbers, where they have one of their own."""
+    """Unit of all its numbers as of `display_unit`, where they have one of their own."""
     spec: str
     look: bool
     """Whether someone should look at it."""
@@ -108,7 +108,8 @@ class Table:
         count = sum(each is not UNIT for each in self.columns)
         assert len(cells) == count, f"{len(cells)} cells for {count} columns of {self.title}"
         given = iter(cells)
-        every = tuple(unit if each is UNIT else next(given) for each in self.columns)
+        si = "rad" if unit == SHAFT_ANGLE else unit
+        every = tuple(si if each is UNIT else next(given) for each in self.columns)
         self.rows.append(Row(every, unit, spec, look, section or total, total))
 
     def of(self, place: str) -> Table:

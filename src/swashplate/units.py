@@ -162,9 +162,19 @@ class DisplayUnit(NamedTuple):
         return f"{words} ({self.name})" if self.name else words
 
 
+SHAFT_ANGLE = "rad of the shaft"
+"""Unit of a shaft's angle for `display_unit`: shown as its speed is, in turns or metres of rope.
+
+``"rad"`` is any other angle. ``"rad/s"`` and ``"rad/s^2"`` are the shaft's wherever they are shown,
+except for parameters, see `chosen_unit`, and for `PLATE_RATE`.
+"""
+PLATE_RATE = "rad/s of the plate"
+"""Unit of the swash plate's angular speed for `display_unit`."""
+
 _USUAL: dict[str, tuple[tuple[float, DisplayUnit], ...]] = {
     "rad": ((0.0, DisplayUnit("deg", 180.0 / pi)),),
     "rad/s": ((0.0, DisplayUnit("deg/s", 180.0 / pi)),),
+    PLATE_RATE: ((0.0, DisplayUnit("deg/s", 180.0 / pi)),),
     "rad/s^2": ((0.0, DisplayUnit("deg/s²", 180.0 / pi)),),
     "m": ((10.0, DisplayUnit("m", 1.0)), (0.0, DisplayUnit("mm", 1e3))),
     "m/s": ((10.0, DisplayUnit("m/s", 1.0)), (0.0, DisplayUnit("mm/s", 1e3))),
@@ -180,7 +190,9 @@ _TURNS = {
     "rad/s": (("rad/s", 1.0), ("rad", 1.0), ("rad/s²", 1.0)),
     "deg/s": (("deg/s", 180.0 / pi), ("deg", 180.0 / pi), ("deg/s²", 180.0 / pi)),
 }
-"""Speed, position and acceleration that go together."""
+"""Speed, angle and acceleration of a shaft that go together."""
+_OF_SHAFT = ("rad/s", SHAFT_ANGLE, "rad/s^2")
+"""Their units, in the same order."""
 _RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 _chosen: ContextVar[Mapping[str, DisplayUnit]] = ContextVar(
     "units of choice", default=MappingProxyType({})
@@ -191,43 +203,59 @@ def units_of_choice(words: Sequence[str], drum: float | None = None) -> dict[str
     """The units that someone names, ``"rpm"`` or ``"bar"``, by the SI unit each is shown for.
 
     With the diameter of a drum on the shaft [m], ``"m/min"`` and ``"m/s"`` of its rope stand for
-    the shaft's speed.
+    the shaft's speed. A unit of speed is for the shaft, and its angle and acceleration go with it;
+    other angles and frequencies stay as they are.
 
     Raises
     ------
     InputError
-        If a unit is unknown, or measures what no table shows.
+        If a unit is unknown, or measures what no table shows, if two are for one quantity, or if
+        the drum has no diameter.
     """
+    if drum is not None and not drum > 0.0:
+        raise InputError(f"A drum's diameter must be above 0 m, not {drum:g}: --drum 0.4.")
+    named: dict[str, str] = {}
     chosen: dict[str, DisplayUnit] = {}
-    rope = {"m/min": 60.0, "m/s": 1.0}
+    beside: dict[str, DisplayUnit] = {}
     for word in words:
-        if word == "m/min" and drum is None:
-            raise InputError("A speed in m/min of rope needs the drum's diameter: --drum 0.4.")
-        turns = _TURNS.get(speed_unit(word))
-        if turns is None and word in rope and drum is not None:
-            radius = 0.5 * drum
-            turns = ((word, rope[word] * radius), ("m", radius), ("m/s²", radius))
-        if turns is not None:
-            for si, (name, factor) in zip(("rad/s", "rad", "rad/s^2"), turns, strict=True):
-                chosen[si] = DisplayUnit(name, factor)
+        shown, turns = _chosen_by(word, drum)
+        for si in shown:
+            if named.setdefault(si, word) != word:
+                raise InputError(
+                    f"--units names two units of one quantity, {named[si]} and {word}: give one."
+                )
+        chosen |= shown
+        beside |= turns
+    if "rad" in chosen and beside:
+        beside[SHAFT_ANGLE] = chosen["rad"]
+    return {**beside, **chosen}
+
+
+def _chosen_by(
+    word: str, drum: float | None
+) -> tuple[dict[str, DisplayUnit], dict[str, DisplayUnit]]:
+    """What a unit is chosen for, and what of the shaft goes with it, by SI unit."""
+    turns, rope = _TURNS.get(speed_unit(word)), {"m/min": 60.0, "m/s": 1.0}
+    if word == "m/min" and drum is None:
+        raise InputError("A speed in m/min of rope needs the drum's diameter: --drum 0.4.")
+    if word in rope and drum is not None:
+        radius = 0.5 * drum
+        turns = ((word, rope[word] * radius), ("m", radius), ("m/s²", radius))
+    if turns is not None:
+        units = {si: DisplayUnit(*each) for si, each in zip(_OF_SHAFT, turns, strict=True)}
+        return {"rad/s": units.pop("rad/s")}, units
+    usual = {si: each for si, units in _USUAL.items() for _, each in units if each.name == word}
+    if word and usual:
+        return usual, {}
+    for si in ("Pa", "m", "m/s", "A", "rad"):
+        try:
+            return {si: DisplayUnit(word, 1.0 / to_si(1.0, word, si, "--units"))}, {}
+        except InputError:
             continue
-        usual = [(si, each) for si, units in _USUAL.items() for _, each in units]
-        if word and word in (each.name for _, each in usual):
-            chosen.update((si, each) for si, each in usual if each.name == word)
-            continue
-        for si in ("Pa", "m", "m/s", "A", "rad"):
-            try:
-                size = to_si(1.0, word, si, "--units")
-            except InputError:
-                continue
-            chosen[si] = DisplayUnit(word, 1.0 / size)
-            break
-        else:
-            raise InputError(
-                f"No table shows a quantity in '{word}': choose one of speed (rpm, rad/s, deg/s; "
-                "m/min of rope with a drum), pressure (bar), length (mm), angle (deg) or current."
-            )
-    return chosen
+    raise InputError(
+        f"No table shows a quantity in '{word}': choose one of speed (rpm, rad/s, deg/s; "
+        "m/min of rope with a drum), pressure (bar), length (mm), angle (deg) or current."
+    )
 
 
 @contextmanager
@@ -243,9 +271,14 @@ def shown_in(words: Sequence[str], drum: float | None = None) -> Iterator[None]:
 def show_rod() -> None:
     """Show what is called a shaft's motion as a rod's, in mm or what was chosen, for that while."""
     chosen = _chosen.get()
-    for turning, moving in (("rad/s", "m/s"), ("rad", "m"), ("rad/s^2", "m/s^2")):
+    for turning, moving in zip(_OF_SHAFT, ("m/s", "m", "m/s^2"), strict=True):
         usual = _USUAL[moving][1][1]
         _chosen.set({turning: chosen.get(moving, usual), **_chosen.get()})
+
+
+def of_shaft(si: str) -> str:
+    """Unit of a shaft's quantity for `display_unit`, of its SI unit: an angle is the shaft's."""
+    return SHAFT_ANGLE if si == "rad" else si
 
 
 def display_unit(si: str, largest: float = float("inf")) -> DisplayUnit:
@@ -256,22 +289,34 @@ def display_unit(si: str, largest: float = float("inf")) -> DisplayUnit:
     """
     if si in _chosen.get():
         return _chosen.get()[si]
+    if si == SHAFT_ANGLE:
+        return display_unit("rad", largest)
     for size, shown in _USUAL.get(si, ()):
         if largest >= size or size == 0.0:
             return shown
     base, slash, of = si.partition("/s/")
     if slash:
         speed = display_unit(f"{base}/s")
-        return DisplayUnit(f"({speed.name})/{of}", speed.factor)
+        return DisplayUnit(f"{_in_brackets(speed)}/{of}", speed.factor)
     if si.endswith("/(rad/s)"):
         speed = display_unit("rad/s")
-        return DisplayUnit(f"{si.removesuffix('(rad/s)')}({speed.name})", 1.0 / speed.factor)
+        before = si.removesuffix("(rad/s)")
+        return DisplayUnit(f"{before}{_in_brackets(speed)}", 1.0 / speed.factor)
     return DisplayUnit(unit_text(si), 1.0)
 
 
+def _in_brackets(unit: DisplayUnit) -> str:
+    """Name of a unit within a fraction."""
+    return f"({unit.name})" if "/" in unit.name else unit.name
+
+
 def chosen_unit(si: str) -> DisplayUnit:
-    """Unit to show a parameter in: the one chosen, else SI as its file has it."""
-    return _chosen.get().get(si) or DisplayUnit(unit_text(si), 1.0)
+    """Unit to show a parameter in: the one chosen, else SI as its file has it.
+
+    No parameter is a speed of the shaft: one in rad/s or rad/s² stays so.
+    """
+    shown = None if si in _OF_SHAFT else _chosen.get().get(si)
+    return shown or DisplayUnit(unit_text(si), 1.0)
 
 
 def unit_text(unit: str) -> str:

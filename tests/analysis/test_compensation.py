@@ -1,5 +1,6 @@
 """The inverse steady-state map: exact at its points, monotone, the same after a file."""
 
+import re
 import tomllib
 
 import numpy as np
@@ -9,6 +10,7 @@ from hypothesis import strategies as st
 
 from swashplate import DomainError, Drive, FileError, InputError, maneuvers
 from swashplate.analysis import improvement, inverse_map, proportional_command, wanted_of_stick
+from swashplate.units import display_unit, shown_in
 
 MAPS = {name: inverse_map(Drive.preset(name)) for name in ("hoist", "slew", "luff", "neutral")}
 
@@ -75,6 +77,24 @@ def test_commands_that_cannot_be(speed, rate, said) -> None:
         MAPS["hoist"].command(speed, rate)
     clipped = MAPS["hoist"].voltage([4.0, -4.0], clip=True)
     assert clipped == pytest.approx([7.8726, -7.4067], abs=1e-4)
+
+
+@pytest.mark.parametrize("unit", ["deg/s", "rpm"])
+def test_what_a_drive_cannot_hold_is_said_in_the_unit_of_choice(unit: str) -> None:
+    inverse = MAPS["hoist"]
+    with shown_in([unit]):
+        low, high = (display_unit("rad/s").factor * each for each in inverse.limits)
+        said = f"its speeds reach from {low:.6g} {unit} to {high:.6g} {unit}"
+        with pytest.raises(InputError, match=re.escape(said)):
+            inverse.voltage(4.0)
+        table = inverse.tables([0.0, 1.0])[0]
+        factor = display_unit("rad/s").factor
+        assert [table.texts(row)[1:] for row in table.rows] == [
+            ["0.0000", f"{factor * inverse.creep:.3f}"],
+            [f"{float(inverse.voltage(1.0)):.4f}", f"{factor:.3f}"],
+        ]
+        assert f"and {factor * inverse.gap[1]:.3f} {unit} only the creep" in table.caption
+        assert not inverse.tables([1.0])[0].caption
 
 
 def test_files(tmp_path) -> None:

@@ -110,7 +110,8 @@ def test_one_at_a_time(done, tmp_path):
 
 def test_the_map_that_is_printed(done):
     text = done("compensate", "hoist", "--speed-deg-s", "97.75", "--speed-deg-s", "-22.16")
-    rows = dict(pair for line in text.splitlines() if len(pair := line.split()) == 2)
+    lines = (line.split() for line in text.splitlines())
+    rows = {cells[0]: cells[1] for cells in lines if len(cells) in (2, 3)}
     # the static table: 97.75 deg/s at 4 V, -22.16 at -1 V
     expected = {"97.75": 4.0, "-22.16": -1.0, "195.997": 7.87, "-184.996": -7.41}
     assert {k: float(rows[k]) for k in expected} == pytest.approx(expected, abs=0.005)
@@ -149,6 +150,7 @@ def test_gain_and_phase_at_0_3_hz(done):
     assert "hoist, sines about 0 V: 6 frequencies from 0.02 to 5 Hz" in text
     rows = [line.split() for line in text.partition("─\n")[2].split("\n\n")[0].splitlines()]
     assert [row[0] for row in rows] == ["1", "4", "6.5", "9"]
+    assert "No motion under 1 V at 5 Hz.\n" in text
     phases = [float(row[2]) for row in rows]
     assert phases == sorted(phases, reverse=True)
     assert phases[-1] < -50.0 < -20.0 < phases[0]

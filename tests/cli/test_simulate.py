@@ -82,6 +82,29 @@ def test_a_rod_is_shown_in_millimetres(done, number, tmp_path):
     assert number(text, "peak speed, positive") == pytest.approx(fastest, abs=0.01)
 
 
+@pytest.mark.parametrize(
+    ("words", "row", "value"),
+    [
+        (
+            ("linearize", "hoist", "--at", "4", "--units", "m/min", "--drum", "0.8"),
+            "swash angle",
+            "deg",
+        ),
+        (("linearize", "hoist", "--at", "4", "--units", "rpm"), "steady gain", "rpm/V"),
+        (("simulate", "hoist", "step:9", "--units", "rpm"), "position at the end", "turns"),
+        (("show", "hoist", "--units", "m/min", "--drum", "0.8"), "omega", "56.253 61.833 rad/s"),
+        (("show", "hoist", "--units", "rpm"), "Z13", "0.27596 0.26047 rad"),
+        (("full-order", "hoist", "step:2", "--units", "rpm"), "spool_frequency", "40 Hz"),
+        (("full-order", "hoist", "step:2"), "motor_constant", "rad/m³"),
+        (("show", "hoist", "--set", "cam_ripple=0.01"), "cam_ripple (", ": 0.01"),
+    ],
+)
+def test_only_the_shafts_motion_is_shown_in_its_unit(done, words, row, value):
+    line = next(each for each in done(*words).splitlines() if each.startswith(row))
+    assert value in " ".join(line.split())
+    assert not line.endswith(" 1")  # a pure number has no unit
+
+
 def test_a_load_that_nothing_feels_is_said(done):
     text = done("simulate", "hoist", "rest:1", "--set", "load_torque=30kN*m")
     assert "! load_torque changes nothing without motor_leakage or motor_constant" in text

@@ -6,8 +6,9 @@ A page is run from top to bottom in an empty folder:
   begins with ``# name.py`` is that file, too;
 - ``console`` blocks line by line: ``$ swashplate ...`` is run, 80 columns wide, and the lines below
   it must be what it printed, ``...`` standing for lines left out;
-- ``$ cc ...`` and ``$ ./program`` are run where there is a compiler;
-- ``c`` blocks begin with ``/* name.c */`` and are that file;
+- ``$ cc ...`` and ``$ ./program`` are run where there is a compiler, ``$ node ...`` where there is
+  Node;
+- ``c`` and ``js`` blocks begin with ``/* name.c */`` and are that file;
 - ``toml`` and ``csv`` blocks that begin with ``# name`` are that file; campaigns and fit
   configurations are valid, other ``toml`` is a fragment;
 - ``diff`` blocks change a file: ``--- name``, then lines kept, taken out and put in;
@@ -108,8 +109,8 @@ def run_command(command: str, shown: str) -> None:
         run_swashplate(command, words, shown)
     elif program == "make":
         assert set(words) <= TARGETS, command
-    elif program == "cc" or program.startswith("./"):
-        if which("cc") is None:
+    elif program in ("cc", "node") or program.startswith("./"):
+        if which("node" if program == "node" else "cc") is None:
             return
         done = subprocess.run([program, *words], capture_output=True, text=True, check=False)
         assert done.returncode == 0, done.stderr
@@ -182,7 +183,7 @@ def test_a_page_does_what_it_shows(
                 printed = out.getvalue()
             case "console":
                 run_console(content)
-            case "toml" | "csv" | "c":
+            case "toml" | "csv" | "c" | "js":
                 write_file(language, content)
             case "diff":
                 change_file(content)

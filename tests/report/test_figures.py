@@ -21,6 +21,7 @@ from swashplate.analysis import (
     envelope,
     improvement,
     inverse_map,
+    limit_shares,
     one_at_a_time,
     trial,
     what_if,
@@ -318,6 +319,16 @@ def test_the_timeline_has_a_row_for_each_limit(
         figures.plot_limit_timeline(all_limits, wanted=[0.0])
 
 
+def test_the_timeline_and_the_table_agree_on_the_dead_zone(hoist: Drive, step: Simulation) -> None:
+    """At rest nothing is asked that the dead zone could hold back."""
+    table = limit_shares(hoist, step["voltage"]).table().of("t")
+    (share,) = [table.texts(row)[1] for row in table.rows if row.cells[0] == "dead zone"]
+    rows = figures.plot_limit_timeline(step).axes[2]
+    names = [label.get_text() for label in rows.get_yticklabels()]
+    assert rows.texts[names.index(SHADES[Limit.DEAD_ZONE].name)].get_text() == share
+    assert 100.0 * step.active(Limit.DEAD_ZONE).mean() > 10.0 > float(share.split()[0])
+
+
 def test_speeds_before_and_after(made: dict[str, Figure]) -> None:
     figure = made["whatif"]
     tops = sorted(float(each.max()) for each in lines(figure, 1))
@@ -351,6 +362,8 @@ def test_lines_of_a_sweep_are_the_response(made: dict[str, Figure], hoist: Drive
         expected = DEGREE * swept.gain[row]
         np.testing.assert_allclose(lines(figure, 0)[row][there], expected[there])
     assert legend(figure) == ["1 V", "9 V", "small motions about 4 V"]
+    assert not swept.moves.all()
+    assert "\n".join(swept.still()) in [text.get_text() for text in figure.axes[0].texts]
     by_current = hoist.linearize(current=0.5)
     with pytest.raises(InputError, match="leads from voltage to shaft_speed"):
         figures.plot_bode(swept, linear=by_current)

@@ -17,7 +17,16 @@ from swashplate.equations.marching.record import SOURCE_RATE
 from swashplate.errors import DomainError, InputError
 from swashplate.parameters.rules import FULL_VOLTAGE
 from swashplate.results import Result, short
-from swashplate.tables import UNIT, Column, Form, Table, ending, write_table, write_text
+from swashplate.tables import (
+    UNIT,
+    Column,
+    Form,
+    Table,
+    ending,
+    quantity,
+    write_table,
+    write_text,
+)
 
 if TYPE_CHECKING:
     import polars
@@ -105,10 +114,12 @@ class InverseMap(Result):
         inside, slack = np.clip(wanted, low, high), ROUNDING * (high - low)
         beyond = wanted[np.abs(wanted - inside) > slack]
         if beyond.size and not clip:
-            worst, low, high = np.degrees([beyond[np.abs(beyond).argmax()], low, high])
+            worst, least, most = (
+                quantity(float(each), "rad/s", spec=".6g")
+                for each in (beyond[np.abs(beyond).argmax()], low, high)
+            )
             raise InputError(
-                f"{self.name} cannot settle at {worst:.6g} deg/s: its speeds reach "
-                f"from {low:.6g} to {high:.6g} deg/s; want less, or clip."
+                f"{self.name} cannot settle at {worst}: its speeds reach from {least} to {most}."
             )
         # the creep comes first, so that it wins a tie
         held = np.array([self.creep, below, above])
@@ -161,9 +172,23 @@ class InverseMap(Result):
 
     def tables(self, speeds: Sequence[float] = ()) -> list[Table]:
         """Voltages of wanted speeds [rad/s]; the map at a few points; where it holds."""
-        wanted = Table("", (Column("wanted speed", "g", "rad/s"), Column("voltage", "z.4f", "V")))
-        for speed, voltage in zip(speeds, self.voltage(speeds), strict=True):
-            wanted.add(speed, float(voltage))
+        columns = (
+            Column("wanted speed", "g", "rad/s"),
+            Column("voltage", "z.4f", "V"),
+            Column("settles at", "z.3f", "rad/s"),
+        )
+        wanted = Table("", columns)
+        voltages = self.voltage(speeds)
+        # the map the other way round: in the gap the drive creeps, or goes at its slowest
+        map_voltages = np.concatenate([self.minus.voltage, [0.0], self.plus.voltage])
+        map_speeds = np.concatenate([self.minus.speed, [self.creep], self.plus.speed])
+        settled = np.interp(voltages, map_voltages, map_speeds)
+        for row in zip(speeds, voltages, settled, strict=True):
+            wanted.add(*map(float, row))
+        below, above = self.gap
+        if any(below < speed < above for speed in speeds):
+            low, high = (quantity(each, "rad/s", spec="z.3f") for each in (below, above))
+            wanted.caption = f"between {low} and {high} only the creep at 0 V can be held"
         made, total = self._points(MOST_SHOWN), self.minus.speed.size + self.plus.speed.size + 1
         if len(made.rows) < total:
             made.caption = f"{len(made.rows)} of {total} points shown"

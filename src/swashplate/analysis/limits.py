@@ -9,7 +9,12 @@ from typing import TYPE_CHECKING, Unpack
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from swashplate.analysis.outcomes import checked_speed, rms_difference, time_share
+from swashplate.analysis.outcomes import (
+    checked_speed,
+    rms_difference,
+    share_cell,
+    time_share,
+)
 from swashplate.drive import Drive, Given
 from swashplate.equations.marching.record import SOURCE_RATE
 from swashplate.equations.marching.run import Start
@@ -19,7 +24,7 @@ from swashplate.parameters.parameter_set import Change
 from swashplate.results import Result, Tabular
 from swashplate.simulation.result import Limit, Simulation
 from swashplate.simulation.run import simulate_drive
-from swashplate.tables import Cell, Column, Table, quantity
+from swashplate.tables import Column, Table, quantity
 
 if TYPE_CHECKING:
     import polars
@@ -159,8 +164,8 @@ class LimitShares(Tabular):
         for each in self.shares:
             if acting and not (each.time_share or each.error_share or each.failure or each.alone):
                 continue
-            time = Cell(0.0, "never") if each.time_share == 0.0 else each.time_share
             words = each.limit, each.component, each.failure
+            time = share_cell(each.time_share)
             made.add(*words, time, each.error, each.error_share, each.alone)
         return made
 

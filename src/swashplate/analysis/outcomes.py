@@ -18,7 +18,7 @@ from swashplate.parameters.rules import FULL_VOLTAGE
 from swashplate.results import Result
 from swashplate.simulation.result import Limit
 from swashplate.tables import UNIT, Cell, Column, Table
-from swashplate.units import DisplayUnit, display_unit
+from swashplate.units import SHAFT_ANGLE, DisplayUnit, display_unit, of_shaft
 
 if TYPE_CHECKING:
     from swashplate.simulation.result import Simulation
@@ -153,7 +153,7 @@ class Outcome(Result):
     @property
     def shown(self) -> DisplayUnit:
         """Unit to show it in: that of its quantity, and per cent for a share."""
-        return DisplayUnit("%", 100.0) if self.unit == "1" else display_unit(self.unit)
+        return DisplayUnit("%", 100.0) if self.unit == "1" else display_unit(of_shaft(self.unit))
 
     @property
     def spec(self) -> str:
@@ -162,7 +162,9 @@ class Outcome(Result):
 
     def add_to(self, table: Table, cells: Sequence[float]) -> None:
         """Add a row of its values, SI."""
-        table.add(self.words, *cells, unit="" if self.unit == "1" else self.unit, spec=self.spec)
+        table.add(
+            self.words, *cells, unit="" if self.unit == "1" else of_shaft(self.unit), spec=self.spec
+        )
 
 
 OUTCOMES: dict[str, Outcome] = {}
@@ -287,8 +289,8 @@ def outcome_matrix(speed: Array, trial: Trial, outcomes: Sequence[Outcome]) -> A
 # --- runs in words --------------------------------------------------------------------------------
 
 
-def time_share(run: Simulation, limit: Limit) -> float:
-    """Share of a record's samples at which a limit acts, 0 to 1.
+def held_back(run: Simulation, limit: Limit) -> NDArray[np.bool_]:
+    """(n,) samples at which a limit acts.
 
     Of the dead zone only samples with a command other than 0 count: at rest nothing is asked that
     it could hold back.
@@ -297,7 +299,18 @@ def time_share(run: Simulation, limit: Limit) -> float:
     if limit == Limit.DEAD_ZONE:
         command = run.current if run.voltage is None else run.voltage
         acts = acts & (command != 0.0)
-    return float(acts.mean())
+    return acts
+
+
+def time_share(run: Simulation, limit: Limit) -> float:
+    """Share of a record's samples at which a limit acts, 0 to 1; see `held_back`."""
+    return float(held_back(run, limit).mean())
+
+
+def share_cell(share: float | None) -> Cell:
+    """A share of time as people read it."""
+    words = "" if share is None else f"{100.0 * share:.1f} %" if share else "never"
+    return Cell(share, words)
 
 
 def run_tables(run: Simulation) -> tuple[Table, Table]:
@@ -307,8 +320,8 @@ def run_tables(run: Simulation) -> tuple[Table, Table]:
     did.add("peak speed, positive", max(float(run.shaft_speed.max()), 0.0), unit="rad/s")
     did.add("peak speed, negative", min(float(run.shaft_speed.min()), 0.0), unit="rad/s")
     did.add("speed at the end", float(run.shaft_speed[-1]), unit="rad/s")
-    did.add("position at the end", position, unit="rad", spec="z.1f")
-    if display_unit("rad").name == "deg":
+    did.add("position at the end", position, unit=SHAFT_ANGLE, spec="z.1f")
+    if display_unit(SHAFT_ANGLE).name == "deg":
         did.add("", position / (2.0 * np.pi), unit="turns", spec="z.3f")
     peaks = {"positive": max(run.current.max(), 0.0), "negative": min(run.current.min(), 0.0)}
     for way, current in peaks.items():
@@ -317,7 +330,7 @@ def run_tables(run: Simulation) -> tuple[Table, Table]:
     held = Table("", (Column("Limit"), Column("share of time", ".1%")))
     for limit in Limit:
         words = str(limit.name).lower().replace("_", " ")
-        held.add(words, time_share(run, limit) or Cell(0.0, "never"))
+        held.add(words, share_cell(time_share(run, limit)))
     return did, held
 
 

@@ -25,6 +25,7 @@ from swashplate.parameters.rules import FULL_VOLTAGE
 from swashplate.results import Result
 from swashplate.simulation.result import Simulation
 from swashplate.tables import UNIT, Column, Table, listed, quantity
+from swashplate.units import of_shaft
 
 if TYPE_CHECKING:
     from swashplate.analysis.monte_carlo import Bands
@@ -312,8 +313,9 @@ class OneAtATime(Result):
 
     def _table(self, k: int, every: bool) -> Table:
         outcome, base, swings = self.outcomes[k], float(self.base[k]), self.swings[:, k]
-        number = "none" if np.isnan(base) else quantity(base, outcome.unit, spec=outcome.spec)
-        values = (outcome.spec, outcome.unit, "none")
+        unit = of_shaft(outcome.unit)
+        number = "none" if np.isnan(base) else quantity(base, unit, spec=outcome.spec)
+        values = (outcome.spec, unit, "none")
         columns = (
             *(Column(head, of="f") for head in ("outcome", "unit")),
             Column("lever"),

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swashplate.campaign.recognition import UNNAMED, Recognised
-from swashplate.campaign.schema import ChannelKind, InitialState, InputKind, Role
+from swashplate.campaign.schema import ChannelKind, InitialState, InputKind, Role, shown_unit
 from swashplate.errors import InputError
 from swashplate.results import Result, Tabular, figures
 from swashplate.tables import UNIT, Column, Table
@@ -190,6 +190,11 @@ class Channel(Result):
         """Whether it is an integral of the speed, with a free zero."""
         return self.kind in ("position", "encoder_counts")
 
+    @property
+    def shown_unit(self) -> str:
+        """Its unit as of `swashplate.units.display_unit`, which knows a shaft's angle."""
+        return shown_unit(self.kind, self.unit)
+
     def at(self, time: Array) -> Array:
         """Its readings at other instants [s]; before the first stamp the first one holds."""
         return _between(self, time)
@@ -268,7 +273,8 @@ class Experiment(Tabular):
         made = Table(title, (Column("channel"), Column("kind"), *numbers, UNIT))
         for name, each in self._signals():
             ends = float(each.values.min()), float(each.values.max())
-            made.add(name, each.kind, each.values.size, *ends, unit=each.unit)
+            unit = shown_unit(each.kind, each.unit)
+            made.add(name, each.kind, each.values.size, *ends, unit=unit)
         return made
 
     def plot(self, **how: Any) -> Figure:

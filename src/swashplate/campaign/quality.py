@@ -23,7 +23,7 @@ from swashplate.campaign.samples import (
     stamp_statistics,
     turns_over,
 )
-from swashplate.campaign.schema import applying, inside
+from swashplate.campaign.schema import applying, inside, shown_unit
 from swashplate.parameters.rules import FULL_VOLTAGE
 from swashplate.results import Result
 from swashplate.tables import Column, Table, count
@@ -157,7 +157,7 @@ def _of_channel(experiment: Experiment, channel: Channel, signed: bool) -> Itera
     if channel.kind in ("shaft_speed", "position") and steps.size > 2:
         step, extent = float(np.median(steps)), float(np.ptp(values))
         if step > COARSE * extent:
-            size = display_unit(channel.unit, extent)
+            size = display_unit(channel.shown_unit, extent)
             yield (
                 f"reads in steps of {size.factor * step:.3g} {size.name}, "
                 f"{100.0 * step / extent:.2g} % of its range: smaller motions and dead zones "
@@ -519,7 +519,8 @@ def quality_table(experiment: Experiment, qualities: Sequence[Quality]) -> Table
         ),
     )
     for each in qualities:
-        stamps, shown = each.stamps, display_unit(each.unit, max(abs(each.low), abs(each.high)))
+        stamps, largest = each.stamps, max(abs(each.low), abs(each.high))
+        shown = display_unit(shown_unit(each.kind, each.unit), largest)
         low, high = shown.factor * each.low, shown.factor * each.high
         made.add(
             experiment.name,

@@ -13,7 +13,7 @@ from pydantic import BaseModel, ConfigDict, Field, PositiveFloat, model_validato
 from swashplate.errors import InputError
 from swashplate.logs import TextOptions
 from swashplate.results import short
-from swashplate.units import scaling, speed_unit
+from swashplate.units import of_shaft, scaling, speed_unit
 
 InputKind = Literal["voltage", "current", "other"]
 ChannelKind = Literal[
@@ -101,6 +101,11 @@ SIGNALS: Mapping[ChannelKind, str] = {
     kind: KINDS[kind].signal for kind in CHANNEL_KINDS if KINDS[kind].signal
 }
 """Simulated signals by the kinds of channel that measure them."""
+
+
+def shown_unit(kind: str, unit: str) -> str:
+    """Unit to show a signal of a kind in, as of `display_unit`, of its SI unit."""
+    return of_shaft(unit) if KINDS[kind].signal == "shaft_position" else unit
 
 
 def conversion(kind: str, unit: str | None, what: str) -> tuple[str, float, float]:

@@ -428,6 +428,8 @@ def bode(
     drive.note(f"{drive.title}, sines about {bias:g} V: {span}")
     note(f"At {frequency:g} Hz:")
     show(made)
+    for each in response.still():
+        say(f"{each}.")
 
 
 def full_order(

@@ -52,7 +52,7 @@ FigureFile = Annotated[
 SetFile = Annotated[
     Path | None,
     option("Write the changed drive as a parameter file.", metavar="SET.toml"),
-    Form("a parameter file"),
+    Form("a parameter file", (".toml",)),
 ]
 Required = Annotated[float, option("Largest error of held-out runs, in % of their range.", min=0.0)]
 
@@ -172,9 +172,7 @@ class ShownUnits:
     """Units that tables and figures are shown in."""
 
     units: str = ""
-    drum: Annotated[
-        float | None, option("Diameter of the drum on the shaft.", metavar="M", min=0.0)
-    ] = None
+    drum: Annotated[float | None, option("Diameter of the drum on the shaft.", metavar="M")] = None
 
 
 _ENTRY = re.compile(r"^  (\w+)((?: --[\w/-]+)*) ?([A-Z\[]\S*)?: (.*(?:\n   .*)*)", re.MULTILINE)

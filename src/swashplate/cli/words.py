@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from swashplate.documents import parse_toml, read_text
 from swashplate.errors import FileError, InputError
+from swashplate.units import unit_text
 
 if TYPE_CHECKING:
     from swashplate.analysis.outcomes import Trial
@@ -288,7 +289,8 @@ def changes_between(before: ParameterSet, after: ParameterSet) -> list[str]:
     known = {each.symbol for each in before.values()}
     added = [each for each in after.values() if each.symbol not in known]
     lines = [
-        f"{each.symbol} ({each.name}): {'/'.join(f'{v:g}' for v in each.values)} {each.unit}"
+        f"{each.symbol} ({each.name}): {'/'.join(f'{v:g}' for v in each.values)} "
+        f"{unit_text(each.unit)}".rstrip()
         for each in added
     ]
     if UNFELT in {each.symbol for each in added} and not set(FEELING) & set(after.refinements):
@@ -298,12 +300,14 @@ def changes_between(before: ParameterSet, after: ParameterSet) -> list[str]:
         if new.value == old.value:
             continue
         words = ("/".join(f"{v:g}" for v in each.values) for each in (old, new))
-        lines.append(f"{old.symbol} ({old.name}): {' -> '.join(words)} {old.unit}")
+        unit = unit_text(old.unit)
+        lines.append(f"{old.symbol} ({old.name}): {' -> '.join(words)} {unit}".rstrip())
         ratios = [b / a for a, b in zip(old.values, new.values, strict=False) if a and isfinite(a)]
         far = [r for r in ratios if isfinite(r) and not 1.0 / SURPRISING < abs(r) < SURPRISING]
         if any(far):
             lines.append(
-                f"! {old.symbol} is {max(far):.3g} times what it was: is it meant in {old.unit}?"
+                f"! {old.symbol} is {max(far):.3g} times what it was: is it meant"
+                f"{f' in {unit}' * bool(unit)}?"
             )
     return lines
 

@@ -383,7 +383,7 @@ def _motor_leakage(owner: str, Z: Mapping[str, float], n: Mapping[str, float]) -
             )
     if len(leakages) == 2 and abs(leakages[0] - leakages[1]) > AGREES * abs(leakages[0]):
         raise ParameterError(
-            f"{owner}: Z11 makes motor_leakage {leakages[0]:.6g} 1/(N m s), but Z12 makes it "
+            f"{owner}: Z11 makes motor_leakage {leakages[0]:.6g} rad/(s N m), but Z12 makes it "
             f"{leakages[1]:.6g}; choose load_torque and load_inertia so that both agree, for "
             f"example load_inertia = {Z['Z12'] / (Z['Z10'] * leakages[0]):.12g} kg m²."
         )

@@ -230,7 +230,7 @@ def scales_words(fit: StageFit) -> str:
     parts = []
     for name, size in fit.problem.scales.items():
         having = next(each for each in fit.problem.experiments if name in each.channels)
-        unit = display_unit(having[name].unit, size)
+        unit = display_unit(having[name].shown_unit, size)
         parts.append(f"{plain(unit.factor * size, 3)} {unit.name} of {name}")
     return f"One unit of residual is {listed(parts)}."
 
@@ -266,7 +266,7 @@ def runs_tables(qualities: Sequence[RunQuality]) -> list[Table]:
                 Column("correlation_lag_s", "+.2f", "1", of="f"),
             ),
         )
-        unit = alike[0].experiment[name].unit
+        unit = alike[0].experiment[name].shown_unit
         for each in alike:
             run, test = each.experiment, each.test
             tested: tuple[float | None, ...] = (None,) * 4

@@ -85,6 +85,14 @@ def linearize(
             f"{' and one '.join(kind.__name__ for kind in kinds)} of finite numbers."
         )
     if states is None:
+        for part in model.parts:
+            if part.settled is None and floats_of(part.state):
+                each_state = ", ".join(f"{kind.__name__}(...)" for kind in kinds)
+                raise InputError(
+                    f"{instance.name}: {part.name} has no equation for its steady state "
+                    "('settled'); give the states of the operating point: "
+                    f"states=[{each_state}]."
+                )
         # what belongs to the first sample alone has passed
         known = instance.start(at, h, "steady").arguments
         states = [called(part.step, each) for part, each in zip(model.parts, known, strict=True)]

@@ -23,6 +23,7 @@ from swashplate.parameters.parameter_set import ParameterSet
 from swashplate.parameters.rules import FULL_VOLTAGE
 from swashplate.results import Tabular
 from swashplate.simulation.instance import check_filter_stability, instance_of, without_ripple
+from swashplate.simulation.result import UNITS
 from swashplate.tables import Column, Table
 
 if TYPE_CHECKING:
@@ -94,6 +95,20 @@ class FrequencyResponse(Tabular):
             there = ratio != 0.0
             row[there] = np.unwrap(np.angle(ratio[there]))
         return phase
+
+    def still(self) -> list[str]:
+        """Where `moves` denies an answer, in words, for each amplitude that has such a place."""
+        unit, said = UNITS[self.input], list[str]()
+        for amplitude, moves in zip(self.amplitudes, self.moves, strict=True):
+            places = np.flatnonzero(~moves)
+            if places.size == 0:
+                continue
+            low, high = self.frequencies[places[[0, -1]]]
+            where = f"at {low:.3g} Hz" if low == high else f"from {low:.3g} to {high:.3g} Hz"
+            if high > low and places[-1] - places[0] >= places.size:
+                where = f"at {places.size} frequencies {where}"
+            said.append(f"No motion under {amplitude:g} {unit} {where}")
+        return said
 
     def to_polars(self) -> polars.DataFrame:
         """Table in SI, a row for each amplitude and frequency; no phase where nothing moves."""

@@ -79,12 +79,12 @@ class Machine(NamedTuple):
         stands_for="A_p")]
     pumping_arm: Annotated[float, Definition("arm of the pumping pistons' force on the plate", "m",
         0.0, stands_for="d5")]
-    motor_constant: Annotated[float, Definition("motor speed over flow", "1/m^3", above=0.0,
+    motor_constant: Annotated[float, Definition("motor speed over flow", "rad/m^3", above=0.0,
         stands_for="K_mf")]
     pump_flow_gain: Annotated[float, Definition("pump flow over swash angle", "m^3/s", above=0.0,
         stands_for="C_q")]
-    motor_leakage: Annotated[float, Definition("motor speed lost over load torque", "1/(N m s)",
-        0.0, stands_for="K_mL")]
+    motor_leakage: Annotated[float, Definition("motor speed lost over load torque",
+        "rad/(s N m)", 0.0, stands_for="K_mL")]
     load_inertia: Annotated[float, Definition("inertia of the load at the motor", "kg m^2", 0.0,
         stands_for="C_i")]
     load_torque: Annotated[float, Definition("static torque of the load, against positive speed",

@@ -25,6 +25,7 @@ from swashplate.analysis import (
     WhatIf,
     proportional_command,
 )
+from swashplate.analysis.outcomes import held_back, share_cell, time_share
 from swashplate.errors import InputError
 from swashplate.parameters.rules import FULL_VOLTAGE
 from swashplate.report.lines import (
@@ -183,7 +184,7 @@ def plot_limit_timeline(
     InputError
         If the wanted speed has another length than the run.
     """
-    acting, unit = [each for each in Limit if run.active(each).any()], display_unit("rad/s")
+    acting, unit = [each for each in Limit if held_back(run, each).any()], display_unit("rad/s")
     asked = None if wanted is None else np.asarray(wanted, dtype=np.float64)
     if asked is not None and asked.shape != run.time.shape:
         raise InputError(
@@ -214,7 +215,7 @@ def _bars(ax: Axes, run: Simulation, acting: list[Limit]) -> None:
     ax.set_yticks(range(count), [SHADES[limit].name for limit in acting])
     ax.grid(False, axis="y")
     for row, limit in enumerate(acting):
-        spans = merged(stretches(run.time, run.active(limit)))
+        spans = merged(stretches(run.time, held_back(run, limit)))
         ax.broken_barh(
             [(begin, end - begin) for begin, end in spans.tolist()],
             (row - 0.5 * BAR, BAR),
@@ -224,7 +225,7 @@ def _bars(ax: Axes, run: Simulation, acting: list[Limit]) -> None:
         )
         write(
             ax,
-            f"{100.0 * run.active(limit).mean():.1f} %",
+            share_cell(time_share(run, limit)).text,
             (1.0, row),
             (5.0, 0.0),
             coords=ax.get_yaxis_transform(),

@@ -71,7 +71,7 @@ _ROLES = {"fit": "for the fit", "validate": "for validation"}
 
 
 class Column(NamedTuple):
-    """What a column of panels shows: a channel by name and SI unit; the input has no name."""
+    """What a column of panels shows: a channel by name and unit; the input has no name."""
 
     key: tuple[str, str]
     words: str
@@ -87,7 +87,7 @@ class Column(NamedTuple):
 
 def _signals(experiment: Experiment) -> dict[tuple[str, str], InputSignal | Channel]:
     """The input, whose name is empty, and the channels, by name and unit."""
-    channels = {(name, each.unit): each for name, each in experiment.channels.items()}
+    channels = {(name, each.shown_unit): each for name, each in experiment.channels.items()}
     return {("", experiment.input.unit): experiment.input, **channels}
 
 
@@ -331,7 +331,7 @@ def plot_channel(
     elif simulated is not None:
         lower.append((time, values - simulated[rows], INK, THIN))
         below, si = "measured less simulated", channel.unit
-    unit = display_unit(channel.unit, float(np.abs(values).max()))
+    unit = display_unit(channel.shown_unit, float(np.abs(values).max()))
     labels = [unit.label(channel.kind.replace("_", " ").replace("encoder counts", "angle"))]
     if lower:
         scale = lower[-1][1] if channel.is_position or not used.any() else lower[-1][1][used]

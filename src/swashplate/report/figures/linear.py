@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from swashplate.errors import InputError
 from swashplate.linear import FrequencyResponse, LinearDrive
+from swashplate.report.figures.simulation import SIGNAL_UNITS
 from swashplate.report.style import (
     FAINT,
     GREY,
@@ -44,7 +45,7 @@ def plot_bode(
 ) -> Figure:
     """Figure of gain, phase and distortion over the frequency, a line for each amplitude.
 
-    Lines end where nothing moves any more.
+    Lines end where nothing moves any more, which is said at the foot of the gain.
 
     Parameters
     ----------
@@ -75,7 +76,7 @@ def plot_bode(
         legend.append(handle(f"small motions about {where}", GREY, "dashed"))
     output = WORDS.get(response.output, response.output.replace("_", " "))
     words = f"{response.name}: {response.input} to {output}, sines about {response.bias:g} {unit}"
-    shown = display_unit(UNITS[response.output], float(response.gain.max()))
+    shown = display_unit(SIGNAL_UNITS[response.output], float(response.gain.max()))
     by = f"({shown.name})" if "/" in shown.name else shown.name or "1"
     labels = f"gain ({by}/{unit})", "phase (deg)", "distortion (%)"
     words = words if title is None else title
@@ -96,6 +97,8 @@ def plot_bode(
         for ax, row in zip(axes, small, strict=False):
             ax.plot(fine, row, color=GREY, linestyle="dashed", linewidth=LINE, zorder=1.8)
     _scale(axes, response)
+    # the lines are at the top there
+    write(axes[0], "\n".join(response.still()), (0.0, 0.0), (4.0, 4.0), color=GREY, va="bottom")
     if mark is not None and response.frequencies[0] <= mark <= response.frequencies[-1]:
         for ax in axes:
             ax.axvline(mark, color=FAINT, linewidth=1.0, zorder=1.3)

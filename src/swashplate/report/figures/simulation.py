@@ -43,19 +43,20 @@ from swashplate.report.style import (
     zero_line,
 )
 from swashplate.simulation.result import UNITS, Limit, Simulation
-from swashplate.units import display_unit
+from swashplate.units import PLATE_RATE, SHAFT_ANGLE, display_unit
 
 Flags = NDArray[np.int8]
 Stops = tuple[float, float]
 SIGNAL_UNITS = {
     **UNITS,
+    "shaft_position": SHAFT_ANGLE,
     "time": "s",
     "spool_velocity": "m/s",
-    "swash_rate": "rad/s",
+    "swash_rate": PLATE_RATE,
     "valve_flow": "m^3/s",
     "pump_flow": "m^3/s",
 }
-"""SI unit of each signal of a run."""
+"""Unit of each signal of a run, as of `display_unit`."""
 
 WIDE, NARROW = 1.9, 0.9
 """Widths of two lines that lie on one another for long. [pt]"""
@@ -252,7 +253,7 @@ def _spool(position: Array, opening: Array, ends: Stops) -> Panel:
 
 def _swash(angle: Array, stops: Stops) -> Panel:
     marks = (Mark(x, f"stop {signed(float(np.degrees(x)), 1)}°") for x in stops)
-    return Panel("swash angle", "swash", (Trace(angle, BLUE),), marks=tuple(marks))
+    return Panel("swash angle", "rad", (Trace(angle, BLUE),), marks=tuple(marks))
 
 
 def _chain(panels: Sequence[Panel], time: Array, title: str, rows: slice = slice(None)) -> Figure:
@@ -272,8 +273,7 @@ def _fill(ax: Axes, panel: Panel, time: Array, rows: slice) -> None:
     """Draw signals over time, from zero on, with the marks that they come near to."""
     largest = max(float(np.abs(each.values[rows]).max()) for each in panel.traces)
     unit = display_unit(panel.si, max(largest, panel.least) or inf)
-    # an angle within the machine stays in degrees, whatever the shaft's is shown in
-    name, factor = ("deg", float(np.degrees(1.0))) if panel.si == "swash" else unit
+    name, factor = unit
     ax.set_ylabel(f"{panel.words}\n({name})", fontsize=NORMAL, color=INK)
     zero_line(ax)
     shown = [factor * each.values[rows] for each in panel.traces]

@@ -107,7 +107,8 @@ def shown_runs(stages: Sequence[StageFit], predicted: Sequence[RunQuality]) -> t
         channels = [each.experiment[name] for each in alike]
         largest = max(_largest(each.values) for each in channels)
         residual = max(_largest(each.residual) for each in alike)
-        units[name] = [display_unit(channels[0].unit, size) for size in (largest, residual)]
+        unit = channels[0].shown_unit
+        units[name] = [display_unit(unit, size) for size in (largest, residual)]
     for each, stage in found:
         of_run = runs.setdefault((each.experiment.name, each.experiment.role), [])
         of_run.append(Shown(each, stage, *units[each.channel]))
@@ -133,7 +134,7 @@ def run_words(quality: RunQuality) -> str:
     """What must stand beside every fit %: RMSE, initial state, what is ignored."""
     found, run = quality.measures, quality.experiment
     channel = run[quality.channel]
-    parts = [f"RMSE {quantity(found.rmse, channel.unit)}"]
+    parts = [f"RMSE {quantity(found.rmse, channel.shown_unit)}"]
     if found.fit_percent is not None and found.nrmse is not None:
         parts.insert(0, f"fit {found.fit_percent:.2f} %")
         parts.append(f"NRMSE {found.nrmse:.3g}")
