@@ -1,5 +1,6 @@
 """What is written down rather than measured or fitted: runs, linearised fits, noise, a set-up."""
 
+import re
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from types import SimpleNamespace
@@ -133,6 +134,11 @@ class Backwards(Serial):
 
     def run(self, function, shared, items):
         yield from reversed(list(super().run(function, shared, items)))
+
+
+def put(pattern: str, new: str, count: int = 0) -> Callable[[str], str]:
+    """A change of a file's text: what spoils it."""
+    return lambda text: re.sub(pattern, new, text, count=count)
 
 
 TWO_STAGES = Setup.model_validate(

@@ -174,31 +174,27 @@ BELOW = np.where(np.arange(TIME.size) == 3, 0.001, 0.0)
 """A sample of noise below zero, which is no current backwards."""
 
 
-@pytest.mark.parametrize(
-    ("channels", "expected"),
-    [
-        ({"signed_current": CURRENT}, CURRENT),
-        (
-            {
-                "current_plus": np.maximum(CURRENT, 0.0) + 0.05,
-                "current_minus": np.maximum(-CURRENT, 0.0) + 0.05,
-            },
-            CURRENT,
-        ),
-        (
-            {"rectified_current": np.where(BELOW > 0.0, -BELOW, np.abs(CURRENT))},
-            np.where(BELOW > 0.0, 0.0, CURRENT),
-        ),
-    ],
-    ids=lambda each: next(iter(each), "") if isinstance(each, dict) else "",
-)
+CURRENTS = {
+    "signed": ({"signed_current": CURRENT}, CURRENT),
+    "of each way": (
+        {
+            "current_plus": np.maximum(CURRENT, 0.0) + 0.05,
+            "current_minus": np.maximum(-CURRENT, 0.0) + 0.05,
+        },
+        CURRENT,
+    ),
+    "rectified": (
+        {"rectified_current": np.where(BELOW > 0.0, -BELOW, np.abs(CURRENT))},
+        np.where(BELOW > 0.0, 0.0, CURRENT),
+    ),
+}
+
+
+@pytest.mark.parametrize(("channels", "expected"), CURRENTS.values(), ids=CURRENTS)
 def test_a_measured_current_drives_the_pump(channels: dict, expected: np.ndarray) -> None:
     command = run_of("step", 4.0 * np.sign(CURRENT), channels, hold="previous")
     np.testing.assert_allclose(measured_current(command).values, expected, atol=1e-15)
     np.testing.assert_allclose(measured_current(command, 1.5).values, 1.5 * expected, atol=1e-15)
-
-
-def test_a_run_driven_by_a_current_has_one_and_another_says_what_it_needs() -> None:
     driven = run_of("step", CURRENT, {}, kind="current")
     np.testing.assert_allclose(measured_current(driven).values, CURRENT)
     with pytest.raises(InputError, match="step has no measured current to drive the pump"):

@@ -91,13 +91,6 @@ def test_residuals_within_the_doubt_are_no_lack_of_fit() -> None:
     assert ratio(standard_uncertainty={"gain": "4 %"}) < 1.1
 
 
-def test_it_is_written_and_read(tmp_path: Path) -> None:
-    setup = stated(**DOUBTS)
-    path = tmp_path / "own.toml"
-    path.write_text(setup_text(setup), "utf-8")
-    assert load_setup(path).standard_uncertainty == DOUBTS
-
-
 @pytest.mark.parametrize(
     ("name", "doubt", "words"),
     [
@@ -107,12 +100,15 @@ def test_it_is_written_and_read(tmp_path: Path) -> None:
         ("Z9", -1.0, "standard_uncertainty.Z9"),
     ],
 )
-def test_what_is_wrong_is_refused(
+def test_it_is_written_and_read_and_refused_where_it_is_wrong(
     tmp_path: Path, name: str, doubt: float | str, words: str
 ) -> None:
-    said = f'{{ {name} = "{doubt}" }}' if isinstance(doubt, str) else f"{{ {name} = {doubt} }}"
     path = tmp_path / "own.toml"
-    path.write_text(f"standard_uncertainty = {said}\n" + setup_text(load_setup("hoist")), "utf-8")
+    path.write_text(setup_text(stated(**DOUBTS)), "utf-8")
+    assert load_setup(path).standard_uncertainty == DOUBTS
+    said = f'"{doubt}"' if isinstance(doubt, str) else doubt
+    text = f"standard_uncertainty = {{ {name} = {said} }}\n" + setup_text(load_setup("hoist"))
+    path.write_text(text, "utf-8")
     with pytest.raises(ParameterError, match=words):
         load_setup(path)
 

@@ -61,13 +61,16 @@ def test_estimate_and_interval_are_those_of_bayes(memory: float, scale: float) -
 
 def test_what_the_data_leave_open_is_the_prior() -> None:
     given = problem(Prior(2.0, 1.0), memory=MEMORY)
-    spare = Unknown("spare", 5.0, 0.1, 9.0, prior=Prior(3.0, 0.2))  # the model does not use it
-    given = replace(given, unknowns=Unknowns((*given.unknowns, spare)))
+    # the model uses neither; a prior in the logarithm is a share of its mean
+    known = {"low": 0.1, "high": 9.0, "prior": Prior(3.0, 0.2)}
+    spare = Unknown("spare", 5.0, **known), Unknown("other", 5.0, **known, log=True)
+    given = replace(given, unknowns=Unknowns((*given.unknowns, *spare)))
     found = weighed(given, solve(given).vector)
     best = solve(found).vector
-    _, estimate = estimates(uncertainty(linearised_fit(found, best)).quoted)
-    assert estimate.value == pytest.approx(3.0, abs=1e-6)
-    assert estimate.upper - estimate.lower == pytest.approx(2.0 * 1.959964 * 0.2, rel=1e-3)
+    _, plain, log = estimates(uncertainty(linearised_fit(found, best)).quoted)
+    assert (plain.value, log.value) == pytest.approx((3.0, 3.0), abs=1e-6)
+    assert plain.upper - plain.lower == pytest.approx(2.0 * 1.959964 * 0.2, rel=1e-3)
+    assert log.upper / log.lower == pytest.approx(np.exp(2.0 * 1.959964 * 0.2), rel=1e-3)
 
 
 def level(seed: int, *, count: int = 500, outliers: float = 0.1) -> Problem:

@@ -1,14 +1,12 @@
 """A fit on disk is the fit, and is refused where it no longer belongs to its campaign."""
 
 import json
-import re
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
-from tests.identification.given import TWO_STAGES
+from tests.identification.given import TWO_STAGES, put
 
 from swashplate import Campaign, Drive, FileError, InputError, ParameterError
 from swashplate.identification.assessment import Judged, fingerprint, load_fit
@@ -45,6 +43,9 @@ def path(campaign: Campaign, fitted: Fit, tmp_path: Path) -> Path:
 
 def test_a_fit_comes_back_as_it_was(path: Path, campaign: Campaign, fitted: Fit) -> None:
     stored = load_fit(path, campaign)
+    # others read it, too: it is JSON without numbers of its own
+    content = json.loads(path.read_text("utf-8"), parse_constant=lambda word: pytest.fail(word))
+    assert content["stages"][0]["starts"][1]["cost"] == "Infinity"
     assert stored.result.runs == campaign.experiments
     assert stored.result.setup == fitted.setup
     assert stored.result.nominal == fitted.nominal
@@ -102,11 +103,6 @@ def test_profiles_folds_and_notes_come_back(
         load_fit(path, campaign)
 
 
-def test_the_file_is_json_that_others_read(path: Path) -> None:
-    content = json.loads(path.read_text("utf-8"), parse_constant=lambda word: pytest.fail(word))
-    assert content["stages"][0]["starts"][1]["cost"] == "Infinity"
-
-
 def test_another_campaign_is_refused(path: Path, campaign: Campaign) -> None:
     first, second = campaign.experiments
     alone = replace(campaign, experiments=(first,))
@@ -124,27 +120,13 @@ def test_another_campaign_is_refused(path: Path, campaign: Campaign) -> None:
         load_fit(path, changed)
 
 
-def test_there_is_no_such_file(campaign: Campaign, tmp_path: Path) -> None:
-    with pytest.raises(FileError, match="There is no file"):
-        load_fit(tmp_path / "none.json", campaign)
-
-
-def put(pattern: str, new: str, count: int = 0) -> Callable[[str], str]:
-    return lambda text: re.sub(pattern, new, text, count=count)
-
-
 POISON = {
     "cut": (lambda text: text[:-100], "is not JSON"),
-    "nested": (lambda text: "[" * 100_000, "not JSON: recursion limit"),
     "another key": (put('"axis"', '"ax"'), "an entry 'axis'"),
     "other parameters": (put('"Z10"', '"Z9"', 1), "stage pump has other parameters .* fit again"),
     "other version": (put('"swashplate": "[^"]*"', '"swashplate": "9.9"'), "9.9"),
-    "many digits": (put('"cost": [0-9.e+-]+', '"cost": 1' + 5000 * "0"), "number out of range"),
     "text for a vector": (put(r'"vector": \[[^]]+\]', '"vector": "abc"'), "finite numbers"),
-    "wrong length": (
-        put(r'"vector": \[[^]]+\]', '"vector": [1.0]', 1),
-        "stage card has other parameters",
-    ),
+    "wrong length": (put(r'"vector": \[[^]]+\]', '"vector": [1.0]', 1), "stage card has other"),
     "a number for the drive": (put('"nominal": ', '"nominal": 3, "was": '), "nominal"),
 }
 
