@@ -159,9 +159,7 @@ def test_a_spike_of_the_command_is_found_and_left_out(drafted: Drafted) -> None:
     assert tests["log"].input.at(TIME[900:901]) == pytest.approx(command[899:900])
 
 
-def test_a_tap_of_the_command_is_no_spike_but_a_drop_out_while_it_stands_still_is(
-    drafted: Drafted,
-) -> None:
+def test_a_tap_of_the_command_is_no_spike_but_a_drop_out_while_it_stands_still_is(drafted) -> None:
     command = 5.0 * ((TIME > 1.0) & (TIME < 1.019)) - 3.0 * (TIME > 4.0)
     assert findings(drafted(voltage=command, speed=lagged(command))) == []
     speed = lagged(BOTH) + np.random.default_rng(1).normal(0.0, 0.01, TIME.size)
@@ -172,9 +170,7 @@ def test_a_tap_of_the_command_is_no_spike_but_a_drop_out_while_it_stands_still_i
 
 @pytest.mark.parametrize("command", [BOTH, SINE, np.abs(BOTH)])
 @pytest.mark.parametrize("lag", [0.02, 0.1])
-def test_motions_and_zero_crossings_are_no_spikes(
-    drafted: Drafted, command: np.ndarray, lag: float
-) -> None:
+def test_motions_and_zero_crossings_are_no_spikes(drafted, command, lag) -> None:
     rng = np.random.default_rng(2)
     for size in (0.0, 0.01):
         speed = lagged(command, lag) + rng.normal(0.0, size, TIME.size)
@@ -202,9 +198,7 @@ def test_motions_and_zero_crossings_are_no_spikes(
     ],
     ids=["glitches of a counter", "a whole channel"],
 )  # fmt: skip
-def test_what_is_ignored_has_no_findings(
-    drafted: Drafted, columns: Columns, said: str, old: str, new: str
-) -> None:
+def test_what_is_ignored_has_no_findings(drafted, columns, said, old, new) -> None:
     tests = drafted(draft=PER_TURN, **columns)
     assert any(said in each for each in findings(tests))
     assert findings(edit(tests, old, new)) == []
@@ -214,9 +208,7 @@ def test_what_is_ignored_has_no_findings(
 
 
 @pytest.mark.parametrize("again", [7.3, 5.5])
-def test_a_run_is_split_where_its_counter_may_have_gone_round(
-    drafted: Drafted, again: float
-) -> None:
+def test_a_run_is_split_where_its_counter_may_have_gone_round(drafted, again) -> None:
     """17,000 counts a second and 16 bits: half a round takes 1.9 s, the gap 2.3 s or 0.5 s."""
     command = 4.0 * (TIME > 0.1)
     speed = 17_000.0 * lagged(command) / 4.0
@@ -263,9 +255,7 @@ def test_an_angle_that_begins_anew(drafted: Drafted, noise: float, begin: float)
         refuse_unsound(check_runs(tests.experiments, Drive.preset("hoist").parameters))
 
 
-def test_an_angle_without_a_unit_is_in_degrees_and_a_motion_of_half_a_turn_in_none(
-    drafted: Drafted,
-) -> None:
+def test_an_angle_without_a_unit_is_in_degrees_and_a_motion_of_half_a_turn_in_none(drafted) -> None:
     assert 'unit = "deg"    # guessed' in text_of(drafted(angle=TURNED % 360.0))
     text = text_of(drafted(angle=np.radians(0.1 * TURNED)))
     assert 'unit = "rad"    # guessed' in text
@@ -422,9 +412,7 @@ def test_headers(drafted: Drafted, columns: Columns, speed: np.ndarray) -> None:
         ("Kanal_links", "other", "1"),
     ],
 )
-def test_the_unit_at_the_end_of_a_name_that_is_given(
-    tmp_path: Path, name: str, kind: str, unit: str
-) -> None:
+def test_the_unit_at_the_end_of_a_name_that_is_given(tmp_path, name, kind, unit) -> None:
     log = write(tmp_path, "log.csv", {"time": TIME, "n": BOTH, name: 0.001 * BOTH})
     text = draft_campaign([log], tmp_path, columns={name: kind})
     axis = tomllib.loads(text)["axes"]["drive"]

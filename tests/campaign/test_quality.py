@@ -58,9 +58,7 @@ def test_a_good_log_has_no_findings(campaign_folder: Path) -> None:
         (lambda t: t * [1, 1, 1, -1], "counts", "should its sign be -1"),
     ],
 )
-def test_what_a_log_shows(
-    campaign_folder: Path, change: Callable[[np.ndarray], np.ndarray], signal: str, said: str
-) -> None:
+def test_what_a_log_shows(campaign_folder, change, signal, said) -> None:
     found = qualities(rewrite(campaign_folder / "campaign.toml", change))
     assert said in found[signal].findings[0]
     if said.startswith("1 gap"):  # stamps that are the input's are told of once

@@ -35,9 +35,7 @@ def readback(values: np.ndarray, *, noise: float = 0.01, offset: float = 0.03) -
 
 @pytest.mark.parametrize(("axis", "name"), SOURCE)
 @pytest.mark.parametrize("rate", [512.0, 19.0])
-def test_tests_of_the_source_are_recognised_through_a_12_bit_readback(
-    axis: str, name: str, rate: float
-) -> None:
+def test_tests_of_the_source_are_recognised_through_a_12_bit_readback(axis, name, rate) -> None:
     run = maneuvers.source_tests(axis)[name]
     time = irregular(run.length) if rate == 19.0 else grid(run.length, rate)
     found = recognise(time, readback(run(time)))
@@ -159,9 +157,7 @@ def shapes(draw: st.DrawFn) -> tuple[Maneuver, str, list[float], float]:
 
 @given(shapes(), st.floats(0.0, 0.01), st.sampled_from([512.0, 100.0, 50.0]))
 @settings(max_examples=60)
-def test_any_sine_step_or_ramp(
-    shape: tuple[Maneuver, str, list[float], float], noise: float, rate: float
-) -> None:
+def test_any_sine_step_or_ramp(shape, noise, rate) -> None:
     run, kind, numbers, within = shape
     time = grid(run.length, rate)
     found = recognise(time, readback(run(time), noise=noise))
@@ -186,9 +182,7 @@ def test_any_sine_step_or_ramp(
     ),
 )
 @settings(max_examples=40)
-def test_any_record_has_an_answer(
-    size: int, seed: int, make: Callable[[np.random.Generator, int], np.ndarray]
-) -> None:
+def test_any_record_has_an_answer(size, seed, make) -> None:
     random = np.random.default_rng(seed)
     time = np.cumsum(random.uniform(0.001, 0.1, size))
     found = recognise(time, make(random, size))

@@ -121,7 +121,7 @@ def test_the_map_that_is_printed(done):
 # --- other models of a drive ----------------------------------------------------------------------
 
 
-def test_a_linear_model(done, number):
+def test_a_linear_model_and_its_notes(done, number):
     text = done("linearize", "hoist", "--at", "4")
     hoist = Drive.preset("hoist")
     slope = np.degrees(hoist.steady_speed(4.001) - hoist.steady_speed(3.999)) / 0.002
@@ -133,9 +133,6 @@ def test_a_linear_model(done, number):
     (line,) = [line for line in text.splitlines() if "±" in line]
     assert line.split() == ["rad/s", "-40.439", "±39.104", "8.953", "0.719"]
     assert number(text, "gain at 0.3 Hz") < number(text, "steady gain")
-
-
-def test_notes_of_a_linear_model(done):
     left_out = "Coulomb term C, which only motions below 0.01 A/s see, is left out"
     assert left_out in done("linearize", "slew", "--at", "2")
     text = done("linearize", "neutral", "--at", "0", "--set", "G1=0.03")

@@ -59,9 +59,7 @@ file = "log.csv"
 """
 
 
-def test_a_tacho_beside_the_drive_before_any_fit(
-    done: Words, refused: Words, tmp_path: Path
-) -> None:
+def test_a_tacho_beside_the_drive_before_any_fit(done, refused, tmp_path) -> None:
     rows = [f"{k / 100},{4 if k > 20 else 0},{98 if k > 40 else 0}" for k in range(300)]
     (tmp_path / "log.csv").write_text("\n".join(["time,u,n", *rows]) + "\n", "utf-8")
     look = ("campaign", "plot", "--run", "log", "--channel", "tacho", "--to", "2", "--force")
@@ -78,9 +76,7 @@ def test_a_tacho_beside_the_drive_before_any_fit(
     assert 'if the log is in V, write unit = "V": it then reaches 4 V' in said
 
 
-def test_what_a_draft_leaves_out_stands_before_the_command_to_run(
-    done: Words, tmp_path: Path
-) -> None:
+def test_what_a_draft_leaves_out_stands_before_the_command_to_run(done, tmp_path) -> None:
     rows = [f"{k},{row}" for k, row in enumerate(ROWS)]
     text = "\n".join(["Nr,time [s],voltage [V],current [A],Geber", *rows]) + "\n"
     (tmp_path / "log.csv").write_text(text, "utf-8")

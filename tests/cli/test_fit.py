@@ -13,7 +13,6 @@ from pathlib import Path
 import pytest
 from tests.cli.conftest import STEPS
 from tests.shown import check_shown
-from typer.testing import Result
 
 from swashplate import Campaign, Drive
 from swashplate.identification.assessment import Judged
@@ -52,9 +51,7 @@ def campaign(done: Words, tmp_path: Path) -> Path:
 # --- fit ------------------------------------------------------------------------------------------
 
 
-def test_a_campaign_becomes_a_drive(
-    done: Words, refused: Words, campaign: Path, tmp_path: Path
-) -> None:
+def test_a_campaign_becomes_a_drive(done, refused, campaign, tmp_path) -> None:
     words = ("fit", CAMPAIGN, "--setup", "setup.toml", "--out", "fitted")
     said = done(*words, "--timing")
     (times,) = re.findall(r"^Time: +(.*)$", said, re.MULTILINE)
@@ -147,9 +144,7 @@ def test_all_that_can_be_asked_for_besides(done: Words, campaign: Path, tmp_path
     assert "profile" in (tmp_path / "fitted" / "report.html").read_text("utf-8").lower()
 
 
-def test_a_result_that_is_of_no_use_ends_with_1(
-    run: Callable[..., Result], campaign: Path, tmp_path: Path
-) -> None:
+def test_a_result_that_is_of_no_use_ends_with_1(run, campaign, tmp_path) -> None:
     narrow = SETUP.replace("relative = [0.5, 2.0]", "relative = [0.99, 1.01]")
     (tmp_path / "narrow.toml").write_text(narrow, "utf-8")
     words = ("--setup", "narrow.toml", "--no-report", "--evaluations", "900")
@@ -189,9 +184,7 @@ def test_fits_that_are_refused(refused: Words, virtual: Path, tmp_path: Path) ->
 # --- validate -------------------------------------------------------------------------------------
 
 
-def test_a_drive_beside_the_runs_that_were_held_out(
-    done: Words, held_out: Path, tmp_path: Path
-) -> None:
+def test_a_drive_beside_the_runs_that_were_held_out(done, held_out, tmp_path) -> None:
     said = done("validate", "hoist", CAMPAIGN, "--out", "found")
     assert "hoist_step_-5_V" in said
     assert "hoist_step_4_V" not in said
@@ -212,9 +205,7 @@ def test_a_drive_beside_the_runs_that_were_held_out(
     assert "follow the input" not in said
 
 
-def test_a_drive_that_is_not_usable_ends_with_1(
-    run: Callable[..., Result], held_out: Path, tmp_path: Path
-) -> None:
+def test_a_drive_that_is_not_usable_ends_with_1(run, held_out, tmp_path) -> None:
     """A drive of too low a gain misses the more the larger the command."""
     Drive.preset("hoist").scale(Z10=0.4, J=0.4).to_toml(tmp_path / "wrong.toml")
     result = run("validate", "wrong.toml", CAMPAIGN)

@@ -64,11 +64,8 @@ def place(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("examples")
     tests = (maneuvers.step(4.0, stop=3.0, length=4.0), maneuvers.step(-5.0, stop=3.0, length=4.0))
     for name in ("virtual", "harbour", "logs"):
-        path = rig.write(rig.run("hoist", [*tests, maneuvers.step(9.0)], seed=1), folder / name)
-        if name != "logs":
-            text = path.read_text("utf-8")
-            before, _, after = text.rpartition('role = "fit"')
-            path.write_text(f'{before}role = "validate"{after}', "utf-8")
+        what = {"seed": 1, "validate": [] if name == "logs" else ["step +9 V"]}
+        rig.write(rig.run("hoist", [*tests, maneuvers.step(9.0)], **what), folder / name)
     (folder / "harbour" / "mine.toml").write_text(FEWER, "utf-8")
     hoist = Drive.preset("hoist")
     for name in ("mine.toml", "worn.toml"):
@@ -85,9 +82,7 @@ def place(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("example", [e for e in examples() if not any(w in e for w in ELSEWHERE)])
-def test_the_examples_can_be_run(
-    place: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, example: str
-) -> None:
+def test_the_examples_can_be_run(place, tmp_path, monkeypatch, example) -> None:
     if "--pdf" in example and not (shutil.which("chromium") or shutil.which("chromium-browser")):
         pytest.skip("there is no Chromium here; `make browser` installs it where it can")
     folder = tmp_path / "examples"

@@ -1,7 +1,5 @@
 """What earlier stages do not know and fixed parameters may be off by, in later intervals."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 from tests.identification.given import unknowns_of, virtual
@@ -100,9 +98,7 @@ def test_residuals_within_the_doubt_are_no_lack_of_fit() -> None:
         ("Z9", -1.0, "standard_uncertainty.Z9"),
     ],
 )
-def test_it_is_written_and_read_and_refused_where_it_is_wrong(
-    tmp_path: Path, name: str, doubt: float | str, words: str
-) -> None:
+def test_it_is_written_and_read_and_refused_where_it_is_wrong(tmp_path, name, doubt, words) -> None:
     path = tmp_path / "own.toml"
     path.write_text(setup_text(stated(**DOUBTS)), "utf-8")
     assert load_setup(path).standard_uncertainty == DOUBTS

@@ -441,9 +441,7 @@ def test_what_a_model_leaves_out_is_not_called_an_error_of_the_sensor() -> None:
         ("delay", 1.0, 0.25, "position in run 2 by +"),
     ],
 )
-def test_a_run_with_a_scale_or_a_delay_of_its_own_is_named(
-    what: str, gain: float, late: float, said: str
-) -> None:
+def test_a_run_with_a_scale_or_a_delay_of_its_own_is_named(what, gain, late, said) -> None:
     """The third of six runs reads 15 % too much or is 250 ms late, the noise is not stated."""
     random = np.random.default_rng(7)
     runs = [trial(f"run {k}") for k in range(7)]

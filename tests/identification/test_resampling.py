@@ -148,9 +148,7 @@ KINDS = st.lists(
 
 
 @given(kinds=KINDS, folds=st.integers(2, 20), seed=st.integers(0, 1000))
-def test_runs_of_a_kind_are_dealt_apart(
-    kinds: list[tuple[str, tuple[float, float]]], folds: int, seed: int
-) -> None:
+def test_runs_of_a_kind_are_dealt_apart(kinds, folds, seed) -> None:
     folds = min(folds, len(kinds))
     runs = [run_of(k, kind, *ends) for k, (kind, ends) in enumerate(kinds)]
     parts = deal(runs, folds, seed)
@@ -174,9 +172,7 @@ def found(short_campaign: Campaign) -> CrossValidation:
     return cross_validate(short_campaign.experiments, nominal.parameters, TWO_STAGES, **how)
 
 
-def test_each_fold_is_predicted_by_a_fit_to_the_others(
-    short_campaign: Campaign, found: CrossValidation
-) -> None:
+def test_each_fold_is_predicted_by_a_fit_to_the_others(short_campaign, found) -> None:
     assert [fold.number for fold in found.folds] == [0, 1, 2, 3]
     held = [name for fold in found.folds for name in fold.held]
     assert sorted(held) == sorted(each.name for each in short_campaign)

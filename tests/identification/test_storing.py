@@ -66,9 +66,7 @@ def test_a_fit_comes_back_as_it_was(path: Path, campaign: Campaign, fitted: Fit)
             assert np.array_equal(getattr(ours.solution, name), value), name
 
 
-def test_profiles_folds_and_notes_come_back(
-    tmp_path: Path, campaign: Campaign, fitted: Fit
-) -> None:
+def test_profiles_folds_and_notes_come_back(tmp_path, campaign, fitted) -> None:
     points = tuple(Point(x, 3.0 + x * x, np.array([x, 0.5])) for x in (-0.1, 0.0, 0.1))
     profile = Profile(0, 3.0, points, 1.0, -0.1, None, ("crossed", "bound"), points[0], "J", "card")
     held = {"current": Measures(10, 0.1, 0.5)}
@@ -132,9 +130,7 @@ POISON = {
 
 
 @pytest.mark.parametrize(("poison", "sentence"), POISON.values(), ids=POISON)
-def test_a_poisoned_file_ends_in_a_sentence(
-    path: Path, campaign: Campaign, poison, sentence: str
-) -> None:
+def test_a_poisoned_file_ends_in_a_sentence(path, campaign, poison, sentence) -> None:
     path.write_text(poison(path.read_text("utf-8")), "utf-8")
     with pytest.raises((FileError, ParameterError), match=f"fit.json.*{sentence}") as caught:
         load_fit(path, campaign)

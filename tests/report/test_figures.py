@@ -3,7 +3,6 @@
 import subprocess
 import sys
 import warnings
-from collections.abc import Callable
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -40,9 +39,7 @@ GAP = 0.1
     st.lists(st.sampled_from([1.0, 1.3, 20.0]), min_size=150, max_size=150),
     st.integers(3, 12),
 )
-def test_no_extreme_is_lost_on_either_side_of_a_gap(
-    values: list[int], steps: list[float], columns: int
-) -> None:
+def test_no_extreme_is_lost_on_either_side_of_a_gap(values, steps, columns) -> None:
     heights = np.array(values, dtype=float)
     time = np.cumsum(steps)[: heights.size]
     gaps = gap_rows(time)
@@ -88,9 +85,7 @@ SIGNATURES = {".PNG": b"\x89PNG", ".svg": b"<?xml", ".pdf": b"%PDF"}
 
 
 @pytest.mark.parametrize("suffix", SIGNATURES)
-def test_a_figure_is_written_whole_and_the_same_each_time(
-    step: Simulation, tmp_path: Path, suffix: str
-) -> None:
+def test_a_figure_is_written_whole_and_the_same_each_time(step, tmp_path, suffix) -> None:
     first, second = tmp_path / f"first{suffix}", tmp_path / f"second{suffix}"
     save_figure(plot_simulation(step), first)
     save_figure(plot_simulation(step), str(second))
@@ -162,6 +157,7 @@ def made(hoist: Drive, step: Simulation, all_limits: Simulation, task: Trial) ->
     response = hoist.frequency_response(np.geomspace(0.05, 5.0, 12), [1.0, 9.0])
     return {
         "simulation": figures.plot_simulation(step),
+        "one sample": figures.plot_simulation(hoist.simulate([0.0])),
         "all limits": figures.plot_simulation(all_limits),
         "by current": figures.plot_simulation(current),
         "neutral": figures.plot_simulation(neutral.simulate(maneuvers.step(0.8).sample())),
@@ -177,9 +173,7 @@ def made(hoist: Drive, step: Simulation, all_limits: Simulation, task: Trial) ->
     }
 
 
-def test_everything_can_be_read(
-    made: dict[str, Figure], assert_legible: Callable[[Figure], None]
-) -> None:
+def test_everything_can_be_read(made, assert_legible) -> None:
     for figure in made.values():
         assert_legible(figure)
 
@@ -243,9 +237,7 @@ def test_units_of_choice_hold_for_figures(step: Simulation) -> None:
     assert labels(figures.plot_simulation(step))[5] == "shaft speed (deg/s)"
 
 
-def test_every_limit_is_shaded_where_it_acts(
-    made: dict[str, Figure], all_limits: Simulation
-) -> None:
+def test_every_limit_is_shaded_where_it_acts(made, all_limits) -> None:
     figure = made["all limits"]
     panels = {
         Limit.DEAD_ZONE: [1],
@@ -291,10 +283,6 @@ def test_a_long_run_is_drawn_by_few_points_and_few_spans(hoist: Drive) -> None:
     assert lines(figure, 5)[0].max() == pytest.approx(DEGREE * run.shaft_speed.max())
 
 
-def test_a_single_sample_can_be_shown(hoist: Drive) -> None:
-    figures.plot_simulation(hoist.simulate([0.0])).draw_without_rendering()
-
-
 def test_a_comparison_shows_what_differs(step: Simulation, hoist: Drive) -> None:
     faster = hoist.scale(Z10=1.5).simulate(step.voltage)
     figure = figures.plot_comparison({"hoist": step, "faster": faster}, title="both")
@@ -306,9 +294,7 @@ def test_a_comparison_shows_what_differs(step: Simulation, hoist: Drive) -> None
         figures.plot_comparison({})
 
 
-def test_the_timeline_has_a_row_for_each_limit(
-    made: dict[str, Figure], all_limits: Simulation
-) -> None:
+def test_the_timeline_has_a_row_for_each_limit(made, all_limits) -> None:
     rows = made["timeline"].axes[2]
     names = [label.get_text() for label in rows.get_yticklabels()]
     assert names == [shade.name for shade in SHADES.values()]

@@ -11,9 +11,9 @@ from pathlib import Path
 import numpy as np
 import polars as pl
 import pytest
+from tests.identification.given import virtual
 
 from swashplate import Campaign, Drive, FileError, InputError, maneuvers
-from swashplate.campaign import rig
 from swashplate.identification.assessment import Judged
 from swashplate.identification.fitting import Fit, fit
 from swashplate.identification.profile import Point, Profile
@@ -49,28 +49,22 @@ SETUP = Setup.model_validate({"title": "two stages", "stages": STAGES})
 
 @pytest.fixture(scope="module")
 def campaign(tmp_path_factory: pytest.TempPathFactory) -> Campaign:
-    """Three virtual runs of the hoist, the last held out, a window of the first ignored."""
-    folder = tmp_path_factory.mktemp("campaign") / "tests"
+    """Three virtual runs of the hoist, the last held out."""
     commands = [maneuvers.step(4.0), maneuvers.ramp(1.0), maneuvers.step(-6.5)]
     truth = Drive.preset("hoist").replace(omega=(75.0, 80.0), G1=(0.051, 0.056))
-    rig.write(rig.run("hoist", commands, seed=4, truth=truth), folder)
-    before, _, after = (folder / "campaign.toml").read_text("utf-8").rpartition('role = "fit"')
-    (folder / "campaign.toml").write_text(f'{before}role = "validate"{after}', "utf-8")
-    return Campaign.from_toml(folder / "campaign.toml")
+    what = {"seed": 4, "truth": truth, "validate": ["step -6.5 V"]}
+    return virtual(tmp_path_factory.mktemp("campaign"), "hoist", commands, **what)
 
 
 @pytest.fixture(scope="module")
 def fitted(campaign: Campaign) -> Fit:
-    runs = campaign.select(role="fit")
-    first = runs[0]
-    channel = first["current"]
-    weight = np.where(channel.time < 0.5, 0.0, channel.weight)
-    first = replace(
-        first,
-        channels={**first.channels, "current": replace(channel, weight=weight)},
-        ignored=((0.0, 0.5, "the dither starts"),),
-    )
-    return fit(campaign.drive("hoist").parameters, [first, *runs[1:]], SETUP, threads=1)
+    """A fit to the runs, a window of the first ignored."""
+    first, *others = campaign.select(role="fit")
+    current = first["current"]
+    current = replace(current, weight=np.where(current.time < 0.5, 0.0, current.weight))
+    channels, ignored = {**first.channels, "current": current}, (0.0, 0.5, "the dither starts")
+    first = replace(first, channels=channels, ignored=(ignored,))
+    return fit(campaign.drive("hoist").parameters, [first, *others], SETUP, threads=1)
 
 
 @pytest.fixture(scope="module")
@@ -219,9 +213,7 @@ def test_rmse_and_fit_of_a_run_are_recomputed(read: Page, fitted: Fit) -> None:
     assert number(row["RMSE"]) == pytest.approx(1e3 * rmse, rel=6e-3)
 
 
-def test_initial_state_and_ignored_windows_stand_beside_every_fit_percent(
-    read: Page, page: Path
-) -> None:
+def test_initial_state_and_ignored_windows_stand_beside_every_fit_percent(read, page) -> None:
     rows = read.rows("agreement")
     assert all(row["start"] == "rest" for row in rows)
     assert any("the dither starts" in row["ignored"] for row in rows)
@@ -433,9 +425,7 @@ def test_a_validation_has_no_fit(validated: Path, campaign: Campaign, fitted: Fi
     assert verdict((), predicted).headline in page.words.replace("\N{NO-BREAK SPACE}", " ")
 
 
-def test_a_page_that_cannot_be_written_leaves_the_old_one(
-    tmp_path: Path, write, judged: Judged
-) -> None:
+def test_a_page_that_cannot_be_written_leaves_the_old_one(tmp_path, write, judged) -> None:
     with pytest.raises(FileError, match="cannot be written"):
         write_fit_report(judged, tmp_path / "none" / "fit.html")
     (tmp_path / "fit.html").write_text("old")

@@ -9,9 +9,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from tests.identification.given import virtual
 
 from swashplate import Drive, InputError
-from swashplate.campaign import Campaign, rig
+from swashplate.campaign import Campaign
 from swashplate.identification import predict
 from swashplate.identification.validation import with_speeds
 from swashplate.maneuvers import parse
@@ -84,9 +85,8 @@ def test_a_slider_gives_what_python_gives(tmp_path: Path, browsed) -> None:
 @pytest.fixture(scope="module")
 def tests(tmp_path_factory: pytest.TempPathFactory) -> Campaign:
     """Virtual tests of the hoist."""
-    folder = tmp_path_factory.mktemp("tests")
     maneuvers = [parse("step:6,length=6"), parse("sine:5,0.2,length=10")]
-    return Campaign.from_toml(rig.write(rig.run(Drive.preset("hoist"), maneuvers, seed=4), folder))
+    return virtual(tmp_path_factory.mktemp("tests"), "hoist", maneuvers, seed=4)
 
 
 def test_errors_are_those_of_the_prediction(tests: Campaign, tmp_path: Path, browsed) -> None:
