@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from tests.campaign.conftest import Drafted
 
-from swashplate import Campaign, InputError, ParameterError
+from swashplate import InputError, ParameterError
 from swashplate.campaign import draft_campaign as draft
 
 
@@ -76,21 +76,16 @@ def test_a_draft_can_be_read(drafted: Drafted) -> None:
     assert tests["run2"]["rectified_current"].values[-1] == pytest.approx(0.4)
 
 
-def test_logs_of_one_name_are_told_apart_by_their_folders(tmp_path: Path) -> None:
-    logs = [tmp_path / day / "run.csv" for day in ("monday", "tuesday")]
-    for each in logs:
-        each.parent.mkdir()
-        each.write_text("t,voltage [V],speed [rpm]\n0,0,0\n0.1,0,0\n0.2,4,9\n", "utf-8")
-    path = tmp_path / "campaign.toml"
-    path.write_text(draft(logs, tmp_path), "utf-8")
-    assert [each.run for each in Campaign.from_toml(path)] == ["monday/run.csv", "tuesday/run.csv"]
+def test_logs_of_one_name_are_told_apart_by_their_folders(drafted: Drafted) -> None:
+    text = "t,voltage [V],speed [rpm]\n0,0,0\n0.1,0,0\n0.2,4,9\n"
+    tests = drafted(dict.fromkeys(("monday/run.csv", "tuesday/run.csv"), text))
+    assert [each.run for each in tests] == ["monday/run.csv", "tuesday/run.csv"]
 
 
-def test_an_axis_for_each_prefix_and_logs_without_some(tmp_path: Path) -> None:
-    both, one = tmp_path / "both.csv", tmp_path / "one.csv"
-    both.write_text("Time,Boom Cmd,Stick Cmd,Boom Ms,Stick Ms\n0,7,6,1,2\n1,8,6,1,2\n", "utf-8")
-    one.write_text("Time,Boom Cmd,Boom Ms\n0,7,1\n1,8,2\n", "utf-8")
-    content = tomllib.loads(draft([both, one], tmp_path))
+def test_an_axis_for_each_prefix_and_logs_without_some(drafted: Drafted) -> None:
+    both = "Time,Boom Cmd,Stick Cmd,Boom Ms,Stick Ms\n0,7,6,1,2\n1,8,6,1,2\n"
+    one = "Time,Boom Cmd,Boom Ms\n0,7,1\n1,8,2\n"
+    content = tomllib.loads(drafted({"both.csv": both, "one.csv": one}).path.read_text("utf-8"))
     assert list(content["axes"]) == ["boom", "stick"]
     assert content["axes"]["stick"]["input"]["offset"] == -6.0
     assert content["axes"]["boom"]["channels"]["position"]["unit"] == "mm"
@@ -115,13 +110,16 @@ def test_a_log_without_a_command_leaves_a_line_to_fill_in(drafted: Drafted, tmp_
         draft([], tmp_path)
 
 
+ENCODER = {"drive": "hoist", "counts_per_turn": 4096.0}
+
+
 @pytest.mark.parametrize("name", ["Drehgeber", "counts"])
-def test_a_counter_that_begins_anew_is_an_encoder_s(tmp_path: Path, name: str) -> None:
+def test_a_counter_that_begins_anew_is_an_encoder_s(drafted: Drafted, name: str) -> None:
     """A column of whole numbers that go up to 4095 and begin anew, and one that numbers rows."""
-    counts = [60 * max(k - 20, 0) % 4096 for k in range(200)]
-    rows = [f"{k},{k / 100},{4 if k > 20 else 0},{n},on" for k, n in enumerate(counts)]
-    (tmp_path / "log.csv").write_text("\n".join([f"Nr,time,voltage,{name},state", *rows]), "utf-8")
-    text = draft([tmp_path / "log.csv"], tmp_path, "hoist", 4096.0)
+    row = np.arange(200)
+    on, counts = row > 20, 60 * np.maximum(row - 20, 0) % 4096
+    columns = {"Nr": row, "time": row / 100, "voltage": 4 * on, name: counts, "state": ["on"] * 200}
+    text = drafted({"log.csv": columns}, draft=ENCODER).path.read_text("utf-8")
     found = tomllib.loads(text)["axes"]["hoist"]["channels"]["encoder_counts"]
     assert found["column"] == name
     assert (found["counts_per_turn"], found["rolls_over_at"]) == (4096, 4096)

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from tests.campaign.conftest import BOTH, RATE, TIME, Columns, Drafted, write
+from tests.campaign.conftest import BOTH, RATE, TIME, Columns, Drafted, read_draft, write
 from tests.logs.writing import write_log
 
 from swashplate import Campaign, Drive, FileError, InputError, ParameterError
@@ -307,9 +307,7 @@ def test_each_group_has_its_own_clock(tmp_path: Path, suffix: str) -> None:
     log, late, speed = tmp_path / f"log{suffix}", TIME[::2] + 1e-3, lagged(BOTH)[::2]
     groups = {"cmd": {"time": TIME, "voltage": BOTH}, "meas": {"time": late, "speed": speed}}
     write_log(log, groups, units={"voltage": "V", "speed": "rad/s"})
-    path = tmp_path / "campaign.toml"
-    path.write_text(draft_campaign([log], tmp_path, drive="hoist"), "utf-8")
-    tests = Campaign.from_toml(path)
+    tests = read_draft(tmp_path, [log], drive="hoist")
     run = tests["log"]
     assert run.input.time == pytest.approx(TIME)
     assert run["shaft_speed"].time == pytest.approx(late)
@@ -440,11 +438,9 @@ def test_maneuvers_in_a_comment_are_in_volts(drafted: Drafted) -> None:
 
 def test_the_run_held_back_leaves_its_kind_in_the_fit(drafted: Drafted) -> None:
     """The last by name is the only step upwards."""
-    steps = {"a": -8.0, "b": -6.0, "c": -4.0, "d": 8.0}
-    logs = {
-        f"{name}.csv": {"time": TIME, "voltage": u * (TIME > 1.0), "speed": u * (TIME > 1.0)}
-        for name, u in steps.items()
-    }
+    steps = {"a": -8.0 * (TIME > 1.0), "b": -6.0 * (TIME > 1.0), "c": -4.0 * (TIME > 1.0)}
+    steps["d"] = 8.0 * (TIME > 1.0)
+    logs = {f"{key}.csv": {"time": TIME, "voltage": u, "speed": u} for key, u in steps.items()}
     roles = {each.name: each.role for each in drafted(logs)}
     assert roles == {"a": "fit", "b": "fit", "c": "validate", "d": "fit"}
 
@@ -474,24 +470,16 @@ def test_an_axis_has_the_packaged_drive_of_its_name(drafted: Drafted) -> None:
         ("11:59:57 PM", "12:00:02.5 AM"),
     ],
 )
-def test_stamps_of_a_calendar_and_of_a_clock(tmp_path: Path, stamps: tuple[str, str]) -> None:
-    rows = [f"{stamp};{k};{k}" for k, stamp in enumerate(stamps)]
-    (tmp_path / "log.csv").write_text("\n".join(["Zeit;voltage;speed", *rows]) + "\n", "utf-8")
-    path = tmp_path / "campaign.toml"
-    path.write_text(draft_campaign([tmp_path / "log.csv"], tmp_path), "utf-8")
-    assert Campaign.from_toml(path)["log"].input.time == pytest.approx([0.0, 5.5])
+def test_stamps_of_a_calendar_and_of_a_clock(drafted: Drafted, stamps: tuple[str, str]) -> None:
+    text = "Zeit;voltage;speed\n{};0;0\n{};1;1\n".format(*stamps)
+    assert drafted({"log.csv": text})["log"].input.time == pytest.approx([0.0, 5.5])
 
 
-def test_dashes_are_missing_numbers(drafted: Drafted) -> None:
+def test_dashes_are_missing_numbers_and_commas_between_commas_are_named(drafted: Drafted) -> None:
     cells = [f"{each:g}" for each in BOTH]
     cells[5:8] = ["---", "--", "---"]
     tests = drafted(speed=cells)
     assert 'missing = "drop"    # guessed: 3 cells are empty' in text_of(tests)
     assert tests["log"]["shaft_speed"].dropped == 3
-
-
-def test_decimal_commas_between_commas_are_named(tmp_path: Path) -> None:
-    log = tmp_path / "log.csv"
-    log.write_text("time,voltage,speed\n0,0,1,0,2,0\n0,1,1,5,2,5\n", "utf-8")
     with pytest.raises(FileError, match="Do decimal commas stand between commas"):
-        draft_campaign([log], tmp_path)
+        drafted({"log.csv": "time,voltage,speed\n0,0,1,0,2,0\n0,1,1,5,2,5\n"})
