@@ -1,19 +1,19 @@
 """Stamps, counts with their roll-overs and jumps, the ammeter's sign, and speed from counts."""
 
-from pathlib import Path
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from scipy.signal import lsim
+from tests.identification.given import run_of
 
 from swashplate.campaign import (
     DIFFERENTIATOR,
     LOW_PASS,
     Channel,
     Encoder,
-    Source,
     find_lost_counts,
     increasing,
     interpolate_counts,
@@ -148,11 +148,11 @@ def position(
     time: np.ndarray, values: np.ndarray, encoder: Encoder | None = None, kind: str = "position"
 ) -> Channel:
     """A channel; of an encoder `values` are counts."""
-    angle = values if encoder is None else values * encoder.angle_per_count
-    counts, source = None if encoder is None else values, Source(Path("log.csv"), "x")
-    return Channel(
-        "x", kind, "rad", time, angle, np.ones(values.size), source, encoder=encoder, counts=counts
-    )
+    channel = run_of("x", time, {kind: values}, time=time)[kind]
+    if encoder is None:
+        return channel
+    angle = values * encoder.angle_per_count
+    return replace(channel, kind="encoder_counts", values=angle, encoder=encoder, counts=values)
 
 
 @pytest.mark.interpreted
@@ -183,7 +183,7 @@ def test_the_plain_difference_and_a_measured_speed() -> None:
 
 def test_counts_are_joined_before_they_are_filtered() -> None:
     counts = np.floor(0.3 * np.arange(400.0))
-    winch = position(np.arange(400) * H, counts, Encoder(2526.3, 1.0, -1, None), "encoder_counts")
+    winch = position(np.arange(400) * H, counts, Encoder(2526.3, 1.0, -1, None))
     found = speed_of(winch)
     # 0.3 counts a sample, backwards: neighbours alone would give 0 or a whole count
     expected = -0.3 * 2.0 * np.pi / 2526.3 / H
