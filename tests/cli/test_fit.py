@@ -7,11 +7,12 @@ import signal
 import subprocess
 import sys
 import time
+import tomllib
 from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from tests.cli.conftest import STEPS
+from tests.cli.conftest import STEPS, stages
 from tests.shown import check_shown
 
 from swashplate import Campaign, Drive
@@ -21,19 +22,7 @@ from swashplate.identification.setup import Setup
 
 Words = Callable[..., str]
 CAMPAIGN = "virtual/campaign.toml"
-SETUP = """
-[[stages]]
-name = "card"
-part = "card"
-free.J = { relative = [0.5, 2.0] }
-free.omega_plus = { relative = [0.5, 2.0] }
-
-[[stages]]
-name = "pump"
-part = "pump"
-free.Z8 = { relative = [0.5, 2.0], log = true }
-free.Z16 = { relative = [0.5, 2.0], log = true }
-"""
+SETUP = stages(card="J omega_plus", pump="Z8 Z16")
 
 
 @pytest.fixture
@@ -229,15 +218,9 @@ def test_validations_that_are_refused(refused: Words, held_out: Path) -> None:
 @pytest.fixture
 def fitted(held_out: Path, tmp_path: Path) -> Fit:
     """A fit and what it keeps of itself, in the folder fitted."""
-    free = {"card": ("J_plus", (0.5, 2.0)), "pump": ("Z10", (0.8, 1.25))}
-    stages = [
-        {"name": part, "part": part, "free": {name: {"relative": bounds}}}
-        for part, (name, bounds) in free.items()
-    ]
     campaign = Campaign.from_toml(held_out)
-    runs = campaign.select(role="fit")
-    setup = Setup.model_validate({"stages": stages})
-    found = fit(Drive.preset("hoist").parameters, runs, setup)
+    setup = Setup.model_validate(tomllib.loads(stages(card="J_plus", pump="Z10")))
+    found = fit(Drive.preset("hoist").parameters, campaign.select(role="fit"), setup)
     (tmp_path / "fitted").mkdir()
     Drive(found.parameters).to_toml(tmp_path / "fitted" / "drive.toml")
     Judged(campaign, found, notes={"seed": "7"}).store(tmp_path / "fitted" / "fit.json")

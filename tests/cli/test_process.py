@@ -13,6 +13,7 @@ from pathlib import Path
 import pytest
 import scipy.io
 import typer
+from tests.cli.conftest import stages
 from typer.testing import CliRunner
 
 from swashplate import Drive, __version__, maneuvers
@@ -195,18 +196,6 @@ INSTEAD = {
     "logs/*.csv": "logs/hoist_step_4_V.csv",
 }
 """Draws, starts and folds, as many as a test has time for, and names that there are."""
-FEWER = """
-[[stages]]
-name = "card"
-part = "card"
-free.G1 = { relative = [0.5, 2.0] }
-free.J = { relative = [0.5, 2.0] }
-[[stages]]
-name = "pump"
-part = "pump"
-free.Z8 = { relative = [0.5, 2.0], log = true }
-free.Z10 = { relative = [0.5, 2.0], log = true }
-"""
 ELSEWHERE = ("demo", "valve", "campaign init", "logs/start.toml")
 """Run by tests of their own, or by the page docs/how-to/another-machine.md."""
 
@@ -231,9 +220,9 @@ def place(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("examples")
     tests = (maneuvers.step(4.0, stop=3.0, length=4.0), maneuvers.step(-5.0, stop=3.0, length=4.0))
     for name in ("virtual", "harbour", "logs"):
-        what = {"seed": 1, "validate": [] if name == "logs" else ["step +9 V"]}
+        what = {"seed": 1, "validate": [] if name == "logs" else ["step 9 V"]}
         rig.write(rig.run("hoist", [*tests, maneuvers.step(9.0)], **what), folder / name)
-    (folder / "harbour" / "mine.toml").write_text(FEWER, "utf-8")
+    (folder / "harbour" / "mine.toml").write_text(stages(card="G1 J", pump="Z8 Z10"), "utf-8")
     hoist = Drive.preset("hoist")
     for name in ("mine.toml", "worn.toml"):
         hoist.scale(Z10=0.9).to_toml(folder / name)

@@ -141,27 +141,15 @@ def put(pattern: str, new: str, count: int = 0) -> Callable[[str], str]:
     return lambda text: re.sub(pattern, new, text, count=count)
 
 
+LATER = {"from": 1.0, "to": 1.2, "factor": 10.0}
+CARD = {"free": {"J": {"relative": (0.5, 2.0)}}, "weights": {"rectified_current": [LATER]}}
+KNOWN = {"relative": (0.8, 1.25), "log": True, "prior": {"mean": 12.8, "deviation": 0.05}}
 TWO_STAGES = Setup.model_validate(
     {
         "title": "two stages",
         "stages": [
-            {
-                "name": "card",
-                "part": "card",
-                "free": {"J": {"relative": (0.5, 2.0)}},
-                "weights": {"rectified_current": [{"from": 1.0, "to": 1.2, "factor": 10.0}]},
-            },
-            {
-                "name": "pump",
-                "part": "pump",
-                "free": {
-                    "Z10": {
-                        "relative": (0.8, 1.25),
-                        "log": True,
-                        "prior": {"mean": 12.8, "deviation": 0.05},
-                    }
-                },
-            },
+            {"name": "card", "part": "card", **CARD},
+            {"name": "pump", "part": "pump", "free": {"Z10": KNOWN}},
         ],
     }
 )
