@@ -78,11 +78,7 @@ def test_stamps_and_readings_that_no_instrument_gives_are_refused(said: str, use
     ("time", "counts", "lines"),
     [
         # changes at rows 2, 5, 7; the first row begins the first line; after row 7 it is held
-        (
-            range(10),
-            [5, 5, 6, 6, 6, 8, 8, 7, 7, 7],
-            [5, 5.5, 6, 6 + 2 / 3, 6 + 4 / 3, 8, 7.5, 7, 7, 7],
-        ),
+        (range(9), [5, 5, 6, 6, 6, 8, 8, 7, 7], [5, 5.5, 6, 20 / 3, 22 / 3, 8, 7.5, 7, 7]),
         ([0.0, 1.0, 3.0, 4.0, 10.0], [0, 0, 1, 1, 2], [0.0, 1 / 3, 1.0, 1 + 1 / 7, 2.0]),
     ],
 )
