@@ -99,15 +99,6 @@ def test_unrelated_slow_signals_are_rarely_called_related() -> None:
     assert sum(abs(each.peak[1]) > 1.96 / np.sqrt(N) for each in found) >= 57
 
 
-def test_cross_correlation_by_hand() -> None:
-    residual = np.array([0.0, 0, 0, 3, 0, 0, 0, -3, 0, 0, 0, 0])
-    command = np.array([0.0, 1, 0, 0, 0, -1, 0, 0, 0, 0, 0, 0])
-    found = residual_test(np.arange(12.0), residual, command, longest=3.0)
-    # the residual is the command two samples later: 6/(√18 √2) = 1
-    assert dict(zip(found.lags, found.correlation, strict=True))[2.0] == pytest.approx(1.0)
-    assert found.lags.tolist() == [-3, -2, -1, 0, 1, 2, 3]
-
-
 @pytest.mark.parametrize(
     ("residual", "command"), [(np.zeros(N), COMMAND), (WHITE, np.full(N, 3.0))]
 )

@@ -111,9 +111,12 @@ def held_out(error: np.ndarray) -> RunQuality:
     return compared(bench_run("held", 1.5, truth + 0.02 * SWAP), "y", truth + error)
 
 
+GOOD = held_out(0.0 * TIME)
+
+
 def test_a_fit_that_carries_over_is_usable_and_one_without_runs_held_out_says_so() -> None:
     fitted = stage()
-    found = verdict([fitted], [held_out(0.0 * TIME)])
+    found = verdict([fitted], [GOOD])
     assert found.usable, found.headline
     # 0.02 of what 1.5 · 2 · (1 - exp(-5)) with the noise comes to
     assert found.headline == "Usable: predicts held-out y to 0.66 % of its range."
@@ -127,8 +130,7 @@ def test_a_fit_that_carries_over_is_usable_and_one_without_runs_held_out_says_so
 def test_a_current_that_was_not_fitted_is_not_judged() -> None:
     run = run_of("held", WAVE, {"rectified_current": WAVE}, time=TIME)
     current = compared(run, "rectified_current", 0.0 * WAVE)
-    held = held_out(0.0 * TIME)
-    assert verdict([stage()], [held, current]).headline == verdict([stage()], [held]).headline
+    assert verdict([stage()], [GOOD, current]).headline == verdict([stage()], [GOOD]).headline
     assert "rectified_current" in verdict((), [current]).headline
 
 
@@ -155,24 +157,19 @@ def test_wide_intervals_ask_for_attention() -> None:
 
 
 def test_most_unknowns_at_bounds_is_hopeless() -> None:
-    fitted = stage(bounds=(0.1, 1.5), lags=(1.2, 5.0))
-    held = held_out(0.0 * TIME)
-    found = verdict([fitted], [held])
+    found = verdict([stage(bounds=(0.1, 1.5), lags=(1.2, 5.0))], [GOOD])
     assert not found.usable
     assert "2 of 2 parameters are at a bound or not determined" in found.headline
 
 
 def test_an_interrupted_fit_is_not_usable() -> None:
     whole = stage()
-    cut = replace(whole, solution=replace(whole.solution, interrupted=True, converged=False))
-    held = held_out(0.0 * TIME)
-    found = verdict([cut], [held], planned=["rise", "brake"])
+    cut = replace(whole.solution, interrupted=True, converged=False)
+    found = verdict([replace(whole, solution=cut)], [GOOD], planned=["rise", "brake"])
     assert not found.usable
     assert "stage rise was interrupted" in found.headline
     assert "brake was never fitted" in found.headline
-    unfinished = replace(
-        whole, solution=replace(whole.solution, converged=False, message="too many evaluations")
-    )
-    found = verdict([unfinished], [held])
+    unfinished = replace(whole.solution, converged=False, message="too many evaluations")
+    found = verdict([replace(whole, solution=unfinished)], [GOOD])
     assert not found.usable
     assert "did not converge (too many evaluations)" in found.headline
