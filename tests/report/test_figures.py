@@ -196,24 +196,17 @@ def shades(figure: Figure, panel: int) -> dict[str, np.ndarray]:
 
 
 def test_the_chain_from_command_to_speed(made: dict[str, Figure], step: Simulation) -> None:
+    expected = {
+        "voltage (V)": [step.voltage],
+        "current (A)": [step.current_positive, step.current_negative],
+        "spool (mm)": [1e3 * step.spool_position, 1e3 * step.orifice_opening],
+        "stroking pressure (bar)": [1e-5 * step.stroker_pressure],
+        "swash angle (deg)": [DEGREE * step.swash_angle],
+        "shaft speed (deg/s)": [DEGREE * step.shaft_speed],
+    }
     figure = made["simulation"]
-    assert labels(figure) == [
-        "voltage (V)",
-        "current (A)",
-        "spool (mm)",
-        "stroking pressure (bar)",
-        "swash angle (deg)",
-        "shaft speed (deg/s)",
-    ]
-    expected = [
-        [step.voltage],
-        [step.current_positive, step.current_negative],
-        [1e3 * step.spool_position, 1e3 * step.orifice_opening],
-        [1e-5 * step.stroker_pressure],
-        [DEGREE * step.swash_angle],
-        [DEGREE * step.shaft_speed],
-    ]
-    for panel, signals in enumerate(expected):
+    assert labels(figure) == list(expected)
+    for panel, signals in enumerate(expected.values()):
         for drawn, signal in zip(lines(figure, panel), signals, strict=True):
             np.testing.assert_allclose(drawn, signal, rtol=1e-12)
     assert labels(made["by current"])[0] == "current (A)"
@@ -227,17 +220,10 @@ def test_units_of_choice_hold_for_figures(step: Simulation) -> None:
     assert labels(figures.plot_simulation(step))[5] == "shaft speed (deg/s)"
 
 
-def test_every_limit_is_shaded_where_it_acts(made, all_limits) -> None:
-    figure = made["all limits"]
-    panels = {
-        Limit.DEAD_ZONE: [1],
-        Limit.CURRENT_RATE: [1],
-        Limit.ORIFICE: [2],
-        Limit.SPOOL: [2],
-        Limit.RELIEF: [3],
-        Limit.SWASH_STOP: [4, 5],
-    }
-    time = all_limits.time
+def test_every_limit_is_shaded_where_it_acts(made, all_limits: Simulation) -> None:
+    figure, time = made["all limits"], all_limits.time
+    panels = {Limit.DEAD_ZONE: [1], Limit.CURRENT_RATE: [1], Limit.ORIFICE: [2], Limit.SPOOL: [2]}
+    panels |= {Limit.RELIEF: [3], Limit.SWASH_STOP: [4, 5]}
     for limit, at in panels.items():
         name = SHADES[limit].name
         assert [panel for panel in range(6) if name in shades(figure, panel)] == at

@@ -331,12 +331,12 @@ def test_truth_stands_beside_the_estimates(write, judged: Judged, read: Page) ->
     truth = Drive.preset("hoist").replace(omega=(75.0, 80.0), G1=(0.051, 0.056)).parameters
     page = write(truth=truth)
     assert "truth" not in read.rows("parameters")[0]
-    row = next(row for row in page.rows("parameters") if row["name"] == "G1_plus")
-    assert number(row["truth"]) == pytest.approx(0.051, rel=1e-4)
-    estimate = next(
-        each for each in judged.result.stages[0].uncertainty.estimates if each.name == "G1_plus"
-    )
-    assert row["holds"] == ("yes" if estimate.lower <= 0.051 <= estimate.upper else "no")
+    rows = {row["name"]: row for row in page.rows("parameters")}
+    assert number(rows["G1_plus"]["truth"]) == pytest.approx(0.051, rel=1e-4)
+    estimates = judged.result.stages[0].uncertainty.estimates
+    (estimate,) = [each for each in estimates if each.name == "G1_plus"]
+    holds = estimate.lower <= 0.051 <= estimate.upper
+    assert rows["G1_plus"]["holds"] == ("yes" if holds else "no")
     fixed = {row["name"]: row for row in page.rows("held")}
     assert number(fixed["Z4"]["truth"]) == pytest.approx(truth.numbers["Z4"], rel=1e-4)
 
@@ -405,11 +405,8 @@ def test_starts_of_each_stage_are_listed(write, fitted: Fit) -> None:
     page = write(result=replace(fitted, stages=(replace(first, starts=STARTS), second)))
     assert "card: 2 of 4 starts reached the best cost, 3." in page.words
     assert "1 left the model's domain" in page.words
-    assert [row[:2] for row in page.tables["starts"][1:]] == [
-        ["0", "1"],
-        ["1", "1"],
-        ["2", "23.33333"],
-    ]
+    listed = [row[:2] for row in page.tables["starts"][1:]]
+    assert listed == [["0", "1"], ["1", "1"], ["2", "23.33333"]]
 
 
 @pytest.fixture(scope="module")
