@@ -262,9 +262,7 @@ def test_a_slow_log_of_steps_is_fitted_as_well_as_a_fast_one(short_campaign: Cam
 
 
 @pytest.mark.parametrize("first", [0, 2])
-def test_a_slow_log_is_predicted_as_well_as_a_fast_one(
-    short_campaign: Campaign, first: int
-) -> None:
+def test_a_slow_log_is_predicted_as_well_as_a_fast_one(short_campaign, first) -> None:
     """By the true drive, of which these logs have no noise; with jumps halfway it is far off."""
     truth = Drive.preset("hoist").replace(J=(0.26, 0.31), Z10=13.0)
     for run in short_campaign.experiments:
