@@ -38,29 +38,26 @@ def test_a_good_log_has_no_findings(campaign_folder: Path) -> None:
     assert found["current"].lost_counts is None
 
 
-@pytest.mark.parametrize(
-    ("change", "signal", "said"),
-    [
-        (
-            lambda t: np.delete(t, range(20, 30), axis=0),
-            "input",
-            "1 gap, the longest 0.11 s; 10 samples are missing",
-        ),
-        (lambda t: t - np.outer(t[:, 0] >= 800.0, [0, 0, 0, 900]), "counts", "jumps once"),
-        (lambda t: t * [1, 1, 0, 1] + [0, 0, 12.0, 0], "current", "is it connected"),
-        (
-            lambda t: t * np.where(t[:, :1] >= 600.0, [1, 1, -1, 1], 1.0),
-            "current",
-            "should it be signed_current",
-        ),
-        (lambda t: t * [1, 0, 0, 0], "input", "nothing can be identified"),
-        (lambda t: t * [1, 10, 1, 1], "input", "check unit, scale and offset"),
-        (lambda t: t * [1, 1, 1, -1], "counts", "should its sign be -1"),
-    ],
-)
-def test_what_a_log_shows(
-    campaign_folder: Path, change: Callable[[np.ndarray], np.ndarray], signal: str, said: str
-) -> None:
+SHOWN = {
+    "1 gap, the longest 0.11 s; 10 samples are missing": (
+        "input",
+        lambda t: np.delete(t, range(20, 30), axis=0),
+    ),
+    "jumps once": ("counts", lambda t: t - np.outer(t[:, 0] >= 800.0, [0, 0, 0, 900])),
+    "is it connected": ("current", lambda t: t * [1, 1, 0, 1] + [0, 0, 12.0, 0]),
+    "should it be signed_current": (
+        "current",
+        lambda t: t * np.where(t[:, :1] >= 600.0, [1, 1, -1, 1], 1.0),
+    ),
+    "nothing can be identified": ("input", lambda t: t * [1, 0, 0, 0]),
+    "check unit, scale and offset": ("input", lambda t: t * [1, 10, 1, 1]),
+    "should its sign be -1": ("counts", lambda t: t * [1, 1, 1, -1]),
+}
+
+
+@pytest.mark.parametrize("said", SHOWN)
+def test_what_a_log_shows(campaign_folder: Path, said: str) -> None:
+    signal, change = SHOWN[said]
     found = qualities(rewrite(campaign_folder / "campaign.toml", change))
     assert said in found[signal].findings[0]
     if said.startswith("1 gap"):  # stamps that are the input's are told of once
@@ -146,21 +143,20 @@ def test_a_stick_that_rests_away_from_zero_is_named(edited: Edit) -> None:
 
 
 @pytest.mark.parametrize("step", [1, 4])
-def test_an_encoder_resolves_the_step_of_its_counts(edited: Edit, step: int) -> None:
+def test_an_encoder_resolves_the_step_of_its_counts(campaign_folder: Path, step: int) -> None:
     """A decoder that counts every fourth edge is four times as coarse."""
 
     def faster(table: np.ndarray) -> np.ndarray:
         turned = step * np.rint(1e-4 * table[:, 0] ** 2)
         return np.column_stack([table[:, :3], turned])
 
-    run = Campaign.from_toml(rewrite(edited("", ""), faster))["up"]
-    assert run["counts"].resolution == step * abs(run["counts"].encoder.angle_per_count)
+    path = campaign_folder / "campaign.toml"
+    even = Campaign.from_toml(path)["up"]["counts"]
+    count = abs(even.encoder.angle_per_count)
+    assert even.resolution == count  # equal steps are a constant speed
+    run = Campaign.from_toml(rewrite(path, faster))["up"]
+    assert run["counts"].resolution == step * count
     assert run["current"].resolution is None
-
-
-def test_equal_steps_are_a_constant_speed(campaign_folder: Path) -> None:
-    counts = Campaign.from_toml(campaign_folder / "campaign.toml")["up"]["counts"]
-    assert counts.resolution == abs(counts.encoder.angle_per_count)
 
 
 # --- runs beside each other -----------------------------------------------------------------------

@@ -35,9 +35,7 @@ def readback(values: np.ndarray, *, noise: float = 0.01, offset: float = 0.03) -
 
 @pytest.mark.parametrize(("axis", "name"), SOURCE)
 @pytest.mark.parametrize("rate", [512.0, 19.0])
-def test_tests_of_the_source_are_recognised_through_a_12_bit_readback(
-    axis: str, name: str, rate: float
-) -> None:
+def test_tests_of_the_source_are_recognised_through_a_12_bit_readback(axis, name, rate) -> None:
     run = maneuvers.source_tests(axis)[name]
     time = irregular(run.length) if rate == 19.0 else grid(run.length, rate)
     found = recognise(time, readback(run(time)))
@@ -134,13 +132,9 @@ def shapes(draw: st.DrawFn) -> tuple[Maneuver, str, list[float], float]:
     kind = draw(st.sampled_from(["sine", "step", "ramp"]))
     if kind == "step":
         start, dwell = draw(st.floats(0.2, 2.0)), draw(st.floats(0.5, 5.0))
+        run = maneuvers.step(signed, start=start, stop=start + dwell, length=10.0)
         # the converter's step is 0.5 % of 1 V
-        return (
-            maneuvers.step(signed, start=start, stop=start + dwell, length=10.0),
-            kind,
-            [signed],
-            9e-3,
-        )
+        return run, kind, [signed], 9e-3
     if kind == "sine":
         frequency = draw(st.floats(0.05, 2.0))
         # a longer return would begin with the slope of the sine and rise far above it
@@ -159,9 +153,7 @@ def shapes(draw: st.DrawFn) -> tuple[Maneuver, str, list[float], float]:
 
 @given(shapes(), st.floats(0.0, 0.01), st.sampled_from([512.0, 100.0, 50.0]))
 @settings(max_examples=60)
-def test_any_sine_step_or_ramp(
-    shape: tuple[Maneuver, str, list[float], float], noise: float, rate: float
-) -> None:
+def test_any_sine_step_or_ramp(shape, noise: float, rate: float) -> None:
     run, kind, numbers, within = shape
     time = grid(run.length, rate)
     found = recognise(time, readback(run(time), noise=noise))
@@ -171,24 +163,19 @@ def test_any_sine_step_or_ramp(
     assert found.frequency == (float(words[2]) if kind == "sine" else None)
 
 
-@given(
-    st.integers(1, 300),
-    st.integers(0, 2**32 - 1),
-    st.sampled_from(
-        [
-            lambda random, n: random.normal(0.0, 3.0, n),
-            lambda random, n: np.cumsum(random.normal(0.0, 1.0, n)),
-            lambda random, n: np.round(random.normal(0.0, 1.0, n)),
-            lambda random, n: np.repeat(random.normal(0.0, 4.0, n // 20 + 1), 20)[:n],
-            lambda random, n: np.where(random.random(n) < 0.02, 5.0, 0.0),
-            lambda random, n: np.sin(random.uniform(0.0, 3.0) * np.arange(n)),
-        ]
-    ),
-)
+RECORDS = [
+    lambda random, n: random.normal(0.0, 3.0, n),
+    lambda random, n: np.cumsum(random.normal(0.0, 1.0, n)),
+    lambda random, n: np.round(random.normal(0.0, 1.0, n)),
+    lambda random, n: np.repeat(random.normal(0.0, 4.0, n // 20 + 1), 20)[:n],
+    lambda random, n: np.where(random.random(n) < 0.02, 5.0, 0.0),
+    lambda random, n: np.sin(random.uniform(0.0, 3.0) * np.arange(n)),
+]
+
+
+@given(st.integers(1, 300), st.integers(0, 2**32 - 1), st.sampled_from(RECORDS))
 @settings(max_examples=40)
-def test_any_record_has_an_answer(
-    size: int, seed: int, make: Callable[[np.random.Generator, int], np.ndarray]
-) -> None:
+def test_any_record_has_an_answer(size: int, seed: int, make: Callable) -> None:
     random = np.random.default_rng(seed)
     time = np.cumsum(random.uniform(0.001, 0.1, size))
     found = recognise(time, make(random, size))

@@ -1,19 +1,19 @@
 """Stamps, counts with their roll-overs and jumps, the ammeter's sign, and speed from counts."""
 
-from pathlib import Path
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from scipy.signal import lsim
+from tests.identification.given import run_of
 
 from swashplate.campaign import (
     DIFFERENTIATOR,
     LOW_PASS,
     Channel,
     Encoder,
-    Source,
     find_lost_counts,
     increasing,
     interpolate_counts,
@@ -36,21 +36,6 @@ def test_rounded_stamps_are_put_back_onto_their_grid() -> None:
     assert np.ptp(np.diff(time)) < 1e-12
 
 
-@pytest.mark.parametrize(
-    ("time", "said"),
-    [
-        ([0.0, 1.0, 1.0, 2.0], "row 2 (the first is 0) has 1.0 s after 1.0 s"),
-        ([0.0, np.nan, 1.0], "time must be finite, but row 1"),
-        ([0.0], "two rows at least"),
-        ([[0.0, 1.0]], "one row of numbers"),
-    ],
-)
-def test_wrong_stamps_are_refused(time: list, said: str) -> None:
-    with pytest.raises(InputError) as refused:
-        increasing(time)
-    assert said in str(refused.value)
-
-
 # --- counts ---------------------------------------------------------------------------------------
 
 
@@ -60,9 +45,7 @@ def test_wrong_stamps_are_refused(time: list, said: str) -> None:
     st.sampled_from([1000, 1024, 999]),
     st.booleans(),
 )
-def test_any_motion_slower_than_half_the_range_is_recovered(
-    steps: list[int], first: int, modulus: int, signed: bool
-) -> None:
+def test_any_motion_slower_than_half_the_range_is_recovered(steps, first, modulus, signed) -> None:
     walk = first + np.concatenate([[0], np.cumsum(steps)])
     low = modulus // 2 if signed else 0
     readings = (walk + low) % modulus - low
@@ -71,33 +54,31 @@ def test_any_motion_slower_than_half_the_range_is_recovered(
     assert unwrapped[0] == readings[0]
 
 
-@pytest.mark.parametrize(
-    ("counts", "modulus", "said"),
-    [
-        ([2, 3, 7], 8, "half the range of a counter of 8.*row 2 .* is 7"),
-        ([0, 9], 8, "from 0 to 7, as of a counter of 8 .* row 1 .* is 9"),
-        ([-1, 7], 8, "from -4 to 3, as of a signed counter of 8 .* row 1 .* is 7"),
-        ([0, 0.5], 8, "whole numbers, but row 1"),
-        ([0, 1], 2**64, "from 2 to 2.53 readings"),
-        ([0, np.nan], 256, "finite, but row 1"),
-    ],
-)
-def test_readings_that_no_such_counter_shows_are_refused(
-    counts: list, modulus: int, said: str
-) -> None:
+REFUSED = {
+    r"row 2 \(the first is 0\) has 1.0 s after 1.0 s": lambda: increasing([0.0, 1.0, 1.0, 2.0]),
+    "time must be finite, but row 1": lambda: increasing([0.0, np.nan, 1.0]),
+    "two rows at least": lambda: increasing([0.0]),
+    "one row of numbers": lambda: increasing([[0.0, 1.0]]),
+    "half the range of a counter of 8.*row 2 .* is 7": lambda: unwrap_counts([2, 3, 7], 8),
+    "from 0 to 7, as of a counter of 8 .* row 1 .* is 9": lambda: unwrap_counts([0, 9], 8),
+    "from -4 to 3, as of a signed .* row 1 .* is 7": lambda: unwrap_counts([-1, 7], 8),
+    "whole numbers, but row 1": lambda: unwrap_counts([0, 0.5], 8),
+    "from 2 to 2.53 readings": lambda: unwrap_counts([0, 1], 2**64),
+    "finite, but row 1": lambda: unwrap_counts([0, np.nan], 256),
+}
+
+
+@pytest.mark.parametrize(("said", "use"), REFUSED.items(), ids=REFUSED)
+def test_stamps_and_readings_that_no_instrument_gives_are_refused(said: str, use) -> None:
     with pytest.raises(InputError, match=said):
-        unwrap_counts(counts, modulus)
+        use()
 
 
 @pytest.mark.parametrize(
     ("time", "counts", "lines"),
     [
         # changes at rows 2, 5, 7; the first row begins the first line; after row 7 it is held
-        (
-            range(10),
-            [5, 5, 6, 6, 6, 8, 8, 7, 7, 7],
-            [5, 5.5, 6, 6 + 2 / 3, 6 + 4 / 3, 8, 7.5, 7, 7, 7],
-        ),
+        (range(9), [5, 5, 6, 6, 6, 8, 8, 7, 7], [5, 5.5, 6, 20 / 3, 22 / 3, 8, 7.5, 7, 7]),
         ([0.0, 1.0, 3.0, 4.0, 10.0], [0, 0, 1, 1, 2], [0.0, 1 / 3, 1.0, 1 + 1 / 7, 2.0]),
     ],
 )
@@ -163,11 +144,11 @@ def position(
     time: np.ndarray, values: np.ndarray, encoder: Encoder | None = None, kind: str = "position"
 ) -> Channel:
     """A channel; of an encoder `values` are counts."""
-    angle = values if encoder is None else values * encoder.angle_per_count
-    counts, source = None if encoder is None else values, Source(Path("log.csv"), "x")
-    return Channel(
-        "x", kind, "rad", time, angle, np.ones(values.size), source, encoder=encoder, counts=counts
-    )
+    channel = run_of("x", time, {kind: values}, time=time)[kind]
+    if encoder is None:
+        return channel
+    angle = values * encoder.angle_per_count
+    return replace(channel, kind="encoder_counts", values=angle, encoder=encoder, counts=values)
 
 
 @pytest.mark.interpreted
@@ -198,7 +179,7 @@ def test_the_plain_difference_and_a_measured_speed() -> None:
 
 def test_counts_are_joined_before_they_are_filtered() -> None:
     counts = np.floor(0.3 * np.arange(400.0))
-    winch = position(np.arange(400) * H, counts, Encoder(2526.3, 1.0, -1, None), "encoder_counts")
+    winch = position(np.arange(400) * H, counts, Encoder(2526.3, 1.0, -1, None))
     found = speed_of(winch)
     # 0.3 counts a sample, backwards: neighbours alone would give 0 or a whole count
     expected = -0.3 * 2.0 * np.pi / 2526.3 / H

@@ -16,6 +16,16 @@ STEPS = tuple(
 """Two short tests, as options of 'rig'."""
 
 
+def stages(**free: str) -> str:
+    """A fit configuration: stages by their part, each with the parameters to estimate in words."""
+    text = ""
+    for part, names in free.items():
+        text += f'[[stages]]\nname = "{part}"\npart = "{part}"\n'
+        for name in names.split():
+            text += f"free.{name} = {{ relative = [0.5, 2.0], log = true }}\n"
+    return text
+
+
 @pytest.fixture(scope="session")
 def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The published hoist's virtual tests, in a folder that tests copy from."""

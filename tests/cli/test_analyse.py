@@ -24,15 +24,10 @@ def cells(text: str, row: str) -> list[str]:
 
 
 def test_the_envelope(done, number):
-    """The numbers of the model description."""
     text = done("limits", "hoist")
-    expected = {
-        "saturation voltage": (7.87, -7.41),
-        "speed limit": (196.0, -185.0),
-        "acceleration at rest": (136.8, -177.8),
-    }
-    for row, values in expected.items():
-        assert [number(text, row, k) for k in range(2)] == pytest.approx(values, abs=0.05)
+    assert [number(text, "speed limit", k) for k in range(2)] == pytest.approx(
+        [196, -185], abs=0.05
+    )
     assert number(text, "creep at 0 V") == pytest.approx(3.09, abs=0.005)
     assert "gain, mean" in done("limits", "hoist", "--set", "Z17=5")  # which does not move
 
@@ -122,7 +117,7 @@ def test_the_map_that_is_printed(done):
 # --- other models of a drive ----------------------------------------------------------------------
 
 
-def test_a_linear_model(done, number):
+def test_a_linear_model_and_its_notes(done, number):
     text = done("linearize", "hoist", "--at", "4")
     hoist = Drive.preset("hoist")
     slope = np.degrees(hoist.steady_speed(4.001) - hoist.steady_speed(3.999)) / 0.002
@@ -134,9 +129,6 @@ def test_a_linear_model(done, number):
     (line,) = [line for line in text.splitlines() if "±" in line]
     assert line.split() == ["rad/s", "-40.439", "±39.104", "8.953", "0.719"]
     assert number(text, "gain at 0.3 Hz") < number(text, "steady gain")
-
-
-def test_notes_of_a_linear_model(done):
     left_out = "Coulomb term C, which only motions below 0.01 A/s see, is left out"
     assert left_out in done("linearize", "slew", "--at", "2")
     text = done("linearize", "neutral", "--at", "0", "--set", "G1=0.03")

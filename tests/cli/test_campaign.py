@@ -6,6 +6,7 @@ from pathlib import Path
 
 import polars as pl
 import pytest
+from tests.cli.conftest import stages
 from typer.testing import Result
 
 from swashplate import Campaign, Drive
@@ -59,9 +60,7 @@ file = "log.csv"
 """
 
 
-def test_a_tacho_beside_the_drive_before_any_fit(
-    done: Words, refused: Words, tmp_path: Path
-) -> None:
+def test_a_tacho_beside_the_drive_before_any_fit(done, refused, tmp_path) -> None:
     rows = [f"{k / 100},{4 if k > 20 else 0},{98 if k > 40 else 0}" for k in range(300)]
     (tmp_path / "log.csv").write_text("\n".join(["time,u,n", *rows]) + "\n", "utf-8")
     look = ("campaign", "plot", "--run", "log", "--channel", "tacho", "--to", "2", "--force")
@@ -78,9 +77,7 @@ def test_a_tacho_beside_the_drive_before_any_fit(
     assert 'if the log is in V, write unit = "V": it then reaches 4 V' in said
 
 
-def test_what_a_draft_leaves_out_stands_before_the_command_to_run(
-    done: Words, tmp_path: Path
-) -> None:
+def test_what_a_draft_leaves_out_stands_before_the_command_to_run(done, tmp_path) -> None:
     rows = [f"{k},{row}" for k, row in enumerate(ROWS)]
     text = "\n".join(["Nr,time [s],voltage [V],current [A],Geber", *rows]) + "\n"
     (tmp_path / "log.csv").write_text(text, "utf-8")
@@ -122,21 +119,6 @@ def test_refinements_and_backlash_change_the_logs(done: Words, tmp_path: Path) -
 
 # --- what tests are worth -------------------------------------------------------------------------
 
-CARD = """
-[[stages]]
-name = "card"
-part = "card"
-free.J = { relative = [0.5, 2.0] }
-free.lim1_plus = { relative = [0.5, 2.0], log = true }
-"""
-PUMP = """
-[[stages]]
-name = "pump"
-part = "pump"
-free.{} = {{ relative = [0.5, 2.0], log = true }}
-free.{} = {{ relative = [0.5, 2.0], log = true }}
-"""
-
 
 def section(said: str, title: str) -> dict[str, str]:
     """Rows of a table by their first cell."""
@@ -147,7 +129,7 @@ def section(said: str, title: str) -> dict[str, str]:
 
 def test_small_positive_steps_want_large_and_negative_ones(done: Words, tmp_path: Path) -> None:
     done("rig", "hoist", "--out", "virtual", *steps(1, 2))
-    (tmp_path / "setup.toml").write_text(PUMP.format("Z13", "Z19"), "utf-8")
+    (tmp_path / "setup.toml").write_text(stages(pump="Z13 Z19"), "utf-8")
     words = ("virtual/campaign.toml", "--setup", "setup.toml", *steps(2, -2, 9, -9))
     said = done("advise", *words, "--tests", "2", "--out", "advice.csv")
     best = section(said, "For each parameter")
@@ -177,7 +159,7 @@ def test_a_fresh_plan_needs_a_drive_alone(done: Words, refused: Words) -> None:
 
 def test_what_positive_steps_determine(done: Words, tmp_path: Path) -> None:
     done("rig", "hoist", "--out", "virtual", "--severity", "clean", *steps(2, 9, 0.1))
-    (tmp_path / "setup.toml").write_text(CARD + PUMP.format("Z8", "Z13"), "utf-8")
+    (tmp_path / "setup.toml").write_text(stages(card="J lim1_plus", pump="Z8 Z13"), "utf-8")
     words = ("virtual/campaign.toml", "--setup")
     said = done("excitation", *words, "setup.toml", "--out", "runs.csv")
     assert said.startswith("! hoist_step_0.1_V: its command stays between 0 and 0.1 V")
@@ -194,5 +176,5 @@ def test_what_positive_steps_determine(done: Words, tmp_path: Path) -> None:
     assert set(table["stage"]) == {"card", "pump"}
     shares = table.select(pl.sum_horizontal(pl.col("^hoist_.*$"))).to_series()
     assert set(shares.round(9)) == {0.0, 1.0}
-    (tmp_path / "mine.toml").write_text(PUMP.format("Z8", "Z13_plus"), "utf-8")
+    (tmp_path / "mine.toml").write_text(stages(pump="Z8 Z13_plus"), "utf-8")
     assert "The fit configuration can stay as it is." in done("excitation", *words, "mine.toml")

@@ -7,13 +7,13 @@ import signal
 import subprocess
 import sys
 import time
+import tomllib
 from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from tests.cli.conftest import STEPS
+from tests.cli.conftest import STEPS, stages
 from tests.shown import check_shown
-from typer.testing import Result
 
 from swashplate import Campaign, Drive
 from swashplate.identification.assessment import Judged
@@ -22,19 +22,7 @@ from swashplate.identification.setup import Setup
 
 Words = Callable[..., str]
 CAMPAIGN = "virtual/campaign.toml"
-SETUP = """
-[[stages]]
-name = "card"
-part = "card"
-free.J = { relative = [0.5, 2.0] }
-free.omega_plus = { relative = [0.5, 2.0] }
-
-[[stages]]
-name = "pump"
-part = "pump"
-free.Z8 = { relative = [0.5, 2.0], log = true }
-free.Z16 = { relative = [0.5, 2.0], log = true }
-"""
+SETUP = stages(card="J omega_plus", pump="Z8 Z16")
 
 
 @pytest.fixture
@@ -52,9 +40,7 @@ def campaign(done: Words, tmp_path: Path) -> Path:
 # --- fit ------------------------------------------------------------------------------------------
 
 
-def test_a_campaign_becomes_a_drive(
-    done: Words, refused: Words, campaign: Path, tmp_path: Path
-) -> None:
+def test_a_campaign_becomes_a_drive(done, refused, campaign, tmp_path) -> None:
     words = ("fit", CAMPAIGN, "--setup", "setup.toml", "--out", "fitted")
     said = done(*words, "--timing")
     (times,) = re.findall(r"^Time: +(.*)$", said, re.MULTILINE)
@@ -147,9 +133,7 @@ def test_all_that_can_be_asked_for_besides(done: Words, campaign: Path, tmp_path
     assert "profile" in (tmp_path / "fitted" / "report.html").read_text("utf-8").lower()
 
 
-def test_a_result_that_is_of_no_use_ends_with_1(
-    run: Callable[..., Result], campaign: Path, tmp_path: Path
-) -> None:
+def test_a_result_that_is_of_no_use_ends_with_1(run, campaign, tmp_path) -> None:
     narrow = SETUP.replace("relative = [0.5, 2.0]", "relative = [0.99, 1.01]")
     (tmp_path / "narrow.toml").write_text(narrow, "utf-8")
     words = ("--setup", "narrow.toml", "--no-report", "--evaluations", "900")
@@ -189,9 +173,7 @@ def test_fits_that_are_refused(refused: Words, virtual: Path, tmp_path: Path) ->
 # --- validate -------------------------------------------------------------------------------------
 
 
-def test_a_drive_beside_the_runs_that_were_held_out(
-    done: Words, held_out: Path, tmp_path: Path
-) -> None:
+def test_a_drive_beside_the_runs_that_were_held_out(done, held_out, tmp_path) -> None:
     said = done("validate", "hoist", CAMPAIGN, "--out", "found")
     assert "hoist_step_-5_V" in said
     assert "hoist_step_4_V" not in said
@@ -212,9 +194,7 @@ def test_a_drive_beside_the_runs_that_were_held_out(
     assert "follow the input" not in said
 
 
-def test_a_drive_that_is_not_usable_ends_with_1(
-    run: Callable[..., Result], held_out: Path, tmp_path: Path
-) -> None:
+def test_a_drive_that_is_not_usable_ends_with_1(run, held_out, tmp_path) -> None:
     """A drive of too low a gain misses the more the larger the command."""
     Drive.preset("hoist").scale(Z10=0.4, J=0.4).to_toml(tmp_path / "wrong.toml")
     result = run("validate", "wrong.toml", CAMPAIGN)
@@ -238,15 +218,9 @@ def test_validations_that_are_refused(refused: Words, held_out: Path) -> None:
 @pytest.fixture
 def fitted(held_out: Path, tmp_path: Path) -> Fit:
     """A fit and what it keeps of itself, in the folder fitted."""
-    free = {"card": ("J_plus", (0.5, 2.0)), "pump": ("Z10", (0.8, 1.25))}
-    stages = [
-        {"name": part, "part": part, "free": {name: {"relative": bounds}}}
-        for part, (name, bounds) in free.items()
-    ]
     campaign = Campaign.from_toml(held_out)
-    runs = campaign.select(role="fit")
-    setup = Setup.model_validate({"stages": stages})
-    found = fit(Drive.preset("hoist").parameters, runs, setup)
+    setup = Setup.model_validate(tomllib.loads(stages(card="J_plus", pump="Z10")))
+    found = fit(Drive.preset("hoist").parameters, campaign.select(role="fit"), setup)
     (tmp_path / "fitted").mkdir()
     Drive(found.parameters).to_toml(tmp_path / "fitted" / "drive.toml")
     Judged(campaign, found, notes={"seed": "7"}).store(tmp_path / "fitted" / "fit.json")

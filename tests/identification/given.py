@@ -1,5 +1,6 @@
 """What is written down rather than measured or fitted: runs, linearised fits, noise, a set-up."""
 
+import re
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from types import SimpleNamespace
@@ -135,27 +136,20 @@ class Backwards(Serial):
         yield from reversed(list(super().run(function, shared, items)))
 
 
+def put(pattern: str, new: str, count: int = 0) -> Callable[[str], str]:
+    """A change of a file's text: what spoils it."""
+    return lambda text: re.sub(pattern, new, text, count=count)
+
+
+LATER = {"from": 1.0, "to": 1.2, "factor": 10.0}
+CARD = {"free": {"J": {"relative": (0.5, 2.0)}}, "weights": {"rectified_current": [LATER]}}
+KNOWN = {"relative": (0.8, 1.25), "log": True, "prior": {"mean": 12.8, "deviation": 0.05}}
 TWO_STAGES = Setup.model_validate(
     {
         "title": "two stages",
         "stages": [
-            {
-                "name": "card",
-                "part": "card",
-                "free": {"J": {"relative": (0.5, 2.0)}},
-                "weights": {"rectified_current": [{"from": 1.0, "to": 1.2, "factor": 10.0}]},
-            },
-            {
-                "name": "pump",
-                "part": "pump",
-                "free": {
-                    "Z10": {
-                        "relative": (0.8, 1.25),
-                        "log": True,
-                        "prior": {"mean": 12.8, "deviation": 0.05},
-                    }
-                },
-            },
+            {"name": "card", "part": "card", **CARD},
+            {"name": "pump", "part": "pump", "free": {"Z10": KNOWN}},
         ],
     }
 )

@@ -7,13 +7,11 @@ import numpy as np
 import pytest
 from tests.identification.given import run_of, virtual
 
-from swashplate import Campaign, Channel, Drive, Experiment, InputError, maneuvers
+from swashplate import Campaign, Drive, Experiment, InputError, maneuvers
 from swashplate.campaign import guess_drive
 from swashplate.identification.data_checks import (
     Finding,
-    Motion,
     check_runs,
-    contradictions,
     refuse_unsound,
 )
 from swashplate.identification.fitting import fit, smooth
@@ -62,22 +60,14 @@ def put(place: int, value: float):
     return lambda speed: np.where(np.arange(speed.size) == place, value, speed)
 
 
-def thinned() -> Experiment:
-    few = run("few", held(8.0))
-    weight = np.zeros(few.input.values.size)
-    weight[[600, 1200]] = 1.0
-    return replace(few, channels={"speed": replace(few["shaft_speed"], weight=weight)})
+def empty(speed: np.ndarray) -> np.ndarray:
+    return np.full_like(speed, np.nan)
 
 
-def shortened(of: str) -> Experiment:
-    one = run("one", held(8.0))
-    if of == "input":
-        return replace(
-            one, input=replace(one.input, time=one.input.time[:1], values=one.input.values[:1])
-        )
-    speed = one["shaft_speed"]
-    speed = replace(speed, time=speed.time[:1], values=speed.values[:1], weight=speed.weight[:1])
-    return replace(one, channels={"shaft_speed": speed})
+FEW = 1.0 * np.isin(np.arange(held(8.0).size), (600, 1200))
+"""A weight that leaves two samples."""
+SHORT = replace(GOOD[0].input, time=GOOD[0].input.time[:1], values=GOOD[0].input.values[:1])
+INFINITE = replace(GOOD[0].input, values=put(3, np.inf)(held(8.0)))
 
 
 REFUSED = {
@@ -87,7 +77,11 @@ REFUSED = {
         PUMP,
         "In all 3 runs 'shaft_speed' goes against the command",
     ),
-    "two samples": ((thinned(),), pump("Z8", "Z16"), "2 samples cannot determine 3 parameters"),
+    "two samples": (
+        (run("few", held(8.0), weight=FEW),),
+        pump("Z8", "Z16"),
+        "2 samples cannot determine 3 parameters",
+    ),
     "dead zone": (
         (run("timid", held(0.1)), run("shy", held(-0.05))),
         PUMP,
@@ -95,7 +89,7 @@ REFUSED = {
     ),
     "still": ((*GOOD, run("dead", held(8.0), np.zeros_like)), PUMP, "dead: .* never changes"),
     "no number": (
-        (*GOOD, run("empty", held(8.0), lambda speed: np.full_like(speed, np.nan))),
+        (*GOOD, run("empty", held(8.0), empty)),
         PUMP,
         "empty: 'shaft_speed' is not finite in 2,049 samples",
     ),
@@ -104,13 +98,13 @@ REFUSED = {
         PUMP,
         "in 1 sample, the first at 1 s",
     ),
-    "input": (
-        (*GOOD, replace(GOOD[0], input=replace(GOOD[0].input, values=put(3, np.inf)(held(8.0))))),
+    "input": ((*GOOD, replace(GOOD[0], input=INFINITE)), PUMP, "up: its input is not finite at"),
+    "input of one sample": ((replace(GOOD[0], input=SHORT),), PUMP, "up: its input has 1 sample"),
+    "one sample": (
+        (*GOOD, run("one", held(8.0), lambda speed: speed[:1])),
         PUMP,
-        "up: its input is not finite at sample 3",
+        "one: .* has 1 sample that can count",
     ),
-    "input of one sample": ((*GOOD, shortened("input")), PUMP, "one: its input has 1 sample"),
-    "one sample": ((*GOOD, shortened("speed")), PUMP, "one: .* has 1 sample that can count"),
     "nothing depends on it": (GOOD, pump("Z14", "Z15"), "no run depends on any of Z14, Z15"),
 }
 
@@ -120,10 +114,6 @@ def test_what_no_fit_could_mean_anything_for_is_refused(runs, setup: Setup, said
     with pytest.raises(InputError, match=said) as caught:
         fit(NOMINAL, runs, setup)
     assert "\n" not in str(caught.value)
-
-
-def empty(speed: np.ndarray) -> np.ndarray:
-    return np.full_like(speed, np.nan)
 
 
 WARNED = {
@@ -173,14 +163,3 @@ def test_a_position_that_freezes_while_the_drive_runs() -> None:
     first, last = (float(each) for each in said.partition("from ")[2].split()[:3:2])
     assert 1.2 <= first <= 1.4
     assert 2.4 <= last <= 2.6
-
-
-def test_the_odd_one_of_many_runs_is_found() -> None:
-    time, found = np.arange(0.0, 4.0, 0.02), []
-    for number in range(120):
-        command = float(number % 3 + 2) * (time > 1.0)
-        speed = command * (2.0 if number == 77 else 0.5)
-        channel: Channel = run_of("", command, {"shaft_speed": speed}, time=time)["shaft_speed"]
-        found.append(Motion(f"run {number}", channel, time, speed, 0.5 * command))
-    (odd,) = contradictions("speed", found)
-    assert odd.run == "run 77"

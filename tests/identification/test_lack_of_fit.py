@@ -29,30 +29,29 @@ TESTS = {
 Logs = Callable[[dict[str, np.ndarray]], None]
 
 
+NOMINAL = Drive.preset("slew")
+MISFIT = "lack of fit of counts"
+DRIFT = "drift of counts"
+
+
 def fitted(
     folder: Path,
-    drive: Drive | None = None,
-    logs: Logs | None = None,
+    drive: Drive = NOMINAL,
+    logs: Logs = lambda columns: None,
     each: tuple[float, ...] = (0.0,) * 5,
 ) -> tuple[list[StageFit], Verdict]:
     """A slew campaign of five tests, each with a machine that much faster, and its judgement."""
-    nominal = Drive.preset("slew")
     runs = {}
     for faster, (name, maneuver) in zip(each, TESTS.items(), strict=True):
-        truth = drive if drive is not None else nominal
-        if faster:
-            truth = truth.scale(Z10=1.0 + faster)
-        made = rig.run(nominal, {name: maneuver}, truth=truth, validate=[name] * (name == "middle"))
+        truth, held = drive.scale(Z10=1.0 + faster), [name] * (name == "middle")
+        made = rig.run(NOMINAL, {name: maneuver}, truth=truth, validate=held)
         columns = {key: values.copy() for key, values in made.runs[name].columns.items()}
-        if logs is not None:
-            logs(columns)
+        logs(columns)
         runs[name] = replace(made.runs[name], columns=columns)
-    path = rig.write(replace(made, runs=runs), folder / "virtual")
-    campaign = Campaign.from_toml(path)
-    result = fit(nominal.parameters, campaign.select(role="fit"), load_setup("slew"))
-    stages = list(result.stages)
+    campaign = Campaign.from_toml(rig.write(replace(made, runs=runs), folder / "virtual"))
+    result = fit(NOMINAL.parameters, campaign.select(role="fit"), load_setup("slew"))
     predicted = predict(result.parameters, campaign.select(role="validate"))
-    return stages, verdict(stages, predicted)
+    return [*result.stages], verdict(result.stages, predicted)
 
 
 @pytest.fixture(scope="module")
@@ -62,10 +61,6 @@ def sound(tmp_path_factory: pytest.TempPathFactory) -> tuple[list[StageFit], Ver
 
 def failed(found: Verdict) -> set[str]:
     return {each.name for each in found.criteria if each.failure}
-
-
-MISFIT = "lack of fit of counts"
-DRIFT = "drift of counts"
 
 
 def test_a_sound_campaign_passes_every_criterion(sound) -> None:
@@ -90,7 +85,7 @@ def test_the_units_of_the_estimates_are_found_by_computation(sound) -> None:
 @pytest.mark.slow
 def test_an_estimate_at_its_bound_is_a_unit_like_a_fixed_one(tmp_path: Path) -> None:
     # Z8 could make up for a sixth of the supply pressure, and may go down to a half
-    stages, found = fitted(tmp_path, Drive.preset("slew").scale(Z9=0.15))
+    stages, found = fitted(tmp_path, NOMINAL.scale(Z9=0.15))
     assert "Z8" in stages[-1].identifiability.at_bounds
     assert {"Z8", "Z9"} <= set(lack_of_fit(stages).units)
     assert found.grade == "Not usable"
@@ -107,9 +102,8 @@ def test_late_stamps_of_the_command_are_the_fixed_delay(sound) -> None:
 
 @pytest.mark.slow
 def test_a_longer_delay_than_the_fixed_one_is_named(tmp_path: Path) -> None:
-    nominal = Drive.preset("slew")
-    tau = nominal.parameters.numbers["tau"]
-    stages, found = fitted(tmp_path, nominal.replace(tau=tau + 0.02))
+    tau = NOMINAL.parameters.numbers["tau"]
+    stages, found = fitted(tmp_path, NOMINAL.replace(tau=tau + 0.02))
     assert found.grade == "Usable for prediction", found.headline
     assert {MISFIT, "time stamps of counts"} <= failed(found)
     causes = {each.name: each for each in lack_of_fit(stages).causes}
@@ -120,9 +114,8 @@ def test_a_longer_delay_than_the_fixed_one_is_named(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 def test_a_load_is_named(tmp_path: Path) -> None:
-    nominal = Drive.preset("slew")
-    lost = np.radians(0.08)
-    loaded = nominal.replace(load_torque=3e4, motor_leakage=float(lost) / 3e4)
+    lost = float(np.radians(0.08))
+    loaded = NOMINAL.replace(load_torque=3e4, motor_leakage=lost / 3e4)
     stages, found = fitted(tmp_path, loaded)
     assert MISFIT in failed(found)
     first = lack_of_fit(stages).causes[0]
@@ -213,8 +206,7 @@ def test_a_scale_that_is_off_is_named_with_the_fixed_value_that_looks_like_it(
         columns["current"] *= 1.05
 
     # 3 % more counts are a shaft that is 3 % faster
-    faster = Drive.preset("slew").scale(Z10=1.03)
-    change = {"drive": faster} if name == "counts" else {"logs": off}
+    change = {"drive": NOMINAL.scale(Z10=1.03)} if name == "counts" else {"logs": off}
     stages, found = fitted(tmp_path, **change)
     assert found.grade == "Usable for prediction", found.headline
     assert f"{said} by +" in found.headline

@@ -23,6 +23,14 @@ BUMP = np.exp(-((TIME - 2.0) ** 2) / 0.02)
 DESIGN = np.column_stack([LEVEL, np.sin(1.7 * TIME), BUMP])
 
 
+def linearised(
+    name: str, residual: np.ndarray, rows: np.ndarray, channel: str = "current", **more: object
+) -> LinearisedRun:
+    """A run from 0 s on."""
+    how = {"time": TIME[: residual.size], **more}
+    return LinearisedRun(name, channel, residual=residual, jacobian=rows, **how)
+
+
 def fitted(
     noise: np.ndarray, weight: np.ndarray | None = None, design: np.ndarray = DESIGN
 ) -> tuple[LinearisedFit, np.ndarray]:
@@ -35,9 +43,7 @@ def fitted(
         len(noise) * rows.T @ rows, sum(rows.T @ (w * each) for each in noise)
     )
     runs = [
-        LinearisedRun(
-            f"run {k}", "current", TIME[:count], w * (e + design @ estimate), rows, weight
-        )
+        linearised(f"run {k}", w * (e + design @ estimate), rows, weight=weight)
         for k, e in enumerate(noise)
     ]
     names = [f"p{k}" for k in range(design.shape[1])]
@@ -47,18 +53,15 @@ def fitted(
 # --- correlation over time ------------------------------------------------------------------------
 
 
-def colour(*residuals: np.ndarray, time: np.ndarray | None = None) -> NoiseColour:
-    runs = [
-        LinearisedRun(
-            f"run {k}",
-            "speed",
-            np.arange(each.size) / RATE if time is None else time,
-            each,
-            np.ones((each.size, 1)),
-        )
-        for k, each in enumerate(residuals)
-    ]
-    return noise_colours(linear_fit(runs, unknowns_of(["p"], [1.0])))[0]
+def level(*runs: LinearisedRun) -> LinearisedFit:
+    """A fit of a level."""
+    return linear_fit(runs, unknowns_of(["p"], [1.0]))
+
+
+def colour(residual: np.ndarray, time: np.ndarray | None = None) -> NoiseColour:
+    time = np.arange(residual.size) / RATE if time is None else time
+    run = linearised("a", residual, np.ones((residual.size, 1)), time=time)
+    return noise_colours(level(run))[0]
 
 
 def test_gaps_and_jitter_of_stamps_do_not_change_the_colour() -> None:
@@ -89,21 +92,13 @@ def test_drifts_and_next_to_no_residuals() -> None:
 
 
 def test_channels_and_steps_have_their_own_colours() -> None:
+    kinds = (("a", "speed", RATE), ("a", "current", RATE), ("b", "speed", 100.0))
     runs = [
-        LinearisedRun(name, channel, np.arange(100) / rate, TIME[:100], np.ones((100, 1)))
-        for name, channel, rate in (
-            ("a", "speed", RATE),
-            ("a", "current", RATE),
-            ("b", "speed", 100.0),
-            ("c", "speed", RATE),
-        )
+        linearised(name, TIME[:100], np.ones((100, 1)), channel, time=np.arange(100) / rate)
+        for name, channel, rate in (*kinds, ("c", "speed", RATE))
     ]
-    found = noise_colours(linear_fit(runs, unknowns_of(["p"], [1.0])))
-    assert [(each.channel, each.members) for each in found] == [
-        ("speed", (0, 3)),
-        ("current", (1,)),
-        ("speed", (2,)),
-    ]
+    found = [(each.channel, each.members) for each in noise_colours(level(*runs))]
+    assert found == [("speed", (0, 3)), ("current", (1,)), ("speed", (2,))]
 
 
 # --- spectral lines -------------------------------------------------------------------------------
@@ -146,7 +141,7 @@ def test_slow_model_errors_white_noise_and_short_runs_have_no_lines() -> None:
     white = [without_lines(fitted(rng.normal(size=(RUNS, N)))[0])[1] for _ in range(20)]
     # one campaign in a hundred may have one by chance
     assert sum(len(each) for each in white) <= 1
-    short = LinearisedRun("short", "current", TIME[:100], np.ones(100), DESIGN[:100])
+    short = linearised("short", np.ones(100), DESIGN[:100])
     assert without_lines(linear_fit([short], unknowns_of("abc", np.ones(3))))[1] == ()
 
 
@@ -154,8 +149,7 @@ def test_slow_model_errors_white_noise_and_short_runs_have_no_lines() -> None:
 def test_a_line_at_half_the_rate(size):
     # spectra of an even number of frequencies and, at 546 samples, of an odd one
     turning = (-1.0) ** np.arange(size) + 0.1 * np.random.default_rng(1).normal(size=size)
-    run = LinearisedRun("a", "current", TIME[:size], turning, np.ones((size, 1)), None)
-    _, lines = without_lines(linear_fit([run], unknowns_of("a", [1.0])))
+    _, lines = without_lines(level(linearised("a", turning, np.ones((size, 1)))))
     assert lines[0].frequency == pytest.approx(RATE / 2.0, rel=0.005)
     assert lines[0].share > 0.9
 

@@ -1,14 +1,12 @@
 """A fit on disk is the fit, and is refused where it no longer belongs to its campaign."""
 
 import json
-import re
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
-from tests.identification.given import TWO_STAGES
+from tests.identification.given import TWO_STAGES, put
 
 from swashplate import Campaign, Drive, FileError, InputError, ParameterError
 from swashplate.identification.assessment import Judged, fingerprint, load_fit
@@ -45,6 +43,9 @@ def path(campaign: Campaign, fitted: Fit, tmp_path: Path) -> Path:
 
 def test_a_fit_comes_back_as_it_was(path: Path, campaign: Campaign, fitted: Fit) -> None:
     stored = load_fit(path, campaign)
+    # others read it, too: it is JSON without numbers of its own
+    content = json.loads(path.read_text("utf-8"), parse_constant=lambda word: pytest.fail(word))
+    assert content["stages"][0]["starts"][1]["cost"] == "Infinity"
     assert stored.result.runs == campaign.experiments
     assert stored.result.setup == fitted.setup
     assert stored.result.nominal == fitted.nominal
@@ -55,28 +56,21 @@ def test_a_fit_comes_back_as_it_was(path: Path, campaign: Campaign, fitted: Fit)
             assert (one.number, one.cost) == (other.number, other.cost)
             np.testing.assert_array_equal(one.vector, other.vector)
         assert ours.values == theirs.values
-        assert ours.problem.cost(ours.solution.vector) == theirs.problem.cost(
-            theirs.solution.vector
-        )
-        assert replace(ours.solution, vector=np.zeros(0)).__dict__.keys() == (
-            theirs.solution.__dict__.keys()
-        )
-        for name, value in theirs.solution.__dict__.items():
+        costs = [each.problem.cost(each.solution.vector) for each in (ours, theirs)]
+        assert costs[0] == costs[1]
+        for name, value in vars(theirs.solution).items():
             assert np.array_equal(getattr(ours.solution, name), value), name
 
 
-def test_profiles_folds_and_notes_come_back(
-    tmp_path: Path, campaign: Campaign, fitted: Fit
-) -> None:
+def test_profiles_folds_and_notes_come_back(tmp_path, campaign, fitted) -> None:
     points = tuple(Point(x, 3.0 + x * x, np.array([x, 0.5])) for x in (-0.1, 0.0, 0.1))
-    profile = Profile(0, 3.0, points, 1.0, -0.1, None, ("crossed", "bound"), points[0], "J", "card")
+    name, ends = fitted.stage("card").problem.unknowns.names[0], ("crossed", "bound")
+    profile = Profile(0, 3.0, points, 1.0, -0.1, None, ends, points[0], name, "card")
     held = {"current": Measures(10, 0.1, 0.5)}
     fold = Fold(0, ("a",), ("J",), held, True)
     folds = CrossValidation(3, 2, (fold,), held, {"current": "A"})
     path = tmp_path / "fit.json"
-    profile = replace(profile, name=fitted.stage("card").problem.unknowns.names[0])
-    kept = [profile]
-    Judged(campaign, fitted, profiles=kept, folds=folds, notes={"seed": "3"}).store(path)
+    Judged(campaign, fitted, profiles=[profile], folds=folds, notes={"seed": "3"}).store(path)
     stored = load_fit(path, campaign)
     assert stored.folds == folds
     assert stored.notes == {"seed": "3"}
@@ -102,57 +96,33 @@ def test_profiles_folds_and_notes_come_back(
         load_fit(path, campaign)
 
 
-def test_the_file_is_json_that_others_read(path: Path) -> None:
-    content = json.loads(path.read_text("utf-8"), parse_constant=lambda word: pytest.fail(word))
-    assert content["stages"][0]["starts"][1]["cost"] == "Infinity"
-
-
 def test_another_campaign_is_refused(path: Path, campaign: Campaign) -> None:
     first, second = campaign.experiments
     alone = replace(campaign, experiments=(first,))
     with pytest.raises(InputError, match="was fitted to the run '.*', which .* has not"):
         load_fit(path, alone)
-    channel = second["current"]
-    weight = channel.weight.copy()
-    weight[:10] = 0.0
-    ignored = replace(
-        second, channels={**second.channels, "current": replace(channel, weight=weight)}
-    )
+    current = second["current"]
+    current = replace(current, weight=current.weight * (current.time > 0.1))
+    ignored = replace(second, channels={**second.channels, "current": current})
     assert fingerprint(ignored) != fingerprint(second)
     changed = replace(campaign, experiments=(first, ignored))
     with pytest.raises(InputError, match="is not as it was when .* was fitted"):
         load_fit(path, changed)
 
 
-def test_there_is_no_such_file(campaign: Campaign, tmp_path: Path) -> None:
-    with pytest.raises(FileError, match="There is no file"):
-        load_fit(tmp_path / "none.json", campaign)
-
-
-def put(pattern: str, new: str, count: int = 0) -> Callable[[str], str]:
-    return lambda text: re.sub(pattern, new, text, count=count)
-
-
 POISON = {
     "cut": (lambda text: text[:-100], "is not JSON"),
-    "nested": (lambda text: "[" * 100_000, "not JSON: recursion limit"),
     "another key": (put('"axis"', '"ax"'), "an entry 'axis'"),
     "other parameters": (put('"Z10"', '"Z9"', 1), "stage pump has other parameters .* fit again"),
     "other version": (put('"swashplate": "[^"]*"', '"swashplate": "9.9"'), "9.9"),
-    "many digits": (put('"cost": [0-9.e+-]+', '"cost": 1' + 5000 * "0"), "number out of range"),
     "text for a vector": (put(r'"vector": \[[^]]+\]', '"vector": "abc"'), "finite numbers"),
-    "wrong length": (
-        put(r'"vector": \[[^]]+\]', '"vector": [1.0]', 1),
-        "stage card has other parameters",
-    ),
+    "wrong length": (put(r'"vector": \[[^]]+\]', '"vector": [1.0]', 1), "stage card has other"),
     "a number for the drive": (put('"nominal": ', '"nominal": 3, "was": '), "nominal"),
 }
 
 
 @pytest.mark.parametrize(("poison", "sentence"), POISON.values(), ids=POISON)
-def test_a_poisoned_file_ends_in_a_sentence(
-    path: Path, campaign: Campaign, poison, sentence: str
-) -> None:
+def test_a_poisoned_file_ends_in_a_sentence(path, campaign, poison, sentence) -> None:
     path.write_text(poison(path.read_text("utf-8")), "utf-8")
     with pytest.raises((FileError, ParameterError), match=f"fit.json.*{sentence}") as caught:
         load_fit(path, campaign)

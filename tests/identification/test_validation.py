@@ -82,9 +82,10 @@ def test_white_noise_passes() -> None:
     assert np.mean(np.abs(found.correlation) < found.band) > 0.9
 
 
-def test_a_missed_delay_is_found_where_it_is() -> None:
+@pytest.mark.parametrize("kept", [TIME >= 0.0, (TIME < 2.0) | (TIME > 3.0)], ids=["all", "a gap"])
+def test_a_missed_delay_is_found_where_it_is(kept: np.ndarray) -> None:
     late = np.interp(TIME - 0.1, TIME, COMMAND)
-    found = residual_test(TIME, 0.5 * late + 0.2 * WHITE, COMMAND)
+    found = residual_test(TIME[kept], (0.5 * late + 0.2 * WHITE)[kept], COMMAND[kept])
     assert found.peak[0] == pytest.approx(0.1, abs=0.01)
     assert found.follows
     assert "+0.1 s after it" in found.verdict
@@ -96,23 +97,6 @@ def test_unrelated_slow_signals_are_rarely_called_related() -> None:
     found = [residual_test(TIME, *pair) for pair in pairs]
     assert sum(each.follows for each in found) <= 9  # 5 % of 60 is 3, and its deviation 1.7
     assert sum(abs(each.peak[1]) > 1.96 / np.sqrt(N) for each in found) >= 57
-
-
-def test_lags_across_a_gap_are_true() -> None:
-    kept = np.ones(N, bool)
-    kept[1000:1500] = False
-    late = np.interp(TIME - 0.1, TIME, COMMAND)
-    found = residual_test(TIME[kept], (late + 0.1 * WHITE)[kept], COMMAND[kept])
-    assert found.peak[0] == pytest.approx(0.1, abs=0.01)
-
-
-def test_cross_correlation_by_hand() -> None:
-    residual = np.array([0.0, 0, 0, 3, 0, 0, 0, -3, 0, 0, 0, 0])
-    command = np.array([0.0, 1, 0, 0, 0, -1, 0, 0, 0, 0, 0, 0])
-    found = residual_test(np.arange(12.0), residual, command, longest=3.0)
-    # the residual is the command two samples later: 6/(√18 √2) = 1
-    assert dict(zip(found.lags, found.correlation, strict=True))[2.0] == pytest.approx(1.0)
-    assert found.lags.tolist() == [-3, -2, -1, 0, 1, 2, 3]
 
 
 @pytest.mark.parametrize(

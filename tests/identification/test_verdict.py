@@ -32,12 +32,16 @@ def criterion(found: Verdict, name: str) -> Criterion:
     return next(each for each in found.criteria if each.name == name)
 
 
-def test_a_good_prediction_has_its_numbers() -> None:
-    found = verdict((), [quality(WAVE + 0.24 * SWAP)])
+def test_a_good_prediction_has_its_numbers_and_what_is_required_decides() -> None:
+    runs = [quality(WAVE + 0.24 * SWAP)]
+    found = verdict((), runs)
     # 0.24 of a range of 20
     assert found.headline == "Predicts y to 1.2 % of its range over 1 run."
     assert found.usable
     assert not found.sentences
+    strict = verdict((), runs, required=0.01)
+    assert strict.headline == "Not usable: predicts y to 1.2 % of its range only."
+    assert criterion(strict, "error / range, runs predicted").limit == "1 %"
 
 
 def test_the_range_is_that_of_all_runs() -> None:
@@ -107,33 +111,27 @@ def held_out(error: np.ndarray) -> RunQuality:
     return compared(bench_run("held", 1.5, truth + 0.02 * SWAP), "y", truth + error)
 
 
-def test_a_fit_that_carries_over_is_usable() -> None:
-    found = verdict([stage()], [held_out(0.0 * TIME)])
+GOOD = held_out(0.0 * TIME)
+
+
+def test_a_fit_that_carries_over_is_usable_and_one_without_runs_held_out_says_so() -> None:
+    fitted = stage()
+    found = verdict([fitted], [GOOD])
     assert found.usable, found.headline
     # 0.02 of what 1.5 · 2 · (1 - exp(-5)) with the noise comes to
     assert found.headline == "Usable: predicts held-out y to 0.66 % of its range."
     assert not any("larger errors" in each for each in found.sentences)
+    found = verdict([fitted], [])
+    assert found.usable
+    assert found.headline.endswith("no run was held out.")
+    assert "no run was held out" in found.not_judged[0]
 
 
 def test_a_current_that_was_not_fitted_is_not_judged() -> None:
     run = run_of("held", WAVE, {"rectified_current": WAVE}, time=TIME)
     current = compared(run, "rectified_current", 0.0 * WAVE)
-    held = held_out(0.0 * TIME)
-    assert verdict([stage()], [held, current]).headline == verdict([stage()], [held]).headline
+    assert verdict([stage()], [GOOD, current]).headline == verdict([stage()], [GOOD]).headline
     assert "rectified_current" in verdict((), [current]).headline
-
-
-def test_what_is_required_decides() -> None:
-    found = verdict((), [quality(WAVE + 0.24 * SWAP)], required=0.01)
-    assert found.headline == "Not usable: predicts y to 1.2 % of its range only."
-    assert criterion(found, "error / range, runs predicted").limit == "1 %"
-
-
-def test_a_fit_without_runs_held_out_says_so() -> None:
-    found = verdict([stage()], [])
-    assert found.usable
-    assert found.headline.endswith("no run was held out.")
-    assert "no run was held out" in found.not_judged[0]
 
 
 def test_a_fit_that_does_not_carry_over_is_not_usable() -> None:
@@ -159,24 +157,19 @@ def test_wide_intervals_ask_for_attention() -> None:
 
 
 def test_most_unknowns_at_bounds_is_hopeless() -> None:
-    fitted = stage(bounds=(0.1, 1.5), lags=(1.2, 5.0))
-    held = held_out(0.0 * TIME)
-    found = verdict([fitted], [held])
+    found = verdict([stage(bounds=(0.1, 1.5), lags=(1.2, 5.0))], [GOOD])
     assert not found.usable
     assert "2 of 2 parameters are at a bound or not determined" in found.headline
 
 
 def test_an_interrupted_fit_is_not_usable() -> None:
     whole = stage()
-    cut = replace(whole, solution=replace(whole.solution, interrupted=True, converged=False))
-    held = held_out(0.0 * TIME)
-    found = verdict([cut], [held], planned=["rise", "brake"])
+    cut = replace(whole.solution, interrupted=True, converged=False)
+    found = verdict([replace(whole, solution=cut)], [GOOD], planned=["rise", "brake"])
     assert not found.usable
     assert "stage rise was interrupted" in found.headline
     assert "brake was never fitted" in found.headline
-    unfinished = replace(
-        whole, solution=replace(whole.solution, converged=False, message="too many evaluations")
-    )
-    found = verdict([unfinished], [held])
+    unfinished = replace(whole.solution, converged=False, message="too many evaluations")
+    found = verdict([replace(whole, solution=unfinished)], [GOOD])
     assert not found.usable
     assert "did not converge (too many evaluations)" in found.headline

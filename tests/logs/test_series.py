@@ -4,6 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import scipy.io
 
 from swashplate import FileError, InputError
 from swashplate.logs import (
@@ -12,7 +13,6 @@ from swashplate.logs import (
     TextOptions,
     check_stamps,
     read_series,
-    unit_of,
 )
 
 
@@ -49,7 +49,7 @@ COLUMNS = [
         ("slow/count", "slow/count"),
     ],
 )
-def test_find(wanted, name):
+def test_a_column_is_found_by_its_name(wanted, name):
     log = log_of(*COLUMNS)
     assert log.find(wanted).name == name
     assert log.read([wanted])[wanted].tolist() == [COLUMNS.index(log.find(wanted))] * 3
@@ -64,30 +64,14 @@ def test_find(wanted, name):
         ("u", "no column 'u'"),
     ],
 )
-def test_find_nothing_or_too_much(wanted, said):
+def test_no_column_or_several_are_refused(wanted, said):
     with pytest.raises(InputError, match=said):
         log_of(*COLUMNS).find(wanted)
 
 
-@pytest.mark.parametrize(
-    ("column", "wanted", "si", "unit"),
-    [
-        (Column("time [ms]", "ms"), "time", "s", "ms"),
-        (Column("n", "-"), "n", "1", "1"),
-        (Column("time_ms"), "time", "s", "ms"),
-        (Column("time_ms"), "time_ms", "s", "ms"),
-        (Column("time_start"), "time_start", "s", "s"),
-        (Column("voltage_A"), "voltage_A", "V", "V"),  # phase A: amperes measure no voltage
-        (Column("time"), "time", "s", "s"),
-    ],
-)
-def test_units(column, wanted, si, unit):
-    assert unit_of(column, wanted, si) == unit
-
-
-def written(path: Path, text: str) -> Path:
-    path.write_text(text, "utf-8")
-    return path
+def written(folder: Path, text: str) -> Path:
+    (folder / "log.csv").write_text(text, "utf-8")
+    return folder / "log.csv"
 
 
 @pytest.mark.parametrize(
@@ -104,6 +88,11 @@ def written(path: Path, text: str) -> Path:
             )
         ),
         ("time,oil [degC]\n0,0\n1,20.5\n", "oil", "K", {}, [0.0, 1.0], [273.15, 293.65]),
+        ("time,n [-]\n0,1\n1,2\n", "n", "1", {}, [0, 1], [1, 2]),
+        ("time_ms,u\n0,1\n1,2\n", "u", "V", {"time_column": "time_ms"}, [0, 1e-3], [1, 2]),
+        ("time_start,u\n0,1\n1,2\n", "u", "V", {"time_column": "time_start"}, [0, 1], [1, 2]),
+        # phase A: amperes measure no voltage
+        ("time,voltage_A\n0,1\n1,2\n", "voltage_A", "V", {}, [0, 1], [1, 2]),
         ("t,u [mV]\n0,1500\n1,1\n", "u [mV]", "V", {"time_column": "t"}, [0, 1], [1.5, 0.001]),
         (
             "t;u\n0;1,500\n1;2,500\n",
@@ -116,7 +105,7 @@ def written(path: Path, text: str) -> Path:
     ],
 )
 def test_series_are_si(tmp_path, text, column, unit, options, time, values):
-    series = read_series(written(tmp_path / "log.csv", text), column, unit, **options)
+    series = read_series(written(tmp_path, text), column, unit, **options)
     np.testing.assert_allclose(series.time, time, rtol=1e-14)
     np.testing.assert_allclose(series.values, values, rtol=1e-14)
 
@@ -128,11 +117,14 @@ def test_series_are_si(tmp_path, text, column, unit, options, time, values):
         ("t,voltage\n0,1\n", InputError, "no column 'time'"),
         ("time,voltage [m]\n0,1\n", InputError, "'m', which does not measure the same as V"),
         ("time,voltage\n0,1\n1e-320,1\n", FileError, "its 2 rows last 1e-320 s by column 'time'"),
+        (None, FileError, "'time' has 5 rows and 'voltage' has 4; they must have as many"),
     ],
 )
 def test_bad_files_are_refused_in_a_sentence(tmp_path, text, error, sentence):
+    path = tmp_path / "log.mat"
+    scipy.io.savemat(path, {"time": np.arange(5.0), "voltage": np.arange(4.0)})
     with pytest.raises(error, match=sentence) as caught:
-        read_series(written(tmp_path / "log.csv", text), "voltage", "V")
+        read_series(written(tmp_path, text) if text else path, "voltage", "V")
     assert "\n" not in str(caught.value)
 
 
@@ -154,13 +146,3 @@ NAN = float("nan")
 def test_stamps(numbers, said):
     with pytest.raises(FileError, match=f"log.xyz: column .*{said}"):
         check_stamps(log_of(), "time", np.array(numbers))
-
-
-def test_columns_of_unequal_length(tmp_path):
-    import scipy.io
-
-    scipy.io.savemat(tmp_path / "log.mat", {"time": np.arange(5.0), "voltage": np.arange(4.0)})
-    with pytest.raises(
-        FileError, match="'time' has 5 rows and 'voltage' has 4; they must have as many"
-    ):
-        read_series(tmp_path / "log.mat", "voltage", "V")

@@ -85,9 +85,7 @@ def test_the_heading_says_what_run_it_is() -> None:
     assert "a gap of 2.52 s" in second
 
 
-def test_marks_say_what_is_left_out_weighted_clipped_or_missing(
-    assert_legible: Callable[[Figure], None],
-) -> None:
+def test_marks_say_what_is_left_out_weighted_clipped_or_missing(assert_legible) -> None:
     weight = np.ones(TIME.size)
     weight[100:200], weight[300:320] = 0.0, 10.0
     late = np.r_[TIME[:400], TIME[400:] + 1.0]

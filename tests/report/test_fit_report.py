@@ -1,5 +1,8 @@
 """The report of a fit: what stands in it is what was found, and it needs nothing but itself."""
 
+from __future__ import annotations
+
+import html
 import json
 import re
 import zlib
@@ -11,18 +14,24 @@ from pathlib import Path
 import numpy as np
 import polars as pl
 import pytest
+from tests.identification.given import virtual
 
 from swashplate import Campaign, Drive, FileError, InputError, maneuvers
-from swashplate.campaign import rig
 from swashplate.identification.assessment import Judged
 from swashplate.identification.fitting import Fit, fit
 from swashplate.identification.profile import Point, Profile
 from swashplate.identification.resampling import CrossValidation, Fold
 from swashplate.identification.setup import Setup
 from swashplate.identification.solving import Solution
-from swashplate.identification.validation import Measures, predict
+from swashplate.identification.validation import Measures, predict, with_speeds
 from swashplate.identification.verdict import verdict
-from swashplate.report.fit_report import print_report, write_fit_report, write_validation_report
+from swashplate.maneuvers import parse
+from swashplate.report.fit_report import (
+    print_report,
+    write_fit_report,
+    write_live_page,
+    write_validation_report,
+)
 from swashplate.report.fit_report.runs import (
     packed,
     run_data,
@@ -49,28 +58,22 @@ SETUP = Setup.model_validate({"title": "two stages", "stages": STAGES})
 
 @pytest.fixture(scope="module")
 def campaign(tmp_path_factory: pytest.TempPathFactory) -> Campaign:
-    """Three virtual runs of the hoist, the last held out, a window of the first ignored."""
-    folder = tmp_path_factory.mktemp("campaign") / "tests"
+    """Three virtual runs of the hoist, the last held out."""
     commands = [maneuvers.step(4.0), maneuvers.ramp(1.0), maneuvers.step(-6.5)]
     truth = Drive.preset("hoist").replace(omega=(75.0, 80.0), G1=(0.051, 0.056))
-    rig.write(rig.run("hoist", commands, seed=4, truth=truth), folder)
-    before, _, after = (folder / "campaign.toml").read_text("utf-8").rpartition('role = "fit"')
-    (folder / "campaign.toml").write_text(f'{before}role = "validate"{after}', "utf-8")
-    return Campaign.from_toml(folder / "campaign.toml")
+    what = {"seed": 4, "truth": truth, "validate": ["step -6.5 V"]}
+    return virtual(tmp_path_factory.mktemp("campaign"), "hoist", commands, **what)
 
 
 @pytest.fixture(scope="module")
 def fitted(campaign: Campaign) -> Fit:
-    runs = campaign.select(role="fit")
-    first = runs[0]
-    channel = first["current"]
-    weight = np.where(channel.time < 0.5, 0.0, channel.weight)
-    first = replace(
-        first,
-        channels={**first.channels, "current": replace(channel, weight=weight)},
-        ignored=((0.0, 0.5, "the dither starts"),),
-    )
-    return fit(campaign.drive("hoist").parameters, [first, *runs[1:]], SETUP, threads=1)
+    """A fit to the runs, a window of the first ignored."""
+    first, *others = campaign.select(role="fit")
+    current = first["current"]
+    current = replace(current, weight=np.where(current.time < 0.5, 0.0, current.weight))
+    channels, ignored = {**first.channels, "current": current}, (0.0, 0.5, "the dither starts")
+    first = replace(first, channels=channels, ignored=(ignored,))
+    return fit(campaign.drive("hoist").parameters, [first, *others], SETUP, threads=1)
 
 
 @pytest.fixture(scope="module")
@@ -219,9 +222,7 @@ def test_rmse_and_fit_of_a_run_are_recomputed(read: Page, fitted: Fit) -> None:
     assert number(row["RMSE"]) == pytest.approx(1e3 * rmse, rel=6e-3)
 
 
-def test_initial_state_and_ignored_windows_stand_beside_every_fit_percent(
-    read: Page, page: Path
-) -> None:
+def test_initial_state_and_ignored_windows_stand_beside_every_fit_percent(read, page) -> None:
     rows = read.rows("agreement")
     assert all(row["start"] == "rest" for row in rows)
     assert any("the dither starts" in row["ignored"] for row in rows)
@@ -330,12 +331,12 @@ def test_truth_stands_beside_the_estimates(write, judged: Judged, read: Page) ->
     truth = Drive.preset("hoist").replace(omega=(75.0, 80.0), G1=(0.051, 0.056)).parameters
     page = write(truth=truth)
     assert "truth" not in read.rows("parameters")[0]
-    row = next(row for row in page.rows("parameters") if row["name"] == "G1_plus")
-    assert number(row["truth"]) == pytest.approx(0.051, rel=1e-4)
-    estimate = next(
-        each for each in judged.result.stages[0].uncertainty.estimates if each.name == "G1_plus"
-    )
-    assert row["holds"] == ("yes" if estimate.lower <= 0.051 <= estimate.upper else "no")
+    rows = {row["name"]: row for row in page.rows("parameters")}
+    assert number(rows["G1_plus"]["truth"]) == pytest.approx(0.051, rel=1e-4)
+    estimates = judged.result.stages[0].uncertainty.estimates
+    (estimate,) = [each for each in estimates if each.name == "G1_plus"]
+    holds = estimate.lower <= 0.051 <= estimate.upper
+    assert rows["G1_plus"]["holds"] == ("yes" if holds else "no")
     fixed = {row["name"]: row for row in page.rows("held")}
     assert number(fixed["Z4"]["truth"]) == pytest.approx(truth.numbers["Z4"], rel=1e-4)
 
@@ -404,11 +405,8 @@ def test_starts_of_each_stage_are_listed(write, fitted: Fit) -> None:
     page = write(result=replace(fitted, stages=(replace(first, starts=STARTS), second)))
     assert "card: 2 of 4 starts reached the best cost, 3." in page.words
     assert "1 left the model's domain" in page.words
-    assert [row[:2] for row in page.tables["starts"][1:]] == [
-        ["0", "1"],
-        ["1", "1"],
-        ["2", "23.33333"],
-    ]
+    listed = [row[:2] for row in page.tables["starts"][1:]]
+    assert listed == [["0", "1"], ["1", "1"], ["2", "23.33333"]]
 
 
 @pytest.fixture(scope="module")
@@ -433,9 +431,7 @@ def test_a_validation_has_no_fit(validated: Path, campaign: Campaign, fitted: Fi
     assert verdict((), predicted).headline in page.words.replace("\N{NO-BREAK SPACE}", " ")
 
 
-def test_a_page_that_cannot_be_written_leaves_the_old_one(
-    tmp_path: Path, write, judged: Judged
-) -> None:
+def test_a_page_that_cannot_be_written_leaves_the_old_one(tmp_path, write, judged) -> None:
     with pytest.raises(FileError, match="cannot be written"):
         write_fit_report(judged, tmp_path / "none" / "fit.html")
     (tmp_path / "fit.html").write_text("old")
@@ -487,3 +483,125 @@ def test_a_report_is_printed(page: Path, tmp_path: Path, browsed) -> None:
     assert len(re.findall(rb"/Type /Page\b", content)) >= 5
     with pytest.raises(FileError, match=r"ends in '.txt'; a printed report is written as \.pdf"):
         print_report(page, tmp_path / "fit.txt")
+
+
+# --- the live page --------------------------------------------------------------------------------
+
+
+ACTS = """<script>
+const act = (words, value) => {
+  const range = document.querySelector(`input[type=range][aria-label="${words}"]`);
+  range.value = value;
+  range.dispatchEvent(new Event("input"));
+};
+const wait = setInterval(() => {
+  if (document.body.dataset.ready !== "yes") return;
+  clearInterval(wait);
+  const acting = [...live.latest.limits];
+  const { limits } = JSON.parse(document.getElementById("live").textContent);
+  const made = { first: [...live.latest.signals.shaft_speed], before: live.latest.errors };
+  made.channels = live.figure.showing.shown.map((each) => each.name);
+  const acts = (bit) => acting.map((each) => (each & bit ? 1 : 0));
+  made.limits = Object.fromEntries(limits.map(([bit, name]) => [name, acts(bit)]));
+  act("LEVER"[0].toUpperCase() + "LEVER".slice(1), 0.75);
+  made.factor = live.factors.get("LEVER");
+  made.moved = [...live.latest.signals.shaft_speed];
+  made.errors = live.latest.errors;
+  made.toml = document.getElementById("toml").textContent;
+  document.body.dispatchEvent(new KeyboardEvent("keydown", { key: "r", bubbles: true }));
+  made.reset = [...live.latest.signals.shaft_speed];
+  made.milliseconds = document.body.dataset.milliseconds;
+  const textContent = JSON.stringify(made);
+  document.body.append(Object.assign(document.createElement("pre"), { id: "made", textContent }));
+}, 5);
+</script></body>"""
+
+
+def acted(page: Path, tmp_path: Path, browsed, lever: str = "orifice") -> dict:
+    """What a browser makes of a page of which one lever's slider is moved, and then reset."""
+    tried = tmp_path / "tried.html"
+    tried.write_text(
+        page.read_text("utf-8").replace("</body>", ACTS.replace("LEVER", lever)), "utf-8"
+    )
+    found = re.search(r'<pre id="made">(.*?)</pre>', browsed(tried, ""), re.DOTALL)
+    assert found is not None
+    return json.loads(html.unescape(found[1]))
+
+
+def test_a_slider_gives_what_python_gives(tmp_path: Path, browsed) -> None:
+    drive, command = Drive.preset("hoist"), parse("step:9")
+    page = tmp_path / "live.html"
+    write_live_page(drive, page, command=command)
+    made = acted(page, tmp_path, browsed)
+    # the page's voltages have four bytes each
+    voltage = command.sample(512.0).astype(np.float32).astype(float)
+    run = drive.simulate(voltage, 512.0)
+    largest = np.abs(run.shaft_speed).max()
+    np.testing.assert_allclose(made["first"], run.shaft_speed, rtol=0.0, atol=1e-12 * largest)
+    for name, acts in made["limits"].items():
+        assert acts == run.active(name.replace("-", "_")).astype(int).tolist(), name
+    assert sum(made["limits"]["orifice"]) > 10
+    moved = drive.scale(Z16=made["factor"]).simulate(voltage, 512.0).shaft_speed
+    assert np.abs(moved - run.shaft_speed).max() > 0.01 * largest
+    np.testing.assert_allclose(made["moved"], moved, rtol=0.0, atol=1e-12 * largest)
+    assert made["reset"] == made["first"]
+    changed = drive.scale(Z16=made["factor"]).parameters["Z16"].values
+    line = re.fullmatch(
+        r'\[pump_motor\]\nZ16 = \{ value = \[(\S+), (\S+)\], unit = "m", status = "user" \}',
+        made["toml"],
+    )
+    assert line is not None, made["toml"]
+    np.testing.assert_allclose([float(line[1]), float(line[2])], changed, rtol=1e-15)
+
+
+@pytest.fixture(scope="module")
+def tests(tmp_path_factory: pytest.TempPathFactory) -> Campaign:
+    """Virtual tests of the hoist."""
+    maneuvers = [parse("step:6,length=6"), parse("sine:5,0.2,length=10")]
+    return virtual(tmp_path_factory.mktemp("tests"), "hoist", maneuvers, seed=4)
+
+
+def test_errors_are_those_of_the_prediction(tests: Campaign, tmp_path: Path, browsed) -> None:
+    page, drive = tmp_path / "live.html", Drive.preset("hoist").scale(Z10=1.02)
+    assert write_live_page(drive, page, campaign=tests) == ()
+    made = acted(page, tmp_path, browsed)
+    found = {q.channel: q.measures for q in with_speeds(predict(drive, [tests[0]]))}
+    shown = dict(zip(made["channels"], made["before"], strict=True))
+    assert set(shown) == set(found) - {"counts"}
+    for name, errors in shown.items():
+        # what was measured is rounded to 1/65,535 of its range on the page
+        assert errors["rmse"] == pytest.approx(found[name].rmse, rel=1e-3), name
+        assert errors["fit"] == pytest.approx(found[name].fit_percent, abs=0.01), name
+    assert made["errors"][-1]["rmse"] > 1.5 * made["before"][-1]["rmse"]
+
+
+def test_what_cannot_be_shown_is_refused(tests: Campaign, tmp_path: Path) -> None:
+    drive, page = Drive.preset("hoist"), tmp_path / "live.html"
+    with pytest.raises(InputError, match="needs the runs of a campaign, or a command"):
+        write_live_page(drive, page)
+    with pytest.raises(InputError, match="no axis 'slew'"):
+        write_live_page(drive, page, campaign=tests, axis="slew")
+    assert not page.exists()
+
+
+def test_a_lever_of_a_parameter_without_directions_counts_once(tmp_path: Path, browsed) -> None:
+    drive, command, page = Drive.preset("hoist"), parse("step:9"), tmp_path / "live.html"
+    write_live_page(drive, page, command=command)
+    made = acted(page, tmp_path, browsed, "pump")
+    voltage = command.sample(512.0).astype(np.float32).astype(float)
+    moved = drive.scale(Z10=made["factor"]).simulate(voltage, 512.0).shaft_speed
+    assert np.abs(moved - made["first"]).max() > 0.1
+    np.testing.assert_allclose(made["moved"], moved, rtol=0.0, atol=1e-11)
+
+
+def test_the_page_is_small_and_asks_for_nothing(tests: Campaign, tmp_path: Path) -> None:
+    page = tmp_path / "live.html"
+    write_live_page(Drive.preset("hoist"), page, command=parse("step:9"))
+    text = page.read_text("utf-8")
+    content = json.loads(re.search(r'id="live">(.*?)</script>', text)[1])
+    assert len(text) - len(content["wasm"]) < 60_000
+    # each lever moves each of its numbers once
+    for lever in content["levers"]:
+        assert len({number for number, _ in lever["moves"]}) == len(lever["moves"]), lever["name"]
+    for asks in (r"""(src|href)=["'](?!data:|#)""", r"url\(", r"fetch\(", "XMLHttp", r"import\("):
+        assert not re.search(asks, text), asks

@@ -160,7 +160,7 @@ def content_of(
         if not step <= LONGEST_STEP:
             raise InputError(
                 f"The step is {step:g} s, but must be above 0 and at most 1/{SOURCE_RATE:g} s: an "
-                "FMU's master may take longer ones, a program calls swp_step several times a sample."
+                "FMU's master may take longer ones, in C call swp_step several times a sample."
             )
         rate = what.parameters.rate
         if rate is not None and abs(rate * step - 1.0) > 1e-9:
