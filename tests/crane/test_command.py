@@ -144,8 +144,20 @@ def test_a_cranes_file_takes_the_folder_of_a_fit_beside_it(tmp_path):
     for word in ("fitted", "fitted/drive.toml"):
         path.write_text(text.replace('luff = "luff"', f'luff = "{word}"'), "utf-8")
         made = Crane.from_toml(path)
+        assert not made.fits  # without the numbers of a fit beside it there is nothing to draw from
         assert made.luff.parameters.numbers == wide.parameters.numbers
         assert made.hoist.name == "hoist"
+
+
+def test_drives_of_another_axis_and_campaigns_are_refused(tmp_path):
+    crane, place = Crane.preset("tg3637"), tmp_path / "drive.toml"
+    crane.slew.to_toml(place)
+    with pytest.raises(ParameterError, match=r"luff: .*drive.toml is a drive of the slew"):
+        crane.with_drive(luff=tmp_path)
+    assert crane.with_drive(slew=place).slew == crane.slew
+    (tmp_path / "campaign.toml").write_text('[[runs]]\nfile = "a.csv"\n', "utf-8")
+    with pytest.raises(ParameterError, match=r"hoist: .*campaign.toml is a campaign: fit it first"):
+        crane.with_drive(hoist=tmp_path / "campaign.toml")
 
 
 @pytest.mark.slow

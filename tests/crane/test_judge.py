@@ -207,6 +207,10 @@ def test_own_logs_lead_to_the_verdict_on_the_own_crane(crane, fitted):
     assert crane.with_drive(luff="hoist").luff.name == "hoist"
     drawn = own.drawn(luff=stored_draws(place, draws=3, seed=1))
     assert len(drawn) == 3
+    assert own.fits == {"luff": place}
+    assert crane.with_drive(luff=place / "drive.toml").fits == own.fits
+    assert not own.with_drive(luff=crane.luff).fits
+    assert {each.luff for each in own.drawn()} == set(stored_draws(place).drives)
     found = judge(
         own, MEANT, seeds=range(4), drives={"drawn": drawn}, remedies=False, length=30.0, start=10.0
     )
@@ -218,14 +222,49 @@ def test_own_logs_lead_to_the_verdict_on_the_own_crane(crane, fitted):
     assert found.counted("drawn")[1] != alone.counted("one")[0]
 
 
+def scaled(drive, factors):
+    """Draws that are a drive with other orifices."""
+    return Draws(tuple(drive.scale(Z16=each) for each in factors), 0)
+
+
 def test_cranes_are_drawn_axis_by_axis(crane):
-    hoist = Draws(tuple(crane.hoist.scale(Z16=each) for each in (0.9, 1.0, 1.1)), 0)
-    luff = Draws(tuple(crane.luff.scale(Z16=each) for each in (0.8, 1.2)), 0)
+    hoist, luff = scaled(crane.hoist, (0.9, 1.0, 1.1)), scaled(crane.luff, (0.8, 1.2))
     drawn = crane.drawn(hoist=hoist, luff=luff)
-    assert [each.luff for each in drawn] == list(luff.drives)
-    assert [each.hoist for each in drawn] == list(hoist.drives[:2])
+    assert {each.luff for each in drawn} == set(luff.drives)
+    assert {each.hoist for each in drawn} < set(hoist.drives)
+    assert all(each.slew == crane.slew for each in drawn)
     with pytest.raises(InputError, match="draws of at least one axis"):
         crane.drawn()
+
+
+def test_draws_of_two_axes_from_one_seed_are_not_correlated(crane):
+    factors = np.random.default_rng(0).uniform(0.9, 1.1, 100)
+    drawn = crane.drawn(luff=scaled(crane.luff, factors), slew=scaled(crane.slew, factors))
+    assert len(drawn) == 100
+    pairs = [[each.luff["Z16"].numbers["Z16_plus"], each.slew["Z16"].numbers["Z16_plus"]]
+             for each in drawn]  # fmt: skip
+    # 0.26 is beyond 99 % of independent pairs
+    assert abs(np.corrcoef(np.transpose(pairs))[0, 1]) < 0.26
+
+
+def test_control_does_not_know_the_draw_that_moves_the_crane(crane):
+    weaker = crane.slew.scale(Z17=1.05)
+    stick = Stick.trapezoid(slew=0.5, until={"slew_deg": 30.0}, length=30.0)
+    (drawn,) = crane.drawn(slew=Draws((weaker,), 0))
+    told, untold = crane.with_drive(slew=weaker), crane.with_drive(slew=weaker, told=False)
+    runs = [each.simulate(stick) for each in (crane, drawn, untold, told)]
+    volts, ends = [each.voltage[:, 1] for each in runs], [each.slew_deg[-1] for each in runs]
+    # the map of the drive before: the same voltages, and another end
+    np.testing.assert_array_equal(volts[1], volts[0])
+    np.testing.assert_array_equal(volts[2], volts[0])
+    assert ends[1] == ends[2]
+    assert abs(ends[1] - ends[0]) > 1.0
+    # a drive that control is told of gets other voltages, and ends where it should
+    assert abs(ends[3] - ends[0]) < 0.1
+    # what is built anew is known: the fitted drive moves with the drawn one
+    upgraded = drawn.upgraded("slew", {"orifice": 2.0})
+    assert upgraded.slew == weaker.scale(Z16=2.0)
+    assert upgraded.known_drive("slew") == crane.slew.scale(Z16=2.0)
 
 
 def test_what_makes_no_study_is_said(crane):

@@ -54,7 +54,7 @@ class Placed:
 
         own = self.crane.endswith(".toml")
         made = Crane.from_toml(self.crane) if own else Crane.preset(self.crane)
-        return made.with_drive(**dict(pairs_of("--drive", self.drive, "luff=mine.toml")))
+        return made.with_drive(told=True, **dict(pairs_of("--drive", self.drive, "luff=mine.toml")))
 
     @property
     def pose(self) -> dict[str, Any]:
@@ -124,17 +124,17 @@ class Studied(Placed):
 
     def sets(self) -> dict[str, Any]:
         """Sets of drives by name."""
-        from swashplate.analysis.monte_carlo import stored_draws
-        from swashplate.analysis.whatif import find_lever, pulled
+        from swashplate.analysis.whatif import find_lever
 
         names = filter(None, map(str.strip, (self.drives or "ideal,identified").split(",")))
         sets: dict[str, Any] = {name: name for name in names}
         if "drawn" in sets:
-            pairs = pairs_of("--drive", self.drive, "luff=fitted")
-            draws = {axis: stored_draws(place) for axis, place in pairs if Path(place).is_dir()}
-            if not draws:
+            if not self.chosen.fits:
                 raise InputError("--drives drawn needs the folder of a fit: --drive luff=FOLDER.")
-            sets["drawn"] = self.chosen.drawn(**draws)
+            sets["drawn"] = self.chosen.drawn()
+            kept = [axis for axis in AXES if axis not in self.chosen.fits]
+            as_given = f"; as given, since they come from no fit: {', '.join(kept)}" if kept else ""
+            side.print(f"Drawn: {', '.join(self.chosen.fits)}{as_given}")
         crane, changed = self.chosen, []
         for name, text in pairs_of("--scale", self.scale, "luff.orifice=1.5"):
             (axis, _, lever), words = name.partition("."), f"--scale {name}={text}"
@@ -145,7 +145,7 @@ class Studied(Placed):
                 )
             find_lever(lever)
             factor = _number(words, text)
-            crane = crane.with_drive(**{axis: pulled(getattr(crane, axis), {lever: factor})})
+            crane = crane.upgraded(axis, {lever: factor})
             changed.append(f"{axis} {lever} ×{factor:g}")
         if changed:
             sets[", ".join(changed)] = crane
