@@ -21,6 +21,8 @@ if TYPE_CHECKING:
     from swashplate.crane.control import Control
 
 VERDICT = Form("a verdict", (".html", ".csv", ".parquet"))
+LEAST_ALLOWED = 0.5
+"""Percent of seaways below which a share is probably meant."""
 START, AXES = ("slew_deg", "boom_deg", "rope_m"), ("hoist", "slew", "luff")
 
 app = typer.Typer(
@@ -259,11 +261,13 @@ def judge(
     """Judge control on a crane's drives over many seaways.
 
     Every variant goes through the same seaways. Control fails if it makes the
-    swing worse than none in more than 5 % of them; the exit code is then 1, and
-    a larger orifice of the luff drive and a clip are tried.
+    swing worse than none in more than 5 % of them, as far as the 95 % interval
+    of that share tells; a larger orifice of the luff drive and a clip are then
+    tried. Where the interval holds the 5 % it is not decided, and the verdict
+    says how many seaways would do. The exit code is 0 only if control works.
 
     Options:
-      allowed PERCENT: Seaways in which control may be worse than none.
+      allowed PERCENT: Seaways in which control may be worse than none, in percent.
       remedies --remedies/--no-remedies: Whether to look for what would do.
       dask ADDRESS: Run on a Dask cluster: tcp://HOST:PORT.
       out FILE: Write the verdict's page, .html, or its numbers, .csv or .parquet.
@@ -273,25 +277,31 @@ def judge(
       swashplate crane judge tg3637 --scale luff.orifice=3 --out judge.html
       swashplate crane judge tg3637 --drive luff=fitted --drives identified,drawn
     """
+    if 0.0 < allowed < LEAST_ALLOWED:
+        raise InputError(
+            f"--allowed is in percent, and {allowed:g} % of the seaways would ask for thousands of "
+            f"them: did you mean --allowed {100.0 * allowed:g}?"
+        )
     more: dict[str, Any] = {"allowed": allowed / 100.0, "remedies": remedies}
     if dask is not None:
         from swashplate.executors import Dask
 
         more["executor"] = Dask(dask)
     found: Judgment = study.through(study.chosen.judge, **more)
-    write = found.write
+    what, write = "Numbers of every seaway, in SI", found.write
     if out is not None and out.suffix.lower() == ".html":
         from swashplate.report.scene import write_judgment
 
-        write = partial(write_judgment, found)
-    save(out, "Verdict", write)
+        what, write = "Verdict", partial(write_judgment, found)
+    save(out, what, write)
     draw(plot, "plot_judgment", found)
     _end(study.chosen, found.tables(), *found.sentences()[1:])
     say_saved()
+    headline = f"{found.outcome.capitalize()}: {found.verdict()}"
     if not found.passed:
-        side.print(f"Fails: {found.verdict()}")
+        side.print(headline)
         raise typer.Exit(1)
-    say(f"Works: {found.verdict()}")
+    say(headline)
 
 
 def follow(
