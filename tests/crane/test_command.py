@@ -140,6 +140,7 @@ def test_wrong_words_end_in_one_sentence(words, sentence):
         ({"tower_sheave_angle": 1.0}, "tower_sheave_angle is 57.2958 deg, but the luff rope only"),
         ({"boom_limits": (0.9, 0.5)}, "boom_limits are 51.5662 and 28.6479 deg, but must rise"),
         ({"rope_limits": (0.0, 50.0)}, "rope_limits are 0 and 50 m, but must rise from above 0"),
+        ({"boom_length": 28000.0}, "boom_length is 28000 m, but no crane is longer than 300 m"),
         ({"slew_axis": 3.0}, "slew_axis has 1 numbers, but needs 3"),
         ({"jib": 3.0}, "A crane has no jib; it has boom_length"),
     ],

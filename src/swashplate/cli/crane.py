@@ -246,7 +246,8 @@ def run(
         from swashplate.report.scene import write_scene
 
         save(scene, "Scene", lambda path: write_scene(runs, path))
-    _end(crane, tables)
+    low = [f"{name}: {each}" for name, run in runs.items() for each in run.sentences()]
+    _end(crane, tables, *low)
 
 
 def judge(

@@ -76,6 +76,8 @@ GEOMETRY: Mapping[str, tuple[str, int, Literal["above 0", "at least 0", ""]]] = 
     "rope_limits": ("m", 2, ""),
 }
 """Quantities of a crane: SI unit, how many numbers it has, and their range."""
+LONGEST = 300.0
+"""Length on a crane, its rope apart, beyond which another unit is probably meant. [m]"""
 
 
 class CraneFile(BaseModel):
@@ -227,6 +229,11 @@ class Crane:
                 found = len(values)
                 raise ParameterError(f"{name}: {each} has {found} numbers, but needs {count}.")
             made[each] = tuple(to_si(v, entry.unit, unit, f"{name}: {each}") for v in values)
+            if unit == "m" and each != "rope_limits" and max(map(abs, made[each])) > LONGEST:
+                raise ParameterError(
+                    f"{name}: {each} is {max(map(abs, made[each])):g} m, but no crane is longer "
+                    f"than {LONGEST:g} m: look at its unit."
+                )
             value = made[each][0]
             if (rule and not value >= 0.0) or (rule == "above 0" and value == 0.0):
                 raise ParameterError(f"{name}: {each} is {value:g}, but must be {rule}.")

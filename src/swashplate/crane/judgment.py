@@ -355,7 +355,7 @@ class Judgment(Tabular):
 
     def tables(self) -> list[Table]:
         """Swing of each variant, how often it is worse, paired differences, limits, remedies."""
-        study, seaways = self.study, len(self.study.seeds)
+        seaways = len(self.study.seeds)
         interval = [Column(each, ".2f", "rad", none="–") for each in ("rms", "from", "to")]
         swings = Table(
             f"Swing in {count(seaways, 'seaway')}, means with 95 % intervals",

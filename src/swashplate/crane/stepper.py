@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from functools import lru_cache
-from math import degrees, inf, isfinite, pi, sin, sqrt
+from math import atan2, degrees, hypot, inf, isfinite, pi, sin, sqrt
 from numbers import Real
 from typing import TYPE_CHECKING, Any, Literal, TypedDict, Unpack, get_args
 
@@ -134,7 +134,8 @@ class CraneStepper:
         Returns
         -------
         dict
-            Signals by name, as of a run, SI; errors are those of `Crane.simulate`.
+            Signals by name as of `CraneRun.rows`, and the angle ``swing``, SI; errors are those of
+            `Crane.simulate`.
         """
         most = FULL_VOLTAGE if self.fixed.actuation == loop.DIRECT else 1.0
         commands = np.array([command], dtype=np.float64)
@@ -146,8 +147,10 @@ class CraneStepper:
         return self.named(self.take(commands, motion)[0])
 
     def named(self, row: Array) -> dict[str, float]:
-        """Signals of a row that `take` returns, by name."""
-        return dict(zip(ROWS, row.tolist(), strict=True))
+        """Signals of a row that `take` returns, by name, and the swing."""
+        made = dict(zip(ROWS, row.tolist(), strict=True))
+        x, y, down = (made[f"tip_{axis}"] - made[f"load_{axis}"] for axis in "xyz")
+        return made | {"swing": atan2(hypot(x, y), down)}
 
     def take(self, commands: Array, ship: Array) -> Array:
         """Advance by many samples at once: a row for each, a column for each of `step`'s signals.
@@ -234,6 +237,11 @@ def _fixed(
     pair = np.array(wind, dtype=object)
     if pair.shape != (2,) or not all(isinstance(v, Real) and isfinite(v) for v in pair):
         raise InputError(f"wind is {wind!r}, but must be two speeds, forward and to port, in m/s.")
+    if load > crane.safe_load:
+        raise InputError(
+            f"The load is {load:g} kg, but {crane.name} lifts {crane.safe_load:g} kg: take less, "
+            "or a crane with another safe_load."
+        )
     drag = AIR * drag_area / (2.0 * load) if load > 0.0 else 0.0  # which the suspension refuses
     if loaded:
         _check_loaded(crane, actuation, load + suspension.hook, suspension)
