@@ -37,7 +37,7 @@ def test_run_compares_variants_and_writes_signals_and_a_figure(tmp_path):
     assert (tmp_path / "run.png").stat().st_size > 10_000
     out, scene = tmp_path / "run.parquet", tmp_path / "scene.html"
     files = ["--out", str(out), "--scene", str(scene)]
-    one = said("run", "tg3637", *words, "--sea", "ss2,90,1", *files)
+    one = said("run", "tg3637", *words, "--sea", "ss2,90,1", "--variant", "identified", *files)
     assert one.exit_code == 0, one.output
     assert "Hägglunds TG3637" in scene.read_text("utf-8")
     table = pl.read_parquet(out)

@@ -92,14 +92,14 @@ class Studied(Placed):
     Options:
       control CONTROL: Control, as of 'run' behind the colon; by default as it is designed for
           ideal drives.
-      sea SEA[,HEADING]: A sea and its heading, 90 abeam: ss2, ss3, ss3-swell, ss4; by default
-          ss3,90.
+      sea SEA[,HEADING]: A sea, ss2, ss3, ss3-swell or ss4, and where its waves come from: 0
+          astern, 90 starboard, 180 ahead, 270 port; by default ss3,90.
       seeds N: Number of seaways; judge takes 200 by default.
       drives NAMES: ideal: follow at once; identified: the crane's own; volts: these, 10 V for full
-          speed; drawn: from the errors of the fits given with --drive; by default
-          ideal,identified. A verdict is on the last.
-      scale AXIS.NAME=FACTOR: Drives with a lever or parameter moved, judged last:
-          luff.orifice=1.5. May be repeated.
+          speed; drawn: from the errors of the fits that the drives come from, while control
+          knows the fits; by default ideal,identified. A verdict is on the last.
+      scale AXIS.NAME=FACTOR: Drives with a lever or parameter moved, which control knows, judged
+          last: luff.orifice=1.5. May be repeated.
     """
 
     control: str = "feedback=0.2/0.2+ship+loop=1.5"
@@ -209,11 +209,11 @@ def run(
           repeated.
       duration S: Time for which an axis without target moves.
       length S: Length of the run.
-      sea SEA[,HEADING[,SEED]]: A seaway, its heading in degrees (90 abeam) and its seed: ss2, ss3,
-          ss3-swell, ss4.
+      sea SEA[,HEADING[,SEED]]: A sea, ss2, ss3, ss3-swell or ss4; where its waves come from, 0
+          astern, 90 starboard (the default), 180 ahead, 270 port; and its seed.
       variant DRIVES[:CONTROL]: Drives behind the stick and, after a colon, control: inverse (the
-          default), volts or ideal; zv-joint, zvd-tip, ei-tip and the like, feedback=GAIN/DELAY,
-          ship, clip=M, loop=GAIN, joined by +. May be repeated.
+          default, also called identified), volts or ideal; zv-joint, zvd-tip, ei-tip and the like,
+          feedback=GAIN/DELAY, ship, clip=M, loop=GAIN, joined by +. May be repeated.
       brake --brake/--no-brake: Whether a brake holds the hoist at rest.
       scene FILE: Write the scene that moves: .html.
 
@@ -236,8 +236,9 @@ def run(
             hoist=hoist, slew=slew, luff=luff, until=targets, duration=duration, length=length
         )
         for first in variant or ["inverse"]:
-            actuation, _, law = first.partition(":")
-            how: dict[str, Any] = {"actuation": actuation, "control": control_of(law)}
+            drives, _, law = first.partition(":")
+            how: dict[str, Any] = {"control": control_of(law)}
+            how["actuation"] = "inverse" if drives == "identified" else drives
             runs[first] = crane.simulate(stick, sea=seaway, brake=brake, **how, **placed.pose)
         tables = run_tables(runs)
     save(out, "All signals, in SI", runs[first].write)
@@ -315,7 +316,7 @@ def follow(
     """Show the largest sines of the tip that each axis can follow, and what seas ask for.
 
     Options:
-      sea SEA[,HEADING]: Only this sea; by default all.
+      sea SEA[,HEADING]: Only this sea, and where its waves come from, as of 'run'; by default all.
 
     For example:
       swashplate crane follow tg3637 --plot follow.png

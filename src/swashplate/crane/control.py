@@ -2,8 +2,10 @@
 
 Each is a value; `|` combines them: ``TipShaper("zv") | DelayedFeedback(0.2) | Clip()``. In the
 loop they act in one order, whatever order they are written in: joint shaper, path of the tip, tip
-shaper, offsets of the tip (feedback, ship, own), clip, inverse kinematics, position loop. The
-linear crane is for controllers that are designed outside the package.
+shaper, offsets of the tip (feedback, ship, own), clip, inverse kinematics, position loop. Every
+stage but a joint shaper works on the path of the tip, and brings the position loop of 0.7 /s with
+it, by which the shafts follow that path; `PositionLoop` sets another gain. The linear crane is for
+controllers that are designed outside the package.
 """
 
 from __future__ import annotations
@@ -170,7 +172,10 @@ class Clip(Control):
 
 @dataclass(frozen=True)
 class PositionLoop(Control):
-    """Loop that brings slew and luff back to the wanted path; 0.7 /s without one."""
+    """Loop that brings slew and luff back to the wanted path.
+
+    It belongs to every control of the tip; without this stage its gain is 0.7 /s.
+    """
 
     gain: float = 0.7
     """Speed added for each radian of a shaft's error. [1/s]"""
@@ -179,7 +184,10 @@ class PositionLoop(Control):
 
 @dataclass(frozen=True)
 class Law(Control):
-    """A law of one's own: an offset of the wanted tip, as a model of the engine with its state."""
+    """A law of one's own: an offset of the wanted tip, as a model of the engine with its state.
+
+    The position loop acts beside it, at 0.7 /s unless a `PositionLoop` says otherwise.
+    """
 
     model: Model
     """Its inputs are of `SEEN`, its signals or states among others `GIVES`."""

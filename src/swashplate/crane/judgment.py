@@ -368,7 +368,7 @@ class Judgment(Tabular):
         )
         share = [Column("worse than none", ".1%"), Column("from", ".1%"), Column("to", ".1%")]
         worse = Table(
-            "Seaways with more swing than without control, 95 % intervals",
+            "More swing than without control, 95 % intervals",
             (Column("variant", wrap=True), Column("seaways", "d"), *share),
         )
         for name in self.names:

@@ -254,7 +254,8 @@ def limit_table(rows: Iterable[tuple[str, str, Iterable[float]]]) -> Table:
     heads = [str(each.name).lower().replace("_", " ") for each in PUMPS]
     numbers = [Column(each, ".1%", none="–") for each in heads]
     columns = (Column("variant", wrap=True), Column("axis"), *numbers)
-    made = Table("Share of time for which limits act", columns)
+    said = "dead zone: the current is within that of the solenoids"
+    made = Table("Share of time for which limits act", columns, said)
     for name, axis, shares in rows:
         made.add(name, axis, *shares)
     return made

@@ -113,7 +113,8 @@ class Seaway(Result):
     sea: str | Spectrum = "ss3"
     """A name of `SEA_STATES`, or a spectrum."""
     heading_deg: float = 90.0
-    """0 following, 90 abeam to port, 180 head sea."""
+    """Where the waves run, from the bow to port: 0 following, 90 abeam from starboard, 180 head
+    sea, 270 abeam from port."""
     seed: int = 0
     """Of the components."""
     ship: Hull | TransferFunctions = field(default=CRANE_SHIP, repr=False)
@@ -256,8 +257,8 @@ def _check_rotations(motion: Array, of: str) -> None:
     worst = int(np.argmax(most))
     if most[worst] > STEEPEST:
         raise InputError(
-            f"{of}: {MOTIONS[3 + worst]} reaches {most[worst]:.3g} rad, which no ship does. If it is "
-            f"in degrees, say so in the log's header, {MOTIONS[3 + worst]} [deg], or convert it."
+            f"{of}: {MOTIONS[3 + worst]} reaches {most[worst]:.3g} rad, which no ship does. If it "
+            f"is in degrees, say so in the log's header, {MOTIONS[3 + worst]} [deg], or convert it."
         )
 
 

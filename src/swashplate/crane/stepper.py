@@ -44,35 +44,51 @@ would swing against each other from sample to sample."""
 
 
 class Setup(TypedDict, total=False):
-    """How a run is set up: keywords of `Crane.simulate` and `Crane.stepper`."""
+    """How a run is set up: keywords of `Crane.simulate` and `Crane.stepper`, each as it likes.
+
+    Keys
+    ----
+    control : Control, default None
+        Of `swashplate.crane.control`; by default the stick's commands as they are.
+    actuation : {"inverse", "volts", "ideal", "direct"}, default "inverse"
+        What makes speeds of wanted speeds: the real drives behind their inverse maps, or behind
+        10 V for full speed (``"volts"``); or drives that follow at once within their limits of
+        speed (``"ideal"``). A stepper also takes voltages (``"direct"``).
+    slew_deg : float, default 0, in studies 90
+        From forward to starboard.
+    boom_deg : float, default 45
+        The boom's elevation.
+    rope_m : float, default 20, in studies 27
+        Rope below the tip.
+    load : float, default the crane's safe load, which is also the largest
+        Its mass. [kg]
+    suspension : Suspension, default a point on a rigid rope
+        Elastic rope, hook with slings.
+    loaded : bool, default False
+        Whether the rope loads the drives: its tension is a torque on each shaft, by virtual work,
+        which they take a sample later as their ``load_torque``. Off, as their tests were without
+        load; drives feel it by their ``motor_leakage`` and ``line_stiffness``. What the boom weighs
+        is not in it.
+    drag_area : float, default 0
+        C_d A of the load. [m²]
+    wind : (float, float), default (0, 0)
+        Forward and to port. [m/s]
+    brake : bool, default True
+        Whether a brake holds the hoist 0.3 s after its voltage has come into the dead zone. A
+        voltage at its edge keeps the brake open.
+    """
 
     control: Control | None
-    """Of `swashplate.crane.control`; by default the stick's commands as they are."""
     actuation: Actuation
-    """What makes speeds of wanted speeds: the real drives behind their inverse maps, ``"inverse"``
-    (the default), or behind 10 V for full speed, ``"volts"``; or drives that follow at once within
-    their limits of speed, ``"ideal"``. A stepper also takes voltages, ``"direct"``."""
     slew_deg: float
     boom_deg: float
     rope_m: float
-    """Slew from forward to starboard, boom's elevation, rope below the tip; by default 0, 45 and
-    20, in studies 90, 45 and 27."""
     load: float | None
-    """Its mass, by default the safe load. [kg]"""
     suspension: Suspension
-    """Elastic rope, hook with slings; by default a point on a rigid rope."""
     loaded: bool
-    """Whether the rope loads the drives: its tension is a torque on each shaft, by virtual work,
-    which they take a sample later as their ``load_torque``. Off by default, as their tests were
-    without load; drives feel it by their ``motor_leakage`` and ``line_stiffness``. What the boom
-    weighs is not in it."""
     drag_area: float
-    """C_d A of the load. [m²]"""
     wind: tuple[float, float]
-    """Forward and to port. [m/s]"""
     brake: bool
-    """Whether a brake holds the hoist 0.3 s after its command has returned to the dead zone; on by
-    default."""
 
 
 class CraneStepper:
