@@ -166,7 +166,7 @@ def test_a_cranes_file_takes_the_folder_of_a_fit_beside_it(tmp_path):
 def test_drives_of_another_axis_and_campaigns_are_refused(tmp_path):
     crane, place = Crane.preset("tg3637"), tmp_path / "drive.toml"
     crane.slew.to_toml(place)
-    with pytest.raises(ParameterError, match=r"luff: .*drive.toml is a drive of the slew"):
+    with pytest.raises(ParameterError, match=r"luff: .*drive.toml has a drive of the slew"):
         crane.with_drive(luff=tmp_path)
     assert crane.with_drive(slew=place).slew == crane.slew
     (tmp_path / "campaign.toml").write_text('[[runs]]\nfile = "a.csv"\n', "utf-8")

@@ -12,7 +12,7 @@ from swashplate.campaign import rig
 from swashplate.crane import Crane, Stick, control, follow, judge, sweep
 from swashplate.crane.judgment import mean_of, share_of
 from swashplate.crane.result import PUMPS
-from swashplate.errors import InputError
+from swashplate.errors import InputError, ParameterError
 from swashplate.executors import Processes, Serial, Threads
 from swashplate.identification.assessment import Judged
 from swashplate.identification.fitting import fit
@@ -236,6 +236,8 @@ def test_own_logs_lead_to_the_verdict_on_the_own_crane(crane, fitted):
     given = crane.with_drive(luff=result)
     assert given.luff.parameters.numbers == result.drive.parameters.numbers
     assert crane.with_drive(luff="hoist").luff.name == "hoist"
+    with pytest.raises(ParameterError, match="slew: the fit has a drive of the luff"):
+        crane.with_drive(slew=result)
     drawn = own.drawn(luff=stored_draws(place, draws=3, seed=1))
     assert len(drawn) == 3
     assert own.fits == {"luff": place}

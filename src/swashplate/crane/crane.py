@@ -416,17 +416,24 @@ def _drives(given: Mapping[Any, DriveLike], folder: Path) -> tuple[dict[str, Any
     """Drives as they are given, and the folders of the fits that they come from; by axis."""
     made, fits = {}, {}
     for axis, each in given.items():
-        made[axis], place = _drive(each, folder, axis)
+        drive, place = _drive(each, folder, axis)
+        # a packaged drive or a Drive is put onto another axis knowingly, a fit or file hardly
+        named = isinstance(each, Drive) or str(each) in preset_names()
+        if not named and drive.name in AXES and drive.name != axis:
+            raise ParameterError(
+                f"{axis}: {place or 'the fit'} has a drive of the {drive.name}. If it moves the "
+                f"{axis} as well, give it another name."
+            )
         if place and place.name == "drive.toml" and place.with_name("fit.json").is_file():
             fits[axis] = place.parent
+        made[axis] = drive
     return made, fits
 
 
 def _drive(given: DriveLike, folder: Path, axis: str) -> tuple[Drive, Path | None]:
-    """The drive of an axis as it is given, and its file.
+    """The drive of an axis as it is given, and its file, if it has one.
 
-    Places are looked for in a folder, packaged names go first. A `ParameterError` for no drive, or
-    a file with that of another axis.
+    Places are looked for in a folder, packaged names go first.
     """
     if not isinstance(given, str | Path):
         made = getattr(given, "drive", given)
@@ -440,13 +447,7 @@ def _drive(given: DriveLike, folder: Path, axis: str) -> tuple[Drive, Path | Non
             raise ParameterError(
                 f"{axis}: {place} is a campaign: fit it first, and give the folder of the fit."
             )
-        made = Drive.from_toml(place)
-        if made.name in AXES and made.name != axis:
-            raise ParameterError(
-                f"{axis}: {place} is a drive of the {made.name}. If it moves the {axis} as well, "
-                "change the name in the file."
-            )
-        return made, place
+        return Drive.from_toml(place), place
     raise ParameterError(
         f"{axis}: a crane's drive is a packaged one, {', '.join(preset_names())}, a .toml file, or "
         f"the result or folder of a fit, but there is no such '{given}'."

@@ -115,6 +115,8 @@ def follow(
 ) -> Followable:
     """Largest amplitudes of the tip that each axis can follow over periods [s]; what seas ask for.
 
+    They are of the drives as control knows them, see `Crane.with_drive`.
+
     Seas are names of `SEA_STATES`; ship and heading are those of the seaway, by default the crane
     ship's hull in beam waves.
     """
