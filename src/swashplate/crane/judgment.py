@@ -315,16 +315,11 @@ class Judgment(Tabular):
             f"The controller makes {worse}: {none:.2f} deg RMS without it, {own:.2f} with it"
             f"{self._cause()}."
         )
-        sure = [each.what for each in self.remedies if each.worse.high <= self.allowed]
-        perhaps = [each for each in self.remedies if each.worse.high > self.allowed]
-        if sure:
-            said += f" {' or '.join(sure).capitalize()} would do."
-        if perhaps:
-            most = max(each.worse.value for each in perhaps)
-            said += (
-                f" {' or '.join(each.what for each in perhaps).capitalize()} may do: run more "
-                f"seaways ({more_seaways(most, seaways, self.allowed)})."
-            )
+        for each in self.remedies:
+            more = more_seaways(each.worse.value, seaways, self.allowed)
+            sure = each.worse.high <= self.allowed
+            what = "would do" if sure else f"may do: run more seaways ({more})"
+            said += f" {each.what.capitalize()} {what}."
         if self.tried and not self.remedies:
             said += f" None of these would do: {listed(self.tried)}."
         return said
