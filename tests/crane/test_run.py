@@ -208,8 +208,26 @@ def same_by_steps(crane, stick, ship, **setup):
     """A run, which a stepper makes as well."""
     run, stepper = crane.simulate(stick, sea=ship, **setup), crane.stepper(**setup)
     made = [list(stepper.step(tuple(u), s).values()) for u, s in zip(run.stick, ship, strict=True)]
-    np.testing.assert_array_equal(np.array(made), run.out)
+    *signals, swing = np.array(made).T
+    np.testing.assert_array_equal(np.transpose(signals), run.out)
+    np.testing.assert_allclose(np.degrees(swing), run.swing_deg, atol=1e-12)
     return run
+
+
+def test_tables_of_runs_have_the_ships_motion(crane):
+    ship = Seaway("ss3", seed=1).motion(5 * 512 + 1)
+    table = crane.simulate(Stick.rest(5.0), sea=ship).to_polars()
+    motions = ["surge", "sway", "heave", "roll", "pitch", "yaw"]
+    np.testing.assert_array_equal(table[motions].to_numpy(), ship)
+    still = crane.simulate(Stick.rest(5.0)).to_polars()
+    assert not still[motions].to_numpy().any()
+
+
+def test_loads_below_the_waterline_are_named(crane):
+    assert not crane.simulate(Stick.rest(1.0), boom_deg=45.0).sentences()
+    (said,) = crane.simulate(Stick.rest(1.0), boom_deg=20.0, rope_m=40.0).sentences()
+    # of 19 m of pedestal, 36 m of boom at 20 degrees and 40 m of rope
+    assert said.startswith("The load is down to z = -8.7 m,")
 
 
 @pytest.mark.interpreted
@@ -273,6 +291,17 @@ def test_lowered_load_goes_down_and_stretches_its_rope_by_its_weight(crane):
     assert run.load[-1, 2] - run.load[0, 2] == pytest.approx(-10.0, abs=2e-3)
     assert run.tension[-1] == pytest.approx(35000.0 * G, rel=1e-4)
     assert not run.slack.any()
+
+
+@pytest.mark.parametrize(("luff", "how"), [(0.8, {"boom_deg": 52.7}), (-0.8, {})])
+def test_hoist_ends_at_its_rope_while_the_luff_pays_out(crane, luff, how):
+    until = {"rope_m": 15.0, **how}
+    stick = Stick.trapezoid(luff=luff, hoist=0.6, until=until, duration=10.0)
+    run = crane.simulate(stick, actuation="ideal")
+    assert run.rope[-1] == pytest.approx(15.0, abs=1e-6)
+    # with the hoist at rest the luff changes the rope by half a metre or more
+    moved = crane.simulate(Stick.trapezoid(luff=luff, until=how, duration=10.0), actuation="ideal")
+    assert abs(moved.rope[-1] - 20.0) > 0.4
 
 
 def test_luffing_lifts_the_load(crane):
@@ -356,6 +385,7 @@ REFUSED = [
     ({"stick": MOVING, "actuation": "ideal"}, "Ideal drives follow at once, .* a row of zeros"),
     ({"stick": 3}, "The stick is 3, but must be a Stick"),
     ({"boom_deg": 85.0}, "boom of tg3637 stands at 85 deg, but moves between 15 and 80"),
+    ({"load": 36000.0}, "The load is 36000 kg, but tg3637 lifts 35000 kg: take less"),
     ({"rope_m": 2.0}, "rope of tg3637 is 2 m, but can be 3 to 50 m"),
     ({"sea": np.zeros((5121, 6))}, "is 60 s long, but the ship's motion only 10 s"),
     ({"sea": "ss3"}, r"A sea is a Seaway, as Seaway\('ss3'\), or the ship's motion in rows"),

@@ -292,6 +292,14 @@ def test_measured_motion_comes_from_a_log(tmp_path):
         ship_motion(path)
     with pytest.raises(InputError, match="A ship's motions are surge, .* not rolling"):
         ship_motion(path, {"rolling": "roll"})
+    # degrees under a header that says nothing, or says radians
+    path.write_text("\n".join(["time [s];heave [m];roll [rad]", *rows]), "utf-8")
+    with pytest.raises(InputError, match=r"ship.csv: roll reaches 2 rad, .* roll \[deg\]"):
+        ship_motion(path, {"roll": "roll"})
+    with pytest.raises(InputError, match="The sea's motion: pitch reaches 3 rad, which no ship"):
+        Crane.preset("tg3637").simulate(
+            Stick.rest(1.0), sea=np.full((600, 6), 3.0) * [0, 0, 0, 0, 1, 0]
+        )
     path.write_text("\n".join(["time [s];heave [m];roll [deg]", *rows[:100], *rows[301:]]), "utf-8")
     with pytest.raises(InputError, match="has no heave from 9.9 to 30.1 s"):
         ship_motion(path, {"heave": "heave"})

@@ -81,6 +81,7 @@ def test_verdicts_page_says_what_the_judgment_does(tmp_path, judged):
     text = tmp_path.joinpath("judge.html").read_text("utf-8")
     assert judged.verdict() in text
     assert text.count("<svg") == 3
+    assert "min-width: 600px" not in text  # figures are whole on a narrow screen
     assert not re.search(r"(src|href)\s*=\s*[\"']?(https?:)?//", text)
     rms = np.degrees(judged.counted("identified").mean())
     assert f"{rms:.2f}" in text

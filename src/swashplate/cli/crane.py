@@ -21,6 +21,8 @@ if TYPE_CHECKING:
     from swashplate.crane.control import Control
 
 VERDICT = Form("a verdict", (".html", ".csv", ".parquet"))
+LEAST_ALLOWED = 0.5
+"""Percent of seaways below which a share is probably meant."""
 START, AXES = ("slew_deg", "boom_deg", "rope_m"), ("hoist", "slew", "luff")
 
 app = typer.Typer(
@@ -54,7 +56,7 @@ class Placed:
 
         own = self.crane.endswith(".toml")
         made = Crane.from_toml(self.crane) if own else Crane.preset(self.crane)
-        return made.with_drive(**dict(pairs_of("--drive", self.drive, "luff=mine.toml")))
+        return made.with_drive(told=True, **dict(pairs_of("--drive", self.drive, "luff=mine.toml")))
 
     @property
     def pose(self) -> dict[str, Any]:
@@ -90,14 +92,14 @@ class Studied(Placed):
     Options:
       control CONTROL: Control, as of 'run' behind the colon; by default as it is designed for
           ideal drives.
-      sea SEA[,HEADING]: A sea and its heading, 90 abeam: ss2, ss3, ss3-swell, ss4; by default
-          ss3,90.
+      sea SEA[,HEADING]: A sea, ss2, ss3, ss3-swell or ss4, and where its waves come from: 0
+          astern, 90 starboard, 180 ahead, 270 port; by default ss3,90.
       seeds N: Number of seaways; judge takes 200 by default.
       drives NAMES: ideal: follow at once; identified: the crane's own; volts: these, 10 V for full
-          speed; drawn: from the errors of the fits given with --drive; by default
-          ideal,identified. A verdict is on the last.
-      scale AXIS.NAME=FACTOR: Drives with a lever or parameter moved, judged last:
-          luff.orifice=1.5. May be repeated.
+          speed; drawn: from the errors of the fits that the drives come from, while control
+          knows the fits; by default ideal,identified. A verdict is on the last.
+      scale AXIS.NAME=FACTOR: Drives with a lever or parameter moved, which control knows, judged
+          last: luff.orifice=1.5. May be repeated.
     """
 
     control: str = "feedback=0.2/0.2+ship+loop=1.5"
@@ -124,17 +126,17 @@ class Studied(Placed):
 
     def sets(self) -> dict[str, Any]:
         """Sets of drives by name."""
-        from swashplate.analysis.monte_carlo import stored_draws
-        from swashplate.analysis.whatif import find_lever, pulled
+        from swashplate.analysis.whatif import find_lever
 
         names = filter(None, map(str.strip, (self.drives or "ideal,identified").split(",")))
         sets: dict[str, Any] = {name: name for name in names}
         if "drawn" in sets:
-            pairs = pairs_of("--drive", self.drive, "luff=fitted")
-            draws = {axis: stored_draws(place) for axis, place in pairs if Path(place).is_dir()}
-            if not draws:
+            if not self.chosen.fits:
                 raise InputError("--drives drawn needs the folder of a fit: --drive luff=FOLDER.")
-            sets["drawn"] = self.chosen.drawn(**draws)
+            sets["drawn"] = self.chosen.drawn()
+            kept = [axis for axis in AXES if axis not in self.chosen.fits]
+            as_given = f"; as given, since they come from no fit: {', '.join(kept)}" if kept else ""
+            side.print(f"Drawn: {', '.join(self.chosen.fits)}{as_given}")
         crane, changed = self.chosen, []
         for name, text in pairs_of("--scale", self.scale, "luff.orifice=1.5"):
             (axis, _, lever), words = name.partition("."), f"--scale {name}={text}"
@@ -145,7 +147,7 @@ class Studied(Placed):
                 )
             find_lever(lever)
             factor = _number(words, text)
-            crane = crane.with_drive(**{axis: pulled(getattr(crane, axis), {lever: factor})})
+            crane = crane.upgraded(axis, {lever: factor})
             changed.append(f"{axis} {lever} ×{factor:g}")
         if changed:
             sets[", ".join(changed)] = crane
@@ -207,11 +209,11 @@ def run(
           repeated.
       duration S: Time for which an axis without target moves.
       length S: Length of the run.
-      sea SEA[,HEADING[,SEED]]: A seaway, its heading in degrees (90 abeam) and its seed: ss2, ss3,
-          ss3-swell, ss4.
+      sea SEA[,HEADING[,SEED]]: A sea, ss2, ss3, ss3-swell or ss4; where its waves come from, 0
+          astern, 90 starboard (the default), 180 ahead, 270 port; and its seed.
       variant DRIVES[:CONTROL]: Drives behind the stick and, after a colon, control: inverse (the
-          default), volts or ideal; zv-joint, zvd-tip, ei-tip and the like, feedback=GAIN/DELAY,
-          ship, clip=M, loop=GAIN, joined by +. May be repeated.
+          default, also called identified), volts or ideal; zv-joint, zvd-tip, ei-tip and the like,
+          feedback=GAIN/DELAY, ship, clip=M, loop=GAIN, joined by +. May be repeated.
       brake --brake/--no-brake: Whether a brake holds the hoist at rest.
       scene FILE: Write the scene that moves: .html.
 
@@ -234,8 +236,9 @@ def run(
             hoist=hoist, slew=slew, luff=luff, until=targets, duration=duration, length=length
         )
         for first in variant or ["inverse"]:
-            actuation, _, law = first.partition(":")
-            how: dict[str, Any] = {"actuation": actuation, "control": control_of(law)}
+            drives, _, law = first.partition(":")
+            how: dict[str, Any] = {"control": control_of(law)}
+            how["actuation"] = "inverse" if drives == "identified" else drives
             runs[first] = crane.simulate(stick, sea=seaway, brake=brake, **how, **placed.pose)
         tables = run_tables(runs)
     save(out, "All signals, in SI", runs[first].write)
@@ -244,7 +247,8 @@ def run(
         from swashplate.report.scene import write_scene
 
         save(scene, "Scene", lambda path: write_scene(runs, path))
-    _end(crane, tables)
+    low = [f"{name}: {each}" for name, run in runs.items() for each in run.sentences()]
+    _end(crane, tables, *low)
 
 
 def judge(
@@ -259,11 +263,13 @@ def judge(
     """Judge control on a crane's drives over many seaways.
 
     Every variant goes through the same seaways. Control fails if it makes the
-    swing worse than none in more than 5 % of them; the exit code is then 1, and
-    a larger orifice of the luff drive and a clip are tried.
+    swing worse than none in more than 5 % of them, as far as the 95 % interval
+    of that share tells; a larger orifice of the luff drive and a clip are then
+    tried. Where the interval holds the 5 % it is not decided, and the verdict
+    says how many seaways would do. The exit code is 0 only if control works.
 
     Options:
-      allowed PERCENT: Seaways in which control may be worse than none.
+      allowed PERCENT: Seaways in which control may be worse than none, in percent.
       remedies --remedies/--no-remedies: Whether to look for what would do.
       dask ADDRESS: Run on a Dask cluster: tcp://HOST:PORT.
       out FILE: Write the verdict's page, .html, or its numbers, .csv or .parquet.
@@ -273,25 +279,31 @@ def judge(
       swashplate crane judge tg3637 --scale luff.orifice=3 --out judge.html
       swashplate crane judge tg3637 --drive luff=fitted --drives identified,drawn
     """
+    if 0.0 < allowed < LEAST_ALLOWED:
+        raise InputError(
+            f"--allowed is in percent, and {allowed:g} % of the seaways would ask for thousands of "
+            f"them: did you mean --allowed {100.0 * allowed:g}?"
+        )
     more: dict[str, Any] = {"allowed": allowed / 100.0, "remedies": remedies}
     if dask is not None:
         from swashplate.executors import Dask
 
         more["executor"] = Dask(dask)
     found: Judgment = study.through(study.chosen.judge, **more)
-    write = found.write
+    what, write = "Numbers of every seaway, in SI", found.write
     if out is not None and out.suffix.lower() == ".html":
         from swashplate.report.scene import write_judgment
 
-        write = partial(write_judgment, found)
-    save(out, "Verdict", write)
+        what, write = "Verdict", partial(write_judgment, found)
+    save(out, what, write)
     draw(plot, "plot_judgment", found)
     _end(study.chosen, found.tables(), *found.sentences()[1:])
     say_saved()
+    headline = f"{found.outcome.capitalize()}: {found.verdict()}"
     if not found.passed:
-        side.print(f"Fails: {found.verdict()}")
+        side.print(headline)
         raise typer.Exit(1)
-    say(f"Works: {found.verdict()}")
+    say(headline)
 
 
 def follow(
@@ -304,7 +316,7 @@ def follow(
     """Show the largest sines of the tip that each axis can follow, and what seas ask for.
 
     Options:
-      sea SEA[,HEADING]: Only this sea; by default all.
+      sea SEA[,HEADING]: Only this sea, and where its waves come from, as of 'run'; by default all.
 
     For example:
       swashplate crane follow tg3637 --plot follow.png

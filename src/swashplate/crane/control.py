@@ -2,8 +2,10 @@
 
 Each is a value; `|` combines them: ``TipShaper("zv") | DelayedFeedback(0.2) | Clip()``. In the
 loop they act in one order, whatever order they are written in: joint shaper, path of the tip, tip
-shaper, offsets of the tip (feedback, ship, own), clip, inverse kinematics, position loop. The
-linear crane is for controllers that are designed outside the package.
+shaper, offsets of the tip (feedback, ship, own), clip, inverse kinematics, position loop. Every
+stage but a joint shaper works on the path of the tip, and brings the position loop of 0.7 /s with
+it, by which the shafts follow that path; `PositionLoop` sets another gain. The linear crane is for
+controllers that are designed outside the package.
 """
 
 from __future__ import annotations
@@ -136,7 +138,10 @@ class TipShaper(JointShaper):
 
 @dataclass(frozen=True)
 class DelayedFeedback(Control):
-    """Delayed position feedback (Masoud and Nayfeh): the tip follows the load of a moment ago."""
+    """Delayed position feedback (Masoud and Nayfeh): the tip follows the load of a moment ago.
+
+    It comes with a position loop of 0.7 /s, see `PositionLoop`.
+    """
 
     gain: float = 0.2
     """k, part of the load's horizontal distance from the tip that is added to the wanted tip."""
@@ -157,7 +162,7 @@ class Clip(Control):
     """Limit of what control may add to the operator's tip.
 
     It is static, so that it has no phase: it can take authority from the controller, but never feed
-    the swing.
+    the swing. Alone it still makes the path of the tip controlled, by a position loop of 0.7 /s.
     """
 
     size: float | Literal["auto"] = "auto"
@@ -170,7 +175,10 @@ class Clip(Control):
 
 @dataclass(frozen=True)
 class PositionLoop(Control):
-    """Loop that brings slew and luff back to the wanted path; 0.7 /s without one."""
+    """Loop that brings slew and luff back to the wanted path.
+
+    It belongs to every control of the tip; without this stage its gain is 0.7 /s.
+    """
 
     gain: float = 0.7
     """Speed added for each radian of a shaft's error. [1/s]"""
@@ -179,7 +187,10 @@ class PositionLoop(Control):
 
 @dataclass(frozen=True)
 class Law(Control):
-    """A law of one's own: an offset of the wanted tip, as a model of the engine with its state."""
+    """A law of one's own: an offset of the wanted tip, as a model of the engine with its state.
+
+    The position loop acts beside it, at 0.7 /s unless a `PositionLoop` says otherwise.
+    """
 
     model: Model
     """Its inputs are of `SEEN`, its signals or states among others `GIVES`."""

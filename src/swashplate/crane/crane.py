@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property, lru_cache
 from importlib.resources import files
 from math import cos, degrees, isfinite, radians, sin
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal, Protocol, Unpack
 
+import numpy as np
 from numpy.typing import ArrayLike
 from pydantic import BaseModel, ConfigDict, Field, FiniteFloat
 
 from swashplate.analysis.compensation import InverseMap, inverse_map
+from swashplate.analysis.whatif import pulled
 from swashplate.crane.control import linearize
 from swashplate.crane.kinematics import Boom, Geometry, Home, Vector, luff_rope
 from swashplate.crane.loop import DIRECT, IDEAL
@@ -74,6 +76,8 @@ GEOMETRY: Mapping[str, tuple[str, int, Literal["above 0", "at least 0", ""]]] = 
     "rope_limits": ("m", 2, ""),
 }
 """Quantities of a crane: SI unit, how many numbers it has, and their range."""
+LONGEST = 300.0
+"""Length on a crane, its rope apart, beyond which another unit is probably meant. [m]"""
 
 
 class CraneFile(BaseModel):
@@ -106,6 +110,10 @@ class Crane:
     hoist: Drive
     slew: Drive
     luff: Drive
+    known: Mapping[str, Drive] = field(default_factory=dict)
+    """Drives that control knows, by axis, where they are not those that move the crane."""
+    fits: Mapping[str, Path] = field(default_factory=dict)
+    """Folders of the fits that its drives come from, by axis."""
 
     def __post_init__(self) -> None:
         _ = self._si
@@ -130,26 +138,72 @@ class Crane:
         count = sum(each.status == "assumed" for each in self.quantities.values())
         return f"{count} of {len(self.quantities)} quantities" if count else ""
 
-    def with_drive(self, **drives: DriveLike) -> Crane:
+    def with_drive(self, *, told: bool = True, **drives: DriveLike) -> Crane:
         """The crane with other drives by axis.
 
-        Each is a drive, ``luff=crane.luff.scale(Z16=1.5)``; the result of a fit; or a place: a
-        packaged name, a parameter file, or the folder that a fit wrote.
+        Parameters
+        ----------
+        told : bool
+            Whether control knows the new drives, as after a redesign. If not, it counts on those
+            before, as where a drive has worn: inverse maps, the stick's full speed and the clip
+            are theirs.
+        **drives
+            Each is a drive, ``luff=crane.luff.scale(Z16=1.5)``; the result of a fit; or a place: a
+            packaged name, a parameter file, or the folder that a fit wrote.
         """
         check_names("A crane has no drive", drives, AXES, "it has")
-        made: dict[str, Any] = {axis: _drive(each, Path()) for axis, each in drives.items()}
-        return replace(self, **made)
+        made, fits = _drives(drives, Path())
+        known = {axis: drive for axis, drive in self.known.items() if axis not in made}
+        if not told:
+            known |= {axis: self.known_drive(axis) for axis in made}
+        fits |= {axis: place for axis, place in self.fits.items() if axis not in made}
+        return replace(self, known=known, fits=fits, **made)
+
+    def known_drive(self, axis: str) -> Drive:
+        """The drive of an axis as control knows it: its own, unless `known` has another."""
+        drive: Drive = self.known.get(axis, getattr(self, axis))
+        return drive
+
+    def upgraded(self, axis: str, levers: Mapping[str, float]) -> Crane:
+        """The crane with levers moved on the drive of an axis, which control knows, as redesigned.
+
+        Where control knows another drive of that axis, they are moved on that, too.
+        """
+        known = dict(self.known)
+        if axis in known:
+            known[axis] = pulled(known[axis], levers)
+        fits = {name: place for name, place in self.fits.items() if name != axis}
+        made: dict[str, Any] = {axis: pulled(getattr(self, axis), levers), "known": known}
+        return replace(self, fits=fits, **made)
 
     def drawn(self, **draws: Draws) -> tuple[Crane, ...]:
         """Cranes whose drives are drawn from the errors of fits, by axis; others keep their drive.
 
-        Draws are those of `analysis.monte_carlo.drives`: as many cranes as the shortest has, of
-        several axes the first with the first.
+        Control knows none of the draws: it counts on this crane's drives, which should be the
+        fitted ones. Draws are those of `analysis.monte_carlo.drives`, by default of the fits that
+        the drives come from: as many cranes as the shortest has. Those of each axis are shuffled by
+        themselves, so that draws of two axes from the same seed are not paired.
         """
+        from swashplate.analysis.monte_carlo import stored_draws
+
+        check_names("A crane has no drive", draws, AXES, "it has")
+        draws = draws or {
+            axis: stored_draws(place, drive=getattr(self, axis))
+            for axis, place in self.fits.items()
+        }
         if not draws:
-            raise InputError("Cranes are drawn from the draws of at least one axis.")
-        sets = zip(*(each.drives for each in draws.values()), strict=False)
-        return tuple(self.with_drive(**dict(zip(draws, each, strict=True))) for each in sets)
+            raise InputError(
+                "Cranes are drawn from the draws of at least one axis, but no drive of "
+                f"{self.name} comes from the folder of a fit, as luff=FOLDER."
+            )
+        shuffled: dict[str, Any] = {}
+        for axis, each in draws.items():
+            order = np.random.default_rng(AXES.index(axis)).permutation(len(each.drives))
+            shuffled[axis] = [each.drives[k] for k in order]
+        sets = zip(*shuffled.values(), strict=False)
+        return tuple(
+            self.with_drive(told=False, **dict(zip(shuffled, each, strict=True))) for each in sets
+        )
 
     def with_geometry(self, **changes: float | tuple[float, ...]) -> Crane:
         """The crane with other quantities, in SI and by name: ``boom_length=38.0``.
@@ -175,6 +229,11 @@ class Crane:
                 found = len(values)
                 raise ParameterError(f"{name}: {each} has {found} numbers, but needs {count}.")
             made[each] = tuple(to_si(v, entry.unit, unit, f"{name}: {each}") for v in values)
+            if unit == "m" and each != "rope_limits" and max(map(abs, made[each])) > LONGEST:
+                raise ParameterError(
+                    f"{name}: {each} is {max(map(abs, made[each])):g} m, but no crane is longer "
+                    f"than {LONGEST:g} m: look at its unit."
+                )
             value = made[each][0]
             if (rule and not value >= 0.0) or (rule == "above 0" and value == 0.0):
                 raise ParameterError(f"{name}: {each} is {value:g}, but must be {rule}.")
@@ -230,8 +289,8 @@ class Crane:
         return low, high
 
     def inverse(self, axis: str) -> InverseMap:
-        """Inverse map of the drive of an axis, ``"hoist"``, ``"slew"`` or ``"luff"``."""
-        return _inverse(getattr(self, axis))
+        """Inverse map of the drive that control knows of ``"hoist"``, ``"slew"`` or ``"luff"``."""
+        return _inverse(self.known_drive(axis))
 
     def home(self, slew_deg: float = 0.0, boom_deg: float = 45.0, rope_m: float = 20.0) -> Home:
         """Where a run starts; an `InputError` if boom or rope are beyond the crane's limits."""
@@ -353,21 +412,45 @@ def preset_text(name: str) -> str:
     return found[name].read_text("utf-8")
 
 
-def _drive(given: DriveLike, folder: Path) -> Drive:
-    """A drive as it is given; places are looked for in a folder, packaged names go first."""
+def _drives(given: Mapping[Any, DriveLike], folder: Path) -> tuple[dict[str, Any], dict[str, Path]]:
+    """Drives as they are given, and the folders of the fits that they come from; by axis."""
+    made, fits = {}, {}
+    for axis, each in given.items():
+        drive, place = _drive(each, folder, axis)
+        # a packaged drive or a Drive is put onto another axis knowingly, a fit or file hardly
+        named = isinstance(each, Drive) or str(each) in preset_names()
+        if not named and drive.name in AXES and drive.name != axis:
+            raise ParameterError(
+                f"{axis}: {place or 'the fit'} has a drive of the {drive.name}. If it moves the "
+                f"{axis} as well, give it another name."
+            )
+        if place and place.name == "drive.toml" and place.with_name("fit.json").is_file():
+            fits[axis] = place.parent
+        made[axis] = drive
+    return made, fits
+
+
+def _drive(given: DriveLike, folder: Path, axis: str) -> tuple[Drive, Path | None]:
+    """The drive of an axis as it is given, and its file, if it has one.
+
+    Places are looked for in a folder, packaged names go first.
+    """
     if not isinstance(given, str | Path):
         made = getattr(given, "drive", given)
         if isinstance(made, Drive):
-            return made
+            return made, None
     elif str(given) in preset_names():
-        return Drive.preset(str(given))
-    elif (place := folder / given).is_dir():
-        return Drive.from_toml(place / "drive.toml")
-    elif place.suffix == ".toml":
-        return Drive.from_toml(place)
+        return Drive.preset(str(given)), None
+    elif (place := folder / given).is_dir() or place.suffix == ".toml":
+        place = place / "drive.toml" if place.is_dir() else place
+        if place.is_file() and "runs" in parse_toml(read_text(place), str(place)):
+            raise ParameterError(
+                f"{axis}: {place} is a campaign: fit it first, and give the folder of the fit."
+            )
+        return Drive.from_toml(place), place
     raise ParameterError(
-        f"A crane's drive is a packaged one, {', '.join(preset_names())}, a .toml file, or the "
-        f"result or folder of a fit, but there is no such '{given}'."
+        f"{axis}: a crane's drive is a packaged one, {', '.join(preset_names())}, a .toml file, or "
+        f"the result or folder of a fit, but there is no such '{given}'."
     )
 
 
@@ -380,6 +463,6 @@ def _read(text: str, origin: str, folder: Path) -> Crane:
         extra = f", and knows no '{strange[0]}'" if strange else ""
         need = f"needs an entry '{lacks[0]}'" if lacks else f"has {len(GEOMETRY)} quantities"
         raise ParameterError(f"{origin}: geometry {need}{extra}.")
-    drives: dict[str, Any] = {axis: _drive(each, folder) for axis, each in content.drives.items()}
+    drives, fits = _drives(content.drives, folder)
     quantities = {name: content.geometry[name] for name in GEOMETRY}
-    return Crane(content.name, content.title, quantities, **drives)
+    return Crane(content.name, content.title, quantities, **drives, fits=fits)

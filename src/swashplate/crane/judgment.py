@@ -7,8 +7,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from math import cos, pi, radians, sin, sqrt
-from typing import TYPE_CHECKING, Any, NamedTuple
+from math import cos, inf, pi, radians, sin, sqrt
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -37,6 +37,27 @@ FACTORS = (1.25, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0)
 """Factors on the luff's orifice that are tried, the smallest first."""
 SHARES = (0.8, 0.6, 0.4)
 """Shares of what the luff can follow at which control is clipped on trial, the largest first."""
+ENOUGH = (
+    10,
+    15,
+    20,
+    30,
+    50,
+    75,
+    100,
+    150,
+    200,
+    300,
+    500,
+    700,
+    1000,
+    1500,
+    2000,
+    3000,
+    5000,
+    10_000,
+)
+"""Numbers of seaways that are advised where fewer do not decide."""
 BLOCK = 20
 """Seaways of a trial after which it is given up if it has failed already."""
 LOOP = PositionLoop()
@@ -94,6 +115,8 @@ def follow(
 ) -> Followable:
     """Largest amplitudes of the tip that each axis can follow over periods [s]; what seas ask for.
 
+    They are of the drives as control knows them, see `Crane.with_drive`.
+
     Seas are names of `SEA_STATES`; ship and heading are those of the seaway, by default the crane
     ship's hull in beam waves.
     """
@@ -138,8 +161,11 @@ class Estimate(NamedTuple):
     high: float
 
 
-def mean_of(values: Array) -> Estimate:
+def mean_of(values: Array, least: float = -inf) -> Estimate:
     """Mean of independent values with Student's interval; NaN are left out.
+
+    Values that cannot be below `least`, as a swing not below 0, have no interval that reaches
+    below it.
 
     Notes
     -----
@@ -155,17 +181,42 @@ def mean_of(values: Array) -> Estimate:
         return Estimate(mean, np.nan, np.nan)
     t = float(stdtrit(known.size - 1, 0.975))
     half = t * float(known.std(ddof=1)) / sqrt(known.size)
-    return Estimate(mean, mean - half, mean + half)
+    return Estimate(mean, max(mean - half, least), mean + half)
+
+
+def share_of(hits: int, seaways: int) -> Estimate:
+    """Share of independent seaways with its exact interval (Clopper and Pearson 1934)."""
+    from scipy.special import betaincinv
+
+    low = float(betaincinv(hits, seaways - hits + 1, 0.025)) if hits > 0 else 0.0
+    high = float(betaincinv(hits + 1, seaways - hits, 0.975)) if hits < seaways else 1.0
+    return Estimate(hits / seaways, low, high)
+
+
+def counted_words(share: Estimate, seaways: int) -> str:
+    """A share of seaways in words: ``"2 of 37 seaways (95 % interval 0.7 to 18.2 %)"``."""
+    low, high = 100.0 * share.low, 100.0 * share.high
+    of = f"{round(share.value * seaways)} of {count(seaways, 'seaway')}"
+    return f"{of} (95 % interval {low:.1f} to {high:.1f} %)"
+
+
+def more_seaways(share: float, seaways: int, allowed: float) -> str:
+    """How many more seaways than so many tell a share from the one allowed, if the share stays."""
+    for more in ENOUGH:
+        found = share_of(round(share * more), more)
+        if more > seaways and not found.low <= allowed <= found.high:
+            return f"about {more}"
+    return f"more than {ENOUGH[-1]}"
 
 
 class Remedy(NamedTuple):
-    """A change with which control passes."""
+    """A change with which control passes, or with which it is not decided whether it does."""
 
     what: str
     """In words: ``"luff orifice ×1.5"``."""
     size: float
     """Factor on the orifice, or size of the clip. [m]"""
-    worse: float
+    worse: Estimate
     """Share of seaways in which control is then worse than none."""
     swing: Estimate
     """Root mean square swing then. [rad]"""
@@ -183,7 +234,7 @@ class Judgment(Tabular):
     """Share of seaways in which control may be worse than none."""
     remedies: tuple[Remedy, ...] = ()
     tried: tuple[str, ...] = ()
-    """What was tried and does not do."""
+    """What was tried and is worse than none in more of the seaways than allowed."""
 
     figure = "plot_judgment"
 
@@ -209,18 +260,30 @@ class Judgment(Tabular):
         """Mean paired difference of the root mean square swing to another variant. [rad]"""
         return mean_of(self.counted(name) - self.counted(other))
 
-    def worse(self, name: str) -> float:
+    def worse(self, name: str) -> Estimate:
         """Share of seaways in which a variant swings more than no control, or was stopped."""
-        return float(_worse(self.counted(name), self.counted(NONE)).mean())
+        worse = _worse(self.counted(name), self.counted(NONE))
+        return share_of(int(worse.sum()), worse.size)
 
     def acting(self, name: str, axis: str, limit: Limit) -> float:
         """Mean share of time for which a limit of a drive acts; NaN if every run was stopped."""
         return mean_of(self.counted(name, f"{axis}_{str(limit.name).lower()}")).value
 
     @property
+    def outcome(self) -> Literal["works", "fails", "not decided"]:
+        """Whether the judged variant is worse than none as seldom as allowed, and has an effect.
+
+        Not decided where the interval of the share in which it is worse holds the one allowed.
+        """
+        share = self.worse(self.judged)
+        if share.low > self.allowed or self._idle:
+            return "fails"
+        return "works" if share.high <= self.allowed else "not decided"
+
+    @property
     def passed(self) -> bool:
-        """Whether the judged variant has an effect, and is worse than none as seldom as allowed."""
-        return self.worse(self.judged) <= self.allowed and not self._idle
+        """Whether the judged variant works."""
+        return self.outcome == "works"
 
     @property
     def _idle(self) -> bool:
@@ -229,26 +292,35 @@ class Judgment(Tabular):
 
     def verdict(self) -> str:
         """What the judged variant amounts to, and what would do if it fails."""
-        share, seaways = f"{self.worse(self.judged):.0%}", count(len(self.study.seeds), "seaway")
-        share = share.replace("%", " %")
+        share, seaways, outcome = self.worse(self.judged), len(self.study.seeds), self.outcome
+        worse = f"swing worse than none in {counted_words(share, seaways)}"
         none, own = (np.degrees(mean_of(self.counted(each)).value) for each in (NONE, self.judged))
-        if self.passed:
+        if outcome == "works":
             return (
                 f"With the drives '{self.judged}' the controller brings the swing from {none:.2f} "
-                f"to {own:.2f} deg RMS and makes it worse than none in {share} of {seaways}."
+                f"to {own:.2f} deg RMS and makes {worse}."
             )
         if self._idle:
             return (
                 f"With the drives '{self.judged}' the controller changes nothing: {none:.2f} deg "
-                f"RMS without it, {own:.2f} with it, in {seaways}."
+                f"RMS without it, {own:.2f} with it, in {count(seaways, 'seaway')}."
+            )
+        if outcome == "not decided":
+            return (
+                f"With the drives '{self.judged}' the controller makes {worse}: that does not say "
+                f"whether it is more than the {100.0 * self.allowed:g} % allowed. Run more seaways "
+                f"({more_seaways(share.value, seaways, self.allowed)})."
             )
         said = (
-            f"The controller makes swing worse than none in {share} of {seaways} ({none:.2f} deg "
-            f"RMS without, {own:.2f} with it){self._cause()}."
+            f"The controller makes {worse}: {none:.2f} deg RMS without it, {own:.2f} with it"
+            f"{self._cause()}."
         )
-        if self.remedies:
-            said += f" {' or '.join(each.what for each in self.remedies).capitalize()} would do."
-        elif self.tried:
+        for each in self.remedies:
+            more = more_seaways(each.worse.value, seaways, self.allowed)
+            sure = each.worse.high <= self.allowed
+            what = "would do" if sure else f"may do: run more seaways ({more})"
+            said += f" {each.what.capitalize()} {what}."
+        if self.tried and not self.remedies:
             said += f" None of these would do: {listed(self.tried)}."
         return said
 
@@ -260,8 +332,8 @@ class Judgment(Tabular):
         shares = [(self.acting(self.judged, a, each), a, each) for a in AXES for each in names]
         share, axis, limit = max(shares, key=lambda each: np.nan_to_num(each[0]))
         if np.isnan(share):
-            return ", and was stopped in all of them"
-        return f": {axis} at its {names[limit]} {100.0 * share:.0f} % of the time"
+            return "; it was stopped in all of them"
+        return f", {axis} at its {names[limit]} {100.0 * share:.0f} % of the time"
 
     def run(self, name: str, seed: int) -> CraneRun:
         """The whole run of a variant in one seaway; a `DomainError` if it was stopped."""
@@ -279,24 +351,32 @@ class Judgment(Tabular):
         return self.study.seeds[int(order[len(order) // 2])]
 
     def tables(self) -> list[Table]:
-        """Swing of each variant, paired differences, limits, and what was tried."""
+        """Swing of each variant, how often it is worse, paired differences, limits, remedies."""
+        seaways = len(self.study.seeds)
         interval = [Column(each, ".2f", "rad", none="–") for each in ("rms", "from", "to")]
         swings = Table(
-            f"Swing in {count(len(self.study.seeds), 'seaway')}, means with 95 % intervals",
+            f"Swing in {count(seaways, 'seaway')}, means with 95 % intervals",
             (
                 *(Column("variant", wrap=True), *interval),
                 Column("largest", ".2f", "rad", none="–"),
-                *(Column("worse than none", ".0%", none="–"), Column("stopped", "d")),
+                Column("stopped", "d"),
             ),
             "largest: median over the seaways of the largest swing",
         )
+        share = [Column("worse than none", ".1%"), Column("from", ".1%"), Column("to", ".1%")]
+        worse = Table(
+            "More swing than without control, 95 % intervals",
+            (Column("variant", wrap=True), Column("seaways", "d"), *share),
+        )
         for name in self.names:
             rms, largest = self.counted(name), self.counted(name, "largest_swing")
-            worse = np.nan if name == NONE else self.worse(name)
             known = largest[np.isfinite(largest)]
             median = float(np.median(known)) if known.size else np.nan
-            stopped, look = int(np.isnan(rms).sum()), worse > self.allowed
-            swings.add(name, *mean_of(rms), median, worse, stopped, look=look)
+            found = self.worse(name)
+            look = found.value > self.allowed
+            swings.add(name, *mean_of(rms, 0.0), median, int(np.isnan(rms).sum()), look=look)
+            if name != NONE:
+                worse.add(name, round(found.value * seaways), *found, look=look)
         spec = [Column(each, "+.2f", "rad", none="–") for each in ("difference", "from", "to")]
         heads = (Column("variant", wrap=True), Column("less", wrap=True), *spec)
         paired = Table("Differences of RMS swing within each seaway", heads)
@@ -309,12 +389,12 @@ class Judgment(Tabular):
             if self.study.cases[name].driven
             for axis in AXES
         ]
-        columns = (Column("remedy"), Column("worse than none", ".0%"), *interval)
+        columns = (Column("remedy"), *share, *interval)
         said = f"tried on the crane's own drives; a clip with a position loop of {LOOP.gain:g} /s"
-        remedies = Table("What would do", columns, said)
+        remedies = Table("Remedies", columns, said)
         for each in self.remedies:
-            remedies.add(each.what, each.worse, *each.swing)
-        return [swings, paired, limit_table(acting), *([remedies] if self.remedies else [])]
+            remedies.add(each.what, *each.worse, *each.swing)
+        return [swings, worse, paired, limit_table(acting), *([remedies] if self.remedies else [])]
 
     def to_polars(self) -> polars.DataFrame:
         """Numbers of every variant in every seaway, SI, shares of time of limits."""
@@ -332,8 +412,8 @@ class Judgment(Tabular):
         study, assumed = self.study, self.study.crane.assumed
         rests = (
             f"Swing counts from {study.start:g} s to {study.cases[NONE].stick.length:g} s of each "
-            "seaway. Control fails if it is worse than none in more than "
-            f"{100.0 * self.allowed:.0f} % of them."
+            "seaway. Control works if it is worse than none in at most "
+            f"{100.0 * self.allowed:g} % of them; the 95 % interval of that share decides."
         )
         crane = (f"{assumed} of the crane are assumed.",) if assumed else ()
         return (self.verdict(), rests, *crane)
@@ -362,7 +442,7 @@ def judge(
         Share of seaways in which control may be worse than none.
     remedies : bool
         Whether to look for a larger orifice of the luff and for a clip that would do on the crane's
-        own drives, if control fails.
+        own drives, if control fails: the least of each that surely does, else the least that may.
     **study
         Seaways, drives, stick, where each run begins: see `Study.of`. The verdict is on the last of
         the drives.
@@ -375,7 +455,7 @@ def judge(
     made = Judgment(asked, asked.outcomes(list(asked.cases.values())), allowed)
     case = asked.cases[made.judged]
     law = case.setup["control"]
-    if made.passed or not remedies or not case.driven or law is None:
+    if made.outcome != "fails" or not remedies or not case.driven or law is None:
         return made
     # factors are of the crane as it is built, whatever was judged
     cranes = (crane,) if len(case.cranes) == 1 else case.cranes
@@ -391,13 +471,18 @@ def judge(
     found: list[Remedy] = []
     tried: list[str] = []
     for trials in (larger, clipped):
+        may: list[Remedy] = []
         for what, size, built, control in trials:
             values = _trial(made, case.moved(control=control)._replace(cranes=built))
-            if values is not None:
-                worse = float(_worse(values, made.counted(NONE)).mean())
-                found.append(Remedy(what, size, worse, mean_of(values)))
+            if values is None:
+                tried.append(what)
+                continue
+            worse = share_of(int(_worse(values, made.counted(NONE)).sum()), values.size)
+            may.append(Remedy(what, size, worse, mean_of(values, 0.0)))
+            if worse.high <= allowed:
                 break
-            tried.append(what)
+        # the last one if that surely does, else the least
+        found += may[-1:] if may and may[-1].worse.high <= allowed else may[:1]
     return replace(made, remedies=tuple(found), tried=tuple(tried))
 
 

@@ -15,6 +15,7 @@ from swashplate.crane.loop import ROWS, Fixed
 from swashplate.crane.rope import GRAVITY
 from swashplate.crane.stepper import ACTUATIONS, RATE
 from swashplate.crane.stick import AXES, check_names
+from swashplate.crane.transfer_functions import MOTIONS
 from swashplate.errors import InputError
 from swashplate.results import Tabular
 from swashplate.simulation.result import Limit, Named, Simulation
@@ -196,14 +197,26 @@ class CraneRun(Tabular):
         """What the run amounts to, and what limits its drives."""
         return run_tables({self.actuation: self})
 
+    def sentences(self) -> tuple[str, ...]:
+        """Where the load goes under water, as far as that is known."""
+        lowest = float(self.load[:, 2].min())
+        if lowest >= 0.0:
+            return ()
+        return (
+            f"The load is down to z = {lowest:.1f} m, below the point of the ship that its motion "
+            "is given for, near the waterline. Water is not in the model.",
+        )
+
     def to_polars(self) -> polars.DataFrame:
-        """All signals, a row for each sample, in SI."""
+        """All signals and the ship's motion, a row for each sample, in SI."""
         import polars as pl
 
         columns = {"time": self.time}
         columns |= {f"stick_{axis}": self.stick[:, i] for i, axis in enumerate(AXES)}
         columns |= {name: self[name] for name in ROWS}
         columns["swing"] = np.radians(self.swing_deg)
+        moving = self.ship.shape[1] > 1
+        columns |= {name: self.ship[:, i if moving else 0] for i, name in enumerate(MOTIONS)}
         return pl.DataFrame(columns)
 
 
@@ -241,7 +254,8 @@ def limit_table(rows: Iterable[tuple[str, str, Iterable[float]]]) -> Table:
     heads = [str(each.name).lower().replace("_", " ") for each in PUMPS]
     numbers = [Column(each, ".1%", none="–") for each in heads]
     columns = (Column("variant", wrap=True), Column("axis"), *numbers)
-    made = Table("Share of time for which limits act", columns)
+    said = "dead zone: the current is within that of the solenoids"
+    made = Table("Share of time for which limits act", columns, said)
     for name, axis, shares in rows:
         made.add(name, axis, *shares)
     return made

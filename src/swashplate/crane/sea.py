@@ -28,6 +28,8 @@ LONGEST_HOLE = 1.0
 """Time without a sample in a log of motions that is a hole, where samples are closer. [s]"""
 COARSE = 8.0
 """Rate at which motion and two derivatives are summed up before they are joined smoothly. [Hz]"""
+STEEPEST = 1.0
+"""Roll, pitch or yaw beyond which a measured motion is probably in degrees. [rad]"""
 LEAST_ENERGY, MOST_LOST = 0.5, 0.05
 """Part of a spectrum's energy that must lie within the band; largest part of a sea's that may lie
 beyond a file's frequencies, where the motions of its ends are taken."""
@@ -111,7 +113,8 @@ class Seaway(Result):
     sea: str | Spectrum = "ss3"
     """A name of `SEA_STATES`, or a spectrum."""
     heading_deg: float = 90.0
-    """0 following, 90 abeam to port, 180 head sea."""
+    """Where the waves run, from the bow to port: 0 following, 90 abeam from starboard, 180 head
+    sea, 270 abeam from port."""
     seed: int = 0
     """Of the components."""
     ship: Hull | TransferFunctions = field(default=CRANE_SHIP, repr=False)
@@ -216,7 +219,8 @@ def ship_motion(
     FileError
         If the file cannot be read; it names file, column and row.
     InputError
-        For a motion or column that there is not, or fewer than four samples.
+        For a motion or column that there is not, fewer than four samples, or a rotation beyond
+        1 rad.
     """
     from scipy.interpolate import CubicSpline
 
@@ -243,7 +247,19 @@ def ship_motion(
             made = np.zeros((int((time[-1] - time[0]) * rate + 1e-6) + 1, 6))
         grid = time[0] + np.arange(len(made)) / rate
         made[:, MOTIONS.index(motion)] = CubicSpline(time, values)(grid)
+    _check_rotations(made, str(path))
     return made
+
+
+def _check_rotations(motion: Array, of: str) -> None:
+    """Refuse rotations beyond `STEEPEST`."""
+    most = np.abs(motion[:, 3:]).max(axis=0, initial=0.0)
+    worst = int(np.argmax(most))
+    if most[worst] > STEEPEST:
+        raise InputError(
+            f"{of}: {MOTIONS[3 + worst]} reaches {most[worst]:.3g} rad, which no ship does. If it "
+            f"is in degrees, say so in the log's header, {MOTIONS[3 + worst]} [deg], or convert it."
+        )
 
 
 def motion_of(sea: Seaway | ArrayLike | None, count: int, rate: float) -> Array:
@@ -266,6 +282,7 @@ def motion_of(sea: Seaway | ArrayLike | None, count: int, rate: float) -> Array:
             f"The stick is {(count - 1) / rate:g} s long, but the ship's motion only "
             f"{(len(made) - 1) / rate:g} s at {rate:g} Hz."
         )
+    _check_rotations(made, "The sea's motion")
     return made[:count]
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from functools import lru_cache
-from math import degrees, inf, isfinite, pi, sin, sqrt
+from math import atan2, degrees, hypot, inf, isfinite, pi, sin, sqrt
 from numbers import Real
 from typing import TYPE_CHECKING, Any, Literal, TypedDict, Unpack, get_args
 
@@ -44,35 +44,51 @@ would swing against each other from sample to sample."""
 
 
 class Setup(TypedDict, total=False):
-    """How a run is set up: keywords of `Crane.simulate` and `Crane.stepper`."""
+    """How a run is set up: keywords of `Crane.simulate` and `Crane.stepper`, each as it likes.
+
+    Keys
+    ----
+    control : Control, default None
+        Of `swashplate.crane.control`; by default the stick's commands as they are.
+    actuation : {"inverse", "volts", "ideal", "direct"}, default "inverse"
+        What makes speeds of wanted speeds: the real drives behind their inverse maps, or behind
+        10 V for full speed (``"volts"``); or drives that follow at once within their limits of
+        speed (``"ideal"``). A stepper also takes voltages (``"direct"``).
+    slew_deg : float, default 0, in studies 90
+        From forward to starboard.
+    boom_deg : float, default 45
+        The boom's elevation.
+    rope_m : float, default 20, in studies 27
+        Rope below the tip.
+    load : float, default the crane's safe load, which is also the largest
+        Its mass. [kg]
+    suspension : Suspension, default a point on a rigid rope
+        Elastic rope, hook with slings.
+    loaded : bool, default False
+        Whether the rope loads the drives: its tension is a torque on each shaft, by virtual work,
+        which they take a sample later as their ``load_torque``. Off, as their tests were without
+        load; drives feel it by their ``motor_leakage`` and ``line_stiffness``. What the boom weighs
+        is not in it.
+    drag_area : float, default 0
+        C_d A of the load. [m²]
+    wind : (float, float), default (0, 0)
+        Forward and to port. [m/s]
+    brake : bool, default True
+        Whether a brake holds the hoist 0.3 s after its voltage has come into the dead zone. A
+        voltage at its edge keeps the brake open.
+    """
 
     control: Control | None
-    """Of `swashplate.crane.control`; by default the stick's commands as they are."""
     actuation: Actuation
-    """What makes speeds of wanted speeds: the real drives behind their inverse maps, ``"inverse"``
-    (the default), or behind 10 V for full speed, ``"volts"``; or drives that follow at once within
-    their limits of speed, ``"ideal"``. A stepper also takes voltages, ``"direct"``."""
     slew_deg: float
     boom_deg: float
     rope_m: float
-    """Slew from forward to starboard, boom's elevation, rope below the tip; by default 0, 45 and
-    20, in studies 90, 45 and 27."""
     load: float | None
-    """Its mass, by default the safe load. [kg]"""
     suspension: Suspension
-    """Elastic rope, hook with slings; by default a point on a rigid rope."""
     loaded: bool
-    """Whether the rope loads the drives: its tension is a torque on each shaft, by virtual work,
-    which they take a sample later as their ``load_torque``. Off by default, as their tests were
-    without load; drives feel it by their ``motor_leakage`` and ``line_stiffness``. What the boom
-    weighs is not in it."""
     drag_area: float
-    """C_d A of the load. [m²]"""
     wind: tuple[float, float]
-    """Forward and to port. [m/s]"""
     brake: bool
-    """Whether a brake holds the hoist 0.3 s after its command has returned to the dead zone; on by
-    default."""
 
 
 class CraneStepper:
@@ -134,7 +150,8 @@ class CraneStepper:
         Returns
         -------
         dict
-            Signals by name, as of a run, SI; errors are those of `Crane.simulate`.
+            Signals by name as of `CraneRun.rows`, and the angle ``swing``, SI; errors are those of
+            `Crane.simulate`.
         """
         most = FULL_VOLTAGE if self.fixed.actuation == loop.DIRECT else 1.0
         commands = np.array([command], dtype=np.float64)
@@ -146,8 +163,10 @@ class CraneStepper:
         return self.named(self.take(commands, motion)[0])
 
     def named(self, row: Array) -> dict[str, float]:
-        """Signals of a row that `take` returns, by name."""
-        return dict(zip(ROWS, row.tolist(), strict=True))
+        """Signals of a row that `take` returns, by name, and the swing."""
+        made = dict(zip(ROWS, row.tolist(), strict=True))
+        x, y, down = (made[f"tip_{axis}"] - made[f"load_{axis}"] for axis in "xyz")
+        return made | {"swing": atan2(hypot(x, y), down)}
 
     def take(self, commands: Array, ship: Array) -> Array:
         """Advance by many samples at once: a row for each, a column for each of `step`'s signals.
@@ -234,6 +253,11 @@ def _fixed(
     pair = np.array(wind, dtype=object)
     if pair.shape != (2,) or not all(isinstance(v, Real) and isfinite(v) for v in pair):
         raise InputError(f"wind is {wind!r}, but must be two speeds, forward and to port, in m/s.")
+    if load > crane.safe_load:
+        raise InputError(
+            f"The load is {load:g} kg, but {crane.name} lifts {crane.safe_load:g} kg: take less, "
+            "or a crane with another safe_load."
+        )
     drag = AIR * drag_area / (2.0 * load) if load > 0.0 else 0.0  # which the suspension refuses
     if loaded:
         _check_loaded(crane, actuation, load + suspension.hook, suspension)

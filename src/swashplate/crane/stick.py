@@ -73,8 +73,8 @@ class Stick(Result):
         hoist, slew, luff : float
             Part of the full speed, -1 to 1, its sign that of the way.
         until : mapping of str to float, optional
-            Where an ideal drive would end: ``slew_deg`` from forward, ``boom_deg``, ``rope_m``;
-            each needs the command of its axis.
+            Where an ideal drive would end: ``slew_deg`` from forward, ``boom_deg``, ``rope_m``,
+            with what the luff pays out; each needs the command of its axis.
         duration : float, optional
             Of an axis without target. [s]
         start, ramp, length : float
@@ -136,25 +136,31 @@ class Stick(Result):
             busy = np.flatnonzero(np.any(self.samples != 0.0, axis=1))
             return made, float(grid[busy[-1]]) if busy.size else 0.0
         made, end, g = np.zeros((time.size, 3)), 0.0, crane.geometry
-        for axis, part in self.parts.items():
+        turned = 0.0  # by the shaft of the luff, whose way pays out rope below the tip
+        for axis in ("luff", "hoist", "slew"):
+            if axis not in self.parts:
+                continue
+            part = self.parts[axis]
+            low, high = crane.inverse(axis).limits
+            speed = part * high if part > 0.0 else -part * low
             # time from zero to zero that brings an ideal drive to its target
             name, lasts = TARGETS[axis], self.duration or 0.0
             if name in self.until:
                 target = self.until[name]
                 boom = Boom(cos(radians(target)), sin(radians(target)))
                 way = (
-                    (home.rope - target) / g.hoist,
+                    (home.rope - target + g.coupling * g.luff * turned) / g.hoist,
                     radians(target) - home.slew,
                     (home.luff_rope - luff_rope(boom, g)) / g.luff,
                 )[AXES.index(axis)]
-                low, high = crane.inverse(axis).limits
-                speed = part * high if part > 0.0 else -part * low
                 if way * speed <= 0.0:
                     raise InputError(
                         f"The {axis} leads away from {name} = {target:g}, or is there already: "
                         "change the sign of its command or the target."
                     )
                 lasts = way / speed + self.ramp
+            if axis == "luff":
+                turned = speed * (lasts - self.ramp)
             if lasts < 2.0 * self.ramp:
                 raise InputError(
                     f"The {axis} moves for {lasts:.3g} s, less than its two ramps of "

@@ -13,7 +13,6 @@ from typing import Any, NamedTuple, Unpack
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from swashplate.analysis.whatif import pulled
 from swashplate.crane.control import Control
 from swashplate.crane.crane import Crane, begun
 from swashplate.crane.result import PUMPS, CraneRun, swing_of
@@ -348,4 +347,4 @@ def with_orifice(cranes: tuple[Crane, ...], factor: float) -> tuple[Crane, ...]:
     """Cranes with another in-line orifice of their luff drives; the same ones for a factor of 1."""
     if factor == 1.0:
         return cranes
-    return tuple(each.with_drive(luff=pulled(each.luff, {"orifice": factor})) for each in cranes)
+    return tuple(each.upgraded("luff", {"orifice": factor}) for each in cranes)

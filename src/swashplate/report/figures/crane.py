@@ -189,7 +189,7 @@ def plot_sweep(result: Sweep, *, limit_deg: float = 3.0, title: str = "") -> Fig
             ax.plot(points, np.maximum(values[0, :, k, 1], LEAST), marker="o", ms=3.0, **how)
             ends[0].plot(points, values[0, :, k, 2], marker="o", ms=3.0, **how)
         else:
-            found = np.array([mean_of(values[:, n, k, 0]) for n in range(points.size)])
+            found = np.array([mean_of(values[:, n, k, 0], 0.0) for n in range(points.size)])
             middle, low, high = np.maximum(found, LEAST).T
             ax.fill_between(points, low, high, color=color, alpha=0.15, linewidth=0.0)
             ax.plot(points, middle, **how)
@@ -283,14 +283,15 @@ def plot_judgment(result: Judgment, *, title: str = "") -> Figure:
         values = np.degrees(result.counted(name))
         known = values[np.isfinite(values)]
         edge = max(edge, float(known.max(initial=0.0)))
-        share = result.worse(name) if name in result.names[1:] else 0.0
+        share = result.worse(name).value if name in result.names[1:] else 0.0
         color = style.VERMILION if share > result.allowed else style.BLUE
         spread = row + random.uniform(-0.25, 0.25, known.size)
         ax.plot(known, spread, "o", color=color, ms=3.2, alpha=0.45, mew=0.0)
-        mean = mean_of(known)
+        mean = mean_of(known, 0.0)
         ax.hlines(row, mean.low, mean.high, color=style.INK, linewidth=3.0)
         ax.vlines(mean.value, row - 0.3, row + 0.3, color=style.INK, linewidth=1.6)
-        worse = f"\nworse than none: {100.0 * share:.0f} %" if name in result.names[1:] else ""
+        of = f"{round(share * values.size)} of {values.size}"
+        worse = f"\nworse than none: {of}" if name in result.names[1:] else ""
         labels.append(name + worse)
     ax.grid(False, axis="y")
     ax.set_yticks(range(len(names)), labels, fontsize=style.NORMAL)

@@ -119,7 +119,7 @@ def write_judgment(judgment: Judgment, path: str | Path) -> None:
     study, judged = judgment.study, judgment.judged
     crane, setup = study.crane, study.cases[NONE].setup
     pose = {name: setup[name] for name in ("slew_deg", "boom_deg", "rope_m")}
-    swings, differences, limits, *remedies = judgment.tables()
+    swings, worse, differences, limits, *remedies = judgment.tables()
     verdict, *rests = judgment.sentences()
     # a scene alone needs no figures
     from swashplate.report.figures.crane import (
@@ -130,9 +130,12 @@ def write_judgment(judgment: Judgment, path: str | Path) -> None:
     )
     from swashplate.report.fit_report.summary import light
 
-    look: Light = "good" if judgment.passed else "bad"
+    outcome = judgment.outcome
+    looks: dict[str, Light] = {"works": "good", "not decided": "look", "fails": "bad"}
+    look = looks[outcome]
+    headline = f"{outcome.capitalize()}: {verdict}"
     summary = [
-        Block("verdict", (light(look, "works" if judgment.passed else "fails"), verdict), look),
+        Block("verdict", (light(look, outcome), headline), look),
         _drawn(plot_judgment(judgment), "Swing of each variant in each seaway"),
         *(block for each in remedies for block in titled(each)),
     ]
@@ -159,10 +162,11 @@ def write_judgment(judgment: Judgment, path: str | Path) -> None:
             drives = count(len(case.cranes), "crane") if case.driven else "ideal drives"
             basis.append(f"{name}: {case.setup['control']!r}, {drives}.")
     basis += [f"{axis}: {getattr(crane, axis).parameters.title}." for axis in ("slew", "luff")]
+    blocks = [block for each in (swings, worse, differences) for block in titled(each)]
     geometry = Block("details", [Block("table", crane.table())], "Geometry, with its sources")
     sections = [
         Section("summary", "Summary", [*summary, *listed_block(rests)]),
-        Section("swing", "Swing", [text(IN_WORDS), *titled(swings), *titled(differences)]),
+        Section("swing", "Swing", [text(IN_WORDS), *blocks]),
         Section("limits", "Limits of the drives", limiting),
         Section("example", "One of the seaways", example),
         Section("basis", "What it rests on", [*listed_block(basis), geometry, text(ASSUMED)]),
@@ -178,7 +182,7 @@ def write_judgment(judgment: Judgment, path: str | Path) -> None:
 
 
 def _drawn(figure: Figure, caption: str) -> Block:
-    """A figure as SVG within the page, as wide as there is room."""
+    """A figure as SVG within the page, whole on a narrow screen as well."""
     from matplotlib import rc_context
 
     written = StringIO()
@@ -186,5 +190,4 @@ def _drawn(figure: Figure, caption: str) -> Block:
         figure.savefig(written, format="svg", metadata={"Date": None})
     drawn = written.getvalue()
     drawn = drawn[drawn.index("<svg") :]
-    look = '<svg class="chart" style="min-width: 600px"'
-    return Block("figure", Markup(drawn.replace("<svg", look, 1)), caption)
+    return Block("figure", Markup(drawn.replace("<svg", '<svg class="chart"', 1)), caption)
