@@ -37,26 +37,7 @@ FACTORS = (1.25, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0)
 """Factors on the luff's orifice that are tried, the smallest first."""
 SHARES = (0.8, 0.6, 0.4)
 """Shares of what the luff can follow at which control is clipped on trial, the largest first."""
-ENOUGH = (
-    10,
-    15,
-    20,
-    30,
-    50,
-    75,
-    100,
-    150,
-    200,
-    300,
-    500,
-    700,
-    1000,
-    1500,
-    2000,
-    3000,
-    5000,
-    10_000,
-)
+ENOUGH = (10, 20, 30, 50, 75, 100, 150, 200, 300, 500, 700, 1000, 1500, 2000, 3000, 5000, 10_000)
 """Numbers of seaways that are advised where fewer do not decide."""
 BLOCK = 20
 """Seaways of a trial after which it is given up if it has failed already."""
