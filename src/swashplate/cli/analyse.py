@@ -78,8 +78,9 @@ def limits(
         show(found.table())
         return
     with working("Simulating"):
-        name, run = words.simulated(drive.chosen, command, sampling)
-        shares = shares_of(drive.chosen, run, sampling.start)
+        chosen = words.at_rate(drive.chosen, sampling.rate)
+        name, run = words.simulated(chosen, command, sampling)
+        shares = shares_of(chosen, run, sampling.start)
     title = f"{drive.title}, {name}"
     save(out, "Shares of each limit, in SI", shares.write)
     draw(plot, "plot_limit_timeline", run, wanted=shares.wanted, title=title)
@@ -298,12 +299,13 @@ def compensate(
 
     check_output(out, compensation.INVERSE_MAP)
     with working("Inverting"):
-        found, bought = compensation.inverse_map(drive.chosen, points), None
+        chosen = words.at_rate(drive.chosen, sampling.rate)
+        found, bought = compensation.inverse_map(chosen, points), None
         tables = found.tables([radians(each) for each in speeds_deg_s or ()])
         if stick is not None:
-            name, run = words.simulated(drive.chosen, stick, sampling)
+            name, run = words.simulated(chosen, stick, sampling)
             wanted = compensation.wanted_of_stick(found, run["voltage"])
-            bought = compensation.improvement(drive.chosen, wanted, run.record.rate, inverse=found)
+            bought = compensation.improvement(chosen, wanted, run.record.rate, inverse=found)
             tables.append(replace(bought.table(), title=f"Error of the speed under {name}"))
     save(out, "Inverse map, in SI", found.write)
     draw(plot, "plot_compensation", found, bought)
@@ -471,7 +473,7 @@ def full_order(
         raise InputError("--plot draws one run; name a maneuver or a log, such as step:9.")
     given = words.physical_values(physical or ())
     with working("Completing the physical values"):
-        chosen = drive.chosen
+        chosen = words.at_rate(drive.chosen, sampling.rate)
         axis = physical_set.nearest_set(chosen.name) if like is None else like
         whole = full.FullOrderDrive.from_drive(chosen.plain, axis, **given)
         tables = [physical_set.choices_table(axis, given), whole.modes().table()]

@@ -44,7 +44,8 @@ def simulate(
     with working("Simulating"):
         from swashplate.analysis.outcomes import run_tables
 
-        name, run = words.simulated(drive.chosen, command, sampling)
+        chosen = words.at_rate(drive.chosen, sampling.rate)
+        name, run = words.simulated(chosen, command, sampling)
         tables, title = run_tables(run), f"{drive.title}, {name}"
     save(out, "All signals, in SI", run.write)
     window = words.window_of(run.time, begin, end)
@@ -80,7 +81,7 @@ def compare(
     with working("Simulating"):
         from swashplate.analysis.outcomes import rms_difference, side_by_side
 
-        pair = (words.drive_of(first), words.drive_of(second))
+        pair = [words.at_rate(words.drive_of(each), rate) for each in (first, second)]
         labels = [each.name for each in pair]
         if labels[0] == labels[1]:  # then by what was typed
             labels = [first, second if second != first else f"{second} (2)"]

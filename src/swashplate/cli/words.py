@@ -336,6 +336,21 @@ def maneuver_of(word: str, *drives: Drive) -> Maneuver:
         ) from None
 
 
+def at_rate(drive: Drive, rate: float) -> Drive:
+    """The drive for a rate: a recursion for another one becomes its equation, said in a note."""
+    from swashplate.cli.terminal import note
+    from swashplate.equations.marching.record import least_substeps
+
+    own, marched = drive.parameters.rate, rate * least_substeps(rate)
+    if own is None or abs(marched / own - 1.0) < 1e-9:
+        return drive
+    note(
+        f"{drive.name}: the card's filter is a recursion for {own:g} Hz; at {marched:g} Hz the "
+        "differential equation with the same poles takes its place."
+    )
+    return drive.at_every_rate()
+
+
 def simulated(drive: Drive, command: str, options: Sampling) -> tuple[str, Simulation]:
     """Name of a command, a maneuver or a file, and the drive's simulation over it."""
     from swashplate.logs import open_log, read_series
@@ -406,5 +421,6 @@ def trial_of(drive: Drive, command: str, options: Sampling) -> tuple[str, Trial]
     """Name of a command, a maneuver or a log, and the trial that it makes."""
     from swashplate.analysis.outcomes import trial
 
+    drive = at_rate(drive, options.rate)
     name, run = simulated(drive, command, options)
     return name, trial(drive, run["voltage"], options.rate)
