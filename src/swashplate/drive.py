@@ -328,12 +328,14 @@ class Drive(Result):
         *,
         interpolation: Interpolation = "linear",
         start: Start = "rest",
+        measured: Sequence[str] = (),
     ) -> Stepper[Sample]:
         """The drive one sample at a time: command in, sample out, numbers as in `simulate`.
 
-        `h` is the interval between samples [s]; other arguments as in `simulate`.
+        `h` is the interval between samples [s]; other arguments as in `simulate`. Of `measured`,
+        such as ``("load_torque", "pump_speed")``, each step takes a number behind the voltage.
         """
-        return drive_stepper(self.parameters, h, interpolation, start)
+        return drive_stepper(self.parameters, h, interpolation, start, measured)
 
     def compiled_step(
         self,

@@ -75,6 +75,31 @@ def test_bad_command_leaves_the_state(hoist: Drive) -> None:
     assert (stepper.state.machine.lines == before.machine.lines).all()
 
 
+@pytest.mark.parametrize("rate", [512.0, 200.0])
+def test_what_is_measured_goes_into_a_step_as_into_a_simulation(hoist: Drive, rate: float) -> None:
+    drive, n = hoist.replace(load_inertia=5e3, motor_leakage=1e-6), np.arange(1200)
+    voltage, load = 6.0 * np.sign(np.sin(n / 200.0)), 2e4 * np.cos(n / 60.0)
+    given = {"load_torque": load, "pump_speed": 1.0 - 0.1 * (n > 800)}
+    stepper = drive.stepper(1.0 / rate, interpolation="previous", measured=tuple(given))
+    made = [stepper.step(*each).shaft_speed for each in zip(voltage, *given.values(), strict=True)]
+    run = drive.simulate(voltage, rate, interpolation="previous", **given)
+    assert made == run.shaft_speed.tolist()
+
+
+@pytest.mark.parametrize(
+    ("measured", "inputs", "said"),
+    [
+        (["lod"], (1.0, 2.0), "hoist has no input 'lod'; it has voltage, pump_speed"),
+        (["pump_speed"], (1.0, -1.0), "pump_speed is -1.0, but must be .* of 0 or above"),
+        (["supply_pressure"], (1.0, 0.0), "supply_pressure is 0.0, but must be .* of 1 or above"),
+        (["pump_speed"] * 2, (1.0, 1.0, 1.0), "takes each input once"),
+    ],
+)
+def test_measured_inputs_without_sense_are_refused(hoist: Drive, measured, inputs, said) -> None:
+    with pytest.raises(InputError, match=said):
+        hoist.stepper(measured=measured).step(*inputs)
+
+
 def test_state_of_another_rate_is_refused(hoist: Drive) -> None:
     with pytest.raises(InputError, match="of another model, delay or rate"):
         hoist.stepper(1e-3).state = hoist.stepper(1e-4).state

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import sys
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -135,7 +136,11 @@ class Sample(NamedTuple):
 
 
 def drive_stepper(
-    parameters: ParameterSet, h: float, interpolation: Interpolation, start: Start
+    parameters: ParameterSet,
+    h: float,
+    interpolation: Interpolation,
+    start: Start,
+    measured: Sequence[str],
 ) -> Stepper[Sample]:
     """The drive one sample at a time; see `Drive.stepper`."""
     check_rate(h, "sample interval", "s")
@@ -146,14 +151,17 @@ def drive_stepper(
     check_filter_stability(parameters, 1.0 / (rate * substeps))
     return Stepper(
         instance_of(parameters, True),
-        ("voltage",),
+        ("voltage", *measured),
         Sample._fields[1:],
         rate,
-        Sample._make,
+        lambda values: Sample(values[0], *values[1 + len(measured) :]),
         start,
-        interpolation=interpolation,
+        interpolation={"voltage": interpolation, **dict.fromkeys(measured, "linear")},
         substeps=substeps,
-        bound=FULL_VOLTAGE,
+        ranges={
+            "voltage": (-FULL_VOLTAGE, FULL_VOLTAGE),
+            **{name: (least, sys.float_info.max) for name, (least, _) in LEAST.items()},
+        },
     )
 
 

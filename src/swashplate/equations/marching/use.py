@@ -7,6 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from difflib import get_close_matches
 from functools import cached_property, lru_cache
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, ClassVar, Generic, NamedTuple, Self, TypeVar, Unpack
 
 import numpy as np
@@ -43,6 +44,7 @@ if TYPE_CHECKING:
     import polars
 
 Array = NDArray[np.float64]
+LARGEST = sys.float_info.max
 S = TypeVar("S")
 T = TypeVar("T", bound=np.generic)
 
@@ -413,11 +415,14 @@ class Stepper(Generic[S]):
         *,
         interpolation: Between = None,
         substeps: int | None = None,
-        bound: float = sys.float_info.max,
+        ranges: Mapping[str, tuple[float, float]] = MappingProxyType({}),
     ) -> None:
         check_start(start)
+        if len(set(inputs)) < len(inputs):
+            raise InputError(f"A step takes each input once, not {', '.join(inputs)}.")
         between, self._substeps = checked_sampling(inputs, rate, interpolation, substeps)
-        self._start, self._sample, self._bound = start, sample, bound
+        self._start, self._sample = start, sample
+        self._ranges = [ranges.get(name, (-LARGEST, LARGEST)) for name in inputs]
         self.inputs, limits = tuple(inputs), instance.model.limit_bits
         found = [
             (Stored(limits[name][0], "limits"), False)
@@ -477,21 +482,20 @@ class Stepper(Generic[S]):
         DomainError
             If the model leaves its domain, or a number grows beyond all bounds.
         """
-        bound = self._bound
         if len(inputs) != len(self.inputs):
             raise InputError(
                 f"A step takes {', '.join(self.inputs)}: {len(self.inputs)} numbers, not "
                 f"{len(inputs)}."
             )
-        for name, value in zip(self.inputs, inputs, strict=True):
+        for name, value, (low, high) in zip(self.inputs, inputs, self._ranges, strict=True):
             try:
-                within = bool(-bound <= value <= bound)
+                within = bool(low <= value <= high)
             except (TypeError, ValueError):
                 within = False
             if not within:
-                raise InputError(
-                    f"The {name} is {value!r}, but must be a finite number within ±{bound:g}."
-                )
+                room = f" within ±{high:g}" if low == -high else f" of {low:g} or above"
+                room = "" if low == -LARGEST else room
+                raise InputError(f"The {name} is {value!r}, but must be a finite number{room}.")
         machine, totals, values, begun = self._state
         values[1] = inputs
         if not begun:
