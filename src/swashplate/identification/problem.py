@@ -122,8 +122,9 @@ class Problem(Result):
         """
         key = vector.tobytes(), compressed
         if key not in self._last:
-            small = self._reduced if compressed else self._full
-            ways = [small if each else self._full for each in self._marched]
+            ways = [self._reduced if each else self._factored for each in self._marched]
+            if not compressed:
+                ways = [self._full] * len(self.experiments)
             parts = self._each(lambda number: ways[number](vector, number))
             priors = Evaluation(*self.unknowns.prior_rows(vector))
             residuals, jacobians = zip(*parts, priors, strict=True)
@@ -187,6 +188,12 @@ class Problem(Result):
     def _full(self, vector: Array, number: int) -> Evaluation:
         values, by = zip(*self.linearised(vector, number).values(), strict=True)
         return Evaluation(np.concatenate(values), np.vstack(by))
+
+    def _factored(self, vector: Array, number: int) -> Evaluation:
+        """The triangular factor of [J r] where the march cannot make it."""
+        residuals, jacobian = self._full(vector, number)
+        factor = triangular_factor(np.column_stack([jacobian, residuals]))
+        return Evaluation(factor[:, -1], factor[:, :-1])
 
     def _reduced(self, vector: Array, number: int) -> Evaluation:
         """A triangular factor of [J r] of one experiment, without ever holding J."""
