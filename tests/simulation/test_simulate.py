@@ -89,7 +89,7 @@ def test_what_is_measured_goes_into_a_step_as_into_a_simulation(hoist: Drive, ra
 @pytest.mark.parametrize(
     ("measured", "inputs", "said"),
     [
-        (["lod"], (1.0, 2.0), "hoist has no input 'lod'; it has voltage, pump_speed"),
+        (["lad"], (1.0, 2.0), "hoist has no input 'lad'; it has voltage, pump_speed"),
         (["pump_speed"], (1.0, -1.0), "pump_speed is -1.0, but must be .* of 0 or above"),
         (["supply_pressure"], (1.0, 0.0), "supply_pressure is 0.0, but must be .* of 1 or above"),
         (["pump_speed"] * 2, (1.0, 1.0, 1.0), "takes each input once"),
