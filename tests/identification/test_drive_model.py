@@ -19,7 +19,7 @@ from swashplate.identification.drive_model import (
 from swashplate.identification.fitting import fit, smooth
 from swashplate.identification.setup import Free, Setup, Stage, load_setup
 from swashplate.identification.unknowns import Unknown
-from swashplate.identification.validation import predict
+from swashplate.identification.validation import at_instants, predict
 from swashplate.maneuvers import source_tests, step
 
 
@@ -270,3 +270,10 @@ def test_a_slow_log_is_predicted_as_well_as_a_fast_one(short_campaign, first) ->
         rounding = run["counts"].resolution / np.sqrt(12.0)
         assert found["counts"].measures.rmse < 0.2 * rounding
         assert found["current"].measures.rmse < 4e-4
+
+
+def test_a_run_without_a_channel_of_a_drive_has_its_command_as_it_is() -> None:
+    time = (np.arange(300) + 0.5) / 100.0
+    run = run_of("run", np.where(time < 1.0, 0.0, 5.0), {"depth": np.zeros(300)}, time=time)
+    assert len(run.input.edges) == 1
+    assert at_instants(Drive.preset("hoist").parameters, run) is run

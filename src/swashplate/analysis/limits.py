@@ -218,12 +218,10 @@ def limit_shares(
     the card's filter and of the valve, so that only the limits make an error. A measured pump speed
     or supply pressure is a limit, too: away, the set's own stands in its place.
     """
-    return shares_of(drive, drive.simulate(voltage, rate, start=start, **given), start, wanted)
+    return shares_of(drive, drive.simulate(voltage, rate, start=start, **given), wanted)
 
 
-def shares_of(
-    drive: Drive, run: Simulation, start: Start, wanted: ArrayLike | None = None
-) -> LimitShares:
+def shares_of(drive: Drive, run: Simulation, wanted: ArrayLike | None = None) -> LimitShares:
     """Shares of each limit in a run of a drive; see `limit_shares`."""
 
     def speed_without(*limits: Removal) -> Array | str:
@@ -233,7 +231,7 @@ def shares_of(
         records = {name: each for name, each in run.records.items() if name not in left}
         try:
             other = drive.replace(**changes).parameters
-            return simulate_drive(other, records, start).shaft_speed
+            return simulate_drive(other, records, run.start).shaft_speed
         except SwashplateError as refusal:
             return str(refusal)
 

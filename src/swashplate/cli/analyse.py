@@ -80,7 +80,7 @@ def limits(
     with working("Simulating"):
         chosen = words.at_rate(drive.chosen, sampling.rate)
         name, run = words.simulated(chosen, command, sampling)
-        shares = shares_of(chosen, run, sampling.start)
+        shares = shares_of(chosen, run)
     title = f"{drive.title}, {name}"
     save(out, "Shares of each limit, in SI", shares.write)
     draw(plot, "plot_limit_timeline", run, wanted=shares.wanted, title=title)

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swashplate.crane.loop import ROWS, Fixed
-from swashplate.crane.rope import GRAVITY
+from swashplate.crane.rope import GRAVITY, swing_of
 from swashplate.crane.stepper import ACTUATIONS, RATE
 from swashplate.crane.stick import AXES, check_names
 from swashplate.crane.transfer_functions import MOTIONS
@@ -40,12 +40,6 @@ THREES = {
     **{"shaft_speed": "speed_hoist", "load_torque": "torque_hoist"},
 }
 """Signals of three neighbours of `ROWS`, by the first of them."""
-
-
-def swing_of(load: Array, tip: Array) -> Array:
-    """Angle between rope and plumb line. [rad]"""
-    x, y, z = (load - tip).T
-    return np.asarray(np.arctan2(np.hypot(x, y), -z))
 
 
 @dataclass(frozen=True, eq=False)

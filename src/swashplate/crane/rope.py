@@ -335,6 +335,12 @@ def load_motion(
     return LoadMotion(out[:, :3], out[:, 6], out[:, 3:6] if s.sling > 0.0 else None)
 
 
+def swing_of(load: Array, tip: Array) -> Array:
+    """Angle between rope and plumb line. [rad]"""
+    x, y, z = (load - tip).T
+    return np.asarray(np.arctan2(np.hypot(x, y), -z))
+
+
 def too_fast(length: float, time: float, rate: float) -> str:
     """Sentence for a rope that is too short for the step."""
     return (

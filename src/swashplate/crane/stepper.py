@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from functools import lru_cache
-from math import atan2, degrees, hypot, inf, isfinite, pi, sin, sqrt
+from math import degrees, inf, isfinite, pi, sin, sqrt
 from numbers import Real
 from typing import TYPE_CHECKING, Any, Literal, TypedDict, Unpack, get_args
 
@@ -15,7 +15,7 @@ from swashplate.crane import loop
 from swashplate.crane.control import GIVES, SEEN, Control, settings_of
 from swashplate.crane.kinematics import Shafts, Vector, boom_at, rope_length, shaft_torques, tip_of
 from swashplate.crane.loop import ROWS, Fixed, Inverse, Plant, State
-from swashplate.crane.rope import AIR, GRAVITY, Hung, Suspension, too_fast
+from swashplate.crane.rope import AIR, GRAVITY, Hung, Suspension, swing_of, too_fast
 from swashplate.crane.stick import AXES, check_names
 from swashplate.drive import Drive
 from swashplate.equations import CompiledStep, Machine, compiled_step
@@ -165,8 +165,8 @@ class CraneStepper:
     def named(self, row: Array) -> dict[str, float]:
         """Signals of a row that `take` returns, by name, and the swing."""
         made = dict(zip(ROWS, row.tolist(), strict=True))
-        x, y, down = (made[f"tip_{axis}"] - made[f"load_{axis}"] for axis in "xyz")
-        return made | {"swing": atan2(hypot(x, y), down)}
+        load, tip = (np.array([made[f"{end}_{axis}"] for axis in "xyz"]) for end in ("load", "tip"))
+        return made | {"swing": float(swing_of(load, tip))}
 
     def take(self, commands: Array, ship: Array) -> Array:
         """Advance by many samples at once: a row for each, a column for each of `step`'s signals.

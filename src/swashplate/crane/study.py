@@ -15,7 +15,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from swashplate.crane.control import Control
 from swashplate.crane.crane import Crane, begun
-from swashplate.crane.result import PUMPS, CraneRun, swing_of
+from swashplate.crane.result import PUMPS, CraneRun
+from swashplate.crane.rope import swing_of
 from swashplate.crane.sea import Seaway, Spectrum
 from swashplate.crane.stepper import RATE, Actuation, Setup
 from swashplate.crane.stick import AXES, Stick, check_names

@@ -316,10 +316,11 @@ def edges_problem(parameters: ParameterSet, run: Experiment) -> Problem | None:
     """The problem of the instants of a command's edges in a run that is predicted.
 
     One unit of residual is what the prediction errs by with all of them halfway, so that a drive
-    that is wrong says little of them. None where there are no edges, or too many.
+    that is wrong says little of them. None where there are no edges, or too many, or no
+    channel of a drive.
     """
     model, edges = DriveModel(parameters), _edges(run, {})
-    if not 0 < len(edges) <= MOST_EDGES:
+    if not 0 < len(edges) <= MOST_EDGES or not model.signals_of(run):
         return None
     scales, zeros = dict[str, float](), list[Unknown]()
     for name, simulated in model.simulate({}, run).items():

@@ -330,9 +330,11 @@ def checked_ends(
             step = sign * max(min(float(reach[index]), room), least)
             side = _side(minimise, optimum, index, rise, step, float(bound), MOST_POINTS)
             distance = np.inf if side.end is None else abs(side.end - optimum.number)
-            if not shallow and side.end is None:
-                continue  # the others make up for it: the linearised end holds
             better = None if side.better is None else side.better.cost
+            if not shallow and side.end is None:  # the linearised end holds
+                if better is None:
+                    continue  # as the others make up for this one
+                distance = float(reach[index])
             yield CheckedEnd(index, sign > 0.0, float(distance), better)
 
 

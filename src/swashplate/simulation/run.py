@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import NamedTuple
@@ -19,7 +18,7 @@ from swashplate.equations.marching.record import (
     on_grid,
 )
 from swashplate.equations.marching.run import Instance, Start, Started, marched
-from swashplate.equations.marching.use import Stepper
+from swashplate.equations.marching.use import LARGEST, Stepper
 from swashplate.errors import DomainError, InputError
 from swashplate.maneuvers import Maneuver, sampled
 from swashplate.parameters.parameter_set import ParameterSet
@@ -160,7 +159,7 @@ def drive_stepper(
         substeps=substeps,
         ranges={
             "voltage": (-FULL_VOLTAGE, FULL_VOLTAGE),
-            **{name: (least, sys.float_info.max) for name, (least, _) in LEAST.items()},
+            **{name: (least, LARGEST) for name, (least, _) in LEAST.items()},
         },
     )
 
