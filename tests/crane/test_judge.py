@@ -10,7 +10,7 @@ from swashplate import Campaign, Drive
 from swashplate.analysis.monte_carlo import Draws, stored_draws
 from swashplate.campaign import rig
 from swashplate.crane import Crane, Stick, control, follow, judge, sweep
-from swashplate.crane.judgment import mean_of, share_of
+from swashplate.crane.judgment import mean_of, more_seaways, share_of
 from swashplate.crane.result import PUMPS
 from swashplate.errors import InputError, ParameterError
 from swashplate.executors import Processes, Serial, Threads
@@ -106,6 +106,14 @@ def test_intervals_of_shares_are_the_exact_ones(hits, seaways):
     expected = binomtest(hits, seaways).proportion_ci(0.95, method="exact")
     found = share_of(hits, seaways)
     assert found == pytest.approx((hits / seaways, expected.low, expected.high), abs=1e-12)
+
+
+def test_more_seaways_are_those_that_tell_if_the_share_stays():
+    """With none worse 72 tell it from 5 %; a share of 5 % itself no number does."""
+    assert [more_seaways(share, 20, 0.05) for share in (0.0, 0.05)] == [
+        "about 75",
+        "200 to begin with",
+    ]
 
 
 def test_differences_are_paired(judged):

@@ -187,7 +187,8 @@ def more_seaways(share: float, seaways: int, allowed: float) -> str:
         found = share_of(round(share * more), more)
         if more > seaways and not found.low <= allowed <= found.high:
             return f"about {more}"
-    return f"more than {ENOUGH[-1]}"
+    # a share as large as the one allowed: more seaways will first tell whether it stays so
+    return f"{10 * seaways} to begin with"
 
 
 class Remedy(NamedTuple):
