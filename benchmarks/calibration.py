@@ -79,11 +79,11 @@ def drive_campaign(axis, case, seed, compared):
     """Rows of a campaign of a drive."""
     from swashplate import Campaign, Drive
     from swashplate.campaign import rig
+    from swashplate.identification.criteria import verdict
     from swashplate.identification.drive_model import true_value
     from swashplate.identification.fitting import drawn, fit
     from swashplate.identification.setup import load_setup
     from swashplate.identification.validation import predict
-    from swashplate.identification.verdict import verdict
 
     setup, nominal = load_setup(axis), Drive.preset(axis)
     # campaigns of two cells share neither machine nor noise

@@ -225,13 +225,13 @@ def campaign(_, item):
     from swashplate import Campaign, Drive
     from swashplate.campaign import rig
     from swashplate.errors import SwashplateError
+    from swashplate.identification.criteria import verdict
     from swashplate.identification.data_checks import check_runs
     from swashplate.identification.drive_model import true_value
     from swashplate.identification.fitting import fit, smooth
-    from swashplate.identification.lack_of_fit import lack_of_fit
+    from swashplate.identification.misfit import lack_of_fit
     from swashplate.identification.setup import load_setup
     from swashplate.identification.validation import predict
-    from swashplate.identification.verdict import verdict
 
     fault, nominal = FAULTS[name], Drive.preset(axis)
     tests, machine = simulated_campaign(fault, axis, seed)

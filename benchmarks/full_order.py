@@ -15,7 +15,7 @@ import polars as pl
 from numpy.typing import NDArray
 
 from swashplate import maneuvers
-from swashplate.equations.marching.jacobian import jacobian, residuals
+from swashplate.equations.marching.derivatives import jacobian, residuals
 from swashplate.equations.marching.observation import Observation, ObservedRecord
 from swashplate.equations.marching.record import record_of
 from swashplate.full_order import FullOrderDrive, compare

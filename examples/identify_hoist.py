@@ -16,12 +16,12 @@ import numpy as np
 
 from swashplate import Campaign, Drive
 from swashplate.campaign import rig
+from swashplate.identification.criteria import verdict
 from swashplate.identification.drive_model import true_value
 from swashplate.identification.experiment_design import outlook
 from swashplate.identification.fitting import drawn, fit, smooth
 from swashplate.identification.setup import load_setup
 from swashplate.identification.validation import predict, with_speeds
-from swashplate.identification.verdict import verdict
 from swashplate.report.figures import plot_channel, save_figure
 
 parser = argparse.ArgumentParser(description="Identify a hoist.")

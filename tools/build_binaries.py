@@ -21,7 +21,7 @@ import tomlkit
 
 from swashplate import Drive, export
 from swashplate.export import fmi, libraries
-from swashplate.export.variables import NONE
+from swashplate.export.variable_list import NONE
 
 ROOT = Path(__file__).parents[1]
 BINARIES = ROOT / "src" / "swashplate" / "export" / "binaries"

@@ -58,8 +58,8 @@ def test_help_is_a_page_with_examples(tmp_path):
     ("typed", "without"),
     [
         ("--help", HEAVY),
-        ("simulate --help", {*HEAVY, "swashplate.cli.fit"}),
-        ("simulate hoist step:9", {"matplotlib", "pint", "polars", "swashplate.cli.fit"}),
+        ("simulate --help", {*HEAVY, "swashplate.cli.identify"}),
+        ("simulate hoist step:9", {"matplotlib", "pint", "polars", "swashplate.cli.identify"}),
     ],
 )
 def test_what_a_command_does_not_import(tmp_path, typed, without):

@@ -19,7 +19,7 @@ import swashplate.equations
 import swashplate.models
 from swashplate import Drive, PhysicalSet
 from swashplate.equations import derive
-from swashplate.equations.equation import interpreted, is_function
+from swashplate.equations.declaration import interpreted, is_function
 from swashplate.equations.model import Window
 from swashplate.equations.syntax import plain
 from swashplate.models import card, full_order, machine, pump

@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from swashplate.equations import closure, closure_hash, derive, equation
-from swashplate.equations.equation import is_function
+from swashplate.equations.declaration import is_function
 from swashplate.equations.syntax import plain
 from swashplate.models import card, pump
 from swashplate.models import displacement_control as control

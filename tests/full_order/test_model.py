@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from swashplate import DomainError, FullOrderDrive, PhysicalSet
-from swashplate.equations.equation import interpreted
-from swashplate.equations.marching.jacobian import jacobian, residuals
+from swashplate.equations.declaration import interpreted
+from swashplate.equations.marching.derivatives import jacobian, residuals
 from swashplate.equations.marching.observation import Observation, ObservedRecord
 from swashplate.equations.marching.record import record_of
 from swashplate.models.displacement_control import Solenoids

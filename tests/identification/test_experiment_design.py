@@ -8,6 +8,10 @@ import pytest
 from tests.identification.given import run_of, unknowns_of, virtual
 
 from swashplate import Campaign, Drive, Experiment, InputError, maneuvers
+from swashplate.identification.determination import (
+    Identifiability,
+    identifiability,
+)
 from swashplate.identification.experiment_design import (
     MEMORY,
     Candidate,
@@ -21,10 +25,6 @@ from swashplate.identification.experiment_design import (
     outlook,
 )
 from swashplate.identification.fitting import fit, smooth
-from swashplate.identification.identifiability import (
-    Identifiability,
-    identifiability,
-)
 from swashplate.identification.setup import Forces, Free, Setup, Stage, load_setup
 from swashplate.identification.unknowns import Prior
 from swashplate.maneuvers import sine, step

@@ -28,7 +28,7 @@ from swashplate.identification.intervals import (
     weighed,
     with_handed,
 )
-from swashplate.identification.lack_of_fit import lack_of_fit
+from swashplate.identification.misfit import lack_of_fit
 from swashplate.identification.noise import Covariance
 from swashplate.identification.problem import (
     LinearisedRun,
@@ -37,7 +37,7 @@ from swashplate.identification.problem import (
     influence,
     linearised_fit,
 )
-from swashplate.identification.profile import checked_ends, profile
+from swashplate.identification.profiles import checked_ends, profile
 from swashplate.identification.setup import Setup, load_setup, setup_text
 from swashplate.identification.solving import solve
 from swashplate.identification.unknowns import Prior, Unknown, Unknowns

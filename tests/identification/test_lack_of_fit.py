@@ -11,12 +11,12 @@ from tests.identification.given import bench_run
 from swashplate import Campaign, Drive
 from swashplate.campaign import rig
 from swashplate.identification import faults
+from swashplate.identification.criteria import Verdict, verdict
 from swashplate.identification.faults import clipped_channels
 from swashplate.identification.fitting import StageFit, fit
-from swashplate.identification.lack_of_fit import lack_of_fit
+from swashplate.identification.misfit import lack_of_fit
 from swashplate.identification.setup import load_setup
 from swashplate.identification.validation import predict
-from swashplate.identification.verdict import Verdict, verdict
 from swashplate.maneuvers import ramp, sine, step
 
 TESTS = {

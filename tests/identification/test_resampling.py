@@ -22,7 +22,7 @@ from swashplate import Campaign, Drive, Experiment, InputError
 from swashplate.identification.fitting import StageFit, fit
 from swashplate.identification.noise import spectral_covariance
 from swashplate.identification.problem import LinearisedFit, LinearisedRun, Problem
-from swashplate.identification.profile import profiles_of
+from swashplate.identification.profiles import profiles_of
 from swashplate.identification.resampling import (
     Bootstrap,
     CrossValidation,

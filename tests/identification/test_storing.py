@@ -11,7 +11,7 @@ from tests.identification.given import TWO_STAGES, put
 from swashplate import Campaign, Drive, FileError, InputError, ParameterError
 from swashplate.identification.assessment import Judged, fingerprint, load_fit
 from swashplate.identification.fitting import Fit, fit
-from swashplate.identification.profile import Point, Profile
+from swashplate.identification.profiles import Point, Profile
 from swashplate.identification.resampling import CrossValidation, Fold
 from swashplate.identification.solving import Solution
 from swashplate.identification.validation import Measures

@@ -8,13 +8,13 @@ from tests.identification.given import RISE, TIME, bench_run, risen, run_of
 
 from swashplate import Drive
 from swashplate.identification import Verdict, verdict
+from swashplate.identification.criteria import Criterion
 from swashplate.identification.fitting import StageFit
 from swashplate.identification.problem import Problem
 from swashplate.identification.setup import Stage
 from swashplate.identification.solving import solve
 from swashplate.identification.unknowns import Unknown, Unknowns
 from swashplate.identification.validation import RunQuality, compared, part_of_range
-from swashplate.identification.verdict import Criterion
 
 WAVE = 10.0 * np.sin(2.0 * np.pi * TIME[:-1] / 4.0)
 WAVE = np.append(WAVE, 0.0)

@@ -9,7 +9,7 @@ import pytest
 
 from swashplate import DomainError, Drive, InputError
 from swashplate.equations import instance_of as instance_of_model
-from swashplate.equations.equation import equation
+from swashplate.equations.declaration import equation
 from swashplate.equations.marching.part import Stored
 from swashplate.equations.marching.run import Instance, Part, marched
 from swashplate.equations.model import Model, Tap, discretised, join

@@ -18,13 +18,13 @@ from tests.identification.given import virtual
 
 from swashplate import Campaign, Drive, FileError, InputError, maneuvers
 from swashplate.identification.assessment import Judged
+from swashplate.identification.criteria import verdict
 from swashplate.identification.fitting import Fit, fit
-from swashplate.identification.profile import Point, Profile
+from swashplate.identification.profiles import Point, Profile
 from swashplate.identification.resampling import CrossValidation, Fold
 from swashplate.identification.setup import Setup
 from swashplate.identification.solving import Solution
 from swashplate.identification.validation import Measures, predict, with_speeds
-from swashplate.identification.verdict import verdict
 from swashplate.maneuvers import parse
 from swashplate.report.fit_report import (
     print_report,

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from swashplate import ParameterSet, maneuvers
-from swashplate.equations.marching.jacobian import Jacobian, Triangle
+from swashplate.equations.marching.derivatives import Jacobian, Triangle
 from swashplate.equations.marching.observation import ObservedRecord, Own
 from swashplate.simulation.residuals import made_ready, wanted_columns
 

@@ -8,7 +8,7 @@ from tests.simulation.experiments import triangle
 
 from swashplate import DomainError, Drive
 from swashplate.equations import Model, equation, instance_of
-from swashplate.equations.marching import jacobian as engine
+from swashplate.equations.marching import derivatives as engine
 from swashplate.equations.marching.observation import Observation, ObservedRecord
 from swashplate.equations.marching.record import Record, record_of
 

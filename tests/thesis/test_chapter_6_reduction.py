@@ -10,7 +10,7 @@ import pytest
 
 from swashplate import Drive, maneuvers
 from swashplate.equations import derive
-from swashplate.equations.equation import interpreted
+from swashplate.equations.declaration import interpreted
 from swashplate.equations.fields import made
 from swashplate.full_order import QUANTITIES, FullOrderDrive, PhysicalSet
 from swashplate.models import displacement_control as control

@@ -24,7 +24,7 @@ from swashplate.campaign.samples import interpolate_counts
 from swashplate.campaign.schema import ChannelKind
 from swashplate.drive import Drive
 from swashplate.equations.cache import kernel
-from swashplate.equations.equation import inlined
+from swashplate.equations.declaration import inlined
 from swashplate.errors import InputError
 from swashplate.parameters.parameter_set import ParameterSet, set_of
 from swashplate.results import short

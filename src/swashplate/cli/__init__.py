@@ -65,21 +65,21 @@ says more about a command.
 
 
 COMMANDS = {
-    "Demonstrations": {"demo": "fit.demo"},
+    "Demonstrations": {"demo": "identify.demo"},
     "Simulate": {
-        "simulate": "simulate.simulate",
-        "compare": "simulate.compare",
-        "axes": "simulate.axes",
-        "show": "simulate.show_parameters",
+        "simulate": "simulation.simulate",
+        "compare": "simulation.compare",
+        "axes": "simulation.axes",
+        "show": "simulation.show_parameters",
     },
     "Test": {"rig": "campaign.rig", "campaign": "campaign.app"},
     "Identify": {
         "guess": "campaign.guess",
         "excitation": "campaign.excitation",
-        "fit": "fit.fit",
-        "validate": "fit.validate",
+        "fit": "identify.fit",
+        "validate": "identify.validate",
         "advise": "campaign.advise",
-        "report": "fit.report",
+        "report": "identify.report",
     },
     "Analyse": {
         "limits": "analyse.limits",
@@ -92,8 +92,8 @@ COMMANDS = {
         "full-order": "analyse.full_order",
         "crane": "crane.app",
     },
-    "Export": {"export": "export.export", "live": "export.live"},
-    "This installation": {"doctor": "doctor.doctor"},
+    "Export": {"export": "exports.export", "live": "exports.live"},
+    "This installation": {"doctor": "installation.doctor"},
 }
 """Where each command stands, by the panel of the help that lists it."""
 

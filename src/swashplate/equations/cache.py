@@ -26,7 +26,7 @@ from numba import config, njit
 from numba.core.caching import FunctionCache, IndexDataCacheFile
 from numba.misc.appdirs import AppDirs
 
-from swashplate.equations.equation import JIT_OFF, closure_hash, hash_of, is_function, known
+from swashplate.equations.declaration import JIT_OFF, closure_hash, hash_of, is_function, known
 from swashplate.equations.syntax import plain
 
 P = ParamSpec("P")

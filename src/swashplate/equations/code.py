@@ -19,7 +19,7 @@ from time import perf_counter
 from typing import Any, ParamSpec, TypeVar
 
 from swashplate.equations import expressions as ex
-from swashplate.equations.equation import inlined, interpreted, remember_text
+from swashplate.equations.declaration import inlined, interpreted, remember_text
 from swashplate.equations.expressions import Node
 from swashplate.equations.syntax import CHOICES, MATH, Parsed, hints_of, is_named_tuple
 from swashplate.errors import EquationError

@@ -8,7 +8,7 @@ from typing import Any, TypeVar
 
 from swashplate.equations.adjoints import Derived, derived_function, listing
 from swashplate.equations.code import GENERATING, Code, Value, arguments, leaves
-from swashplate.equations.equation import inlined, module_of
+from swashplate.equations.declaration import inlined, module_of
 from swashplate.equations.reading import RULES, read
 from swashplate.equations.syntax import parsed, plain
 

@@ -22,7 +22,7 @@ from swashplate.equations.code import (
     leaves,
     rebuilt,
 )
-from swashplate.equations.equation import inlined
+from swashplate.equations.declaration import inlined
 from swashplate.equations.expressions import ONE, ZERO, Node, make
 from swashplate.equations.syntax import Parsed
 from swashplate.equations.writing import UNNAMED, function_source, function_text, named_by_text

@@ -31,7 +31,7 @@ from importlib import import_module
 from types import FunctionType
 from typing import Any, Literal, NamedTuple, get_args, get_type_hints
 
-from swashplate.equations.equation import equation, equation_of_text
+from swashplate.equations.declaration import equation, equation_of_text
 from swashplate.equations.fields import Definition, floats_of, ranges_of
 from swashplate.equations.syntax import is_named_tuple, plain
 from swashplate.errors import InputError

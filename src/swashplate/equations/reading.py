@@ -24,7 +24,7 @@ from swashplate.equations.code import (
     leaves,
     rebuilt,
 )
-from swashplate.equations.equation import JIT_OFF
+from swashplate.equations.declaration import JIT_OFF
 from swashplate.equations.expressions import Node, make
 from swashplate.equations.loops import interpolate, interpolated, repeated, repetition, root, solved
 from swashplate.equations.syntax import (

@@ -16,7 +16,7 @@ from importlib import import_module
 from types import CellType, FunctionType
 from typing import Any, NamedTuple, get_type_hints
 
-from swashplate.equations.equation import closure, equation, equation_of_text, is_function
+from swashplate.equations.declaration import closure, equation, equation_of_text, is_function
 from swashplate.equations.model import Equation, Model, arguments_of, join
 from swashplate.equations.syntax import is_named_tuple, plain
 from swashplate.errors import InputError

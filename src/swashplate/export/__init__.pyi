@@ -11,5 +11,5 @@ from .fmi import fmu as fmu
 from .libraries import PLATFORMS as PLATFORMS
 from .libraries import compiled_c as compiled_c
 from .libraries import wasm as wasm
-from .variables import Variable as Variable
-from .variables import variables as variables
+from .variable_list import Variable as Variable
+from .variable_list import variables as variables

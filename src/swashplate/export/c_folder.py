@@ -23,7 +23,7 @@ from swashplate.equations.marching.run import Instance, called
 from swashplate.equations.marching.run import instance_of as instance_of_model
 from swashplate.equations.model import Model
 from swashplate.errors import FileError, InputError
-from swashplate.export.variables import DRIVE, DRIVE_WORDS, OWN, References, Words, words_of
+from swashplate.export.variable_list import DRIVE, DRIVE_WORDS, OWN, References, Words, words_of
 from swashplate.models.card import stable_step
 from swashplate.models.displacement_control import steep_stops
 from swashplate.parameters.rules import FULL_VOLTAGE

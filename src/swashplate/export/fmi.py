@@ -35,7 +35,7 @@ from swashplate.export.libraries import (
     packaged,
     sources,
 )
-from swashplate.export.variables import LONGEST_LINE, NONE, Variable, variables
+from swashplate.export.variable_list import LONGEST_LINE, NONE, Variable, variables
 from swashplate.results import Result
 from swashplate.tables import UNIT, Column, Table, write_bytes
 from swashplate.units import si_exponents, to_si

@@ -33,7 +33,7 @@ from swashplate.export.c_folder import (
     exported_drive,
     source_text,
 )
-from swashplate.export.variables import DRIVE, References, c_header
+from swashplate.export.variable_list import DRIVE, References, c_header
 from swashplate.tables import write_bytes
 
 NAME = "swashplate_drive"

@@ -17,7 +17,7 @@ from typing import Any, Literal
 import numpy as np
 
 from swashplate.documents import parse_toml, validated
-from swashplate.equations.equation import interpreted
+from swashplate.equations.declaration import interpreted
 from swashplate.equations.fields import Definition, Flag, declared_by
 from swashplate.errors import ParameterError
 from swashplate.models import machine as equations

@@ -1,6 +1,9 @@
 from .assessment import Judged as Judged
 from .assessment import judge_fit as judge_fit
 from .assessment import load_fit as load_fit
+from .criteria import Verdict as Verdict
+from .criteria import verdict as verdict
+from .determination import Identifiability as Identifiability
 from .drive_model import DriveModel as DriveModel
 from .experiment_design import Outlook as Outlook
 from .experiment_design import advise as advise
@@ -10,7 +13,6 @@ from .fitting import Fit as Fit
 from .fitting import Search as Search
 from .fitting import StageFit as StageFit
 from .fitting import fit as fit
-from .identifiability import Identifiability as Identifiability
 from .intervals import Uncertainty as Uncertainty
 from .intervals import uncertainty as uncertainty
 from .model import Linearised as Linearised
@@ -18,8 +20,8 @@ from .model import Model as Model
 from .model import OwnModel as OwnModel
 from .problem import Problem as Problem
 from .problem import linearised_fit as linearised_fit
-from .profile import Profile as Profile
-from .profile import profiles_of as profiles_of
+from .profiles import Profile as Profile
+from .profiles import profiles_of as profiles_of
 from .resampling import Bootstrap as Bootstrap
 from .resampling import CrossValidation as CrossValidation
 from .resampling import bootstraps_of as bootstraps_of
@@ -36,5 +38,3 @@ from .unknowns import Prior as Prior
 from .unknowns import Unknown as Unknown
 from .unknowns import Unknowns as Unknowns
 from .validation import predict as predict
-from .verdict import Verdict as Verdict
-from .verdict import verdict as verdict

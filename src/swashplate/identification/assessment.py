@@ -18,10 +18,11 @@ from swashplate.campaign.experiment import Experiment
 from swashplate.documents import read_json
 from swashplate.errors import FileError, InputError
 from swashplate.identification import tables
+from swashplate.identification.criteria import REQUIRED, Verdict, verdict
 from swashplate.identification.drive_model import Parameters
 from swashplate.identification.fitting import Fit, Solved, StageFit, fingerprint, staged
 from swashplate.identification.problem import Loss, Problem
-from swashplate.identification.profile import Profile, profiles_of
+from swashplate.identification.profiles import Profile, profiles_of
 from swashplate.identification.resampling import (
     Bootstrap,
     CrossValidation,
@@ -32,7 +33,6 @@ from swashplate.identification.setup import ModelSetup, Setup, Stage
 from swashplate.identification.solving import Solution
 from swashplate.identification.unknowns import Unknown, Unknowns
 from swashplate.identification.validation import RunQuality, predict
-from swashplate.identification.verdict import REQUIRED, Verdict, verdict
 from swashplate.parameters.definitions import find
 from swashplate.parameters.files import dump_set, read_set
 from swashplate.parameters.parameter_set import Motion, ParameterSet

@@ -21,8 +21,8 @@ from swashplate.campaign.experiment import Channel, Experiment, InputSignal, Sou
 from swashplate.campaign.rig import COUNTS_PER_TURN
 from swashplate.drive import Drive
 from swashplate.errors import InputError
+from swashplate.identification.determination import Identifiability, identifiability
 from swashplate.identification.drive_model import CURRENTS, DriveModel, stage_problem
-from swashplate.identification.identifiability import Identifiability, identifiability
 from swashplate.identification.intervals import uncertainty
 from swashplate.identification.problem import (
     TOLERANCE,

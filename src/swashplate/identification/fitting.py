@@ -27,6 +27,7 @@ from swashplate.identification.data_checks import (
     refuse_unsound,
     spike_findings,
 )
+from swashplate.identification.determination import Identifiability, identifiability
 from swashplate.identification.drive_model import (
     DriveModel,
     Parameters,
@@ -36,7 +37,6 @@ from swashplate.identification.drive_model import (
     with_estimates,
 )
 from swashplate.identification.faults import measurement_error
-from swashplate.identification.identifiability import Identifiability, identifiability
 from swashplate.identification.intervals import Uncertainty, stage_uncertainty, weighed
 from swashplate.identification.model import EDGE, EquationModel, Model, OwnModel
 from swashplate.identification.problem import LinearisedFit, Loss, Problem, linearised_fit

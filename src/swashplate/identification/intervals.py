@@ -26,7 +26,7 @@ from swashplate.identification.noise import (
     without_lines,
 )
 from swashplate.identification.problem import LinearisedFit, Problem, linearised_fit
-from swashplate.identification.profile import CheckedEnd, checked_ends
+from swashplate.identification.profiles import CheckedEnd, checked_ends
 from swashplate.identification.unknowns import Unknowns
 from swashplate.results import Result, short
 from swashplate.tables import percent

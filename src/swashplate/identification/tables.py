@@ -10,8 +10,8 @@ from math import inf
 from typing import TYPE_CHECKING
 
 from swashplate.errors import InputError
+from swashplate.identification.determination import GAUGES
 from swashplate.identification.drive_model import START_PRESSURE, DriveModel, true_value
-from swashplate.identification.identifiability import GAUGES
 from swashplate.identification.intervals import Estimate
 from swashplate.identification.model import EDGE
 from swashplate.identification.noise import LEVEL

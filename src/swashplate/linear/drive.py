@@ -14,7 +14,7 @@ from typing import Any, Literal, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from swashplate.equations.equation import interpreted
+from swashplate.equations.declaration import interpreted
 from swashplate.equations.fields import is_real
 from swashplate.equations.marching.record import (
     SOURCE_RATE,

@@ -7,7 +7,7 @@ negative.
 
 from typing import Annotated, NamedTuple
 
-from swashplate.equations.equation import equation
+from swashplate.equations.declaration import equation
 from swashplate.equations.fields import Definition
 from swashplate.equations.model import Model, Tap
 from swashplate.models.channel import (

@@ -3,7 +3,7 @@
 from dataclasses import replace
 from typing import NamedTuple
 
-from swashplate.equations.equation import equation
+from swashplate.equations.declaration import equation
 from swashplate.equations.model import Model, join
 from swashplate.models.card import Card, Currents, card, flowing_card
 from swashplate.models.channel import CardOptions, channel_level

@@ -14,7 +14,7 @@ below 2. Limits are projections: what is beyond a stop is put back on it and sto
 from math import atan, tan
 from typing import NamedTuple
 
-from swashplate.equations.equation import equation
+from swashplate.equations.declaration import equation
 from swashplate.equations.fields import OFF, Flag
 from swashplate.equations.library import clipped
 from swashplate.equations.loops import repeated, root

@@ -13,7 +13,7 @@ eq. 6.38 has d4 alone, which would not conserve energy (erratum 16).
 from math import asin, atan, pi, sin, sqrt, tan
 from typing import Annotated, NamedTuple
 
-from swashplate.equations.equation import equation
+from swashplate.equations.declaration import equation
 from swashplate.equations.fields import MINUS, Definition, Flag
 from swashplate.equations.library import clipped
 from swashplate.equations.loops import root

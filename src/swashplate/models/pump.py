@@ -8,7 +8,7 @@ stand in the same sample and the same step; an option that is off leaves nothing
 from math import exp, sqrt
 from typing import NamedTuple
 
-from swashplate.equations.equation import equation
+from swashplate.equations.declaration import equation
 from swashplate.equations.loops import root
 from swashplate.equations.model import Model
 from swashplate.models.displacement_control import (

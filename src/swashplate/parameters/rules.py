@@ -14,7 +14,7 @@ from numba.np.unsafe.ndarray import to_fixed_tuple
 from numpy.typing import NDArray
 
 from swashplate.equations.cache import kernel
-from swashplate.equations.equation import JIT_OFF, inlined, interpreted
+from swashplate.equations.declaration import JIT_OFF, inlined, interpreted
 from swashplate.errors import ParameterError
 from swashplate.models.channel import Channel, channel_level
 from swashplate.models.displacement_control import (

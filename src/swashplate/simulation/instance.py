@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from swashplate.equations.equation import interpreted
+from swashplate.equations.declaration import interpreted
 from swashplate.equations.fields import declared_by
 from swashplate.equations.marching.run import Instance, Part
 from swashplate.equations.model import Model

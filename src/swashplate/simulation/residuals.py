@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from swashplate.equations.marching import jacobian as engine
+from swashplate.equations.marching import derivatives as engine
 from swashplate.equations.marching.observation import ObservedRecord, Own, every_sample
 from swashplate.equations.marching.record import Record
 from swashplate.equations.marching.run import Instance, Start

@@ -1,7 +1,7 @@
-from .interface import interface as interface
 from .model import Exported as Exported
 from .model import feedthrough as feedthrough
 from .model import newest as newest
+from .model_interface import interface as interface
 from .text import HELPERS as HELPERS
 from .text import Kind as Kind
 from .text import c_name as c_name

@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 
 from swashplate.equations import expressions as ex
 from swashplate.equations.code import Choice, Code, Item, Let, Rule, generating, leaves
-from swashplate.equations.equation import JIT_OFF
+from swashplate.equations.declaration import JIT_OFF
 from swashplate.equations.expressions import Node, text
 from swashplate.equations.marching.march import Sampler, lower, output_of
 from swashplate.equations.marching.part import Stored, choose

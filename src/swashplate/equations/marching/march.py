@@ -21,7 +21,7 @@ from typing import Any
 
 from swashplate.equations import expressions as ex
 from swashplate.equations.code import Code, Item, Let, Value, leaves
-from swashplate.equations.equation import inlined
+from swashplate.equations.declaration import inlined
 from swashplate.equations.expressions import Node, text
 from swashplate.equations.fields import floats_of
 from swashplate.equations.marching.part import PartCode, Stored, choose

@@ -11,7 +11,7 @@ from numba.extending import intrinsic
 
 from swashplate.equations import expressions as ex
 from swashplate.equations.code import Code, Flag, Tuple, Value, fixed, leaves, rebuilt
-from swashplate.equations.equation import JIT_OFF
+from swashplate.equations.declaration import JIT_OFF
 from swashplate.equations.expressions import Node
 from swashplate.equations.fields import floats_of
 from swashplate.equations.model import (

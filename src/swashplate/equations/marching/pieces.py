@@ -19,7 +19,7 @@ from numba.extending import intrinsic
 from numpy.typing import NDArray
 
 from swashplate.equations.cache import kernel, on_disk
-from swashplate.equations.equation import JIT_OFF, known
+from swashplate.equations.declaration import JIT_OFF, known
 from swashplate.equations.syntax import plain
 
 PIECE = "count, first, h, records, before, whole, fraction, params, given, states, met, flat"

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swashplate.equations.cache import kernel, pasted, subroutine
-from swashplate.equations.equation import inlined
+from swashplate.equations.declaration import inlined
 from swashplate.equations.marching.pieces import behind, call
 
 Array = NDArray[np.float64]

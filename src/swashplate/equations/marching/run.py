@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from swashplate.equations.cache import generated, kernel
 from swashplate.equations.code import compiled_names, generating
-from swashplate.equations.equation import inlined, interpreted
+from swashplate.equations.declaration import inlined, interpreted
 from swashplate.equations.fields import (
     check_mapping,
     floats_of,

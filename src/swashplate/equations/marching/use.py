@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 from swashplate.equations.cache import kernel
 from swashplate.equations.code import generating
 from swashplate.equations.fields import check_mapping
-from swashplate.equations.marching.jacobian import jacobian
+from swashplate.equations.marching.derivatives import jacobian
 from swashplate.equations.marching.march import output_of
 from swashplate.equations.marching.observation import Own, every_sample
 from swashplate.equations.marching.part import Stored

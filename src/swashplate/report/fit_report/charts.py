@@ -8,7 +8,7 @@ import numpy as np
 from markupsafe import Markup
 from numpy.typing import NDArray
 
-from swashplate.identification.profile import Profile
+from swashplate.identification.profiles import Profile
 from swashplate.identification.unknowns import Unknown
 from swashplate.report.lines import thinned
 

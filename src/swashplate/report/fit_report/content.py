@@ -16,19 +16,19 @@ from swashplate.drive import Drive
 from swashplate.errors import InputError
 from swashplate.identification import tables
 from swashplate.identification.assessment import Judged, motion_of
+from swashplate.identification.criteria import Verdict, starts_of, verdict
+from swashplate.identification.determination import Identifiability
 from swashplate.identification.drive_model import Parameters
 from swashplate.identification.fitting import Fit, StageFit
-from swashplate.identification.identifiability import Identifiability
-from swashplate.identification.profile import Profile
+from swashplate.identification.profiles import Profile
 from swashplate.identification.resampling import CrossValidation
 from swashplate.identification.setup import ModelSetup
 from swashplate.identification.solving import Solution
 from swashplate.identification.validation import RunQuality, at_instants, percent
-from swashplate.identification.verdict import Verdict, starts_of, verdict
 from swashplate.parameters.parameter_set import ParameterSet
 from swashplate.report.fit_report import charts
+from swashplate.report.fit_report.html_page import Block, Section, listed_block, page, text, titled
 from swashplate.report.fit_report.live import can_run, live_page, run_of
-from swashplate.report.fit_report.page import Block, Section, listed_block, page, text, titled
 from swashplate.report.fit_report.runs import ShownRun, run_data, run_words, shown_runs
 from swashplate.report.fit_report.summary import light, run_error, run_lights, summary_section
 from swashplate.tables import NONE, Cell, Column, Table, count, ended, joined, listed, write_text

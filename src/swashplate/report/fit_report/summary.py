@@ -14,22 +14,22 @@ from swashplate.analysis import dead_zone, drives, limit_shares
 from swashplate.campaign import Campaign
 from swashplate.drive import Drive
 from swashplate.errors import SwashplateError
+from swashplate.identification.criteria import (
+    CARRIES_OVER,
+    POOR,
+    Grade,
+    Verdict,
+)
+from swashplate.identification.determination import weak_unknowns
 from swashplate.identification.fitting import StageFit
-from swashplate.identification.identifiability import weak_unknowns
 from swashplate.identification.validation import (
     following,
     percent,
     pooled,
     range_of,
 )
-from swashplate.identification.verdict import (
-    CARRIES_OVER,
-    POOR,
-    Grade,
-    Verdict,
-)
 from swashplate.parameters.rules import FULL_VOLTAGE
-from swashplate.report.fit_report.page import Block, Section, listed_block, text
+from swashplate.report.fit_report.html_page import Block, Section, listed_block, text
 from swashplate.report.fit_report.runs import ShownRun
 from swashplate.tables import NONE, UNIT, Cell, Column, Table, count, listed
 from swashplate.units import display_unit

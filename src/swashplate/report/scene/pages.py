@@ -15,7 +15,7 @@ from swashplate.crane import CraneRun, Judgment
 from swashplate.crane.stepper import RATE
 from swashplate.crane.study import NONE
 from swashplate.errors import DomainError, InputError
-from swashplate.report.fit_report.page import (
+from swashplate.report.fit_report.html_page import (
     Block,
     Section,
     listed_block,

@@ -12,11 +12,11 @@ import numpy as np
 from swashplate.campaign.experiment import Experiment
 from swashplate.errors import DomainError, InputError
 from swashplate.identification.data_checks import contradicting_runs
+from swashplate.identification.determination import WIDE, weak_unknowns
 from swashplate.identification.drive_model import CURRENTS, LIMITS, DriveModel, limits_reached
 from swashplate.identification.faults import DRIFT, LOSS, Fault, measurement_error
-from swashplate.identification.identifiability import WIDE, weak_unknowns
 from swashplate.identification.intervals import open_unknowns
-from swashplate.identification.lack_of_fit import Alone, ChannelFit, LackOfFit, lack_of_fit
+from swashplate.identification.misfit import Alone, ChannelFit, LackOfFit, lack_of_fit
 from swashplate.identification.solving import Solution
 from swashplate.identification.validation import (
     FOLLOWS,

@@ -31,10 +31,10 @@ from swashplate.tables import PRINTED, TABLE, check_folder, joined, made_folder,
 
 if TYPE_CHECKING:
     from swashplate.identification.assessment import Judged
+    from swashplate.identification.criteria import Verdict
     from swashplate.identification.drive_model import Parameters
     from swashplate.identification.setup import Setup
     from swashplate.identification.solving import Progress, Solution
-    from swashplate.identification.verdict import Verdict
     from swashplate.parameters.parameter_set import ParameterSet
 
 INTERRUPTED = 130
@@ -326,9 +326,9 @@ def validate(
     """
     from swashplate.identification import tables
     from swashplate.identification.assessment import versions
+    from swashplate.identification.criteria import verdict
     from swashplate.identification.data_checks import refuse_unsound, spike_findings
     from swashplate.identification.validation import predict, with_speeds
-    from swashplate.identification.verdict import verdict
 
     if out is not None:
         check_folder(out)
