@@ -20,7 +20,6 @@ from numpy.typing import NDArray
 from swashplate.campaign.campaign import Campaign
 from swashplate.campaign.experiment import Channel, Experiment
 from swashplate.campaign.quality import spiked
-from swashplate.campaign.samples import interpolate_counts
 from swashplate.campaign.schema import ChannelKind
 from swashplate.drive import Drive
 from swashplate.equations.cache import kernel
@@ -146,8 +145,42 @@ def march_guess(
         position[n] = position[n - 1] + 0.5 * h * (before + speed)
 
 
+class _Windows(NamedTuple):
+    """Windows of time (m,) over which mean speeds are compared."""
+
+    begins: Array
+    """[s]"""
+    ends: Array
+    """[s]"""
+    averaged: float = 0.0
+    """Time after each end over which a noisy position is averaged, 0 for instants. [s]"""
+
+    @property
+    def weights(self) -> Array:
+        """Root of the number (m,) of shortest windows that each of them is worth. [1]"""
+        return np.sqrt((self.ends - self.begins) / WINDOW)
+
+    def mean_speeds(self, time: Array, position: Array) -> Array:
+        """Mean speeds (m,) of a position (n,) at instants (n,) [s]."""
+        if not self.averaged:
+            first, last = (np.interp(instants, time, position) for instants in self[:2])
+        else:
+            steps = 0.5 * (position[1:] + position[:-1]) * np.diff(time)
+            area = np.concatenate([[0.0], np.cumsum(steps)])
+            first, last = (
+                np.interp(instants + self.averaged, time, area) - np.interp(instants, time, area)
+                for instants in self[:2]
+            )
+            first, last = first / self.averaged, last / self.averaged
+        return np.asarray((last - first) / (self.ends - self.begins))
+
+    def of(self, chosen: NDArray[np.bool_]) -> _Windows:
+        """Some of them."""
+        return self._replace(begins=self.begins[chosen], ends=self.ends[chosen])
+
+
 class _Run(NamedTuple):
-    """A run: the march's grid (n,), its command (k,) and mean speeds (m,) of windows from edges."""
+    """A run: the march's grid (n,), its command (k,) and mean speeds (m,) of windows."""
 
     time: Array
     stamps: Array
@@ -157,16 +190,14 @@ class _Run(NamedTuple):
     held: bool
     """Whether the command is held between stamps, or a straight line."""
     start: float
-    begins: Array
-    width: float
-    """[s]"""
+    windows: _Windows
     speeds: Array
     coarse: float
-    """Mean speed of one count in a window; 0 of a channel that is no encoder. [unit]"""
+    """Mean speed of one count in the shortest window; 0 of other channels than encoders. [unit]"""
 
 
 def _errors(runs: Sequence[_Run], numbers: Array) -> Array:
-    """Simulated less measured mean speeds of all runs.
+    """Simulated less measured mean speeds of all runs, weighted by their windows' lengths.
 
     Numbers (12,) are those of `march_guess`, and the delay [s].
     """
@@ -179,18 +210,9 @@ def _errors(runs: Sequence[_Run], numbers: Array) -> Array:
         # else errors had a minimum at every whole step
         time = numbers[11] + np.append(run.time[0] - BEFORE, run.time)
         position = np.append(-BEFORE * run.start, position)
-        errors.append(_mean_speeds(time, position, run.begins, run.width) - run.speeds)
+        simulated = run.windows.mean_speeds(time, position)
+        errors.append(run.windows.weights * (simulated - run.speeds))
     return np.concatenate(errors)
-
-
-def _mean_speeds(time: Array, position: Array, begins: Array, width: float) -> Array:
-    """Change (m,) of the mean position from a window to the next, over its width [s].
-
-    All samples of a noisy position count, which a difference of two of them would lose.
-    """
-    area = np.concatenate([[0.0], np.cumsum(0.5 * (position[1:] + position[:-1]) * np.diff(time))])
-    first, middle, last = (np.interp(begins + k * width, time, area) for k in range(3))
-    return np.asarray((last - 2.0 * middle + first) / width**2)
 
 
 def guess_drive(tests: Campaign | Sequence[Experiment]) -> Guess:
@@ -237,7 +259,8 @@ def guess_drive(tests: Campaign | Sequence[Experiment]) -> Guess:
             'sign = -1 for this run, or leave the run out with role = "ignore".'
         )
     speeds = np.concatenate([np.zeros(0), *(run.speeds for run in runs)])
-    if speeds.size < FEWEST:
+    weights = np.concatenate([np.zeros(0), *(run.windows.weights for run in runs)])
+    if np.sum(weights**2) < FEWEST:
         raise InputError(
             "No run measures a motion that a guess could be read off: it needs a channel of the "
             "kind shaft_speed, position or encoder_counts that is not ignored."
@@ -248,8 +271,9 @@ def guess_drive(tests: Campaign | Sequence[Experiment]) -> Guess:
     scale = float(np.quantile(np.abs(speeds), 0.99))
     if not size.max() > 0.0 or scale == 0.0:
         raise InputError("The command or the speed never leaves rest: there is nothing to guess.")
-    found = _searched(runs, speeds, size, scale)
-    rms = float(np.sqrt(np.mean(_errors(runs, found) ** 2)))
+    found = _searched(runs, weights * speeds, size, scale)
+    mean = np.average(speeds, weights=weights**2)
+    unexplained = np.sum(_errors(runs, found) ** 2) / np.sum(weights**2 * (speeds - mean) ** 2)
     # numbers of a way that was not tried are the other's
     pairs = found[:10].reshape(5, 2)
     pairs[:, size == 0.0] = pairs[:, size > 0.0][:, :1]
@@ -261,7 +285,7 @@ def guess_drive(tests: Campaign | Sequence[Experiment]) -> Guess:
         delay=round(float(found[11]), 6),
         command=command,
         speed=scale,
-        fit_percent=100.0 * (1.0 - rms / float(np.std(speeds))),
+        fit_percent=100.0 * (1.0 - sqrt(unexplained)),
     )
 
 
@@ -269,38 +293,71 @@ def _run(experiment: Experiment, channel: Channel) -> _Run:
     drive, used = experiment.input, channel.used
     time, values = channel.time[used], channel.values[used]
     interval = float(np.median(np.diff(time)))
-    width, coarse = max(WINDOW, 2.0 * interval), 0.0
-    if count := channel.resolution:
-        rows = round(width / interval)
-        coarse = count / width
+    width = max(WINDOW, 2.0 * interval)
+    count = channel.resolution or 0.0
+    rows = round(width / interval)
+    fastest = np.abs(values[rows:] - values[:-rows]).max(initial=0.0)
+    if count and fastest < FEW * count:
         # a slow staircase shows a count in a window or none, whatever the speed between
-        if np.abs(values[rows:] - values[:-rows]).max(initial=0.0) < FEW * count:
-            values = interpolate_counts(time, values)
-    travelled = values - values[0]
-    if not channel.is_position:
-        steps = 0.5 * (values[1:] + values[:-1]) * np.diff(time)
-        travelled = np.concatenate([[0.0], np.cumsum(steps)])
-    if channel.kind == "position":
-        width = max(width, _quiet_width(time, values, interval))
-    ends = max(time[0], drive.time[0]), min(time[-1], drive.time[-1])
-    begins = np.arange(ends[0], ends[1] - 2.0 * width, width)
+        time, travelled = _edges(time, values, count)
+        windows = _windows_between(time, width)
+    else:
+        travelled = values - values[0]
+        if not channel.is_position:
+            steps = 0.5 * (values[1:] + values[:-1]) * np.diff(time)
+            travelled = np.concatenate([[0.0], np.cumsum(steps)])
+        if channel.kind == "position":
+            width = max(width, _quiet_width(time, values, interval))
+        begins = np.arange(time[0], time[-1] - 2.0 * width, width)
+        # all samples of a noisy position count, which a difference of two of them would lose
+        windows = _Windows(begins, begins + width, averaged=width)
+    span = windows.begins, windows.ends + windows.averaged
+    inside = (span[0] >= drive.time[0]) & (span[1] <= drive.time[-1])
     # windows across ignored samples or a gap tell of no speed
-    for gap in np.flatnonzero(np.diff(time) > 3.0 * interval):
-        begins = begins[(begins >= time[gap + 1]) | (begins + 2.0 * width <= time[gap])]
-    speeds = _mean_speeds(time, travelled, begins, width)
+    stamps = channel.time[used]
+    for gap in np.flatnonzero(np.diff(stamps) > 3.0 * interval):
+        inside &= (span[0] >= stamps[gap + 1]) | (span[1] <= stamps[gap])
+    windows = windows.of(inside)
+    speeds = windows.mean_speeds(time, travelled)
     grid = drive.time[0] + STEP * np.arange(np.ceil((drive.time[-1] - drive.time[0]) / STEP) + 1.0)
     held = drive.interpolation == "previous"
     # a straight line may cross a dead zone between two stamps
     stamps = np.append(drive.time, grid[-1]) if held else np.union1d(drive.time, grid)
     start = 0.0 if experiment.start == "rest" or not speeds.size else float(speeds[0])
-    return _Run(grid, stamps, drive.at(stamps), held, start, begins, width, speeds, coarse)
+    return _Run(
+        *(grid, stamps, drive.at(stamps), held, start, windows, speeds),
+        coarse=count / width,
+    )
+
+
+def _edges(time: Array, angle: Array, count: float) -> tuple[Array, Array]:
+    """Instants at which an encoder's reading changed [s], and the angles that it then had.
+
+    A reading of k counts tells that the angle lies between k and k + 1, so that it is known when
+    the reading changes, in both directions alike. A run without two changes stood still.
+    """
+    changed = np.flatnonzero(angle[1:] != angle[:-1])
+    if changed.size < 2:
+        return time[[0, -1]], np.zeros(2)
+    instants = 0.5 * (time[changed] + time[changed + 1])
+    return instants, 0.5 * (angle[changed] + angle[changed + 1] + count)
+
+
+def _windows_between(instants: Array, width: float) -> _Windows:
+    """Windows from one of the instants to the next that is at least a width later [s]."""
+    chosen = [0]
+    for index in range(1, instants.size):
+        if instants[index] - instants[chosen[-1]] >= width:
+            chosen.append(index)
+    return _Windows(instants[chosen[:-1]], instants[chosen[1:]])
 
 
 def _goes_with(run: _Run) -> bool:
     """Whether a motion goes with its command at any of the delays from which the search begins."""
-    middle = run.begins + run.width
+    middle = 0.5 * (run.windows.begins + run.windows.ends + run.windows.averaged)
     commands = (np.interp(middle - late, run.stamps, run.command) for late in DELAYS)
-    return any(float(command @ run.speeds) >= 0.0 for command in commands)
+    weighted = run.windows.weights**2 * run.speeds
+    return any(float(command @ weighted) >= 0.0 for command in commands)
 
 
 def _quiet_width(time: Array, position: Array, interval: float) -> float:
@@ -314,8 +371,11 @@ def _quiet_width(time: Array, position: Array, interval: float) -> float:
     return (noise * sqrt(2.0 * interval) / (QUIET * fastest)) ** (2.0 / 3.0) if fastest else 0.0
 
 
-def _searched(runs: Sequence[_Run], speeds: Array, size: Array, scale: float) -> Array:
-    """Numbers (12,) of least squares: a grid first, on which gains are linear, then all at once."""
+def _searched(runs: Sequence[_Run], weighted: Array, size: Array, scale: float) -> Array:
+    """Numbers (12,) of least squares: a grid first, on which gains are linear, then all at once.
+
+    From the weighted mean speeds (m,), the largest command each way (2,) and the greatest speed.
+    """
     from scipy.optimize import least_squares
 
     tried, steepness = size > 0.0, scale / size.max()
@@ -350,8 +410,8 @@ def _searched(runs: Sequence[_Run], speeds: Array, size: Array, scale: float) ->
         at_rest, unit = _errors(runs, numbers), np.eye(12)
         ways = [_errors(runs, numbers + unit[2 + way]) for way in np.flatnonzero(tried)]
         gain, left = np.zeros(2), np.transpose([each - at_rest for each in ways])
-        gain[tried] = np.linalg.lstsq(left, speeds, rcond=None)[0]
-        cost = float(np.sum((left @ gain[tried] - speeds) ** 2))
+        gain[tried] = np.linalg.lstsq(left, weighted, rcond=None)[0]
+        cost = float(np.sum((left @ gain[tried] - weighted) ** 2))
         steep = np.log(np.maximum(gain, 1e-3 * steepness) / steepness)
         dead = np.where(tried, share, 0.1)
         candidates.append((cost, np.array([*dead, *steep, log(lag), delay]), gain))
@@ -386,7 +446,7 @@ def _searched(runs: Sequence[_Run], speeds: Array, size: Array, scale: float) ->
         without = np.where(np.arange(12) == index, NONE if index < 10 else 0.0, whole)
         rough = _errors(runs, numbers_of(without)) / (0.05 * scale)
         loss = 0.05**2 * float(np.sum(np.sqrt(1.0 + rough**2) - 1.0))
-        if loss < SEEN * cost + NEXT_TO_NOTHING * float(np.sum((speeds / scale) ** 2)):
+        if loss < SEEN * cost + NEXT_TO_NOTHING * float(np.sum((weighted / scale) ** 2)):
             whole = without
     return numbers_of(whole)
 
