@@ -206,21 +206,55 @@ def test_a_jump_at_the_edge_of_the_dead_zone_is_found() -> None:
     assert "J_plus" not in fit_configuration(none, guessed_set(none, "x"))
 
 
+def encoder_runs(pulses: float, **numbers: float) -> list[Experiment]:
+    """A run of each command, measured by an encoder with few counts a turn."""
+    encoder = Encoder(pulses, 1.0, 1, None)
+    made = []
+    for run in runs("position", lag=0.05):
+        speed = machine(run.input.values, lag=0.05, **numbers)
+        position = np.concatenate([[0.0], np.cumsum(0.5 * (speed[1:] + speed[:-1])) / RATE])
+        counts = np.floor(position / encoder.angle_per_count + 0.3)
+        channel = replace(
+            run["position"],
+            kind="encoder_counts",
+            counts=counts,
+            values=counts * encoder.angle_per_count,
+            encoder=encoder,
+        )
+        made.append(replace(run, channels={"counts": channel}))
+    return made
+
+
 @pytest.mark.parametrize("pulses", [60.0, 240.0])
 def test_an_encoder_of_few_pulses_shows_no_jump(pulses: float) -> None:
-    made = []
-    for each in runs("position", lag=0.05):
-        speed = machine(each.input.values, lag=0.05)
-        position = np.concatenate([[0.0], np.cumsum(0.5 * (speed[1:] + speed[:-1])) / RATE])
-        encoder = Encoder(pulses, 1.0, 1, None)
-        counts = np.floor(position / encoder.angle_per_count + 0.3)
-        read = {"counts": counts, "values": counts * encoder.angle_per_count, "encoder": encoder}
-        channel = replace(each["position"], kind="encoder_counts", **read)
-        made.append(replace(each, channels={"counts": channel}))
-    found = guess_drive(made)
+    found = guess_drive(encoder_runs(pulses))
     assert found.jump == (0.0, 0.0)
-    assert found.gain == pytest.approx(GAIN, rel=0.08)
-    assert found.dead_zone == pytest.approx(DEAD, abs=0.3)
+    assert found.gain == pytest.approx(GAIN, rel=0.005)
+    assert found.dead_zone == pytest.approx(DEAD, abs=0.01)
+    assert found.top_speed == found.acceleration == (np.inf, np.inf)
+
+
+@pytest.mark.parametrize("pulses", [60.0, 240.0])
+def test_an_encoder_of_few_pulses_shows_a_jump(pulses: float) -> None:
+    found = guess_drive(encoder_runs(pulses, jump=0.3))
+    assert found.jump == pytest.approx((0.3, 0.3), rel=0.1)
+    assert found.gain == pytest.approx(GAIN, rel=0.03)
+
+
+def test_a_run_without_a_count_widens_the_dead_zone() -> None:
+    """Two large steps leave the dead zone open; a command of 0.45 V moved nothing."""
+    steps = [run for run in encoder_runs(60.0) if run.name in ("up", "down")]
+    assert max(guess_drive(steps).dead_zone) < 0.3
+    command = 0.45 * np.sin(TIME)
+    still = run_of("still", command, {"counts": np.zeros(TIME.size)}, time=TIME, hold="previous")
+    channel = replace(
+        still["counts"],
+        kind="encoder_counts",
+        counts=np.zeros(TIME.size),
+        encoder=steps[0]["counts"].encoder,
+    )
+    found = guess_drive([*steps, replace(still, channels={"counts": channel})])
+    assert min(found.dead_zone) > 0.43
 
 
 def test_a_lag_that_is_not_seen_stays_fixed() -> None:

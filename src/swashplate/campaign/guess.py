@@ -192,8 +192,6 @@ class _Run(NamedTuple):
     start: float
     windows: _Windows
     speeds: Array
-    coarse: float
-    """Mean speed of one count in the shortest window; 0 of other channels than encoders. [unit]"""
 
 
 def _errors(runs: Sequence[_Run], numbers: Array) -> Array:
@@ -324,10 +322,7 @@ def _run(experiment: Experiment, channel: Channel) -> _Run:
     # a straight line may cross a dead zone between two stamps
     stamps = np.append(drive.time, grid[-1]) if held else np.union1d(drive.time, grid)
     start = 0.0 if experiment.start == "rest" or not speeds.size else float(speeds[0])
-    return _Run(
-        *(grid, stamps, drive.at(stamps), held, start, windows, speeds),
-        coarse=count / width,
-    )
+    return _Run(grid, stamps, drive.at(stamps), held, start, windows, speeds)
 
 
 def _edges(time: Array, angle: Array, count: float) -> tuple[Array, Array]:
@@ -438,8 +433,7 @@ def _searched(runs: Sequence[_Run], weighted: Array, size: Array, scale: float) 
         np.concatenate([whole[:2] + jump * back, whole[2:], jump * tried]) for jump in JUMPS
     )
     whole = np.append(whole, [0.0, 0.0])
-    coarse = max(run.coarse for run in runs)
-    if SEEN * smaller < cost and numbers_of(jumping)[8:10].max() > coarse:
+    if SEEN * smaller < cost:
         cost, whole = smaller, jumping
     # a limit or a jump that makes no difference was not met
     for index in range(6, 12):
