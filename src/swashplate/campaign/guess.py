@@ -30,6 +30,7 @@ from swashplate.results import short
 from swashplate.tables import UNIT, Cell, Column, Table
 
 Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
 
 STEP = 0.005
 """Step of the march. [s]"""
@@ -176,7 +177,7 @@ class _Windows(NamedTuple):
             first, last = first / self.averaged, last / self.averaged
         return np.asarray((last - first) / (self.ends - self.begins))
 
-    def of(self, chosen: NDArray[np.bool_]) -> _Windows:
+    def of(self, chosen: Mask) -> _Windows:
         """Some of them."""
         return self._replace(begins=self.begins[chosen], ends=self.ends[chosen])
 
@@ -394,7 +395,7 @@ def _searched(runs: Sequence[_Run], weighted: Array, size: Array, scale: float) 
         rough = errors_of(vector) / ROUGH
         return ROUGH**2 * float(np.sum(np.sqrt(1.0 + rough**2) - 1.0))
 
-    def descended(start: Array, free: Array, **how: Any) -> tuple[float, Array]:
+    def descended(start: Array, free: Mask, **how: Any) -> tuple[float, Array]:
         """Loss and numbers after a descent in those that are free (12,)."""
 
         def errors_at(part: Array) -> Array:
@@ -416,7 +417,7 @@ def _searched(runs: Sequence[_Run], weighted: Array, size: Array, scale: float) 
         end[free] = solution.x
         return float(solution.cost), end
 
-    def best(starts: Iterable[Array], free: Array) -> tuple[float, Array]:
+    def best(starts: Iterable[Array], free: Mask) -> tuple[float, Array]:
         """Of many starts a few steps each, and only the best of them farther."""
         begun = [descended(start, free, max_nfev=12) for start in starts]
         begun.sort(key=lambda pair: pair[0])
