@@ -398,7 +398,7 @@ class Judgment(Tabular):
             f"{100.0 * self.allowed:g} % of them; the 95 % interval of that share decides."
         )
         crane = (f"{assumed} of the crane are assumed.",) if assumed else ()
-        return (self.verdict(), rests, *crane)
+        return (self.verdict(), rests, *crane, *study.provenance())
 
 
 def _worse(own: Array, none: Array) -> NDArray[np.bool_]:

@@ -172,6 +172,11 @@ class Study(Result):
         seaway = sea if isinstance(sea, Seaway) else Seaway(sea)
         return cls(crane, cases, seaway, tuple(seeds), start, executor or Threads(), progress)
 
+    def provenance(self) -> tuple[str, ...]:
+        """Sentences on the drives of all its cranes, each once: `Crane.provenance`."""
+        cranes = [self.crane, *(crane for case in self.cases.values() for crane in case.cranes)]
+        return tuple(dict.fromkeys(words for crane in cranes for words in crane.provenance()))
+
     def outcomes(self, cases: Sequence[Case], numbers: range | None = None) -> Array:
         """`COUNTED` of all cases in the seaways, or in some of them by their numbers, (n, m, 18).
 
