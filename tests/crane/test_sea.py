@@ -1,11 +1,12 @@
 """Seaways and ships: against closed forms, published hulls and plain sums."""
 
-from math import cos, pi, radians, sin
+from math import pi, radians, sin
 from pathlib import Path
 
 import h5py
 import numpy as np
 import pytest
+from tests.fuzz.seeds import HEADINGS, MOTIONS, OMEGAS, capytaine, small_body
 
 from swashplate.crane import (
     SEA_STATES,
@@ -94,12 +95,6 @@ def test_closed_form_is_the_published_one(hull, speed, heading, period, heave, p
     assert np.degrees(abs(found[4, 0])) == pytest.approx(pitch, abs=1e-5)
 
 
-def small_body(heading, omega):
-    """Motions of a body that goes with the water and along its slope, as any in a long wave."""
-    k, c, s = omega**2 / G, cos(heading), sin(heading)
-    return np.array([-1j * c, -1j * s, 1.0, -1j * k * s, 1j * k * c, 0.0])
-
-
 def hull_motions(heading, omega):
     return HULL.response(np.array([omega]), np.array([heading]))[:, 0]
 
@@ -137,9 +132,7 @@ def test_s175_in_sea_state_3_moves_as_the_files_own_points_say(s175):
     np.testing.assert_allclose(motion[:, 1:4].std(axis=0), np.sqrt(energy[1:4]), rtol=0.03)
 
 
-MOTIONS = ("surge", "sway", "heave", "roll", "pitch", "yaw")
 HEADER = ",".join(["heading_deg,omega", *(f"{each}_re,{each}_im" for each in MOTIONS)])
-HEADINGS, OMEGAS = (0.0, 30.0, 90.0, 150.0, 180.0), (0.1, 0.2, 0.5)
 
 
 @pytest.fixture
@@ -186,21 +179,6 @@ def wamit_lines(length=80.0):
     return lines
 
 
-def write_capytaine(path, sign=-1.0):
-    """The file that separate_complex_values and to_netcdf write, made by h5py."""
-    table = np.array([[small_body(radians(h), w) for h in HEADINGS] for w in OMEGAS])
-    parts = np.stack([table.real, sign * table.imag])  # complex, omega, wave_direction, dof
-    grids = {"omega": np.array(OMEGAS), "wave_direction": np.radians(HEADINGS)}
-    words = {"complex": ["re", "im"], "radiating_dof": [each.title() for each in MOTIONS]}
-    with h5py.File(path, "w") as file:
-        for name, values in (grids | words).items():
-            text = h5py.string_dtype() if name in words else None
-            file.create_dataset(name, data=values, dtype=text).make_scale(name)
-        file["RAO"] = parts
-        for n, axis in enumerate(("complex", "omega", "wave_direction", "radiating_dof")):
-            file["RAO"].dims[n].attach_scale(file[axis])
-
-
 @pytest.mark.parametrize("program", ["wamit", "capytaine"])
 def test_files_of_other_programs_go_with_the_water_in_a_long_wave(tmp_path, program):
     path = tmp_path / ("ship.4" if program == "wamit" else "ship.nc")
@@ -208,7 +186,7 @@ def test_files_of_other_programs_go_with_the_water_in_a_long_wave(tmp_path, prog
         path.write_text("\n".join(wamit_lines()), "utf-8")
         ship = read_ship(path, 80.0)
     else:
-        write_capytaine(path)
+        capytaine(path)
         ship = read_ship(path)
     assert ship.headings.size == 5
     assert ship.frequencies == pytest.approx(OMEGAS)
@@ -236,7 +214,7 @@ def test_cut_files_and_other_conventions_are_refused(tmp_path):
     refused("of 0 deg surge is .* must go with the water, .*-1j times", turned, InputError)
     with pytest.raises(InputError, match="ULEN is 0 m"):
         read_ship(path, 0.0)
-    write_capytaine(nc, sign=1.0)
+    capytaine(nc, sign=1.0)
     with pytest.raises(InputError, match="in the longest wave of 0 deg surge is"):
         read_ship(nc)
     with h5py.File(nc, "a") as file:

@@ -1,37 +1,18 @@
 """Files of ships that are damaged, or have numbers that no ship has: each ends in one sentence."""
 
 import time
-from math import inf, nan, pi, radians
+from math import inf, nan
 
 import h5py
 import numpy as np
 import pytest
-from tests.crane.test_sea import HEADER, MOTIONS, small_body, write_capytaine
+from tests.fuzz.seeds import MOTIONS, capytaine, ship_table_lines, wamit_lines
 
 from swashplate.crane import read_ship, ship_motion
 from swashplate.errors import FileError, InputError, SwashplateError
 from swashplate.logs import apart
 
 WAVES = [(heading, omega) for heading in (0.0, 90.0, 180.0) for omega in (0.1, 0.2, 0.5)]
-
-
-def table_lines(waves=WAVES):
-    """Rows of a .csv for waves of headings [deg] and frequencies."""
-    rows = [HEADER]
-    for heading, omega in waves:
-        motions = small_body(radians(heading), omega).tolist()
-        parts = [part for z in motions for part in (z.real, z.imag)]
-        rows.append(",".join(map(repr, (heading, omega, *parts))))
-    return rows
-
-
-def wamit_lines(waves=WAVES):
-    lines = []
-    for heading, omega in waves:
-        for number, z in enumerate(small_body(radians(heading), omega).tolist(), 1):
-            numbers = (2.0 * pi / omega, heading, number, abs(z), 0.0, z.real, z.imag)
-            lines.append(" ".join(map(repr, numbers)))
-    return lines
 
 
 @pytest.fixture
@@ -68,17 +49,10 @@ def check_ending(path, length=None):
 # --- Capytaine ------------------------------------------------------------------------------------
 
 
-def headings_and_frequencies(monkeypatch):
-    """A grid of 7 headings and 10 frequencies."""
-    monkeypatch.setattr("tests.crane.test_sea.HEADINGS", tuple(np.linspace(0.0, 180.0, 7)))
-    monkeypatch.setattr("tests.crane.test_sea.OMEGAS", tuple(np.linspace(0.1, 1.5, 10)))
-
-
 @pytest.fixture
-def capytaine(tmp_path, monkeypatch):
-    headings_and_frequencies(monkeypatch)
+def ship(tmp_path):
     path = tmp_path / "ship.nc"
-    write_capytaine(path)
+    capytaine(path, np.linspace(0.0, 180.0, 7).tolist(), np.linspace(0.1, 1.5, 10).tolist())
     return path
 
 
@@ -87,46 +61,43 @@ FLIPS = [(2408, 0x80), (2432, 0x20), (2480, 0x20), (1160, 0x20), (1208, 0x08), (
 
 
 @pytest.mark.parametrize(("place", "bit"), FLIPS)
-def test_a_flipped_bit_ends_in_a_sentence_in_time(capytaine, monkeypatch, place, bit):
-    read_ship(capytaine)  # starts the process, which takes its time on a busy machine
+def test_a_flipped_bit_ends_in_a_sentence_in_time(ship, monkeypatch, place, bit):
+    read_ship(ship)  # starts the process, which takes its time on a busy machine
     monkeypatch.setattr(apart, "_PATIENCE", 2.0)
-    content = bytearray(capytaine.read_bytes())
+    content = bytearray(ship.read_bytes())
     content[place] ^= bit
-    capytaine.write_bytes(content)
+    ship.write_bytes(content)
     begun = time.monotonic()
-    check_ending(capytaine)
+    check_ending(ship)
     assert time.monotonic() - begun < 20.0
 
 
-def test_flipped_bits_end_in_a_sentence_or_in_numbers(capytaine, monkeypatch):
-    read_ship(capytaine)
+def test_flipped_bits_end_in_a_sentence_or_in_numbers(ship, monkeypatch):
+    read_ship(ship)
     monkeypatch.setattr(apart, "_PATIENCE", 2.0)
-    whole, random = capytaine.read_bytes(), np.random.default_rng(34)
+    whole, random = ship.read_bytes(), np.random.default_rng(34)
     written = np.flatnonzero(np.frombuffer(whole, np.uint8))
     for place in random.choice(written, 100):
         content = bytearray(whole)
         content[place] ^= 1 << random.integers(8)
-        capytaine.write_bytes(content)
-        check_ending(capytaine)
+        ship.write_bytes(content)
+        check_ending(ship)
 
 
-def test_objects_of_another_kind_are_refused(capytaine):
-    with h5py.File(capytaine, "a") as file:
+def test_objects_of_another_kind_are_refused(ship):
+    with h5py.File(ship, "a") as file:
         del file["RAO"]
         file.create_group("RAO")
     with pytest.raises(FileError, match="netCDF 4 with an array RAO over complex"):
-        read_ship(capytaine)
+        read_ship(ship)
 
 
-def test_frequencies_at_the_limits_are_refused(tmp_path, monkeypatch):
-    headings_and_frequencies(monkeypatch)
-    path = tmp_path / "ship.nc"
-    write_capytaine(path)
+def test_frequencies_at_the_limits_are_refused(ship):
     for limit in (0.0, inf):
-        with h5py.File(path, "a") as file:
+        with h5py.File(ship, "a") as file:
             file["omega"][-1] = limit
         with pytest.raises(FileError, match=rf"ship.nc: frequency is {limit:g} .* 0.001 to 100"):
-            read_ship(path)
+            read_ship(ship)
 
 
 def test_a_folder_and_no_file_are_refused(tmp_path):
@@ -141,7 +112,7 @@ def test_a_folder_and_no_file_are_refused(tmp_path):
 
 
 def test_a_quotation_mark_that_is_never_closed_is_refused(refused):
-    lines = table_lines()
+    lines = ship_table_lines(WAVES)
     long = [lines[0], '"' + lines[1], *["x" * 100] * 2000]
     assert "quotation mark that is not closed" in refused(long)
 
@@ -156,7 +127,7 @@ def test_waves_on_no_grid_are_refused_before_it_is_made(refused, suffix):
             strict=True,
         )
     )
-    lines = table_lines(waves) if suffix == ".csv" else wamit_lines(waves)
+    lines = ship_table_lines(waves) if suffix == ".csv" else wamit_lines(waves)
     begun = time.process_time()
     sentence = refused(lines, suffix)
     assert time.process_time() - begun < 10.0  # 28 s for 6000 waves, when the grid was made
@@ -181,7 +152,7 @@ def test_waves_on_no_grid_are_refused_before_it_is_made(refused, suffix):
 )
 def test_numbers_of_wamit_that_no_ship_has_are_refused(refused, column, number, expected):
     names = ["period", "heading", "motion", "modulus", "phase", "real part", "imaginary part"]
-    lines = wamit_lines()
+    lines = wamit_lines(WAVES)
     cells = lines[4].split()
     cells[names.index(column)] = number
     lines[4] = " ".join(cells)
@@ -192,7 +163,7 @@ def test_numbers_of_wamit_that_no_ship_has_are_refused(refused, column, number, 
 @pytest.mark.parametrize("column", ["heading_deg", "omega", "heave_re", "yaw_im"])
 @pytest.mark.parametrize("number", ["1e308", "-1e308", "nan"])
 def test_numbers_of_a_table_that_no_ship_has_are_refused(refused, column, number):
-    lines = table_lines()
+    lines = ship_table_lines(WAVES)
     cells = lines[3].split(",")
     cells[lines[0].split(",").index(column)] = number
     lines[3] = ",".join(cells)
@@ -207,7 +178,7 @@ def test_counts_of_veres_are_whole(refused):
 def test_text_at_random_ends_in_a_sentence_or_in_numbers(tmp_path):
     random = np.random.default_rng(7)
     cells = ["", "nan", "-1", "0", "1e308", "5e-324", "7.5", '"', "6", "x", "180", "1e9", "\0", "µ"]
-    for suffix, lines in ((".csv", table_lines()), (".4", wamit_lines())):
+    for suffix, lines in ((".csv", ship_table_lines(WAVES)), (".4", wamit_lines(WAVES))):
         separator = "," if suffix == ".csv" else " "
         for _ in range(150):
             changed = list(lines)
