@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property, lru_cache
 from importlib.resources import files
-from math import cos, degrees, isfinite, radians, sin
+from math import cos, degrees, radians, sin
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal, Unpack
 
@@ -253,8 +253,10 @@ class Crane:
             raise InputError(
                 f"The rope of {self.name} is {rope_m:g} m, but can be {short:g} to {long:g} m."
             )
-        if not isfinite(slew_deg):
-            raise InputError("The slew at the start must be a finite angle.")
+        if not abs(slew_deg) <= 720.0:
+            raise InputError(
+                f"The slew at the start is {slew_deg:g} deg, but must be within 720 deg."
+            )
         boom = Boom(cos(radians(boom_deg)), sin(radians(boom_deg)))
         return Home(radians(slew_deg), float(luff_rope(boom, self.geometry)), rope_m)
 

@@ -39,6 +39,8 @@ SHARES = (0.8, 0.6, 0.4)
 """Shares of what the luff can follow at which control is clipped on trial, the largest first."""
 ENOUGH = (10, 20, 30, 50, 75, 100, 150, 200, 300, 500, 700, 1000, 1500, 2000, 3000, 5000, 10_000)
 """Numbers of seaways that are advised where fewer do not decide."""
+SLOWEST = 3600.0
+"""Longest period that an axis is asked to follow; a tide has more, a swell 25 s. [s]"""
 BLOCK = 20
 """Seaways of a trial after which it is given up if it has failed already."""
 LOOP = PositionLoop()
@@ -102,8 +104,8 @@ def follow(
     ship's hull in beam waves.
     """
     times = np.atleast_1d(np.asarray(periods, dtype=np.float64))
-    if not (np.isfinite(times).all() and (times > 0.0).all() and times.size):
-        raise InputError("Periods to follow must be above 0 s.")
+    if not (((times > 0.0) & (times <= SLOWEST)).all() and times.size):
+        raise InputError(f"Periods to follow must be above 0 s and at most {SLOWEST:g} s.")
     g, home = crane.geometry, crane.home(slew_deg, boom_deg, rope_m)
     boom = boom_at(0.0, g, home)
     rates = (g.hoist, g.foot + g.boom * boom.cos, float(reach_rate(boom, g)))

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from math import isfinite, log, radians
+from math import log, radians
 from numbers import Real
 from pathlib import Path
 from typing import NamedTuple
@@ -43,6 +43,8 @@ RATES = (10.0, 1e5)
 """Samples a second that a measured motion is given at. [Hz]"""
 LARGEST = 100_000_000
 """Numbers of a motion, 0.8 GB; nine hours at 512 Hz."""
+HIGHEST = 30.0
+"""Largest significant height of a sea; the largest one measured is 19 m. [m]"""
 LEAST_ENERGY, MOST_LOST = 0.5, 0.05
 """Part of a spectrum's energy that must lie within the band; largest part of a sea's that may lie
 beyond a file's frequencies, where the motions of its ends are taken."""
@@ -52,20 +54,24 @@ beyond a file's frequencies, where the motions of its ends are taken."""
 class Spectrum:
     """JONSWAP's spectrum of waves; Bretschneider's with a peak factor of 1.
 
-    An `InputError` unless all are above 0 and most of the energy lies at waves of 2.5 to 25 s.
+    An `InputError` unless all are above 0 and plausible, and most of the energy lies at waves of
+    2.5 to 25 s.
     """
 
     height: float
-    """Significant wave height, four standard deviations of the surface. [m]"""
+    """Significant wave height, four standard deviations of the surface; at most 30. [m]"""
     period: float
     """Of the peak. [s]"""
     peak_factor: float = 1.0
-    """γ, 3.3 for young wind seas."""
+    """γ, 3.3 for young wind seas; at most 10, seas have 1 to 7."""
 
     def __post_init__(self) -> None:
-        for name, value in vars(self).items():
-            if not (isfinite(value) and value > 0.0):
-                raise InputError(f"The {name} of a sea is {value:g}, but must be above 0.")
+        for name, most in (("height", HIGHEST), ("period", 1000.0), ("peak_factor", 10.0)):
+            value = getattr(self, name)
+            if not 0.0 < value <= most:
+                raise InputError(
+                    f"The {name} of a sea is {value:g}, but must be above 0 and at most {most:g}."
+                )
         omega = np.linspace(*BAND, 2001)
         held = float(np.trapezoid(self.density(omega), omega))
         if held < LEAST_ENERGY * self.height**2 / 16.0:
@@ -145,8 +151,13 @@ class Seaway(Result):
             raise InputError(f"A sea is a name, as 'ss3', or a Spectrum, not of type {kind}.")
         if isinstance(self.sea, str):
             check_names("There is no sea", [self.sea], SEA_STATES)
-        if not (isfinite(self.heading_deg) and isfinite(self.speed) and self.components >= 2):
-            raise InputError("A seaway has a finite heading and speed and two or more components.")
+        if not (abs(self.heading_deg) <= 720.0 and abs(self.speed) <= 50.0):
+            raise InputError(
+                f"A seaway has a heading within 720 deg and a ship's speed within 50 m/s, not "
+                f"{self.heading_deg:g} deg and {self.speed:g} m/s."
+            )
+        if not 2 <= self.components <= 100_000:
+            raise InputError(f"A seaway has 2 to 100000 components, not {self.components:g}.")
         if not str(self.seed).isdigit():
             raise InputError(f"The seed of a seaway is {self.seed}, but must be 0, 1, 2, ...")
         if isinstance(self.ship, TransferFunctions):

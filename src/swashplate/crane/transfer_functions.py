@@ -43,6 +43,14 @@ HEAVES = 0.3
 """Largest distance of heave from 1 in the longest wave of a file, which the wave's crest lifts."""
 STEEPEST = 2.0
 """Largest pitch in the longest following wave of a file, over the wave's slope."""
+HULLS: Mapping[str, tuple[float, float]] = {
+    "length": (1.0, 600.0),
+    "beam": (0.3, 200.0),
+    "draught": (0.05, 50.0),
+    "roll_period": (0.5, 100.0),
+    "roll_damping": (1e-4, 1.0),
+}
+"""Ranges that the numbers of every ship lie well within, from a dinghy on. [m], [s]"""
 WIDEST, ASIDE = 90.0, 5.0
 """Largest angle between headings of a file; angle to its only one that is taken for it. [deg]"""
 
@@ -56,22 +64,27 @@ class Hull:
 
     Heave and pitch are theirs; roll is the waves' slope through one resonance; sway and surge
     follow the water. Ask the ship for its roll period first: nothing else matters as much. An
-    `InputError` unless all numbers are above 0.
+    `InputError` for numbers that no ship has.
     """
 
     length: float
+    """1 to 600; ships reach 400. [m]"""
     beam: float
+    """0.3 to 200. [m]"""
     draught: float
-    """[m], as length and beam."""
+    """0.05 to 50. [m]"""
     roll_period: float = 13.0
-    """Natural period. [s]"""
+    """Natural period, 0.5 to 100. [s]"""
     roll_damping: float = 0.06
-    """Damping ratio."""
+    """Damping ratio, 0.0001 to 1."""
 
     def __post_init__(self) -> None:
-        for name, value in vars(self).items():
-            if not (isfinite(value) and value > 0.0):
-                raise InputError(f"The hull's {name} is {value:g}, but must be above 0.")
+        for name, (low, high) in HULLS.items():
+            value = getattr(self, name)
+            if not low <= value <= high:
+                raise InputError(
+                    f"The hull's {name} is {value:g}, but must be {low:g} to {high:g}."
+                )
 
     def response(self, omega: Array, heading: Array, speed: float = 0.0) -> Complex:
         """Complex amplitudes of six motions, (6, n); as `TransferFunctions.response`."""
