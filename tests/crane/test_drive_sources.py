@@ -6,11 +6,11 @@ import pytest
 from typer.testing import CliRunner
 
 from swashplate.cli import app
-from swashplate.crane import Crane, control, judge
+from swashplate.crane import Crane, Stick, control, judge
 from swashplate.crane.crane import preset_text
 from swashplate.identification import Verdict, load_setup
 from swashplate.identification.assessment import FitFile, StoredVerdict
-from swashplate.report.scene import write_judgment
+from swashplate.report.scene import write_judgment, write_scene
 
 GRADES = {
     "Usable": "Usable: predicts held-out shaft_speed within 1.1 % of its range.",
@@ -160,6 +160,15 @@ def test_judgment_and_page_say_the_verdict(fit, tmp_path, grade):
     for part in (summary, basis):
         assert GRADES[grade] in part
     look = {"Usable": "good", "Not usable": "bad"}.get(grade, "look")
-    assert f'class="headline {look}"' in summary
+    assert f'<dt class="{look}">Hoist&#39;s drive' in summary
+    forced = "It rests on the fit of the hoist, which is not usable." in found.headline()
+    assert forced == (grade == "Not usable")
+    assert found.headline().replace("'", "&#39;") in summary
     hoist = crane.hoist.parameters.title
     assert f"hoist: {hoist}" in basis
+
+
+def test_a_scene_says_the_verdict(fit, tmp_path):
+    crane = Crane.preset("tg3637").with_drive(hoist=fit("Not usable"))
+    write_scene(crane.simulate(Stick.rest(2.0)), tmp_path / "scene.html")
+    assert GRADES["Not usable"] in tmp_path.joinpath("scene.html").read_text("utf-8")

@@ -316,11 +316,10 @@ def judge(
     draw(plot, "plot_judgment", found)
     _end(study.chosen, found.tables(), *found.sentences()[1:])
     say_saved()
-    headline = f"{found.outcome.capitalize()}: {found.verdict()}"
     if not found.passed:
-        side.print(headline)
+        side.print(found.headline())
         raise typer.Exit(1)
-    say(headline)
+    say(found.headline())
 
 
 def follow(

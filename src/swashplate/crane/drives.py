@@ -50,12 +50,15 @@ class DriveSource(NamedTuple):
         """Whether no verdict says that it is not."""
         return self.grade != UNUSABLE
 
-    def sentence(self, axis: str) -> str:
-        """Where the drive of an axis comes from, and what the verdict was."""
-        drive = f"The {axis}'s drive is {self.place}"
+    def words(self) -> str:
+        """Where the drive comes from, and what the verdict was, as the end of a sentence."""
         if self.grade is None:
-            return f"{drive}; no verdict on it is known, as {self.verdict}."
-        return f"{drive}; the verdict on its fit is: {self.verdict}"
+            return f"{self.place}; no verdict on it is known, as {self.verdict}."
+        return f"{self.place}; the verdict on its fit is: {self.verdict}"
+
+    def sentence(self, axis: str) -> str:
+        """The same of the drive of an axis."""
+        return f"The {axis}'s drive is {self.words()}"
 
 
 def drives_of(

@@ -274,6 +274,21 @@ class Judgment(Tabular):
         """Whether the judged variant swings as no control does, in every seaway."""
         return np.allclose(self.counted(self.judged), self.counted(NONE), rtol=1e-3)
 
+    def headline(self) -> str:
+        """The outcome, the verdict, and whether they rest on a drive whose fit is not usable."""
+        words = f"{self.outcome.capitalize()}: {self.verdict()}"
+        case = self.study.cases[self.judged]
+        unusable = {
+            axis
+            for crane in case.cranes
+            for axis, source in crane.sources.items()
+            if not source.usable
+        }
+        if not unusable:
+            return words
+        axes = listed([axis for axis in AXES if axis in unusable])
+        return f"{words} It rests on the fit of the {axes}, which is not usable."
+
     def verdict(self) -> str:
         """What the judged variant amounts to, and what would do if it fails."""
         share, seaways, outcome = self.worse(self.judged), len(self.study.seeds), self.outcome

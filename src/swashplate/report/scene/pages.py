@@ -82,6 +82,7 @@ def write_scene(runs: CraneRun | Mapping[str, CraneRun], path: str | Path) -> No
         title=first.crane.title,
         names=list(named),
         assumed=first.crane.assumed,
+        provenance=first.crane.provenance(),
         data=script_json(content),
     )
     write_text(made, path)
@@ -123,7 +124,7 @@ def write_judgment(judgment: Judgment, path: str | Path) -> None:
     pose = {name: setup[name] for name in ("slew_deg", "boom_deg", "rope_m")}
     swings, worse, differences, limits, *remedies = judgment.tables()
     provenance = study.provenance()
-    verdict, *rests = (words for words in judgment.sentences() if words not in provenance)
+    _, *rests = (words for words in judgment.sentences() if words not in provenance)
     # a scene alone needs no figures
     from swashplate.report.figures.crane import (
         plot_crane,
@@ -136,10 +137,9 @@ def write_judgment(judgment: Judgment, path: str | Path) -> None:
     outcome = judgment.outcome
     looks: dict[str, Light] = {"works": "good", "not decided": "look", "fails": "bad"}
     look = looks[outcome]
-    headline = f"{outcome.capitalize()}: {verdict}"
     summary = [
-        Block("verdict", (light(look, outcome), headline), look),
-        *_fit_lights(crane),
+        Block("verdict", (light(look, outcome), judgment.headline()), look),
+        *_fit_verdicts(crane),
         _drawn(plot_judgment(judgment), "Swing of each variant in each seaway"),
         *(block for each in remedies for block in titled(each)),
     ]
@@ -188,17 +188,14 @@ def write_judgment(judgment: Judgment, path: str | Path) -> None:
     write_text(made, path)
 
 
-def _fit_lights(crane: Crane) -> list[Block]:
+def _fit_verdicts(crane: Crane) -> list[Block]:
     """The verdict on the fit of each drive that comes from one, or that none is known."""
-    from swashplate.report.fit_report.summary import light
-
     looks: dict[str | None, Light] = {"Usable": "good", UNUSABLE: "bad"}
-    blocks = []
-    for axis, source in crane.sources.items():
-        look = looks.get(source.grade, "look")
-        meaning = source.grade or "no verdict known"
-        blocks.append(Block("verdict", (light(look, meaning), source.sentence(axis)), look))
-    return blocks
+    terms = [
+        (f"{axis.capitalize()}'s drive", looks.get(source.grade, "look"), [source.words()])
+        for axis, source in crane.sources.items()
+    ]
+    return [Block("terms", terms, "verdict")] if terms else []
 
 
 def _drawn(figure: Figure, caption: str) -> Block:
