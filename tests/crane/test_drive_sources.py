@@ -84,6 +84,9 @@ def test_a_cranes_file_with_such_a_fit_is_refused_too(fit, tmp_path):
     assert refused.exit_code == 2
     assert "Not usable" in refused.stderr
     assert said("run", mine, "--length", "5", "--force").exit_code == 0
+    shown = said("show", mine)
+    assert shown.exit_code == 0
+    assert GRADES["Not usable"] in shown.stdout
 
 
 @pytest.mark.parametrize("grade", GRADES)

@@ -64,13 +64,9 @@ class Placed:
 
     @cached_property
     def chosen(self) -> Crane:
-        """The crane, with its drives."""
-        from swashplate.crane import Crane
-
-        own = self.crane.endswith(".toml")
-        made = Crane.from_toml(self.crane) if own else Crane.preset(self.crane)
+        """The crane, with its drives; one whose fit is not usable is refused without --force."""
         drives = dict(pairs_of("--drive", self.drive, "luff=mine.toml"))
-        crane = made.with_drive(told=True, **drives)
+        crane = _crane_of(self.crane).with_drive(told=True, **drives)
         if not FORCED.get():
             _refuse_unusable(crane)
         return crane
@@ -189,10 +185,12 @@ def show_crane(crane: str, *, toml: bool = False) -> None:
         read = read_text if crane.endswith(".toml") else preset_text
         typer.echo(read(crane), nl=False)
         return
-    chosen = Placed(crane).chosen
+    chosen = _crane_of(crane)
     show(chosen.table())
     for axis in AXES:
         note(f"{axis}: {getattr(chosen, axis).parameters.title}")
+    for sentence in chosen.provenance():
+        say(sentence)
 
 
 def run(
@@ -437,6 +435,13 @@ def _number(what: str, text: str) -> float:
         return float(text)
     except ValueError:
         raise InputError(f"{what}: '{text}' is no number.") from None
+
+
+def _crane_of(name: str) -> Crane:
+    """A packaged crane by its name, or the crane of a file."""
+    from swashplate.crane import Crane
+
+    return Crane.from_toml(name) if name.endswith(".toml") else Crane.preset(name)
 
 
 def _refuse_unusable(crane: Crane) -> None:
