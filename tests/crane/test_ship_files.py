@@ -170,6 +170,14 @@ def test_numbers_of_a_table_that_no_ship_has_are_refused(refused, column, number
     assert f"line 4: {column} is '{number}', but must be a number from " in refused(lines)
 
 
+@pytest.mark.parametrize("length", [1e-300, 1e300, nan, -175.0])
+def test_lengths_of_wamit_that_no_ship_has_are_refused(tmp_path, length):
+    path = tmp_path / "ship.4"
+    path.write_text("\n".join(wamit_lines(WAVES)), "utf-8")
+    with pytest.raises(InputError, match=r"ship.4: WAMIT's length ULEN is .* 0.01 to 10000 m"):
+        read_ship(path, length)
+
+
 def test_counts_of_veres_are_whole(refused):
     lines = ["VERES", *["text"] * 8, "1 1.5 1 6", "0", "0", "0.5"]
     assert "line 10: headings is '1.5', but must be a whole number from 1" in refused(lines, ".re1")

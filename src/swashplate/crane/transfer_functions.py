@@ -234,6 +234,8 @@ RANGES: Mapping[str, tuple[float, float]] = {
     "count": (1, 100_000),
 }
 """Plausible numbers of a file; in m/s, deg, rad/s, s, m/m or rad/m."""
+LENGTHS = (0.01, 10_000.0)
+"""Plausible lengths ULEN of WAMIT. [m]"""
 WHOLE = ("motion", "count")
 """Those that are whole numbers."""
 KINDS = {
@@ -262,7 +264,7 @@ def read_ship(path: str | Path, length: float | None = None) -> TransferFunction
         [rad/s], ``surge_re``, ``surge_im`` and so on [m/m], [rad/m], and where it likes ``speed``
         [m/s]. Waves from beyond 180 deg are taken as those from the other side, by symmetry.
     length : float, optional
-        WAMIT's ULEN, by which rotations of a ``.4`` are made dimensionless. [m]
+        WAMIT's ULEN, by which rotations of a ``.4`` are made dimensionless, 0.01 to 10 000. [m]
 
     Raises
     ------
@@ -279,8 +281,11 @@ def read_ship(path: str | Path, length: float | None = None) -> TransferFunction
         raise InputError(
             f"{path}: a .4 of WAMIT, and no other file, needs the length ULEN of its run."
         )
-    if length is not None and not (isfinite(length) and length > 0.0):
-        raise InputError(f"WAMIT's length ULEN is {length:g} m, but must be above 0.")
+    low, high = LENGTHS
+    if length is not None and not low <= length <= high:
+        raise InputError(
+            f"{path}: WAMIT's length ULEN is {length:g} m, but must be {low:g} to {high:g} m."
+        )
     readers = {".re1": _veres, ".4": _wamit, ".nc": _capytaine, ".csv": _csv}
     if kind not in readers:
         raise InputError(
