@@ -13,6 +13,7 @@ from swashplate.errors import ParameterError, SwashplateError
 from swashplate.parameters.files import preset_names
 
 if TYPE_CHECKING:
+    from swashplate.identification.assessment import StoredVerdict
     from swashplate.identification.criteria import Grade
 
 DRIVE_FILE, FIT_FILE = "drive.toml", "fit.json"
@@ -79,17 +80,17 @@ def drives_of(
         For a file that is not there or not a drive's, and a drive of another axis.
     """
     drives, sources = {}, {}
-    for axis, each in given.items():
-        drive, path = _drive(each, folder, axis)
+    for axis, drive_like in given.items():
+        drive, path = _drive(drive_like, folder, axis)
         # a packaged drive or a Drive is put onto another axis knowingly, a fit or file hardly
-        named = isinstance(each, Drive) or str(each) in preset_names()
-        if not named and drive.name in AXES and drive.name != axis:
+        chosen = isinstance(drive_like, Drive) or str(drive_like) in preset_names()
+        if not chosen and drive.name in AXES and drive.name != axis:
             raise ParameterError(
                 f"{axis}: {path or 'the fit'} has a drive of the {drive.name}. If it moves the "
                 f"{axis} as well, give it another name."
             )
         drives[axis] = drive
-        source = _source(each, drive, path)
+        source = _source(drive_like, drive, path)
         if source is not None:
             sources[axis] = source
     return drives, sources
@@ -98,9 +99,9 @@ def drives_of(
 def _drive(given: DriveLike, folder: Path, axis: str) -> tuple[Drive, Path | None]:
     """The drive of an axis as it is given, and its file, if it has one."""
     if not isinstance(given, str | Path):
-        made = getattr(given, "drive", given)
-        if isinstance(made, Drive):
-            return made, None
+        drive = getattr(given, "drive", given)
+        if isinstance(drive, Drive):
+            return drive, None
     elif str(given) in preset_names():
         return Drive.preset(str(given)), None
     elif (path := folder / given).is_dir() or path.suffix == ".toml":
@@ -137,26 +138,32 @@ def _source(given: DriveLike, drive: Drive, path: Path | None) -> DriveSource | 
 def _source_of_file(path: Path, drive: Drive) -> DriveSource:
     """The source of a drive's file, with the verdict of the fit beside it."""
     stored = path.with_name(FIT_FILE)
-    if path.name != DRIVE_FILE or not stored.is_file():
-        fit, why = None, "there is no fit beside it"
-    else:
+    fit, why = None, "there is no fit beside it"
+    if path.name == DRIVE_FILE and stored.is_file():
         fit = path.parent
-        from swashplate.identification.assessment import read_verdict
-
-        try:
-            verdict = read_verdict(stored)
-        except SwashplateError as error:
-            verdict, why = None, f"the fit beside it cannot be read ({str(error).rstrip('.')})"
-        else:
-            why = f"{stored} has none: fit again"
+        verdict, why = _stored_verdict(stored, drive)
         if verdict is not None:
-            if verdict.numbers == dict(drive.parameters.numbers):
-                return DriveSource(str(path), fit, verdict.grade, verdict.headline)
-            why = f"it is not the drive that {stored} was written with"
+            return DriveSource(str(path), fit, verdict.grade, verdict.headline)
     stated = _stated_in_title(drive)
     if stated:
         return DriveSource(str(path), fit, UNUSABLE, stated)
     return DriveSource(str(path), fit, None, why)
+
+
+def _stored_verdict(path: Path, drive: Drive) -> tuple[StoredVerdict | None, str]:
+    """The verdict of a stored fit on a drive; None and the clause why if it is not known."""
+    # only what comes from a fit needs the identification
+    from swashplate.identification.assessment import read_verdict
+
+    try:
+        verdict = read_verdict(path)
+    except SwashplateError as error:
+        return None, f"the fit beside it cannot be read ({str(error).rstrip('.')})"
+    if verdict is None:
+        return None, f"{path} has none: fit again"
+    if verdict.numbers != dict(drive.parameters.numbers):
+        return None, f"it is not the drive that {path} was written with"
+    return verdict, ""
 
 
 def _stated_in_title(drive: Drive) -> str:
