@@ -96,7 +96,7 @@ def test_frequencies_at_the_limits_are_refused(ship):
     for limit in (0.0, inf):
         with h5py.File(ship, "a") as file:
             file["omega"][-1] = limit
-        with pytest.raises(FileError, match=rf"ship.nc: frequency is {limit:g} .* 0.001 to 100"):
+        with pytest.raises(FileError, match=rf"ship.nc: omega is {limit:g} .* 0.001 to 100"):
             read_ship(ship)
 
 

@@ -410,17 +410,18 @@ def _capytaine(path: str | Path) -> Amplitudes:
     rows["value"].imag = -columns["im"]
     for name, values in (
         ("heading", rows["heading"]),
-        ("frequency", rows["frequency"]),
-        ("part", columns["re"]),
-        ("part", columns["im"]),
+        ("omega", rows["frequency"]),
+        ("real part", columns["re"]),
+        ("imaginary part", columns["im"]),
     ):
-        low, high = RANGES[name]
+        low, high = RANGES[KINDS.get(name, name)]
         wrong = np.flatnonzero(~((low <= values) & (values <= high)))
         if wrong.size:
             row = rows[wrong[0]]
             raise FileError(
-                f"{path}: {name} is {values[wrong[0]]:g} in waves of {row['frequency']:g} rad/s "
-                f"and {row['heading']:g} deg, but must be {_expected(name)}."
+                f"{path}: {name} is {values[wrong[0]]:g} of the {MOTIONS[row['motion'] - 1]} in "
+                f"waves of {row['frequency']:g} rad/s and {row['heading']:g} deg, but must be "
+                f"{_expected(name)}."
             )
     return rows
 
