@@ -39,6 +39,8 @@ SHARES = (0.8, 0.6, 0.4)
 """Shares of what the luff can follow at which control is clipped on trial, the largest first."""
 ENOUGH = (10, 20, 30, 50, 75, 100, 150, 200, 300, 500, 700, 1000, 1500, 2000, 3000, 5000, 10_000)
 """Numbers of seaways that are advised where fewer do not decide."""
+SLOWEST = 3600.0
+"""Longest period that an axis is asked to follow; a tide has more, a swell 25 s. [s]"""
 BLOCK = 20
 """Seaways of a trial after which it is given up if it has failed already."""
 LOOP = PositionLoop()
@@ -102,8 +104,8 @@ def follow(
     ship's hull in beam waves.
     """
     times = np.atleast_1d(np.asarray(periods, dtype=np.float64))
-    if not (np.isfinite(times).all() and (times > 0.0).all() and times.size):
-        raise InputError("Periods to follow must be above 0 s.")
+    if not (((times > 0.0) & (times <= SLOWEST)).all() and times.size):
+        raise InputError(f"Periods to follow must be above 0 s and at most {SLOWEST:g} s.")
     g, home = crane.geometry, crane.home(slew_deg, boom_deg, rope_m)
     boom = boom_at(0.0, g, home)
     rates = (g.hoist, g.foot + g.boom * boom.cos, float(reach_rate(boom, g)))
@@ -272,6 +274,21 @@ class Judgment(Tabular):
         """Whether the judged variant swings as no control does, in every seaway."""
         return np.allclose(self.counted(self.judged), self.counted(NONE), rtol=1e-3)
 
+    def headline(self) -> str:
+        """The outcome, the verdict, and whether they rest on a drive whose fit is not usable."""
+        words = f"{self.outcome.capitalize()}: {self.verdict()}"
+        case = self.study.cases[self.judged]
+        unusable = {
+            axis
+            for crane in case.cranes
+            for axis, source in crane.sources.items()
+            if not source.usable
+        }
+        if not unusable:
+            return words
+        axes = listed([axis for axis in AXES if axis in unusable])
+        return f"{words} It rests on the fit of the {axes}, which is not usable."
+
     def verdict(self) -> str:
         """What the judged variant amounts to, and what would do if it fails."""
         share, seaways, outcome = self.worse(self.judged), len(self.study.seeds), self.outcome
@@ -398,7 +415,7 @@ class Judgment(Tabular):
             f"{100.0 * self.allowed:g} % of them; the 95 % interval of that share decides."
         )
         crane = (f"{assumed} of the crane are assumed.",) if assumed else ()
-        return (self.verdict(), rests, *crane)
+        return (self.verdict(), rests, *crane, *study.provenance())
 
 
 def _worse(own: Array, none: Array) -> NDArray[np.bool_]:

@@ -17,7 +17,7 @@ from swashplate.crane.control import Control
 from swashplate.crane.crane import Crane, begun
 from swashplate.crane.result import PUMPS, CraneRun
 from swashplate.crane.rope import swing_of
-from swashplate.crane.sea import Seaway, Spectrum
+from swashplate.crane.sea import HIGHEST, Seaway, Spectrum
 from swashplate.crane.stepper import RATE, Actuation, Setup
 from swashplate.crane.stick import AXES, Stick, check_names
 from swashplate.errors import DomainError, InputError
@@ -172,6 +172,11 @@ class Study(Result):
         seaway = sea if isinstance(sea, Seaway) else Seaway(sea)
         return cls(crane, cases, seaway, tuple(seeds), start, executor or Threads(), progress)
 
+    def provenance(self) -> tuple[str, ...]:
+        """Sentences on the drives of all its cranes, each once: `Crane.provenance`."""
+        cranes = [self.crane, *(crane for case in self.cases.values() for crane in case.cranes)]
+        return tuple(dict.fromkeys(words for crane in cranes for words in crane.provenance()))
+
     def outcomes(self, cases: Sequence[Case], numbers: range | None = None) -> Array:
         """`COUNTED` of all cases in the seaways, or in some of them by their numbers, (n, m, 18).
 
@@ -221,6 +226,9 @@ class Swept(NamedTuple):
     """A quantity that a sweep goes over."""
 
     points: tuple[float, ...]
+    low: float
+    high: float
+    """Range of plausible points."""
     study: Mapping[str, Any]
     """Keywords of a study unless the user says otherwise."""
     unit: str
@@ -232,11 +240,19 @@ class Swept(NamedTuple):
 TURN, PERIOD = 45.0, 7.5
 """Slew of a sweep over the stick [deg]; peak period of a sweep over the waves' height [s]."""
 SWEPT: Mapping[str, Swept] = {
-    "bearing": Swept(tuple(range(0, 360, 15)), {"seeds": range(4)}, "deg", ("slew_deg",)),
-    "height": Swept((0.1, 0.2, 0.3, 0.45, 0.6, 0.9, 1.2), {"seeds": range(40)}, "m"),
-    "orifice": Swept((0.5, 0.75, 1.0, 1.25, 1.5, 2.0, 3.0, 5.0), {"seeds": range(20)}, ""),
+    "bearing": Swept(
+        tuple(range(0, 360, 15)), -720.0, 720.0, {"seeds": range(4)}, "deg", ("slew_deg",)
+    ),
+    "height": Swept(
+        (0.1, 0.2, 0.3, 0.45, 0.6, 0.9, 1.2), 0.001, HIGHEST, {"seeds": range(40)}, "m"
+    ),
+    "orifice": Swept(
+        (0.5, 0.75, 1.0, 1.25, 1.5, 2.0, 3.0, 5.0), 0.01, 100.0, {"seeds": range(20)}, ""
+    ),
     "stick": Swept(
         tuple(k / 10.0 for k in range(1, 11)),
+        0.001,
+        1.0,
         {"seeds": (0,), "slew_deg": 0.0, "rope_m": 20.0, "drives": (IDEAL, "volts", BUILT)},
         "",
         ("seeds", "sea", "stick", "start", "length"),
@@ -308,9 +324,12 @@ def sweep(
     if taken:
         raise InputError(f"A sweep over the {over} sets {taken[0]} itself: leave it out.")
     grid = np.atleast_1d(np.asarray(swept.points if points is None else points, dtype=np.float64))
-    if not (grid.size and np.isfinite(grid).all() and (over == "bearing" or (grid > 0.0).all())):
-        above = "" if over == "bearing" else " above 0"
-        raise InputError(f"Points of the {over} must be one or more finite numbers{above}.")
+    if not (grid.size and (swept.low <= grid).all() and (grid <= swept.high).all()):
+        raise InputError(
+            f"Points of the {over} must be one or more numbers from {swept.low:g} to "
+            f"{swept.high:g} {swept.unit}".rstrip()
+            + "."
+        )
     asked = Study.of(crane, control, **{**swept.study, **study})
     if over == "stick":
         asked = replace(asked, sea=None)

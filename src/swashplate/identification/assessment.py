@@ -18,7 +18,7 @@ from swashplate.campaign.experiment import Experiment
 from swashplate.documents import read_json
 from swashplate.errors import FileError, InputError
 from swashplate.identification import tables
-from swashplate.identification.criteria import REQUIRED, Verdict, verdict
+from swashplate.identification.criteria import REQUIRED, Grade, Verdict, verdict
 from swashplate.identification.drive_model import Parameters
 from swashplate.identification.fitting import Fit, Solved, StageFit, fingerprint, staged
 from swashplate.identification.problem import Loss, Problem
@@ -110,6 +110,11 @@ class Judged(Result):
             profiles=tuple(self.profiles),
             folds=self.folds,
             notes=dict(self.notes),
+            verdict=StoredVerdict(
+                grade=self.verdict.grade,
+                headline=self.verdict.headline,
+                numbers=dict(self.result.parameters.numbers),
+            ),
         )
         write_text(content.model_dump_json(indent=1, by_alias=True) + "\n", path)
 
@@ -260,6 +265,15 @@ class StoredStage(Entry):
     starts: tuple[Solution, ...]
 
 
+class StoredVerdict(Entry):
+    """The verdict on the fit when it was stored."""
+
+    grade: Grade
+    headline: str
+    numbers: dict[str, float]
+    """Of the drive or model that it is about."""
+
+
 class FitFile(Entry):
     """The whole file."""
 
@@ -276,6 +290,16 @@ class FitFile(Entry):
     """Behind the name of their stage in older files, which do not name the unknown."""
     folds: CrossValidation | None
     notes: dict[str, str]
+    verdict: StoredVerdict | None = None
+    """None in a file of a version that did not store it."""
+
+
+def read_verdict(path: str | Path) -> StoredVerdict | None:
+    """The verdict that a stored fit had, without its campaign; None if the file has none.
+
+    A `FileError` or `ParameterError` if the file is none that `Judged.store` wrote.
+    """
+    return read_json(path, FitFile, strict=False).verdict
 
 
 def load_fit(
