@@ -22,6 +22,7 @@ from swashplate.crane.stepper import RATE, Actuation, Setup
 from swashplate.crane.stick import AXES, Stick, check_names
 from swashplate.errors import DomainError, InputError
 from swashplate.executors import Executor, Threads
+from swashplate.progress import counted
 from swashplate.results import Result
 from swashplate.tables import Column, Table
 
@@ -184,7 +185,9 @@ class Study(Result):
         made = np.full((len(chosen), len(cases), len(COUNTED)), np.nan)
         items = [(n, self.seeds[n]) for n in chosen]
         work = (tuple(cases), self.sea, self.start)
-        for done, (k, values) in enumerate(self.executor.run(_of_seaway, work, items), 1):
+        runs = self.executor.run(_of_seaway, work, items)
+        seaways = counted(runs, len(chosen), "seaways", f"Simulating {self.crane.name}")
+        for done, (k, values) in enumerate(seaways, 1):
             made[k] = values
             if self.progress is not None and numbers is None:
                 self.progress(done, len(chosen))

@@ -36,6 +36,7 @@ from swashplate.identification.validation import RunQuality, predict
 from swashplate.parameters.definitions import find
 from swashplate.parameters.files import dump_set, read_set
 from swashplate.parameters.parameter_set import Motion, ParameterSet
+from swashplate.progress import working
 from swashplate.results import Result
 from swashplate.tables import Table, write_text
 
@@ -70,7 +71,10 @@ class Judged(Result):
     def verdict(self) -> Verdict:
         """What it can be used for."""
         planned = [each.name for each in self.result.setup.stages]
-        return verdict(self.result.stages, self.predicted, planned=planned, required=self.required)
+        with working("Judging the fit"):
+            return verdict(
+                self.result.stages, self.predicted, planned=planned, required=self.required
+            )
 
     def tables(self) -> list[Table]:
         """Criteria of the verdict, then the fit's tables and the errors of held-out runs."""
