@@ -63,25 +63,10 @@ def strokes(names: Iterable[str]) -> dict[str, Stroke]:
 def new_figure(
     width: float, height: float, *, layout: Literal["constrained", "none"] = "constrained"
 ) -> Figure:
-    """An empty white figure of a size [inch], whose panels find their places by themselves.
+    """An empty white figure of a size [inch], whose panels find their places by themselves."""
+    from swashplate.report.figure import PlainFigure
 
-    Its words are drawn as they are: names come from files, and a dollar in one is no formula.
-    """
-    from matplotlib.figure import Figure
-    from matplotlib.text import Text
-
-    class Plain(Figure):
-        def draw(self, renderer: Any) -> None:
-            for each in self.findobj(Text):
-                assert isinstance(each, Text)
-                each.set_parse_math(False)
-                if not (words := each.get_text()).isprintable():
-                    each.set_text(
-                        "".join(c if c.isprintable() or c == "\n" else "\ufffd" for c in words)
-                    )
-            super().draw(renderer)
-
-    made = Plain(figsize=(width, height), dpi=DPI, facecolor="white")
+    made = PlainFigure(figsize=(width, height), dpi=DPI, facecolor="white")
     if layout == "constrained":
         made.set_layout_engine("constrained", w_pad=0.06, h_pad=0.04, hspace=0.02, wspace=0.02)
     return made
