@@ -25,8 +25,8 @@ class Lines:
     def show(self, line: str) -> None:
         self.shown.append(line)
 
-    def end(self, line: str) -> None:
-        self.ended.append(line)
+    def end(self, work: progress.Work) -> None:
+        self.ended.append(work.words)
 
 
 def test_work_is_logged_and_shown_from_its_beginning_to_its_end(caplog) -> None:
@@ -40,7 +40,7 @@ def test_work_is_logged_and_shown_from_its_beginning_to_its_end(caplog) -> None:
     assert lines.shown[:2] == ["Fitting hoist", "Fitting hoist: stage card"]
     assert "Fitting hoist: stage card: evaluation 4" not in lines.shown
     assert lines.shown[-1] == "Judging"
-    assert [line.partition(":")[0] for line in lines.ended] == ["Fitting hoist", "Judging"]
+    assert lines.ended == ["Fitting hoist", "Judging"]
     said = [record.getMessage() for record in caplog.records]
     assert said[:2] == ["Fitting hoist", "Stage card"]
     assert [line.partition(":")[0] for line in said[2:]] == [
@@ -75,7 +75,7 @@ def test_a_prompt_gets_one_line_that_is_wiped_out(capsys, monkeypatch) -> None:
     line = progress.PromptLine()
     line.show("Fitting hoist: stage card")
     line.show("Judging")
-    line.end("Judging: 0.1 s")
+    line.end(progress.Work("Judging"))
     first, second, last = capsys.readouterr().err.split("\r")[1:4]
     assert first == "Fitting hoist: sta…"
     assert second == f"{'Judging':19}"

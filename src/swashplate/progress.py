@@ -35,16 +35,16 @@ class Display(Protocol):
     def show(self, line: str) -> None:
         """Show a line in the place of the one before."""
 
-    def end(self, line: str) -> None:
-        """Show the last line, which says how long the whole work took."""
+    def end(self, work: Work) -> None:
+        """Show that the whole work is at its end."""
 
 
 class Work:
     """Work under way, as `working` gives it."""
 
-    def __init__(self, words: str) -> None:
+    def __init__(self, words: str, detail: str = "") -> None:
         self.words = words
-        self.detail = ""
+        self.detail = detail
         self.started = perf_counter()
 
     def at(self, detail: str) -> None:
@@ -115,10 +115,10 @@ def counted(items: Iterable[T], total: int, what: str, words: str) -> Iterator[T
             work.at(f"{done} of {total} {what}")
 
 
-def begin(words: str) -> Work:
+def begin(words: str, detail: str = "") -> Work:
     """Begin work whose end is not in the same function; `end` must follow."""
-    work = Work(words)
-    LOGGER.info("%s", words)
+    work = Work(words, detail)
+    LOGGER.info("%s", work.line)
     with _state.lock:
         if not _state.works:
             _state.display = _state.displays[-1] if _state.displays else _usual_display()
@@ -137,7 +137,7 @@ def end(work: Work) -> None:
         if _state.works or _state.display is None:
             _refresh()
         else:
-            _state.display.end(f"{work.words}: {work.seconds:.1f} s")
+            _state.display.end(work)
             _state.display = None
 
 
@@ -183,33 +183,44 @@ def _usual_display() -> Display | None:
     if not enabled:
         return None
     if in_notebook():
-        return NotebookLine()
+        return _notebook_line
     at_prompt = hasattr(sys, "ps1") and sys.stderr is not None and sys.stderr.isatty()
     return PromptLine() if at_prompt else None
 
 
 class NotebookLine:
-    """A grey line below a notebook's cell, which stays with the time that the work took."""
+    """One grey line below a notebook's cell, which stays with the times that its works took."""
 
     def __init__(self) -> None:
+        self._cell = -1
         self._handle: Any = None
+        self._seconds = dict[str, float]()
+        """Times of the works of this cell that ended, in all, by their words. [s]"""
 
     def show(self, line: str) -> None:
-        """Show a line in the place of the one before."""
+        """Show a line in the place of the one before, behind what the cell did so far."""
+        cell = sys.modules["IPython"].get_ipython().execution_count
+        if cell != self._cell:
+            self._cell, self._handle, self._seconds = cell, None, {}
+        ended = [f"{words}: {seconds:.1f} s" for words, seconds in self._seconds.items()]
+        text = "; ".join([*ended, line] if line else ended)
         words = {
-            "text/plain": line,
-            "text/html": f'<span style="opacity: 0.65">{escape(line)}</span>',
+            "text/plain": text,
+            "text/html": f'<span style="opacity: 0.65">{escape(text)}</span>',
         }
         if self._handle is None:
-            self._handle = import_module("IPython.display").display(
-                words, raw=True, display_id=True
-            )
+            display = import_module("IPython.display").display
+            self._handle = display(words, raw=True, display_id=True)
         else:
             self._handle.update(words, raw=True)
 
-    def end(self, line: str) -> None:
-        """Show the last line."""
-        self.show(line)
+    def end(self, work: Work) -> None:
+        """Show how long it took."""
+        self._seconds[work.words] = self._seconds.get(work.words, 0.0) + work.seconds
+        self.show("")
+
+
+_notebook_line = NotebookLine()
 
 
 class PromptLine:
@@ -226,7 +237,7 @@ class PromptLine:
         sys.stderr.flush()
         self._length = len(shown)
 
-    def end(self, line: str) -> None:
+    def end(self, work: Work) -> None:
         """Wipe out the line."""
         sys.stderr.write(f"\r{'':{self._length}}\r")
         sys.stderr.flush()

@@ -15,7 +15,7 @@ from rich.console import Console
 from rich.status import Status
 
 from swashplate.errors import FileError
-from swashplate.progress import shown_by
+from swashplate.progress import Work, shown_by
 from swashplate.tables import UNIT, Form, Table, check_place, ending
 
 FORCED: ContextVar[bool] = ContextVar("FORCED", default=False)
@@ -148,7 +148,7 @@ class Shown:
         """Replace the words."""
         self._update(line)
 
-    def end(self, line: str) -> None:
+    def end(self, work: Work) -> None:
         """Leave the last line where it is."""
 
 

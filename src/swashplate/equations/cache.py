@@ -122,7 +122,7 @@ class _KernelCache(FunctionCache):
         except Exception:  # whole, and yet nothing that this Numba can use
             kept = None
         if kept is None:  # what Numba does next, up to `save_overload`, takes up to 3 s
-            self._compiling.append(progress.begin(f"{COMPILING}: {self._title}"))
+            self._compiling.append(progress.begin(COMPILING, self._title))
         return kept
 
     def save_overload(self, sig: Any, data: Any) -> None:

@@ -125,6 +125,15 @@ class Verdict(Result):
             made.add(each.name, each.value, each.limit, state, each.reason, look=state != "met")
         return made
 
+    def remarks(self) -> list[str]:
+        """What it holds for, what asks for attention, what is open and what is assumed."""
+        validity = [self.validity] if self.validity else []
+        assumed = [f"Assumed: {each[:1].lower()}{each[1:]}" for each in self.assumed]
+        return [*validity, *self.sentences, *self.not_judged, *assumed]
+
+    def _sentences(self) -> list[str]:
+        return self.remarks()
+
     @property
     def usable(self) -> bool:
         """Whether nothing rules out the use."""

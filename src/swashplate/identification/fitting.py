@@ -192,7 +192,9 @@ class Fit(Result):
     def tables(self) -> list[Table]:
         """Estimates with their intervals, stage by stage, then the errors of each fitted run."""
         runs = [quality for each in self.stages for quality in each.runs]
-        return [*map(tables.estimates_table, self.stages), *tables.runs_tables(runs)]
+        errors = tables.runs_tables(runs)
+        errors = [replace(table, title=f"{table.title}, fitted runs") for table in errors]
+        return [*map(tables.estimates_table, self.stages), *errors]
 
     @property
     def sentences(self) -> tuple[str, ...]:

@@ -5,9 +5,10 @@ The drive is marched over whole cycles of each frequency until it repeats itself
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from math import ceil, sqrt
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, cast, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -21,13 +22,17 @@ from swashplate.linear.drive import OUTPUTS
 from swashplate.models.displacement_control import Pump
 from swashplate.parameters.parameter_set import ParameterSet
 from swashplate.parameters.rules import FULL_VOLTAGE
-from swashplate.results import Tabular
+from swashplate.results import GivenAxes, Tabular, figures
 from swashplate.simulation.instance import check_filter_stability, instance_of, without_ripple
 from swashplate.simulation.result import UNITS
 from swashplate.tables import Column, Table
 
 if TYPE_CHECKING:
     import polars
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from swashplate.linear.drive import LinearDrive
 
 Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
@@ -46,8 +51,6 @@ class FrequencyResponse(Tabular):
 
     A row for each amplitude, a column for each frequency.
     """
-
-    figure = "plot_bode"
 
     name: str
     """Name of the drive."""
@@ -73,6 +76,42 @@ class FrequencyResponse(Tabular):
             f"FrequencyResponse({self.name!r}, {self.input} to {self.output}, "
             f"{self.amplitudes.size} amplitudes, {self.frequencies.size} frequencies)"
         )
+
+    @overload
+    def plot(
+        self,
+        *,
+        linear: LinearDrive | None = None,
+        mark: float | None = 0.3,
+        ax: None = None,
+        title: str | None = None,
+    ) -> Figure: ...
+
+    @overload
+    def plot(
+        self,
+        *,
+        linear: LinearDrive | None = None,
+        mark: float | None = 0.3,
+        ax: GivenAxes,
+        title: str | None = None,
+    ) -> GivenAxes: ...
+
+    def plot(
+        self,
+        *,
+        linear: LinearDrive | None = None,
+        mark: float | None = 0.3,
+        ax: Axes | Sequence[Axes] | None = None,
+        title: str | None = None,
+    ) -> Figure | Axes | Sequence[Axes]:
+        """Figure of gain, phase and distortion over the frequency, a line for each amplitude.
+
+        By default a new figure; with `ax`, two for gain and phase or three, it is drawn there, and
+        `ax` returned. See `swashplate.report.figures.plot_bode`.
+        """
+        draw = figures().plot_bode
+        return cast("Figure", draw(self, linear=linear, mark=mark, ax=ax, title=title))
 
     @property
     def gain(self) -> Array:

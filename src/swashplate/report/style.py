@@ -7,6 +7,7 @@ from pathlib import Path
 from textwrap import wrap
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
+from swashplate.errors import InputError
 from swashplate.tables import FIGURE, ending, write_whole
 
 if TYPE_CHECKING:
@@ -100,6 +101,55 @@ def sheet(
         put_legend(axes[0], legend)
     figure.align_ylabels(axes)
     return figure, axes
+
+
+def given_axes(ax: Axes | Sequence[Axes], count: int, what: str) -> list[Axes]:
+    """The axes of a caller, one for each of so many things, also of ``pyplot.subplots``.
+
+    Raises
+    ------
+    InputError
+        If there are more or fewer.
+    """
+    import numpy as np
+
+    axes = list(np.ravel(np.asarray(ax, dtype=object)))
+    if len(axes) != count:
+        raise InputError(f"There are {len(axes)} axes for {count} {what}: give one for each.")
+    return axes
+
+
+def dress_given(
+    ax: Axes | Sequence[Axes],
+    title: str | None,
+    labels: Sequence[str],
+    below: str,
+    *,
+    what: str = "panels",
+    legend: Sequence[Artist] = (),
+) -> list[Axes]:
+    """Dress a caller's axes as `sheet` does its panels; the title and legend are within the first.
+
+    Without a title they get none: the caller's figure may have one.
+    """
+    axes = given_axes(ax, len(labels), what)
+    for panel, label in zip(axes, labels, strict=True):
+        dress(panel, label)
+    label_below(axes[-1], below)
+    if title:
+        axes[0].set_title(title, loc="left", fontsize=NORMAL, color=INK)
+    if legend:
+        axes[0].legend(handles=legend, frameon=False, fontsize=SMALL, labelcolor=INK)
+    return axes
+
+
+def root_figure(ax: Axes) -> Figure:
+    """The whole figure that a panel is in."""
+    from matplotlib.figure import Figure
+
+    figure = ax.get_figure(root=True)
+    assert isinstance(figure, Figure)
+    return figure
 
 
 def write_title(figure: Figure, title: str) -> None:
