@@ -323,6 +323,30 @@ def test_only_what_can_be_drawn_has_a_plot(work: Work) -> None:
     assert isinstance(work.fitted.stages[0].runs[0].plot(), Figure)
 
 
+def test_a_frequency_response_is_shown_in_units_of_people() -> None:
+    response = Drive.preset("hoist").frequency_response(np.geomspace(0.1, 1.0, 20), [2.0, 1e-3])
+    first = next(line for line in response.summary().splitlines() if line.strip().startswith("2 "))
+    amplitude, frequency, gain, phase, distortion, _ = first.split()
+    assert (float(amplitude), float(frequency)) == (2.0, 0.1)
+    assert float(gain) == pytest.approx(np.degrees(response.gain[0, 0]), rel=1e-3)
+    assert float(phase) == pytest.approx(np.degrees(response.phase[0, 0]), abs=0.05)
+    assert float(distortion) == pytest.approx(100.0 * response.distortion[0, 0], abs=0.05)
+    assert response.summary().count("no motion") == 8
+    assert "8 of 20 frequencies shown" in response.summary()
+
+
+def test_a_comparison_of_models_shows_their_difference() -> None:
+    five = FullOrderDrive.preset("hoist")
+    found = compare(five, five.drive.simulate(TESTS[0]))
+    lines = {line.split("  ")[0]: line.split() for line in found.summary().splitlines()}
+    assert float(lines["largest difference"][2]) == pytest.approx(
+        np.degrees(np.abs(found.error).max()), rel=1e-3
+    )
+    assert float(lines["largest difference"][4]) == pytest.approx(
+        100.0 * found.relative[0], abs=0.005
+    )
+
+
 def axes(count: int) -> list[Any]:
     return list(Figure().subplots(count, 1, squeeze=False)[:, 0])
 

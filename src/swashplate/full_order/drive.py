@@ -510,6 +510,18 @@ class Comparison(Tabular):
         top = self.top_speed if self.moves else float("nan")
         return float(np.abs(self.error).max() / top), float(np.sqrt(np.mean(self.error**2)) / top)
 
+    def table(self) -> Table:
+        """Top speed, and the largest and the rms difference of the reduced model."""
+        columns = (Column("Shaft speed"), Column("", ".4g"), UNIT, Column("share", ".2%"))
+        made = Table("", columns)
+        largest = float(np.abs(self.error).max())
+        rms = float(np.sqrt(np.mean(self.error**2)))
+        relative = self.relative  # NaN, shown as nothing, if it does not move
+        made.add("top speed, five states", self.top_speed, None, unit="rad/s")
+        made.add("largest difference", largest, relative[0], unit="rad/s")
+        made.add("rms difference", rms, relative[1], unit="rad/s")
+        return made
+
     def plot(self, *, title: str | None = None) -> Figure:
         """Figure of both speeds, their difference, and what lies between command and speed."""
         return cast("Figure", figures().plot_full_order(self, title=title))

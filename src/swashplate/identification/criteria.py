@@ -379,7 +379,7 @@ def _determined(stages: Sequence[StageFit]) -> Criterion:
     name, value = "parameters without a value", f"{lost} of {total}"
     why = "a fit that determines few of its parameters has found nothing"
     failure = f"{value} parameters are at a bound or not determined" if lost > MOST * total else ""
-    return Criterion(name, value, f"{MOST:.0%}", why, failure)
+    return Criterion(name, value, f"{100.0 * MOST:g} %", why, failure)
 
 
 def _bounded_predictions(stages: Sequence[StageFit], predicted: Sequence[RunQuality]) -> Criterion:

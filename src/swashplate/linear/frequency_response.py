@@ -42,6 +42,8 @@ FEWEST_STEPS, MOST_STEPS = 8, 1_000_000
 """Steps of a cycle, which bound the frequencies from both sides."""
 SHORTEST = 1.0  # Half of a march lasts as long at least. [s]
 LONGEST = 64  # Times the first march, after which an answer that still changes is given up.
+SHOWN = 8
+"""Frequencies of a response that its table shows; its figure shows all of them."""
 STILL = 1e-12  # Answers below this part of the output's size are none.
 
 
@@ -134,6 +136,29 @@ class FrequencyResponse(Tabular):
             there = ratio != 0.0
             row[there] = np.unwrap(np.angle(ratio[there]))
         return phase
+
+    def table(self) -> Table:
+        """Gain, phase and distortion by amplitude, at up to `SHOWN` of the frequencies."""
+        columns = (
+            Column("amplitude", "g", UNITS[self.input]),
+            Column("frequency", ".4g", "Hz"),
+            Column("gain", ".4g", f"{UNITS[self.output]}/{UNITS[self.input]}", none="no motion"),
+            Column("phase", "z.1f", "rad"),
+            Column("distortion", ".1%"),
+        )
+        made, size = Table("", columns), self.frequencies.size
+        rows = np.unique(np.linspace(0, size - 1, min(size, SHOWN)).round().astype(int))
+        for k, amplitude in enumerate(self.amplitudes.tolist()):
+            for at in rows.tolist():
+                answer: tuple[float | None, ...] = (None, None, None)
+                if self.moves[k, at]:
+                    numbers = (self.gain[k, at], self.phase[k, at], self.distortion[k, at])
+                    answer = tuple(map(float, numbers))
+                frequency, first = float(self.frequencies[at]), at == rows[0]
+                made.add(amplitude, frequency, *answer, section=bool(first and k))
+        if rows.size < size:
+            made.caption = f"{rows.size} of {size} frequencies shown"
+        return made
 
     def still(self) -> list[str]:
         """Where `moves` denies an answer, in words, for each amplitude that has such a place."""

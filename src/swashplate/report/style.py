@@ -127,10 +127,12 @@ def dress_given(
     *,
     what: str = "panels",
     legend: Sequence[Artist] = (),
+    legend_at: str = "best",
 ) -> list[Axes]:
     """Dress a caller's axes as `sheet` does its panels; the title and legend are within the first.
 
-    Without a title they get none: the caller's figure may have one.
+    Without a title they get none: the caller's figure may have one. `legend_at` is a location as
+    of `matplotlib.axes.Axes.legend`.
     """
     axes = given_axes(ax, len(labels), what)
     for panel, label in zip(axes, labels, strict=True):
@@ -139,8 +141,21 @@ def dress_given(
     if title:
         axes[0].set_title(title, loc="left", fontsize=NORMAL, color=INK)
     if legend:
-        axes[0].legend(handles=legend, frameon=False, fontsize=SMALL, labelcolor=INK)
+        legend_within(axes[0], legend, legend_at)
     return axes
+
+
+def legend_within(ax: Axes, handles: Sequence[Artist], location: Any = "best") -> None:
+    """Write a legend into a caller's panel, on white: lines may pass behind it."""
+    ax.legend(
+        handles=handles,
+        loc=location,
+        fontsize=SMALL,
+        labelcolor=INK,
+        facecolor="white",
+        edgecolor="none",
+        framealpha=0.85,
+    )
 
 
 def root_figure(ax: Axes) -> Figure:

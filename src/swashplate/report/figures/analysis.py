@@ -60,6 +60,7 @@ from swashplate.report.style import (
     dress_given,
     given_axes,
     handle,
+    legend_within,
     new_figure,
     put_legend,
     sheet,
@@ -119,24 +120,27 @@ def plot_envelope(
     envelope : Envelope
         What to show.
     ax : matplotlib axes, optional
-        Where to draw; by default in a new figure.
+        Where to draw, with a legend of the colours alone; by default in a new figure.
 
     Returns
     -------
     Figure, or `ax` as it was given
     """
-    legend = [handle(name, color) for color, name in ENVELOPE_LOOKS]
+    colors = [handle(name, color) for color, name in ENVELOPE_LOOKS]
     curves = (*envelope.accelerating, envelope.released)
     drawn = {by for curve in curves for by in curve.by}
-    legend += [handle(WORDS[by], INK, d, LINE) for by, d in DASHES.items() if by in drawn]
+    dashes = [handle(WORDS[by], INK, d, LINE) for by, d in DASHES.items() if by in drawn]
     words = f"{envelope.name}: acceleration that each speed allows" if title is None else title
     speed, acceleration = display_unit("rad/s"), display_unit("rad/s^2")
     up, across = acceleration.label("acceleration"), speed.label("speed")
     if ax is None:
-        figure, (panel,) = sheet([3.8], words, [up], across, legend=legend)
+        figure, (panel,) = sheet([3.8], words, [up], across, legend=[*colors, *dashes])
         _draw_envelope(panel, envelope)
         return figure
-    (panel,) = dress_given(ax, title, [up], across, what="panel", legend=legend)
+    # the lines lie above, below and in the middle
+    (panel,) = dress_given(
+        ax, title, [up], across, what="panel", legend=colors, legend_at="center left"
+    )
     _draw_envelope(panel, envelope)
     return ax
 
@@ -399,7 +403,7 @@ def plot_tornado(
     if ax is not None:
         axes = given_axes(ax, len(shown), "outcomes")
         _draw_swings(axes, result, shown)
-        axes[0].legend(handles=legend, **how)
+        legend_within(axes[0], legend)
         return ax
     columns = min(len(shown), 2)
     rows = -(-len(shown) // columns)
@@ -499,7 +503,7 @@ def plot_compensation(
             raise InputError("The runs of an improvement need a figure of their own: leave out ax.")
         axes = given_axes(ax, min(max(np.size(np.asarray(ax, dtype=object)), 1), 2), "panels")
         _draw_map(inverse, *axes)
-        axes[0].legend(handles=legend, frameon=False, fontsize=SMALL, labelcolor=INK)
+        legend_within(axes[0], legend)
         if title:
             axes[0].set_title(title, loc="left", fontsize=NORMAL, color=INK)
         return ax
