@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from math import cos, inf, pi, radians, sin, sqrt
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple, cast
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple, cast, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -24,12 +24,13 @@ from swashplate.crane.stepper import RATE
 from swashplate.crane.stick import AXES, check_names
 from swashplate.crane.study import COUNTED, NONE, Case, Laws, Study, with_orifice
 from swashplate.errors import InputError
-from swashplate.results import Result, Tabular, figures
+from swashplate.results import GivenAxes, Result, Tabular, figures
 from swashplate.simulation.result import Limit
 from swashplate.tables import Column, Table, count, listed
 
 if TYPE_CHECKING:
     import polars
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 Array = NDArray[np.float64]
@@ -71,9 +72,20 @@ class Followable(Result):
     crane: Crane = field(repr=False)
     boom_deg: float
 
-    def plot(self, *, title: str = "") -> Figure:
-        """Figure of the amplitudes over the period, with what seas ask for as points."""
-        return cast("Figure", figures().plot_follow(self, title=title))
+    @overload
+    def plot(self, *, ax: None = None, title: str = "") -> Figure: ...
+
+    @overload
+    def plot(self, *, ax: GivenAxes, title: str = "") -> GivenAxes: ...
+
+    def plot(
+        self, *, ax: Axes | Sequence[Axes] | None = None, title: str = ""
+    ) -> Figure | Axes | Sequence[Axes]:
+        """Figure of the amplitudes over the period, with what seas ask for as points.
+
+        By default a new figure; with `ax` it is drawn there, and `ax` returned.
+        """
+        return cast("Figure", figures().plot_follow(self, ax=ax, title=title))
 
     def tables(self) -> list[Table]:
         """Amplitudes over the period, and what seas ask for."""
@@ -224,9 +236,20 @@ class Judgment(Tabular):
     def __repr__(self) -> str:
         return f"Judgment({count(len(self.study.seeds), 'seaway')}, {', '.join(self.names)})"
 
-    def plot(self, *, title: str = "") -> Figure:
-        """Figure of the swing of every variant in every seaway, and what limits its drives."""
-        return cast("Figure", figures().plot_judgment(self, title=title))
+    @overload
+    def plot(self, *, ax: None = None, title: str = "") -> Figure: ...
+
+    @overload
+    def plot(self, *, ax: GivenAxes, title: str = "") -> GivenAxes: ...
+
+    def plot(
+        self, *, ax: Axes | Sequence[Axes] | None = None, title: str = ""
+    ) -> Figure | Axes | Sequence[Axes]:
+        """Figure of the swing of every variant in every seaway, its mean and interval.
+
+        By default a new figure; with `ax` it is drawn there, and `ax` returned.
+        """
+        return cast("Figure", figures().plot_judgment(self, ax=ax, title=title))
 
     @property
     def names(self) -> tuple[str, ...]:
