@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from math import cos, inf, pi, radians, sin, sqrt
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple, cast, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -24,12 +24,14 @@ from swashplate.crane.stepper import RATE
 from swashplate.crane.stick import AXES, check_names
 from swashplate.crane.study import COUNTED, NONE, Case, Laws, Study, with_orifice
 from swashplate.errors import InputError
-from swashplate.results import Result, Tabular
+from swashplate.results import GivenAxes, Result, Tabular, figures
 from swashplate.simulation.result import Limit
 from swashplate.tables import Column, Table, count, listed
 
 if TYPE_CHECKING:
     import polars
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 Array = NDArray[np.float64]
 
@@ -72,7 +74,20 @@ class Followable(Result):
     crane: Crane = field(repr=False)
     boom_deg: float
 
-    figure = "plot_follow"
+    @overload
+    def plot(self, *, ax: None = None, title: str = "") -> Figure: ...
+
+    @overload
+    def plot(self, *, ax: GivenAxes, title: str = "") -> GivenAxes: ...
+
+    def plot(
+        self, *, ax: Axes | Sequence[Axes] | None = None, title: str = ""
+    ) -> Figure | Axes | Sequence[Axes]:
+        """Figure of the amplitudes over the period, with what seas ask for as points.
+
+        By default a new figure; with `ax` it is drawn there, and `ax` returned.
+        """
+        return cast("Figure", figures().plot_follow(self, ax=ax, title=title))
 
     def tables(self) -> list[Table]:
         """Amplitudes over the period, and what seas ask for."""
@@ -220,10 +235,23 @@ class Judgment(Tabular):
     tried: tuple[str, ...] = ()
     """What was tried and is worse than none in more of the seaways than allowed."""
 
-    figure = "plot_judgment"
-
     def __repr__(self) -> str:
         return f"Judgment({count(len(self.study.seeds), 'seaway')}, {', '.join(self.names)})"
+
+    @overload
+    def plot(self, *, ax: None = None, title: str = "") -> Figure: ...
+
+    @overload
+    def plot(self, *, ax: GivenAxes, title: str = "") -> GivenAxes: ...
+
+    def plot(
+        self, *, ax: Axes | Sequence[Axes] | None = None, title: str = ""
+    ) -> Figure | Axes | Sequence[Axes]:
+        """Figure of the swing of every variant in every seaway, its mean and interval.
+
+        By default a new figure; with `ax` it is drawn there, and `ax` returned.
+        """
+        return cast("Figure", figures().plot_judgment(self, ax=ax, title=title))
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -405,6 +433,14 @@ class Judgment(Tabular):
             for name, values in zip(self.names, found, strict=True)
         ]
         return pl.DataFrame(rows)
+
+    @property
+    def headline(self) -> str:
+        """The outcome and the verdict in one sentence."""
+        return f"{self.outcome.capitalize()}: {self.verdict()}"
+
+    def _sentences(self) -> list[str]:
+        return list(self.sentences()[1:])  # the first one is the headline
 
     def sentences(self) -> tuple[str, ...]:
         """The verdict, and what it rests on."""

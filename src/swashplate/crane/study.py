@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any, NamedTuple, Unpack
+from typing import TYPE_CHECKING, Any, NamedTuple, Unpack, cast
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -22,8 +22,12 @@ from swashplate.crane.stepper import RATE, Actuation, Setup
 from swashplate.crane.stick import AXES, Stick, check_names
 from swashplate.errors import DomainError, InputError
 from swashplate.executors import Executor, Threads
-from swashplate.results import Result
+from swashplate.progress import counted
+from swashplate.results import Result, figures
 from swashplate.tables import Column, Table
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 Array = NDArray[np.float64]
 Laws = Control | Mapping[str, Control | None]
@@ -189,7 +193,9 @@ class Study(Result):
         made = np.full((len(chosen), len(cases), len(COUNTED)), np.nan)
         items = [(n, self.seeds[n]) for n in chosen]
         work = (tuple(cases), self.sea, self.start)
-        for done, (k, values) in enumerate(self.executor.run(_of_seaway, work, items), 1):
+        runs = self.executor.run(_of_seaway, work, items)
+        seaways = counted(runs, len(chosen), "seaways", f"Simulating {self.crane.name}")
+        for done, (k, values) in enumerate(seaways, 1):
             made[k] = values
             if self.progress is not None and numbers is None:
                 self.progress(done, len(chosen))
@@ -276,8 +282,6 @@ class Sweep(Result):
     crane: Crane = field(repr=False)
     sea: Seaway | None = field(repr=False)
 
-    figure = "plot_sweep"
-
     def mean(self) -> Array:
         """(n, variants, 3) means over the seaways. [rad]"""
         return np.asarray(np.mean(self.values, axis=0))
@@ -285,6 +289,10 @@ class Sweep(Result):
     def below(self, limit_deg: float) -> Array:
         """(n, variants) share of seaways whose largest swing is below a limit."""
         return np.asarray(np.mean(np.degrees(self.values[..., 1]) < limit_deg, axis=0))
+
+    def plot(self, *, limit_deg: float = 3.0, title: str = "") -> Figure:
+        """Figure of the swing over the quantity; `swashplate.report.figures.plot_sweep`."""
+        return cast("Figure", figures().plot_sweep(self, limit_deg=limit_deg, title=title))
 
     def tables(self) -> list[Table]:
         """Root mean square swing; over the stick the residual swing, and where the slew ends."""

@@ -36,7 +36,8 @@ from swashplate.identification.validation import RunQuality, predict
 from swashplate.parameters.definitions import find
 from swashplate.parameters.files import dump_set, read_set
 from swashplate.parameters.parameter_set import Motion, ParameterSet
-from swashplate.results import Result
+from swashplate.progress import working
+from swashplate.results import Result, folded
 from swashplate.tables import Table, write_text
 
 if TYPE_CHECKING:
@@ -70,20 +71,34 @@ class Judged(Result):
     def verdict(self) -> Verdict:
         """What it can be used for."""
         planned = [each.name for each in self.result.setup.stages]
-        return verdict(self.result.stages, self.predicted, planned=planned, required=self.required)
+        with working("Judging the fit"):
+            return verdict(
+                self.result.stages, self.predicted, planned=planned, required=self.required
+            )
 
     def tables(self) -> list[Table]:
         """Criteria of the verdict, then the fit's tables and the errors of held-out runs."""
-        return [
-            self.verdict.table(),
-            *self.result.tables(),
-            *tables.runs_tables(self.predicted),
-        ]
+        return [self.verdict.table(), *self.result.tables(), *self._held_out_tables()]
+
+    def _held_out_tables(self) -> list[Table]:
+        made = tables.runs_tables(self.predicted)
+        return [replace(table, title=f"{table.title}, held-out runs") for table in made]
+
+    def _repr_html_(self) -> str:
+        estimates = folded("Estimates, and errors of fitted runs", self.result.tables())
+        held_out = self._held_out_tables()
+        errors = folded("Errors of held-out runs", held_out) if held_out else ""
+        return f"{self.verdict._repr_html_()}{estimates}{errors}"
+
+    @property
+    def headline(self) -> str:
+        """The verdict in one sentence."""
+        return self.verdict.headline
 
     @property
     def sentences(self) -> tuple[str, ...]:
-        """The verdict's headline and all that it says."""
-        return (self.verdict.headline, *self.verdict.sentences, *self.verdict.not_judged)
+        """What the verdict says below its table."""
+        return tuple(self.verdict.remarks())
 
     def store(self, path: str | Path) -> None:
         """Write what `load_fit` reads and the report can be made from again, whole or not at all.
