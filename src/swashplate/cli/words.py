@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from swashplate.documents import parse_toml, read_text
+from swashplate.equations.fields import is_real
 from swashplate.errors import FileError, InputError
 from swashplate.units import unit_text
 
@@ -169,6 +170,9 @@ def model_parameters_of(folder: str, file: Path, runs: Sequence[Experiment]) -> 
             f"{place} has no table [{setup.name}] with {', '.join(nominal.numbers)}: give the "
             f"folder that 'swashplate fit --model {file}' wrote."
         )
+    for name, value in table.items():
+        if not is_real(value):
+            raise InputError(f"{place}: {name} under [{setup.name}] is {value!r:.60}, no number.")
     return replace(nominal, numbers={name: float(value) for name, value in table.items()})
 
 

@@ -4,11 +4,12 @@ from collections.abc import Mapping
 from functools import cache
 from importlib.resources import files
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated
 
-from pydantic import BaseModel, ConfigDict, Field, PositiveFloat
+from pydantic import BaseModel, ConfigDict, Field
 
 from swashplate.documents import parse_toml, read_text, validated
+from swashplate.entries import Name, Number, Positive, Version
 from swashplate.equations.replacement import found_at
 from swashplate.errors import InputError, ParameterError
 from swashplate.parameters.definitions import Block, Definition, declare, find, options_of
@@ -27,7 +28,7 @@ from swashplate.units import to_si
 
 # --- what stands in a file ------------------------------------------------------------------------
 
-TwoNumbers = Annotated[list[float], Field(min_length=2, max_length=2)]
+TwoNumbers = Annotated[list[Number], Field(min_length=2, max_length=2)]
 
 
 class FilePart(BaseModel):
@@ -39,7 +40,7 @@ class FilePart(BaseModel):
 class Entry(FilePart):
     """One parameter: ``Z16 = { value = [1.2e-4, 1.5e-4], unit = "m", source = "table 7.2" }``."""
 
-    value: float | TwoNumbers
+    value: Number | TwoNumbers
     unit: str
     source: str = ""
     status: Status = "user"
@@ -52,7 +53,7 @@ class ModelOptions(FilePart):
     pressure_root: PressureRoot = "published"
     coulomb_sign: CoulombSign = "smooth"
     card_switch: CardSwitch = "sampled"
-    rate: PositiveFloat | None = None
+    rate: Positive | None = None
     """Samples a second that the recursion of the card's filter belongs to; none is the filter's
     differential equation, for any rate."""
     options: list[str] | None = None
@@ -65,10 +66,10 @@ class ModelOptions(FilePart):
 class CardFile(FilePart):
     """A control card by itself, so that several sets can use it."""
 
-    format: Literal[1] = 1
-    name: str
+    format: Version = 1
+    name: Name
     title: str = ""
-    rate: PositiveFloat | None = None
+    rate: Positive | None = None
     """Of the recursion that its filter belongs to."""
     control_card: dict[str, Entry]
 
@@ -76,11 +77,11 @@ class CardFile(FilePart):
 class SetFile(FilePart):
     """A whole drive; `control_card` is the name of a packaged card or the card's own table."""
 
-    format: Literal[1] = 1
-    name: str
+    format: Version = 1
+    name: Name
     title: str = ""
     control_card: str | dict[str, Entry]
-    card: str = ""
+    card: Name = ""
     """Name of a card that is given by its own table."""
     pump_motor: dict[str, Entry]
     model: ModelOptions = ModelOptions()
