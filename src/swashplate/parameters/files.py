@@ -1,6 +1,6 @@
 """Parameter sets as TOML files: the packaged ones and the user's."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from functools import cache
 from importlib.resources import files
 from pathlib import Path
@@ -10,7 +10,7 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from swashplate.documents import parse_toml, read_text, validated
 from swashplate.entries import Name, Number, Positive, Version
-from swashplate.equations.replacement import found_at
+from swashplate.equations.replacement import Replacement, again, found_at, uses
 from swashplate.errors import InputError, ParameterError
 from swashplate.parameters.definitions import Block, Definition, declare, find, options_of
 from swashplate.parameters.parameter_set import (
@@ -47,6 +47,14 @@ class Entry(FilePart):
     bounds: TwoNumbers | None = None
 
 
+class EquationPlaces(FilePart):
+    """An equation in the place of another one, each as ``module:name``."""
+
+    old: str
+    new: str
+    parameters: str | None = None
+
+
 class ModelOptions(FilePart):
     """Variants of the equations; the defaults are those the published values belong to."""
 
@@ -58,7 +66,7 @@ class ModelOptions(FilePart):
     differential equation, for any rate."""
     options: list[str] | None = None
     """Terms of the pump that count; where they are not given, those whose parameters are not 0."""
-    equations: list[dict[str, str]] = []
+    equations: list[EquationPlaces] = []
     """One's own equations in place of the package's, each as ``module:name``."""
     motion: Motion = "shaft"
 
@@ -125,15 +133,7 @@ def read_set(text: str, origin: str) -> ParameterSet:
         card_name, entries, rate = card.name, card.control_card, rate or card.rate
     else:
         card_name, entries = contents.card or f"{contents.name} card", contents.control_card
-    equations = []
-    for places in model.equations:
-        # a file runs no code, so that the equation's module must be imported already
-        try:
-            equations.append(found_at(places))
-        except (ImportError, InputError, TypeError) as error:
-            raise ParameterError(f"{origin}: [model] equations: {error}") from None
-        if equations[-1].parameters is not None:
-            declare(equations[-1].parameters)
+    equations = _replacements(model.equations, origin)
     blocks: dict[Block, Mapping[str, Entry]] = {
         "control_card": entries,
         "pump_motor": contents.pump_motor,
@@ -154,8 +154,32 @@ def read_set(text: str, origin: str) -> ParameterSet:
         *(contents.name, contents.title, card_name, parameters),
         *(model.pressure_root, model.coulomb_sign, model.card_switch, rate),
         options_of(values) if model.options is None else frozenset(model.options),
-        *(tuple(equations), model.motion),
+        *(equations, model.motion),
     )
+
+
+def _replacements(entries: Sequence[EquationPlaces], origin: str) -> tuple[Replacement, ...]:
+    """The equations that stand in the place of a drive's own."""
+    if not entries:
+        return ()
+    from swashplate.models.drive import drive, pump_drive
+
+    replacements = []
+    model, pump_model = drive, pump_drive
+    for entry in entries:
+        try:
+            made = found_at(entry.model_dump(exclude_none=True))
+            model = again(model, made)
+            if uses(pump_model, made.old):
+                pump_model = again(pump_model, made)
+            elif made.parameters is not None:
+                raise InputError(f"{entry.old} is an equation of the card and takes no parameters.")
+        except (ImportError, InputError) as error:
+            raise ParameterError(f"{origin}: [model] equations: {error}") from None
+        if made.parameters is not None:
+            declare(made.parameters)
+        replacements.append(made)
+    return tuple(replacements)
 
 
 def _packaged_card(name: str, origin: str) -> CardFile:
