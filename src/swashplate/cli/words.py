@@ -11,7 +11,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from swashplate.documents import parse_toml, read_text
-from swashplate.equations.fields import is_real
 from swashplate.errors import FileError, InputError
 from swashplate.units import unit_text
 
@@ -159,6 +158,7 @@ def parameters_of(word: str) -> ParameterSet:
 
 def model_parameters_of(folder: str, file: Path, runs: Sequence[Experiment]) -> ModelSetup:
     """A model of one's own with the numbers that a fit wrote into its folder."""
+    from swashplate.equations.fields import is_real
     from swashplate.identification.setup import ModelSetup
 
     setup = ModelSetup.from_file(file)

@@ -401,6 +401,12 @@ class ModelSetup(Result):
             sys.path.insert(0, str(file.parent))
         try:
             module = import_module(file.stem)
+        except SystemExit as error:
+            sys.modules.pop(file.stem, None)
+            raise FileError(
+                f"{path} ended Python with sys.exit({error.code!r}) as it was loaded: guard what "
+                "the file does as a script by if __name__ == '__main__'."
+            ) from None
         except Exception as error:  # the user's own code, which can raise anything
             sys.modules.pop(file.stem, None)
             own = [e.lineno for e in extract_tb(error.__traceback__) if e.filename == str(file)]
