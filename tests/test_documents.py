@@ -65,6 +65,7 @@ def test_one_sentence(entries, said):
         ('name = "\\u001b[31mred"', "the character U+001B"),
         ('[runs]\n"a\\u0007" = 1', "the character U+0007"),
         ('title = "\\uFFFE"', "the character U+FFFE"),
+        ('title = "\\u202Egnp.exe"', "the character U+202E"),
         ('title = "\\uFFFF"', "the character U+FFFF"),
         ('title = "\\uD800"', "is not TOML"),
         (f"name = '{'x' * 100_000}'", "a text of 100000 characters"),

@@ -46,8 +46,11 @@ _TOKEN = re.compile(
     re.VERBOSE | re.DOTALL,
 )
 """Pieces of a TOML text, as far as a dotted key needs them; each character is looked at once."""
-_UNPRINTABLE = re.compile("[\0-\x08\x0b\x0c\x0e-\x1f\x7f-\x9f\ud800-\udfff\ufffe\uffff]")
-"""Characters that steer a terminal, or that neither XML nor UTF-8 can hold."""
+_UNPRINTABLE = re.compile(
+    r"[\0-\x08\x0b\x0c\x0e-\x1f\x7f-\x9f\u202a-\u202e\u2066-\u2069\ud800-\udfff\ufffe\uffff]"
+)
+"""Characters that steer a terminal or turn the direction of writing, or that neither XML nor UTF-8
+can hold."""
 
 
 def read_text(path: str | Path) -> str:
