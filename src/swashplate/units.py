@@ -84,11 +84,7 @@ def to_si(value: float, unit: str, si: str, what: str) -> float:
     try:
         # offsets (degC) are handled by Quantity, not by a factor
         quantity = registry.Quantity(value, _written_out(unit) if unit != "1" else "")
-        if value != 0.0 and quantity.magnitude == 0.0:
-            raise ValueError("a unit of size 0")
         number = float(quantity.to(_written_out(si) if si != "1" else "").magnitude)
-        if isfinite(value) and not isfinite(number):
-            raise ValueError("a unit of infinite size")
     except UndefinedUnitError:
         raise InputError(f"{what} has the unknown unit '{unit}'; give it in {wanted}.") from None
     except DimensionalityError:
@@ -100,6 +96,8 @@ def to_si(value: float, unit: str, si: str, what: str) -> float:
         raise InputError(
             f"{what} has the unreadable unit '{shown}'; give it in {wanted}."
         ) from None
+    if isfinite(value) and not isfinite(number):
+        raise InputError(f"{what} is {value:g} {unit}, too large a number in {si}; check it.")
     return number
 
 
