@@ -1,12 +1,14 @@
 """A number in a file is a number: neither ``true`` nor ``"36"``; and a truth value is no number."""
 
 import re
+from types import SimpleNamespace
 
 import pytest
 
-from swashplate import Drive, ParameterError
+from swashplate import Drive, InputError, ParameterError
 from swashplate.campaign import Campaign
-from swashplate.identification import load_setup
+from swashplate.cli.words import model_parameters_of
+from swashplate.identification import ModelSetup, load_setup
 
 CAMPAIGN = """
 virtual = true
@@ -101,6 +103,16 @@ def test_numbers_of_a_drive(tmp_path):
         path.write_text(long)
         with pytest.raises(ParameterError, match=f"drive.toml: {name} is .* at most 100"):
             Drive.from_toml(path)
+
+
+@pytest.mark.parametrize("value", ["true", '"0.1"', "[0.1]", "{ value = 0.1 }"])
+def test_numbers_of_a_model_of_ones_own(tmp_path, monkeypatch, value):
+    nominal = SimpleNamespace(numbers={"lag": 0.1})
+    setup = SimpleNamespace(name="valve", nominal=lambda runs: nominal)
+    monkeypatch.setattr(ModelSetup, "from_file", lambda path: setup)
+    _written(tmp_path / "parameters.toml", f"[valve]\nlag = {value}\n")
+    with pytest.raises(InputError, match=r"parameters.toml: lag under \[valve\]"):
+        model_parameters_of(str(tmp_path), tmp_path / "valve.py", ())
 
 
 def _written(path, text):

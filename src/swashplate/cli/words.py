@@ -171,7 +171,7 @@ def model_parameters_of(folder: str, file: Path, runs: Sequence[Experiment]) -> 
             f"folder that 'swashplate fit --model {file}' wrote."
         )
     for name, value in table.items():
-        if not is_real(value):
+        if isinstance(value, bool) or not is_real(value):
             raise InputError(f"{place}: {name} under [{setup.name}] is {value!r:.60}, no number.")
     return replace(nominal, numbers={name: float(value) for name, value in table.items()})
 

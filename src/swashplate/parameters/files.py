@@ -168,17 +168,17 @@ def _replacements(entries: Sequence[EquationPlaces], origin: str) -> tuple[Repla
     model, pump_model = drive, pump_drive
     for entry in entries:
         try:
-            made = found_at(entry.model_dump(exclude_none=True))
-            model = again(model, made)
-            if uses(pump_model, made.old):
-                pump_model = again(pump_model, made)
-            elif made.parameters is not None:
+            replacement = found_at(entry.model_dump(exclude_none=True))
+            model = again(model, replacement)
+            if uses(pump_model, replacement.old):
+                pump_model = again(pump_model, replacement)
+            elif replacement.parameters is not None:
                 raise InputError(f"{entry.old} is an equation of the card and takes no parameters.")
         except (ImportError, InputError) as error:
             raise ParameterError(f"{origin}: [model] equations: {error}") from None
-        if made.parameters is not None:
-            declare(made.parameters)
-        replacements.append(made)
+        if replacement.parameters is not None:
+            declare(replacement.parameters)
+        replacements.append(replacement)
     return tuple(replacements)
 
 
