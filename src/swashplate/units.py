@@ -5,8 +5,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
 from functools import cache
-from math import pi
-from tokenize import TokenError
+from math import isfinite, pi
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
@@ -32,17 +31,6 @@ LONGEST = 80
 """Letters of a unit."""
 _POWER = re.compile(r"(?:\*\*|\^)\s*\(?\s*[+-]?\d{1,2}(?:[./]\d{1,3})?\s*\)?(?!\s*(?:\*\*|\^|\d))")
 """A power as a unit has it: a plain number, no power of a power."""
-
-_UNREADABLE = (
-    ArithmeticError,
-    AssertionError,
-    AttributeError,
-    RecursionError,
-    TokenError,
-    TypeError,
-    ValueError,
-)
-"""What Pint's parser meets unreadable text with."""
 
 
 def _written_out(unit: str) -> str:
@@ -96,7 +84,7 @@ def to_si(value: float, unit: str, si: str, what: str) -> float:
     try:
         # offsets (degC) are handled by Quantity, not by a factor
         quantity = registry.Quantity(value, _written_out(unit) if unit != "1" else "")
-        return float(quantity.to(_written_out(si) if si != "1" else "").magnitude)
+        number = float(quantity.to(_written_out(si) if si != "1" else "").magnitude)
     except UndefinedUnitError:
         raise InputError(f"{what} has the unknown unit '{unit}'; give it in {wanted}.") from None
     except DimensionalityError:
@@ -104,10 +92,13 @@ def to_si(value: float, unit: str, si: str, what: str) -> float:
             f"{what} is given in '{unit}', which does not measure the same as {si}; "
             f"give it in {wanted}."
         ) from None
-    except _UNREADABLE:
+    except Exception:  # Pint evaluates the text, and raises whatever the evaluation does
         raise InputError(
             f"{what} has the unreadable unit '{shown}'; give it in {wanted}."
         ) from None
+    if isfinite(value) and not isfinite(number):
+        raise InputError(f"{what} is {value:g} {unit}, too large a number in {si}; check it.")
+    return number
 
 
 def scaling(unit: str, si: str, what: str) -> tuple[float, float]:
@@ -138,7 +129,7 @@ def si_exponents(unit: str) -> dict[str, int] | None:
     try:
         base = _registry().parse_units(_written_out(unit).replace("^", "**"))
         factor, root = _registry().get_base_units(base)
-    except _UNREADABLE:
+    except Exception:  # see `to_si`
         return None
     powers = {str(name): float(power) for name, power in root._units.items()}
     if factor != 1.0 or not all(n.is_integer() and k in _BASE for k, n in powers.items()):

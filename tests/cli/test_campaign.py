@@ -178,3 +178,13 @@ def test_what_positive_steps_determine(done: Words, tmp_path: Path) -> None:
     assert set(shares.round(9)) == {0.0, 1.0}
     (tmp_path / "mine.toml").write_text(stages(pump="Z8 Z13_plus"), "utf-8")
     assert "The fit configuration can stay as it is." in done("excitation", *words, "mine.toml")
+
+
+def test_a_guess_looks_for_its_folder_first(refused, virtual, tmp_path, monkeypatch) -> None:
+    """Not after the search, which takes many times as long."""
+    from swashplate import campaign
+
+    monkeypatch.setattr(campaign, "guess_drive", lambda runs: pytest.fail("it searched"))
+    (tmp_path / "file").write_text("")
+    sentence = refused("guess", "virtual/campaign.toml", "--out", "file/guessed")
+    assert "file/guessed cannot be made" in sentence

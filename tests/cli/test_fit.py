@@ -19,6 +19,7 @@ from swashplate import Campaign, Drive
 from swashplate.identification.assessment import Judged
 from swashplate.identification.fitting import Fit, fit
 from swashplate.identification.setup import Setup
+from swashplate.locks import locked
 
 Words = Callable[..., str]
 CAMPAIGN = "virtual/campaign.toml"
@@ -74,16 +75,18 @@ def test_a_campaign_becomes_a_drive(done, refused, campaign, tmp_path) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("how", [signal.SIGKILL, signal.SIGINT], ids=["kill", "Ctrl-C"])
+@pytest.mark.parametrize(
+    "how", [signal.SIGKILL, signal.SIGINT, signal.SIGTERM], ids=["kill", "Ctrl-C", "terminate"]
+)
 def test_an_interrupted_search_goes_on(campaign: Path, tmp_path: Path, how: signal.Signals) -> None:
     command = [sys.executable, "-m", "swashplate", "fit", CAMPAIGN, "--no-report", "--starts", "6"]
     command += ["--setup", "setup.toml", "--out"]
     store = tmp_path / "fitted" / "starts"
     running = subprocess.Popen(
-        [*command, "fitted", "--jobs", "2" if how == signal.SIGINT else "1"],
+        [*command, "fitted", "--jobs", "1" if how == signal.SIGKILL else "2"],
         cwd=tmp_path,
         stdout=subprocess.PIPE,
-        stderr=subprocess.DEVNULL,
+        stderr=subprocess.PIPE,
         text=True,
         start_new_session=True,
     )
@@ -93,8 +96,9 @@ def test_an_interrupted_search_goes_on(campaign: Path, tmp_path: Path, how: sign
         assert time.monotonic() < deadline
         time.sleep(0.005)
     os.killpg(running.pid, how)  # as a terminal does
-    said, _ = running.communicate(timeout=60.0)
-    if how == signal.SIGINT:
+    said, warnings = running.communicate(timeout=60.0)
+    if how != signal.SIGKILL:
+        assert "leaked" not in warnings
         assert running.returncode == 130
         assert "Interrupted in the stage 'card': interrupted after " in said
         assert "--resume goes on" in said
@@ -168,6 +172,28 @@ def test_fits_that_are_refused(refused: Words, virtual: Path, tmp_path: Path) ->
         assert said in refused("fit", CAMPAIGN, "--setup", "bad.toml")
     virtual.write_text(virtual.read_text("utf-8").replace('role = "fit"', 'role = "ignore"'))
     assert "no run of the axis 'hoist' has the role 'fit'" in refused("fit", CAMPAIGN)
+
+
+def test_one_fit_at_a_time_into_a_folder(refused: Words, virtual: Path, tmp_path: Path) -> None:
+    words = ("fit", CAMPAIGN, "--axis", "boom", "--out", "results/fitted")
+    with locked(tmp_path / "results" / "fitted"):
+        sentence = refused(*words)
+        assert "results/fitted is in use" in sentence
+        assert f"process {os.getpid()} on" in sentence
+        assert "--out" in sentence
+    assert "no axis 'boom'" in refused(*words)  # and leaves no folder behind
+
+
+def test_a_model_that_is_executed_says_so(run, virtual: Path, tmp_path: Path) -> None:
+    page = re.sub(r"[\s│]+", " ", run("fit", "--help").stdout)
+    assert "The file is executed: name only one that you trust" in page
+    (tmp_path / "ending.py").write_text("import sys\nsys.exit(7)\n")
+    done = run("fit", CAMPAIGN, "--model", "ending.py")
+    assert done.exit_code == 2
+    sentence = done.stderr
+    assert "ending.py" in sentence
+    assert "sys.exit(7)" in sentence
+    assert "__main__" in sentence
 
 
 # --- validate -------------------------------------------------------------------------------------

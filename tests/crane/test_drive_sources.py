@@ -164,9 +164,9 @@ def test_judgment_and_page_say_the_verdict(fit, tmp_path, grade):
         assert GRADES[grade] in part
     look = {"Usable": "good", "Not usable": "bad"}.get(grade, "look")
     assert f'<dt class="{look}">Hoist&#39;s drive' in summary
-    forced = "It rests on the fit of the hoist, which is not usable." in found.headline()
+    forced = "It rests on the fit of the hoist, which is not usable." in found.headline
     assert forced == (grade == "Not usable")
-    assert found.headline().replace("'", "&#39;") in summary
+    assert found.headline.replace("'", "&#39;") in summary
     hoist = crane.hoist.parameters.title
     assert f"hoist: {hoist}" in basis
 

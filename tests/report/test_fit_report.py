@@ -15,6 +15,7 @@ import numpy as np
 import polars as pl
 import pytest
 from tests.identification.given import virtual
+from tests.report.conftest import injected, policy_of, with_script
 
 from swashplate import Campaign, Drive, FileError, InputError, maneuvers
 from swashplate.identification.assessment import Judged
@@ -441,7 +442,7 @@ def test_a_page_that_cannot_be_written_leaves_the_old_one(tmp_path, write, judge
     assert [each.read_text() for each in tmp_path.iterdir()] == ["old"]
 
 
-ZOOM = """<script>
+ZOOM = """
 addEventListener("load", () => {
   const stack = document.querySelector(".run .stack");
   const { left, width } = stack.getBoundingClientRect();
@@ -450,7 +451,7 @@ addEventListener("load", () => {
   stack.dispatchEvent(new PointerEvent("pointermove", at));
   dispatchEvent(new Event("beforeprint"));
 });
-</script></body>"""
+"""
 
 
 def test_the_page_renders_and_zooms_in_a_browser_without_errors(
@@ -458,7 +459,7 @@ def test_the_page_renders_and_zooms_in_a_browser_without_errors(
 ) -> None:
     assert browsed(validated).count('data-drawn="yes"') == 4
     zoomed = tmp_path / "zoomed.html"
-    zoomed.write_text(page.read_text("utf-8").replace("</body>", ZOOM), "utf-8")
+    zoomed.write_text(with_script(page.read_text("utf-8"), ZOOM), "utf-8")
     made = browsed(zoomed)
     # 3 runs, and one of those held out, which is alone on the first screen
     assert made.count('data-drawn="yes"') == made.count('class="stack"') == 4
@@ -475,6 +476,35 @@ def test_the_page_renders_and_zooms_in_a_browser_without_errors(
     assert len(ticks) > 4
 
 
+def test_nothing_runs_in_a_report_but_its_own_scripts(
+    page: Path, validated: Path, tmp_path: Path, browsed
+) -> None:
+    assert injected(validated, tmp_path, browsed).count('data-drawn="yes"') == 4
+    assert injected(page, tmp_path, browsed).count('data-drawn="yes"') == 4
+    # of the live page within it, which is folded until somebody opens it
+    opened = tmp_path / "opened.html"
+    text = page.read_text("utf-8").replace('<details class="screen">', "<details open>")
+    opened.write_text(with_script(text.replace('loading="lazy"', ""), FRAMED), "utf-8")
+    assert 'data-framed="yes"' in browsed(opened)
+
+
+FRAMED = """
+const wait = setInterval(() => {
+  const { contentDocument } = document.querySelector("iframe.live");
+  if (contentDocument?.body?.dataset.ready !== "yes") return;
+  clearInterval(wait);
+  document.body.dataset.framed = "yes";
+}, 5);
+"""
+
+
+def test_nothing_runs_in_a_live_page_but_its_own_scripts(tmp_path: Path, browsed) -> None:
+    page = tmp_path / "live.html"
+    write_live_page(Drive.preset("hoist"), page, command=parse("step:9"))
+    assert policy_of(page.read_text("utf-8"))["script-src"][-1] == "'wasm-unsafe-eval'"
+    assert 'data-ready="yes"' in injected(page, tmp_path, browsed)
+
+
 def test_a_report_is_printed(page: Path, tmp_path: Path, browsed) -> None:
     printed = tmp_path / "fit.pdf"
     print_report(page, printed)
@@ -488,7 +518,7 @@ def test_a_report_is_printed(page: Path, tmp_path: Path, browsed) -> None:
 # --- the live page --------------------------------------------------------------------------------
 
 
-ACTS = """<script>
+ACTS = """
 const act = (words, value) => {
   const range = document.querySelector(`input[type=range][aria-label="${words}"]`);
   range.value = value;
@@ -514,15 +544,14 @@ const wait = setInterval(() => {
   const textContent = JSON.stringify(made);
   document.body.append(Object.assign(document.createElement("pre"), { id: "made", textContent }));
 }, 5);
-</script></body>"""
+"""
 
 
 def acted(page: Path, tmp_path: Path, browsed, lever: str = "orifice") -> dict:
     """What a browser makes of a page of which one lever's slider is moved, and then reset."""
     tried = tmp_path / "tried.html"
-    tried.write_text(
-        page.read_text("utf-8").replace("</body>", ACTS.replace("LEVER", lever)), "utf-8"
-    )
+    script = ACTS.replace("LEVER", lever)
+    tried.write_text(with_script(page.read_text("utf-8"), script), "utf-8")
     found = re.search(r'<pre id="made">(.*?)</pre>', browsed(tried, ""), re.DOTALL)
     assert found is not None
     return json.loads(html.unescape(found[1]))

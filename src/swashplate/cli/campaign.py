@@ -25,7 +25,17 @@ from swashplate.cli.terminal import (
     working,
 )
 from swashplate.errors import InputError
-from swashplate.tables import FIGURE, Column, Table, count, ended, joined, write_text
+from swashplate.tables import (
+    FIGURE,
+    Column,
+    Table,
+    check_folder,
+    count,
+    ended,
+    joined,
+    made_folder,
+    write_text,
+)
 
 LEGEND = (
     "jitter and longest gap in ms; clip: % of the samples at the ends of the instrument's range;\n"
@@ -311,15 +321,16 @@ def guess(path: Path = CAMPAIGN, *, axis: AxisName = None, out: Path | None = No
     from swashplate import campaign as tests
     from swashplate.drive import Drive
 
+    folder = path.parent if out is None else out
+    start, setup = folder / "start.toml", folder / "setup.toml"
     with working(f"Reading {path}"):
-        campaign, chosen = words.campaign_of(path, axis)
-        runs = words.runs_to_fit(campaign, chosen)
-        folder = path.parent if out is None else out
-        start, setup = folder / "start.toml", folder / "setup.toml"
         check_free(start, setup)
+        campaign, chosen = words.campaign_of(path, axis)
+        check_folder(folder)
+        runs = words.runs_to_fit(campaign, chosen)
         found = tests.guess_drive(runs)
         parameters = tests.guessed_set(found, path.name)
-        folder.mkdir(parents=True, exist_ok=True)
+        made_folder(folder)
         Drive(parameters).to_toml(start)
         write_text(tests.fit_configuration(found, parameters), setup)
     show(tests.guess_table(found))

@@ -16,6 +16,7 @@ from swashplate.cli.options import AxisName, Required, option
 from swashplate.cli.terminal import (
     bullets,
     check_free,
+    lock,
     long_work,
     note,
     save,
@@ -107,8 +108,8 @@ def fit(
     role 'validate', and says what the data determine. Writes the drive as a
     parameter file that 'simulate' takes, the fit configuration, the estimates
     with their intervals, and what 'report' needs to write the report again.
-    Ctrl-C keeps the best so far, of several starts those that ended, and the exit
-    code is 130. It is 1 if the result is not usable.
+    Ctrl-C or SIGTERM keeps the best so far, of several starts those that ended,
+    and the exit code is 130. It is 1 if the result is not usable.
 
     Options:
       out DIR: Folder for the fitted drive and its tables.
@@ -138,6 +139,7 @@ def fit(
             "more, 1000 for smooth ones."
         )
     check_folder(out)
+    lock(out)
     if not resume:
         made = [DRIVE, CONFIGURATION, NUMBERS, "estimates.csv", STORED]
         check_free(*(out / each for each in (*made, *["report.html"] * report)))
@@ -461,6 +463,7 @@ def demo(*, out: Path = Path("demo"), seed: int = 1) -> None:
 
     if not (out / "virtual" / "truth").is_dir():  # an earlier demo is replaced, nothing else
         check_free(out)
+    lock(out)
     setup = load_setup("hoist")
     with long_work("", 5) as begin:
         begin("testing the virtual hoist")

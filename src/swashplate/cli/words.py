@@ -158,6 +158,7 @@ def parameters_of(word: str) -> ParameterSet:
 
 def model_parameters_of(folder: str, file: Path, runs: Sequence[Experiment]) -> ModelSetup:
     """A model of one's own with the numbers that a fit wrote into its folder."""
+    from swashplate.equations.fields import is_real
     from swashplate.identification.setup import ModelSetup
 
     setup = ModelSetup.from_file(file)
@@ -169,6 +170,9 @@ def model_parameters_of(folder: str, file: Path, runs: Sequence[Experiment]) -> 
             f"{place} has no table [{setup.name}] with {', '.join(nominal.numbers)}: give the "
             f"folder that 'swashplate fit --model {file}' wrote."
         )
+    for name, value in table.items():
+        if isinstance(value, bool) or not is_real(value):
+            raise InputError(f"{place}: {name} under [{setup.name}] is {value!r:.60}, no number.")
     return replace(nominal, numbers={name: float(value) for name, value in table.items()})
 
 

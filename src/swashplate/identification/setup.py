@@ -15,12 +15,13 @@ from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, PositiveFloat, model_validator
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
 
 from swashplate.campaign import ChannelKind
 from swashplate.campaign.experiment import Experiment
-from swashplate.campaign.schema import Finite, NotNegative, Positive, Weight, Window
+from swashplate.campaign.schema import Weight, Window
 from swashplate.documents import parse_toml, read_text, validated
+from swashplate.entries import Finite, Flag, NotNegative, Positive
 from swashplate.equations import Model as Equations
 from swashplate.equations.fields import check_mapping, is_real
 from swashplate.errors import FileError, InputError, ParameterError
@@ -37,10 +38,7 @@ from swashplate.simulation.instance import START
 Array = NDArray[np.float64]
 _SETUPS = files("swashplate.identification").joinpath("setups")
 Pair = tuple[Finite, Finite]
-StandardUncertainty = (
-    Annotated[PositiveFloat, Field(strict=True, allow_inf_nan=False)]
-    | Annotated[str, Field(pattern=r"^\d+(\.\d+)? ?%$")]
-)
+StandardUncertainty = Positive | Annotated[str, Field(pattern=r"^\d+(\.\d+)? ?%$")]
 """A standard uncertainty: in SI units, or as "5 %" of the value."""
 COEFFICIENTS = ("Z19", "Z20", "Z21", "Z22")
 """Of the solenoids: what forces stand for."""
@@ -73,8 +71,8 @@ class Free(Entry):
 
     relative: Bounds | None = Field(None, description="Bounds as factors on the nominal value.")
     bounds: Bounds | None = Field(None, description="Bounds in SI units.")
-    log: bool = Field(False, description="Move the logarithm: for positive numbers.")
-    tied: bool = Field(False, description="One value for both directions.")
+    log: Flag = Field(False, description="Move the logarithm: for positive numbers.")
+    tied: Flag = Field(False, description="One value for both directions.")
     prior: Prior | None = Field(None, description="A normal distribution, of the logarithm if log.")
 
     @model_validator(mode="after")
@@ -91,10 +89,10 @@ class Forces(Entry):
     of the current beyond the dead zone Z17.
     """
 
-    plus: tuple[PositiveFloat, PositiveFloat, PositiveFloat, PositiveFloat] = Field(
+    plus: tuple[Positive, Positive, Positive, Positive] = Field(
         description="Effective currents of the positive direction, increasing [A]."
     )
-    minus: tuple[PositiveFloat, PositiveFloat, PositiveFloat, PositiveFloat] = Field(
+    minus: tuple[Positive, Positive, Positive, Positive] = Field(
         description="Of the negative direction, as magnitudes [A]."
     )
     relative: Bounds = Field((0.5, 2.0), description="Bounds as factors on the nominal forces.")
@@ -403,6 +401,12 @@ class ModelSetup(Result):
             sys.path.insert(0, str(file.parent))
         try:
             module = import_module(file.stem)
+        except SystemExit as error:
+            sys.modules.pop(file.stem, None)
+            raise FileError(
+                f"{path} ended Python with sys.exit({error.code!r}) as it was loaded: guard what "
+                "the file does as a script by if __name__ == '__main__'."
+            ) from None
         except Exception as error:  # the user's own code, which can raise anything
             sys.modules.pop(file.stem, None)
             own = [e.lineno for e in extract_tb(error.__traceback__) if e.filename == str(file)]

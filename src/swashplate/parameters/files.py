@@ -1,15 +1,16 @@
 """Parameter sets as TOML files: the packaged ones and the user's."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from functools import cache
 from importlib.resources import files
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated
 
-from pydantic import BaseModel, ConfigDict, Field, PositiveFloat
+from pydantic import BaseModel, ConfigDict, Field
 
 from swashplate.documents import parse_toml, read_text, validated
-from swashplate.equations.replacement import found_at
+from swashplate.entries import Name, Number, Positive, Version
+from swashplate.equations.replacement import Replacement, again, found_at, uses
 from swashplate.errors import InputError, ParameterError
 from swashplate.parameters.definitions import Block, Definition, declare, find, options_of
 from swashplate.parameters.parameter_set import (
@@ -27,7 +28,7 @@ from swashplate.units import to_si
 
 # --- what stands in a file ------------------------------------------------------------------------
 
-TwoNumbers = Annotated[list[float], Field(min_length=2, max_length=2)]
+TwoNumbers = Annotated[list[Number], Field(min_length=2, max_length=2)]
 
 
 class FilePart(BaseModel):
@@ -39,11 +40,19 @@ class FilePart(BaseModel):
 class Entry(FilePart):
     """One parameter: ``Z16 = { value = [1.2e-4, 1.5e-4], unit = "m", source = "table 7.2" }``."""
 
-    value: float | TwoNumbers
+    value: Number | TwoNumbers
     unit: str
     source: str = ""
     status: Status = "user"
     bounds: TwoNumbers | None = None
+
+
+class EquationPlaces(FilePart):
+    """An equation in the place of another one, each as ``module:name``."""
+
+    old: str
+    new: str
+    parameters: str | None = None
 
 
 class ModelOptions(FilePart):
@@ -52,12 +61,12 @@ class ModelOptions(FilePart):
     pressure_root: PressureRoot = "published"
     coulomb_sign: CoulombSign = "smooth"
     card_switch: CardSwitch = "sampled"
-    rate: PositiveFloat | None = None
+    rate: Positive | None = None
     """Samples a second that the recursion of the card's filter belongs to; none is the filter's
     differential equation, for any rate."""
     options: list[str] | None = None
     """Terms of the pump that count; where they are not given, those whose parameters are not 0."""
-    equations: list[dict[str, str]] = []
+    equations: list[EquationPlaces] = []
     """One's own equations in place of the package's, each as ``module:name``."""
     motion: Motion = "shaft"
 
@@ -65,10 +74,10 @@ class ModelOptions(FilePart):
 class CardFile(FilePart):
     """A control card by itself, so that several sets can use it."""
 
-    format: Literal[1] = 1
-    name: str
+    format: Version = 1
+    name: Name
     title: str = ""
-    rate: PositiveFloat | None = None
+    rate: Positive | None = None
     """Of the recursion that its filter belongs to."""
     control_card: dict[str, Entry]
 
@@ -76,11 +85,11 @@ class CardFile(FilePart):
 class SetFile(FilePart):
     """A whole drive; `control_card` is the name of a packaged card or the card's own table."""
 
-    format: Literal[1] = 1
-    name: str
+    format: Version = 1
+    name: Name
     title: str = ""
     control_card: str | dict[str, Entry]
-    card: str = ""
+    card: Name = ""
     """Name of a card that is given by its own table."""
     pump_motor: dict[str, Entry]
     model: ModelOptions = ModelOptions()
@@ -124,15 +133,7 @@ def read_set(text: str, origin: str) -> ParameterSet:
         card_name, entries, rate = card.name, card.control_card, rate or card.rate
     else:
         card_name, entries = contents.card or f"{contents.name} card", contents.control_card
-    equations = []
-    for places in model.equations:
-        # a file runs no code, so that the equation's module must be imported already
-        try:
-            equations.append(found_at(places))
-        except (ImportError, InputError, TypeError) as error:
-            raise ParameterError(f"{origin}: [model] equations: {error}") from None
-        if equations[-1].parameters is not None:
-            declare(equations[-1].parameters)
+    equations = _replacements(model.equations, origin)
     blocks: dict[Block, Mapping[str, Entry]] = {
         "control_card": entries,
         "pump_motor": contents.pump_motor,
@@ -153,8 +154,32 @@ def read_set(text: str, origin: str) -> ParameterSet:
         *(contents.name, contents.title, card_name, parameters),
         *(model.pressure_root, model.coulomb_sign, model.card_switch, rate),
         options_of(values) if model.options is None else frozenset(model.options),
-        *(tuple(equations), model.motion),
+        *(equations, model.motion),
     )
+
+
+def _replacements(entries: Sequence[EquationPlaces], origin: str) -> tuple[Replacement, ...]:
+    """The equations that stand in the place of a drive's own."""
+    if not entries:
+        return ()
+    from swashplate.models.drive import drive, pump_drive
+
+    replacements = []
+    model, pump_model = drive, pump_drive
+    for entry in entries:
+        try:
+            replacement = found_at(entry.model_dump(exclude_none=True))
+            model = again(model, replacement)
+            if uses(pump_model, replacement.old):
+                pump_model = again(pump_model, replacement)
+            elif replacement.parameters is not None:
+                raise InputError(f"{entry.old} is an equation of the card and takes no parameters.")
+        except (ImportError, InputError) as error:
+            raise ParameterError(f"{origin}: [model] equations: {error}") from None
+        if replacement.parameters is not None:
+            declare(replacement.parameters)
+        replacements.append(replacement)
+    return tuple(replacements)
 
 
 def _packaged_card(name: str, origin: str) -> CardFile:
