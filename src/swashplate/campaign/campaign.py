@@ -13,7 +13,7 @@ from swashplate.campaign import schema
 from swashplate.campaign.experiment import Experiment
 from swashplate.campaign.reading import read_run
 from swashplate.documents import parse_toml, read_text, validated
-from swashplate.errors import InputError
+from swashplate.errors import InputError, UnknownNameError
 from swashplate.logs import open_log
 from swashplate.results import Result, figures
 from swashplate.tables import Column as Head
@@ -114,8 +114,8 @@ class Campaign(Result):
 
         Raises
         ------
-        InputError
-            If there is none of that name.
+        UnknownNameError
+            If there is none of that name; it is a ``KeyError`` as well.
         IndexError
             If there are not so many.
         """
@@ -125,12 +125,12 @@ class Campaign(Result):
         if name in by_name:
             return by_name[name]
         if any(name == run or name.startswith(f"{run} ") for run in self.ignored):
-            raise InputError(f"{self.path}: the run '{name}' has the role 'ignore'.")
+            raise UnknownNameError(f"{self.path}: the run '{name}' has the role 'ignore'.")
         near = get_close_matches(name, by_name, 1)
         meant = f" (did you mean {near[0]}?)" if near else ""
         known = ", ".join([*by_name][:LISTED])
         more = f" and {len(by_name) - LISTED} more" if len(by_name) > LISTED else ""
-        raise InputError(f"{self.path} has no run '{name}'{meant}; it has {known}{more}.")
+        raise UnknownNameError(f"{self.path} has no run '{name}'{meant}; it has {known}{more}.")
 
     def select(
         self, *, axis: str | None = None, role: schema.Role | None = None

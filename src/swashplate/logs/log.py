@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from swashplate.errors import FileError, InputError
+from swashplate.errors import FileError, InputError, MissingFileError
 from swashplate.units import scaling, speed_unit, to_si
 
 if TYPE_CHECKING:
@@ -245,7 +245,7 @@ def open_log(path: str | Path, *, options: TextOptions | None = None) -> Log:
             with source.open("rb") as file:
                 why = "" if file.read(1) else "is empty"
     except FileNotFoundError:
-        raise FileError(f"There is no file {source}.") from None
+        raise MissingFileError(f"There is no file {source}.") from None
     except (OSError, ValueError) as error:
         why = f"cannot be read: {getattr(error, 'strerror', None) or said(error)}"
     if why or name is None:
