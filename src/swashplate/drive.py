@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple, TypedDict, Unpack, overload
@@ -18,7 +18,7 @@ from swashplate.equations.model import Equation
 from swashplate.equations.replacement import Replacement
 from swashplate.errors import InputError
 from swashplate.maneuvers import Maneuver
-from swashplate.parameters.files import dump_set, load_preset, load_set
+from swashplate.parameters.files import dump_set, load_preset, load_set, preset_names
 from swashplate.parameters.parameter_set import Change, Parameter, ParameterSet
 from swashplate.parameters.rules import FULL_VOLTAGE
 from swashplate.results import Result
@@ -65,8 +65,11 @@ class Given(TypedDict, total=False):
 
 
 @dataclass(frozen=True)
-class Drive(Result):
+class Drive(Result, Mapping[str, Parameter]):
     """A hydrostatic drive from joystick voltage to shaft speed. Immutable.
+
+    It is a mapping of its parameters by symbol: ``drive["Z16"]``, or ``drive["Z16_plus"]`` for one
+    direction.
 
     Examples
     --------
@@ -78,6 +81,18 @@ class Drive(Result):
     parameters: ParameterSet
     """Value, unit, bounds, source and status of every parameter, by symbol."""
 
+    def __post_init__(self) -> None:
+        """Refuse what is not a parameter set, with the call that takes it."""
+        given: object = self.parameters
+        if isinstance(given, ParameterSet):
+            return
+        way = "Drive(parameters) takes a ParameterSet"
+        if isinstance(given, str) and given in preset_names():
+            way = f'the packaged drive is Drive.preset("{given}")'
+        elif isinstance(given, str | Path):
+            way = f'a parameter file is read with Drive.from_toml("{given}")'
+        raise InputError(f"A Drive cannot be made of {given!r}: {way}.")
+
     @classmethod
     def preset(cls, name: str) -> Drive:
         """A packaged drive, ``"hoist"``, ``"slew"``, ``"luff"`` or ``"neutral"``, by its name."""
@@ -85,7 +100,21 @@ class Drive(Result):
 
     @classmethod
     def from_toml(cls, path: str | Path) -> Drive:
-        """A drive from a parameter file; a `ParameterError` names file, parameter and rule."""
+        """A drive from a parameter file, or from the folder of a fit.
+
+        Parameters
+        ----------
+        path : path
+            The file, or a folder that `Identification.save` or ``swashplate fit`` wrote, of which
+            ``drive.toml`` is read.
+
+        Raises
+        ------
+        FileError
+            If there is no such file, or the folder holds no drive.
+        ParameterError
+            If an entry is wrong; the sentence names file, parameter and rule.
+        """
         return cls(load_set(path))
 
     def to_toml(self, path: str | Path) -> None:
@@ -109,9 +138,24 @@ class Drive(Result):
         """Name of the parameter set."""
         return self.parameters.name
 
-    def __getitem__(self, symbol: str) -> Parameter:
-        """A parameter by symbol, e.g. ``drive["Z16"].value.plus``."""
-        return self.parameters[symbol]
+    def __getitem__(self, name: str) -> Parameter:
+        """A parameter by its symbol, ``drive["Z16"].value.plus``, or ``drive["Z16_plus"].value``.
+
+        Raises
+        ------
+        UnknownParameterError
+            If no parameter has the name; it is a ``KeyError`` as well.
+        """
+        return self.parameters[name]
+
+    def __contains__(self, name: object) -> bool:
+        return name in self.parameters
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.parameters)
+
+    def __len__(self) -> int:
+        return len(self.parameters)
 
     def replace(self, **changes: Change) -> Drive:
         """A drive with other values.

@@ -1,5 +1,7 @@
 """A parameter set: values with their origin, immutable, always valid."""
 
+from __future__ import annotations
+
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, fields, replace
 from itertools import groupby
@@ -13,6 +15,7 @@ from swashplate.equations.replacement import Replacement
 from swashplate.errors import ParameterError
 from swashplate.parameters.definitions import (
     CATALOGUE,
+    COLUMNS,
     OWN,
     REFINEMENTS,
     SWITCHES,
@@ -81,6 +84,18 @@ class Parameter(Result):
         """The same by column."""
         return dict(zip(self.definition.columns, self.values, strict=True))
 
+    def in_direction(self, column: str) -> Parameter:
+        """One direction of a parameter with two by itself, ``Z16_plus`` of ``Z16``."""
+        index = self.definition.columns.index(column)
+        side = ("positive", "negative")[index]
+        definition = replace(
+            self.definition,
+            name=f"{self.name}, {side}",
+            symbol=column,
+            fields=(self.definition.fields[index],),
+        )
+        return replace(self, definition=definition, value=self.values[index])
+
 
 class Entries(Mapping[str, Parameter]):
     """Parameters by symbol, read-only, of a frozen dataclass that has them as `parameters`."""
@@ -119,7 +134,9 @@ class Entries(Mapping[str, Parameter]):
 class ParameterSet(Entries):
     """All parameters of a drive, by symbol; of the refinements those that are given.
 
-    A refinement that is not given can be asked for by its symbol all the same, and is off.
+    One direction has a name of its own: ``parameters["Z16_plus"]``. Iteration and length count
+    symbols. A refinement that is not given can be asked for by its symbol all the same, and is off;
+    ``in`` is true for what the set gives.
 
     Raises
     ------
@@ -179,13 +196,25 @@ class ParameterSet(Entries):
     def __repr__(self) -> str:
         return f"ParameterSet({self.name!r}, {len(self)} parameters)"
 
-    def __getitem__(self, symbol: str) -> Parameter:
-        if symbol in self.parameters:
-            return self.parameters[symbol]
-        definition = REFINEMENTS.get(symbol, OWN.get(symbol))
+    def __getitem__(self, name: str) -> Parameter:
+        """A parameter by its symbol (``Z16``), or one direction of it (``Z16_plus``).
+
+        Raises
+        ------
+        UnknownParameterError
+            If no parameter has the name; it is a ``KeyError`` as well.
+        """
+        if name in self.parameters:
+            return self.parameters[name]
+        if name in COLUMNS:
+            return self.parameters[COLUMNS[name]].in_direction(name)
+        definition = REFINEMENTS.get(name, OWN.get(name))
         if definition is None or definition.default is None:
-            raise unknown_parameter(symbol)
+            raise unknown_parameter(name)
         return Parameter(definition, definition.default, status="inactive")
+
+    def __contains__(self, name: object) -> bool:
+        return name in self.parameters or name in self.numbers
 
     def __hash__(self) -> int:
         return hash((self.name, self.options, self.equations, *self.numbers.values()))
