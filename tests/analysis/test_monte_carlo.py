@@ -18,7 +18,7 @@ from swashplate.analysis import (
 )
 from swashplate.campaign import Campaign, rig
 from swashplate.errors import FileError
-from swashplate.identification.assessment import Judged
+from swashplate.identification.assessment import Identification
 from swashplate.identification.drive_model import DriveModel
 from swashplate.identification.fitting import Fit, fit
 from swashplate.identification.setup import Free, Setup, load_setup
@@ -118,7 +118,7 @@ def fit_and_folder(tmp_path_factory: pytest.TempPathFactory) -> tuple[Fit, Path]
     path = rig.write(virtual, place / "virtual")
     campaign = Campaign.from_toml(path)
     result = fit(Drive.preset("hoist").parameters, campaign.experiments, small_setup())
-    Judged(campaign, result).store(place / "fit.json")
+    Identification(campaign, result).save(place)
     return result, place
 
 

@@ -310,10 +310,11 @@ def guess(path: Path = CAMPAIGN, *, axis: AxisName = None, out: Path | None = No
     """
     from swashplate import campaign as tests
     from swashplate.drive import Drive
+    from swashplate.identification.identifying import runs_to_fit
 
     with working(f"Reading {path}"):
         campaign, chosen = words.campaign_of(path, axis)
-        runs = words.runs_to_fit(campaign, chosen)
+        runs = runs_to_fit(campaign, chosen)
         folder = path.parent if out is None else out
         start, setup = folder / "start.toml", folder / "setup.toml"
         check_free(start, setup)

@@ -290,6 +290,34 @@ def load_setup(name: str | Path) -> Setup:
     return validated(parse_toml(text, file), Setup, file)
 
 
+FreeParameters = Setup | str | Path | Mapping[str, Any]
+"""What a fit is to estimate: a fit configuration, its packaged name or file, or a mapping."""
+
+
+def free_entries(free: Mapping[str, Any]) -> dict[str, Free]:
+    """What a mapping frees of a drive, by symbol or column.
+
+    Each value is a pair of factors on the nominal value, ``{"Z8": (0.5, 2)}``, a `Free`, or a
+    mapping as in the TOML file, ``{"Z8": {"bounds": [1e5, 9e5]}}``. A `ParameterError` names what
+    is wrong.
+    """
+    entries: dict[str, Free] = {}
+    for name, entry in free.items():
+        find(name)
+        if isinstance(entry, Free):
+            entries[name] = entry
+        elif isinstance(entry, Mapping):
+            entries[name] = validated(dict(entry), Free, f"free, {name}")
+        elif isinstance(entry, Sequence) and len(entry) == 2 and all(map(is_real, entry)):
+            entries[name] = validated({"relative": tuple(entry)}, Free, f"free, {name}")
+        else:
+            raise ParameterError(
+                f"{name} is free as {entry!r}: give two factors on its nominal value, (0.5, 2), or "
+                "its bounds in SI, {'bounds': (LOW, HIGH)}."
+            )
+    return entries
+
+
 def setup_text(setup: Setup) -> str:
     """A fit configuration as TOML that `load_setup` reads as an equal one."""
     from tomlkit import dumps, inline_table
