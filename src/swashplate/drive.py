@@ -36,6 +36,7 @@ from swashplate.simulation.run import (
     simulate_drive,
     steady_states,
 )
+from swashplate.units import in_si
 
 if TYPE_CHECKING:
     from swashplate.executors import Executor
@@ -162,9 +163,9 @@ class Drive(Result, Mapping[str, Parameter]):
 
         Parameters
         ----------
-        **changes : float or (float, float)
+        **changes : float, Pint quantity, or a pair of them
             By symbol (``Z16=1.2e-4`` both ways, ``Z16=(1.2e-4, 1.5e-4)`` plus and minus) or by one
-            direction (``Z16_plus=1.2e-4``), in SI.
+            direction (``Z16_plus=1.2e-4``), in SI or with a unit (``Z16=0.12 * ureg.mm``).
 
         Raises
         ------
@@ -238,7 +239,7 @@ class Drive(Result, Mapping[str, Parameter]):
 
         Parameters
         ----------
-        voltage : (n,) array_like or Maneuver
+        voltage : (n,) array_like, Pint quantity or Maneuver
             Command; a maneuver is sampled at `rate`. [V]
         rate : float
             Samples a second, 10 Hz to 100 kHz; with `time`, rate of the result's grid. [Hz]
@@ -379,6 +380,7 @@ class Drive(Result, Mapping[str, Parameter]):
         `h` is the interval between samples [s]; other arguments as in `simulate`. Of `measured`,
         such as ``("load_torque", "pump_speed")``, each step takes a number behind the voltage.
         """
+        h = in_si(h, "s", "The interval")
         return drive_stepper(self.parameters, h, interpolation, start, measured)
 
     def compiled_step(
@@ -406,6 +408,7 @@ class Drive(Result, Mapping[str, Parameter]):
         InputError
             For signals that a drive does not have, and a rate too low for the card's filter.
         """
+        rate = in_si(rate, "Hz", "The rate")
         check_rate(rate)
         check_filter_stability(self.parameters, 1.0 / rate)
         instance = instance_of(self.parameters, by_voltage=True)
@@ -460,6 +463,7 @@ class Drive(Result, Mapping[str, Parameter]):
         """
         from swashplate.linear import linearize_drive
 
+        at, current = in_si(at, "V", "The voltage"), in_si(current, "A", "The current")
         return linearize_drive(self.parameters, at, current, input, outputs, coulomb)
 
     def frequency_response(
@@ -529,6 +533,7 @@ class Drive(Result, Mapping[str, Parameter]):
         return self._steady(voltage)[0]
 
     def _steady(self, voltage: float | Sequence[float] | Array) -> tuple[float | Array, ...]:
+        voltage = in_si(voltage, "V", "The voltage")
         try:
             volts = np.atleast_1d(np.array(voltage, dtype=np.float64))
         except (TypeError, ValueError):

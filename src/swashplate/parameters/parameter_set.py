@@ -12,7 +12,7 @@ import numpy as np
 
 from swashplate.equations.fields import is_real
 from swashplate.equations.replacement import Replacement
-from swashplate.errors import ParameterError
+from swashplate.errors import InputError, ParameterError
 from swashplate.parameters.definitions import (
     CATALOGUE,
     COLUMNS,
@@ -29,6 +29,7 @@ from swashplate.parameters.definitions import (
 from swashplate.parameters.rules import broken_rules, check_options, refuse
 from swashplate.results import Result
 from swashplate.tables import UNIT, Column, Table
+from swashplate.units import Quantity, in_si
 
 PressureRoot = Literal["published", "symmetric"]
 CoulombSign = Literal["smooth", "literal"]
@@ -45,7 +46,8 @@ class Pair(NamedTuple):
 
 
 Value = float | Pair
-Change = float | tuple[float, float]
+Change = float | Quantity | tuple[float | Quantity, float | Quantity]
+"""A new value in SI or with a unit, or a pair of them, plus and minus."""
 
 
 @dataclass(frozen=True)
@@ -270,7 +272,8 @@ class ParameterSet(Entries):
         Parameters
         ----------
         changes : mapping
-            Symbol (``Z16``, both directions or a pair) or column (``Z16_plus``) to value, SI.
+            Symbol (``Z16``, both directions or a pair) or column (``Z16_plus``) to value: a number
+            in SI, or a Pint quantity.
         options : frozenset of str, optional
             Terms that count then. By default a refinement whose parameters are changed comes on
             where one of them is not 0, and goes off where all are.
@@ -316,8 +319,12 @@ def value_of(
         raise ParameterError(f"{name} has one value, not a plus and a minus one.")
     if isinstance(change, tuple) and len(change) != 2:
         raise ParameterError(f"{name} takes one value or two (plus, minus), not {len(change)}.")
+    given = change if isinstance(change, tuple) else (change,)
+    what = f"{name} ({definition.name})"
     try:
-        numbers = [float(each) for each in (change if isinstance(change, tuple) else (change,))]
+        numbers = [float(in_si(number, definition.unit, what)) for number in given]
+    except InputError as error:
+        raise ParameterError(str(error)) from None
     except (TypeError, ValueError):
         raise ParameterError(
             f"{name} must be a number in {definition.unit}, or a pair of them, not {change!r}."

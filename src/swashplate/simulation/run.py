@@ -29,7 +29,8 @@ from swashplate.simulation.instance import (
     models_of,
     without_ripple,
 )
-from swashplate.simulation.result import Simulation
+from swashplate.simulation.result import UNITS, Simulation
+from swashplate.units import in_si
 
 Array = NDArray[np.float64]
 LEAST: Mapping[str, tuple[float, str]] = {
@@ -55,9 +56,16 @@ def drive_records(
 ) -> dict[str, Record]:
     """A drive's command and what was measured beside it on the march's grid, checked.
 
-    What was measured is a straight line between samples, whatever the command is.
+    What was measured is a straight line between samples, whatever the command is. Pint quantities
+    are turned into SI.
     """
-    beside = {name: values for name, values in measured.items() if values is not None}
+    command = in_si(command, UNITS[driver], f"The {driver}")
+    rate, time = in_si(rate, "Hz", "The rate"), in_si(time, "s", "The time")
+    beside = {
+        name: in_si(values, UNITS[name], f"The {name}")
+        for name, values in measured.items()
+        if values is not None
+    }
     between: dict[str, Interpolation | None] = {driver: interpolation}
     between |= dict.fromkeys(beside, "linear")
     steps = least_substeps(rate, substeps)
