@@ -237,7 +237,14 @@ def guess_drive(tests: Campaign | Sequence[Experiment]) -> Guess:
             'sign = -1 for this run, or leave the run out with role = "ignore".'
         )
     speeds = np.concatenate([np.zeros(0), *(run.speeds for run in runs)])
-    if speeds.size < FEWEST:
+    if speeds.size < FEWEST and any(
+        channel.used.any() for each in experiments for channel in each.of_kind(*kinds)
+    ):
+        raise InputError(
+            f"The runs are too short to guess from: they give {speeds.size} mean speeds, each over "
+            f"{WINDOW:g} s or more, and at least {FEWEST} are needed."
+        )
+    if not speeds.size:
         raise InputError(
             "No run measures a motion that a guess could be read off: it needs a channel of the "
             "kind shaft_speed, position or encoder_counts that is not ignored."

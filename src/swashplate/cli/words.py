@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from swashplate.documents import parse_toml, read_text
-from swashplate.errors import FileError, InputError, MissingFileError
+from swashplate.errors import FileError, InputError, MissingFileError, UnknownParameterError
 from swashplate.units import unit_text
 
 if TYPE_CHECKING:
@@ -195,10 +195,19 @@ def drive_of(word: str, values: Sequence[str] = (), factors: Sequence[str] = ())
     scaled_as = "Z16=1.5, Z16=1.5/1.2 (plus/minus) or orifice=1.5"
     pulling = [word for word in factors if _is_lever(word.partition("=")[0].strip())]
     scaling = [word for word in factors if word not in pulling]
+
+    def scalable(name: str) -> Any:
+        try:
+            return find(name)
+        except UnknownParameterError:
+            from swashplate.analysis.whatif import find_lever
+
+            return find_lever(name)  # refuses it, and lists levers as well
+
     chosen = assigned("--set", values, set_as, valued, units=True)
     levers = assigned("--scale", pulling, scaled_as, str, (1,))
     drive = Drive(parameters_of(word)).replace(**chosen)
-    drive = drive.scale(**assigned("--scale", scaling, scaled_as, find))
+    drive = drive.scale(**assigned("--scale", scaling, scaled_as, scalable))
     if levers:
         from swashplate.analysis.whatif import pulled
 
@@ -314,8 +323,9 @@ def at_rate(drive: Drive, rate: float) -> Drive:
     own, marched = drive.parameters.rate, rate * least_substeps(rate)
     if own is None or abs(marched / own - 1.0) < 1e-9:
         return drive
+    steps = "" if marched == rate else f", computed in steps of 1/{marched:g} s,"
     note(
-        f"{drive.name}: the card's filter is a recursion for {own:g} Hz; at {marched:g} Hz the "
+        f"{drive.name}: the card's filter is a recursion for {own:g} Hz; at {rate:g} Hz{steps} the "
         "differential equation with the same poles takes its place."
     )
     return drive.at_every_rate()

@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from swashplate.equations.fields import is_real
 from swashplate.equations.marching.part import Stored
 from swashplate.equations.marching.record import (
     Interpolation,
@@ -61,6 +62,12 @@ def drive_records(
     """
     command = in_si(command, UNITS[driver], f"The {driver}")
     rate, time = in_si(rate, "Hz", "The rate"), in_si(time, "s", "The time")
+    if is_real(command):
+        instead = f", or a maneuver such as maneuvers.step({command:g})"
+        raise InputError(
+            f"The {driver} is a single number, {command:g}: give an array with a number for each "
+            f"sample{instead if driver == 'voltage' else ''}."
+        )
     beside = {
         name: in_si(values, UNITS[name], f"The {name}")
         for name, values in measured.items()
