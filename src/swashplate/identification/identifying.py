@@ -46,7 +46,7 @@ def identify(
     starts: int = 0,
     folds: int = 0,
     bootstrap: int = 0,
-    profiles: Sequence[str] = (),
+    profiles: str | Sequence[str] = (),
     seed: int = 0,
     loss: Loss = "linear",
     max_evaluations: int = MOST_EVALUATIONS,
@@ -84,7 +84,7 @@ def identify(
         More starts, spread over the bounds; the best is refined.
     folds, bootstrap : int
         Folds of a cross-validation, and refits to new noise (40 or more); 0 for none.
-    profiles : sequence of str
+    profiles : str or sequence of str
         Parameters to profile the cost along, by name, or ``"all"``.
     seed : int
         Random seed of starts, folds and bootstrap.
@@ -135,6 +135,7 @@ def identify(
             "more, 1000 for smooth ones."
         )
     show = watch or _silent
+    profiles = (profiles,) if isinstance(profiles, str) else profiles
     campaign = tests if isinstance(tests, Campaign) else Campaign.from_toml(tests)
     axis = only_axis(campaign, axis)
     runs = runs_to_fit(campaign, axis)

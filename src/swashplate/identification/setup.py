@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cache
 from importlib import import_module
 from importlib.resources import files
 from math import inf
@@ -23,7 +23,7 @@ from swashplate.campaign.schema import Finite, NotNegative, Positive, Weight, Wi
 from swashplate.documents import parse_toml, read_text, validated
 from swashplate.equations import Model as Equations
 from swashplate.equations.fields import check_mapping, is_real
-from swashplate.errors import FileError, InputError, ParameterError
+from swashplate.errors import FileError, InputError, MissingFileError, ParameterError
 from swashplate.identification.model import OFFSET, OwnModel, simulated
 from swashplate.identification.problem import Problem, noise_scales
 from swashplate.identification.solving import solve
@@ -104,13 +104,9 @@ class Forces(Entry):
     columns: ClassVar = tuple(f"{symbol}_{side}" for side in SIDES for symbol in COEFFICIENTS)
     """The parameters that they stand for."""
 
-    @cached_property
+    @property
     def _inverse(self) -> Array:
-        """(8, 8) map from forces to coefficients, of F = Z19 i + Z20 i² + Z21 i³ + Z22 i⁴."""
-        zero, orders = np.zeros((4, 4)), np.arange(1, 5)
-        plus = np.power.outer(self.plus, orders)
-        minus = np.power.outer(self.minus, orders) * (-1.0) ** (orders + 1)
-        return np.linalg.inv(np.block([[plus, zero], [zero, minus]]))
+        return _coefficients_of_forces(self.plus, self.minus)
 
     def values(self, parameters: ParameterSet) -> dict[str, float]:
         """The forces of a parameter set, by name. [N]"""
@@ -129,6 +125,18 @@ class Forces(Entry):
         """Derivatives by one force of the coefficients of its direction. [1/Aᵏ]"""
         column = self._inverse[:, self.names.index(name)].tolist()
         return {each: slope for each, slope in zip(self.columns, column, strict=True) if slope}
+
+
+@cache
+def _coefficients_of_forces(
+    plus: tuple[float, float, float, float], minus: tuple[float, float, float, float]
+) -> Array:
+    """(8, 8) map from forces to coefficients, of F = Z19 i + Z20 i² + Z21 i³ + Z22 i⁴."""
+    # not kept in the entry itself: entries are compared by all that they hold
+    zero, orders = np.zeros((4, 4)), np.arange(1, 5)
+    positive = np.power.outer(plus, orders)
+    negative = np.power.outer(minus, orders) * (-1.0) ** (orders + 1)
+    return np.linalg.inv(np.block([[positive, zero], [zero, negative]]))
 
 
 class InputWeight(Window):
@@ -425,6 +433,8 @@ class ModelSetup(Result):
             If it lacks one of the names.
         """
         file = Path(path).resolve()
+        if not file.exists():
+            raise MissingFileError(f"There is no file {path}: name a Python file with a model.")
         if not file.is_file() or file.suffix != ".py" or not file.stem.isidentifier():
             raise FileError(f"{path} is no Python file with a model, such as valve.py.")
         if str(file.parent) not in sys.path:
