@@ -217,7 +217,7 @@ class Identification(Estimated):
             If a run of the campaign is not as it was; the sentence names it.
         """
         place = Path(path)
-        file = place / STORED if place.is_dir() else place.parent / STORED
+        file = place.with_name(STORED) if place.is_file() else place / STORED
         if not file.is_file():
             raise MissingFileError(
                 f"There is no {STORED} in {file.parent}: give a folder that 'swashplate fit' or "
