@@ -15,6 +15,7 @@ import pytest
 from tests.cli.conftest import STEPS, stages
 from tests.shown import check_shown
 
+import swashplate
 from swashplate import Campaign, Drive
 from swashplate.identification.assessment import Identification
 from swashplate.identification.fitting import Fit, fit
@@ -210,6 +211,15 @@ def test_validations_that_are_refused(refused: Words, held_out: Path) -> None:
     held_out.write_text(text, "utf-8")
     said = refused("validate", "hoist", CAMPAIGN)
     assert "no run of the axis 'hoist' has the role 'validate'; another" in said
+
+
+def test_the_command_and_python_write_the_same(done: Words, held_out: Path, tmp_path: Path) -> None:
+    (tmp_path / "setup.toml").write_text(stages(card="J_plus", pump="Z10"), "utf-8")
+    words = ("--setup", "setup.toml", "--folds", "2", "--seed", "4", "--jobs", "1", "--no-report")
+    done("fit", CAMPAIGN, *words)
+    result = swashplate.identify(CAMPAIGN, free="setup.toml", folds=2, seed=4)
+    for file in result.save("python"):
+        assert file.read_bytes() == (tmp_path / "fitted" / file.name).read_bytes(), file.name
 
 
 # --- report ---------------------------------------------------------------------------------------
