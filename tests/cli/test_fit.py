@@ -215,9 +215,9 @@ def test_validations_that_are_refused(refused: Words, held_out: Path) -> None:
 
 def test_the_command_and_python_write_the_same(done: Words, held_out: Path, tmp_path: Path) -> None:
     (tmp_path / "setup.toml").write_text(stages(card="J_plus", pump="Z10"), "utf-8")
-    words = ("--setup", "setup.toml", "--folds", "2", "--seed", "4", "--jobs", "1", "--no-report")
-    done("fit", CAMPAIGN, *words)
-    result = swashplate.identify(CAMPAIGN, free="setup.toml", folds=2, seed=4)
+    words = ("--setup", "setup.toml", "--profile", "Z10", "--starts", "1", "--seed", "4")
+    done("fit", CAMPAIGN, *words, "--jobs", "1", "--no-report")
+    result = swashplate.identify(CAMPAIGN, free="setup.toml", profiles="Z10", starts=1, seed=4)
     for file in result.save("python"):
         assert file.read_bytes() == (tmp_path / "fitted" / file.name).read_bytes(), file.name
 
