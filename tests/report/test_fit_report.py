@@ -180,7 +180,7 @@ def number(text: str) -> float:
 
 def test_estimates_and_intervals_are_those_of_the_fit(read: Page, judged: Identification) -> None:
     rows = {row["name"]: row for row in read.rows("parameters")}
-    for stage in judged.result.stages:
+    for stage in judged.fit.stages:
         for estimate in stage.uncertainty.estimates:
             if estimate.name.startswith("offset"):
                 continue
@@ -268,7 +268,7 @@ def test_samples_of_a_run_are_in_the_page(read: Page, fitted: Fit) -> None:
 
 def test_every_sample_can_be_had_as_a_table(tmp_path: Path, judged: Identification) -> None:
     path = tmp_path / "samples.parquet"
-    write_samples(shown_runs(judged.result.stages, judged.predicted), path)
+    write_samples(shown_runs(judged.fit.stages, judged.predicted), path)
     table = pl.read_parquet(path)
     assert {*table["channel"]} == {"current", "counts", "speed from counts"}
     held = next(each for each in judged.predicted if each.channel == "current")
@@ -333,7 +333,7 @@ def test_truth_stands_beside_the_estimates(write, judged: Identification, read: 
     assert "truth" not in read.rows("parameters")[0]
     rows = {row["name"]: row for row in page.rows("parameters")}
     assert number(rows["G1_plus"]["truth"]) == pytest.approx(0.051, rel=1e-4)
-    estimates = judged.result.stages[0].uncertainty.estimates
+    estimates = judged.fit.stages[0].uncertainty.estimates
     (estimate,) = [each for each in estimates if each.name == "G1_plus"]
     holds = estimate.lower <= 0.051 <= estimate.upper
     assert rows["G1_plus"]["holds"] == ("yes" if holds else "no")
@@ -404,7 +404,7 @@ def test_cross_validation_has_a_section(write) -> None:
 
 def test_starts_of_each_stage_are_listed(write, fitted: Fit) -> None:
     first, second = fitted.stages
-    page = write(result=replace(fitted, stages=(replace(first, starts=STARTS), second)))
+    page = write(fit=replace(fitted, stages=(replace(first, starts=STARTS), second)))
     assert "card: 2 of 4 starts reached the best cost, 3." in page.words
     assert "1 left the model's domain" in page.words
     listed = [row[:2] for row in page.tables["starts"][1:]]
