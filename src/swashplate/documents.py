@@ -11,7 +11,7 @@ from reprlib import Repr
 from stat import S_ISDIR, S_ISREG
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from swashplate.errors import FileError, ParameterError
+from swashplate.errors import FileError, MissingFileError, ParameterError
 
 if TYPE_CHECKING:
     from pydantic import BaseModel
@@ -71,7 +71,7 @@ def read_text(path: str | Path) -> str:
     except FileError:
         raise
     except FileNotFoundError:
-        raise FileError(f"There is no file {path}.") from None
+        raise MissingFileError(f"There is no file {path}.") from None
     except UnicodeDecodeError as error:
         raise FileError(
             f"{path} is not UTF-8 text: byte {error.start} is {error.object[error.start]:#04x}."

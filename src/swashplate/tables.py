@@ -388,6 +388,8 @@ def write_whole(path: str | Path, write: Callable[[Path], object]) -> None:
                 # on Ctrl-C Polars raises one of its own and leaves Python's to come: it comes here
                 beside.unlink(missing_ok=True)
                 raise
+    except FileError:
+        raise
     except OSError as error:
         raise FileError(f"{target} cannot be written: {error.strerror or error}.") from None
     except Exception as error:  # libraries raise what they like; what is not the disk's goes on

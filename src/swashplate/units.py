@@ -7,7 +7,7 @@ from contextvars import ContextVar
 from functools import cache
 from math import isfinite, pi
 from types import MappingProxyType
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Protocol, runtime_checkable
 
 from swashplate.errors import InputError
 
@@ -105,6 +105,37 @@ def scaling(unit: str, si: str, what: str) -> tuple[float, float]:
     """Factor and zero of a unit, SI = factor x + zero; arguments and errors as of `to_si`."""
     zero = to_si(0.0, unit, si, what)
     return to_si(1.0, unit, si, what) - zero, zero
+
+
+@runtime_checkable
+class Quantity(Protocol):
+    """A number or array with a unit, such as Pint's."""
+
+    @property
+    def magnitude(self) -> Any:
+        """The number or array."""
+        ...
+
+    @property
+    def units(self) -> Any:
+        """Its unit, whose format ``~C`` is one that `to_si` reads, as of Pint."""
+        ...
+
+
+def in_si(value: Any, si: str, what: str) -> Any:
+    """The number or array of a quantity, in an SI unit; any other value as it is.
+
+    A quantity's array keeps its shape. `what` the value is stands in the error's sentence.
+
+    Raises
+    ------
+    InputError
+        If the quantity measures something else.
+    """
+    if not isinstance(value, Quantity):
+        return value
+    factor, zero = scaling(f"{value.units:~C}" or "1", si, what)
+    return value.magnitude * factor + zero
 
 
 _BASE = {

@@ -411,7 +411,7 @@ def test_the_unit_at_the_end_of_a_name_that_is_given(tmp_path, name, kind, unit)
 
 
 def test_a_log_without_a_clock_leaves_its_rate_open(drafted: Drafted, tmp_path: Path) -> None:
-    with pytest.raises(ParameterError, match="needs an entry 'time'"):
+    with pytest.raises(ParameterError, match="needs an entry 'time'; line 10 is marked FIXME"):
         drafted({"log.csv": {"voltage": BOTH, "speed": lagged(BOTH)}})
     path = tmp_path / "campaign.toml"
     text = path.read_text("utf-8")

@@ -15,8 +15,9 @@ import pytest
 from tests.cli.conftest import STEPS, stages
 from tests.shown import check_shown
 
+import swashplate
 from swashplate import Campaign, Drive
-from swashplate.identification.assessment import Judged
+from swashplate.identification.assessment import Identification
 from swashplate.identification.fitting import Fit, fit
 from swashplate.identification.setup import Setup
 from swashplate.locks import locked
@@ -63,7 +64,7 @@ def test_a_campaign_becomes_a_drive(done, refused, campaign, tmp_path) -> None:
     assert parameters.title.startswith("Virtual tests")
     assert "speed at the end" in done("simulate", "fitted/drive.toml", "step:4")
     header, *rows = (tmp_path / "fitted" / "estimates.csv").read_text("utf-8").splitlines()
-    assert header.startswith("stage,parameter,unit,nominal,estimate")
+    assert header.startswith("stage,parameter,unit,nominal,value,lower,upper,standard_error")
     assert len([row for row in rows if "offset" not in row]) == 6
     # the folder knows what was free: no packaged configuration bears the drive's name
     Drive(parameters).renamed("winch").to_toml(tmp_path / "fitted" / "drive.toml")
@@ -125,14 +126,14 @@ def test_all_that_can_be_asked_for_besides(done: Words, campaign: Path, tmp_path
         rows = [row for row in csv.DictReader(file) if "offset" not in row["parameter"]]
     # by other noise of the same kind the estimates move about as far as the errors say
     for row in rows:
-        low, high = (float(row[f"{side} 95 %"]) for side in ("lower", "upper"))
-        least, most = (float(row[f"bootstrap {side} 95 %"]) for side in ("lower", "upper"))
+        low, high = (float(row[side]) for side in ("lower", "upper"))
+        least, most = (float(row[f"bootstrap_{side}"]) for side in ("lower", "upper"))
         assert 0.3 < (most - least) / (high - low) < 2.0, row["parameter"]
     # nearly quadratic: the profile ends where the linear interval does
     (ends,) = re.findall(r"^ *pump +Z8 +(.*)$", said.partition("Profile likelihoods")[2], re.M)
     (linear,) = (row for row in rows if row["parameter"] == "Z8")
     found = [float(each) for each in re.findall(r"\d\S*", ends)][-3:]
-    wanted = [float(linear[each]) for each in ("estimate", "lower 95 %", "upper 95 %")]
+    wanted = [float(linear[each]) for each in ("value", "lower", "upper")]
     assert found == pytest.approx(wanted, rel=0.01)
     assert "profile" in (tmp_path / "fitted" / "report.html").read_text("utf-8").lower()
 
@@ -238,6 +239,15 @@ def test_validations_that_are_refused(refused: Words, held_out: Path) -> None:
     assert "no run of the axis 'hoist' has the role 'validate'; another" in said
 
 
+def test_the_command_and_python_write_the_same(done: Words, held_out: Path, tmp_path: Path) -> None:
+    (tmp_path / "setup.toml").write_text(stages(card="J_plus", pump="Z10"), "utf-8")
+    words = ("--setup", "setup.toml", "--profile", "Z10", "--starts", "1", "--seed", "4")
+    done("fit", CAMPAIGN, *words, "--jobs", "1", "--no-report")
+    result = swashplate.identify(CAMPAIGN, free="setup.toml", profiles="Z10", starts=1, seed=4)
+    for file in result.save("python"):
+        assert file.read_bytes() == (tmp_path / "fitted" / file.name).read_bytes(), file.name
+
+
 # --- report ---------------------------------------------------------------------------------------
 
 
@@ -247,9 +257,7 @@ def fitted(held_out: Path, tmp_path: Path) -> Fit:
     campaign = Campaign.from_toml(held_out)
     setup = Setup.model_validate(tomllib.loads(stages(card="J_plus", pump="Z10")))
     found = fit(Drive.preset("hoist").parameters, campaign.select(role="fit"), setup)
-    (tmp_path / "fitted").mkdir()
-    Drive(found.parameters).to_toml(tmp_path / "fitted" / "drive.toml")
-    Judged(campaign, found, notes={"seed": "7"}).store(tmp_path / "fitted" / "fit.json")
+    Identification(campaign, found, notes={"seed": "7"}).save(tmp_path / "fitted")
     return found
 
 

@@ -166,6 +166,8 @@ def test_what_was_measured_beside_the_voltage_counts(done, refused):
 def test_a_recursion_for_another_rate_becomes_its_equation(done):
     text = done("simulate", "hoist", "step:9", "--rate", "1000", "--out", "run.parquet")
     assert "a recursion for 512 Hz; at 1000 Hz the differential equation" in text
+    slow = " ".join(done("simulate", "hoist", "step:9", "--rate", "100").split())
+    assert "at 100 Hz, computed in steps of 1/600 s, the differential equation" in slow
     exact = Drive.preset("hoist").at_every_rate()
     run = exact.simulate(maneuvers.step(9.0).sample(1000.0), 1000.0)
     assert np.array_equal(pl.read_parquet("run.parquet")["shaft_speed"], run.shaft_speed)

@@ -104,7 +104,8 @@ def test_a_drive_without_a_verdict_says_so(fit, tmp_path):
     crane.hoist.to_toml(alone)
     shown = said("run", "tg3637", "--length", "5", "--drive", f"hoist={alone}")
     assert shown.exit_code == 0
-    assert "no verdict on it is known, as there is no fit beside it" in " ".join(shown.stdout.split())
+    words = " ".join(shown.stdout.split())
+    assert "no verdict on it is known, as there is no fit beside it" in words
     older = crane.with_drive(hoist=fit(None)).sources["hoist"]
     assert (older.grade, older.usable) == (None, True)
     assert "fit again" in older.verdict

@@ -18,7 +18,7 @@ from tests.identification.given import virtual
 from tests.report.conftest import injected, policy_of, with_script
 
 from swashplate import Campaign, Drive, FileError, InputError, maneuvers
-from swashplate.identification.assessment import Judged
+from swashplate.identification.assessment import Identification
 from swashplate.identification.criteria import verdict
 from swashplate.identification.fitting import Fit, fit
 from swashplate.identification.profiles import Point, Profile
@@ -78,13 +78,13 @@ def fitted(campaign: Campaign) -> Fit:
 
 
 @pytest.fixture(scope="module")
-def judged(campaign: Campaign, fitted: Fit) -> Judged:
+def judged(campaign: Campaign, fitted: Fit) -> Identification:
     """The fit with a profile, several starts and notes."""
     optimum = Point(0.0, 3.0, np.zeros(1))
     points = (Point(-0.1, 4.0, np.zeros(1)), optimum, Point(0.1, 4.5, np.zeros(1)))
     name, ends = fitted.stages[0].problem.unknowns.names[0], ("crossed", "crossed")
     profile = Profile(0, 3.0, points, 1.0, -0.1, 0.08, ends, None, name, "card")
-    return Judged(campaign, fitted, profiles=[profile], notes=NOTES)
+    return Identification(campaign, fitted, profiles=[profile], notes=NOTES)
 
 
 STARTS = tuple(
@@ -96,7 +96,7 @@ NOTES = {"command": HOSTILE, "seed": "4"}
 
 
 @pytest.fixture(scope="module")
-def page(tmp_path_factory: pytest.TempPathFactory, judged: Judged) -> Path:
+def page(tmp_path_factory: pytest.TempPathFactory, judged: Identification) -> Path:
     path = tmp_path_factory.mktemp("report") / "fit.html"
     write_fit_report(judged, path)
     return path
@@ -160,7 +160,7 @@ def read(page: Path) -> Page:
 
 
 @pytest.fixture
-def write(tmp_path: Path, judged: Judged):
+def write(tmp_path: Path, judged: Identification):
     """Write the report of the fit with other entries; what stands in it."""
 
     def written(truth=None, **entries) -> Page:
@@ -179,9 +179,9 @@ def number(text: str) -> float:
     return float(found[1]) * 10.0 ** int((found[2] or "0").translate(raised))
 
 
-def test_estimates_and_intervals_are_those_of_the_fit(read: Page, judged: Judged) -> None:
+def test_estimates_and_intervals_are_those_of_the_fit(read: Page, judged: Identification) -> None:
     rows = {row["name"]: row for row in read.rows("parameters")}
-    for stage in judged.result.stages:
+    for stage in judged.fit.stages:
         for estimate in stage.uncertainty.estimates:
             if estimate.name.startswith("offset"):
                 continue
@@ -267,9 +267,9 @@ def test_samples_of_a_run_are_in_the_page(read: Page, fitted: Fit) -> None:
     assert float(np.abs(error).max()) < rms / 16.0
 
 
-def test_every_sample_can_be_had_as_a_table(tmp_path: Path, judged: Judged) -> None:
+def test_every_sample_can_be_had_as_a_table(tmp_path: Path, judged: Identification) -> None:
     path = tmp_path / "samples.parquet"
-    write_samples(shown_runs(judged.result.stages, judged.predicted), path)
+    write_samples(shown_runs(judged.fit.stages, judged.predicted), path)
     table = pl.read_parquet(path)
     assert {*table["channel"]} == {"current", "counts", "speed from counts"}
     held = next(each for each in judged.predicted if each.channel == "current")
@@ -281,7 +281,7 @@ def test_every_sample_can_be_had_as_a_table(tmp_path: Path, judged: Judged) -> N
     assert 0.0 < ignored["time"].max() < 0.5
 
 
-def test_a_long_run_costs_few_bytes(judged: Judged) -> None:
+def test_a_long_run_costs_few_bytes(judged: Identification) -> None:
     quality = next(each for each in judged.predicted if each.channel == "current")
     channel = quality.experiment[quality.channel]
     many = 40
@@ -328,13 +328,13 @@ def test_the_panel_offers_first_what_was_fitted(read: Page) -> None:
     assert {each["symbol"] for each in values if each["main"]} == {"G1", "Z10", "omega"}
 
 
-def test_truth_stands_beside_the_estimates(write, judged: Judged, read: Page) -> None:
+def test_truth_stands_beside_the_estimates(write, judged: Identification, read: Page) -> None:
     truth = Drive.preset("hoist").replace(omega=(75.0, 80.0), G1=(0.051, 0.056)).parameters
     page = write(truth=truth)
     assert "truth" not in read.rows("parameters")[0]
     rows = {row["name"]: row for row in page.rows("parameters")}
     assert number(rows["G1_plus"]["truth"]) == pytest.approx(0.051, rel=1e-4)
-    estimates = judged.result.stages[0].uncertainty.estimates
+    estimates = judged.fit.stages[0].uncertainty.estimates
     (estimate,) = [each for each in estimates if each.name == "G1_plus"]
     holds = estimate.lower <= 0.051 <= estimate.upper
     assert rows["G1_plus"]["holds"] == ("yes" if holds else "no")
@@ -373,7 +373,9 @@ def test_the_first_screen_is_for_the_owner(read: Page, fitted: Fit, validated: P
     assert "Change first:" in read.words
 
 
-def test_each_run_has_a_light_and_links(read: Page, write, campaign, judged: Judged) -> None:
+def test_each_run_has_a_light_and_links(
+    read: Page, write, campaign, judged: Identification
+) -> None:
     rows = read.rows("overview")
     assert [row["role"] for row in rows] == ["fit", "fit", "validate"]
     assert rows[-1]["run"] == judged.predicted[0].experiment.name
@@ -403,7 +405,7 @@ def test_cross_validation_has_a_section(write) -> None:
 
 def test_starts_of_each_stage_are_listed(write, fitted: Fit) -> None:
     first, second = fitted.stages
-    page = write(result=replace(fitted, stages=(replace(first, starts=STARTS), second)))
+    page = write(fit=replace(fitted, stages=(replace(first, starts=STARTS), second)))
     assert "card: 2 of 4 starts reached the best cost, 3." in page.words
     assert "1 left the model's domain" in page.words
     listed = [row[:2] for row in page.tables["starts"][1:]]

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from json import JSONDecodeError, loads
 from pathlib import Path
 
 import numpy as np
@@ -12,11 +11,9 @@ from numpy.typing import NDArray
 
 from swashplate.analysis.outcomes import Outcome, Trial, outcome_matrix
 from swashplate.analysis.whatif import pulled
-from swashplate.campaign import Campaign
-from swashplate.documents import read_text
 from swashplate.drive import Drive
-from swashplate.errors import DomainError, FileError, InputError, ParameterError
-from swashplate.identification.assessment import load_fit
+from swashplate.errors import DomainError, InputError, ParameterError
+from swashplate.identification.assessment import Identification
 from swashplate.identification.drive_model import DriveModel
 from swashplate.identification.fitting import StageFit
 from swashplate.parameters.parameter_set import ParameterSet
@@ -158,8 +155,6 @@ def _drawn(stages: Sequence[StageFit], random: np.random.Generator) -> Parameter
 
 # --- drives of a stored fit -----------------------------------------------------------------------
 
-STORED = "fit.json"  # What a fit's folder holds of it.
-
 
 def stored_draws(
     folder: str | Path,
@@ -188,18 +183,8 @@ def stored_draws(
     FileError, InputError, ParameterError
         If the folder holds no fit, or campaign or drive are not those of the fit.
     """
-    place, path = Path(folder), Path(folder) / STORED
-    if not path.is_file():
-        raise InputError(f"{place} holds no {STORED}: give a folder that a fit wrote.")
-    try:
-        tests = Path(loads(read_text(path))["campaign"]) if campaign is None else Path(campaign)
-    except (JSONDecodeError, KeyError, TypeError) as error:
-        raise FileError(f"{path} is no stored fit: {error}.") from None
-    if campaign is None and not tests.is_file():
-        raise InputError(
-            f"{path} was fitted to {tests}, which is not there: say where the campaign is."
-        )
-    fit = load_fit(path, Campaign.from_toml(tests)).result
+    place = Path(folder)
+    fit = Identification.load(place, campaign).fit
     if drive is not None:
         given, found = drive.parameters.numbers, fit.drive.parameters.numbers
         other = [name for name, value in found.items() if given[name] != value]

@@ -261,7 +261,14 @@ def guess_drive(tests: Campaign | Sequence[Experiment]) -> Guess:
         )
     speeds = np.concatenate([np.zeros(0), *(run.speeds for run in runs)])
     weights = np.concatenate([np.zeros(0), *(run.windows.weights for run in runs)])
-    if np.sum(weights**2) < FEWEST:
+    worth = float(np.sum(weights**2))
+    moving = (channel for run in experiments for channel in run.of_kind(*kinds))
+    if worth < FEWEST and any(channel.used.any() for channel in moving):
+        raise InputError(
+            f"The runs are too short to guess from: they give {worth:.0f} mean speeds of "
+            f"{WINDOW:g} s, and at least {FEWEST} are needed."
+        )
+    if not speeds.size:
         raise InputError(
             "No run measures a motion that a guess could be read off: it needs a channel of the "
             "kind shaft_speed, position or encoder_counts that is not ignored."

@@ -320,6 +320,7 @@ def guess(path: Path = CAMPAIGN, *, axis: AxisName = None, out: Path | None = No
     """
     from swashplate import campaign as tests
     from swashplate.drive import Drive
+    from swashplate.identification.identifying import runs_to_fit
 
     folder = path.parent if out is None else out
     start, setup = folder / "start.toml", folder / "setup.toml"
@@ -327,7 +328,7 @@ def guess(path: Path = CAMPAIGN, *, axis: AxisName = None, out: Path | None = No
         check_free(start, setup)
         campaign, chosen = words.campaign_of(path, axis)
         check_folder(folder)
-        runs = words.runs_to_fit(campaign, chosen)
+        runs = runs_to_fit(campaign, chosen)
         found = tests.guess_drive(runs)
         parameters = tests.guessed_set(found, path.name)
         made_folder(folder)

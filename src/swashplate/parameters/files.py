@@ -11,7 +11,7 @@ from pydantic import BaseModel, ConfigDict, Field
 from swashplate.documents import parse_toml, read_text, validated
 from swashplate.entries import Name, Number, Positive, Version
 from swashplate.equations.replacement import Replacement, again, found_at, uses
-from swashplate.errors import InputError, ParameterError
+from swashplate.errors import InputError, MissingFileError, ParameterError
 from swashplate.parameters.definitions import Block, Definition, declare, find, options_of
 from swashplate.parameters.parameter_set import (
     CardSwitch,
@@ -120,8 +120,66 @@ def load_preset(name: str) -> ParameterSet:
 
 
 def load_set(path: str | Path) -> ParameterSet:
-    """A parameter set from a TOML file; a `ParameterError` names file, parameter and rule."""
-    return read_set(read_text(path), str(path))
+    """A parameter set from a TOML file, or from a fit's folder.
+
+    A `FileError` says that there is no such file, or that the folder holds no drive; a
+    `ParameterError` names file, parameter and rule.
+    """
+    file = fitted_drive(path) if Path(path).is_dir() else Path(path)
+    return read_set(read_text(file), str(file))
+
+
+FITTED_DRIVE, FITTED_NUMBERS = "drive.toml", "parameters.toml"
+"""In a folder that a fit wrote: the drive, or the numbers of a user-defined model."""
+
+
+def fitted_drive(folder: str | Path) -> Path:
+    """The parameter file in a fit's folder; a `MissingFileError` if it holds no drive."""
+    file = Path(folder) / FITTED_DRIVE
+    if file.is_file():
+        return file
+    if (Path(folder) / FITTED_NUMBERS).is_file():
+        raise MissingFileError(
+            f"{folder} is the fit of a model of your own: give its file by --model where the "
+            "command has that option; simulate and export it from Python."
+        )
+    raise MissingFileError(
+        f"There is no {FITTED_DRIVE} in {folder}: give a folder that 'swashplate fit' or "
+        "Identification.save wrote, or a parameter file."
+    )
+
+
+def set_file(name: str | Path) -> Path | None:
+    """The parameter file that a name means: a path, or a fit's folder; None for a packaged set.
+
+    A packaged name goes before a file or folder of that name, which can be written ``./hoist``. A
+    `MissingFileError` says that there is nothing of that name.
+    """
+    path = Path(name)
+    if str(name) in preset_names():
+        return None
+    if path.is_dir():
+        return fitted_drive(path)
+    if path.suffix.lower() == ".toml" or len(path.parts) > 1 or path.is_file():
+        return path
+    raise MissingFileError(
+        f"There is no packaged set, file or folder '{name}'; packaged are "
+        f"{', '.join(preset_names())}."
+    )
+
+
+def named_set(name: str | Path) -> ParameterSet:
+    """The packaged set of a name, the set in a TOML file, or the one in a fit's folder.
+
+    Raises
+    ------
+    FileError
+        If there is no packaged set, file or folder of that name.
+    ParameterError
+        If an entry of the file is wrong.
+    """
+    file = set_file(name)
+    return load_preset(str(name)) if file is None else load_set(file)
 
 
 def read_set(text: str, origin: str) -> ParameterSet:

@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from swashplate.equations.fields import is_real
 from swashplate.equations.marching.part import Stored
 from swashplate.equations.marching.record import (
     Interpolation,
@@ -29,7 +30,8 @@ from swashplate.simulation.instance import (
     models_of,
     without_ripple,
 )
-from swashplate.simulation.result import Simulation
+from swashplate.simulation.result import UNITS, Simulation
+from swashplate.units import in_si
 
 Array = NDArray[np.float64]
 LEAST: Mapping[str, tuple[float, str]] = {
@@ -55,9 +57,22 @@ def drive_records(
 ) -> dict[str, Record]:
     """A drive's command and what was measured beside it on the march's grid, checked.
 
-    What was measured is a straight line between samples, whatever the command is.
+    What was measured is a straight line between samples, whatever the command is. Pint quantities
+    are turned into SI.
     """
-    beside = {name: values for name, values in measured.items() if values is not None}
+    command = in_si(command, UNITS[driver], f"The {driver}")
+    rate, time = in_si(rate, "Hz", "The rate"), in_si(time, "s", "The time")
+    if is_real(command):
+        instead = f", or a maneuver such as maneuvers.step({command:g})"
+        raise InputError(
+            f"The {driver} is a single number, {command:g}: give an array with a number for each "
+            f"sample{instead if driver == 'voltage' else ''}."
+        )
+    beside = {
+        name: in_si(values, UNITS[name], f"The {name}")
+        for name, values in measured.items()
+        if values is not None
+    }
     between: dict[str, Interpolation | None] = {driver: interpolation}
     between |= dict.fromkeys(beside, "linear")
     steps = least_substeps(rate, substeps)

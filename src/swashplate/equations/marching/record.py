@@ -76,7 +76,12 @@ def on_grid(
     data = {name: column(v, f"The {name}") for name, v in inputs.items() if not is_real(v)}
     sizes = {name: samples.size for name, samples in data.items()}
     if len(set(sizes.values())) != 1:
-        listed = ", ".join(f"{name} {size}" for name, size in sizes.items()) or "none is a record"
+        if not sizes:
+            first = next(iter(inputs), "input")
+            raise InputError(
+                f"The {first} is a single number: give an array with a number for each sample."
+            )
+        listed = ", ".join(f"{name} {size}" for name, size in sizes.items())
         raise InputError(f"All inputs need the same number of samples: {listed}.")
     what, size = next(iter(sizes.items()))
     columns = {

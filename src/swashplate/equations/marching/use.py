@@ -48,7 +48,7 @@ from swashplate.equations.marching.run import (
 )
 from swashplate.equations.marching.stepping import CompiledStep, Machine
 from swashplate.equations.model import Model, parameter_paths
-from swashplate.errors import DomainError, InputError
+from swashplate.errors import DomainError, InputError, UnknownNameError
 from swashplate.results import GivenAxes, Tabular, figures
 
 if TYPE_CHECKING:
@@ -219,7 +219,7 @@ class Run(Tabular):
         if signal not in self.names:
             near = get_close_matches(str(signal), self.names, 1)
             meant = f"did you mean {near[0]}? It" if near else "it"
-            raise InputError(
+            raise UnknownNameError(
                 f"A run of {self.name} has no signal '{signal}': {meant} has "
                 f"{', '.join(self.names)}."
             )
