@@ -59,12 +59,14 @@ def init(
     counts_per_turn: float | None = None,
     column: list[str] | None = None,
     unit: list[str] | None = None,
+    title: str | None = None,
 ) -> None:
     """Write the first draft of a campaign file from the headers of logs.
 
     What each column is gets guessed from its name and unit, and marked as such;
-    what cannot be told says FIXME. Read the file, mend what is wrong, then run
-    'swashplate campaign check'.
+    what cannot be told says FIXME. A PLC's words, 27648 or 32767 at full scale, are
+    scaled to volts if they are the command; for a sensor they need its range. Read
+    the file, mend what is wrong, then run 'swashplate campaign check'.
 
     Options:
       out FILE: The campaign file; by default campaign.toml beside the first log.
@@ -73,9 +75,10 @@ def init(
       column KIND=COLUMN: What a column is: time, voltage, shaft_speed or another kind; may be
           repeated.
       unit COLUMN=UNIT: Unit of a column; may be repeated.
+      title TEXT: Heading of the report: machine, place, author; by default the folder's name.
 
     For example:
-      swashplate campaign init logs/*.csv --drive hoist
+      swashplate campaign init logs/*.csv --drive hoist --title "Winch 3, harbour, J. Weber"
       swashplate campaign init trial1.mat trial2.mat --out trials.toml
       swashplate campaign init log.csv --column voltage=u --column shaft_speed=n --unit n=1/min
     """
@@ -93,7 +96,13 @@ def init(
     units = dict(words.pairs_of("--unit", unit, "u=mV"))
     with working("Reading"):
         text = draft_campaign(
-            logs, target.parent, drive, counts_per_turn, columns=kinds, units=units
+            logs,
+            target.parent,
+            drive,
+            counts_per_turn,
+            columns=kinds,
+            units=units,
+            title=title,
         )
     write_text(text, target)
     note(f"Draft: {target}")
