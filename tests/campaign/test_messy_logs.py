@@ -9,8 +9,20 @@ from tests.campaign.conftest import BOTH, RATE, TIME, Columns, Drafted, read_dra
 from tests.logs.writing import write_log
 
 from swashplate import Campaign, Drive, FileError, InputError, ParameterError
-from swashplate.campaign import campaign_findings, draft_campaign, examine, unsigned_currents
-from swashplate.identification.data_checks import beside_the_drives, check_runs, refuse_unsound
+from swashplate.campaign import (
+    campaign_findings,
+    draft_campaign,
+    examine,
+    guess_drive,
+    spiked,
+    unsigned_currents,
+)
+from swashplate.identification.data_checks import (
+    beside_the_drives,
+    check_runs,
+    refuse_unsound,
+    spike_findings,
+)
 
 SINE = 5.0 * np.sin(2.0 * np.pi * 0.4 * TIME)
 PER_TURN = {"counts_per_turn": 1000.0}
@@ -159,6 +171,44 @@ def test_a_spike_of_the_command_is_found_and_left_out(drafted: Drafted) -> None:
     assert tests["log"].input.at(TIME[900:901]) == pytest.approx(command[899:900])
 
 
+COUNTED = np.floor(200.0 * np.cumsum(lagged(BOTH)) / RATE)
+"""Counts of an encoder of 200 to a radian, of a speed of 1 rad/s for a volt."""
+
+
+def test_a_glitch_of_a_counter_is_found_with_the_line_that_leaves_it_out(drafted: Drafted) -> None:
+    glitch = 5000.0 * ((TIME > 3.498) & (TIME < 3.507))
+    tests = drafted(draft=PER_TURN, counts=COUNTED + glitch)
+    ((sentence, gross),) = spiked(tests).values()
+    assert "log: 'encoder_counts' has 1 spike, up to +5000 counts" in sentence
+    assert gross
+    with pytest.raises(InputError, match=r"from = 3\.4975, to = 3\.5075"):
+        guess_drive(tests)
+    tests = mended(tests, "1 spike, up to +5000 counts")
+    assert findings(tests) == []
+    assert spiked(tests) == {}
+
+
+def test_counts_lost_for_good_are_found_with_the_lines_that_cut_the_run(drafted: Drafted) -> None:
+    tests = drafted(draft=PER_TURN, counts=COUNTED - 300.0 * (TIME > 4.498))
+    (finding,) = findings(tests)
+    ((sentence, gross),) = spiked(tests).values()
+    assert sentence == f"log: 'encoder_counts' {finding}"
+    assert not gross
+    assert "-300 counts at 4.4975 s" in finding
+    doubts = refuse_unsound(spike_findings(tests.experiments, "linear"))
+    assert [each.startswith(sentence) for each in doubts] == [True]
+    # as the sentence says
+    first, second = "span = { to = 4.4975 }", "span = { from = 4.4975 }"
+    more = ['name = "log from 4.4975 s"', second, 'start = "estimated"']
+    assert all(each in finding for each in (first, *more))
+    run = '[[runs]]\nfile = "log.csv"\nrole = "fit"\n'
+    text = text_of(tests) + "\n".join([first, "", run, *more, ""])
+    tests.path.write_text(text, "utf-8")
+    tests = Campaign.from_toml(tests.path)
+    assert [each.name for each in tests] == ["log", "log from 4.4975 s"]
+    assert findings(tests) == []
+
+
 def test_a_tap_of_the_command_is_no_spike_but_a_drop_out_while_it_stands_still_is(drafted) -> None:
     command = 5.0 * ((TIME > 1.0) & (TIME < 1.019)) - 3.0 * (TIME > 4.0)
     assert findings(drafted(voltage=command, speed=lagged(command))) == []
@@ -185,7 +235,7 @@ def test_motions_and_zero_crossings_are_no_spikes(drafted, command, lag) -> None
         (
             {"counts": np.floor(200.0 * np.cumsum(lagged(BOTH)) / RATE)
              + 5000.0 * ((TIME > 3.498) & (TIME < 3.507))},
-            "jumps 2 times",
+            "ignore = [{ from = 3.4975, to = 3.5075",
             "gear_ratio = 1.0",
             "ignore = [{ from = 3.4975, to = 3.5075 }]\ngear_ratio = 1.0",
         ),
