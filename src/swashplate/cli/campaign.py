@@ -305,9 +305,10 @@ def rig(
 def guess(path: Path = CAMPAIGN, *, axis: AxisName = None, out: Path | None = None) -> None:
     """Read a machine's dead zones, gains, limits, delay and lag off its logs.
 
-    For a machine of unknown numbers: needs the command and a speed or a position,
-    no current. Writes a drive to start a fit from, start.toml, and what the fit
-    is to change within which bounds, setup.toml.
+    For a machine of unknown numbers: needs the command and a speed or a position.
+    If a current is measured, the amplifier is read off it and fitted first. Writes
+    a drive to start a fit from, start.toml, and what the fit is to change within
+    which bounds, setup.toml.
 
     Options:
       out DIR: Folder for start.toml and setup.toml; by default the campaign's.
@@ -332,6 +333,14 @@ def guess(path: Path = CAMPAIGN, *, axis: AxisName = None, out: Path | None = No
         Drive(parameters).to_toml(start)
         write_text(tests.fit_configuration(found, parameters), setup)
     show(tests.guess_table(found))
+    if found.amplifier is not None:
+        show(tests.amplifier_table(found.amplifier))
+        card = found.amplifier.card
+        like = f"like that of the packaged card {card}" if card else "a plain one"
+        say(
+            f"Its filter is {like}; fit {found.amplifier.fit_percent:.1f} % of the currents. The "
+            "first stage fits the amplifier to the current, the second one the machine."
+        )
     for sentence, _ in tests.spiked(runs).values():
         note(f"! {sentence}.")
     note(f"These numbers alone: fit {found.fit_percent:.1f} % of the mean speeds (100 % is best).")

@@ -26,6 +26,7 @@ from swashplate.identification.data_checks import (
     check_runs,
     refuse_unsound,
     spike_findings,
+    unfitted_currents,
 )
 from swashplate.identification.determination import Identifiability, identifiability
 from swashplate.identification.drive_model import (
@@ -281,6 +282,7 @@ def fit(
         free = nominal.setup
     elif isinstance(free, Setup):
         doubts += refuse_unsound(check_runs(runs, smooth(nominal)))
+        doubts += refuse_unsound(unfitted_currents(runs, free))
         nominal, changed = at_rate_of(runs, nominal)
         doubts += changed
     else:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
+from math import sqrt
 from typing import NamedTuple
 
 import numpy as np
@@ -187,12 +188,15 @@ class NoiseColour(Result):
         """How long the residuals stay correlated, and what that makes the samples worth."""
         if not self.length:
             return f"Residuals of {self.channel} are white."
-        worth = f"{self.inflation:.3g} samples count as one independent sample"
-        if self.inflation <= 1.05:
-            worth = "positive and negative correlations cancel, and the samples count as "
-            worth += "independent ones"
         during = f"{self.length * self.step:.3g} s"
-        return f"Residuals of {self.channel} stay correlated over {during}: {worth}."
+        start = f"Residuals of {self.channel} stay correlated over {during}"
+        if self.inflation <= 1.05:
+            return f"{start}, but intervals are those of independent samples: correlations cancel."
+        wider = sqrt(self.inflation)
+        return (
+            f"{start}, so that intervals are about {wider:.2g} times as wide as for independent "
+            "samples."
+        )
 
 
 def noise_colours(fit: LinearisedFit) -> tuple[NoiseColour, ...]:
