@@ -23,6 +23,7 @@ from swashplate.campaign.schema import KINDS, ROD, TURNS, CampaignFile, InputKin
 from swashplate.documents import parse_toml, toml_key, toml_string, validated
 from swashplate.errors import FileError, InputError
 from swashplate.logs import Column, Log, open_log
+from swashplate.parameters.files import NEUTRAL, preset_names
 from swashplate.units import speed_unit, to_si
 
 Array = NDArray[np.float64]
@@ -62,8 +63,6 @@ TICKS = {"ms": 1e-3, "us": 1e-6, "ns": 1e-9}
 """Units of whole numbers that count the time, and their size. [s]"""
 SLOWEST_LOG = 1.0
 """Rate from which a log of a drive's motion is plausible. [Hz]"""
-NEUTRAL = "neutral"
-"""The packaged drive that is no machine's."""
 MANY = 4
 """Runs from which on one is held back for validation."""
 
@@ -400,8 +399,6 @@ def _axis_lines(
     counts_per_turn: float | None,
 ) -> list[str]:
     """Tables of an axis; what the first log does not show stays open."""
-    from swashplate.parameters.files import preset_names
-
     own = '# drive = "hoist"    # a packaged drive or a parameter file, to be fitted'
     if drive is not None:
         own = f"drive = {toml_string(name if name in preset_names() else drive)}"

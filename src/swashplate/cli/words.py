@@ -133,7 +133,9 @@ def drive_file(word: str) -> Path | None:
             if (place / NUMBERS).is_file():
                 raise InputError(
                     f"{word} is the fit of a model of your own: give its file by --model where the "
-                    "command has that option; simulate and export it from Python."
+                    "command has that option. In Python swashplate.equations.simulate(model, ...) "
+                    'runs it, and swashplate.export.fmu(model, "model.fmu", parameters=..., '
+                    f"step=...) writes an FMU of it, with the numbers in {place / NUMBERS}."
                 )
             raise InputError(
                 f"There is no {DRIVE} in {word}: give a folder that 'swashplate fit' wrote, or a "

@@ -34,7 +34,7 @@ from swashplate.identification.solving import Solution
 from swashplate.identification.unknowns import Unknown, Unknowns
 from swashplate.identification.validation import RunQuality, predict
 from swashplate.parameters.definitions import find
-from swashplate.parameters.files import dump_set, read_set
+from swashplate.parameters.files import NEUTRAL, dump_set, read_set
 from swashplate.parameters.parameter_set import Motion, ParameterSet
 from swashplate.results import Result
 from swashplate.tables import Table, write_text
@@ -117,7 +117,8 @@ class Judged(Result):
         """The fitted set, where each number says whether it was fitted or fixed, and its source.
 
         Of a fitted one the source is campaign, date and 95 % interval; of a fixed one that of the
-        set which the fit began from. The title of one that is not usable says so.
+        set which the fit began from. The title of one that is not usable says so. A machine that
+        began at the start for any machine is called like its axis.
         """
         found, nominal = self.result.drive.parameters, self.result.nominal
         assert isinstance(nominal, ParameterSet)
@@ -136,7 +137,11 @@ class Judged(Result):
         if not self.verdict.usable:
             title += f". {self.verdict.headline.rstrip('.')}"
         return replace(
-            found, title=title, parameters=parameters, motion=motion_of(self.result.runs)
+            found,
+            name=self.result.runs[0].axis if found.name == NEUTRAL else found.name,
+            title=title,
+            parameters=parameters,
+            motion=motion_of(self.result.runs),
         )
 
 

@@ -94,6 +94,10 @@ AXES = ("hoist", "slew", "luff")  # Kruse's three axes.
 SETS = files("swashplate.parameters").joinpath("sets")
 
 
+NEUTRAL = "neutral"
+"""The packaged set that is no machine's, but where any may begin."""
+
+
 def preset_names() -> tuple[str, ...]:
     """Names of the packaged sets, Kruse's axes first."""
     names = {each.name.removesuffix(".toml") for each in SETS.iterdir() if each.is_file()}
