@@ -2,13 +2,14 @@
 
 import tomllib
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from scipy.signal import lfilter
 from tests.identification.given import run_of
 
-from swashplate import Drive
+from swashplate import Drive, InputError
 from swashplate.campaign import (
     Experiment,
     amplifier_table,
@@ -182,3 +183,14 @@ def test_a_current_that_no_stage_fits_is_named_with_what_does(winch) -> None:
     hoist = Drive.preset("hoist")
     doubts = fit(hoist, tests, load_setup("hoist"), max_evaluations=1).doubts
     assert not [each for each in doubts if "no stage fits" in each]
+
+
+def test_a_gross_spike_of_the_current_is_refused_with_the_line_that_leaves_it_out(winch) -> None:
+    _, tests = winch
+    clamp = tests[0]["rectified_current"]
+    values = clamp.values.copy()
+    values[900:902] = 9.9
+    channels = {**tests[0].channels, clamp.name: replace(clamp, values=values)}
+    spoilt = [replace(tests[0], channels=channels), *tests[1:]]
+    with pytest.raises(InputError, match=r"ramp up: 'rectified_current' .* from = 4\.4975, to = 4"):
+        guess_drive(spoilt)

@@ -17,7 +17,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from swashplate.campaign.amplifier import AmplifierGuess, guess_amplifier
+from swashplate.campaign.amplifier import CURRENTS, AmplifierGuess, guess_amplifier
 from swashplate.campaign.campaign import Campaign
 from swashplate.campaign.experiment import Channel, Experiment
 from swashplate.campaign.quality import spiked
@@ -226,9 +226,10 @@ def guess_drive(tests: Campaign | Sequence[Experiment]) -> Guess:
                 'needs a command in V: write kind = "voltage", unit = "V", and a scale that makes '
                 "its full range ±10 V; an offset is added after scaling, in V."
             )
-        sentence, gross = spoilt.get((each.name, channel.name), ("", False))
-        if gross:
-            raise InputError(f"{sentence}.")
+        for used in (channel, *each.of_kind(*CURRENTS)):
+            sentence, gross = spoilt.get((each.name, used.name), ("", False))
+            if gross:
+                raise InputError(f"{sentence}.")
         unit = f"{channel.unit}/s" if channel.is_position else channel.unit
         runs.append(_run(each, channel))
         if not _goes_with(runs[-1]):
@@ -441,7 +442,8 @@ def guessed_set(guess: Guess, source: str) -> ParameterSet:
     title = f"{guess.axis}: guessed from {source}"
     # of a current that was measured the filter has a meaning of its own, whatever the logs' rate
     rate = made.rate if guess.amplifier is None else None
-    return replace(made, name=guess.axis, title=title, parameters=said, rate=rate)
+    card = f"{guess.axis} card"
+    return replace(made, name=guess.axis, title=title, card=card, parameters=said, rate=rate)
 
 
 def _with_current(

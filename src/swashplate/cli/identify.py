@@ -235,6 +235,7 @@ def _say_fit(found: Judged) -> None:
     for profile in found.profiles:
         bullets(profile.sentences())
     say(tables.fixed_line(found.result))
+    bullets(tables.unvalued_lines(found.result))
     note("\nRuns that were fitted")
     show(*tables.runs_tables([quality for each in found.result.stages for quality in each.runs]))
     if found.predicted:

@@ -347,6 +347,14 @@ def _fixing(places: list[int], vector: Array, null: Array, fixed: list[int]) -> 
     return None
 
 
+def without_value(stage: StageFit) -> list[str]:
+    """Unknowns of the machine that ended at a bound, or that the tests do not determine."""
+    found = stage.identifiability
+    lost = {*found.at_bounds, *found.to_fix}
+    machine = (each.name for each in stage.problem.unknowns if each.run is None)
+    return [name for name in machine if name in lost]
+
+
 def weak_unknowns(stage: StageFit) -> list[str]:
     """Unknowns of the machine with an interval wider than 10 % of the value, or without one."""
     try:

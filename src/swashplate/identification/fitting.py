@@ -209,7 +209,7 @@ class Fit(Result):
         if jumps := sum(each.startswith(EDGE) for each in names):
             many = count(jumps, "time")
             said.append(f"Commands jump {many} between two samples: when is estimated.")
-        return (*said, tables.fixed_line(self))
+        return (*said, tables.fixed_line(self), *tables.unvalued_lines(self))
 
 
 def fit(
