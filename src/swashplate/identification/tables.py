@@ -232,7 +232,8 @@ def unvalued_lines(fit: Fit) -> list[str]:
         return []
     return [
         f"Without a value of their own, at a bound or not determined: {listed(lost)}. Fix them in "
-        "the fit configuration, widen their bounds, or add the tests that 'swashplate advise' names."
+        "the fit configuration, widen their bounds, or add tests that determine them; for a drive "
+        "'swashplate advise' names some."
     ]
 
 
