@@ -121,7 +121,7 @@ def test_without_a_current_there_is_no_amplifier() -> None:
 def winch() -> tuple[Drive, list[Experiment]]:
     """A hoist with other numbers, and its tests with tacho and clamp."""
     drive = Drive.preset("hoist").at_every_rate()
-    drive = drive.scale(V_dz=1.1, G1=(0.9, 1.1), Z10=1.1, Z8=1.2, Z16=1.2).replace(Z18=0.0)
+    drive = drive.scale(V_dz=1.1, G1=(0.9, 1.1), Z10=1.1, Z8=1.2, Z16=1.2)
     random, made = np.random.default_rng(3), []
     for name, command in COMMANDS.items():
         run = drive.simulate(command, RATE)
@@ -156,7 +156,7 @@ def test_a_measured_current_gives_a_stage_of_its_own(winch) -> None:
 
 @pytest.mark.slow
 def test_current_and_speed_are_fitted_from_nothing(winch) -> None:
-    """Numbers of the amplifier within 5 %, the current to its noise."""
+    """Numbers of the amplifier within 5 %, the current to its noise, the speed to 5 %."""
     drive, tests = winch
     found = guess_drive(tests)
     start = guessed_set(found, "campaign.toml")
@@ -164,8 +164,9 @@ def test_current_and_speed_are_fitted_from_nothing(winch) -> None:
     truth = drive.parameters.numbers
     for name in ("V_dz_plus", "V_dz_minus", "J_plus", "J_minus", "tau", "omega_plus", "lim2_plus"):
         assert result.parameters.numbers[name] == pytest.approx(truth[name], rel=0.05), name
-    errors = {each.channel: each.measures.rmse for stage in result.stages for each in stage.runs}
-    assert errors["rectified_current"] < 1.1 * 0.005
+    amplifier, pump = result.stages
+    assert max(each.measures.rmse for each in amplifier.runs) < 1.1 * 0.005
+    assert max(each.measures.nrmse for each in pump.runs) < 0.05
     assert not result.doubts
 
 

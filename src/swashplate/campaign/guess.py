@@ -57,6 +57,8 @@ ONE_WAY = 0.05
 ANGLE, FAR_STOP = 0.2, 0.39
 """Angle of the swash plate at the greatest speed that was seen, at most, and that of a stop that
 was not seen. [rad]"""
+OFFSET = 0.1
+"""Largest neutral offset of the spool, over its travel at the greatest speed that was seen. [1]"""
 STEEPEST = 30.0
 """Volts that a radian takes at least, so that at 10 V and at the upper bounds of all gains the
 solenoids do not overpower the feedback spring. [V/rad]"""
@@ -570,12 +572,12 @@ def _solenoid_lines(guess: Guess, numbers: Mapping[str, float]) -> list[str]:
     assert guess.amplifier is not None
     currents = [guess.amplifier.settled(way, guess.command[way]) for way in range(2)]
     begins = numbers["Z17"]
-    most = 0.95 * min(
-        current for current, volts in zip(currents, guess.command, strict=True) if volts
-    )
-    lines = [
-        f"Z17 = {{ bounds = [0.0, {min(2.0 * begins, most) or 0.5 * most:.4g}] }}    # dead zone"
-    ]
+    smallest = min(current for current, volts in zip(currents, guess.command, strict=True) if volts)
+    # below the largest current of either way, or nothing would move
+    most = min(2.0 * begins if begins else 0.5 * smallest, 0.95 * smallest)
+    lines = [f"Z17 = {{ bounds = [0.0, {max(most, 1.05 * begins):.4g}] }}    # dead zone"]
+    offset = OFFSET * numbers["Z5"] * numbers["Z3"] * guess.speed / numbers["Z10"]
+    lines.append(f"Z18 = {{ bounds = [{-offset:.4g}, {offset:.4g}] }}    # neutral offset")
     for way, side in enumerate(SIDES):
         if not guess.command[way]:
             lines.append(NOT_TRIED.format(side))
