@@ -19,7 +19,7 @@ from swashplate.campaign import (
     guessed_set,
 )
 from swashplate.identification.fitting import fit
-from swashplate.identification.setup import Setup, load_setup
+from swashplate.identification.setup import Free, Setup, Stage, load_setup
 
 RATE = 200.0
 TIME = np.arange(int(12.0 * RATE)) / RATE
@@ -195,3 +195,15 @@ def test_a_gross_spike_of_the_current_is_refused_with_the_line_that_leaves_it_ou
     spoilt = [replace(tests[0], channels=channels), *tests[1:]]
     with pytest.raises(InputError, match=r"ramp up: 'rectified_current' .* from = 4\.4975, to = 4"):
         guess_drive(spoilt)
+
+
+def test_parameters_without_a_value_are_named_with_what_to_do(winch) -> None:
+    """No test of the winch opens the relief valve."""
+    _, tests = winch
+    free = {"Z10": Free(relative=(0.5, 2.0)), "Z15": Free(relative=(0.9, 1.1))}
+    stage = Stage(name="pump", part="pump", channels=("shaft_speed",), free=free)
+    found = fit(Drive.preset("hoist"), tests[2:4], Setup(stages=(stage,)))
+    (said,) = [each for each in found.sentences if each.startswith("Without a value")]
+    assert "Z15" in said
+    assert "Z10" not in said
+    assert "swashplate advise" in said
