@@ -550,6 +550,7 @@ def test_a_declared_kind_restricts_the_units(tmp_path: Path) -> None:
     )
     assert entries["PIW_STROKE"]["kind"] == "stroker_pressure"
     assert entries["PIW_STROKE"]["unit"] == "Pa"
+    assert "guessed" not in line_of(text, 'kind = "stroker_pressure"')
     assert "FIXME" in line_of(text, 'unit = "Pa"')
     assert 'role = "fit"' in text
     _, _, entries = drafted_entries(tmp_path, columns, columns={"PIW_STROKE": "position"})

@@ -76,6 +76,8 @@ class _Guess(NamedTuple):
     axis: str = ""
     """What stands before the word in its name, such as the "boom" of "Boom Cmd", or empty."""
     unit: str | None = None
+    given: bool = False
+    """Whether somebody said so."""
     in_header: bool = True
     """Whether its unit stands in brackets, or in a row of its own, where it is read from again."""
     rolls_over_at: float = 0.0
@@ -283,7 +285,7 @@ def _guesses(
         values = [part for part in parts[name] if part.size]
         each = _by_header(column, given.get(name))
         kind = given.get(name, "" if each.kind in taken else each.kind)
-        each = each._replace(kind=kind)
+        each = each._replace(kind=kind, given=name in given)
         if name in units:
             each = each._replace(unit=units[name], in_header=False, why="given")
         elif each.unit is None:
@@ -447,7 +449,8 @@ def _signal_lines(each: _Guess, parts: Sequence[Array], counts_per_turn: float |
     command = percent or (each.kind in ("other", "voltage") and each.full_scale > 0)
     kind, scale = ("voltage" if command else each.kind), 1.0
     known = KINDS[kind]
-    lines = [f'kind = "{kind}"    # guessed: {known.meaning}', f"column = {toml_string(each.name)}"]
+    guessed = "" if each.given and kind == each.kind else "guessed: "
+    lines = [f'kind = "{kind}"    # {guessed}{known.meaning}', f"column = {toml_string(each.name)}"]
     if percent:
         scale = 0.1
         lines += ['unit = "V"', "scale = 0.1    # guessed: 100 % stand for the 10 V of a card"]

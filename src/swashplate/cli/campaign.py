@@ -108,10 +108,14 @@ def init(
     note(f"Draft: {target}")
     guessed = text.count("# guessed")
     note(f"{count(guessed, 'entry is', 'entries are')} guessed: look for '# guessed'.")
+    table, open_ends = "", (f"# {FIXME}", f'column = "{FIXME}"')
     for line in text.splitlines():
-        open_ends = (f"# {FIXME}", f'column = "{FIXME}"')
-        if line.startswith((UNUSED, NO_ENCODER)) or any(each in line for each in open_ends):
+        if line.startswith(("[", "file = ")):  # a run is known by its file
+            table = line.partition("    #")[0]
+        if line.startswith((UNUSED, NO_ENCODER)):
             note(f"  {line.lstrip('# ')}")
+        elif any(each in line for each in open_ends):
+            note(f"  {table} {line.lstrip('# ')}")
     note(f"Then run\n  swashplate campaign check {shlex.quote(str(target))}")
 
 
