@@ -76,6 +76,38 @@ def test_a_campaign_becomes_a_drive(done, refused, campaign, tmp_path) -> None:
 
 
 @pytest.mark.slow
+def test_from_logs_with_a_current_to_a_drive_named_by_its_axis(
+    run, done, virtual, tmp_path
+) -> None:
+    """From neutral: the amplifier is fitted to the current first, and nothing is called neutral."""
+    logs = [str(each) for each in sorted(virtual.parent.glob("*.csv"))]
+    counts = ("--counts-per-turn", "2526.315789473684")
+    done("campaign", "init", *logs, "--drive", "neutral", *counts, "--out", "campaign.toml")
+    path = tmp_path / "campaign.toml"
+    text = (
+        path.read_text("utf-8")
+        .replace("[axes.drive", "[axes.winch")
+        .replace('interpolation = "previous"', 'interpolation = "linear"')
+    )
+    path.write_text(text, "utf-8")
+    said = done("guess", "campaign.toml")
+    assert "rexroth_mdsd_1k_2x_2" in said
+    result = run("fit", "campaign.toml", "--from", "start.toml", "--setup", "setup.toml")
+    assert result.exit_code in (0, 1)
+    assert "no stage fits" not in result.output
+    fitted = Drive.from_toml(tmp_path / "fitted" / "drive.toml")
+    assert fitted.name == "winch"
+    # of steps of one size each way the current is known there alone
+    currents = [Drive.preset("hoist").steady_current(volts) for volts in (-5.0, 4.0)]
+    assert [fitted.steady_current(volts) for volts in (-5.0, 4.0)] == pytest.approx(
+        currents, rel=0.02
+    )
+    plain = run("fit", "campaign.toml", "--out", "plain", "--no-report")
+    assert "'rectified_current' is measured, but no stage fits it" in " ".join(plain.output.split())
+    assert Drive.from_toml(tmp_path / "plain" / "drive.toml").name == "winch"
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "how", [signal.SIGKILL, signal.SIGINT, signal.SIGTERM], ids=["kill", "Ctrl-C", "terminate"]
 )

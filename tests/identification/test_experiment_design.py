@@ -308,6 +308,9 @@ def test_weak_is_what_the_given_covariance_says() -> None:
     wider = judged(RNG.normal(size=(10, 3)), "abc", covariance=9.0 * given).sentences()
     assert sum("Weak" in each for each in wider) == 1
     assert "Weak, each with those before it fixed: a to ±35.3 % and c to ±23.5 %." in wider[-1]
+    assert "all 3 free parameters, 2 of them weakly" in wider[0]
+    widest = judged(RNG.normal(size=(10, 3)), "abc", covariance=1e4 * given).sentences()
+    assert "a not even to ±100 %" in widest[-1]
 
 
 EXACT = ["scale of pressure", "zero of pressure", "scale of spool travel", "scale of force"]

@@ -22,8 +22,9 @@ from swashplate.results import Result
 
 Array = NDArray[np.float64]
 
-MOST_REDRAWN = 20
-"""Draws outside the model's domain for each one inside from which the drawing is given up."""
+MOST_REDRAWN, NARROWED = 20, 0.1
+"""Draws outside the model's domain for each one inside from which the drawing is given up, and part
+of all draws from which those that were left out narrow the bands."""
 
 # --- drives that the tests allow ------------------------------------------------------------------
 
@@ -56,10 +57,13 @@ class Draws(Result):
                 f"Not drawn, as fitted in all drives: {', '.join(self.fixed)}; the bands leave out "
                 "what their errors would add."
             )
-        if self.redrawn:
+        drawn = self.redrawn + len(self.drives)
+        if self.redrawn > NARROWED * drawn:
             said.append(
-                f"{self.redrawn} draws lay outside bounds or the model's domain and were drawn "
-                "again."
+                f"The bands are too narrow: {100.0 * self.redrawn / drawn:.0f} % of the drives "
+                "that the errors of the estimates allow lie beyond the parameters' bounds or the "
+                "model's domain, and were left out. Widen the bounds in the fit configuration, or "
+                "fix the parameters that are not determined."
             )
         return tuple(said)
 

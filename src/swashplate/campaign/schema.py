@@ -61,7 +61,7 @@ KINDS: Mapping[str, Kind] = {
     "current": Kind(("A",), "", "signed current that drives the pump without a card"),
     # by its name an input: channels are of this kind where somebody says so
     "other": Kind((), "", "anything else, kept in the unit that it is written in",
-        "cmd|command|duty|setpoint|valve|stick|joystick|stellgröße|stellgroesse|sollwert|hebel|"
+        "cmd|command|duty|setpoint|valve|stick|joystick|joy|stellgröße|stellgroesse|sollwert|hebel|"
         "consigne|consigna|manette|palanca|spak|pådrag"),
     "encoder_counts": Kind(("rad",), "shaft_position",
         "counts of an encoder; an angle from a free zero",

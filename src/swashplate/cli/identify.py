@@ -213,6 +213,7 @@ def _say_fit(found: Identification) -> None:
     for profile in found.profiles:
         bullets(profile.sentences())
     say(tables.fixed_line(found.fit))
+    bullets(tables.unvalued_lines(found.fit))
     note("\nRuns that were fitted")
     show(*tables.runs_tables([quality for each in found.fit.stages for quality in each.runs]))
     if found.predicted:

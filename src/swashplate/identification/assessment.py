@@ -40,7 +40,13 @@ from swashplate.identification.solving import Solution
 from swashplate.identification.unknowns import Unknown, Unknowns
 from swashplate.identification.validation import RunQuality, predict
 from swashplate.parameters.definitions import find
-from swashplate.parameters.files import FITTED_DRIVE, FITTED_NUMBERS, dump_set, read_set
+from swashplate.parameters.files import (
+    FITTED_DRIVE,
+    FITTED_NUMBERS,
+    NEUTRAL,
+    dump_set,
+    read_set,
+)
 from swashplate.parameters.parameter_set import Motion, ParameterSet
 from swashplate.progress import working
 from swashplate.results import folded
@@ -119,9 +125,7 @@ class Identification(Estimated):
         """What it can be used for."""
         planned = [each.name for each in self.fit.setup.stages]
         with working("Judging the fit"):
-            return verdict(
-                self.fit.stages, self.predicted, planned=planned, required=self.required
-            )
+            return verdict(self.fit.stages, self.predicted, planned=planned, required=self.required)
 
     def tables(self) -> list[Table]:
         """Criteria of the verdict, then the fit's tables and the errors of held-out runs."""
@@ -276,7 +280,8 @@ class Identification(Estimated):
         """Title and motion of the fitted set, and where each of its parameters comes from.
 
         Of a fitted one the source is campaign, date and 95 % interval; of a fixed one that of the
-        set which the fit began from. The title of one that is not usable says so.
+        set which the fit began from. The title of one that is not usable says so. A machine that
+        began at the start for any machine is called like its axis.
         """
         found, nominal = self.fit.drive.parameters, self.fit.nominal
         assert isinstance(nominal, ParameterSet)
@@ -294,7 +299,12 @@ class Identification(Estimated):
         title = f"{self.campaign.title}: fitted to {fitted} runs, {today}"
         if not self.verdict.usable:
             title += f". {self.verdict.headline.rstrip('.')}"
-        return {"title": title, "parameters": parameters, "motion": motion_of(self.fit.runs)}
+        return {
+            "name": self.fit.runs[0].axis if found.name == NEUTRAL else found.name,
+            "title": title,
+            "parameters": parameters,
+            "motion": motion_of(self.fit.runs),
+        }
 
 
 def motion_of(runs: Iterable[Experiment]) -> Motion:

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swashplate.campaign import ChannelKind, applying, inside
+from swashplate.campaign.amplifier import CURRENTS as CURRENTS
 from swashplate.campaign.campaign import Campaign
 from swashplate.campaign.experiment import RISE, Channel, Edge, Experiment, InputSignal
 from swashplate.campaign.samples import signed_by_command
@@ -55,12 +56,6 @@ Parameters = ParameterSet | ModelSetup
 Starts = Mapping[str, Mapping[str, float]]
 """For some experiments by name the currents at the first sample, as `START_CURRENTS` has them."""
 
-CURRENTS: tuple[ChannelKind, ...] = (
-    "signed_current",
-    "rectified_current",
-    "current_plus",
-    "current_minus",
-)
 START_PRESSURE = "start_pressure"
 """Name of δP at the first sample, where it is an unknown of the experiment."""
 START_CURRENTS = ("start_current_plus", "start_current_minus")

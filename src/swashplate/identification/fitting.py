@@ -28,6 +28,7 @@ from swashplate.identification.data_checks import (
     check_runs,
     refuse_unsound,
     spike_findings,
+    unfitted_currents,
 )
 from swashplate.identification.determination import Identifiability, identifiability
 from swashplate.identification.drive_model import (
@@ -269,7 +270,7 @@ class Fit(Estimated):
         if jumps := sum(each.startswith(EDGE) for each in names):
             many = count(jumps, "time")
             said.append(f"Commands jump {many} between two samples: when is estimated.")
-        return (*said, tables.fixed_line(self))
+        return (*said, tables.fixed_line(self), *tables.unvalued_lines(self))
 
 
 def fit(
@@ -352,6 +353,7 @@ def fit(
             )
         free = configuration(free, runs)
         doubts += refuse_unsound(check_runs(runs, smooth(nominal)))
+        doubts += refuse_unsound(unfitted_currents(runs, free))
         nominal, changed = at_rate_of(runs, nominal)
         doubts += changed
 

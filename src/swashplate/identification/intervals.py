@@ -332,8 +332,11 @@ class Uncertainty(Result):
             side, name = "upper" if end.upper else "lower", self.own.variables.names[end.number]
             words = f"{name} has no {side} end: the cost does not rise enough on that side."
             if end.better is not None:
-                words = f"The profile of {name} found a better optimum, cost {end.better:.6g}"
-                words += ": fit from more starts."
+                words = (
+                    f"The search had not found the best fit: the interval of {name} led to a "
+                    f"better one, cost {end.better:.6g}. Fit again with --starts 20 (in Python "
+                    "search = Search(20))."
+                )
             elif np.isfinite(end.distance):
                 words = f"The {side} end of {name} is that of its profile, which is asymmetric."
             said.append(words)

@@ -11,7 +11,7 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 from swashplate.errors import InputError
-from swashplate.identification.determination import GAUGES
+from swashplate.identification.determination import GAUGES, without_value
 from swashplate.identification.drive_model import START_PRESSURE, DriveModel, true_value
 from swashplate.identification.intervals import Estimate, Status
 from swashplate.identification.model import EDGE
@@ -268,6 +268,18 @@ def fixed_line(fit: Fit) -> str:
     plain_names = (n.removesuffix("_plus").removesuffix("_minus") for n in fit.nominal.numbers)
     kept = [name for name in dict.fromkeys(plain_names) if not _is_moved(name, moved)]
     return f"Fixed at their nominal values: {', '.join(kept) or 'none'}."
+
+
+def unvalued_lines(fit: Fit) -> list[str]:
+    """A sentence on the parameters without a value of their own, if there are any."""
+    lost = [name for stage in fit.stages for name in without_value(stage)]
+    if not lost:
+        return []
+    return [
+        f"Without a value of their own, at a bound or not determined: {listed(lost)}. Fix them in "
+        "the fit configuration, widen their bounds, or add tests that determine them; for a drive "
+        "'swashplate advise' names some."
+    ]
 
 
 def scales_words(fit: StageFit) -> str:

@@ -103,6 +103,10 @@ AXES = ("hoist", "slew", "luff")  # Kruse's three axes.
 SETS = files("swashplate.parameters").joinpath("sets")
 
 
+NEUTRAL = "neutral"
+"""The packaged set that is no machine's, but where any may begin."""
+
+
 def preset_names() -> tuple[str, ...]:
     """Names of the packaged sets, Kruse's axes first."""
     names = {each.name.removesuffix(".toml") for each in SETS.iterdir() if each.is_file()}
@@ -141,7 +145,9 @@ def fitted_drive(folder: str | Path) -> Path:
     if (Path(folder) / FITTED_NUMBERS).is_file():
         raise MissingFileError(
             f"{folder} is the fit of a model of your own: give its file by --model where the "
-            "command has that option; simulate and export it from Python."
+            "command has that option. In Python swashplate.equations.simulate(model, ...) runs it, "
+            'and swashplate.export.fmu(model, "model.fmu", parameters=..., step=...) writes an FMU '
+            f"of it, with the numbers in {Path(folder) / FITTED_NUMBERS}."
         )
     raise MissingFileError(
         f"There is no {FITTED_DRIVE} in {folder}: give a folder that 'swashplate fit' or "
