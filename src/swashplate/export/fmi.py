@@ -6,6 +6,7 @@ drive is the package's own; the numbers are a resource that it reads.
 
 from __future__ import annotations
 
+import re
 import warnings
 import zipfile
 from collections.abc import Collection, Mapping, Sequence
@@ -55,6 +56,7 @@ ABILITIES_2 = (
     "canNotUseMemoryManagementFunctions",
 )
 ABILITIES_3 = ("canGetAndSetFMUState", "canSerializeFMUState")
+_NOT_XML = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 _EARLIEST = (1980, 1, 1, 0, 0, 0)
 
 
@@ -204,7 +206,10 @@ def _zipped(members: Mapping[str, bytes]) -> bytes:
 
 
 def _xml(root: ET.Element) -> bytes:
-    """A document's bytes."""
+    """A document's bytes, without the characters that XML cannot have."""
+    for element in root.iter():
+        for name, value in element.attrib.items():
+            element.set(name, _NOT_XML.sub("\N{REPLACEMENT CHARACTER}", value))
     ET.indent(root)
     text = ET.tostring(root, "unicode")
     return f'<?xml version="1.0" encoding="UTF-8"?>\n{text}\n'.encode()

@@ -9,6 +9,7 @@ from swashplate.equations.c_source.model import Exported, Writer, path_of
 from swashplate.equations.c_source.text import (
     HELPERS,
     c_name,
+    comment_line,
     filled,
     function,
     indented,
@@ -46,7 +47,9 @@ class _Interface(Writer):
             "p": e.prefix,
             "P": self.P,
             "samples": e.widest,
-            "title": e.title or f"The model {self.model.name}, one sample at a time.",
+            "title": comment_line(
+                e.title or f"The model {self.model.name}, one sample at a time."
+            ),
             "file": e.file,
             "GUARD": f"{e.file.upper()}_H",
             "signals": signals,
