@@ -155,7 +155,7 @@ WRONG: list[tuple[Callable[..., Any], tuple[Any, ...], str]] = [
     (
         lambda each: HOIST.simulate([1.0, 1.0], pump_speed=each),
         (-1.0, [1.0, -0.1]),
-        "The pump_speed falls to -.*, but must be 0 or above",
+        "The pump_speed falls to -.*, but must be from 0 to 10",
     ),
     (lambda name: HOIST.renamed(name), ("", " ", None), "A drive's name is text, not"),
     (

@@ -28,7 +28,7 @@ from swashplate.models.card import stable_step
 from swashplate.models.displacement_control import steep_stops
 from swashplate.parameters.rules import FULL_VOLTAGE
 from swashplate.simulation.instance import check_filter_stability, instance_of, models_of
-from swashplate.simulation.run import LEAST, Sample
+from swashplate.simulation.run import RANGES, Sample
 from swashplate.tables import write_text
 
 Array = NDArray[np.float64]
@@ -56,7 +56,7 @@ def exported_drive(drive: Drive | None = None) -> Exported:
         parameters=columns,
         outputs=(*Sample._fields[1:], "motor_torque", "motor_pressure_drop"),
         bounds={"voltage": FULL_VOLTAGE},
-        least={name: least for name, (least, _) in LEAST.items()},
+        ranges={name: (least, most) for name, (least, most, _) in RANGES.items()},
         stable={0: stable_step},
         follows={(1, "steep"): steep_stops},
         internal=frozenset({"own"}),
