@@ -49,6 +49,9 @@ DISPLAYED = {"rad": ("deg",), "rad/s": ("deg/s", "rpm"), "Pa": ("bar",), "m": ("
 """Units that people read, offered beside SI ones."""
 WHOLE = "fmu.c"
 """The source that an importer compiles."""
+COPYRIGHT = "Libraries and sources: the swashplate developers; numbers: their owner"
+LICENSE = "Libraries and sources: BSD-3-Clause; numbers: as their owner says"
+"""Of an FMU; who wrote it down is not known, so that it names no author."""
 ABILITIES_2 = (
     "canInterpolateInputs",
     "canGetAndSetFMUstate",
@@ -266,6 +269,8 @@ def _head(content: Content, table: Sequence[Variable], fmi: Version, token: str)
         "modelName": content.name,
         named: token,
         "description": words,
+        "copyright": COPYRIGHT,
+        "license": LICENSE,
         "generationTool": f"swashplate {__version__}",
         "variableNamingConvention": "structured",
     }

@@ -226,7 +226,7 @@ class _Interface(Writer):
         pairs = [e.ranges.get(name, (-inf, inf)) for name in e.measured] or [(0.0, 0.0)]
         listed = ", ".join(f"{{{literal(low)}, {literal(high)}}}" for low, high in pairs)
         lines += [*wrapped(f"static const double input_ranges[][2] = {{{listed}}};"), ""]
-        lines.append("static const size_t flag_places[] = {")
+        lines.append("static const unsigned flag_places[] = {")
         lines += [*(f"    offsetof({e.type}, {place})," for place in e.flags), "};", ""]
         for word, names in (
             ("parameter", [name for name, _, _ in self.rows]),

@@ -42,16 +42,22 @@ static void *fmu_kept_string(const char *text) {
     return made ? memcpy(made, text, length) : NULL;
 }
 
-SWP_FMU_API int swp_fmu_fail(swp_fmu *fmu, const char *message) {
+#if defined(__GNUC__) /* what is called once or never is made small, and not put into its callers */
+#define RARE __attribute__((noinline, cold))
+#else
+#define RARE
+#endif
+
+SWP_FMU_API RARE int swp_fmu_fail(swp_fmu *fmu, const char *message) {
     if (fmu) fmu->say(fmu, SWP_FMU_ERROR, message);
     return SWP_FMU_ERROR;
 }
 
-SWP_FMU_API int swp_fmu_missing(swp_fmu *fmu) {
+SWP_FMU_API RARE int swp_fmu_missing(swp_fmu *fmu) {
     return swp_fmu_fail(fmu, "an array or the place of a result is missing (NULL)");
 }
 
-SWP_FMU_API int swp_fmu_none(swp_fmu *fmu, size_t count) {
+SWP_FMU_API RARE int swp_fmu_none(swp_fmu *fmu, size_t count) {
     if (fmu && count == 0) return SWP_FMU_OK;
     return swp_fmu_fail(fmu, "there are no variables of this type: only real numbers and Booleans");
 }
@@ -62,13 +68,13 @@ typedef struct {
     size_t length;
 } fmu_words;
 
-static void fmu_add(fmu_words *to, const char *text) {
+RARE static void fmu_add(fmu_words *to, const char *text) {
     while (*text && to->length + 1 < sizeof to->text) to->text[to->length++] = *text++;
     to->text[to->length] = '\0';
 }
 
 /* A number with seven decimals at most. */
-static void fmu_add_number(fmu_words *to, double value) {
+RARE static void fmu_add_number(fmu_words *to, double value) {
     char digits[32];
     size_t at = sizeof digits - 1;
     digits[at] = '\0';
@@ -90,7 +96,7 @@ static void fmu_add_number(fmu_words *to, double value) {
 }
 
 /* A call that is not for the mode that the instance is in; `modes` has a bit for each that is. */
-static int fmu_in_mode(swp_fmu *fmu, unsigned modes, const char *call) {
+RARE static int fmu_in_mode(swp_fmu *fmu, unsigned modes, const char *call) {
     static const char *const when[] = {
         "before initialization", "during initialization", "while stepping",
         "after termination; reset the instance or set a state",
@@ -106,7 +112,7 @@ static int fmu_in_mode(swp_fmu *fmu, unsigned modes, const char *call) {
 #define IN(MODE) (1u << SWP_FMU_##MODE)
 
 /* A refused value: the instance goes on as it was. */
-static int fmu_refuse(swp_fmu *fmu, const char *what, const char *why) {
+RARE static int fmu_refuse(swp_fmu *fmu, const char *what, const char *why) {
     fmu_words message = {{0}, 0};
     fmu_add(&message, what);
     fmu_add(&message, ": ");
@@ -138,7 +144,7 @@ static FILE *fmu_opened(const char *path) {
 }
 
 /* The bytes of FOLDER/drive.bin, or NULL. */
-static unsigned char *fmu_resource(const char *folder, size_t *size) {
+RARE static unsigned char *fmu_resource(const char *folder, size_t *size) {
     static const char name[] = "/drive.bin";
     size_t length = strlen(folder);
     while (length > 0 && (folder[length - 1] == '/' || folder[length - 1] == '\\')) length--;
@@ -157,7 +163,7 @@ static unsigned char *fmu_resource(const char *folder, size_t *size) {
 }
 
 /* What is wrong with a resource, NULL if it can be used. */
-static const char *fmu_fault(const unsigned char *bytes, size_t size, const char *token) {
+RARE static const char *fmu_fault(const unsigned char *bytes, size_t size, const char *token) {
     if (size < HEADER_LENGTH || memcmp(bytes, RESOURCE_MAGIC, 8) != 0)
         return "resources/drive.bin holds no numbers of swashplate; export the FMU again";
     if (fmu_little_endian(bytes + 8, 4) != RESOURCE_VERSION ||
@@ -171,14 +177,14 @@ static const char *fmu_fault(const unsigned char *bytes, size_t size, const char
     return NULL;
 }
 
-static uint64_t fmu_hash_of(const unsigned char *bytes, size_t size) { /* FNV-1a */
+RARE static uint64_t fmu_hash_of(const unsigned char *bytes, size_t size) { /* FNV-1a */
     uint64_t hash = 14695981039346656037u;
     for (size_t i = 0; i < size; i++) hash = (hash ^ bytes[i]) * 1099511628211u;
     return hash;
 }
 
 /* Put the model's numbers into a fresh memory. */
-static int fmu_begun(swp_memory *memory, const unsigned char *bytes) {
+RARE static int fmu_begun(swp_memory *memory, const unsigned char *bytes) {
     size_t count = swp_value_count();
     double *values = malloc(count * sizeof *values);
     if (!values) return SWP_BAD_VALUE;
@@ -198,9 +204,9 @@ static int fmu_begun(swp_memory *memory, const unsigned char *bytes) {
     return status;
 }
 
-SWP_FMU_API swp_fmu *swp_fmu_new(const char *name, const char *token, const char *folder,
-                                 swp_fmu_logger *say, void *environment,
-                                 swp_fmu_callback *log) {
+SWP_FMU_API RARE swp_fmu *swp_fmu_new(const char *name, const char *token, const char *folder,
+                                      swp_fmu_logger *say, void *environment,
+                                      swp_fmu_callback *log) {
     swp_fmu *fmu = calloc(1, sizeof *fmu);
     if (!fmu) return NULL;
     fmu->say = say;
@@ -247,7 +253,7 @@ static int fmu_within(uint32_t reference, uint32_t first, int count) {
 /* --- samples ------------------------------------------------------------------------------------ */
 
 /* After a failure inside the model nothing more can be computed, but a state can be set. */
-static int fmu_failed(swp_fmu *fmu, int status) {
+RARE static int fmu_failed(swp_fmu *fmu, int status) {
     fmu->memory.mode = SWP_FMU_FAILED;
     return swp_fmu_fail(fmu, swp_sentence(status));
 }
@@ -345,7 +351,7 @@ static int fmu_is_time(const swp_memory *m, double time) {
     return fabs(time) * DBL_EPSILON <= POINT_TOLERANCE * m->step;
 }
 
-SWP_FMU_API int swp_fmu_setup(swp_fmu *fmu, double start, int ends, double stop) {
+SWP_FMU_API RARE int swp_fmu_setup(swp_fmu *fmu, double start, int ends, double stop) {
     if (!fmu) return SWP_FMU_ERROR;
     int status = fmu_in_mode(fmu, IN(INSTANTIATED), "a start time");
     if (status != SWP_FMU_OK) return status;
@@ -357,7 +363,7 @@ SWP_FMU_API int swp_fmu_setup(swp_fmu *fmu, double start, int ends, double stop)
     return SWP_FMU_OK;
 }
 
-SWP_FMU_API int swp_fmu_begin(swp_fmu *fmu) {
+SWP_FMU_API RARE int swp_fmu_begin(swp_fmu *fmu) {
     if (!fmu) return SWP_FMU_ERROR;
     swp_memory *m = &fmu->memory;
     int status = fmu_in_mode(fmu, IN(INSTANTIATED), "initialization");
@@ -557,7 +563,7 @@ SWP_FMU_API int swp_fmu_get_boolean(swp_fmu *fmu, uint32_t reference, int *value
     return SWP_FMU_OK;
 }
 
-SWP_FMU_API int swp_fmu_set_boolean(swp_fmu *fmu, uint32_t reference, int value) {
+SWP_FMU_API RARE int swp_fmu_set_boolean(swp_fmu *fmu, uint32_t reference, int value) {
     swp_memory *m = &fmu->memory;
     int before = 0;
     int status = swp_fmu_get_boolean(fmu, reference, &before);
@@ -578,7 +584,7 @@ SWP_FMU_API int swp_fmu_set_boolean(swp_fmu *fmu, uint32_t reference, int value)
     return SWP_FMU_OK;
 }
 
-SWP_FMU_API int swp_fmu_set_slope(swp_fmu *fmu, uint32_t reference, double slope) {
+SWP_FMU_API RARE int swp_fmu_set_slope(swp_fmu *fmu, uint32_t reference, double slope) {
     if (!fmu_within(reference, SWP_FMI_INPUT, SWP_FMI_INPUTS))
         return swp_fmu_fail(fmu, "only inputs have derivatives");
     int status = fmu_in_mode(fmu, SETTABLE, "a derivative");
@@ -636,7 +642,7 @@ static void fmu_header(const swp_fmu *fmu, unsigned char *bytes) {
     memcpy(bytes + 24, &fmu->resource, 8);
 }
 
-SWP_FMU_API int swp_fmu_write(swp_fmu *fmu, const void *state, unsigned char *bytes, size_t size) {
+SWP_FMU_API RARE int swp_fmu_write(swp_fmu *fmu, const void *state, unsigned char *bytes, size_t size) {
     if (!fmu || !state || !bytes || size < STATE_SIZE)
         return swp_fmu_fail(fmu, "there is no state, or no room for it");
     fmu_header(fmu, bytes);
@@ -647,12 +653,12 @@ SWP_FMU_API int swp_fmu_write(swp_fmu *fmu, const void *state, unsigned char *by
 }
 
 /* Whether a state could be one of this library: its hash is no protection against intent. */
-static int fmu_possible(const swp_memory *m) {
+RARE static int fmu_possible(const swp_memory *m) {
     return swp_valid(&m->model) && m->step == swp_get_step(&m->model) && m->sample >= -1 &&
            m->mode >= SWP_FMU_INSTANTIATED && m->mode <= SWP_FMU_FAILED;
 }
 
-SWP_FMU_API int swp_fmu_read(swp_fmu *fmu, const unsigned char *bytes, size_t size, void **state) {
+SWP_FMU_API RARE int swp_fmu_read(swp_fmu *fmu, const unsigned char *bytes, size_t size, void **state) {
     unsigned char own[STATE_HEADER];
     if (!fmu) return SWP_FMU_ERROR;
     if (!bytes || !state) return swp_fmu_missing(fmu);
