@@ -30,8 +30,8 @@ AXES = ("hoist", "slew", "luff", "neutral")
 WATCHED = ("current", "shaft_speed", "shaft_position")
 """Signals that are compared; their value references stand in play.c."""
 MOST_COMPRESSED = 155_000
-"""Bytes that all of them together may add to the wheel: 146,000 without the refusals of calls outside
-their mode, odd times and damaged states, most of which are sentences."""
+"""Bytes that all of them together may add to the wheel: 146,000 without the refusals of calls
+outside their mode, odd times and damaged states, most of which are sentences."""
 LOADERS = ("/usr/aarch64-linux-gnu", "/usr/lib/aarch64-linux-gnu")
 
 
