@@ -42,10 +42,12 @@ static void *fmu_kept_string(const char *text) {
     return made ? memcpy(made, text, length) : NULL;
 }
 
-#if defined(__GNUC__) /* what is called once or never is made small, and not put into its callers */
-#define RARE __attribute__((noinline, cold))
+#if defined(__GNUC__) /* what is called once or never is compiled for size */
+#define RARE __attribute__((cold))
+#define APART __attribute__((cold, noinline))
 #else
 #define RARE
+#define APART
 #endif
 
 SWP_FMU_API RARE int swp_fmu_fail(swp_fmu *fmu, const char *message) {
@@ -68,13 +70,13 @@ typedef struct {
     size_t length;
 } fmu_words;
 
-RARE static void fmu_add(fmu_words *to, const char *text) {
+APART static void fmu_add(fmu_words *to, const char *text) {
     while (*text && to->length + 1 < sizeof to->text) to->text[to->length++] = *text++;
     to->text[to->length] = '\0';
 }
 
 /* A number with seven decimals at most. */
-RARE static void fmu_add_number(fmu_words *to, double value) {
+APART static void fmu_add_number(fmu_words *to, double value) {
     char digits[32];
     size_t at = sizeof digits - 1;
     digits[at] = '\0';
@@ -96,7 +98,7 @@ RARE static void fmu_add_number(fmu_words *to, double value) {
 }
 
 /* A call that is not for the mode that the instance is in; `modes` has a bit for each that is. */
-RARE static int fmu_in_mode(swp_fmu *fmu, unsigned modes, const char *call) {
+APART static int fmu_in_mode(swp_fmu *fmu, unsigned modes, const char *call) {
     static const char *const when[] = {
         "before initialization", "during initialization", "while stepping",
         "after termination; reset the instance or set a state",
@@ -112,7 +114,7 @@ RARE static int fmu_in_mode(swp_fmu *fmu, unsigned modes, const char *call) {
 #define IN(MODE) (1u << SWP_FMU_##MODE)
 
 /* A refused value: the instance goes on as it was. */
-RARE static int fmu_refuse(swp_fmu *fmu, const char *what, const char *why) {
+APART static int fmu_refuse(swp_fmu *fmu, const char *what, const char *why) {
     fmu_words message = {{0}, 0};
     fmu_add(&message, what);
     fmu_add(&message, ": ");
@@ -144,7 +146,7 @@ static FILE *fmu_opened(const char *path) {
 }
 
 /* The bytes of FOLDER/drive.bin, or NULL. */
-RARE static unsigned char *fmu_resource(const char *folder, size_t *size) {
+APART static unsigned char *fmu_resource(const char *folder, size_t *size) {
     static const char name[] = "/drive.bin";
     size_t length = strlen(folder);
     while (length > 0 && (folder[length - 1] == '/' || folder[length - 1] == '\\')) length--;
@@ -163,7 +165,7 @@ RARE static unsigned char *fmu_resource(const char *folder, size_t *size) {
 }
 
 /* What is wrong with a resource, NULL if it can be used. */
-RARE static const char *fmu_fault(const unsigned char *bytes, size_t size, const char *token) {
+APART static const char *fmu_fault(const unsigned char *bytes, size_t size, const char *token) {
     if (size < HEADER_LENGTH || memcmp(bytes, RESOURCE_MAGIC, 8) != 0)
         return "resources/drive.bin holds no numbers of swashplate; export the FMU again";
     if (fmu_little_endian(bytes + 8, 4) != RESOURCE_VERSION ||
@@ -177,14 +179,14 @@ RARE static const char *fmu_fault(const unsigned char *bytes, size_t size, const
     return NULL;
 }
 
-RARE static uint64_t fmu_hash_of(const unsigned char *bytes, size_t size) { /* FNV-1a */
+APART static uint64_t fmu_hash_of(const unsigned char *bytes, size_t size) { /* FNV-1a */
     uint64_t hash = 14695981039346656037u;
     for (size_t i = 0; i < size; i++) hash = (hash ^ bytes[i]) * 1099511628211u;
     return hash;
 }
 
 /* Put the model's numbers into a fresh memory. */
-RARE static int fmu_begun(swp_memory *memory, const unsigned char *bytes) {
+APART static int fmu_begun(swp_memory *memory, const unsigned char *bytes) {
     size_t count = swp_value_count();
     double *values = malloc(count * sizeof *values);
     if (!values) return SWP_BAD_VALUE;
@@ -253,7 +255,7 @@ static int fmu_within(uint32_t reference, uint32_t first, int count) {
 /* --- samples ------------------------------------------------------------------------------------ */
 
 /* After a failure inside the model nothing more can be computed, but a state can be set. */
-RARE static int fmu_failed(swp_fmu *fmu, int status) {
+APART static int fmu_failed(swp_fmu *fmu, int status) {
     fmu->memory.mode = SWP_FMU_FAILED;
     return swp_fmu_fail(fmu, swp_sentence(status));
 }
@@ -642,7 +644,8 @@ static void fmu_header(const swp_fmu *fmu, unsigned char *bytes) {
     memcpy(bytes + 24, &fmu->resource, 8);
 }
 
-SWP_FMU_API RARE int swp_fmu_write(swp_fmu *fmu, const void *state, unsigned char *bytes, size_t size) {
+SWP_FMU_API RARE int swp_fmu_write(swp_fmu *fmu, const void *state, unsigned char *bytes,
+                                   size_t size) {
     if (!fmu || !state || !bytes || size < STATE_SIZE)
         return swp_fmu_fail(fmu, "there is no state, or no room for it");
     fmu_header(fmu, bytes);
@@ -653,12 +656,13 @@ SWP_FMU_API RARE int swp_fmu_write(swp_fmu *fmu, const void *state, unsigned cha
 }
 
 /* Whether a state could be one of this library: its hash is no protection against intent. */
-RARE static int fmu_possible(const swp_memory *m) {
+APART static int fmu_possible(const swp_memory *m) {
     return swp_valid(&m->model) && m->step == swp_get_step(&m->model) && m->sample >= -1 &&
            m->mode >= SWP_FMU_INSTANTIATED && m->mode <= SWP_FMU_FAILED;
 }
 
-SWP_FMU_API RARE int swp_fmu_read(swp_fmu *fmu, const unsigned char *bytes, size_t size, void **state) {
+SWP_FMU_API RARE int swp_fmu_read(swp_fmu *fmu, const unsigned char *bytes, size_t size,
+                                  void **state) {
     unsigned char own[STATE_HEADER];
     if (!fmu) return SWP_FMU_ERROR;
     if (!bytes || !state) return swp_fmu_missing(fmu);
