@@ -237,6 +237,7 @@ def whole_interface(model: Any) -> None:
         model.output(number)
         model.set_input(number, 1.0)
         model.set_input(number, float("nan"))
+        model.set_input(number, -1e300)
         model.clear_input(number)
         model.function("sentence")(number)
         model.function("parameter_name")(number)
