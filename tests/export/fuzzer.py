@@ -85,7 +85,7 @@ def main() -> None:
     hoist = Drive.preset("hoist")
     for drive in (hoist, hoist.replace(**REFINEMENTS).renamed("refined")):
         for fmi in PREFIX:
-            with tempfile.TemporaryDirectory(prefix="swashplate-") as folder:
+            with tempfile.TemporaryDirectory(prefix="fuzzed-fmu-") as folder:
                 fuzzer = fuzzer_of(drive, fmi, Path(folder))
                 done = fuzzer.run(arguments.seed, 60.0 * arguments.minutes / 4.0)
             print(f"{drive.name}, FMI {fmi}: {done.stdout.strip()}", flush=True)
