@@ -187,7 +187,9 @@ def column(values: ArrayLike, what: str, *, finite: bool = True) -> Array:
         raise InputError(f"{what} is empty.")
     data = np.array(given, dtype=np.float64, order="C")  # not changed with the user's array
     # one pass: a sum is finite if and only if no sample is NaN or infinite, overflow apart
-    if finite and not np.isfinite(data.sum()):
+    with np.errstate(all="ignore"):
+        total = data.sum()
+    if finite and not np.isfinite(total):
         bad = np.flatnonzero(~np.isfinite(data))
         if bad.size:
             raise InputError(
