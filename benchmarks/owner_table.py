@@ -29,7 +29,8 @@ from swashplate.executors import Processes
 # --- levels ---------------------------------------------------------------------------------------
 
 SLOW, FAST = 128.0, 512.0
-"""Rates of the log and of the simulated winch; the command is held between samples of the log.
+"""Rates of the log and of the simulated winch, the command held between samples of the log. The drive
+"neutral" has a filter as fast as 512 Hz can carry: at other rates it is 1 ms faster or slower.
 [Hz]"""
 TOP_SPEED = (0.3, 30.0)
 """At the stop of the swash plate, log-uniform, the same both ways within ±10 %. [rad/s]"""
@@ -38,7 +39,7 @@ SATURATION = (6.0, 13.0)
 DEAD_ZONE = (0.2, 2.5)
 """Uniform, each way. [V]"""
 JUMP = (0.03, 0.10)
-"""Speed right beyond the dead zone over the top speed, in every second pair of winches. [1]"""
+"""Speed right beyond the dead zone over the top speed, in every second four of winches. [1]"""
 BEND = 0.15
 """Quadratic part of the current at the largest command, at most, over the linear one. [1]"""
 LAG, DELAY = (0.05, 0.4), (0.0, 0.1)
@@ -58,7 +59,7 @@ WAYS = ("positive", "negative")
 QUANTITIES = ("dead zone", "top speed", "acceleration", "delay", "lag", "creep")
 FIELDS = (
     *("seed", "sensor", "orifice", "quantity", "way"),
-    *("truth", "printed", "low", "high", "fit_cpu"),
+    *("truth", "printed", "low", "high", "grade", "fit_cpu"),
 )
 
 
@@ -84,7 +85,7 @@ def draw(seed):
     tops = top * np.exp(0.1 * random.uniform(-1.0, 1.0, 2))
     saturation = random.uniform(*SATURATION, 2)
     dead_zone = random.uniform(*DEAD_ZONE, 2)
-    jump = random.uniform(*JUMP, 2) * tops * (seed // 2 % 2)
+    jump = random.uniform(*JUMP, 2) * tops * (seed // 4 % 2)
     # current to speed: linear to 0.4 % in the neutral drive
     per_ampere = per_angle * numbers["Z5"] * numbers["Z19_plus"]
     per_ampere /= math.sqrt(numbers["Z4"]) * numbers["Z3"]
@@ -171,12 +172,14 @@ def write_logs(seed, folder):
         fast = np.append(np.repeat(command[:-1], repeats), command[-1])
         run = drive.simulate(fast, FAST, interpolation="previous")
         stamps = np.arange(command.size) / SLOW
+        # a march joins its points by straight lines: what is held acts half a step too early
+        seen = stamps - 0.5 / FAST
         if sensor == "tacho":
-            speed = run.shaft_speed[::repeats]
+            speed = np.interp(seen, run.time, run.shaft_speed)
             noise = level * np.abs(speed).max() * random.standard_normal(speed.size)
             head, values = "speed", [f"{each:.6g}" for each in speed + noise]
         else:
-            turns = run.shaft_position[::repeats] / (2.0 * math.pi)
+            turns = np.interp(seen, run.time, run.shaft_position) / (2.0 * math.pi)
             counts = np.floor(counts_per_turn * turns + random.random())
             head, values = "counts", [f"{each:.0f}" for each in counts - counts[0]]
         rows = [f"time,command,{head}"]
@@ -209,7 +212,7 @@ def fitted(seed, folder):
         judge_fit(campaign, result).store(stored)
         seconds = time.process_time() - begun
         (folder / "seconds.txt").write_text(f"{seconds:.1f}\n", "utf-8")
-    return load_fit(stored, campaign, threads=1).result
+    return load_fit(stored, campaign, threads=1)
 
 
 def rows_of(folder, seed):
@@ -219,7 +222,8 @@ def rows_of(folder, seed):
 
     drive, _, sensor, orifice = draw(seed)
     place = Path(folder) / f"{seed:02d}"
-    result = fitted(seed, place)
+    judged = fitted(seed, place)
+    result = judged.result
     truth, values = numbers_of(drive), numbers_of(result.drive)
     table, _ = numbers_table(result.drive, result.stages)
     seconds = (place / "seconds.txt").read_text("utf-8").strip()
@@ -232,7 +236,7 @@ def rows_of(folder, seed):
             printed = cell if isinstance(cell, str) else cell.text
             low, high = ends(printed)
             words = (seed, sensor[0], orifice, name, way)
-            rows.append((*words, factor * exact, printed, low, high, seconds))
+            rows.append((*words, factor * exact, printed, low, high, judged.verdict.grade, seconds))
     return rows
 
 
