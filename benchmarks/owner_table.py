@@ -29,9 +29,8 @@ from swashplate.executors import Processes
 # --- levels ---------------------------------------------------------------------------------------
 
 SLOW, FAST = 128.0, 512.0
-"""Rates of the log and of the simulated winch, the command held between samples of the log. The drive
-"neutral" has a filter as fast as 512 Hz can carry: at other rates it is 1 ms faster or slower.
-[Hz]"""
+"""Rates of the log and of the simulated winch; the command is held between samples of the log. The
+drive "neutral" has a filter as fast as 512 Hz can carry: at others it is 1 ms off. [Hz]"""
 TOP_SPEED = (0.3, 30.0)
 """At the stop of the swash plate, log-uniform, the same both ways within ±10 %. [rad/s]"""
 SATURATION = (6.0, 13.0)
