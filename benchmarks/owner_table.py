@@ -216,14 +216,15 @@ def fitted(seed, folder):
 
 def rows_of(folder, seed):
     """Rows of a winch's table: a quantity one way, with the truth and what is printed."""
-    from swashplate.report.fit_report.summary import numbers_of, numbers_table
+    from swashplate.report.fit_report.summary import largest_commands, numbers_of, numbers_table
     from swashplate.units import display_unit
 
     drive, _, sensor, orifice = draw(seed)
     place = Path(folder) / f"{seed:02d}"
     judged = fitted(seed, place)
     result = judged.result
-    truth, values = numbers_of(drive), numbers_of(result.drive)
+    largest = largest_commands(result.stages)
+    truth, values = numbers_of(drive, largest), numbers_of(result.drive, largest)
     table, _ = numbers_table(result.drive, result.stages)
     seconds = (place / "seconds.txt").read_text("utf-8").strip()
     rows = []
@@ -240,28 +241,33 @@ def rows_of(folder, seed):
 
 
 def ends(printed):
-    """Ends of what a cell promises: of an interval both, of "at least" the one nearer to 0."""
+    """Ends of what a cell promises: of an interval both, of "at least" and "at most" one."""
     if "±" in printed:
         value, half = (float(part.split()[0]) for part in printed.split("±"))
         return value - half, value + half
     if printed.startswith("at least"):
         return float(printed.split()[2].rstrip(",")), ""
+    if printed.startswith("at most"):
+        return "", float(printed.split()[2].rstrip(","))
     return "", ""
 
 
 def holds(row):
-    """Whether a truth lies within the ends of a row; None if nothing is promised."""
+    """Whether a truth lies within the ends of a row; None if nothing is promised.
+
+    One end alone is of the size, whatever the direction.
+    """
     truth, low, high = float(row["truth"]), row["low"], row["high"]
-    if low == "":
-        return None
-    if high == "":
-        return abs(truth) >= abs(float(low)) and truth * float(low) >= 0.0
-    return float(low) <= truth <= float(high)
+    if low and high:
+        return float(low) <= truth <= float(high)
+    if low:
+        return abs(truth) >= abs(float(low))
+    return abs(truth) <= abs(float(high)) if high else None
 
 
 def report(rows):
     """Print shares: of all rows, of quantities, and of winches with one orifice or two."""
-    print("| rows | with an interval | hold | at least | hold |\n|---|--:|--:|--:|--:|")
+    print("| rows | with an interval | hold | one end | hold |\n|---|--:|--:|--:|--:|")
     groups = {"all": rows}
     for name in QUANTITIES:
         groups[name] = [row for row in rows if row["quantity"] == name]
@@ -272,8 +278,8 @@ def report(rows):
     for name in ("tacho", "encoder"):
         groups[name] = [row for row in rows if row["sensor"] == name]
     for name, some in groups.items():
-        intervals = [holds(row) for row in some if row["high"] != ""]
-        bounds = [holds(row) for row in some if row["low"] != "" and row["high"] == ""]
+        intervals = [holds(row) for row in some if row["low"] and row["high"]]
+        bounds = [holds(row) for row in some if bool(row["low"]) != bool(row["high"])]
         print(f"| {name} | {len(some)} | {shares(intervals)} | {shares(bounds)} |")
     seconds = {row["seed"]: float(row["fit_cpu"]) for row in rows}
     print(f"\n{len(seconds)} winches, guess and fit {sum(seconds.values()):.0f} s of CPU.")

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from math import atan, inf
+from math import inf
 from typing import TYPE_CHECKING, Unpack
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from swashplate.analysis.capability import farthest_stop
 from swashplate.analysis.outcomes import (
     checked_speed,
     rms_difference,
@@ -32,11 +33,6 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 # --- limits that can be taken away ----------------------------------------------------------------
-
-FEEDBACK_ARM = 0.98
-"""Sine of the feedback arm's angle at which a plate without a stop is still held: at 1 the closed
-form of the spool ends."""
-WIDEST = 1.5  # Largest angle of a plate without a stop; the model ends at a right angle. [rad]
 
 
 @dataclass(frozen=True)
@@ -68,7 +64,7 @@ def removals(drive: Drive) -> list[Removal]:
     numbers = drive.parameters.numbers
     # with the card's jump left as it is, a solenoid's dead zone beyond it would stay
     jump = min(numbers["Z17"], numbers["J_plus"], numbers["J_minus"])
-    plate = min(atan(FEEDBACK_ARM / numbers["Z3"]), WIDEST)
+    plate = farthest_stop(drive)
     stops = {name: max(plate, numbers[name]) for name in ("Z13_plus", "Z13_minus")}
     larger = "pump: larger, or a smaller motor (Z10, Z13)"
     orifice = "in-line orifice: larger bore (Z16)"

@@ -16,11 +16,12 @@ from swashplate.__about__ import __version__
 from swashplate.campaign.campaign import Campaign
 from swashplate.campaign.experiment import Experiment
 from swashplate.documents import read_json
-from swashplate.errors import FileError, InputError
+from swashplate.errors import DomainError, FileError, InputError
 from swashplate.identification import tables
 from swashplate.identification.criteria import REQUIRED, Verdict, verdict
 from swashplate.identification.drive_model import Parameters
 from swashplate.identification.fitting import Fit, Solved, StageFit, fingerprint, staged
+from swashplate.identification.intervals import unseen_limits
 from swashplate.identification.problem import Loss, Problem
 from swashplate.identification.profiles import Profile, profiles_of
 from swashplate.identification.resampling import (
@@ -136,8 +137,19 @@ class Judged(Result):
         if not self.verdict.usable:
             title += f". {self.verdict.headline.rstrip('.')}"
         return replace(
-            found, title=title, parameters=parameters, motion=motion_of(self.result.runs)
+            found,
+            title=title,
+            parameters=parameters,
+            motion=motion_of(self.result.runs),
+            unreached=self._unreached(),
         )
+
+    def _unreached(self) -> dict[str, float]:
+        """Limits that the fitted runs do not reach; none of a drive that cannot be simulated."""
+        try:
+            return unseen_limits(self.result.stages)
+        except (DomainError, InputError):
+            return {}
 
 
 def motion_of(runs: Iterable[Experiment]) -> Motion:

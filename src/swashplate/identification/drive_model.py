@@ -78,6 +78,15 @@ REACHED = (
 """Limits, the signal whose sign says which side acts, the parameter that sets them, and words."""
 LIMITS = {symbol: words for _, _, symbol, words in sorted(REACHED, key=lambda each: each[2])}
 """What a drive may never have reached in the fitted runs, by symbol."""
+LIMIT_COLUMNS = {
+    "Z13_plus": ("swash_angle", 1.0),
+    "Z13_minus": ("swash_angle", -1.0),
+    "Z14": ("spool_position", 0.0),
+    "Z15": ("stroker_pressure", 0.0),
+    "Z16_plus": ("orifice_opening", 1.0),
+    "Z16_minus": ("orifice_opening", -1.0),
+}
+"""The signal that each of these limits bounds, and the sign of its side, 0 for both."""
 
 # --- what drives an experiment --------------------------------------------------------------------
 
@@ -169,12 +178,34 @@ def simulated_run(experiment: Experiment, parameters: ParameterSet) -> Simulatio
 
 def limits_reached(experiment: Experiment, parameters: ParameterSet) -> set[str]:
     """Columns of the limits that act in a run, such as ``"Z16_plus"``, of Z13 to Z16."""
-    run, found = simulated_run(experiment, parameters), set[str]()
+    return _limits_acting(simulated_run(experiment, parameters))
+
+
+def _limits_acting(run: Simulation) -> set[str]:
+    found = set[str]()
     for limit, signal, symbol, _ in REACHED:
         acts = run.active(limit)
         sides = {"_plus": run[signal] > 0.0, "_minus": run[signal] < 0.0} if signal else {"": acts}
         found |= {symbol + side for side, there in sides.items() if (acts & there).any()}
     return found
+
+
+def limits_unreached(
+    experiments: Sequence[Experiment], parameters: ParameterSet
+) -> dict[str, float]:
+    """Columns of the limits that act in none of some runs, and how far these went. [SI]
+
+    Of Z13 to Z16, whether the model has such a limit or not: behind what was reached anything may
+    lie. Errors are those of `simulated_run`.
+    """
+    reached, acting = dict.fromkeys(LIMIT_COLUMNS, 0.0), set[str]()
+    for each in experiments:
+        run = simulated_run(each, parameters)
+        acting |= _limits_acting(run)
+        for column, (signal, sign) in LIMIT_COLUMNS.items():
+            values = np.abs(run[signal]) if sign == 0.0 else sign * run[signal]
+            reached[column] = max(reached[column], float(values.max()))
+    return {column: value for column, value in reached.items() if column not in acting}
 
 
 def at_rate_of(

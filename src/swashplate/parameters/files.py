@@ -6,7 +6,7 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Annotated, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, PositiveFloat
+from pydantic import BaseModel, ConfigDict, Field, NonNegativeFloat, PositiveFloat
 
 from swashplate.documents import parse_toml, read_text, validated
 from swashplate.equations.replacement import found_at
@@ -60,6 +60,8 @@ class ModelOptions(FilePart):
     equations: list[dict[str, str]] = []
     """One's own equations in place of the package's, each as ``module:name``."""
     motion: Motion = "shaft"
+    unreached: dict[str, NonNegativeFloat] = {}
+    """Limits that the tests never reached, by column, and how far they went. [SI]"""
 
 
 class CardFile(FilePart):
@@ -140,6 +142,8 @@ def read_set(text: str, origin: str) -> ParameterSet:
     }
     parameters: dict[str, Parameter] = {}
     try:
+        for column in model.unreached:
+            find(column)
         for block, table in blocks.items():
             for symbol, entry in table.items():
                 definition = find(symbol)
@@ -153,7 +157,7 @@ def read_set(text: str, origin: str) -> ParameterSet:
         *(contents.name, contents.title, card_name, parameters),
         *(model.pressure_root, model.coulomb_sign, model.card_switch, rate),
         options_of(values) if model.options is None else frozenset(model.options),
-        *(tuple(equations), model.motion),
+        *(tuple(equations), model.motion, model.unreached),
     )
 
 
@@ -205,6 +209,10 @@ def dump_set(parameters: ParameterSet) -> str:
         options["equations"] = [each.places for each in parameters.equations]
     if parameters.motion != "shaft":
         options["motion"] = parameters.motion
+    if parameters.unreached:
+        unreached = inline_table()
+        unreached.update(parameters.unreached)
+        options["unreached"] = unreached
     blocks: dict[str, dict[str, object]] = {"model": options}
     for symbol, each in parameters.items():
         entry = inline_table()
