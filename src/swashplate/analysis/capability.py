@@ -276,7 +276,7 @@ class Envelope(Tabular):
         if near is None or far is None or self._reach_unknown(way, name):
             return Cell(None, "not seen")
         words = "at least" if abs(far) > abs(near) else "at most"
-        return Cell(near, f"{words} {plain(display_unit(unit).factor * near, 3)}, not seen")
+        return Cell(near, f"{words} {plain(display_unit(unit).factor * near, 4)}, not seen")
 
     def _reach_unknown(self, way: int, name: str) -> bool:
         """Whether the tests do not tell how far an orifice, which decides a number, was opened."""

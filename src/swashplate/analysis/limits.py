@@ -127,6 +127,8 @@ class LimitShares(Tabular):
     error: float
     """Rms tracking error of the drive as it is. [rad/s]"""
     shares: tuple[LimitShare, ...]
+    reference: str = "the speed of a drive without limits"
+    """What is compared with, in words."""
 
     @property
     def first(self) -> LimitShare | None:
@@ -139,8 +141,9 @@ class LimitShares(Tabular):
         if first is not None and first.error is not None:
             share = 1.0 - first.error / self.error
             said = [
-                f"Change first: {first.component}. Without this limit the error falls by "
-                f"{100.0 * share:.1f} % to {quantity(first.error, 'rad/s', spec='.3f')} rms."
+                f"Change first: {first.component}. Without this limit the rms difference from "
+                f"{self.reference} falls by {100.0 * share:.1f} % to "
+                f"{quantity(first.error, 'rad/s', spec='.3f')}."
             ]
         failed = (each for each in self.shares if each.failure)
         return said + [f"Not without the {each.limit}: {each.failure}" for each in failed]
@@ -265,4 +268,5 @@ def shares_of(drive: Drive, run: Simulation, wanted: ArrayLike | None = None) ->
             )
         )
     shares.sort(key=lambda each: inf if each.error is None else each.error)
-    return LimitShares(drive.name, run, asked, error, tuple(shares))
+    made = LimitShares(drive.name, run, asked, error, tuple(shares))
+    return made if wanted is None else replace(made, reference="the wanted speed")

@@ -30,6 +30,9 @@ Move = Callable[[float, Known], float]
 
 WIDE = 0.1
 """Half width of a 95 % interval, of the value or the scale, from which an unknown is weak. [1]"""
+VAGUE = 1.0
+"""Half width of a 95 % interval, of the value or the scale, from which an unknown is hardly known.
+[1]"""
 HALF = 1.96
 """Half width of a 95 % interval, in standard errors."""
 MENTIONED, NAMED = 0.02, 6
@@ -142,6 +145,13 @@ class Direction(NamedTuple):
         return isfinite(self.half_width)
 
     @property
+    def precision(self) -> str:
+        """How well the unknown to fix is known; beyond its own size a percentage says nothing."""
+        if self.half_width >= VAGUE:
+            return "to no better than ±100 %"
+        return f"to ±{100.0 * self.half_width:.3g} %"
+
+    @property
     def sentence(self) -> str:
         """What an engineer would say."""
         if self.gauge is not None:
@@ -154,7 +164,7 @@ class Direction(NamedTuple):
         if self.weak:
             along = f" ({moves} have little effect together)" if len(self.changes) > 1 else ""
             return (
-                f"Weak: {self.fix} is known to ±{100.0 * self.half_width:.3g} % only{along}. Add a "
+                f"Weak: {self.fix} is known {self.precision} only{along}. Add a "
                 "test that determines it, or fix one whose value you know."
             )
         change = "together change" if len(self.changes) > 1 else "changes"
@@ -203,6 +213,11 @@ class Identifiability(Result):
         free, rank = int(np.count_nonzero(self.variables.free)), self.rank
         told = f"{rank} combination{'' if rank == 1 else 's'} of {free} free parameters"
         told = f"all {free} free parameters" if rank == free else told
+        vague = [each.fix for each in self.weak if each.half_width >= VAGUE]
+        if vague and rank > len(vague):
+            known = rank - len(vague)
+            told = f"{known} combination{'' if known == 1 else 's'} of {free} free parameters"
+            told += f", and hardly {listed(vague)}"
         said = [f"The tests determine {told if rank else 'none of the parameters'}."]
         if not free:
             said = ["All parameters are at a bound: there is nothing left to determine."]
@@ -214,7 +229,7 @@ class Identifiability(Result):
         if len(self.weak) == 1:
             said.append(self.weak[0].sentence)
         elif self.weak:
-            known = [f"{each.fix} to ±{100.0 * each.half_width:.3g} %" for each in self.weak]
+            known = [f"{each.fix} {each.precision}" for each in self.weak]
             said.append(
                 f"Weak, each with those before it fixed: {listed(known)}. Add tests that determine "
                 "them, or fix those whose values you know."
