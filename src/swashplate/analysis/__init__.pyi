@@ -18,6 +18,7 @@ from .limits import LimitShares as LimitShares
 from .limits import limit_shares as limit_shares
 from .monte_carlo import Bands as Bands
 from .monte_carlo import Draws as Draws
+from .monte_carlo import assumed_parameters as assumed_parameters
 from .monte_carlo import bands as bands
 from .monte_carlo import changes_left_open as changes_left_open
 from .monte_carlo import drives as drives

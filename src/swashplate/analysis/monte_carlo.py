@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from json import JSONDecodeError, loads
-from math import sqrt
+from math import isfinite, sqrt
 from pathlib import Path
+from types import MappingProxyType
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,14 +19,19 @@ from swashplate.documents import read_text
 from swashplate.drive import Drive
 from swashplate.errors import DomainError, FileError, InputError, ParameterError
 from swashplate.identification.assessment import load_fit
-from swashplate.identification.drive_model import DriveModel
+from swashplate.identification.drive_model import LIMIT_COLUMNS, DriveModel
 from swashplate.identification.fitting import StageFit
+from swashplate.identification.intervals import slopes_by
+from swashplate.identification.setup import Forces
 from swashplate.parameters.parameter_set import ParameterSet
 from swashplate.parameters.rules import FULL_VOLTAGE
 from swashplate.results import Result
 
 Array = NDArray[np.float64]
 
+ASSUMED = 0.2
+"""Standard deviation of an assumed parameter over its value: a guess takes 0.2 rad for the plate's
+largest angle, machines have 0.25 to 0.35. [1]"""
 STEP, LARGEST_STEP, NEGLIGIBLE = 0.1, 0.05, 1e-12
 """Of a derivative along an error of estimates: part of a standard error, change of the solver's
 numbers at most, and changes of them that count as none. [1]"""
@@ -123,7 +129,41 @@ def drives(stages: Sequence[StageFit], draws: int = 200, seed: int = 0) -> Draws
     return Draws(tuple(made), redrawn, fixed)
 
 
-def standard_errors(stages: Sequence[StageFit], numbers: Callable[[Drive], Array]) -> Array:
+def assumed_parameters(stages: Sequence[StageFit]) -> list[dict[str, float]]:
+    """Fixed parameters that nobody measured, by column, and what they may be off by.
+
+    Those of the set that a fit begins from whose status is "assumed" or "approximate", both
+    directions together, without those that a stage moves or whose uncertainty is stated.
+    """
+    model = stages[0].problem.model
+    assert isinstance(model, DriveModel)
+    moved = {
+        target
+        for stage in stages
+        for unknown in stage.problem.unknowns
+        for target in unknown.targets
+    }
+    stated = {name for together in stages[0].problem.uncertain for name in together}
+    if any(stage.stage.forces is not None for stage in stages):
+        moved |= set(Forces.columns)
+    known = moved | stated | LIMIT_COLUMNS.keys()
+    found = []
+    for parameter in model.parameters.values():
+        numbers = {
+            column: ASSUMED * value
+            for column, value in parameter.numbers.items()
+            if isfinite(value) and value != 0.0
+        }
+        if parameter.status in ("assumed", "approximate") and known.isdisjoint(numbers) and numbers:
+            found.append(numbers)
+    return found
+
+
+def standard_errors(
+    stages: Sequence[StageFit],
+    numbers: Callable[[Drive], Array],
+    assumed: Sequence[Mapping[str, float]] = (),
+) -> Array:
     """Standard errors of numbers of the fitted drive, from those of the estimates.
 
     Parameters
@@ -132,6 +172,9 @@ def standard_errors(stages: Sequence[StageFit], numbers: Callable[[Drive], Array
         All stages of the fit.
     numbers : callable
         From a drive to an array of any shape.
+    assumed : sequence of mappings
+        What fixed numbers may be off by besides, by column, as of `assumed_parameters`. The
+        estimates follow them, so that what the tests show counts, whatever the scales. [SI]
 
     Raises
     ------
@@ -159,6 +202,9 @@ def standard_errors(stages: Sequence[StageFit], numbers: Callable[[Drive], Array
                 variance += slope**2
     for axis in np.eye(uncertain):
         variance += _slope(stages, {}, axis, numbers, base) ** 2
+    for off in assumed:
+        follow = {stage.stage.name: slopes_by(stage, [off])[:, 0] for stage in stages}
+        variance += _slope(stages, follow, none, numbers, base, off) ** 2
     return np.asarray(np.sqrt(variance))
 
 
@@ -191,13 +237,15 @@ def _slope(
     off: Array,
     numbers: Callable[[Drive], Array],
     base: Array,
+    assumed: Mapping[str, float] = MappingProxyType({}),
 ) -> Array:
     """Change of numbers for errors of the stages' vectors, by a small step along them."""
     largest = max((float(np.abs(error).max()) for error in errors.values()), default=0.0)
     first = min(STEP, LARGEST_STEP / largest) if largest else STEP
     for step in (first, -first, 0.1 * first, -0.1 * first):
         moved = {name: step * error for name, error in errors.items()}
-        parameters = _moved(stages, moved, step * off)
+        other = {column: step * size for column, size in assumed.items()}
+        parameters = _moved(stages, moved, step * off, other)
         if parameters is not None:
             return np.asarray((numbers(Drive(parameters)) - base) / step)
     raise InputError(
@@ -219,10 +267,16 @@ def _drawn(stages: Sequence[StageFit], random: np.random.Generator) -> Parameter
     return _moved(stages, errors, off)
 
 
-def _moved(stages: Sequence[StageFit], own: Mapping[str, Array], off: Array) -> ParameterSet | None:
+def _moved(
+    stages: Sequence[StageFit],
+    own: Mapping[str, Array],
+    off: Array,
+    assumed: Mapping[str, float] = MappingProxyType({}),
+) -> ParameterSet | None:
     """A set with each stage's vector off by an error of its own, 0 if none is given.
 
-    `off` are errors of fixed numbers, in standard uncertainties. None outside bounds or domain.
+    `off` are errors of fixed numbers, in standard uncertainties, `assumed` those of others. None
+    outside bounds or domain.
     """
     model, uncertain = stages[0].problem.model, stages[0].problem.uncertain
     assert isinstance(model, DriveModel)
@@ -232,6 +286,7 @@ def _moved(stages: Sequence[StageFit], own: Mapping[str, Array], off: Array) -> 
         for together, number in zip(uncertain, off.tolist(), strict=True)
         for name, size in together.items()
     }
+    fixed |= {column: parameters.numbers[column] + size for column, size in assumed.items()}
     errors = dict[str, Array]()  # of each stage, by its name
     try:
         if fixed:

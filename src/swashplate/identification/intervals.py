@@ -188,7 +188,14 @@ def slopes_by_earlier(stage: StageFit, earlier: StageFit) -> Array:
 
 def slopes_by_fixed(stage: StageFit) -> Array:
     """(K, F) changes of a stage's estimates for a standard uncertainty of each fixed number."""
-    uncertain = stage.problem.uncertain
+    return slopes_by(stage, stage.problem.uncertain)
+
+
+def slopes_by(stage: StageFit, uncertain: Sequence[Mapping[str, float]]) -> Array:
+    """(K, F) changes of a stage's estimates if fixed numbers, by column, change together by these.
+
+    Without what follows from earlier stages.
+    """
     names = [name for together in uncertain for name in together]
     if not names:
         return np.zeros((len(stage.linearised.variables), 0))

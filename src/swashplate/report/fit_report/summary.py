@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from math import ceil, floor, log10
 from typing import Literal, NamedTuple
 
@@ -11,6 +11,7 @@ from markupsafe import Markup
 from numpy.typing import NDArray
 
 from swashplate.analysis import (
+    assumed_parameters,
     changes_left_open,
     dead_zone,
     limit_shares,
@@ -58,6 +59,8 @@ QUANTILE = 1.96
 OPEN = 0.1
 """Share of a number by which limits that no test reached can move it, from which it has one end
 alone; what moves it by less is taken into its interval. [1]"""
+NO_COMMAND = 0.05
+"""Share of the largest command up to which one the other way is none. [1]"""
 FOLLOWS = 0.01
 """Share of a number by which 5 % of what the tests do not determine can move it, from which it has
 no interval. [1]"""
@@ -67,6 +70,8 @@ no interval. [1]"""
 
 Commands = tuple[float, float]
 """Largest command each way, positive and negative, as magnitudes. [V]"""
+ACCELERATION, DELAY, LAG, CREEP = 2, 3, 4, 5
+"""Rows of the numbers."""
 FULL: Commands = (FULL_VOLTAGE, FULL_VOLTAGE)
 
 
@@ -100,19 +105,29 @@ def numbers_of(drive: Drive, largest: Commands = FULL) -> Array:
 
 
 def largest_commands(stages: Sequence[StageFit]) -> Commands:
-    """Largest command each way of the runs that a fit is of; ±10 V for a way that none goes.
+    """Largest command each way of the runs that a fit is of, ±10 V for a way that none goes.
 
     A step to a larger one would show what no test did.
     """
+    plus, minus = (volts or FULL_VOLTAGE for volts in tested_commands(stages))
+    return plus, minus
+
+
+def tested_commands(stages: Sequence[StageFit]) -> Commands:
+    """Largest command each way of the runs that a fit is of, 0 for a way that none goes."""
     commands = [
         run.input.values
         for stage in stages
         for run in stage.problem.experiments
         if run.input.kind == "voltage"
     ]
+    size = max((float(np.abs(values).max()) for values in commands), default=0.0)
     plus = max((float(values.max()) for values in commands), default=0.0)
     minus = max((float(-values.min()) for values in commands), default=0.0)
-    tested = [min(each, FULL_VOLTAGE) if each > 0.0 else FULL_VOLTAGE for each in (plus, minus)]
+    # noise about 0 V is no command
+    tested = [
+        min(each, FULL_VOLTAGE) if each > NO_COMMAND * size else 0.0 for each in (plus, minus)
+    ]
     return tested[0], tested[1]
 
 
@@ -121,8 +136,8 @@ class _Range(NamedTuple):
 
     half: Array
     """Half widths of 95 % intervals, NaN where there is none."""
-    undetermined: NDArray[np.bool_]
-    """Whether a number depends on what the tests do not determine."""
+    doubt: NDArray[np.object_]
+    """Why a number has no interval, in words; empty if it has one."""
     near: Array
     """The numbers if limits that were not seen lie where the tests ended, as cautious ends."""
     far: Array
@@ -137,7 +152,7 @@ def numbers_table(drive: Drive, stages: Sequence[StageFit]) -> tuple[Table, list
     """
     largest = largest_commands(stages)
     values, sentences = numbers_of(drive, largest), list[str]()
-    range_ = _Range(np.full((6, 2), np.nan), np.zeros((6, 2), dtype=np.bool_), values, values)
+    range_ = _Range(np.full((6, 2), np.nan), np.full((6, 2), "", dtype=object), values, values)
     if stages:
         try:
             range_ = _range_of(drive, stages, values, largest)
@@ -172,8 +187,17 @@ def _range_of(drive: Drive, stages: Sequence[StageFit], values: Array, largest: 
     def numbers(one: Drive) -> Array:
         return numbers_of(one, largest)
 
-    half, unseen = QUANTILE * standard_errors(stages, numbers), unseen_limits(stages)
-    undetermined = changes_left_open(stages, numbers, unseen) > FOLLOWS * np.abs(values)
+    unseen, assumed = unseen_limits(stages), assumed_parameters(stages)
+    half = QUANTILE * standard_errors(stages, numbers, assumed)
+    doubt = np.full((6, 2), "", dtype=object)
+    doubt[changes_left_open(stages, numbers, unseen) > FOLLOWS * np.abs(values)] = "not determined"
+    for way, volts in enumerate(tested_commands(stages)):
+        if volts == 0.0:
+            doubt[:CREEP, way] = "not tested"
+    for way, column in enumerate(("Z16_plus", "Z16_minus")):
+        if mistaken_for_a_lag(column, stages, unseen):
+            # the lag is the same both ways, and the delay follows it
+            doubt[ACCELERATION, way] = doubt[DELAY : LAG + 1] = f"{column} fixed"
     nearest, farthest = drive.replace(**unseen), without_limits(drive, unseen)
     near, far = numbers_of(nearest, largest), numbers_of(farthest, largest)
     moved = np.maximum(np.abs(near - values), np.abs(far - values))
@@ -184,7 +208,42 @@ def _range_of(drive: Drive, stages: Sequence[StageFit], values: Array, largest: 
         near = np.where(np.abs(far) > np.abs(near), near - cautious, near + cautious)
     half = np.where(left_open, np.nan, half + moved)
     near, far = np.where(left_open, near, values), np.where(left_open, far, values)
-    return _Range(half, undetermined, near, far)
+    return _Range(half, doubt, near, far)
+
+
+INTERVALS = (
+    "With 95 % intervals of the fit, rounded up, which do not cover what the model leaves out."
+)
+MEANINGS = {
+    "not seen": "Not seen: no test reached the limit that decides it.",
+    "not tested": "Not tested: no run goes that way.",
+    "not determined": "Not determined: the tests leave open what it follows from.",
+    "(fixed)": "Fixed: follows from parameters that were not fitted.",
+    "Z16_": "Z16 fixed: an orifice that the fit did not look for can be mistaken for a lag.",
+}
+"""What words beside a number mean."""
+
+
+def _meanings(table: Table) -> list[str]:
+    """Meanings of the words that a table of numbers uses."""
+    cells = [cell.text for row in table.rows for cell in row.cells if isinstance(cell, Cell)]
+    return [words for word, words in MEANINGS.items() if any(word in cell for cell in cells)]
+
+
+def mistaken_for_a_lag(
+    column: str, stages: Sequence[StageFit], unseen: Mapping[str, float]
+) -> bool:
+    """Whether an orifice that no stage looks for may have been taken for a lag that one estimates.
+
+    Of a limited acceleration a fit without the limit makes a longer lag, and says nothing.
+    """
+    free = {
+        target
+        for stage in stages
+        for unknown in stage.problem.unknowns
+        for target in unknown.targets
+    }
+    return column in unseen and column not in free and "Z8" in free
 
 
 def _cell(factor: float, values: Array, range_: _Range, index: tuple[int, int]) -> Cell:
@@ -193,8 +252,8 @@ def _cell(factor: float, values: Array, range_: _Range, index: tuple[int, int]) 
     near, far = factor * range_.near[index], factor * range_.far[index]
     if not np.isfinite(value):
         return Cell(None, NONE)
-    if range_.undetermined[index]:
-        return Cell(value, f"{value:.4g} (not determined)")
+    if range_.doubt[index]:
+        return Cell(value, f"{value:.4g} ({range_.doubt[index]})")
     if near != far:
         least = abs(far) > abs(near)
         return Cell(near, f"at {'least' if least else 'most'} {_rounded(near, least)}, not seen")
@@ -291,17 +350,15 @@ def summary_section(
     numbers, limits = [], []
     if drive is not None:
         numbers.append(Block("heading", "Numbers that matter", "h3"))
+        table = None
         try:
             table, said = numbers_table(drive, stages)
             numbers.append(Block("table", table, "numbers"))
         except SwashplateError as error:
             said = [f"This drive has none: {error}"]
-        words = (
-            "With 95 % intervals of the fit, rounded up, which do not cover what the model leaves "
-            "out. Not seen: no test reached the limit that decides it. Not determined: the tests "
-            "leave open what it follows from. Fixed: follows from parameters that were not fitted."
-        )
-        numbers.append(text(" ".join([words, *said] if stages else said), "remark"))
+        if stages:
+            said = [INTERVALS, *(_meanings(table) if table else ()), *said]
+        numbers.append(text(" ".join(said), "remark"))
         limits.append(Block("heading", "What limits it", "h3"))
         limits += listed_block(_limits(drive))
     limits.append(Block("heading", "What to do next", "h3"))
