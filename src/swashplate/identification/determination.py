@@ -215,8 +215,8 @@ class Identifiability(Result):
         told = f"all {free} free parameters" if rank == free else told
         vague = [each.fix for each in self.weak if each.half_width >= VAGUE]
         if vague and rank > len(vague):
-            known = rank - len(vague)
-            told = f"{known} combination{'' if known == 1 else 's'} of {free} free parameters"
+            clear = rank - len(vague)
+            told = f"{clear} combination{'' if clear == 1 else 's'} of {free} free parameters"
             told += f", and hardly {listed(vague)}"
         said = [f"The tests determine {told if rank else 'none of the parameters'}."]
         if not free:
