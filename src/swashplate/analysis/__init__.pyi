@@ -16,6 +16,7 @@ from .compensation import wanted_of_stick as wanted_of_stick
 from .limits import LimitShare as LimitShare
 from .limits import LimitShares as LimitShares
 from .limits import limit_shares as limit_shares
+from .monte_carlo import ASSUMED as ASSUMED
 from .monte_carlo import Bands as Bands
 from .monte_carlo import Draws as Draws
 from .monte_carlo import assumed_parameters as assumed_parameters

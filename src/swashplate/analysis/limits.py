@@ -25,7 +25,7 @@ from swashplate.parameters.parameter_set import Change
 from swashplate.results import Result, Tabular
 from swashplate.simulation.result import Limit, Simulation
 from swashplate.simulation.run import simulate_drive
-from swashplate.tables import Column, Table, quantity
+from swashplate.tables import Column, Table, listed, quantity
 
 if TYPE_CHECKING:
     import polars
@@ -129,6 +129,8 @@ class LimitShares(Tabular):
     shares: tuple[LimitShare, ...]
     reference: str = "the speed of a drive without limits"
     """What is compared with, in words."""
+    unseen: tuple[str, ...] = ()
+    """Columns of limits that act here and that no test of the drive reached."""
 
     @property
     def first(self) -> LimitShare | None:
@@ -145,6 +147,11 @@ class LimitShares(Tabular):
                 f"{self.reference} falls by {100.0 * share:.1f} % to "
                 f"{quantity(first.error, 'rad/s', spec='.3f')}."
             ]
+        if self.unseen:
+            said.append(
+                f"No test reached {listed(self.unseen)}: what is said of it here is no more than "
+                "where the tests ended."
+            )
         failed = (each for each in self.shares if each.failure)
         return said + [f"Not without the {each.limit}: {each.failure}" for each in failed]
 
@@ -268,5 +275,7 @@ def shares_of(drive: Drive, run: Simulation, wanted: ArrayLike | None = None) ->
             )
         )
     shares.sort(key=lambda each: inf if each.error is None else each.error)
-    made = LimitShares(drive.name, run, asked, error, tuple(shares))
+    acting = {column for each in shares if each.time_share for column in each.changes}
+    unseen = tuple(column for column in drive.parameters.unreached if column in acting)
+    made = LimitShares(drive.name, run, asked, error, tuple(shares), unseen=unseen)
     return made if wanted is None else replace(made, reference="the wanted speed")

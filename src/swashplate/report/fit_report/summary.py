@@ -11,6 +11,7 @@ from markupsafe import Markup
 from numpy.typing import NDArray
 
 from swashplate.analysis import (
+    ASSUMED,
     assumed_parameters,
     changes_left_open,
     dead_zone,
@@ -173,6 +174,11 @@ def numbers_table(drive: Drive, stages: Sequence[StageFit]) -> tuple[Table, list
         if words.startswith("Creep"):
             cells[1] = Cell(None, "")
         made.add(words, *cells, unit=unit, spec=".3f")
+    if stages and assumed_parameters(stages):
+        sentences.append(
+            f"Parameters that were assumed count as known to {percent(ASSUMED)}, their standard "
+            "deviation."
+        )
     if largest != FULL:
         sentences.append(
             "Acceleration, delay and lag are those of steps from rest to "
@@ -360,7 +366,7 @@ def summary_section(
             said = [INTERVALS, *(_meanings(table) if table else ()), *said]
         numbers.append(text(" ".join(said), "remark"))
         limits.append(Block("heading", "What limits it", "h3"))
-        limits += listed_block(_limits(drive))
+        limits += listed_block(_limits(drive, stages))
     limits.append(Block("heading", "What to do next", "h3"))
     limits += listed_block(_next(judged, campaign, stages, runs, findings))
     shown.append(Block("pair", [Block("tile", each) for each in (numbers, limits) if each]))
@@ -386,17 +392,21 @@ def _curves(runs: Sequence[ShownRun], virtual: bool) -> Iterable[Block]:
         yield Block("curve", content)
 
 
-def _limits(drive: Drive) -> list[str]:
-    """What acts during a full step each way, and what to change first."""
-    length = int(2.0 * RATE)
-    command = np.repeat((0.0, FULL_VOLTAGE, 0.0, -FULL_VOLTAGE, 0.0), length)
+def _limits(drive: Drive, stages: Sequence[StageFit]) -> list[str]:
+    """What acts during a step each way, and what to change first.
+
+    The steps go to the largest commands that were tested; what no test reached is no limit here.
+    """
+    length, (plus, minus) = int(2.0 * RATE), largest_commands(stages)
+    command = np.repeat((0.0, plus, 0.0, -minus, 0.0), length)
     try:
-        found = limit_shares(drive, command, RATE, interpolation="previous")
+        limited = without_limits(drive, unseen_limits(stages)) if stages else drive
+        found = limit_shares(limited, command, RATE, interpolation="previous")
     except SwashplateError as error:
         return [str(error)]
     acting = sorted(found.shares, key=lambda each: each.time_share or 0.0, reverse=True)
     shares = [f"{e.limit} {percent(e.time_share)}" for e in acting[:3] if e.time_share]
-    head = "Share of the time of steps from rest to ±10 V and back"
+    head = f"Share of the time of steps from rest to {plus:.3g} and -{minus:.3g} V and back"
     return [f"{head}: {', '.join(shares) or 'nothing acts'}.", *found.sentences()[:1]]
 
 
