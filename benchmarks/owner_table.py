@@ -219,7 +219,7 @@ def rows_of(folder, seed):
     drive, _, sensor, orifice = draw(seed)
     place = Path(folder) / f"{seed:02d}"
     judged = fitted(seed, place)
-    result = judged.result
+    result = judged.fit
     largest = largest_commands(result.stages)
     truth, values = numbers_of(drive, largest), numbers_of(result.drive, largest)
     table, _ = numbers_table(result.drive, result.stages)

@@ -219,10 +219,18 @@ def read_set(text: str, origin: str) -> ParameterSet:
         raise ParameterError(f"{origin}: {error}") from None
     values = {symbol: each.values[0] for symbol, each in parameters.items()}
     return ParameterSet(
-        *(contents.name, contents.title, card_name, parameters),
-        *(model.pressure_root, model.coulomb_sign, model.card_switch, rate),
-        options_of(values) if model.options is None else frozenset(model.options),
-        *(equations, model.motion),
+        name=contents.name,
+        title=contents.title,
+        card=card_name,
+        parameters=parameters,
+        pressure_root=model.pressure_root,
+        coulomb_sign=model.coulomb_sign,
+        card_switch=model.card_switch,
+        rate=rate,
+        options=options_of(values) if model.options is None else frozenset(model.options),
+        equations=equations,
+        motion=model.motion,
+        unreached=model.unreached,
     )
 
 
