@@ -138,7 +138,10 @@ def say_error(error: Exception) -> None:
 
 
 def working(text: str) -> AbstractContextManager[Status]:
-    """A spinner while something may take longer than a second; nothing in a pipe."""
+    """A spinner while something may take longer than a second; nothing in a pipe.
+
+    Not inside another one, nor inside `long_work`: rich before 14.1 refuses a second.
+    """
     return side.status(f"{text} ...")
 
 
