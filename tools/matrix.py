@@ -15,15 +15,15 @@ import resource
 import shutil
 import subprocess
 import sys
-import tomllib
 from collections.abc import Iterator
 from dataclasses import dataclass
 from datetime import date
 from hashlib import sha256
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
-from packaging.requirements import Requirement
+from lowest_versions import EXTRAS, lowest_versions
 
 ROOT = Path(__file__).parents[1]
 FOLDER = ROOT / "build" / "matrix"
@@ -31,7 +31,6 @@ PAGE = ROOT / "docs" / "environments.md"
 BEGIN, END = "<!-- table: begin -->", "<!-- table: end -->"
 
 PYTHONS = ("3.11", "3.12", "3.13", "3.14")
-EXTRAS = ("binaries", "dask", "fmu", "mdf", "mpc", "tdms")
 TEST_TOOLS = ("hypothesis", "jupytext", "pytest", "pytest-xdist", "sympy", "wasmtime")
 SHOWN = ("numpy", "scipy", "numba", "pint", "rich")
 """Libraries whose versions the table gives."""
@@ -95,21 +94,6 @@ def interpreter(version: str) -> str | None:
     return None
 
 
-def lowest_versions() -> list[str]:
-    """The lowest version of every direct dependency, extras included, as pip writes them."""
-    project = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]
-    stated = list(project["dependencies"])
-    for extra in EXTRAS:
-        stated += project["optional-dependencies"][extra]
-    pins = set()
-    for line in stated:
-        requirement = Requirement(line)
-        (bound,) = requirement.specifier
-        assert bound.operator == ">=", f"{line}: a lower bound alone is expected"
-        pins.add(f"{requirement.name}=={bound.version}")
-    return sorted(pins)
-
-
 def surroundings(environment: Environment) -> dict[str, str]:
     """Variables of the checks: no constraints, a cache of their own, warnings are errors.
 
@@ -166,15 +150,15 @@ def installed(environment: Environment) -> dict[str, str]:
 
 def run_check(environment: Environment, check: Check) -> dict[str, Any]:
     """Run a check; whether it was green, its processor time and its last words."""
-    place = environment.folder / "work"
-    shutil.rmtree(place, ignore_errors=True)
-    place.mkdir()
+    work = environment.folder / "work"
+    shutil.rmtree(work, ignore_errors=True)
+    work.mkdir()
     log = environment.folder / f"{check.name.replace(' ', '-')}.log"
     before = resource.getrusage(resource.RUSAGE_CHILDREN)
     with log.open("w", encoding="utf-8") as file:
         done = subprocess.run(
             [str(environment.executable), "-m", *check.words],
-            cwd=ROOT if check.name == TESTS else place,
+            cwd=ROOT if check.name == TESTS else work,
             env=surroundings(environment),
             stdout=file,
             stderr=subprocess.STDOUT,
@@ -190,10 +174,8 @@ def run_check(environment: Environment, check: Check) -> dict[str, Any]:
     }
 
 
-def build_wheel() -> Path:
-    """The wheel of this checkout."""
-    folder = FOLDER / "wheel"
-    shutil.rmtree(folder, ignore_errors=True)
+def build_wheel(folder: Path) -> Path:
+    """The wheel of this checkout, in a folder."""
     words = [sys.executable, "-m", "build", "--no-isolation", "--wheel", "--outdir", str(folder)]
     subprocess.run([*words, str(ROOT)], check=True, stdout=subprocess.DEVNULL)
     (wheel,) = folder.glob("*.whl")
@@ -210,7 +192,7 @@ def fingerprint(wheel: Path) -> str:
 
 
 def results_of(environment: Environment) -> dict[str, Any]:
-    """What was found in an environment; empty if nothing was."""
+    """Versions and checks of an environment; empty if it was not tried."""
     path = environment.folder / "results.json"
     if not path.exists():
         return {}
@@ -258,19 +240,19 @@ def cells(environment: Environment) -> list[str]:
     row = [versions.get("python", environment.python), environment.versions]
     row += [versions.get(name, "") for name in SHOWN]
     for check in CHECKS:
-        found = results.get("checks", {}).get(check.name)
-        if found is None:
+        result = results.get("checks", {}).get(check.name)
+        if result is None:
             row.append("not run")
             continue
-        text = "green" if found["green"] else "**red**"
-        row.append(f"{text}: {found['words']}" if check.name == TESTS else text)
+        colour = "green" if result["green"] else "**red**"
+        row.append(f"{colour}: {result['words']}" if check.name == TESTS else colour)
     return [*row, results.get("date", "")]
 
 
 def table() -> Iterator[str]:
     """Lines of the table, in Markdown."""
-    found = [results_of(environment) for environment in ENVIRONMENTS]
-    processors = sorted({each["processor"] for each in found if each})
+    tried = filter(None, map(results_of, ENVIRONMENTS))
+    processors = sorted({results["processor"] for results in tried})
     yield f"Linux, processor: {', '.join(processors) or 'none yet'}."
     yield ""
     heads = ["Python", "versions", "NumPy", "SciPy", "Numba", "Pint", "Rich"]
@@ -295,26 +277,31 @@ def main() -> None:
     parser.add_argument("names", nargs="*", metavar="ENVIRONMENT", help=", ".join(names))
     parser.add_argument("--checks", default=None, help="some of the checks, commas between")
     parser.add_argument("--write", action="store_true", help=f"put the table into {PAGE.name}")
-    given = parser.parse_args()
-    unknown = set(given.names) - set(names)
+    parser.add_argument("--results", action="store_true", help="run nothing: show earlier results")
+    arguments = parser.parse_args()
+    unknown = set(arguments.names) - set(names)
     if unknown:
         parser.error(f"There is no environment {', '.join(sorted(unknown))}: {', '.join(names)}.")
-    chosen = [names[name] for name in given.names] or list(ENVIRONMENTS)
-    wanted = None if given.checks is None else given.checks.split(",")
-    checks = tuple(check for check in CHECKS if wanted is None or check.name in wanted)
+    chosen = [names[name] for name in arguments.names] or list(ENVIRONMENTS)
+    selected = [check.name for check in CHECKS]
+    if arguments.checks is not None:
+        selected = arguments.checks.split(",")
+    checks = tuple(check for check in CHECKS if check.name in selected)
     if not checks:
         parser.error(f"--checks names none of {', '.join(check.name for check in CHECKS)}.")
-    wheel = build_wheel()
-    for environment in chosen:
-        try_environment(environment, wheel, checks)
+    if not arguments.results:
+        with TemporaryDirectory(prefix="swashplate-") as folder:
+            wheel = build_wheel(Path(folder))
+            for environment in chosen:
+                try_environment(environment, wheel, checks)
     print("\n".join(table()))
-    if given.write:
+    if arguments.write:
         write_table()
     red = [
         f"{environment.name}: {name}"
         for environment in chosen
-        for name, found in results_of(environment).get("checks", {}).items()
-        if not found["green"]
+        for name, result in results_of(environment).get("checks", {}).items()
+        if not result["green"]
     ]
     if red:
         sys.exit("Red: " + "; ".join(red))
