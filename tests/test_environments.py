@@ -9,6 +9,8 @@ import pytest
 from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 
+from swashplate import __version__
+
 ROOT = Path(__file__).parents[1]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]
 STATED = [
@@ -58,6 +60,11 @@ def test_the_pythons_are_the_same_wherever_they_are_named() -> None:
     assert PROJECT["requires-python"] == f">={PYTHONS[0]}"
     workflow = (ROOT / ".github" / "workflows" / "ci.yml").read_text("utf-8")
     assert workflow.count(f"python: {list(PYTHONS)}".replace("'", '"')) == 2
+
+
+def test_a_citation_names_the_version() -> None:
+    text = (ROOT / "CITATION.cff").read_text("utf-8")
+    assert re.findall(r"^version: (.*)$", text, re.MULTILINE) == [__version__]
 
 
 def test_the_page_gives_the_bounds_that_are_stated() -> None:
