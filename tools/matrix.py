@@ -11,6 +11,7 @@ from __future__ import annotations
 import argparse
 import json
 import os
+import re
 import resource
 import shutil
 import subprocess
@@ -245,18 +246,19 @@ def cells(environment: Environment) -> list[str]:
             row.append("not run")
             continue
         colour = "green" if result["green"] else "**red**"
-        row.append(f"{colour}: {result['words']}" if check.name == TESTS else colour)
-    return [*row, results.get("date", "")]
+        passed = re.search(r"\d+ passed", result["words"])
+        row.append(f"{colour}, {passed[0]}" if passed else colour)
+    return row
 
 
 def table() -> Iterator[str]:
     """Lines of the table, in Markdown."""
     tried = filter(None, map(results_of, ENVIRONMENTS))
-    processors = sorted({results["processor"] for results in tried})
-    yield f"Linux, processor: {', '.join(processors) or 'none yet'}."
+    occasions = sorted({f"{results['processor']}, {results['date']}" for results in tried})
+    yield f"Linux, {'; '.join(occasions) or 'not yet'}:"
     yield ""
     heads = ["Python", "versions", "NumPy", "SciPy", "Numba", "Pint", "Rich"]
-    heads += [*(check.name for check in CHECKS), "date"]
+    heads += [check.name for check in CHECKS]
     yield f"| {' | '.join(heads)} |"
     yield "|" + "---|" * len(heads)
     for environment in ENVIRONMENTS:
