@@ -8,6 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+pytestmark = pytest.mark.skipif(
+    "default" in sys.warnoptions, reason="the lowest versions themselves warn"
+)
 DEPRECATIONS = (
     DeprecationWarning,
     PendingDeprecationWarning,
@@ -22,7 +25,6 @@ def test_a_deprecation_is_an_error(category: type[Warning]) -> None:
         warnings.warn("will be removed", category, stacklevel=1)
 
 
-@pytest.mark.skipif("default" in sys.warnoptions, reason="the lowest versions warn themselves")
 @pytest.mark.parametrize("category", DEPRECATIONS)
 def test_a_deprecation_is_an_error_in_a_process(tmp_path: Path, category: type[Warning]) -> None:
     """Whoever calls it: the command line, not only a module of its own."""

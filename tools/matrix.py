@@ -155,10 +155,13 @@ def run_check(environment: Environment, check: Check) -> dict[str, Any]:
     shutil.rmtree(work, ignore_errors=True)
     work.mkdir()
     log = environment.folder / f"{check.name.replace(' ', '-')}.log"
+    words = list(check.words)
+    if check.name == TESTS and environment.versions == "lowest":
+        words += ["-W", "default"]
     before = resource.getrusage(resource.RUSAGE_CHILDREN)
     with log.open("w", encoding="utf-8") as file:
         done = subprocess.run(
-            [str(environment.executable), "-m", *check.words],
+            [str(environment.executable), "-m", *words],
             cwd=ROOT if check.name == TESTS else work,
             env=surroundings(environment),
             stdout=file,
