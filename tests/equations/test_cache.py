@@ -311,6 +311,7 @@ def test_kernels_around_compiled_functions_are_kept_apart(tmp_path: Path) -> Non
 @pytest.mark.skipif(os.name == "nt", reason="a file is no folder everywhere, but not by this name")
 def test_without_a_place_it_works_with_a_warning(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
-    done = generate(tmp_path, NUMBA_CACHE_DIR=str(tmp_path / "file"))
+    cache = {"NUMBA_CACHE_DIR": str(tmp_path / "file")}
+    done = generate(tmp_path, **cache, PYTHONWARNINGS="default")
     assert done.stdout.startswith("(15.0, 7.0, 4.0)")
     assert UNCACHED in done.stderr
