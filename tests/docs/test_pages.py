@@ -233,7 +233,10 @@ def test_a_script_that_makes_logs_stands_folded_at_the_end(page: Path) -> None:
     for section in FOLDED.findall(text):
         assert section.strip().startswith("<details>\n<summary>")
         assert section.strip().endswith("</details>")
-    assert not FOLDED.search(text) or FOLDED.sub("", text).rstrip() == text[: text.index("## Try it")].rstrip()
+    assert (
+        not FOLDED.search(text)
+        or FOLDED.sub("", text).rstrip() == text[: text.index("## Try it")].rstrip()
+    )
 
 
 @each_page
