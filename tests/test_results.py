@@ -8,6 +8,7 @@ import sys
 import tomllib
 import types
 from collections.abc import Iterable
+from html import escape
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -15,6 +16,7 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 from tests.identification.given import TWO_STAGES, virtual
+from typer.testing import CliRunner
 
 import swashplate
 from swashplate import Campaign, Drive, FullOrderDrive, InputError, Limit, SquaredError, maneuvers
@@ -29,6 +31,7 @@ from swashplate.analysis import (
     what_if,
 )
 from swashplate.campaign import examine, guess_drive
+from swashplate.cli import app
 from swashplate.crane import Crane, Seaway, Stick, TransferFunctions, control
 from swashplate.full_order import compare
 from swashplate.identification import Fit, fit, judge_fit, outlook, predict
@@ -237,7 +240,7 @@ def test_summaries_and_tables_of_a_notebook(work: Work) -> None:
     html = work.fitted._repr_html_()
     assert html is not None
     assert html.count("<table>") == len(work.fitted.tables()) == 4
-    assert work.judged.verdict.headline in work.judged.summary()
+    assert "<li>Fixed at their nominal values: V_dz" in html
     assert "step +4 V" in work.campaign.summary()
     assert "V_dz" in Drive.preset("hoist").summary()
     run = work.campaign.experiments[0]
@@ -249,14 +252,140 @@ def test_summaries_and_tables_of_a_notebook(work: Work) -> None:
     assert isinstance(work.campaign.plot()[0], Figure)
 
 
+def test_a_verdict_is_the_first_that_is_read(work: Work) -> None:
+    verdict = work.judged.verdict
+    assert verdict.headline.startswith(verdict.grade)
+    for result in (verdict, work.judged):
+        assert result.summary().startswith(f"{verdict.headline}\n\n- {verdict.validity}\n")
+        html = result._repr_html_()
+        assert html is not None
+        assert html.startswith(f"<p><strong>{escape(verdict.headline)}</strong></p>")
+        assert all(escape(criterion.name) in html for criterion in verdict.criteria)
+        assert html.count(escape(verdict.headline)) == 1
+        assert len(repr(result)) <= LONGEST + 40
+    # the long tables are there, for those who open them
+    estimates = html.partition("<details>")[2]
+    assert work.fitted.stages[-1].problem.unknowns.names[0] in estimates
+    assert "held-out runs" not in html  # there are none
+
+
+def test_a_run_says_what_the_command_prints() -> None:
+    run = Drive.preset("hoist").simulate(maneuvers.parse("step:9"))
+    printed = CliRunner().invoke(app, ["simulate", "hoist", "step:9"]).stdout
+    rows = [" ".join(line.split()) for line in printed.splitlines()]
+    summary = [" ".join(line.split()) for line in run.summary().splitlines()]
+    numbers = [line for line in summary if re.search(r"\d|never", line)][1:]
+    assert len(numbers) == 7 + len(Limit)
+    assert all(any(row.startswith(line) for row in rows) for line in numbers)
+    assert f"peak speed, positive {np.degrees(run.shaft_speed.max()):.2f} deg/s" in summary
+    html = run._repr_html_()
+    assert html is not None
+    assert html.count("<table>") == 2
+    assert "swash stop" in html
+
+
+def test_a_full_order_run_shows_the_range_of_each_signal() -> None:
+    run = FullOrderDrive.preset("hoist").simulate(TESTS[0])
+    lines = {line.split("  ")[0]: line for line in run.summary().splitlines()}
+    top = f"{np.degrees(run.shaft_speed.max()):.4g}"
+    assert top in lines["shaft speed"]
+    assert "deg/s" in lines["shaft speed"]
+    assert isinstance(run.plot(), Figure)
+
+
 def test_analyses_show_their_tables_and_figures() -> None:
     found = analyses(Drive.preset("hoist"))
     assert all(each.summary().count("\n") > 2 for each in found)
-    drawn = [each for each in found if each.figure and not hasattr(each, "single")]
-    assert len(drawn) >= 3
+    drawn = [each for each in found if hasattr(each, "plot")]
+    assert len(drawn) == len(found) - 1
     assert all(isinstance(each.plot(), Figure) for each in drawn)
-    with pytest.raises(InputError, match="no figure of a Sizing"):
-        next(each for each in found if type(each).__name__ == "Sizing").plot()
+
+
+def test_only_what_can_be_drawn_has_a_plot(work: Work) -> None:
+    hoist = Drive.preset("hoist")
+    linear = hoist.linearize(4.0)
+    undrawn = [
+        hoist,
+        hoist.parameters,
+        hoist["Z16"],
+        SquaredError(TESTS[0].sample()),
+        linear,
+        work.fitted,
+        work.judged,
+        work.judged.verdict,
+        size(hoist, Requirements(speed=3.5), {"pump": (1.0, 2.0)}),
+    ]
+    assert [each for each in undrawn if hasattr(each, "plot")] == []
+    assert "Z16" in hoist["Z16"].summary()
+    assert "steady gain" in linear.summary()
+    assert isinstance(TESTS[0].plot(), Figure)
+    assert isinstance(work.campaign.experiments[0]["current"].plot(), Figure)
+    assert isinstance(work.fitted.stages[0].runs[0].plot(), Figure)
+
+
+def test_a_frequency_response_is_shown_in_units_of_people() -> None:
+    response = Drive.preset("hoist").frequency_response(np.geomspace(0.1, 1.0, 20), [2.0, 1e-3])
+    first = next(line for line in response.summary().splitlines() if line.strip().startswith("2 "))
+    amplitude, frequency, gain, phase, distortion, _ = first.split()
+    assert (float(amplitude), float(frequency)) == (2.0, 0.1)
+    assert float(gain) == pytest.approx(np.degrees(response.gain[0, 0]), rel=1e-3)
+    assert float(phase) == pytest.approx(np.degrees(response.phase[0, 0]), abs=0.05)
+    assert float(distortion) == pytest.approx(100.0 * response.distortion[0, 0], abs=0.05)
+    assert response.summary().count("no motion") == 8
+    assert "8 of 20 frequencies shown" in response.summary()
+
+
+def test_a_comparison_of_models_shows_their_difference() -> None:
+    five = FullOrderDrive.preset("hoist")
+    found = compare(five, five.drive.simulate(TESTS[0]))
+    lines = {line.split("  ")[0]: line.split() for line in found.summary().splitlines()}
+    assert float(lines["largest difference"][2]) == pytest.approx(
+        np.degrees(np.abs(found.error).max()), rel=1e-3
+    )
+    assert float(lines["largest difference"][4]) == pytest.approx(
+        100.0 * found.relative[0], abs=0.005
+    )
+
+
+def axes(count: int) -> list[Any]:
+    return list(Figure().subplots(count, 1, squeeze=False)[:, 0])
+
+
+@pytest.mark.parametrize(("count", "good"), [(1, False), (2, True), (3, True), (4, False)])
+def test_a_bode_plot_takes_axes_for_gain_and_phase(count: int, good: bool) -> None:
+    response = Drive.preset("hoist").frequency_response([0.1, 0.3, 1.0], [2.0, 4.0])
+    given = axes(count)
+    if not good:
+        with pytest.raises(InputError, match=f"There are {count} axes for"):
+            response.plot(ax=given)
+        return
+    assert response.plot(ax=given) is given
+    assert [len(ax.lines) >= 2 for ax in given] == [True] * count
+    gain, phase = given[:2]
+    assert np.allclose(gain.lines[0].get_ydata(), np.degrees(response.gain[0]))
+    assert np.allclose(phase.lines[0].get_ydata(), np.degrees(response.phase[0]))
+
+
+def test_figures_of_one_panel_draw_in_given_axes() -> None:
+    whole, _, _, _, inverse, tornado = analyses(Drive.preset("hoist"))
+    for result in (whole, inverse, TESTS[0]):
+        (ax,) = axes(1)
+        assert result.plot(ax=ax, title="as measured") is ax
+        assert ax.get_title(loc="left") == "as measured"
+        assert ax.lines
+    with pytest.raises(InputError, match="2 axes for 1 panel"):
+        whole.plot(ax=axes(2))
+    both = axes(2)
+    assert inverse.plot(ax=both) is both
+    narrow, wide = (np.ptp(both[k].get_xlim()) for k in (1, 0))
+    assert narrow < 0.5 * wide
+    with pytest.raises(InputError, match="3 axes for 2 panels"):
+        inverse.plot(ax=axes(3))
+    two = axes(2)
+    assert tornado.plot(ax=two) is two
+    assert [ax.get_xlabel() for ax in two] == ["final speed (deg/s)", "rise time (s)"]
+    with pytest.raises(InputError, match="1 axes for 2 outcomes"):
+        tornado.plot(ax=axes(1))
 
 
 def test_a_drive_stands_where_a_set_does(work: Work) -> None:

@@ -22,12 +22,17 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from typing import TYPE_CHECKING, cast, overload
 
 import numpy as np
 import numpy.typing as npt
 
 from swashplate.errors import InputError
-from swashplate.results import Result
+from swashplate.results import GivenAxes, Result, figures
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 __all__ = ["Maneuver", "chirp", "multisine", "parse", "ramp", "rest", "sine", "source_tests"]
 __all__ += ["stairs", "step"]
@@ -154,6 +159,18 @@ class Maneuver(Result):
                 "of a whole number: change its length or the rate."
             )
         return np.arange(round(samples) + 1) / rate
+
+    @overload
+    def plot(self, *, ax: None = None, title: str | None = None) -> Figure: ...
+
+    @overload
+    def plot(self, *, ax: GivenAxes, title: str | None = None) -> GivenAxes: ...
+
+    def plot(
+        self, *, ax: Axes | Sequence[Axes] | None = None, title: str | None = None
+    ) -> Figure | Axes | Sequence[Axes]:
+        """Figure of its voltage over time; with `ax` it is drawn there, and `ax` returned."""
+        return cast("Figure", figures().plot_maneuver(self, ax=ax, title=title))
 
     def sample(self, rate: float = 512.0) -> Array:
         """Voltage [V] at the instants of `time(rate)`.

@@ -1,8 +1,9 @@
 """Results as Python shows them: a line at the prompt, tables in a notebook, frames elsewhere.
 
-A class that inherits `Result` has a short ``repr`` whatever arrays it holds. Where it has
-``tables()`` or ``table()``, a notebook shows these and `Result.summary` prints them; where the
-class names its `figure`, `Result.plot` draws it.
+A class that inherits `Result` has a short ``repr`` whatever arrays it holds. If it has
+``tables()`` or ``table()``, a notebook shows these and `Result.summary` prints them, and its
+``sentences`` after them. A ``headline`` stands at the very beginning, and then its sentences do,
+too, before the tables. Only a class that can be drawn has a ``plot()``.
 """
 
 from __future__ import annotations
@@ -10,16 +11,21 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence, Set
 from dataclasses import fields, is_dataclass
+from html import escape
 from importlib import import_module
 from pathlib import Path
 from textwrap import shorten
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from swashplate.errors import InputError
 from swashplate.tables import Table, write_table
 
 if TYPE_CHECKING:
     import polars
+    from matplotlib.axes import Axes
+
+GivenAxes = TypeVar("GivenAxes", bound="Axes | Sequence[Axes]")
+"""Matplotlib axes that a caller gives to draw in, and gets back."""
 
 LONGEST = 320
 """Characters of a repr at most: four lines of a terminal."""
@@ -67,10 +73,7 @@ def _brief(value: Any) -> str:
 
 
 class Result:
-    """A result that shows itself: shortly as text, with its tables where it has some."""
-
-    figure: ClassVar[str] = ""
-    """The figure of `swashplate.report.figures` that shows it, empty for none."""
+    """A result that shows itself: shortly as text, with its tables if it has some."""
 
     def __init_subclass__(cls, **options: Any) -> None:
         """Keep the inherited repr, in whose place a dataclass would write one of its own."""
@@ -86,28 +89,36 @@ class Result:
         found = made() if callable(made) else []
         return [found] if isinstance(found, Table) else list(found)
 
+    def _headline(self) -> str:
+        """The sentence that a reader must not miss, empty if there is none."""
+        return str(getattr(self, "headline", ""))
+
+    def _sentences(self) -> list[str]:
+        """What follows from the tables, sentence by sentence."""
+        sentences = getattr(self, "sentences", ())
+        return list(sentences() if callable(sentences) else sentences)
+
     def _repr_html_(self) -> str | None:
-        made = self._tables()
-        return "".join(each._repr_html_() for each in made) if made else None
+        headline, tables = self._headline(), self._tables()
+        shown = "".join(table._repr_html_() for table in tables)
+        items = "".join(f"<li>{escape(sentence)}</li>" for sentence in self._sentences())
+        sentences = f"<ul>{items}</ul>" if items else ""
+        if headline:
+            return f"<p><strong>{escape(headline)}</strong></p>{sentences}{shown}"
+        return f"{shown}{sentences}" or None
 
     def summary(self) -> str:
-        """Text with its tables in the units that people read, and what follows from them."""
-        said = getattr(self, "sentences", ())
-        lines = "\n".join(f"- {each}" for each in (said() if callable(said) else said))
-        parts = [repr(self), *map(str, self._tables()), lines]
-        return "\n\n".join(each for each in parts if each)
+        """Text: its headline or its repr, its tables in the units that people read, sentences."""
+        headline, tables = self._headline(), [str(table) for table in self._tables()]
+        lines = "\n".join(f"- {sentence}" for sentence in self._sentences())
+        parts = [headline, lines, *tables] if headline else [repr(self), *tables, lines]
+        return "\n\n".join(part for part in parts if part)
 
-    def plot(self, **how: Any) -> Any:
-        """Matplotlib figure of it; keywords as of the figure's function.
 
-        Raises
-        ------
-        InputError
-            If nothing draws such a result.
-        """
-        if not self.figure:
-            raise InputError(f"There is no figure of a {type(self).__name__}.")
-        return getattr(figures(), self.figure)(self, **how)
+def folded(title: str, tables: Sequence[Table]) -> str:
+    """HTML of tables that are shown when a reader opens them by their title."""
+    shown = "".join(table._repr_html_() for table in tables)
+    return f"<details><summary>{escape(title)}</summary>{shown}</details>"
 
 
 class Tabular(Result, ABC):

@@ -168,16 +168,41 @@ class Table:
             "  ".join(f"{c:{r}{s}}" for c, r, s in zip(line, right, sizes, strict=True)).rstrip()
             for line in lines
         ]
-        return "\n".join([*([self.title] * bool(self.title)), *text])
+        return "\n".join(line for line in (self.title, *text, self.caption) if line)
 
     def _repr_html_(self) -> str:
         shown = self.of("t")
-        rows = [("th", shown.heads()), *(("td", shown.texts(row)) for row in shown.rows)]
-        body = "".join(
-            f"<tr>{''.join(f'<{tag}>{escape(cell)}</{tag}>' for cell in cells)}</tr>"
-            for tag, cells in rows
-        )
-        return f"<table><caption>{escape(self.title)}</caption>{body}</table>"
+        sides = ["right" if column.spec else "left" for column in shown.columns]
+        parts = ["<table>"]
+        if self.title:
+            parts.append(f'<caption style="{_CAPTION}">{escape(self.title)}</caption>')
+        parts += ["<thead>", _html_row("th", shown.heads(), sides), "</thead>", "<tbody>"]
+        for row in shown.rows:
+            # between sections a line that is seen on light and on dark pages
+            line = "border-top: 1px solid #888; " if row.section else ""
+            parts.append(_html_row("td", shown.texts(row), sides, line))
+        parts += ["</tbody>", "</table>"]
+        if self.caption:
+            parts.append(f"<p>{escape(self.caption)}</p>")
+        return "".join(parts)
+
+
+_CAPTION = "caption-side: top; text-align: left; font-weight: bold; white-space: nowrap"
+
+
+def _html_row(tag: str, cells: Sequence[str], sides: Sequence[str], style: str = "") -> str:
+    """A row of a table in HTML, each cell at its column's side; Jupyter's own is the right one."""
+    made = [
+        f'<{tag} style="{style}text-align: {side}">{escape(cell)}</{tag}>'
+        for cell, side in zip(cells, sides, strict=True)
+    ]
+    return f"<tr>{''.join(made)}</tr>"
+
+
+def share_cell(share: float | None) -> Cell:
+    """A share of time as people read it: ``"12.5 %"``, ``"never"``."""
+    words = "" if share is None else f"{100.0 * share:.1f} %" if share else "never"
+    return Cell(share, words)
 
 
 def joined(tables: Sequence[Table]) -> Table:

@@ -136,12 +136,16 @@ def test_wrong_words_end_in_one_sentence(words, sentence):
 @pytest.mark.parametrize(
     ("change", "sentence"),
     [
-        ({"boom_length": 0.0}, "boom_length is 0, but must be above 0"),
+        ({"boom_length": 0.0}, "boom_length is 0 m, but on a crane it is 1 to 300 m"),
         ({"tower_sheave_angle": 1.0}, "tower_sheave_angle is 57.2958 deg, but the luff rope only"),
         ({"boom_limits": (0.9, 0.5)}, "boom_limits are 51.5662 and 28.6479 deg, but must rise"),
-        ({"rope_limits": (0.0, 50.0)}, "rope_limits are 0 and 50 m, but must rise from above 0"),
-        ({"boom_length": 28000.0}, "boom_length is 28000 m, but no crane is longer than 300 m"),
-        ({"slew_axis": 3.0}, "slew_axis has 1 numbers, but needs 3"),
+        ({"boom_limits": (0.9, 2.0)}, "boom_limits is 2 rad, but on a crane it is 0 to 90 deg"),
+        ({"rope_limits": (0.0, 50.0)}, "rope_limits is 0 m, but on a crane it is 0.05 to 6000 m"),
+        ({"rope_limits": (9.0, 5.0)}, "rope_limits are 9 and 5 m, but the second must be larger"),
+        ({"boom_length": 28000.0}, "boom_length is 28000 m, but on a crane it is 1 to 300 m"),
+        ({"boom_length": True}, "boom_length is True, but must be one number"),
+        ({"boom_limits": "39"}, "boom_limits is '39', but must be a list of 2 numbers"),
+        ({"slew_axis": 3.0}, "slew_axis must be a list of 3 numbers, not 1"),
         ({"jib": 3.0}, "A crane has no jib; it has boom_length"),
     ],
 )

@@ -231,14 +231,15 @@ def fitted(tmp_path_factory):
     free = {"Z16": Free(relative=(0.5, 2.0))}
     setup = Setup(stages=(stage.model_copy(update={"free": free, "forces": None}),))
     result = fit(Drive.preset("luff").parameters, campaign.experiments, setup)
-    Judged(campaign, result).store(place / "fit.json")
+    judged = Judged(campaign, result)
+    judged.store(place / "fit.json")
     result.drive.to_toml(place / "drive.toml")
-    return place, result
+    return place, result, judged.verdict
 
 
 @pytest.mark.slow
 def test_own_logs_lead_to_the_verdict_on_the_own_crane(crane, fitted):
-    place, result = fitted
+    place, result, verdict = fitted
     own = crane.with_drive(luff=place)
     assert own.luff.parameters.numbers == pytest.approx(result.drive.parameters.numbers, rel=1e-9)
     given = crane.with_drive(luff=result)
@@ -249,6 +250,9 @@ def test_own_logs_lead_to_the_verdict_on_the_own_crane(crane, fitted):
     drawn = own.drawn(luff=stored_draws(place, draws=3, seed=1))
     assert len(drawn) == 3
     assert own.fits == {"luff": place}
+    source = own.sources["luff"]
+    assert (source.grade, source.verdict) == (verdict.grade, verdict.headline)
+    assert {each.sources["luff"].verdict for each in drawn} == {verdict.headline}
     assert crane.with_drive(luff=place / "drive.toml").fits == own.fits
     assert not own.with_drive(luff=crane.luff).fits
     assert {each.luff for each in own.drawn()} == set(stored_draws(place).drives)
@@ -327,7 +331,7 @@ def test_what_makes_no_study_is_said(crane):
     refuse("A study has no 'actuation'; it has seeds", actuation="direct")
     with pytest.raises(InputError, match="Periods to follow must be above 0 s"):
         follow(crane, [0.0])
-    with pytest.raises(InputError, match="Points of the height must be one or more finite"):
+    with pytest.raises(InputError, match="Points of the height must be .* from 0.001 to 30 m"):
         sweep(crane, "height", MEANT, points=[-1.0])
     with pytest.raises(InputError, match="A sweep over the bearing sets slew_deg itself"):
         sweep(crane, "bearing", MEANT, slew_deg=90.0)

@@ -1,6 +1,6 @@
 """The load on its rope, against closed forms and an independent integration (DOP853)."""
 
-from math import cos, hypot, pi, radians, sin, sqrt
+from math import cos, hypot, inf, pi, radians, sin, sqrt
 
 import numpy as np
 import pytest
@@ -283,7 +283,12 @@ def test_hook_and_load_fall_together_and_are_caught_together():
 @pytest.mark.parametrize(
     ("make", "message"),
     [
-        (lambda: Suspension(stiffness=0.0), "rope's stiffness is 0 N, but must be above 0"),
+        (lambda: Suspension(stiffness=0.0), "rope's stiffness is 0 N, but must be 1000 to 1e.12 N"),
+        (lambda: Suspension(stiffness=1e300), "rope's stiffness is 1e.300 N, .* inf for a rigid"),
+        (lambda: Suspension(hook=1e300, sling=2.0), "hook is 1e.300, .* at most 1e.06"),
+        (lambda: Suspension(hook=500.0, sling=1e300), "sling is 1e.300, .* at most 200"),
+        (lambda: Suspension(damping=inf), "damping is inf, .* at most 1"),
+        (lambda: load_motion(still(1.0), 3.0, mass=1e-300), "load is 1e-300 kg, .* at least 0.1"),
         (lambda: Suspension(hook=500.0), "500 kg with slings of 0 m: both are above 0, or both 0"),
         (lambda: Suspension(damping=-1.0), "suspension's damping is -1, but must be at least 0"),
         (

@@ -397,6 +397,9 @@ REFUSED = [
     ({"wind": (float("nan"), 0.0)}, r"wind is \(nan, 0.0\), but must be two speeds"),
     ({"suspension": 6e7}, "suspension is 60000000.0, but must be a Suspension"),
     ({"rope_m": "20"}, "rope_m is '20', but must be a number"),
+    ({"drag_area": 1e308}, "drag_area is 1e.308 m², .* at most 100000 m²"),
+    ({"wind": (1e308, 0.0)}, "wind is .*, but must be within 100 m/s"),
+    ({"slew_deg": 1e308}, "slew at the start is 1e.308 deg, but must be within 720 deg"),
     ({"drag_area": None}, "drag_area is None, but must be a number"),
 ]
 
@@ -429,14 +432,27 @@ def test_sticks_and_controllers_that_make_no_sense_are_refused():
         Stick.trapezoid(slew=1.0)
     with refuse("no command hoist"):
         Stick.trapezoid(slew=1.0, until={"slew_deg": 45.0, "rope_m": 10.0})
+    with refuse(r"length above 0 and at most 86400 s, not 1, 0.5 and 1e\+308 s"):
+        Stick.rest(1e308)
+    with refuse(r"recorded stick lasts 1e\+300 s at 1e-300 Hz, .* at most 86400 s"):
+        Stick.record(np.zeros((2, 3)), 1e-300)
     with refuse("Row 1 of the stick is not within -1 to 1"):
         Stick.record([[0.0, 0.0, 0.0], [0.0, 1.5, 0.0]])
     with refuse("A controller has one shaper, not 2"):
         TIP | ZV
     with refuse("A shaper is 'zv', 'zvd' or 'ei', not 'zz'"):
         control.TipShaper("zz")
-    with refuse("gain of delayed feedback is -1"):
-        control.DelayedFeedback(-1.0)
+    for stage, sentence in (
+        (lambda: control.DelayedFeedback(-1.0), "gain of delayed feedback is -1.0, .* at most 2"),
+        (lambda: control.DelayedFeedback(1e308, 0.2), r"gain of .* is 1e\+308, .* at most 2"),
+        (lambda: control.DelayedFeedback(0.2, 1.5), "delay of delayed .* is 1.5, .* at most 1"),
+        (lambda: control.PositionLoop(1e308), r"gain of position loop is 1e\+308, .* at most 50"),
+        (lambda: control.Clip(1e308), r"size of a clip is 1e\+308, .* at most 100"),
+        (lambda: control.Clip("wide"), "size of a clip is 'wide', but must be a number"),
+        (lambda: control.Clip(share=float("nan")), "share of a clip is nan"),
+    ):
+        with refuse(sentence):
+            stage()
     strange = Model("strange", Gains, Filtered, follow_wind, sample=offset)
     with refuse("asks for 'wind', but a crane's controller sees swing_x"):
         control.Law(strange, Gains(1.0, 1.0))

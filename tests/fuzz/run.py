@@ -20,9 +20,10 @@ import time
 from pathlib import Path
 
 import numpy as np
-from seeds import KINDS, valid
+from seeds import KINDS, SHIPS, valid
 
 from swashplate import SwashplateError
+from swashplate.crane import read_ship
 from swashplate.logs import open_log
 
 KEPT = Path(__file__).parents[2] / ".hypothesis" / "fuzz"
@@ -87,6 +88,17 @@ def read(path: Path, limited: bool) -> None:
             check(path, error, limited)
 
 
+def read_of_ship(path: Path, limited: bool) -> None:
+    """Read a ship's transfer functions: finite numbers, or one sentence that names the file."""
+    try:
+        ship = read_ship(path, 1.0 if path.suffix == ".4" else None)
+    except SwashplateError as error:
+        check(path, error, limited)
+        return
+    assert np.isfinite(ship.values).all()
+    assert np.isfinite(ship.frequencies).all()
+
+
 def check(path: Path, error: SwashplateError, limited: bool) -> None:
     """One sentence that names the file, and did not ask for memory without bounds."""
     sentence = str(error)
@@ -99,11 +111,13 @@ def check(path: Path, error: SwashplateError, limited: bool) -> None:
 
 def work(kind: str, number: int, seconds: float, folder: Path) -> None:
     """Damage and read files of a kind for so many seconds."""
-    limited = kind == "text"  # the others are read in a process that has a limit of its own
-    sources = list(valid(kind, folder / "valid"))
+    # the others are read in a process that has a limit of its own
+    limited = kind in ("text", "veres", "wamit", "ship table")
+    sources, reader = list(valid(kind, folder / "valid")), read_of_ship if kind in SHIPS else read
     for path in sources:
-        assert open_log(path).columns, path  # warms up, too: what is imported needs memory as well
-        read(path, limited)
+        # warms up, too: what is imported needs memory as well
+        assert kind in SHIPS or open_log(path).columns, path
+        reader(path, limited)
     contents = [path.read_bytes() for path in sources]
     used = int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
     resource.setrlimit(resource.RLIMIT_AS, (used + 4 * GIGABYTE, used + 4 * GIGABYTE))
@@ -116,7 +130,7 @@ def work(kind: str, number: int, seconds: float, folder: Path) -> None:
         path.unlink(missing_ok=True)
         path.write_bytes(content)
         before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-        read(path, limited)
+        reader(path, limited)
         grown = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before
         assert grown * 1024 < GIGABYTE, f"{grown >> 10} MB for a file of {len(content)} bytes"
         count += 1

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import datetime
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from itertools import product
+from math import cos, pi, radians, sin
 from pathlib import Path
 
 import numpy as np
@@ -128,6 +129,83 @@ def mdf(path: Path, compression: int = 0) -> None:
         file.save(path, overwrite=True, compression=compression)
 
 
+# --- transfer functions of ships ------------------------------------------------------------------
+
+MOTIONS = ("surge", "sway", "heave", "roll", "pitch", "yaw")
+HEADINGS, OMEGAS = (0.0, 30.0, 90.0, 150.0, 180.0), (0.1, 0.2, 0.5)
+
+
+def small_body(heading: float, omega: float) -> np.ndarray:
+    """Motions of a body that goes with the water and along its slope, as any in a long wave."""
+    k, c, s = omega**2 / 9.80665, cos(heading), sin(heading)
+    return np.array([-1j * c, -1j * s, 1.0, -1j * k * s, 1j * k * c, 0.0])
+
+
+def ship_table_lines(waves: Sequence[tuple[float, float]]) -> list[str]:
+    """A table of the body's motions in waves of headings [deg] and frequencies."""
+    parts = (f"{motion}_{part}" for motion in MOTIONS for part in ("re", "im"))
+    lines = [",".join(["heading_deg", "omega", *parts])]
+    for heading, omega in waves:
+        motions = small_body(radians(heading), omega).tolist()
+        numbers = [number for z in motions for number in (z.real, z.imag)]
+        lines.append(",".join(map(repr, (heading, omega, *numbers))))
+    return lines
+
+
+def wamit_lines(waves: Sequence[tuple[float, float]]) -> list[str]:
+    """The same as lines of WAMIT with a ULEN of 1 m."""
+    lines = []
+    for heading, omega in waves:
+        for number, z in enumerate(small_body(radians(heading), omega).tolist(), 1):
+            numbers = (2.0 * pi / omega, heading, number, abs(z), 0.0, z.real, z.imag)
+            lines.append(" ".join(map(repr, numbers)))
+    return lines
+
+
+def capytaine(
+    path: Path,
+    headings: Sequence[float] = HEADINGS,
+    omegas: Sequence[float] = OMEGAS,
+    sign: float = -1.0,
+) -> None:
+    """The file that separate_complex_values and to_netcdf write, made by h5py."""
+    import h5py
+
+    table = np.array([[small_body(radians(h), w) for h in headings] for w in omegas])
+    parts = np.stack([table.real, sign * table.imag])  # complex, omega, wave_direction, dof
+    grids = {"omega": np.array(omegas), "wave_direction": np.radians(headings)}
+    words = {"complex": ["re", "im"], "radiating_dof": [each.title() for each in MOTIONS]}
+    with h5py.File(path, "w") as file:
+        for name, values in (grids | words).items():
+            text = h5py.string_dtype() if name in words else None
+            file.create_dataset(name, data=values, dtype=text).make_scale(name)
+        file["RAO"] = parts
+        for n, axis in enumerate(("complex", "omega", "wave_direction", "radiating_dof")):
+            file["RAO"].dims[n].attach_scale(file[axis])
+
+
+def veres(path: Path) -> None:
+    """The body at rest, as VERES writes motions."""
+    lines = ["VERES", *["text"] * 8, f"1 {len(HEADINGS)} {len(OMEGAS)} 6", "0.0"]
+    for heading in HEADINGS:
+        lines.append(repr(heading))
+        for omega in OMEGAS:
+            lines.append(repr(omega))
+            motions = small_body(radians(heading), omega).tolist()
+            lines += [f"{n} {z.real!r} {z.imag!r}" for n, z in enumerate(motions, 1)]
+    path.write_text("\n".join(lines), "utf-8")
+
+
+def wamit(path: Path) -> None:
+    path.write_text("\n".join(wamit_lines(list(product(HEADINGS, OMEGAS)))), "utf-8")
+
+
+def ship_table(path: Path) -> None:
+    path.write_text("\n".join(ship_table_lines(list(product(HEADINGS, OMEGAS)))), "utf-8")
+
+
+# --- all of them ----------------------------------------------------------------------------------
+
 COMPRESSIONS = ("uncompressed", "zstd", "snappy", "lz4", "gzip")
 FORMATS: dict[str, tuple[str, Callable[..., None], list[tuple]]] = {
     "parquet": (".parquet", parquet, [(each,) for each in COMPRESSIONS]),
@@ -139,7 +217,14 @@ FORMATS: dict[str, tuple[str, Callable[..., None], list[tuple]]] = {
     "mdf": (".mf4", mdf, list(product((0, 1, 2)))),
 }
 """Ending, writer and its ways, by kind."""
-KINDS = ("text", *FORMATS)
+SHIPS: dict[str, tuple[str, Callable[..., None], list[tuple]]] = {
+    "capytaine": (".nc", capytaine, [()]),
+    "veres": (".re1", veres, [()]),
+    "wamit": (".4", wamit, [()]),
+    "ship table": (".csv", ship_table, [()]),
+}
+"""The same of ships' transfer functions, which `read_ship` reads."""
+KINDS = ("text", *FORMATS, *SHIPS)
 
 
 def valid(kind: str, folder: Path) -> Iterator[Path]:
@@ -150,7 +235,7 @@ def valid(kind: str, folder: Path) -> Iterator[Path]:
             (folder / f"{number}.csv").write_bytes(content)
             yield folder / f"{number}.csv"
         return
-    ending, write, ways = FORMATS[kind]
+    ending, write, ways = (FORMATS | SHIPS)[kind]
     for number, way in enumerate(ways):
         write(folder / f"{number}{ending}", *way)
         yield folder / f"{number}{ending}"

@@ -295,7 +295,13 @@ HELD = (run("three", 3, begin=0.5, role="validate"),)
 
 
 def campaign(*experiments: Experiment) -> Campaign:
-    return Campaign(Path("campaign.toml"), "servo", False, {"servo": None}, experiments)
+    return Campaign(
+        Path("campaign.toml"),
+        "servo",
+        False,
+        {each.axis: None for each in experiments},
+        experiments,
+    )
 
 
 def test_the_truth_is_found_judged_and_predicted() -> None:

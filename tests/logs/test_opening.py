@@ -5,6 +5,7 @@ import signal
 import struct
 import subprocess
 import sys
+import threading
 import zlib
 from collections.abc import Callable
 from pathlib import Path
@@ -78,6 +79,20 @@ def test_a_process_that_ends_or_hangs_is_replaced(table, monkeypatch):
         log.read(["time"])
     assert other._process.poll() is not None
     monkeypatch.undo()
+    assert log.read(["time"])["time"].tolist() == [0.0, 1.0]
+
+
+def test_an_interrupt_leaves_no_clock_that_python_waits_for(table):
+    log = open_log(table)
+    other = apart._Other.running
+    os.kill(other._process.pid, signal.SIGSTOP)
+    interrupt = threading.Timer(0.5, os.kill, (os.getpid(), signal.SIGINT))
+    interrupt.start()
+    with pytest.raises(KeyboardInterrupt):
+        log.read(["time"])
+    interrupt.join()
+    assert other._process.poll() is not None
+    assert not [each for each in threading.enumerate() if isinstance(each, threading.Timer)]
     assert log.read(["time"])["time"].tolist() == [0.0, 1.0]
 
 

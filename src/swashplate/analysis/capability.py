@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, fields
-from typing import TYPE_CHECKING, Any, Literal, get_args
+from typing import TYPE_CHECKING, Any, Literal, cast, get_args, overload
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,12 +15,14 @@ from swashplate.equations.marching.run import Instance, Part, called
 from swashplate.models.displacement_control import PumpOptions
 from swashplate.models.pump import PumpState
 from swashplate.parameters.rules import FULL_VOLTAGE
-from swashplate.results import Result, Tabular
+from swashplate.results import GivenAxes, Result, Tabular, figures
 from swashplate.simulation.instance import instance_of
 from swashplate.tables import UNIT, Cell, Column, Table
 
 if TYPE_CHECKING:
     import polars
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 Array = NDArray[np.float64]
 
@@ -197,8 +199,6 @@ class Way(Result):
 class Envelope(Tabular):
     """What a drive can do."""
 
-    figure = "plot_envelope"
-
     name: str
     """Name of the drive."""
     creep: float
@@ -232,6 +232,22 @@ class Envelope(Tabular):
         import polars as pl
 
         return self.table().to_polars().filter(pl.col("unit") != "")
+
+    @overload
+    def plot(self, *, ax: None = None, title: str | None = None) -> Figure: ...
+
+    @overload
+    def plot(self, *, ax: GivenAxes, title: str | None = None) -> GivenAxes: ...
+
+    def plot(
+        self, *, ax: Axes | Sequence[Axes] | None = None, title: str | None = None
+    ) -> Figure | Axes | Sequence[Axes]:
+        """Figure of acceleration over speed, its limits labelled.
+
+        By default a new figure; with `ax` it is drawn there, and `ax` returned. See
+        `swashplate.report.figures.plot_envelope`.
+        """
+        return cast("Figure", figures().plot_envelope(self, ax=ax, title=title))
 
 
 def envelope(drive: Drive) -> Envelope:

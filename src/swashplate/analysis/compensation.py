@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple, cast, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -16,7 +16,7 @@ from swashplate.drive import Drive
 from swashplate.equations.marching.record import SOURCE_RATE
 from swashplate.errors import DomainError, InputError
 from swashplate.parameters.rules import FULL_VOLTAGE
-from swashplate.results import Result, short
+from swashplate.results import GivenAxes, Result, figures, short
 from swashplate.tables import (
     UNIT,
     Column,
@@ -30,6 +30,8 @@ from swashplate.tables import (
 
 if TYPE_CHECKING:
     import polars
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
     from swashplate.simulation.result import Simulation
 
@@ -67,8 +69,6 @@ class InverseMap(Result):
     wanted speed in this gap gets whichever of the three is nearest, 0 V if two are.
     """
 
-    figure = "plot_compensation"
-
     name: str
     """Name of the drive."""
     minus: Branch
@@ -95,6 +95,34 @@ class InverseMap(Result):
     def gap(self) -> tuple[float, float]:
         """Speeds between which only the creep can be held. [rad/s]"""
         return float(self.minus.speed[-1]), float(self.plus.speed[0])
+
+    @overload
+    def plot(
+        self,
+        improvement: Improvement | None = None,
+        *,
+        ax: None = None,
+        title: str | None = None,
+    ) -> Figure: ...
+
+    @overload
+    def plot(self, *, ax: GivenAxes, title: str | None = None) -> GivenAxes: ...
+
+    def plot(
+        self,
+        improvement: Improvement | None = None,
+        *,
+        ax: Axes | Sequence[Axes] | None = None,
+        title: str | None = None,
+    ) -> Figure | Axes | Sequence[Axes]:
+        """Figure of the voltage over the wanted speed, with a close-up at standstill.
+
+        By default a new figure, with the runs of an `improvement` below; with `ax` the map is drawn
+        there, in a second one its close-up, and `ax` returned. See
+        `swashplate.report.figures.plot_compensation`.
+        """
+        draw = figures().plot_compensation
+        return cast("Figure", draw(self, improvement, ax=ax, title=title))
 
     def voltage(self, speed: ArrayLike, *, clip: bool = False) -> Array:
         """Voltage for wanted speeds, element by element; it never falls where the speed rises.

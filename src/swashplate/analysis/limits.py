@@ -4,30 +4,26 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from math import atan, inf
-from typing import TYPE_CHECKING, Unpack
+from typing import TYPE_CHECKING, Unpack, cast
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from swashplate.analysis.outcomes import (
-    checked_speed,
-    rms_difference,
-    share_cell,
-    time_share,
-)
+from swashplate.analysis.outcomes import checked_speed, rms_difference
 from swashplate.drive import Drive, Given
 from swashplate.equations.marching.record import SOURCE_RATE
 from swashplate.equations.marching.run import Start
 from swashplate.errors import DomainError, ParameterError, SwashplateError
 from swashplate.parameters.definitions import columns_of
 from swashplate.parameters.parameter_set import Change
-from swashplate.results import Result, Tabular
+from swashplate.results import Result, Tabular, figures
 from swashplate.simulation.result import Limit, Simulation
 from swashplate.simulation.run import simulate_drive
-from swashplate.tables import Column, Table, quantity
+from swashplate.tables import Column, Table, quantity, share_cell
 
 if TYPE_CHECKING:
     import polars
+    from matplotlib.figure import Figure
 
 Array = NDArray[np.float64]
 
@@ -169,6 +165,11 @@ class LimitShares(Tabular):
             made.add(*words, time, each.error, each.error_share, each.alone)
         return made
 
+    def plot(self, *, title: str | None = None) -> Figure:
+        """Figure of command and speed, beside the wanted speed, and of when each limit acts."""
+        draw = figures().plot_limit_timeline
+        return cast("Figure", draw(self.run, wanted=self.wanted, title=title))
+
     def to_polars(self) -> polars.DataFrame:
         """Table of the shares, SI, the costliest first."""
         return self.table().to_polars()
@@ -261,7 +262,7 @@ def shares_of(drive: Drive, run: Simulation, wanted: ArrayLike | None = None) ->
         shares.append(
             LimitShare(
                 **vars(each),
-                time_share=None if each.flag is None else time_share(run, each.flag),
+                time_share=None if each.flag is None else run.time_share(each.flag),
                 error=without,
                 error_share=None if without is None else 1.0 - without / error if error else 0.0,
                 alone=error_of(speed_without(*(one for one in removed if one is not each))),

@@ -16,9 +16,8 @@ from swashplate.drive import Drive
 from swashplate.errors import InputError
 from swashplate.parameters.rules import FULL_VOLTAGE
 from swashplate.results import Result
-from swashplate.simulation.result import Limit
-from swashplate.tables import UNIT, Cell, Column, Table
-from swashplate.units import SHAFT_ANGLE, DisplayUnit, display_unit, of_shaft
+from swashplate.tables import UNIT, Column, Table
+from swashplate.units import DisplayUnit, display_unit, of_shaft
 
 if TYPE_CHECKING:
     from swashplate.simulation.result import Simulation
@@ -286,52 +285,7 @@ def outcome_matrix(speed: Array, trial: Trial, outcomes: Sequence[Outcome]) -> A
     return np.array(made).reshape(len(made), len(speed)).T
 
 
-# --- runs in words --------------------------------------------------------------------------------
-
-
-def held_back(run: Simulation, limit: Limit) -> NDArray[np.bool_]:
-    """(n,) samples at which a limit acts.
-
-    Of the dead zone only samples with a command other than 0 count: at rest nothing is asked that
-    it could hold back.
-    """
-    acts = run.active(limit)
-    if limit == Limit.DEAD_ZONE:
-        command = run.current if run.voltage is None else run.voltage
-        acts = acts & (command != 0.0)
-    return acts
-
-
-def time_share(run: Simulation, limit: Limit) -> float:
-    """Share of a record's samples at which a limit acts, 0 to 1; see `held_back`."""
-    return float(held_back(run, limit).mean())
-
-
-def share_cell(share: float | None) -> Cell:
-    """A share of time as people read it."""
-    words = "" if share is None else f"{100.0 * share:.1f} %" if share else "never"
-    return Cell(share, words)
-
-
-def run_tables(run: Simulation) -> tuple[Table, Table]:
-    """What a drive did under a command, and how long each of its limits held it back."""
-    did = Table("", (Column("Shaft"), Column("", "z.2f"), UNIT))
-    position = float(run.shaft_position[-1])
-    did.add("peak speed, positive", max(float(run.shaft_speed.max()), 0.0), unit="rad/s")
-    did.add("peak speed, negative", min(float(run.shaft_speed.min()), 0.0), unit="rad/s")
-    did.add("speed at the end", float(run.shaft_speed[-1]), unit="rad/s")
-    did.add("position at the end", position, unit=SHAFT_ANGLE, spec="z.1f")
-    if display_unit(SHAFT_ANGLE).name == "deg":
-        did.add("", position / (2.0 * np.pi), unit="turns", spec="z.3f")
-    peaks = {"positive": max(run.current.max(), 0.0), "negative": min(run.current.min(), 0.0)}
-    for way, current in peaks.items():
-        section = way == "positive"
-        did.add(f"peak current, {way}", float(current), unit="A", spec="z.4f", section=section)
-    held = Table("", (Column("Limit"), Column("share of time", ".1%")))
-    for limit in Limit:
-        words = str(limit.name).lower().replace("_", " ")
-        held.add(words, share_cell(time_share(run, limit)))
-    return did, held
+# --- runs side by side ----------------------------------------------------------------------------
 
 
 def side_by_side(runs: Mapping[str, Simulation]) -> Table:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from math import isnan
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, cast, overload
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,12 +22,15 @@ from swashplate.drive import Drive
 from swashplate.errors import DomainError, InputError, ParameterError
 from swashplate.parameters.definitions import CATALOGUE, COLUMNS, REFINEMENTS, columns_of
 from swashplate.parameters.rules import FULL_VOLTAGE
-from swashplate.results import Result
+from swashplate.results import GivenAxes, Result, figures
 from swashplate.simulation.result import Simulation
 from swashplate.tables import UNIT, Column, Table, listed, quantity
 from swashplate.units import of_shaft
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
     from swashplate.analysis.monte_carlo import Bands
 
 Array = NDArray[np.float64]
@@ -194,8 +197,6 @@ def _undefined(outcomes: Sequence[Outcome], values: Mapping[str, Array]) -> tupl
 class WhatIf(Result):
     """A drive before and after."""
 
-    figure = "plot_whatif"
-
     factors: Mapping[str, float]  # By lever.
     trial: Trial
     outcomes: tuple[Outcome, ...]
@@ -212,6 +213,13 @@ class WhatIf(Result):
     def after(self) -> Variant:
         """The drive with all levers moved."""
         return self.variants[CHANGED]
+
+    def plot(self, *, bands: Mapping[str, Bands] | None = None, title: str | None = None) -> Figure:
+        """Figure of the command, the speeds and the accelerations of the drive before and after.
+
+        With `bands` as of `swashplate.report.figures.plot_whatif`.
+        """
+        return cast("Figure", figures().plot_whatif(self, bands=bands or {}, title=title))
 
     def sentences(self) -> tuple[str, ...]:
         """Outcomes that variants have not, and why."""
@@ -290,14 +298,28 @@ LEAST = 5e-4  # A lever that moves an outcome by less than this part has no row 
 class OneAtATime(Result):
     """Outcomes with each lever moved down and up by itself."""
 
-    figure = "plot_tornado"
-
     ranges: Mapping[str, Range]  # Factors down and up by lever.
     outcomes: tuple[Outcome, ...]
     base: Array  # (K,) outcomes of the drive as it is; NaN where there is none.
     low: Array  # (L, K) with each lever at its lower factor.
     high: Array  # (L, K) with each lever at its upper factor.
     sentences: tuple[str, ...]  # What could not be simulated, or has no such outcome.
+
+    @overload
+    def plot(self, *, ax: None = None, title: str | None = None) -> Figure: ...
+
+    @overload
+    def plot(self, *, ax: GivenAxes, title: str | None = None) -> GivenAxes: ...
+
+    def plot(
+        self, *, ax: Axes | Sequence[Axes] | None = None, title: str | None = None
+    ) -> Figure | Axes | Sequence[Axes]:
+        """Figure of what each lever does by itself, a panel an outcome, the strongest at the top.
+
+        By default a new figure; with `ax`, one for each outcome that is defined, it is drawn there,
+        and `ax` returned. See `swashplate.report.figures.plot_tornado`.
+        """
+        return cast("Figure", figures().plot_tornado(self, ax=ax, title=title))
 
     @property
     def swings(self) -> Array:

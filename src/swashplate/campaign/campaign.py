@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from difflib import get_close_matches
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, get_args
+from typing import TYPE_CHECKING, cast, get_args
 
 from swashplate.campaign import schema
 from swashplate.campaign.experiment import Experiment
@@ -95,10 +95,10 @@ class Campaign(Result):
             made.add(*words, each.duration, ", ".join(each.channels))
         return made
 
-    def plot(self, **how: Any) -> list[Figure]:
+    def plot(self, *, title: str | None = None) -> list[Figure]:
         """Figures of all runs, as of `swashplate.report.figures.plot_campaign`."""
-        drawn: list[Figure] = figures().plot_campaign(self, **{"title": self.title, **how})
-        return drawn
+        words = self.title if title is None else title
+        return cast("list[Figure]", figures().plot_campaign(self, title=words))
 
     def __iter__(self) -> Iterator[Experiment]:
         return iter(self.experiments)

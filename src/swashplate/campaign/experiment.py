@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple
+from typing import TYPE_CHECKING, Literal, NamedTuple, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -195,6 +195,15 @@ class Channel(Result):
         """Its unit as of `swashplate.units.display_unit`, which knows a shaft's angle."""
         return shown_unit(self.kind, self.unit)
 
+    def plot(
+        self, *, window: tuple[float, float] | None = None, title: str | None = None
+    ) -> Figure:
+        """Figure of its samples; of a position also of the speed that it gives.
+
+        With `window` as of `swashplate.report.figures.plot_channel`.
+        """
+        return cast("Figure", figures().plot_channel(self, window=window, title=title))
+
     def at(self, time: Array) -> Array:
         """Its readings at other instants [s]; before the first stamp the first one holds."""
         return _between(self, time)
@@ -277,10 +286,9 @@ class Experiment(Tabular):
             made.add(name, each.kind, each.values.size, *ends, unit=unit)
         return made
 
-    def plot(self, **how: Any) -> Figure:
+    def plot(self, *, title: str | None = None) -> Figure:
         """Figure of its input and channels, as of `swashplate.report.figures.plot_campaign`."""
-        figure: Figure = figures().plot_campaign([self], **how)[0]
-        return figure
+        return cast("Figure", figures().plot_campaign([self], title=title)[0])
 
     @property
     def maneuver(self) -> str:

@@ -12,7 +12,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from itertools import product
 from math import inf, isfinite, log, sqrt
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,6 +30,7 @@ from swashplate.results import short
 from swashplate.tables import UNIT, Cell, Column, Table
 
 Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
 
 STEP = 0.005
 """Step of the march. [s]"""
@@ -55,6 +56,8 @@ ONE_WAY = 0.05
 ANGLE, FAR_STOP = 0.2, 0.39
 """Angle of the swash plate at the greatest speed that was seen, at most, and that of a stop that
 was not seen. [rad]"""
+ROUGH = 0.05
+"""Error over the greatest speed from which the squares of errors grow as their sizes. [1]"""
 STEEPEST = 30.0
 """Volts that a radian takes at least, so that at 10 V and at the upper bounds of all gains the
 solenoids do not overpower the feedback spring. [V/rad]"""
@@ -174,7 +177,7 @@ class _Windows(NamedTuple):
             first, last = first / self.averaged, last / self.averaged
         return np.asarray((last - first) / (self.ends - self.begins))
 
-    def of(self, chosen: NDArray[np.bool_]) -> _Windows:
+    def of(self, chosen: Mask) -> _Windows:
         """Some of them."""
         return self._replace(begins=self.begins[chosen], ends=self.ends[chosen])
 
@@ -370,78 +373,109 @@ def _searched(runs: Sequence[_Run], weighted: Array, size: Array, scale: float) 
     """Numbers (12,) of least squares: a grid first, on which gains are linear, then all at once.
 
     From the weighted mean speeds (m,), the largest command each way (2,) and the greatest speed.
+    What the logs do not show is taken out in the end, and the rest goes to its optimum: with the
+    former in, the squares are so flat that a search ends anywhere along a valley.
     """
     from scipy.optimize import least_squares
 
     tried, steepness = size > 0.0, scale / size.max()
 
     def numbers_of(vector: Array) -> Array:
-        """From what is searched for, with or without limits and jumps."""
-        whole = np.concatenate([vector, [NONE] * (10 - vector.size), [0.0] * (12 - vector.size)])
-        limits = np.exp(whole[6:10]) * scale
-        limits[limits > np.exp(0.5 * NONE) * scale] = inf
-        gain, last = np.exp(whole[2:4]) * steepness, [np.exp(whole[4]), whole[5]]
-        return np.concatenate([whole[:2] * size, gain, limits, whole[10:12] * scale, last])
+        """From what is searched for (12,)."""
+        limits = np.exp(vector[6:10]) * scale
+        limits[vector[6:10] >= NONE] = inf
+        gain, last = np.exp(vector[2:4]) * steepness, [np.exp(vector[4]), vector[5]]
+        return np.concatenate([vector[:2] * size, gain, limits, vector[10:12] * scale, last])
 
-    def descended(start: Array, evaluations: int) -> tuple[float, Array]:
-        low, high, typical = (each[: start.size] for each in (LOWEST, HIGHEST, TYPICAL))
+    def errors_of(vector: Array) -> Array:
+        return _errors(runs, numbers_of(vector)) / scale
+
+    def loss_of(vector: Array) -> float:
+        """As `least_squares` has it with the loss "soft_l1"."""
+        rough = errors_of(vector) / ROUGH
+        return ROUGH**2 * float(np.sum(np.sqrt(1.0 + rough**2) - 1.0))
+
+    def descended(start: Array, free: Mask, **how: Any) -> tuple[float, Array]:
+        """Loss and numbers after a descent in those that are free (12,)."""
+
+        def errors_at(part: Array) -> Array:
+            whole = start.copy()
+            whole[free] = part
+            return errors_of(whole)
+
         solution = least_squares(
-            lambda vector: _errors(runs, numbers_of(vector)) / scale,
-            np.clip(start, low + 1e-6, high - 1e-6),
-            bounds=(low, high),
-            x_scale=typical,
-            **{"loss": "soft_l1", "f_scale": 0.05, "diff_step": 1e-3, "max_nfev": evaluations},
+            errors_at,
+            np.clip(start, LOWEST + 1e-6, HIGHEST - 1e-6)[free],
+            bounds=(LOWEST[free], HIGHEST[free]),
+            x_scale=TYPICAL[free],
+            loss="soft_l1",
+            f_scale=ROUGH,
+            diff_step=1e-3,
+            **how,
         )
-        return float(solution.cost), solution.x
+        end = start.copy()
+        end[free] = solution.x
+        return float(solution.cost), end
 
-    def best(starts: Iterable[Array]) -> tuple[float, Array]:
-        """Of many starts a few steps each, and only the best of them to their ends."""
-        begun = sorted((descended(each, 12) for each in starts), key=lambda each: each[0])
-        return min((descended(each, 60) for _, each in begun[:3]), key=lambda each: each[0])
+    def best(starts: Iterable[Array], free: Mask) -> tuple[float, Array]:
+        """Of many starts a few steps each, and only the best of them farther."""
+        begun = [descended(start, free, max_nfev=12) for start in starts]
+        begun.sort(key=lambda pair: pair[0])
+        return min(
+            (descended(vector, free, max_nfev=30) for _, vector in begun[:3]),
+            key=lambda pair: pair[0],
+        )
 
     candidates: list[tuple[float, Array, Array]] = []
     for lag, delay, share in product(LAGS, DELAYS, DEAD_ZONES):
         numbers = np.array([*(share * size), 0.0, 0.0, *[inf] * 4, 0.0, 0.0, lag, delay])
         at_rest, unit = _errors(runs, numbers), np.eye(12)
         ways = [_errors(runs, numbers + unit[2 + way]) for way in np.flatnonzero(tried)]
-        gain, left = np.zeros(2), np.transpose([each - at_rest for each in ways])
+        gain, left = np.zeros(2), np.transpose([way - at_rest for way in ways])
         gain[tried] = np.linalg.lstsq(left, weighted, rcond=None)[0]
         cost = float(np.sum((left @ gain[tried] - weighted) ** 2))
         steep = np.log(np.maximum(gain, 1e-3 * steepness) / steepness)
         dead = np.where(tried, share, 0.1)
-        candidates.append((cost, np.array([*dead, *steep, log(lag), delay]), gain))
-    candidates.sort(key=lambda each: each[0])
+        vector = np.array([*dead, *steep, log(lag), delay, *[NONE] * 4, 0.0, 0.0])
+        candidates.append((cost, vector, gain))
+    candidates.sort(key=lambda candidate: candidate[0])
     if (candidates[0][2][tried] <= 0.0).any():
         raise InputError(
             "The speed goes against the command: reverse it with sign = -1 in its channel."
         )
-    _, plain = best(start for _, start, _ in candidates[:3])
+    free = np.concatenate([tried, tried, [True, True], tried, tried, tried])
+    _, plain = best((vector for _, vector, _ in candidates[:3]), free & (np.arange(12) < 6))
     # a slow rise may be a lag or a limited acceleration, and less speed than a straight line has a
     # larger dead zone or a top speed: from each of them the search ends at another minimum
-    limits = [0.0, 0.0, *[log(0.7) - plain[4]] * 2]
+    limited = plain.copy()
+    limited[6:10] = [0.0, 0.0, *[log(0.7) - plain[4]] * 2]
     moves = [
         *product((0.0,), (0.0, 0.7), (0.0, -1.5, -3.0)),
         *product((0.2,), (0.0, 0.7), (-1.5,)),
     ]
     cost, whole = best(
-        np.concatenate([plain + np.repeat([wider, steeper, quicker, 0.0], [2, 2, 1, 1]), limits])
-        for wider, steeper, quicker in moves
+        (
+            limited + np.repeat([wider, steeper, quicker, 0.0], [2, 2, 1, 7])
+            for wider, steeper, quicker in moves
+        ),
+        free & (np.arange(12) < 10),
     )
     # the same line behind a larger dead zone
     back = tried * size.max() / np.maximum(size, size.max() * ONE_WAY) / np.exp(whole[2:4])
     smaller, jumping = best(
-        np.concatenate([whole[:2] + jump * back, whole[2:], jump * tried]) for jump in JUMPS
+        (whole + np.concatenate([jump * back, np.zeros(8), jump * tried]) for jump in JUMPS), free
     )
-    whole = np.append(whole, [0.0, 0.0])
     if SEEN * smaller < cost:
         cost, whole = smaller, jumping
     # a limit or a jump that makes no difference was not met
+    seen = free.copy()
     for index in range(6, 12):
-        without = np.where(np.arange(12) == index, NONE if index < 10 else 0.0, whole)
-        rough = _errors(runs, numbers_of(without)) / (0.05 * scale)
-        loss = 0.05**2 * float(np.sum(np.sqrt(1.0 + rough**2) - 1.0))
-        if loss < SEEN * cost + NEXT_TO_NOTHING * float(np.sum((weighted / scale) ** 2)):
-            whole = without
+        without = whole.copy()
+        without[index] = NONE if index < 10 else 0.0
+        nothing = NEXT_TO_NOTHING * float(np.sum((weighted / scale) ** 2))
+        if loss_of(without) < SEEN * cost + nothing:
+            whole, seen[index] = without, False
+    _, whole = descended(whole, seen, jac="3-point", xtol=1e-10, ftol=1e-12, gtol=1e-12)
     return numbers_of(whole)
 
 

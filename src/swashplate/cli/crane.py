@@ -11,7 +11,18 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from swashplate.cli.options import FigureFile, TableFile, command
-from swashplate.cli.terminal import draw, long_work, note, save, say, say_saved, show, side, working
+from swashplate.cli.terminal import (
+    FORCED,
+    draw,
+    long_work,
+    note,
+    save,
+    say,
+    say_saved,
+    show,
+    side,
+    working,
+)
 from swashplate.cli.words import pairs_of
 from swashplate.errors import InputError
 from swashplate.tables import PAGE, Form, Table
@@ -38,7 +49,9 @@ class Placed:
 
     Options:
       crane CRANE|FILE.toml: A packaged crane, tg3637, or your own.
-      drive AXIS=SET: Another drive: luff=mine.toml, or the folder of a fit. May be repeated.
+      drive AXIS=SET: Another drive: luff=mine.toml, or the folder of a fit, whose verdict is shown.
+          May be repeated.
+      force: Replace older files, and take drives whose fit is not usable.
       at NAME=VALUE: Where it begins: slew_deg, boom_deg, rope_m, as rope_m=25. May be repeated.
       ship FILE[,ULEN]: The ship's transfer functions: .re1 of VERES, .nc of Capytaine, .csv, or
           .4 of WAMIT with its ULEN, hull.4,175.
@@ -51,12 +64,12 @@ class Placed:
 
     @cached_property
     def chosen(self) -> Crane:
-        """The crane, with its drives."""
-        from swashplate.crane import Crane
-
-        own = self.crane.endswith(".toml")
-        made = Crane.from_toml(self.crane) if own else Crane.preset(self.crane)
-        return made.with_drive(told=True, **dict(pairs_of("--drive", self.drive, "luff=mine.toml")))
+        """The crane, with its drives; one whose fit is not usable is refused without --force."""
+        drives = dict(pairs_of("--drive", self.drive, "luff=mine.toml"))
+        crane = _crane_of(self.crane).with_drive(told=True, **drives)
+        if not FORCED.get():
+            _refuse_unusable(crane)
+        return crane
 
     @property
     def pose(self) -> dict[str, Any]:
@@ -172,10 +185,12 @@ def show_crane(crane: str, *, toml: bool = False) -> None:
         read = read_text if crane.endswith(".toml") else preset_text
         typer.echo(read(crane), nl=False)
         return
-    chosen = Placed(crane).chosen
+    chosen = _crane_of(crane)
     show(chosen.table())
     for axis in AXES:
         note(f"{axis}: {getattr(chosen, axis).parameters.title}")
+    for sentence in chosen.provenance():
+        say(sentence)
 
 
 def run(
@@ -248,7 +263,7 @@ def run(
 
         save(scene, "Scene", lambda path: write_scene(runs, path))
     low = [f"{name}: {each}" for name, run in runs.items() for each in run.sentences()]
-    _end(crane, tables, *low)
+    _end(crane, tables, *low, *crane.provenance())
 
 
 def judge(
@@ -299,11 +314,10 @@ def judge(
     draw(plot, "plot_judgment", found)
     _end(study.chosen, found.tables(), *found.sentences()[1:])
     say_saved()
-    headline = f"{found.outcome.capitalize()}: {found.verdict()}"
     if not found.passed:
-        side.print(headline)
+        side.print(found.headline())
         raise typer.Exit(1)
-    say(headline)
+    say(found.headline())
 
 
 def follow(
@@ -328,7 +342,7 @@ def follow(
         found = placed.chosen.follow(seaway=seaway, **names, **placed.pose)
     save(out, "Amplitudes, in SI", found.tables()[0].write)
     draw(plot, "plot_follow", found)
-    _end(placed.chosen, found.tables())
+    _end(placed.chosen, found.tables(), *placed.chosen.provenance())
 
 
 def sweep(
@@ -363,7 +377,7 @@ def sweep(
     found: Sweep = study.through(study.chosen.sweep, over, **more)
     save(out, "Swing, in SI", found.tables()[0].write)
     draw(plot, "plot_sweep", found)
-    _end(study.chosen, found.tables())
+    _end(study.chosen, found.tables(), *study.chosen.provenance())
 
 
 def sectors(
@@ -421,6 +435,24 @@ def _number(what: str, text: str) -> float:
         return float(text)
     except ValueError:
         raise InputError(f"{what}: '{text}' is no number.") from None
+
+
+def _crane_of(name: str) -> Crane:
+    """A packaged crane by its name, or the crane of a file."""
+    from swashplate.crane import Crane
+
+    return Crane.from_toml(name) if name.endswith(".toml") else Crane.preset(name)
+
+
+def _refuse_unusable(crane: Crane) -> None:
+    """Refuse a drive whose fit is not usable."""
+    for axis, source in crane.sources.items():
+        if not source.usable:
+            raise InputError(
+                f"{axis}={source.place}: the verdict on the fit of this drive is "
+                f"'{source.verdict.rstrip('.')}'; fit again until it is usable, as its report "
+                f"advises, give another drive, or take this one all the same with --force."
+            )
 
 
 def _end(crane: Crane, tables: Iterable[Table], *said: str) -> None:

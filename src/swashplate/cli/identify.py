@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from swashplate.identification.criteria import Verdict
     from swashplate.identification.drive_model import Parameters
     from swashplate.identification.setup import Setup
-    from swashplate.identification.solving import Progress, Solution
+    from swashplate.identification.solving import Solution
     from swashplate.parameters.parameter_set import ParameterSet
 
 INTERRUPTED = 130
@@ -162,18 +162,12 @@ def fit(
     executor = Dask(dask) if dask is not None else Processes(jobs or None)
     with long_work("Fitting") as shown, clock.part("search"):
 
-        def watch(stage: str, now: Progress) -> None:
-            shown(
-                f"{stage}: iteration {now.iteration}, evaluation {now.evaluations} of at most "
-                f"{evaluations}, cost {now.cost:.6g}"
-            )
-
         def ended(stage: str, one: Solution, done: int) -> None:
             said = f"{stage}: {done} of {starts + 1} starts, the last to cost {one.cost:.6g}"
             shown(said, done / (starts + 1))
 
         search = Search(starts, seed, executor, out / "starts", resume, ended) if starts else None
-        fitted = partial(fit_runs, max_evaluations=evaluations, watch=watch)
+        fitted = partial(fit_runs, max_evaluations=evaluations)
         result = first = fitted(nominal, runs, plan, loss=loss, search=search)
         if joint and len(plan.stages) > 1 and not result.interrupted:
             # from where the stages ended: from afar a joint fit is often caught on its way
@@ -185,7 +179,7 @@ def fit(
             "command with --resume goes on; nothing is written but the starts."
         )
         raise typer.Exit(INTERRUPTED)
-    with working("Judging") as status, clock.part("judging"):
+    with working("Judging"), clock.part("judging"):
         found = judge_fit(
             campaign,
             result,
@@ -197,7 +191,6 @@ def fit(
             executor=executor,
             loss=loss,
             required=require / 100.0,
-            watch=status.update,
         )
         verdict = found.verdict
     with clock.part("report"):

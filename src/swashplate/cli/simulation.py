@@ -42,11 +42,9 @@ def simulate(
       swashplate simulate mine.toml log.csv --interpolation previous --out run.csv
     """
     with working("Simulating"):
-        from swashplate.analysis.outcomes import run_tables
-
         chosen = words.at_rate(drive.chosen, sampling.rate)
         name, run = words.simulated(chosen, command, sampling)
-        tables, title = run_tables(run), f"{drive.title}, {name}"
+        tables, title = run.tables(), f"{drive.title}, {name}"
     save(out, "All signals, in SI", run.write)
     window = words.window_of(run.time, begin, end)
     draw(plot, "plot_simulation", run, window=window, title=title)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import sys
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import AbstractContextManager, contextmanager
+from contextlib import contextmanager
 from contextvars import ContextVar
 from pathlib import Path
 from textwrap import fill
@@ -17,6 +17,7 @@ from rich.console import Console
 from rich.status import Status
 
 from swashplate.errors import FileError
+from swashplate.progress import Work, shown_by
 from swashplate.tables import UNIT, Form, Table, check_place, ending
 
 FORCED: ContextVar[bool] = ContextVar("FORCED", default=False)
@@ -157,9 +158,28 @@ def say_error(error: Exception) -> None:
     side.print(f"Error: {shown}.", soft_wrap=True)
 
 
-def working(text: str) -> AbstractContextManager[Status]:
+class Shown:
+    """Progress of the package's functions, in the words of a spinner or a bar."""
+
+    def __init__(self, update: Callable[[str], object]) -> None:
+        self._update = update
+
+    def show(self, line: str) -> None:
+        """Replace the words."""
+        self._update(line)
+
+    def end(self, work: Work) -> None:
+        """Leave the last line where it is."""
+
+
+@contextmanager
+def working(text: str) -> Iterator[Status]:
     """A spinner while something may take longer than a second; nothing in a pipe."""
-    return side.status(f"{text} ...")
+    with (
+        side.status(f"{text} ...") as status,
+        shown_by(Shown(lambda line: status.update(f"{line} ..."))),
+    ):
+        yield status
 
 
 @contextmanager
@@ -172,7 +192,7 @@ def long_work(text: str, steps: int = 0) -> Iterator[Callable[..., None]]:
     from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeRemainingColumn
 
     said = TextColumn("{task.description}", markup=False)
-    columns = (SpinnerColumn(), BarColumn(bar_width=20), said, TimeRemainingColumn())
+    columns = (SpinnerColumn(), BarColumn(bar_width=12), said, TimeRemainingColumn())
     with Progress(*columns, console=side, transient=True, disable=not side.is_terminal) as bar:
         task, begun = bar.add_task(text, total=None), 0
 
@@ -183,7 +203,8 @@ def long_work(text: str, steps: int = 0) -> Iterator[Callable[..., None]]:
             total = None if share is None else 1.0
             bar.update(task, description=what, total=total, completed=share or 0.0)
 
-        yield show
+        with shown_by(Shown(lambda line: bar.update(task, description=line))):
+            yield show
 
 
 def check_free(*paths: Path) -> None:

@@ -1,5 +1,6 @@
 from . import control as control
 from .crane import Crane as Crane
+from .drives import DriveSource as DriveSource
 from .judgment import Demand as Demand
 from .judgment import Estimate as Estimate
 from .judgment import Followable as Followable

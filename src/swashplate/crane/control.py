@@ -10,8 +10,10 @@ controllers that are designed outside the package.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
-from math import cos, inf, radians, sin
+from math import cos, radians, sin
+from numbers import Real
 from typing import TYPE_CHECKING, Any, ClassVar, Literal, NamedTuple
 
 import numpy as np
@@ -72,14 +74,18 @@ class Control:
     """One stage of control, or several; see the module's text."""
 
     kind: ClassVar[str] = ""
+    largest: ClassVar[Mapping[str, float]] = {}
+    """Largest plausible value of each number, all of which are above 0."""
 
     def __post_init__(self) -> None:
-        for name, value in vars(self).items():
-            most = 1.0 if name == "delay" else inf
-            if isinstance(value, int | float) and not (0.0 < value < inf and value <= most):
-                limit = "" if most == inf else f" and at most {most:g}"
+        for name, most in self.largest.items():
+            value = getattr(self, name)
+            if value == "auto":
+                continue
+            if not (isinstance(value, Real) and 0.0 < float(value) <= most):
                 raise InputError(
-                    f"The {name} of {self.kind} is {value:g}, but must be above 0{limit}."
+                    f"The {name} of {self.kind} is {value!r}, but must be a number above 0 and at "
+                    f"most {most:g}."
                 )
 
     def __or__(self, other: Control) -> Chain:
@@ -144,10 +150,12 @@ class DelayedFeedback(Control):
     """
 
     gain: float = 0.2
-    """k, part of the load's horizontal distance from the tip that is added to the wanted tip."""
+    """k, part of the load's horizontal distance from the tip that is added to the wanted tip; at
+    most 2, and unstable from 1 on."""
     delay: float = 0.25
     """τ in periods of the present rope, at most 1. The damping ratio is about k/2 at 0.25."""
     kind = "delayed feedback"
+    largest: ClassVar[Mapping[str, float]] = {"gain": 2.0, "delay": 1.0}
 
 
 @dataclass(frozen=True)
@@ -167,10 +175,12 @@ class Clip(Control):
 
     size: float | Literal["auto"] = "auto"
     """Along the boom [m]; by default the largest sine of the load's frequency ω₀ that luff and slew
-    can follow, min(v/ω₀, a/ω₀²) with their limits of speed v and acceleration a, times `share`."""
+    can follow, min(v/ω₀, a/ω₀²) with their limits of speed v and acceleration a, times `share`. At
+    most 100 m."""
     share: float = 0.8
-    """Part of it that is used."""
+    """Part of it that is used, at most 10."""
     kind = "a clip"
+    largest: ClassVar[Mapping[str, float]] = {"size": 100.0, "share": 10.0}
 
 
 @dataclass(frozen=True)
@@ -181,8 +191,9 @@ class PositionLoop(Control):
     """
 
     gain: float = 0.7
-    """Speed added for each radian of a shaft's error. [1/s]"""
+    """Speed added for each radian of a shaft's error, at most 50. [1/s]"""
     kind = "position loop"
+    largest: ClassVar[Mapping[str, float]] = {"gain": 50.0}
 
 
 @dataclass(frozen=True)

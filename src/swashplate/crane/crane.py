@@ -6,19 +6,21 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property, lru_cache
 from importlib.resources import files
-from math import cos, degrees, isfinite, radians, sin
+from math import cos, degrees, radians, sin
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal, Protocol, Unpack
+from typing import TYPE_CHECKING, Annotated, Any, Literal, Unpack
 
 import numpy as np
 from numpy.typing import ArrayLike
-from pydantic import BaseModel, ConfigDict, Field, FiniteFloat
+from pydantic import BaseModel, ConfigDict, Field
 
 from swashplate.analysis.compensation import InverseMap, inverse_map
 from swashplate.analysis.whatif import pulled
 from swashplate.crane.control import linearize
+from swashplate.crane.drives import DriveLike, DriveSource, drives_of
 from swashplate.crane.kinematics import Boom, Geometry, Home, Vector, luff_rope
 from swashplate.crane.loop import DIRECT, IDEAL
+from swashplate.crane.quantities import GEOMETRY, Quantity, check_sources, in_si, quantity_of
 from swashplate.crane.result import CraneRun
 from swashplate.crane.sea import Seaway, motion_of
 from swashplate.crane.stepper import RATE, CraneStepper, Setup
@@ -26,9 +28,7 @@ from swashplate.crane.stick import AXES, Array, Stick, check_names
 from swashplate.documents import parse_toml, read_text, validated
 from swashplate.drive import Drive
 from swashplate.errors import InputError, ParameterError
-from swashplate.parameters.files import preset_names
 from swashplate.tables import Column, Table
-from swashplate.units import to_si
 
 if TYPE_CHECKING:
     from swashplate.analysis.monte_carlo import Draws
@@ -37,53 +37,10 @@ if TYPE_CHECKING:
     from swashplate.linear import LinearModel
 
 
-class Fitted(Protocol):
-    """What a fit returns, as far as a crane takes it."""
-
-    @property
-    def drive(self) -> Drive:
-        """The drive that was fitted."""
-        ...
-
-
-DriveLike = Drive | Fitted | str | Path
-
-
-class Quantity(BaseModel):
-    """A length, angle or number of a crane, with where it comes from."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-    value: FiniteFloat | list[FiniteFloat]
-    unit: str
-    status: Literal["published", "measured", "assumed", "user"] = "user"
-    source: str = ""
-
-
-GEOMETRY: Mapping[str, tuple[str, int, Literal["above 0", "at least 0", ""]]] = {
-    "boom_length": ("m", 1, "above 0"),
-    "foot_offset": ("m", 1, "at least 0"),
-    "slew_axis": ("m", 3, ""),
-    "tower_sheave_distance": ("m", 1, "above 0"),
-    "tower_sheave_angle": ("rad", 1, ""),
-    "hoist_drum_radius": ("m", 1, "above 0"),
-    "hoist_falls": ("1", 1, "above 0"),
-    "luff_drum_radius": ("m", 1, "above 0"),
-    "luff_falls": ("1", 1, "above 0"),
-    "rope_coupling": ("1", 1, "at least 0"),
-    "safe_load": ("kg", 1, "above 0"),
-    "boom_limits": ("rad", 2, ""),
-    "rope_limits": ("m", 2, ""),
-}
-"""Quantities of a crane: SI unit, how many numbers it has, and their range."""
-LONGEST = 300.0
-"""Length on a crane, its rope apart, beyond which another unit is probably meant. [m]"""
-
-
 class CraneFile(BaseModel):
     """A crane's file; drives are packaged names, or files and folders of fits beside it."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True)
+    model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
 
     format: Literal[1] = 1
     name: str
@@ -112,8 +69,8 @@ class Crane:
     luff: Drive
     known: Mapping[str, Drive] = field(default_factory=dict)
     """Drives that control knows, by axis, where they are not those that move the crane."""
-    fits: Mapping[str, Path] = field(default_factory=dict)
-    """Folders of the fits that its drives come from, by axis."""
+    sources: Mapping[str, DriveSource] = field(default_factory=dict)
+    """Where drives come from that are neither packaged nor made in Python, by axis."""
 
     def __post_init__(self) -> None:
         _ = self._si
@@ -126,7 +83,10 @@ class Crane:
     @classmethod
     def from_toml(cls, path: str | Path) -> Crane:
         """A crane from a file; a `ParameterError` names file, entry and rule."""
-        return _read(read_text(path), str(path), Path(path).parent)
+        crane = _read(read_text(path), str(path), Path(path).parent)
+        for name in packaged_names():
+            check_sources(crane.quantities, cls.preset(name).quantities, str(path), name)
+        return crane
 
     def __repr__(self) -> str:
         drives = ", ".join(f"{axis} {getattr(self, axis).name!r}" for axis in AXES)
@@ -137,6 +97,15 @@ class Crane:
         """How much of the geometry is assumed: ``"12 of 13 quantities"``, empty if nothing is."""
         count = sum(each.status == "assumed" for each in self.quantities.values())
         return f"{count} of {len(self.quantities)} quantities" if count else ""
+
+    @property
+    def fits(self) -> dict[str, Path]:
+        """Folders of the fits that its drives come from, by axis."""
+        return {axis: source.fit for axis, source in self.sources.items() if source.fit is not None}
+
+    def provenance(self) -> tuple[str, ...]:
+        """A sentence for each drive in `sources`: its file, and the verdict on its fit."""
+        return tuple(source.sentence(axis) for axis, source in self.sources.items())
 
     def with_drive(self, *, told: bool = True, **drives: DriveLike) -> Crane:
         """The crane with other drives by axis.
@@ -149,15 +118,16 @@ class Crane:
             are theirs.
         **drives
             Each is a drive, ``luff=crane.luff.scale(Z16=1.5)``; the result of a fit; or a place: a
-            packaged name, a parameter file, or the folder that a fit wrote.
+            packaged name, a parameter file, or the folder that a fit wrote. The verdict on a fit
+            stands in `sources`; a drive that is not usable is taken, and judgments say so.
         """
         check_names("A crane has no drive", drives, AXES, "it has")
-        made, fits = _drives(drives, Path())
+        made, sources = drives_of(drives, Path())
         known = {axis: drive for axis, drive in self.known.items() if axis not in made}
         if not told:
             known |= {axis: self.known_drive(axis) for axis in made}
-        fits |= {axis: place for axis, place in self.fits.items() if axis not in made}
-        return replace(self, known=known, fits=fits, **made)
+        kept = {axis: source for axis, source in self.sources.items() if axis not in made}
+        return replace(self, known=known, sources=kept | sources, **made)
 
     def known_drive(self, axis: str) -> Drive:
         """The drive of an axis as control knows it: its own, unless `known` has another."""
@@ -172,9 +142,11 @@ class Crane:
         known = dict(self.known)
         if axis in known:
             known[axis] = pulled(known[axis], levers)
-        fits = {name: place for name, place in self.fits.items() if name != axis}
+        sources = dict(self.sources)
+        if axis in sources:  # the verdict stays that of what was changed, draws do not
+            sources[axis] = sources[axis]._replace(fit=None)
         made: dict[str, Any] = {axis: pulled(getattr(self, axis), levers), "known": known}
-        return replace(self, fits=fits, **made)
+        return replace(self, sources=sources, **made)
 
     def drawn(self, **draws: Draws) -> tuple[Crane, ...]:
         """Cranes whose drives are drawn from the errors of fits, by axis; others keep their drive.
@@ -200,60 +172,36 @@ class Crane:
         for axis, each in draws.items():
             order = np.random.default_rng(AXES.index(axis)).permutation(len(each.drives))
             shuffled[axis] = [each.drives[k] for k in order]
+        sources = {
+            axis: source._replace(fit=None) if axis in shuffled else source
+            for axis, source in self.sources.items()
+        }
         sets = zip(*shuffled.values(), strict=False)
         return tuple(
-            self.with_drive(told=False, **dict(zip(shuffled, each, strict=True))) for each in sets
+            replace(
+                self.with_drive(told=False, **dict(zip(shuffled, each, strict=True))),
+                sources=sources,
+            )
+            for each in sets
         )
 
     def with_geometry(self, **changes: float | tuple[float, ...]) -> Crane:
         """The crane with other quantities, in SI and by name: ``boom_length=38.0``.
 
-        A `ParameterError` for an unknown name, or lengths that make no crane.
+        A `ParameterError` for an unknown name, a value out of its plausible range, or lengths that
+        make no crane.
         """
-        made = dict(self.quantities)
+        quantities = dict(self.quantities)
         for name, value in changes.items():
             if name not in GEOMETRY:
                 raise ParameterError(f"A crane has no {name}; it has {', '.join(GEOMETRY)}.")
-            number = float(value) if isinstance(value, int | float) else list(map(float, value))
-            made[name] = Quantity(value=number, unit=GEOMETRY[name][0])
-        return replace(self, quantities=made)
+            quantities[name] = quantity_of(name, value)
+        return replace(self, quantities=quantities)
 
     @cached_property
     def _si(self) -> dict[str, tuple[float, ...]]:
-        """Quantities in SI; lengths that make no crane are refused."""
-        made, name = {}, self.name
-        for each, (unit, count, rule) in GEOMETRY.items():
-            entry = self.quantities[each]
-            values = entry.value if isinstance(entry.value, list) else [entry.value]
-            if len(values) != count:
-                found = len(values)
-                raise ParameterError(f"{name}: {each} has {found} numbers, but needs {count}.")
-            made[each] = tuple(to_si(v, entry.unit, unit, f"{name}: {each}") for v in values)
-            if unit == "m" and each != "rope_limits" and max(map(abs, made[each])) > LONGEST:
-                raise ParameterError(
-                    f"{name}: {each} is {max(map(abs, made[each])):g} m, but no crane is longer "
-                    f"than {LONGEST:g} m: look at its unit."
-                )
-            value = made[each][0]
-            if (rule and not value >= 0.0) or (rule == "above 0" and value == 0.0):
-                raise ParameterError(f"{name}: {each} is {value:g}, but must be {rule}.")
-        low, high = map(degrees, made["boom_limits"])
-        (angle,), (short, long) = map(degrees, made["tower_sheave_angle"]), made["rope_limits"]
-        if not 0.0 <= low < high < 90.0:
-            raise ParameterError(
-                f"{name}: boom_limits are {low:g} and {high:g} deg, but must rise within 0 to 90 "
-                "deg."
-            )
-        if not high < angle < low + 180.0:
-            raise ParameterError(
-                f"{name}: tower_sheave_angle is {angle:g} deg, but the luff rope only lifts a boom "
-                f"up to {high:g} deg from a sheave above that and below {low + 180.0:g} deg."
-            )
-        if not 0.0 < short < long:
-            raise ParameterError(
-                f"{name}: rope_limits are {short:g} and {long:g} m, but must rise from above 0."
-            )
-        return made
+        """Quantities in SI; a `ParameterError` for those that make no crane."""
+        return in_si(self.quantities, self.name)
 
     @cached_property
     def geometry(self) -> Geometry:
@@ -305,8 +253,10 @@ class Crane:
             raise InputError(
                 f"The rope of {self.name} is {rope_m:g} m, but can be {short:g} to {long:g} m."
             )
-        if not isfinite(slew_deg):
-            raise InputError("The slew at the start must be a finite angle.")
+        if not abs(slew_deg) <= 720.0:
+            raise InputError(
+                f"The slew at the start is {slew_deg:g} deg, but must be within 720 deg."
+            )
         boom = Boom(cos(radians(boom_deg)), sin(radians(boom_deg)))
         return Home(radians(slew_deg), float(luff_rope(boom, self.geometry)), rope_m)
 
@@ -373,8 +323,8 @@ class Crane:
         heads = ("quantity", "value", "unit", "status")
         made = Table(self.title or self.name, (*map(Column, heads), Column("source", wrap=True)))
         for name, each in self.quantities.items():
-            values = each.value if isinstance(each.value, list) else [each.value]
-            text, look = ", ".join(f"{value:g}" for value in values), each.status == "assumed"
+            text = ", ".join(f"{value:g}" for value in each.values)
+            look = each.status == "assumed"
             made.add(name.replace("_", " "), text, each.unit, each.status, each.source, look=look)
         return made
 
@@ -403,66 +353,37 @@ def begun(crane: Crane, stick: Stick, setup: Setup) -> tuple[CraneStepper, Array
     return stepper, commands, end
 
 
+SETS = files("swashplate.crane") / "sets"
+
+
+def packaged_names() -> list[str]:
+    """Names of the packaged cranes."""
+    return sorted(each.name.removesuffix(".toml") for each in SETS.iterdir())
+
+
 def preset_text(name: str) -> str:
     """The file of a packaged crane."""
-    sets = files("swashplate.crane") / "sets"
-    found = {each.name.removesuffix(".toml"): each for each in sets.iterdir()}
-    if name not in found:
-        raise ParameterError(f"There is no packaged crane '{name}'; there is {', '.join(found)}.")
-    return found[name].read_text("utf-8")
+    names = packaged_names()
+    if name not in names:
+        raise ParameterError(f"There is no packaged crane '{name}'; there is {', '.join(names)}.")
+    return (SETS / f"{name}.toml").read_text("utf-8")
 
 
-def _drives(given: Mapping[Any, DriveLike], folder: Path) -> tuple[dict[str, Any], dict[str, Path]]:
-    """Drives as they are given, and the folders of the fits that they come from; by axis."""
-    made, fits = {}, {}
-    for axis, each in given.items():
-        drive, place = _drive(each, folder, axis)
-        # a packaged drive or a Drive is put onto another axis knowingly, a fit or file hardly
-        named = isinstance(each, Drive) or str(each) in preset_names()
-        if not named and drive.name in AXES and drive.name != axis:
-            raise ParameterError(
-                f"{axis}: {place or 'the fit'} has a drive of the {drive.name}. If it moves the "
-                f"{axis} as well, give it another name."
-            )
-        if place and place.name == "drive.toml" and place.with_name("fit.json").is_file():
-            fits[axis] = place.parent
-        made[axis] = drive
-    return made, fits
-
-
-def _drive(given: DriveLike, folder: Path, axis: str) -> tuple[Drive, Path | None]:
-    """The drive of an axis as it is given, and its file, if it has one.
-
-    Places are looked for in a folder, packaged names go first.
-    """
-    if not isinstance(given, str | Path):
-        made = getattr(given, "drive", given)
-        if isinstance(made, Drive):
-            return made, None
-    elif str(given) in preset_names():
-        return Drive.preset(str(given)), None
-    elif (place := folder / given).is_dir() or place.suffix == ".toml":
-        place = place / "drive.toml" if place.is_dir() else place
-        if place.is_file() and "runs" in parse_toml(read_text(place), str(place)):
-            raise ParameterError(
-                f"{axis}: {place} is a campaign: fit it first, and give the folder of the fit."
-            )
-        return Drive.from_toml(place), place
-    raise ParameterError(
-        f"{axis}: a crane's drive is a packaged one, {', '.join(preset_names())}, a .toml file, or "
-        f"the result or folder of a fit, but there is no such '{given}'."
-    )
-
-
-def _read(text: str, origin: str, folder: Path) -> Crane:
-    """A crane of a file's text, its drives beside it."""
-    content = validated(parse_toml(text, origin), CraneFile, origin)
+def _geometry_of(content: CraneFile, origin: str) -> dict[str, Quantity]:
+    """All quantities of a crane's file; refuses a name that is missing or unknown."""
     lacks = [name for name in GEOMETRY if name not in content.geometry]
     strange = [name for name in content.geometry if name not in GEOMETRY]
     if lacks or strange:
         extra = f", and knows no '{strange[0]}'" if strange else ""
         need = f"needs an entry '{lacks[0]}'" if lacks else f"has {len(GEOMETRY)} quantities"
         raise ParameterError(f"{origin}: geometry {need}{extra}.")
-    drives, fits = _drives(content.drives, folder)
-    quantities = {name: content.geometry[name] for name in GEOMETRY}
-    return Crane(content.name, content.title, quantities, **drives, fits=fits)
+    return {name: content.geometry[name] for name in GEOMETRY}
+
+
+def _read(text: str, origin: str, folder: Path) -> Crane:
+    """A crane of a file's text, its drives beside it."""
+    content = validated(parse_toml(text, origin), CraneFile, origin)
+    quantities = _geometry_of(content, origin)
+    in_si(quantities, origin)
+    drives, sources = drives_of(content.drives, folder)
+    return Crane(content.name, content.title, quantities, **drives, sources=sources)

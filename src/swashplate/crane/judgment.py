@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from math import cos, inf, pi, radians, sin, sqrt
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple, cast, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -24,12 +24,14 @@ from swashplate.crane.stepper import RATE
 from swashplate.crane.stick import AXES, check_names
 from swashplate.crane.study import COUNTED, NONE, Case, Laws, Study, with_orifice
 from swashplate.errors import InputError
-from swashplate.results import Result, Tabular
+from swashplate.results import GivenAxes, Result, Tabular, figures
 from swashplate.simulation.result import Limit
 from swashplate.tables import Column, Table, count, listed
 
 if TYPE_CHECKING:
     import polars
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 Array = NDArray[np.float64]
 
@@ -39,6 +41,8 @@ SHARES = (0.8, 0.6, 0.4)
 """Shares of what the luff can follow at which control is clipped on trial, the largest first."""
 ENOUGH = (10, 20, 30, 50, 75, 100, 150, 200, 300, 500, 700, 1000, 1500, 2000, 3000, 5000, 10_000)
 """Numbers of seaways that are advised where fewer do not decide."""
+SLOWEST = 3600.0
+"""Longest period that an axis is asked to follow; a tide has more, a swell 25 s. [s]"""
 BLOCK = 20
 """Seaways of a trial after which it is given up if it has failed already."""
 LOOP = PositionLoop()
@@ -70,7 +74,20 @@ class Followable(Result):
     crane: Crane = field(repr=False)
     boom_deg: float
 
-    figure = "plot_follow"
+    @overload
+    def plot(self, *, ax: None = None, title: str = "") -> Figure: ...
+
+    @overload
+    def plot(self, *, ax: GivenAxes, title: str = "") -> GivenAxes: ...
+
+    def plot(
+        self, *, ax: Axes | Sequence[Axes] | None = None, title: str = ""
+    ) -> Figure | Axes | Sequence[Axes]:
+        """Figure of the amplitudes over the period, with what seas ask for as points.
+
+        By default a new figure; with `ax` it is drawn there, and `ax` returned.
+        """
+        return cast("Figure", figures().plot_follow(self, ax=ax, title=title))
 
     def tables(self) -> list[Table]:
         """Amplitudes over the period, and what seas ask for."""
@@ -102,8 +119,8 @@ def follow(
     ship's hull in beam waves.
     """
     times = np.atleast_1d(np.asarray(periods, dtype=np.float64))
-    if not (np.isfinite(times).all() and (times > 0.0).all() and times.size):
-        raise InputError("Periods to follow must be above 0 s.")
+    if not (((times > 0.0) & (times <= SLOWEST)).all() and times.size):
+        raise InputError(f"Periods to follow must be above 0 s and at most {SLOWEST:g} s.")
     g, home = crane.geometry, crane.home(slew_deg, boom_deg, rope_m)
     boom = boom_at(0.0, g, home)
     rates = (g.hoist, g.foot + g.boom * boom.cos, float(reach_rate(boom, g)))
@@ -218,10 +235,23 @@ class Judgment(Tabular):
     tried: tuple[str, ...] = ()
     """What was tried and is worse than none in more of the seaways than allowed."""
 
-    figure = "plot_judgment"
-
     def __repr__(self) -> str:
         return f"Judgment({count(len(self.study.seeds), 'seaway')}, {', '.join(self.names)})"
+
+    @overload
+    def plot(self, *, ax: None = None, title: str = "") -> Figure: ...
+
+    @overload
+    def plot(self, *, ax: GivenAxes, title: str = "") -> GivenAxes: ...
+
+    def plot(
+        self, *, ax: Axes | Sequence[Axes] | None = None, title: str = ""
+    ) -> Figure | Axes | Sequence[Axes]:
+        """Figure of the swing of every variant in every seaway, its mean and interval.
+
+        By default a new figure; with `ax` it is drawn there, and `ax` returned.
+        """
+        return cast("Figure", figures().plot_judgment(self, ax=ax, title=title))
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -271,6 +301,21 @@ class Judgment(Tabular):
     def _idle(self) -> bool:
         """Whether the judged variant swings as no control does, in every seaway."""
         return np.allclose(self.counted(self.judged), self.counted(NONE), rtol=1e-3)
+
+    def headline(self) -> str:
+        """The outcome, the verdict, and whether they rest on a drive whose fit is not usable."""
+        words = f"{self.outcome.capitalize()}: {self.verdict()}"
+        case = self.study.cases[self.judged]
+        unusable = {
+            axis
+            for crane in case.cranes
+            for axis, source in crane.sources.items()
+            if not source.usable
+        }
+        if not unusable:
+            return words
+        axes = listed([axis for axis in AXES if axis in unusable])
+        return f"{words} It rests on the fit of the {axes}, which is not usable."
 
     def verdict(self) -> str:
         """What the judged variant amounts to, and what would do if it fails."""
@@ -389,6 +434,14 @@ class Judgment(Tabular):
         ]
         return pl.DataFrame(rows)
 
+    @property
+    def headline(self) -> str:
+        """The outcome and the verdict in one sentence."""
+        return f"{self.outcome.capitalize()}: {self.verdict()}"
+
+    def _sentences(self) -> list[str]:
+        return list(self.sentences()[1:])  # the first one is the headline
+
     def sentences(self) -> tuple[str, ...]:
         """The verdict, and what it rests on."""
         study, assumed = self.study, self.study.crane.assumed
@@ -398,7 +451,7 @@ class Judgment(Tabular):
             f"{100.0 * self.allowed:g} % of them; the 95 % interval of that share decides."
         )
         crane = (f"{assumed} of the crane are assumed.",) if assumed else ()
-        return (self.verdict(), rests, *crane)
+        return (self.verdict(), rests, *crane, *study.provenance())
 
 
 def _worse(own: Array, none: Array) -> NDArray[np.bool_]:

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from math import pi, sqrt
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,12 +17,13 @@ from swashplate.crane.stepper import ACTUATIONS, RATE
 from swashplate.crane.stick import AXES, check_names
 from swashplate.crane.transfer_functions import MOTIONS
 from swashplate.errors import InputError
-from swashplate.results import Tabular
+from swashplate.results import Tabular, figures
 from swashplate.simulation.result import Limit, Named, Simulation
 from swashplate.tables import Column, Table
 
 if TYPE_CHECKING:
     import polars
+    from matplotlib.figure import Figure
 
     from swashplate.crane.crane import Crane
 
@@ -61,7 +62,6 @@ class CraneRun(Tabular):
     stick_end: float
     """When the last command has returned to zero. [s]"""
 
-    figure = "plot_crane"
     rows = ROWS
 
     def __post_init__(self) -> None:
@@ -94,6 +94,15 @@ class CraneRun(Tabular):
     """(n, 3) torques of the rope that the drives took, zero unless they are loaded. [N m]"""
     rope = Named()
     """(n,) rope below the tip. [m]"""
+
+    def plot(
+        self, *, sea: Mapping[str, CraneRun] | None = None, title: str | None = None
+    ) -> Figure:
+        """Figure of swing, slew and boom, and when limits of the drives act.
+
+        With `sea` as of `swashplate.report.figures.plot_crane`, which draws several runs, too.
+        """
+        return cast("Figure", figures().plot_crane(self, sea=sea, title=title))
 
     @property
     def actuation(self) -> str:

@@ -32,6 +32,10 @@ AIR = 1.225
 """Density of air at 15 °C and sea level. [kg/m³]"""
 FASTEST = 0.3
 """Angle of an elastic bounce over one sample beyond which it is not computed. [rad]"""
+SOFTEST, STIFFEST = 1e3, 1e12
+"""Stiffness EA of ropes: of a thin cord, and beyond that of a hundred thick ropes together. [N]"""
+LIGHTEST = 0.1
+"""Least load: a lighter one does not pull a rope taut. [kg]"""
 TOO_FAST = -1.0
 """Pull that says that the tip moves through the rope's length within a step."""
 
@@ -59,22 +63,28 @@ class Suspension(Result):
     """How the load hangs: elastic rope, hook with slings; by default neither."""
 
     stiffness: float = inf
-    """EA, force for a strain of one of the rope's parts together; infinite for a rigid rope. What
-    lies between the tip and the drum does not stretch. [N]"""
+    """EA, force for a strain of one of the rope's parts together, 1 kN to 1 TN; infinite for a
+    rigid rope. What lies between the tip and the drum does not stretch. [N]"""
     damping: float = 0.02
-    """Damping ratio of the load's bounce on the elastic rope."""
+    """Damping ratio of the load's bounce on the elastic rope, at most 1."""
     hook: float = 0.0
-    """Mass of the hook block; 0 for a load that hangs on the rope itself. [kg]"""
+    """Mass of the hook block, at most 1000 t; 0 for a load that hangs on the rope itself. [kg]"""
     sling: float = 0.0
-    """From the hook to the load. [m]"""
+    """From the hook to the load, at most 200 m. [m]"""
 
     def __post_init__(self) -> None:
-        if not self.stiffness > 0.0:
-            raise InputError(f"The rope's stiffness is {self.stiffness:g} N, but must be above 0.")
-        for name in ("damping", "hook", "sling"):
+        if not (self.stiffness == inf or SOFTEST <= self.stiffness <= STIFFEST):
+            raise InputError(
+                f"The rope's stiffness is {self.stiffness:g} N, but must be {SOFTEST:g} to "
+                f"{STIFFEST:g} N, or inf for a rigid rope."
+            )
+        for name, most in (("damping", 1.0), ("hook", 1e6), ("sling", 200.0)):
             value = getattr(self, name)
-            if not (isfinite(value) and value >= 0.0):
-                raise InputError(f"The suspension's {name} is {value:g}, but must be at least 0.")
+            if not 0.0 <= value <= most:
+                raise InputError(
+                    f"The suspension's {name} is {value:g}, but must be at least 0 and at most "
+                    f"{most:g}."
+                )
         if (self.hook > 0.0) != (self.sling > 0.0):
             raise InputError(
                 f"A hook of {self.hook:g} kg with slings of {self.sling:g} m: both are above 0, or "
@@ -88,8 +98,8 @@ class Suspension(Result):
 
         An `InputError` if the load bounces too fast for the rate.
         """
-        if not (isfinite(load) and load > 0.0):
-            raise InputError(f"The load is {load:g} kg, but must be above 0.")
+        if not (isfinite(load) and load >= LIGHTEST):
+            raise InputError(f"The load is {load:g} kg, but must be at least {LIGHTEST:g} kg.")
         mass = load + self.hook
         pulls = 0.0 if self.stiffness == inf else self.stiffness / mass
         ratio = load / self.hook if self.hook > 0.0 else 0.0

@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from math import isfinite, log, radians
+from math import log, radians
+from numbers import Real
 from pathlib import Path
 from typing import NamedTuple
 
@@ -17,7 +18,7 @@ from swashplate.crane.stick import check_names
 from swashplate.crane.transfer_functions import CRANE_SHIP, MOTIONS, Hull, TransferFunctions
 from swashplate.equations import kernel
 from swashplate.errors import InputError
-from swashplate.logs import TextOptions, read_series
+from swashplate.logs import Series, TextOptions, read_series
 from swashplate.results import Result
 
 Array = NDArray[np.float64]
@@ -28,8 +29,22 @@ LONGEST_HOLE = 1.0
 """Time without a sample in a log of motions that is a hole, where samples are closer. [s]"""
 COARSE = 8.0
 """Rate at which motion and two derivatives are summed up before they are joined smoothly. [Hz]"""
-STEEPEST = 1.0
-"""Roll, pitch or yaw beyond which a measured motion is probably in degrees. [rad]"""
+SPARSEST = 5.0
+"""Median time between samples from which a ship's motion cannot be drawn through them. [s]"""
+ALIKE = 1e-3
+"""Part of the median time between samples below which two stamps are meant to be one."""
+STEEPEST, FARTHEST = 1.0, 1000.0
+"""Roll, pitch or yaw beyond which a measured motion is probably in degrees [rad]; distance from its
+mean place that no ship comes to while a crane works [m]."""
+OVERSHOOT = 1.0
+"""How far a curve through samples may swing beyond them, over their range; where a motion is
+sampled well it is a few percent."""
+RATES = (10.0, 1e5)
+"""Samples a second that a measured motion is given at. [Hz]"""
+LARGEST = 100_000_000
+"""Numbers of a motion, 0.8 GB; nine hours at 512 Hz."""
+HIGHEST = 30.0
+"""Largest significant height of a sea; the largest one measured is 19 m. [m]"""
 LEAST_ENERGY, MOST_LOST = 0.5, 0.05
 """Part of a spectrum's energy that must lie within the band; largest part of a sea's that may lie
 beyond a file's frequencies, where the motions of its ends are taken."""
@@ -39,20 +54,24 @@ beyond a file's frequencies, where the motions of its ends are taken."""
 class Spectrum:
     """JONSWAP's spectrum of waves; Bretschneider's with a peak factor of 1.
 
-    An `InputError` unless all are above 0 and most of the energy lies at waves of 2.5 to 25 s.
+    An `InputError` unless all are above 0 and plausible, and most of the energy lies at waves of
+    2.5 to 25 s.
     """
 
     height: float
-    """Significant wave height, four standard deviations of the surface. [m]"""
+    """Significant wave height, four standard deviations of the surface; at most 30. [m]"""
     period: float
     """Of the peak. [s]"""
     peak_factor: float = 1.0
-    """γ, 3.3 for young wind seas."""
+    """γ, 3.3 for young wind seas; at most 10, seas have 1 to 7."""
 
     def __post_init__(self) -> None:
-        for name, value in vars(self).items():
-            if not (isfinite(value) and value > 0.0):
-                raise InputError(f"The {name} of a sea is {value:g}, but must be above 0.")
+        for name, most in (("height", HIGHEST), ("period", 1000.0), ("peak_factor", 10.0)):
+            value = getattr(self, name)
+            if not 0.0 < value <= most:
+                raise InputError(
+                    f"The {name} of a sea is {value:g}, but must be above 0 and at most {most:g}."
+                )
         omega = np.linspace(*BAND, 2001)
         held = float(np.trapezoid(self.density(omega), omega))
         if held < LEAST_ENERGY * self.height**2 / 16.0:
@@ -132,8 +151,13 @@ class Seaway(Result):
             raise InputError(f"A sea is a name, as 'ss3', or a Spectrum, not of type {kind}.")
         if isinstance(self.sea, str):
             check_names("There is no sea", [self.sea], SEA_STATES)
-        if not (isfinite(self.heading_deg) and isfinite(self.speed) and self.components >= 2):
-            raise InputError("A seaway has a finite heading and speed and two or more components.")
+        if not (abs(self.heading_deg) <= 720.0 and abs(self.speed) <= 50.0):
+            raise InputError(
+                f"A seaway has a heading within 720 deg and a ship's speed within 50 m/s, not "
+                f"{self.heading_deg:g} deg and {self.speed:g} m/s."
+            )
+        if not 2 <= self.components <= 100_000:
+            raise InputError(f"A seaway has 2 to 100000 components, not {self.components:g}.")
         if not str(self.seed).isdigit():
             raise InputError(f"The seed of a seaway is {self.seed}, but must be 0, 1, 2, ...")
         if isinstance(self.ship, TransferFunctions):
@@ -199,7 +223,7 @@ def ship_motion(
     rate: float = 512.0,
     options: TextOptions | None = None,
 ) -> Array:
-    """Motion of a ship from a log, (n, 6) at a rate [Hz], as `Crane.simulate` takes it for a sea.
+    """Motion of a ship from a log, (n, 6), as `Crane.simulate` takes it for a sea.
 
     Cubic splines through the samples, from the first time stamp on; z up, y to port. [m], [rad]
 
@@ -211,6 +235,8 @@ def ship_motion(
     columns : mapping of str to str, optional
         Column of each motion, surge, sway, heave, roll, pitch, yaw; those that are left out are
         zero. By default all six by these names.
+    rate : float
+        Of the motion returned, 10 Hz to 100 kHz; a crane takes 512 Hz.
     options : TextOptions, optional
         How a text file is written, where that cannot be recognised from it.
 
@@ -219,47 +245,99 @@ def ship_motion(
     FileError
         If the file cannot be read; it names file, column and row.
     InputError
-        For a motion or column that there is not, fewer than four samples, or a rotation beyond
-        1 rad.
+        For a motion or column that there is not, a rate out of range, fewer than four samples,
+        samples more than 5 s apart, two stamps that are nearly alike, a spike, a rotation beyond 1
+        rad or a distance beyond 1 km, and a motion of more than 100 million numbers.
     """
-    from scipy.interpolate import CubicSpline
-
     wanted = dict(zip(MOTIONS, MOTIONS, strict=True)) if columns is None else dict(columns)
     strange = [each for each in wanted if each not in MOTIONS]
     if strange or not wanted:
         raise InputError(
             f"A ship's motions are {', '.join(MOTIONS)}, not {', '.join(strange) or 'none'}."
         )
+    low, high = RATES
+    if not (isinstance(rate, Real) and low <= rate <= high):
+        raise InputError(
+            f"The rate of a ship's motion is {rate!r} Hz, but must be {low:g} to {high:g} Hz; a "
+            "crane takes 512 Hz."
+        )
     made: Array = np.zeros((0, 6))
     for motion, column in wanted.items():
         unit = "m" if motion in MOTIONS[:3] else "rad"
-        time, values = read_series(path, column, unit, time_column=time_column, options=options)
-        if time.size < 4:
-            raise InputError(f"{path} has {time.size} samples of {column}, but needs four.")
-        apart = np.diff(time)
-        hole = int(np.argmax(apart))
-        if apart[hole] > max(LONGEST_HOLE, 5.0 * float(np.median(apart))):
-            raise InputError(
-                f"{path} has no {column} from {time[hole]:g} to {time[hole + 1]:g} s: cut the log "
-                "to a part without holes."
-            )
+        series = read_series(path, column, unit, time_column=time_column, options=options)
+        _check_sampling(series.time, column, str(path))
+        _check_sizes({motion: series.values}, str(path))
         if not len(made):
-            made = np.zeros((int((time[-1] - time[0]) * rate + 1e-6) + 1, 6))
-        grid = time[0] + np.arange(len(made)) / rate
-        made[:, MOTIONS.index(motion)] = CubicSpline(time, values)(grid)
-    _check_rotations(made, str(path))
+            seconds = float(series.time[-1] - series.time[0])
+            if 6.0 * seconds * rate > LARGEST:
+                raise InputError(
+                    f"{path} lasts {seconds:g} s: at {rate:g} Hz that are more than the "
+                    f"{LARGEST} numbers that are taken at once; cut the log, or take a lower rate."
+                )
+            made = np.zeros((int(seconds * rate + 1e-6) + 1, 6))
+        grid = series.time[0] + np.arange(len(made)) / rate
+        made[:, MOTIONS.index(motion)] = _curve(series, grid, column, str(path))
+    _check_sizes(dict(zip(MOTIONS, made.T, strict=True)), str(path))
     return made
 
 
-def _check_rotations(motion: Array, of: str) -> None:
-    """Refuse rotations beyond `STEEPEST`."""
-    most = np.abs(motion[:, 3:]).max(axis=0, initial=0.0)
-    worst = int(np.argmax(most))
-    if most[worst] > STEEPEST:
+def _check_sampling(time: Array, column: str, of: str) -> None:
+    """Refuse stamps that no curve of a ship's motion can be drawn through."""
+    if time.size < 4:
+        raise InputError(f"{of} has {time.size} samples of {column}, but needs four.")
+    apart = np.diff(time)
+    median = float(np.median(apart))
+    if median > SPARSEST:
         raise InputError(
-            f"{of}: {MOTIONS[3 + worst]} reaches {most[worst]:.3g} rad, which no ship does. If it "
-            f"is in degrees, say so in the log's header, {MOTIONS[3 + worst]} [deg], or convert it."
+            f"{of}: samples of {column} are {median:g} s apart, but a ship's motion needs one "
+            f"every {SPARSEST:g} s at least; look at the unit of the time."
         )
+    hole, narrow = int(np.argmax(apart)), int(np.argmin(apart))
+    if apart[hole] > max(LONGEST_HOLE, 5.0 * median):
+        raise InputError(
+            f"{of} has no {column} from {time[hole]:g} to {time[hole + 1]:g} s: cut the log to a "
+            "part without holes."
+        )
+    if apart[narrow] < ALIKE * median:
+        raise InputError(
+            f"{of}: data rows {narrow + 1} and {narrow + 2} are only {apart[narrow]:.2g} s apart, "
+            f"others {median:.2g} s: take one of them out, or mend its stamp."
+        )
+
+
+def _curve(series: Series, grid: Array, column: str, of: str) -> Array:
+    """Cubic spline through samples; refuses one that swings far beyond them."""
+    from scipy.interpolate import CubicSpline
+
+    time, values = series
+    curve = np.asarray(CubicSpline(time, values)(grid))
+    low, high = float(values.min()), float(values.max())
+    off = np.maximum(curve - high, low - curve)
+    worst = int(np.argmax(off))
+    if off[worst] > OVERSHOOT * (high - low) + 1e-9:  # of a motion that stands, its rounding
+        row = int(np.argmin(np.abs(time - grid[worst])))
+        raise InputError(
+            f"{of}: a curve through the samples of {column} swings to {curve[worst]:.3g} at "
+            f"{grid[worst]:g} s, far beyond them, {low:.3g} to {high:.3g}: look for a spike or a "
+            f"wrong stamp near data row {row + 1}."
+        )
+    return curve
+
+
+def _check_sizes(motions: Mapping[str, Array], of: str) -> None:
+    """Refuse rotations beyond `STEEPEST`, and distances beyond `FARTHEST`."""
+    for motion, values in motions.items():
+        largest = float(np.abs(values).max(initial=0.0))
+        if motion in MOTIONS[3:] and largest > STEEPEST:
+            raise InputError(
+                f"{of}: {motion} reaches {largest:.3g} rad, which no ship does. If it is in "
+                f"degrees, say so in the log's header, {motion} [deg], or convert it."
+            )
+        if largest > FARTHEST:
+            raise InputError(
+                f"{of}: {motion} reaches {largest:.3g} m, but is counted from the ship's mean "
+                f"place, within {FARTHEST:g} m: look at its unit, or take the mean off."
+            )
 
 
 def motion_of(sea: Seaway | ArrayLike | None, count: int, rate: float) -> Array:
@@ -282,7 +360,7 @@ def motion_of(sea: Seaway | ArrayLike | None, count: int, rate: float) -> Array:
             f"The stick is {(count - 1) / rate:g} s long, but the ship's motion only "
             f"{(len(made) - 1) / rate:g} s at {rate:g} Hz."
         )
-    _check_rotations(made, "The sea's motion")
+    _check_sizes(dict(zip(MOTIONS, made.T, strict=True)), "The sea's motion")
     return made[:count]
 
 

@@ -38,6 +38,8 @@ OUTPUTS = ("shaft_speed", "limits")
 """What the loop takes of each drive."""
 RIGID = Suspension()
 """A point on a rigid rope."""
+WIDEST, STRONGEST = 1e5, 100.0
+"""Largest drag area of a load, and largest wind; gusts of hurricanes have 100 m/s. [m²], [m/s]"""
 QUICKEST = 0.4
 """Largest part of a rope's pull by which a leaking drive may lower it within a sample: at 0.7 they
 would swing against each other from sample to sample."""
@@ -70,9 +72,9 @@ class Setup(TypedDict, total=False):
         load; drives feel it by their ``motor_leakage`` and ``line_stiffness``. What the boom weighs
         is not in it.
     drag_area : float, default 0
-        C_d A of the load. [m²]
+        C_d A of the load, at most 100 000. [m²]
     wind : (float, float), default (0, 0)
-        Forward and to port. [m/s]
+        Forward and to port, within 100 on each axis. [m/s]
     brake : bool, default True
         Whether a brake holds the hoist 0.3 s after its voltage has come into the dead zone. A
         voltage at its edge keeps the brake open.
@@ -246,13 +248,17 @@ def _fixed(
     for name, value in (numbers | {"drag_area": drag_area}).items():
         if not isinstance(value, Real):
             raise InputError(f"{name} is {value!r}, but must be a number.")
-    if not (isfinite(drag_area) and drag_area >= 0.0):
-        raise InputError(f"drag_area is {drag_area:g} m², but must be at least 0.")
+    if not 0.0 <= drag_area <= WIDEST:
+        raise InputError(
+            f"drag_area is {drag_area:g} m², but must be at least 0 and at most {WIDEST:g} m²."
+        )
     if not isinstance(suspension, Suspension):
         raise InputError(f"suspension is {suspension!r}, but must be a Suspension.")
     pair = np.array(wind, dtype=object)
     if pair.shape != (2,) or not all(isinstance(v, Real) and isfinite(v) for v in pair):
         raise InputError(f"wind is {wind!r}, but must be two speeds, forward and to port, in m/s.")
+    if max(map(abs, wind)) > STRONGEST:
+        raise InputError(f"wind is {wind!r}, but must be within {STRONGEST:g} m/s on each axis.")
     if load > crane.safe_load:
         raise InputError(
             f"The load is {load:g} kg, but {crane.name} lifts {crane.safe_load:g} kg: take less, "

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
-from math import cos, inf, radians, sin
+from math import cos, radians, sin
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -20,6 +20,8 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 AXES = ("hoist", "slew", "luff")
+LONGEST = 86_400.0
+"""A day, longer than any run. [s]"""
 TARGETS = {"hoist": "rope_m", "slew": "slew_deg", "luff": "boom_deg"}
 """Where an axis is led to: rope below the tip, slew, elevation of the boom."""
 
@@ -78,7 +80,7 @@ class Stick(Result):
         duration : float, optional
             Of an axis without target. [s]
         start, ramp, length : float
-            Moment of the first ramp, time of each ramp, length of the record. [s]
+            Moment of the first ramp, time of each ramp, length of the record, at most a day. [s]
         """
         parts, targets = {"hoist": hoist, "slew": slew, "luff": luff}, dict(until or {})
         check_names("There is no target", targets, TARGETS.values())
@@ -93,10 +95,10 @@ class Stick(Result):
                     f"The {axis} needs until={{'{target}': ...}} or a duration, so that the stick "
                     "returns."
                 )
-        if not (start >= 0.0 and ramp > 0.0 and 0.0 < length < inf):
+        if not (start >= 0.0 and ramp > 0.0 and 0.0 < length <= LONGEST):
             raise InputError(
-                f"A stick starts at 0 s or later, with ramps and a length above 0 s, not "
-                f"{start:g}, {ramp:g} and {length:g} s."
+                f"A stick starts at 0 s or later, with ramps above 0 s and a length above 0 and at "
+                f"most {LONGEST:g} s, not {start:g}, {ramp:g} and {length:g} s."
             )
         moving = {axis: part for axis, part in parts.items() if part != 0.0}
         return cls(length, start, ramp, moving, targets, duration)
@@ -113,11 +115,17 @@ class Stick(Result):
                 "A recorded stick has two or more rows of hoist, slew and luff, at a rate above "
                 "0 Hz."
             )
+        length = (len(made) - 1) / rate
+        if not length <= LONGEST:
+            raise InputError(
+                f"The recorded stick lasts {length:g} s at {rate:g} Hz, but a run at most "
+                f"{LONGEST:g} s: look at its rate."
+            )
         wrong = np.flatnonzero(~(np.abs(made) <= 1.0).all(axis=1))
         if wrong.size:
             raise InputError(f"Row {wrong[0]} of the stick is not within -1 to 1 on every axis.")
         made.flags.writeable = False
-        return cls((len(made) - 1) / rate, samples=made, rate=float(rate))
+        return cls(length, samples=made, rate=float(rate))
 
     @classmethod
     def rest(cls, length: float = 60.0) -> Stick:

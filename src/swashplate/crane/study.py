@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any, NamedTuple, Unpack
+from typing import TYPE_CHECKING, Any, NamedTuple, Unpack, cast
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -17,13 +17,17 @@ from swashplate.crane.control import Control
 from swashplate.crane.crane import Crane, begun
 from swashplate.crane.result import PUMPS, CraneRun
 from swashplate.crane.rope import swing_of
-from swashplate.crane.sea import Seaway, Spectrum
+from swashplate.crane.sea import HIGHEST, Seaway, Spectrum
 from swashplate.crane.stepper import RATE, Actuation, Setup
 from swashplate.crane.stick import AXES, Stick, check_names
 from swashplate.errors import DomainError, InputError
 from swashplate.executors import Executor, Threads
-from swashplate.results import Result
+from swashplate.progress import counted
+from swashplate.results import Result, figures
 from swashplate.tables import Column, Table
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 Array = NDArray[np.float64]
 Laws = Control | Mapping[str, Control | None]
@@ -172,6 +176,11 @@ class Study(Result):
         seaway = sea if isinstance(sea, Seaway) else Seaway(sea)
         return cls(crane, cases, seaway, tuple(seeds), start, executor or Threads(), progress)
 
+    def provenance(self) -> tuple[str, ...]:
+        """Sentences on the drives of all its cranes, each once: `Crane.provenance`."""
+        cranes = [self.crane, *(crane for case in self.cases.values() for crane in case.cranes)]
+        return tuple(dict.fromkeys(words for crane in cranes for words in crane.provenance()))
+
     def outcomes(self, cases: Sequence[Case], numbers: range | None = None) -> Array:
         """`COUNTED` of all cases in the seaways, or in some of them by their numbers, (n, m, 18).
 
@@ -184,7 +193,9 @@ class Study(Result):
         made = np.full((len(chosen), len(cases), len(COUNTED)), np.nan)
         items = [(n, self.seeds[n]) for n in chosen]
         work = (tuple(cases), self.sea, self.start)
-        for done, (k, values) in enumerate(self.executor.run(_of_seaway, work, items), 1):
+        runs = self.executor.run(_of_seaway, work, items)
+        seaways = counted(runs, len(chosen), "seaways", f"Simulating {self.crane.name}")
+        for done, (k, values) in enumerate(seaways, 1):
             made[k] = values
             if self.progress is not None and numbers is None:
                 self.progress(done, len(chosen))
@@ -221,6 +232,9 @@ class Swept(NamedTuple):
     """A quantity that a sweep goes over."""
 
     points: tuple[float, ...]
+    low: float
+    high: float
+    """Range of plausible points."""
     study: Mapping[str, Any]
     """Keywords of a study unless the user says otherwise."""
     unit: str
@@ -232,11 +246,19 @@ class Swept(NamedTuple):
 TURN, PERIOD = 45.0, 7.5
 """Slew of a sweep over the stick [deg]; peak period of a sweep over the waves' height [s]."""
 SWEPT: Mapping[str, Swept] = {
-    "bearing": Swept(tuple(range(0, 360, 15)), {"seeds": range(4)}, "deg", ("slew_deg",)),
-    "height": Swept((0.1, 0.2, 0.3, 0.45, 0.6, 0.9, 1.2), {"seeds": range(40)}, "m"),
-    "orifice": Swept((0.5, 0.75, 1.0, 1.25, 1.5, 2.0, 3.0, 5.0), {"seeds": range(20)}, ""),
+    "bearing": Swept(
+        tuple(range(0, 360, 15)), -720.0, 720.0, {"seeds": range(4)}, "deg", ("slew_deg",)
+    ),
+    "height": Swept(
+        (0.1, 0.2, 0.3, 0.45, 0.6, 0.9, 1.2), 0.001, HIGHEST, {"seeds": range(40)}, "m"
+    ),
+    "orifice": Swept(
+        (0.5, 0.75, 1.0, 1.25, 1.5, 2.0, 3.0, 5.0), 0.01, 100.0, {"seeds": range(20)}, ""
+    ),
     "stick": Swept(
         tuple(k / 10.0 for k in range(1, 11)),
+        0.001,
+        1.0,
         {"seeds": (0,), "slew_deg": 0.0, "rope_m": 20.0, "drives": (IDEAL, "volts", BUILT)},
         "",
         ("seeds", "sea", "stick", "start", "length"),
@@ -260,8 +282,6 @@ class Sweep(Result):
     crane: Crane = field(repr=False)
     sea: Seaway | None = field(repr=False)
 
-    figure = "plot_sweep"
-
     def mean(self) -> Array:
         """(n, variants, 3) means over the seaways. [rad]"""
         return np.asarray(np.mean(self.values, axis=0))
@@ -269,6 +289,10 @@ class Sweep(Result):
     def below(self, limit_deg: float) -> Array:
         """(n, variants) share of seaways whose largest swing is below a limit."""
         return np.asarray(np.mean(np.degrees(self.values[..., 1]) < limit_deg, axis=0))
+
+    def plot(self, *, limit_deg: float = 3.0, title: str = "") -> Figure:
+        """Figure of the swing over the quantity; `swashplate.report.figures.plot_sweep`."""
+        return cast("Figure", figures().plot_sweep(self, limit_deg=limit_deg, title=title))
 
     def tables(self) -> list[Table]:
         """Root mean square swing; over the stick the residual swing, and where the slew ends."""
@@ -308,9 +332,12 @@ def sweep(
     if taken:
         raise InputError(f"A sweep over the {over} sets {taken[0]} itself: leave it out.")
     grid = np.atleast_1d(np.asarray(swept.points if points is None else points, dtype=np.float64))
-    if not (grid.size and np.isfinite(grid).all() and (over == "bearing" or (grid > 0.0).all())):
-        above = "" if over == "bearing" else " above 0"
-        raise InputError(f"Points of the {over} must be one or more finite numbers{above}.")
+    if not (grid.size and (swept.low <= grid).all() and (grid <= swept.high).all()):
+        raise InputError(
+            f"Points of the {over} must be one or more numbers from {swept.low:g} to "
+            f"{swept.high:g} {swept.unit}".rstrip()
+            + "."
+        )
     asked = Study.of(crane, control, **{**swept.study, **study})
     if over == "stick":
         asked = replace(asked, sea=None)

@@ -9,10 +9,10 @@ heave 1 and roll -ik; in a following sea surge is -i and pitch ik.
 from __future__ import annotations
 
 import csv
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import count
-from math import inf, isfinite, pi
+from math import inf, isfinite, pi, prod
 from pathlib import Path
 
 import numpy as np
@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 from swashplate.crane.rope import GRAVITY
 from swashplate.documents import read_text
 from swashplate.errors import FileError, InputError
+from swashplate.logs import open_as
 from swashplate.results import Result
 
 Array = NDArray[np.float64]
@@ -42,6 +43,14 @@ HEAVES = 0.3
 """Largest distance of heave from 1 in the longest wave of a file, which the wave's crest lifts."""
 STEEPEST = 2.0
 """Largest pitch in the longest following wave of a file, over the wave's slope."""
+HULLS: Mapping[str, tuple[float, float]] = {
+    "length": (1.0, 600.0),
+    "beam": (0.3, 200.0),
+    "draught": (0.05, 50.0),
+    "roll_period": (0.5, 100.0),
+    "roll_damping": (1e-4, 1.0),
+}
+"""Ranges that the numbers of every ship lie well within, from a dinghy on. [m], [s]"""
 WIDEST, ASIDE = 90.0, 5.0
 """Largest angle between headings of a file; angle to its only one that is taken for it. [deg]"""
 
@@ -55,22 +64,27 @@ class Hull:
 
     Heave and pitch are theirs; roll is the waves' slope through one resonance; sway and surge
     follow the water. Ask the ship for its roll period first: nothing else matters as much. An
-    `InputError` unless all numbers are above 0.
+    `InputError` for numbers that no ship has.
     """
 
     length: float
+    """1 to 600; ships reach 400. [m]"""
     beam: float
+    """0.3 to 200. [m]"""
     draught: float
-    """[m], as length and beam."""
+    """0.05 to 50. [m]"""
     roll_period: float = 13.0
-    """Natural period. [s]"""
+    """Natural period, 0.5 to 100. [s]"""
     roll_damping: float = 0.06
-    """Damping ratio."""
+    """Damping ratio, 0.0001 to 1."""
 
     def __post_init__(self) -> None:
-        for name, value in vars(self).items():
-            if not (isfinite(value) and value > 0.0):
-                raise InputError(f"The hull's {name} is {value:g}, but must be above 0.")
+        for name, (low, high) in HULLS.items():
+            value = getattr(self, name)
+            if not low <= value <= high:
+                raise InputError(
+                    f"The hull's {name} is {value:g}, but must be {low:g} to {high:g}."
+                )
 
     def response(self, omega: Array, heading: Array, speed: float = 0.0) -> Complex:
         """Complex amplitudes of six motions, (6, n); as `TransferFunctions.response`."""
@@ -192,9 +206,50 @@ def _weights(grid: Array, at: Array) -> Iterator[tuple[NDArray[np.int64], Array]
 # --- files ----------------------------------------------------------------------------------------
 
 
+AMPLITUDE = np.dtype(
+    [
+        ("speed", float),
+        ("heading", float),
+        ("frequency", float),
+        ("motion", np.int64),
+        ("value", complex),
+    ]
+)
+"""Of one motion in one wave: speed [m/s], heading from x to y [deg], frequency [rad/s], number of
+the motion from 1 on, as in `MOTIONS`, [m/m] or [rad/m] by e^{+iωt}."""
 Amplitude = tuple[float, float, float, int, complex]
-"""Of one motion in one wave: speed [m/s], heading from x to y [deg], frequency [rad/s], place in
-`MOTIONS`, [m/m] or [rad/m] by e^{+iωt}."""
+Amplitudes = NDArray[np.void]
+"""(n,) of `AMPLITUDE`."""
+
+RANGES: Mapping[str, tuple[float, float]] = {
+    "speed": (-50.0, 50.0),
+    # from -180 to 180 or from 0 to 360, and once around beyond that
+    "heading": (-720.0, 720.0),
+    # from waves of an hour to those that a model of 1 : 1000 meets
+    "frequency": (1e-3, 100.0),
+    "period": (0.06, 6300.0),
+    "motion": (1, len(MOTIONS)),
+    # rotations of a .4 are for each metre of ULEN
+    "part": (-1e4, 1e4),
+    "count": (1, 100_000),
+}
+"""Plausible numbers of a file; in m/s, deg, rad/s, s, m/m or rad/m."""
+LENGTHS = (0.01, 10_000.0)
+"""Plausible lengths ULEN of WAMIT. [m]"""
+WHOLE = ("motion", "count")
+"""Those that are whole numbers."""
+KINDS = {
+    "heading_deg": "heading",
+    "omega": "frequency",
+    "real part": "part",
+    "imaginary part": "part",
+    "speeds": "count",
+    "headings": "count",
+    "frequencies": "count",
+    "motions": "count",
+    **{f"{motion}_{part}": "part" for motion in MOTIONS for part in ("re", "im")},
+}
+"""Which range belongs to a number that a file calls otherwise."""
 
 
 def read_ship(path: str | Path, length: float | None = None) -> TransferFunctions:
@@ -209,12 +264,14 @@ def read_ship(path: str | Path, length: float | None = None) -> TransferFunction
         [rad/s], ``surge_re``, ``surge_im`` and so on [m/m], [rad/m], and where it likes ``speed``
         [m/s]. Waves from beyond 180 deg are taken as those from the other side, by symmetry.
     length : float, optional
-        WAMIT's ULEN, by which rotations of a ``.4`` are made dimensionless. [m]
+        WAMIT's ULEN, by which rotations of a ``.4`` are made dimensionless, 0.01 to 10 000. [m]
 
     Raises
     ------
     FileError
-        If a line is none of such a file, or a motion is missing; the sentence says where.
+        If a line is none of such a file, a number is not plausible (`RANGES`), or a motion is
+        missing; the sentence says where. A ``.nc`` is read in a process of its own, which a damaged
+        file cannot hang.
     InputError
         For another ending, a length that is missing or that no other file takes, and another
         convention of axes, headings or phases.
@@ -224,8 +281,11 @@ def read_ship(path: str | Path, length: float | None = None) -> TransferFunction
         raise InputError(
             f"{path}: a .4 of WAMIT, and no other file, needs the length ULEN of its run."
         )
-    if length is not None and not (isfinite(length) and length > 0.0):
-        raise InputError(f"WAMIT's length ULEN is {length:g} m, but must be above 0.")
+    low, high = LENGTHS
+    if length is not None and not low <= length <= high:
+        raise InputError(
+            f"{path}: WAMIT's length ULEN is {length:g} m, but must be {low:g} to {high:g} m."
+        )
     readers = {".re1": _veres, ".4": _wamit, ".nc": _capytaine, ".csv": _csv}
     if kind not in readers:
         raise InputError(
@@ -235,23 +295,50 @@ def read_ship(path: str | Path, length: float | None = None) -> TransferFunction
     return _gathered(path, readers[kind](path), length or 1.0)
 
 
+def _from_rows(rows: Iterable[Amplitude]) -> Amplitudes:
+    """Amplitudes of rows, as one array."""
+    return np.fromiter(rows, AMPLITUDE)
+
+
+def _expected(name: str) -> str:
+    """What a number of a file must be, in words."""
+    kind = KINDS.get(name, name)
+    if kind not in RANGES:
+        return "a number"
+    low, high = RANGES[kind]
+    return f"a {'whole ' if kind in WHOLE else ''}number from {low:g} to {high:g}"
+
+
+def _is_plausible(name: str, value: float) -> bool:
+    """Whether a number of a file is what `_expected` says."""
+    kind = KINDS.get(name, name)
+    low, high = RANGES.get(kind, (-inf, inf))
+    return isfinite(value) and low <= value <= high and (kind not in WHOLE or value.is_integer())
+
+
 def _numbers(path: str | Path, line: int, words: Sequence[str | None], wanted: str) -> list[float]:
-    """Finite numbers of a line, as many as are wanted, joined by commas."""
-    names, made = wanted.split(", "), list[float]()
+    """Plausible numbers of a line, as many as are wanted, joined by commas."""
+    names, numbers = wanted.split(", "), list[float]()
     for name, word in zip(names, [*words, *([None] * len(names))], strict=False):
         try:
-            made.append(float(word or ""))
+            # Python reads 1_000 as a number, no other program does
+            number = inf if "_" in (word or "") else float(word or "")
         except ValueError:
-            made.append(inf)
-        if not isfinite(made[-1]):
+            number = inf
+        if not _is_plausible(name, number):
             raise FileError(
                 f"{path}, line {line}: {name} is {'missing' if word is None else repr(word)}, but "
-                f"must be a number; needed are {wanted}: the file is cut or another one."
+                f"must be {_expected(name)}; needed are {wanted}: the file is cut or another one."
             )
-    return made
+        numbers.append(number)
+    return numbers
 
 
-def _veres(path: str | Path) -> Iterator[Amplitude]:
+def _veres(path: str | Path) -> Amplitudes:
+    return _from_rows(_veres_rows(path))
+
+
+def _veres_rows(path: str | Path) -> Iterator[Amplitude]:
     lines = read_text(path).splitlines()
     if len(lines) < 11 or "VERES" not in lines[0]:
         raise FileError(
@@ -273,77 +360,96 @@ def _veres(path: str | Path) -> Iterator[Amplitude]:
                 (omega,) = following("frequency")
                 for _ in MOTIONS:
                     motion, *parts = following("motion, real part, imaginary part")
-                    yield speed, heading, omega, int(motion) - 1, complex(*parts)
+                    yield speed, heading, omega, int(motion), complex(*parts)
 
 
-def _wamit(path: str | Path) -> Iterator[Amplitude]:
+def _wamit(path: str | Path) -> Amplitudes:
+    return _from_rows(_wamit_rows(path))
+
+
+def _wamit_rows(path: str | Path) -> Iterator[Amplitude]:
     wanted = "period, heading, motion, modulus, phase, real part, imaginary part"
     for row, line in enumerate(read_text(path).splitlines(), 1):
         words = line.split()
         if row == 1 and words and not words[0][-1].isdigit():
             continue  # names of columns
         period, heading, motion, _, _, real, imaginary = _numbers(path, row, words, wanted)
-        # the limits of zero and infinite frequency have periods below 0, or 0
-        omega = 2.0 * pi / period if period > 0.0 else 0.0
-        yield 0.0, heading, omega, int(motion) - 1, complex(real, imaginary)
+        yield 0.0, heading, 2.0 * pi / period, int(motion), complex(real, imaginary)
 
 
-def _csv(path: str | Path) -> Iterator[Amplitude]:
+def _csv(path: str | Path) -> Amplitudes:
+    return _from_rows(_csv_rows(path))
+
+
+def _csv_rows(path: str | Path) -> Iterator[Amplitude]:
     parts = ", ".join(f"{motion}_{part}" for motion in MOTIONS for part in ("re", "im"))
     wanted = f"speed, heading_deg, omega, {parts}"
-    for row, cells in enumerate(csv.DictReader(read_text(path).splitlines()), 2):
-        words = [{"speed": "0", **cells}.get(name) for name in wanted.split(", ")]
-        speed, heading, omega, *values = _numbers(path, row, words, wanted)
-        for motion, pair in enumerate(zip(values[::2], values[1::2], strict=True)):
-            yield speed, heading, omega, motion, complex(*pair)
-
-
-def _capytaine(path: str | Path) -> Iterator[Amplitude]:
-    """Capytaine counts by e^{-iωt}."""
-    from h5py import File
-
-    wanted = ("complex", "wave_direction", "omega", "radiating_dof")
+    table = csv.DictReader(read_text(path).splitlines())
     try:
-        with File(path, "r") as file:
-            scales = [each[0] for each in file["RAO"].dims]
-            names = [each.name.rpartition("/")[2] for each in scales]
-            names = ["radiating_dof" if each.endswith("_dof") else each for each in names]
-            order = [names.index(each) for each in wanted]
-            table = np.transpose(file["RAO"][...], order)
-            labels = [scales[i] for i in order]
-            parts, directions, omega, freedom = (
-                [str(word) for word in each.asstr()[...]] if each.dtype.kind == "O" else each[...]
-                for each in labels
-            )
-        made = table[parts.index("re")] - 1j * table[parts.index("im")]
-    except (OSError, KeyError, ValueError, TypeError, IndexError, RuntimeError) as error:
+        for cells in table:
+            words = [{"speed": "0", **cells}.get(name) for name in wanted.split(", ")]
+            speed, heading, omega, *values = _numbers(path, table.line_num, words, wanted)
+            pairs = zip(values[::2], values[1::2], strict=True)
+            for motion, (real, imaginary) in enumerate(pairs, 1):
+                yield speed, heading, omega, motion, complex(real, imaginary)
+    except csv.Error as error:
         raise FileError(
-            f"{path} is no file of netCDF 4 with an array RAO over {', '.join(wanted)}, with their "
-            f"coordinates and the parts re and im: {error}."
+            f"{path}, line {table.line_num}: {error}: look for a quotation mark that is not closed."
         ) from None
-    for (m, f, i), value in np.ndenumerate(made):
-        if freedom[i].lower() in MOTIONS:
-            heading, motion = float(np.degrees(directions[m])), MOTIONS.index(freedom[i].lower())
-            yield 0.0, heading, float(omega[f]), motion, complex(value)
 
 
-def _gathered(
-    path: str | Path, amplitudes: Iterable[Amplitude], length: float
-) -> TransferFunctions:
+def _capytaine(path: str | Path) -> Amplitudes:
+    """Capytaine counts by e^{-iωt}."""
+    names = ("wave_direction", "omega", "motion", "re", "im")
+    columns = open_as("Capytaine", path).read(names)
+    rows = np.zeros(columns["omega"].size, AMPLITUDE)
+    rows["heading"] = np.degrees(columns["wave_direction"])
+    rows["frequency"] = columns["omega"]
+    rows["motion"] = columns["motion"]
+    rows["value"].real = columns["re"]
+    rows["value"].imag = -columns["im"]
+    for name, values in (
+        ("heading", rows["heading"]),
+        ("omega", rows["frequency"]),
+        ("real part", columns["re"]),
+        ("imaginary part", columns["im"]),
+    ):
+        low, high = RANGES[KINDS.get(name, name)]
+        wrong = np.flatnonzero(~((low <= values) & (values <= high)))
+        if wrong.size:
+            row = rows[wrong[0]]
+            raise FileError(
+                f"{path}: {name} is {values[wrong[0]]:g} of the {MOTIONS[row['motion'] - 1]} in "
+                f"waves of {row['frequency']:g} rad/s and {row['heading']:g} deg, but must be "
+                f"{_expected(name)}."
+            )
+    return rows
+
+
+def _gathered(path: str | Path, rows: Amplitudes, length: float) -> TransferFunctions:
     """A table, each grid rising, headings from 0 to 180 degrees; rotations by a length [m]."""
-    found = np.array(list(amplitudes), dtype=np.complex128)
-    if not found.size:
+    if not rows.size:
         raise FileError(f"{path} has no motions in waves.")
-    sailed, heading, frequency, number = found[:, :4].real.T
-    motion, amplitude = number.astype(np.int64), found[:, 4]
-    if motion.min() < 0 or motion.max() > 5:
-        raise FileError(f"{path} has a motion {motion.max() + 1} of a ship; there are 1 to 6.")
-    angle = np.round(heading, 9) % 360.0
-    grids = sailed, np.minimum(angle, 360.0 - angle), frequency
-    (speeds, v), (headings, m), (omega, f) = (np.unique(x, return_inverse=True) for x in grids)
-    values = np.full((speeds.size, headings.size, omega.size, 6), np.nan, dtype=np.complex128)
+    angle = np.round(rows["heading"], 9) % 360.0
+    speeds, v = np.unique(rows["speed"], return_inverse=True)
+    headings, m = np.unique(np.minimum(angle, 360.0 - angle), return_inverse=True)
+    omega, f = np.unique(rows["frequency"], return_inverse=True)
+    motion, amplitude = rows["motion"] - 1, rows["value"]
+    at = np.stack([v, m, f, motion])
+    shape = (speeds.size, headings.size, omega.size, len(MOTIONS))
+    # a table of all of them could be far larger than the file
+    present = np.unique(np.ravel_multi_index(tuple(at), shape))
+    if present.size < prod(shape):
+        off = np.flatnonzero(present != np.arange(present.size))
+        _, i, j, lacks = np.unravel_index(off[0] if off.size else present.size, shape)
+        raise FileError(
+            f"{path}: there is no {MOTIONS[lacks]} for {omega[j]:g} rad/s and {headings[i]:g} deg; "
+            f"the file is cut, or its waves are on no grid: it has {present.size} of the "
+            f"{prod(shape)} amplitudes of {headings.size} headings and {omega.size} frequencies."
+        )
+    values = np.full(shape, np.nan, dtype=np.complex128)
     # the other side, which follows by symmetry, where this one lacks it
-    other, at = angle > 180.0, np.stack([v, m, f, motion])
+    other = angle > 180.0
     values[*at[:, other]] = MIRRORED[motion[other]] * amplitude[other]
     own, given = at[:, ~other], amplitude[~other]
     values[*own] = given
@@ -355,15 +461,6 @@ def _gathered(
             "there twice, with other values."
         )
     values[..., 3:] /= length
-    gaps = np.argwhere(~np.isfinite(values))
-    if gaps.size:
-        _, i, j, lacks = gaps[0]
-        raise FileError(
-            f"{path}: there is no {MOTIONS[lacks]} for {omega[j]:g} rad/s and {headings[i]:g} deg; "
-            "the file is cut."
-        )
-    if omega[0] <= 0.0:
-        raise FileError(f"{path}: frequencies must be above 0 and finite.")
     if headings.size > 1 and (headings[0] > 1e-6 or headings[-1] < 180.0 - 1e-6):
         raise FileError(f"{path}: headings must reach from 0 to 180 deg.")
     if headings.size > 1 and np.diff(headings).max() > WIDEST:

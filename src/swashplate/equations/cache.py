@@ -26,6 +26,7 @@ from numba import config, njit
 from numba.core.caching import FunctionCache, IndexDataCacheFile
 from numba.misc.appdirs import AppDirs
 
+from swashplate import progress
 from swashplate.equations.declaration import JIT_OFF, closure_hash, hash_of, is_function, known
 from swashplate.equations.syntax import plain
 
@@ -36,6 +37,9 @@ UNCACHED = (
     "swashplate's compiled kernels cannot be kept, so that every session compiles them anew; set "
     "NUMBA_CACHE_DIR to a folder that can be written."
 )
+COMPILING = "Compiling equations, once on this machine"
+GENERATED = "swashplate_generated"
+"""Package of the generated modules."""
 DAY = 86400.0
 """[s]"""
 UNUSED = 30.0 * DAY
@@ -94,6 +98,7 @@ class _KernelCache(FunctionCache):
         self._name, self._py_func = repr(function), function
         self._impl = self._impl_class(function)  # type: ignore[no-untyped-call]
         self._cache_path = self._impl.locator.get_cache_path()
+        self._compiling = list[progress.Work]()
         self.enable()  # type: ignore[no-untyped-call]
 
     @cached_property
@@ -113,9 +118,24 @@ class _KernelCache(FunctionCache):
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         try:
-            return super().load_overload(sig, target_context)  # type: ignore[no-untyped-call]
+            kept = super().load_overload(sig, target_context)  # type: ignore[no-untyped-call]
         except Exception:  # whole, and yet nothing that this Numba can use
-            return None
+            kept = None
+        if kept is None:  # what Numba does next, up to `save_overload`, takes up to 3 s
+            self._compiling.append(progress.begin(COMPILING, self._title))
+        return kept
+
+    def save_overload(self, sig: Any, data: Any) -> None:
+        try:
+            super().save_overload(sig, data)  # type: ignore[no-untyped-call]
+        finally:
+            progress.end(self._compiling.pop())
+
+    @property
+    def _title(self) -> str:
+        """The function's name, or that of its generated module without the hash."""
+        package, _, module = str(self._py_func.__module__).partition(".")
+        return module.rpartition("_")[0] if package == GENERATED else str(self._py_func.__name__)
 
 
 def _cells(function: Any) -> list[tuple[str, str]]:
@@ -230,7 +250,7 @@ def generated(name: str, text: str, names: Mapping[str, Any]) -> dict[str, Any]:
             file.write(text)
         Path(temporary).replace(path)
         _tidy(path.parent)
-    module = ModuleType(f"swashplate_generated.{stem}")
+    module = ModuleType(f"{GENERATED}.{stem}")
     module.__file__ = str(path)
     module.__dict__.update(names)
     sys.modules[module.__name__] = module

@@ -1,5 +1,6 @@
 """The drive with five states: physical sets, simulation, comparison with one state."""
 
+from swashplate.full_order.drive import SIGNAL_UNITS as SIGNAL_UNITS
 from swashplate.full_order.drive import SIGNALS as SIGNALS
 from swashplate.full_order.drive import TABLE_MANEUVERS as TABLE_MANEUVERS
 from swashplate.full_order.drive import Comparison as Comparison

@@ -9,7 +9,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from math import ceil, floor
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, cast
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -36,13 +36,15 @@ from swashplate.models.drive import Source
 from swashplate.models.full_order import PlantConstants, PlantOptions, PlantSignals
 from swashplate.models.machine import Machine, fastest_rate
 from swashplate.parameters.parameter_set import Change
-from swashplate.results import Result, Tabular
+from swashplate.results import Result, Tabular, figures
 from swashplate.simulation.instance import PATHS, card_of, card_options, check_filter_stability
-from swashplate.simulation.result import Named
-from swashplate.tables import Cell, Column, Table
+from swashplate.simulation.result import UNITS, Named
+from swashplate.tables import UNIT, Cell, Column, Table
+from swashplate.units import PLATE_RATE, SHAFT_ANGLE
 
 if TYPE_CHECKING:
     import polars
+    from matplotlib.figure import Figure
 
     from swashplate.maneuvers import Maneuver
     from swashplate.simulation.result import Simulation
@@ -78,6 +80,14 @@ class FullOrderSimulation(Run, Tabular):
     """
 
     kept = PlantSignals._fields
+    shown = (
+        "current",
+        "spool_position",
+        "stroker_pressure",
+        "swash_angle",
+        "shaft_speed",
+        "motor_pressure_drop",
+    )
 
     @property
     def plant(self) -> model.Plant:
@@ -123,6 +133,16 @@ class FullOrderSimulation(Run, Tabular):
     pump_flow = Named()
     """Flow of the pump to the motor. [m³/s]"""
 
+    def table(self) -> Table:
+        """Lowest, highest and last value of each signal."""
+        numbers = (Column(words, "z.4g") for words in ("lowest", "highest", "at the end"))
+        made = Table("", (Column("Signal"), *numbers, UNIT))
+        for name in SIGNALS:
+            values = self[name]
+            low, high, last = float(values.min()), float(values.max()), float(values[-1])
+            made.add(name.replace("_", " "), low, high, last, unit=SIGNAL_UNITS[name])
+        return made
+
     @property
     def spool_hold(self) -> Flags:
         """1 or -1 where the spool is at its stroke."""
@@ -148,6 +168,15 @@ class FullOrderSimulation(Run, Tabular):
         return pl.DataFrame({name: getattr(self, name) for name in (*self.names, *HOLDS)})
 
 
+SIGNAL_UNITS = {
+    **UNITS,
+    "shaft_position": SHAFT_ANGLE,
+    "spool_velocity": "m/s",
+    "swash_rate": PLATE_RATE,
+    "valve_flow": "m^3/s",
+    "pump_flow": "m^3/s",
+}
+"""Unit of each signal of a run, reduced or of full order, as of `display_unit`."""
 SIGNALS = tuple(n for n, each in vars(FullOrderSimulation).items() if isinstance(each, Named))
 """Signals in the order of the chain."""
 HOLDS = ("spool_hold", "relief_hold", "plate_hold")  # Limits that can hold.
@@ -449,8 +478,6 @@ class Comparison(Tabular):
     The reduced one is marched in fine steps, so that what is compared are the equations.
     """
 
-    figure = "plot_full_order"
-
     full: FullOrderSimulation
     reduced_speed: Array
     """Shaft speed of the reduced model. [rad/s]"""
@@ -482,6 +509,22 @@ class Comparison(Tabular):
         """Largest and rms difference over the top speed, NaN without motion. [1]"""
         top = self.top_speed if self.moves else float("nan")
         return float(np.abs(self.error).max() / top), float(np.sqrt(np.mean(self.error**2)) / top)
+
+    def table(self) -> Table:
+        """Top speed, and the largest and the rms difference of the reduced model."""
+        columns = (Column("Shaft speed"), Column("", ".4g"), UNIT, Column("share", ".2%"))
+        made = Table("", columns)
+        largest = float(np.abs(self.error).max())
+        rms = float(np.sqrt(np.mean(self.error**2)))
+        relative = self.relative  # NaN, shown as nothing, if it does not move
+        made.add("top speed, five states", self.top_speed, None, unit="rad/s")
+        made.add("largest difference", largest, relative[0], unit="rad/s")
+        made.add("rms difference", rms, relative[1], unit="rad/s")
+        return made
+
+    def plot(self, *, title: str | None = None) -> Figure:
+        """Figure of both speeds, their difference, and what lies between command and speed."""
+        return cast("Figure", figures().plot_full_order(self, title=title))
 
     def to_polars(self) -> polars.DataFrame:
         """Table of the full-order model's signals, with command and reduced model's speed."""

@@ -18,7 +18,7 @@ from swashplate.campaign.experiment import Experiment
 from swashplate.documents import read_json
 from swashplate.errors import FileError, InputError
 from swashplate.identification import tables
-from swashplate.identification.criteria import REQUIRED, Verdict, verdict
+from swashplate.identification.criteria import REQUIRED, Grade, Verdict, verdict
 from swashplate.identification.drive_model import Parameters
 from swashplate.identification.fitting import Fit, Solved, StageFit, fingerprint, staged
 from swashplate.identification.problem import Loss, Problem
@@ -36,7 +36,8 @@ from swashplate.identification.validation import RunQuality, predict
 from swashplate.parameters.definitions import find
 from swashplate.parameters.files import dump_set, read_set
 from swashplate.parameters.parameter_set import Motion, ParameterSet
-from swashplate.results import Result
+from swashplate.progress import working
+from swashplate.results import Result, folded
 from swashplate.tables import Table, write_text
 
 if TYPE_CHECKING:
@@ -70,20 +71,34 @@ class Judged(Result):
     def verdict(self) -> Verdict:
         """What it can be used for."""
         planned = [each.name for each in self.result.setup.stages]
-        return verdict(self.result.stages, self.predicted, planned=planned, required=self.required)
+        with working("Judging the fit"):
+            return verdict(
+                self.result.stages, self.predicted, planned=planned, required=self.required
+            )
 
     def tables(self) -> list[Table]:
         """Criteria of the verdict, then the fit's tables and the errors of held-out runs."""
-        return [
-            self.verdict.table(),
-            *self.result.tables(),
-            *tables.runs_tables(self.predicted),
-        ]
+        return [self.verdict.table(), *self.result.tables(), *self._held_out_tables()]
+
+    def _held_out_tables(self) -> list[Table]:
+        made = tables.runs_tables(self.predicted)
+        return [replace(table, title=f"{table.title}, held-out runs") for table in made]
+
+    def _repr_html_(self) -> str:
+        estimates = folded("Estimates, and errors of fitted runs", self.result.tables())
+        held_out = self._held_out_tables()
+        errors = folded("Errors of held-out runs", held_out) if held_out else ""
+        return f"{self.verdict._repr_html_()}{estimates}{errors}"
+
+    @property
+    def headline(self) -> str:
+        """The verdict in one sentence."""
+        return self.verdict.headline
 
     @property
     def sentences(self) -> tuple[str, ...]:
-        """The verdict's headline and all that it says."""
-        return (self.verdict.headline, *self.verdict.sentences, *self.verdict.not_judged)
+        """What the verdict says below its table."""
+        return tuple(self.verdict.remarks())
 
     def store(self, path: str | Path) -> None:
         """Write what `load_fit` reads and the report can be made from again, whole or not at all.
@@ -110,6 +125,11 @@ class Judged(Result):
             profiles=tuple(self.profiles),
             folds=self.folds,
             notes=dict(self.notes),
+            verdict=StoredVerdict(
+                grade=self.verdict.grade,
+                headline=self.verdict.headline,
+                numbers=dict(self.result.parameters.numbers),
+            ),
         )
         write_text(content.model_dump_json(indent=1, by_alias=True) + "\n", path)
 
@@ -260,6 +280,15 @@ class StoredStage(Entry):
     starts: tuple[Solution, ...]
 
 
+class StoredVerdict(Entry):
+    """The verdict on the fit when it was stored."""
+
+    grade: Grade
+    headline: str
+    numbers: dict[str, float]
+    """Of the drive or model that it is about."""
+
+
 class FitFile(Entry):
     """The whole file."""
 
@@ -276,6 +305,16 @@ class FitFile(Entry):
     """Behind the name of their stage in older files, which do not name the unknown."""
     folds: CrossValidation | None
     notes: dict[str, str]
+    verdict: StoredVerdict | None = None
+    """None in a file of a version that did not store it."""
+
+
+def read_verdict(path: str | Path) -> StoredVerdict | None:
+    """The verdict that a stored fit had, without its campaign; None if the file has none.
+
+    A `FileError` or `ParameterError` if the file is none that `Judged.store` wrote.
+    """
+    return read_json(path, FitFile, strict=False).verdict
 
 
 def load_fit(

@@ -125,6 +125,15 @@ class Verdict(Result):
             made.add(each.name, each.value, each.limit, state, each.reason, look=state != "met")
         return made
 
+    def remarks(self) -> list[str]:
+        """What it holds for, what asks for attention, what is open and what is assumed."""
+        validity = [self.validity] if self.validity else []
+        assumed = [f"Assumed: {each[:1].lower()}{each[1:]}" for each in self.assumed]
+        return [*validity, *self.sentences, *self.not_judged, *assumed]
+
+    def _sentences(self) -> list[str]:
+        return self.remarks()
+
     @property
     def usable(self) -> bool:
         """Whether nothing rules out the use."""
@@ -370,7 +379,7 @@ def _determined(stages: Sequence[StageFit]) -> Criterion:
     name, value = "parameters without a value", f"{lost} of {total}"
     why = "a fit that determines few of its parameters has found nothing"
     failure = f"{value} parameters are at a bound or not determined" if lost > MOST * total else ""
-    return Criterion(name, value, f"{MOST:.0%}", why, failure)
+    return Criterion(name, value, f"{100.0 * MOST:g} %", why, failure)
 
 
 def _bounded_predictions(stages: Sequence[StageFit], predicted: Sequence[RunQuality]) -> Criterion:

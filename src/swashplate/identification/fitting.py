@@ -46,6 +46,7 @@ from swashplate.identification.unknowns import Prior, Unknown
 from swashplate.identification.validation import RunQuality, run_qualities
 from swashplate.parameters.definitions import columns_of
 from swashplate.parameters.parameter_set import ParameterSet
+from swashplate.progress import LOGGER, working
 from swashplate.results import Result
 from swashplate.tables import count
 
@@ -191,7 +192,9 @@ class Fit(Result):
     def tables(self) -> list[Table]:
         """Estimates with their intervals, stage by stage, then the errors of each fitted run."""
         runs = [quality for each in self.stages for quality in each.runs]
-        return [*map(tables.estimates_table, self.stages), *tables.runs_tables(runs)]
+        errors = tables.runs_tables(runs)
+        errors = [replace(table, title=f"{table.title}, fitted runs") for table in errors]
+        return [*map(tables.estimates_table, self.stages), *errors]
 
     @property
     def sentences(self) -> tuple[str, ...]:
@@ -287,12 +290,28 @@ def fit(
         raise InputError("A drive needs a Setup for what is free, such as load_setup('hoist').")
 
     def solved(stage: Stage, problem: Problem) -> Solved:
-        refuse_unsound(check_rank(f"Stage {stage.name}", problem))
-        seen = None if watch is None else partial(watch, stage.name)
-        limits: dict[str, Any] = {"tolerance": tolerance, "max_evaluations": max_evaluations}
-        return _solved(stage, problem, partial(solve, loss=loss, watch=seen, **limits), search)
+        def seen(now: Progress) -> None:
+            work.at(f"evaluation {now.evaluations}, cost {now.cost:.5g}")
+            if watch is not None:
+                watch(stage.name, now)
 
-    stages = staged(free, nominal, runs, solved, threads=threads)
+        refuse_unsound(check_rank(f"Stage {stage.name}", problem))
+        limits: dict[str, Any] = {"tolerance": tolerance, "max_evaluations": max_evaluations}
+        with working(f"Stage {stage.name}") as work:
+            solve_stage = partial(solve, loss=loss, watch=seen, **limits)
+            result = _solved(stage, problem, solve_stage, search)
+        _, solution, _ = result
+        LOGGER.info(
+            "Stage %s: %s after %d evaluations, cost %.5g",
+            stage.name,
+            solution.message,
+            solution.evaluations,
+            solution.cost,
+        )
+        return result
+
+    with working(f"Fitting {nominal.name}"):
+        stages = staged(free, nominal, runs, solved, threads=threads)
     return Fit(free, nominal, tuple(runs), stages, doubts)
 
 

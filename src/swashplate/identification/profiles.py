@@ -15,6 +15,7 @@ from swashplate.identification.drive_model import DriveModel
 from swashplate.identification.problem import TOLERANCE, LinearisedFit, Problem
 from swashplate.identification.solving import solve
 from swashplate.identification.unknowns import Vector
+from swashplate.progress import counted
 from swashplate.results import Result
 
 if TYPE_CHECKING:
@@ -401,7 +402,9 @@ def profiles_of(
     rises = {k: float(every[k]) for k in chosen}
     shared = replace(problem, threads=1), vector, cost, rises, found.own.standard_errors
     made: dict[str, Profile] = {}
-    for position, each in (executor or Serial()).run(_profiled, shared, chosen):
+    profiles = (executor or Serial()).run(_profiled, shared, chosen)
+    words = f"Profiling {stage.stage.name}"
+    for position, each in counted(profiles, len(chosen), "parameters", words):
         name = variables.names[chosen[position]]
         made[name] = replace(each, name=name, stage=stage.stage.name)
         if watch is not None:

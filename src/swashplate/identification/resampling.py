@@ -29,6 +29,7 @@ from swashplate.identification.solving import NO_EFFECT, solve
 from swashplate.identification.unknowns import Unknowns
 from swashplate.identification.validation import Measures, measures, predict, with_speeds
 from swashplate.parameters.parameter_set import ParameterSet
+from swashplate.progress import counted
 from swashplate.results import Result
 
 Array = NDArray[np.float64]
@@ -126,7 +127,8 @@ def cross_validate(
     shared = tuple(experiments), nominal, setup, loss, None if isinstance(here, Serial) else 1
     done: dict[int, tuple[Fold, list[_Held]]] = {}
     try:
-        for place, found in here.run(_fold, shared, list(enumerate(parts))):
+        folds_done = here.run(_fold, shared, list(enumerate(parts)))
+        for place, found in counted(folds_done, folds, "folds", "Cross-validating"):
             done[place] = found
             if watch is not None:
                 watch(found[0], len(done))
@@ -330,7 +332,8 @@ def bootstraps_of(
         for each, fit in zip(stages, fits, strict=True)
     )
     found: dict[int, tuple[Array, ...] | None] = {}
-    for number, vectors in (executor or Serial()).run(_refitted, shared, range(draws)):
+    refits = (executor or Serial()).run(_refitted, shared, range(draws))
+    for number, vectors in counted(refits, draws, "fits to new noise", "Bootstrapping"):
         found[number] = vectors
         if watch is not None:
             watch(len(found))

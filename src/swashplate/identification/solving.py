@@ -17,8 +17,9 @@ from swashplate.errors import DomainError, FileError, InputError, SwashplateErro
 from swashplate.executors import Executor, Serial
 from swashplate.identification.problem import Evaluation, Loss, Problem
 from swashplate.identification.unknowns import Vector
+from swashplate.progress import counted
 from swashplate.results import Result
-from swashplate.tables import made_folder, write_text
+from swashplate.tables import count, made_folder, write_text
 
 Array = NDArray[np.float64]
 Finite = Annotated[float, Field(allow_inf_nan=False)]
@@ -324,7 +325,9 @@ def solve_from(
     tasks = [task for task in enumerate(starts) if task[0] not in done]
     shared = problem, partial(solve, **settings)  # type: ignore[arg-type]
     try:
-        for _, result in (executor or Serial()).run(_solve_one, shared, tasks):
+        results = (executor or Serial()).run(_solve_one, shared, tasks)
+        words = f"Searching from {count(len(tasks), 'start')}"
+        for _, result in counted(results, len(tasks), "starts", words):
             done[result.number] = result
             if store is not None:
                 begun = tuple(starts[result.number].tolist())

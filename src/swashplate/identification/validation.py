@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,8 +25,11 @@ from swashplate.identification.problem import Problem
 from swashplate.identification.setup import ModelSetup
 from swashplate.identification.solving import solve
 from swashplate.parameters.parameter_set import HasParameters, ParameterSet, set_of
-from swashplate.results import Result
+from swashplate.results import Result, figures
 from swashplate.tables import listed
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 Array = NDArray[np.float64]
 
@@ -205,6 +208,18 @@ class RunQuality(Result):
     def residual(self) -> Array:
         """(m,) simulated less measured."""
         return self.simulated - self.experiment[self.channel].values
+
+    def plot(
+        self, *, window: tuple[float, float] | None = None, title: str | None = None
+    ) -> Figure:
+        """Figure of what was measured and what is simulated, and below of their difference.
+
+        With `window` as of `swashplate.report.figures.plot_channel`.
+        """
+        channel = self.experiment[self.channel]
+        words = f"{self.experiment.name}, {channel.name}" if title is None else title
+        draw = figures().plot_channel
+        return cast("Figure", draw(channel, self.simulated, window=window, title=words))
 
 
 def run_qualities(problem: Problem, vector: Array) -> tuple[RunQuality, ...]:

@@ -31,6 +31,7 @@ from swashplate.models.displacement_control import moment_sine, solenoid_force
 from swashplate.models.pump import overpowered
 from swashplate.parameters.parameter_set import ParameterSet
 from swashplate.parameters.rules import FULL_VOLTAGE
+from swashplate.results import Result
 from swashplate.simulation.instance import (
     card_of,
     check_filter_stability,
@@ -78,6 +79,8 @@ FORCE = {"Z17": 0.0, "Z19_plus": 1.0, "Z19_minus": 1.0} | dict.fromkeys(
 """Solenoids whose force is the current, for a model whose input is the force."""
 DECIMALS = 4
 """Of the voltage that is proposed; rounded away from 0 V, so that it does have a model."""
+SHOWN_AT = 0.3
+"""Frequency at which a model shows its gain and phase: of a load's swing. [Hz]"""
 CLOSED = 64.0 * float(np.finfo(float).eps)
 """By this much tan α_sw stands below a closed spool, on the side of positive opening."""
 
@@ -105,7 +108,7 @@ class OperatingPoint:
 
 
 @dataclass(frozen=True, eq=False)
-class LinearDrive(LinearModel):
+class LinearDrive(LinearModel, Result):
     """Small motions of a drive about an operating point."""
 
     operating_point: OperatingPoint
@@ -115,6 +118,10 @@ class LinearDrive(LinearModel):
     """The drive that was linearised."""
 
     __repr__ = LinearModel.__repr__
+
+    def tables(self) -> list[Table]:
+        """Operating point, small motion and poles, as of `model_tables`."""
+        return model_tables(self, SHOWN_AT)
 
     def content(self) -> dict[str, Any]:
         """What is written of a model; see `LinearModel.content`."""
@@ -461,8 +468,9 @@ def model_tables(
 ) -> list[Table]:
     """Operating point, small motion and poles of a model, and margins of a loop closed over it.
 
-    Of a model to the shaft's speed. Gain and phase are given at `frequency` [Hz]; `loop_gain` is
-    that of a proportional speed loop [V, A or N / (rad/s)].
+    Small motion and margins are of a model whose first output is the shaft's speed. Gain and phase
+    are given at `frequency` [Hz]; `loop_gain` is that of a proportional speed loop
+    [V, A or N / (rad/s)].
     """
     point, unit = model.operating_point, UNITS[model.input]
     answer, at = complex(model.response(frequency)[0]), f"at {frequency:g} Hz"
@@ -473,9 +481,15 @@ def model_tables(
     made.add("swash angle", point.swash_angle, unit="rad", spec="z.3f")
     made.add("shaft speed", point.shaft_speed, unit="rad/s", spec="z.3f")
 
+    if model.outputs[0] != "shaft_speed":
+        return [made, _poles_table(model)]
     moving = _key_values("Small motion")
     moving.add("steady gain", model.gain, unit=f"rad/s/{unit}", spec="z.5g")
-    moving.add("time constant of the pump", model.time_constant, unit="s")
+    try:
+        lag: float | Cell = model.time_constant
+    except DomainError:
+        lag = Cell(None, "shorter than a sample")
+    moving.add("time constant of the pump", lag, unit="s")
     if model.input == "voltage":
         delay = 1e3 * model.parameters.numbers["tau"]
         moving.add("delay of the card", delay, unit="ms", spec="z.3f")
@@ -485,15 +499,7 @@ def model_tables(
     largest = _finite(model.largest_gain)
     moving.add("largest proportional gain", largest, unit=f"{unit}/(rad/s)", spec=".4g")
 
-    heads = (("real", "z.5g"), ("imaginary", "s"), ("Hz", ".4g"), ("damping", ".3f"))
-    poles = Table("", (Column("Poles"), *(Column(*each) for each in heads)))
-    h = model.sample_time
-    for pole in model.poles[model.poles.imag >= 0.0]:  # its conjugate stands for both
-        s = pole if h is None else np.log(pole) / h
-        size = float(abs(s))
-        imaginary = f"±{pole.imag:.5g}" if pole.imag else ""
-        numbers = float(pole.real), imaginary, size / (2.0 * np.pi), float(-s.real) / size
-        poles.add("rad/s" if h is None else "z", *numbers)
+    poles = _poles_table(model)
     if loop_gain is None:
         return [made, moving, poles]
     margins, shown = model.margins(loop_gain), display_unit(f"{unit}/(rad/s)")
@@ -503,6 +509,20 @@ def model_tables(
     loop.add("delay margin", _finite(1e3 * margins.delay_margin), unit="ms", spec=".2f")
     loop.add("gain margin", _finite(margins.gain_margin), spec=".3g")
     return [made, moving, poles, loop]
+
+
+def _poles_table(model: LinearDrive) -> Table:
+    """Poles without those of delays, of two conjugate ones the upper."""
+    heads = (("real", "z.5g"), ("imaginary", "s"), ("Hz", ".4g"), ("damping", ".3f"))
+    poles = Table("", (Column("Poles"), *(Column(*each) for each in heads)))
+    h = model.sample_time
+    for pole in model.poles[model.poles.imag >= 0.0]:
+        s = pole if h is None else np.log(pole) / h
+        size = float(abs(s))
+        imaginary = f"±{pole.imag:.5g}" if pole.imag else ""
+        numbers = float(pole.real), imaginary, size / (2.0 * np.pi), float(-s.real) / size
+        poles.add("rad/s" if h is None else "z", *numbers)
+    return poles
 
 
 def _key_values(title: str) -> Table:

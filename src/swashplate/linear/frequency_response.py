@@ -5,9 +5,10 @@ The drive is marched over whole cycles of each frequency until it repeats itself
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from math import ceil, sqrt
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, cast, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -21,13 +22,17 @@ from swashplate.linear.drive import OUTPUTS
 from swashplate.models.displacement_control import Pump
 from swashplate.parameters.parameter_set import ParameterSet
 from swashplate.parameters.rules import FULL_VOLTAGE
-from swashplate.results import Tabular
+from swashplate.results import GivenAxes, Tabular, figures
 from swashplate.simulation.instance import check_filter_stability, instance_of, without_ripple
 from swashplate.simulation.result import UNITS
 from swashplate.tables import Column, Table
 
 if TYPE_CHECKING:
     import polars
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from swashplate.linear.drive import LinearDrive
 
 Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
@@ -37,6 +42,8 @@ FEWEST_STEPS, MOST_STEPS = 8, 1_000_000
 """Steps of a cycle, which bound the frequencies from both sides."""
 SHORTEST = 1.0  # Half of a march lasts as long at least. [s]
 LONGEST = 64  # Times the first march, after which an answer that still changes is given up.
+SHOWN = 8
+"""Frequencies of a response that its table shows; its figure shows all of them."""
 STILL = 1e-12  # Answers below this part of the output's size are none.
 
 
@@ -46,8 +53,6 @@ class FrequencyResponse(Tabular):
 
     A row for each amplitude, a column for each frequency.
     """
-
-    figure = "plot_bode"
 
     name: str
     """Name of the drive."""
@@ -74,6 +79,42 @@ class FrequencyResponse(Tabular):
             f"{self.amplitudes.size} amplitudes, {self.frequencies.size} frequencies)"
         )
 
+    @overload
+    def plot(
+        self,
+        *,
+        linear: LinearDrive | None = None,
+        mark: float | None = 0.3,
+        ax: None = None,
+        title: str | None = None,
+    ) -> Figure: ...
+
+    @overload
+    def plot(
+        self,
+        *,
+        linear: LinearDrive | None = None,
+        mark: float | None = 0.3,
+        ax: GivenAxes,
+        title: str | None = None,
+    ) -> GivenAxes: ...
+
+    def plot(
+        self,
+        *,
+        linear: LinearDrive | None = None,
+        mark: float | None = 0.3,
+        ax: Axes | Sequence[Axes] | None = None,
+        title: str | None = None,
+    ) -> Figure | Axes | Sequence[Axes]:
+        """Figure of gain, phase and distortion over the frequency, a line for each amplitude.
+
+        By default a new figure; with `ax`, two for gain and phase or three, it is drawn there, and
+        `ax` returned. See `swashplate.report.figures.plot_bode`.
+        """
+        draw = figures().plot_bode
+        return cast("Figure", draw(self, linear=linear, mark=mark, ax=ax, title=title))
+
     @property
     def gain(self) -> Array:
         """Magnitude of the ratio, (a, f)."""
@@ -95,6 +136,29 @@ class FrequencyResponse(Tabular):
             there = ratio != 0.0
             row[there] = np.unwrap(np.angle(ratio[there]))
         return phase
+
+    def table(self) -> Table:
+        """Gain, phase and distortion by amplitude, at up to `SHOWN` of the frequencies."""
+        columns = (
+            Column("amplitude", "g", UNITS[self.input]),
+            Column("frequency", ".4g", "Hz"),
+            Column("gain", ".4g", f"{UNITS[self.output]}/{UNITS[self.input]}", none="no motion"),
+            Column("phase", "z.1f", "rad"),
+            Column("distortion", ".1%"),
+        )
+        made, size = Table("", columns), self.frequencies.size
+        rows = np.unique(np.linspace(0, size - 1, min(size, SHOWN)).round().astype(int))
+        for k, amplitude in enumerate(self.amplitudes.tolist()):
+            for at in rows.tolist():
+                answer: tuple[float | None, ...] = (None, None, None)
+                if self.moves[k, at]:
+                    numbers = (self.gain[k, at], self.phase[k, at], self.distortion[k, at])
+                    answer = tuple(map(float, numbers))
+                frequency, first = float(self.frequencies[at]), at == rows[0]
+                made.add(amplitude, frequency, *answer, section=bool(first and k))
+        if rows.size < size:
+            made.caption = f"{rows.size} of {size} frequencies shown"
+        return made
 
     def still(self) -> list[str]:
         """Where `moves` denies an answer, in words, for each amplitude that has such a place."""

@@ -13,6 +13,7 @@ from swashplate.logs.log import Log as Log
 from swashplate.logs.log import Series as Series
 from swashplate.logs.log import check_duration as check_duration
 from swashplate.logs.log import check_stamps as check_stamps
+from swashplate.logs.log import open_as as open_as
 from swashplate.logs.log import open_log as open_log
 from swashplate.logs.log import read_series as read_series
 from swashplate.logs.log import unit_of as unit_of

@@ -113,12 +113,14 @@ class _Other:
         clock = threading.Timer(seconds, self._process.kill)
         clock.start()
         line = b""
-        with suppress(BrokenPipeError):
-            sink.write(json.dumps(question).encode() + b"\n")
-            sink.flush()
-            line = source.readline()
-        in_time = clock.is_alive()
-        clock.cancel()
+        try:
+            with suppress(BrokenPipeError):
+                sink.write(json.dumps(question).encode() + b"\n")
+                sink.flush()
+                line = source.readline()
+        finally:  # also at Ctrl-C: Python does not end before its clocks
+            in_time = clock.is_alive()
+            clock.cancel()
         if not in_time:
             raise FileError(
                 f"{path} could not be read within {seconds:.0f} s; it is damaged or too large."

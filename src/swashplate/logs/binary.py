@@ -39,7 +39,7 @@ def look(
 ) -> tuple[dict[str, Any], list[Array]]:
     """What a file holds, as `Log` has it, and the columns at some places, from a row to a last one.
 
-    The reader is one of `swashplate.logs.log.ENDINGS`, but text. Of a damaged file it raises
+    The reader is one of `FORMATS`, or MATLAB of any version. Of a damaged file it raises
     whatever its library does.
     """
     form = _form_of(reader, path)
@@ -73,7 +73,7 @@ _LARGEST = 256 << 20
 
 def _form_of(reader: str, path: Path) -> str:
     """The row of `FORMATS` by the first bytes of a file; another kind of file is refused."""
-    check_kind(path, reader, *["HDF5"] * (reader == "MATLAB"))
+    check_kind(path, reader, *["HDF5"] * (reader in ("MATLAB", "Capytaine")))
     with path.open("rb") as file:
         head, size = file.read(2056), file.seek(0, 2)
     if reader == "MDF":
@@ -284,6 +284,57 @@ def _check_stored(dataset: Any) -> None:
             )
 
 
+# --- Capytaine: transfer functions of ships -------------------------------------------------------
+
+_MOTIONS = ("surge", "sway", "heave", "roll", "pitch", "yaw")
+_AXES = ("wave_direction", "omega", "radiating_dof")
+
+
+@contextmanager
+def _capytaine(path: Path) -> Iterator[Iterable[_Item]]:
+    """Rows of all waves and motions in the array RAO of a file that xarray wrote."""
+    import h5py
+
+    try:
+        with h5py.File(path, "r", locking=False) as file:
+            columns = _wave_rows(file["RAO"])
+    except Exception as error:  # at a broken byte the library and its objects raise all there is
+        raise FileError(
+            f"{path} is no file of netCDF 4 with an array RAO over complex, {', '.join(_AXES)}, "
+            f"with their coordinates and the parts re and im: {said(error)}."
+        ) from None
+    yield (
+        _Item(name, "", None, values.size, partial(_some, values))
+        for name, values in columns.items()
+    )
+
+
+def _wave_rows(array: Any) -> dict[str, Array]:
+    """A row for each motion of a ship in each wave; other degrees of freedom are left out."""
+    scales = {scale[0].name.rpartition("/")[2]: scale[0] for scale in array.dims}
+    names = ["radiating_dof" if name.endswith("_dof") else name for name in scales]
+    labels = dict(zip(names, scales.values(), strict=True))
+    for stored in (array, *labels.values()):
+        _check_stored(stored)
+    table = np.transpose(array[...], [names.index(name) for name in ("complex", *_AXES)])
+    parts, freedoms = (
+        [str(word).lower() for word in labels[name].asstr()[...]]
+        for name in ("complex", "radiating_dof")
+    )
+    moved = [number for number, freedom in enumerate(freedoms) if freedom in _MOTIONS]
+    motions = np.array([_MOTIONS.index(freedoms[number]) + 1.0 for number in moved])
+    directions, frequencies = (np.asarray(labels[name][...], np.float64) for name in _AXES[:2])
+    grids = np.meshgrid(directions, frequencies, motions, indexing="ij")
+    columns = dict(zip(("wave_direction", "omega", "motion"), grids, strict=True))
+    for part in ("re", "im"):
+        columns[part] = np.asarray(table[parts.index(part)][..., moved], np.float64)
+    return {name: values.ravel() for name, values in columns.items()}
+
+
+def _some(values: Array, first: int, last: int | None) -> Array:
+    return values[first:last]
+
+
 # --- TDMS -----------------------------------------------------------------------------------------
 
 
@@ -408,6 +459,7 @@ FORMATS: dict[str, tuple[Callable[[Path], AbstractContextManager[Iterable[_Item]
     "MATLAB 5": (_matlab, "vectors"),
     "MATLAB 7.3": (partial(_hdf5, matlab=True), "columns"),
     "HDF5": (_hdf5, "columns"),
+    "Capytaine": (_capytaine, "motions"),
     "TDMS": (_tdms, "channels"),
     "MDF 4": (_mdf, "channels"),
 }

@@ -231,32 +231,52 @@ def open_log(path: str | Path, *, options: TextOptions | None = None) -> Log:
     """
     source = Path(path)
     suffix = source.suffix.lower()
-    name = next((name for name, suffixes in ENDINGS.items() if suffix in suffixes), None)
-    why = ""
+    name = next((name for name, suffixes in ENDINGS.items() if suffix in suffixes), "")
+    why = "" if name else f"ends in '{source.suffix}'; a log is read from {', '.join(SUFFIXES)}"
+    if suffix.startswith(".xls"):
+        why += ": save a spreadsheet as CSV"
+    _check_readable(source, why)
+    if name != "CSV":
+        return open_as(name, source)
+    from swashplate.logs.text import open_text
+
+    return open_text(source, options)
+
+
+def open_as(format: str, path: str | Path) -> Log:
+    """Look into a binary file of a format, whatever its ending, in a process of its own.
+
+    Parameters
+    ----------
+    format : str
+        One of `ENDINGS`, but CSV; or ``"Capytaine"``, whose columns are ``wave_direction`` [rad],
+        ``omega`` [rad/s], ``motion`` (1 to 6, surge to yaw), ``re`` and ``im``, a row for each.
+    path : path
+        The file; a `FileError` as of `open_log`.
+    """
+    source = Path(path)
+    _check_readable(source)
+    from swashplate.logs.apart import open_apart
+
+    return open_apart(format, source)
+
+
+def _check_readable(source: Path, why: str = "") -> None:
+    """Refuse a folder, a file whose name is wrong already, and what is no ordinary, full file."""
     try:
         if source.is_dir():
             why = "is a folder, not a log"
-        elif name is None:
-            why = f"ends in '{source.suffix}'; a log is read from {', '.join(SUFFIXES)}"
-            why += ": save a spreadsheet as CSV" if suffix.startswith(".xls") else ""
-        elif source.exists() and not source.is_file():
+        elif not why and source.exists() and not source.is_file():
             why = "is no ordinary file"
-        else:
+        elif not why:
             with source.open("rb") as file:
                 why = "" if file.read(1) else "is empty"
     except FileNotFoundError:
         raise FileError(f"There is no file {source}.") from None
     except (OSError, ValueError) as error:
         why = f"cannot be read: {getattr(error, 'strerror', None) or said(error)}"
-    if why or name is None:
+    if why:
         raise FileError(f"{source} {why}.")
-    if name == "CSV":
-        from swashplate.logs.text import open_text
-
-        return open_text(source, options)
-    from swashplate.logs.apart import open_apart
-
-    return open_apart(name, source)
 
 
 class Series(NamedTuple):

@@ -71,6 +71,22 @@ class Parameter(Result):
         """SI unit of the value."""
         return self.definition.unit
 
+    def table(self) -> Table:
+        """Its value with its unit, its status, and where it comes from."""
+        columns = (
+            Column("symbol"),
+            Column("name", wrap=True),
+            Column("plus", ".6g"),
+            Column("minus", ".6g"),
+            UNIT,
+            Column("status"),
+            Column("source", wrap=True),
+        )
+        made = Table("", columns, si=True)
+        plus, minus = (*self.values, None)[:2]
+        made.add(self.symbol, self.name, plus, minus, self.status, self.source, unit=self.unit)
+        return made
+
     @property
     def values(self) -> tuple[float, ...]:
         """Its one or two numbers, in the order of ``definition.columns``."""

@@ -7,6 +7,7 @@ from pathlib import Path
 from textwrap import wrap
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
+from swashplate.errors import InputError
 from swashplate.tables import FIGURE, ending, write_whole
 
 if TYPE_CHECKING:
@@ -63,25 +64,10 @@ def strokes(names: Iterable[str]) -> dict[str, Stroke]:
 def new_figure(
     width: float, height: float, *, layout: Literal["constrained", "none"] = "constrained"
 ) -> Figure:
-    """An empty white figure of a size [inch], whose panels find their places by themselves.
+    """An empty white figure of a size [inch], whose panels find their places by themselves."""
+    from swashplate.report.figure import PlainFigure
 
-    Its words are drawn as they are: names come from files, and a dollar in one is no formula.
-    """
-    from matplotlib.figure import Figure
-    from matplotlib.text import Text
-
-    class Plain(Figure):
-        def draw(self, renderer: Any) -> None:
-            for each in self.findobj(Text):
-                assert isinstance(each, Text)
-                each.set_parse_math(False)
-                if not (words := each.get_text()).isprintable():
-                    each.set_text(
-                        "".join(c if c.isprintable() or c == "\n" else "\ufffd" for c in words)
-                    )
-            super().draw(renderer)
-
-    made = Plain(figsize=(width, height), dpi=DPI, facecolor="white")
+    made = PlainFigure(figsize=(width, height), dpi=DPI, facecolor="white")
     if layout == "constrained":
         made.set_layout_engine("constrained", w_pad=0.06, h_pad=0.04, hspace=0.02, wspace=0.02)
     return made
@@ -115,6 +101,70 @@ def sheet(
         put_legend(axes[0], legend)
     figure.align_ylabels(axes)
     return figure, axes
+
+
+def given_axes(ax: Axes | Sequence[Axes], count: int, what: str) -> list[Axes]:
+    """The axes of a caller, one for each of so many things, also of ``pyplot.subplots``.
+
+    Raises
+    ------
+    InputError
+        If there are more or fewer.
+    """
+    import numpy as np
+
+    axes = list(np.ravel(np.asarray(ax, dtype=object)))
+    if len(axes) != count:
+        raise InputError(f"There are {len(axes)} axes for {count} {what}: give one for each.")
+    return axes
+
+
+def dress_given(
+    ax: Axes | Sequence[Axes],
+    title: str | None,
+    labels: Sequence[str],
+    below: str,
+    *,
+    what: str = "panels",
+    legend: Sequence[Artist] = (),
+    legend_at: str = "best",
+) -> list[Axes]:
+    """Dress a caller's axes as `sheet` does its panels; the title and legend are within the first.
+
+    Without a title they get none: the caller's figure may have one. `legend_at` is a location as
+    of `matplotlib.axes.Axes.legend`.
+    """
+    axes = given_axes(ax, len(labels), what)
+    for panel, label in zip(axes, labels, strict=True):
+        dress(panel, label)
+    label_below(axes[-1], below)
+    if title:
+        axes[0].set_title(title, loc="left", fontsize=NORMAL, color=INK)
+    if legend:
+        legend_within(axes[0], legend, legend_at)
+    return axes
+
+
+def legend_within(ax: Axes, handles: Sequence[Artist], location: Any = "best") -> None:
+    """Write a legend into a caller's panel, on white: lines may pass behind it."""
+    ax.legend(
+        handles=handles,
+        loc=location,
+        fontsize=SMALL,
+        labelcolor=INK,
+        facecolor="white",
+        edgecolor="none",
+        framealpha=0.85,
+    )
+
+
+def root_figure(ax: Axes) -> Figure:
+    """The whole figure that a panel is in."""
+    from matplotlib.figure import Figure
+
+    figure = ax.get_figure(root=True)
+    assert isinstance(figure, Figure)
+    return figure
 
 
 def write_title(figure: Figure, title: str) -> None:

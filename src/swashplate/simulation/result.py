@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from enum import IntFlag
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, Any, cast, overload
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +13,9 @@ from numpy.typing import NDArray
 from swashplate.equations.marching.use import Run, read_only
 from swashplate.errors import InputError
 from swashplate.models.displacement_control import Pump
-from swashplate.results import figures
+from swashplate.results import GivenAxes, figures
+from swashplate.tables import UNIT, Column, Table, share_cell
+from swashplate.units import SHAFT_ANGLE, display_unit
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -186,30 +188,96 @@ class Simulation(Run):
             limit = Limit[limit.upper()]
         return np.asarray((self.limits & int(limit)) != 0)
 
+    def held_back(self, limit: Limit) -> NDArray[np.bool_]:
+        """(n,) samples at which a limit acts.
+
+        Of the dead zone only samples with a command other than 0 count: at rest nothing is asked
+        that it could hold back.
+        """
+        acts = self.active(limit)
+        if limit == Limit.DEAD_ZONE:
+            command = self.current if self.voltage is None else self.voltage
+            acts = acts & (command != 0.0)
+        return acts
+
+    def time_share(self, limit: Limit) -> float:
+        """Share of the samples at which a limit acts, 0 to 1; see `held_back`."""
+        return float(self.held_back(limit).mean())
+
+    def tables(self) -> tuple[Table, Table]:
+        """What the drive did, and how long each of its limits held it back."""
+        did = Table("", (Column("Shaft"), Column("", "z.2f"), UNIT))
+        position = float(self.shaft_position[-1])
+        did.add("peak speed, positive", max(float(self.shaft_speed.max()), 0.0), unit="rad/s")
+        did.add("peak speed, negative", min(float(self.shaft_speed.min()), 0.0), unit="rad/s")
+        did.add("speed at the end", float(self.shaft_speed[-1]), unit="rad/s")
+        did.add("position at the end", position, unit=SHAFT_ANGLE, spec="z.1f")
+        if display_unit(SHAFT_ANGLE).name == "deg":
+            did.add("", position / (2.0 * np.pi), unit="turns", spec="z.3f")
+        peaks = {"positive": max(self.current.max(), 0.0), "negative": min(self.current.min(), 0.0)}
+        for way, current in peaks.items():
+            section = way == "positive"
+            did.add(f"peak current, {way}", float(current), unit="A", spec="z.4f", section=section)
+        limits = Table("", (Column("Limit"), Column("share of time", ".1%")))
+        for limit in Limit:
+            words = str(limit.name).lower().replace("_", " ")
+            limits.add(words, share_cell(self.time_share(limit)))
+        return did, limits
+
+    @overload
     def plot(
         self,
-        signals: Sequence[str] = (),
+        signals: str | Sequence[str] = (),
+        *,
+        ax: None = None,
+        label: str = "",
+        window: tuple[float, float] | None = None,
+        title: str | None = None,
+    ) -> Figure: ...
+
+    @overload
+    def plot(
+        self, signals: str | Sequence[str] = (), *, ax: GivenAxes, label: str = ""
+    ) -> GivenAxes: ...
+
+    def plot(
+        self,
+        signals: str | Sequence[str] = (),
         *,
         ax: Axes | Sequence[Axes] | None = None,
         label: str = "",
-        **how: Any,
-    ) -> Figure:
+        window: tuple[float, float] | None = None,
+        title: str | None = None,
+    ) -> Figure | Axes | Sequence[Axes]:
         """Figure of the chain with its active limits shaded, or of some signals alone.
 
         Parameters
         ----------
-        signals : sequence of str
+        signals : str or sequence of str
             Names as of `names`, a panel each; by default the chain.
         ax : matplotlib axes or sequence of them, optional
-            Where to draw the signals, one for each.
+            Where to draw the signals, one for each; the shaft's speed if none is named.
         label : str
             Of the curves, for a legend.
-        **how :
-            Without signals as of `swashplate.report.figures.plot_simulation`.
+        window : (float, float), optional
+            Of the chain, first and last instant to show. [s]
+        title : str, optional
+            Of the chain, in the place of the drive's name.
+
+        Returns
+        -------
+        Figure, or `ax` as it was given
+
+        Raises
+        ------
+        InputError
+            For a signal that there is not, another number of axes, or a window or title of signals.
         """
-        if isinstance(signals, str):
-            signals = (signals,)
-        if signals or ax is not None:
-            chosen = signals or ("shaft_speed",)
-            return cast("Figure", figures().plot_signals(self, chosen, ax=ax, label=label))
-        return cast("Figure", figures().plot_simulation(self, **how))
+        if not signals and ax is None:
+            draw = figures().plot_simulation
+            return cast("Figure", draw(self, window=window, title=title))
+        if window is not None or title is not None:
+            raise InputError("A window or a title is for the figure of the chain: leave out both.")
+        draw = figures().plot_signals
+        chosen = (signals,) if isinstance(signals, str) else tuple(signals)
+        return cast("Figure", draw(self, chosen or ("shaft_speed",), ax=ax, label=label))

@@ -8,7 +8,18 @@ from dataclasses import dataclass, field
 from difflib import get_close_matches
 from functools import cached_property, lru_cache
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, ClassVar, Generic, NamedTuple, Self, TypeVar, Unpack
+from typing import (
+    TYPE_CHECKING,
+    Any,
+    ClassVar,
+    Generic,
+    NamedTuple,
+    Self,
+    TypeVar,
+    Unpack,
+    cast,
+    overload,
+)
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -38,10 +49,12 @@ from swashplate.equations.marching.run import (
 from swashplate.equations.marching.stepping import CompiledStep, Machine
 from swashplate.equations.model import Model, parameter_paths
 from swashplate.errors import DomainError, InputError
-from swashplate.results import Tabular
+from swashplate.results import GivenAxes, Tabular, figures
 
 if TYPE_CHECKING:
     import polars
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 Array = NDArray[np.float64]
 LARGEST = sys.float_info.max
@@ -88,6 +101,8 @@ class Run(Tabular):
     samples: dict[str, Array] = field(default_factory=dict, repr=False)
     """and at the samples."""
 
+    shown: ClassVar[tuple[str, ...]] = ()
+    """Signals that `plot` shows unless others are named; all of them if none is here."""
     kept: ClassVar[tuple[str, ...]] = ()
     """Signals that the first march leaves; all of them if none is named."""
     later: ClassVar[tuple[str, ...]] = ()
@@ -147,6 +162,42 @@ class Run(Tabular):
     def __repr__(self) -> str:
         samples = f"{self.time.size} samples at {self.record.rate:g} Hz"
         return f"{type(self).__name__}({self.name!r}, {samples})"
+
+    @overload
+    def plot(
+        self, signals: str | Sequence[str] = (), *, ax: None = None, label: str = ""
+    ) -> Figure: ...
+
+    @overload
+    def plot(
+        self, signals: str | Sequence[str] = (), *, ax: GivenAxes, label: str = ""
+    ) -> GivenAxes: ...
+
+    def plot(
+        self,
+        signals: str | Sequence[str] = (),
+        *,
+        ax: Axes | Sequence[Axes] | None = None,
+        label: str = "",
+    ) -> Figure | Axes | Sequence[Axes]:
+        """Figure of signals over time, one below the other.
+
+        Parameters
+        ----------
+        signals : str or sequence of str
+            Names as of `names`; by default all of them.
+        ax : matplotlib axes or sequence of them, optional
+            Where to draw the signals, one for each; by default in a new figure.
+        label : str
+            Of the curves, for a legend.
+
+        Returns
+        -------
+        Figure, or `ax` as it was given
+        """
+        chosen = (signals,) if isinstance(signals, str) else tuple(signals)
+        chosen = chosen or self.shown or tuple(name for name in self.names if name != "time")
+        return cast("Figure", figures().plot_signals(self, chosen, ax=ax, label=label))
 
     def to_polars(self) -> polars.DataFrame:
         """Table of time, all signals and a true/false column ``limit_NAME`` for each limit, SI."""

@@ -14,6 +14,7 @@ from .crane import plot_sweep as plot_sweep
 from .linear import plot_bode as plot_bode
 from .simulation import plot_comparison as plot_comparison
 from .simulation import plot_full_order as plot_full_order
+from .simulation import plot_maneuver as plot_maneuver
 from .simulation import plot_signals as plot_signals
 from .simulation import plot_simulation as plot_simulation
 

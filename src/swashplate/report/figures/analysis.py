@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from types import MappingProxyType
+from typing import Any, overload
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -25,7 +26,6 @@ from swashplate.analysis import (
     WhatIf,
     proportional_command,
 )
-from swashplate.analysis.outcomes import held_back, share_cell, time_share
 from swashplate.errors import InputError
 from swashplate.parameters.rules import FULL_VOLTAGE
 from swashplate.report.lines import (
@@ -57,7 +57,10 @@ from swashplate.report.style import (
     Dashes,
     Stroke,
     dress,
+    dress_given,
+    given_axes,
     handle,
+    legend_within,
     new_figure,
     put_legend,
     sheet,
@@ -66,13 +69,21 @@ from swashplate.report.style import (
     write_title,
     zero_line,
 )
+from swashplate.results import GivenAxes
 from swashplate.simulation.result import Limit, Simulation
+from swashplate.tables import share_cell
 from swashplate.units import display_unit
 
 # --- envelope -------------------------------------------------------------------------------------
 
 ROOM = 1.12
 """How far the axes go beyond the speeds that are reached, and the accelerations there."""
+ENVELOPE_LOOKS = (
+    (BLUE, f"+{FULL_VOLTAGE:g} V"),
+    (VERMILION, f"−{FULL_VOLTAGE:g} V"),
+    (FAINT, "let go"),
+)
+"""Colour and name of the two full commands and of the stick let go."""
 DASHES: dict[AcceleratedBy, Dashes] = {
     "orifice": "solid",
     "spool stop": "dashed",
@@ -85,7 +96,20 @@ WORDS: dict[AcceleratedBy, str] = {
 }
 
 
-def plot_envelope(envelope: Envelope, *, title: str | None = None) -> Figure:
+@overload
+def plot_envelope(envelope: Envelope, *, ax: None = None, title: str | None = None) -> Figure: ...
+
+
+@overload
+def plot_envelope(envelope: Envelope, *, ax: GivenAxes, title: str | None = None) -> GivenAxes: ...
+
+
+def plot_envelope(
+    envelope: Envelope,
+    *,
+    ax: Axes | Sequence[Axes] | None = None,
+    title: str | None = None,
+) -> Figure | Axes | Sequence[Axes]:
     """Figure of acceleration over speed with the limits labelled.
 
     The upper line is what +10 V gives, the lower one -10 V; between them everything can be
@@ -95,23 +119,41 @@ def plot_envelope(envelope: Envelope, *, title: str | None = None) -> Figure:
     ----------
     envelope : Envelope
         What to show.
+    ax : matplotlib axes, optional
+        Where to draw, with a legend of the colours alone; by default in a new figure.
+
+    Returns
+    -------
+    Figure, or `ax` as it was given
     """
+    colors = [handle(name, color) for color, name in ENVELOPE_LOOKS]
     curves = (*envelope.accelerating, envelope.released)
-    volts = f"{FULL_VOLTAGE:g} V"
-    looks = ((BLUE, f"+{volts}"), (VERMILION, f"−{volts}"), (FAINT, "let go"))
-    legend = [handle(name, color) for color, name in looks]
     drawn = {by for curve in curves for by in curve.by}
-    legend += [handle(WORDS[by], INK, d, LINE) for by, d in DASHES.items() if by in drawn]
+    dashes = [handle(WORDS[by], INK, d, LINE) for by, d in DASHES.items() if by in drawn]
     words = f"{envelope.name}: acceleration that each speed allows" if title is None else title
     speed, acceleration = display_unit("rad/s"), display_unit("rad/s^2")
-    labels = acceleration.label("acceleration"), speed.label("speed")
-    figure, (ax,) = sheet([3.8], words, labels[:1], labels[1], legend=legend)
+    up, across = acceleration.label("acceleration"), speed.label("speed")
+    if ax is None:
+        figure, (panel,) = sheet([3.8], words, [up], across, legend=[*colors, *dashes])
+        _draw_envelope(panel, envelope)
+        return figure
+    # the lines lie above, below and in the middle
+    (panel,) = dress_given(
+        ax, title, [up], across, what="panel", legend=colors, legend_at="center left"
+    )
+    _draw_envelope(panel, envelope)
+    return ax
+
+
+def _draw_envelope(ax: Axes, envelope: Envelope) -> None:
+    speed, acceleration = display_unit("rad/s"), display_unit("rad/s^2")
     zero_line(ax, upright=True)
     low, high = (speed.factor * way.top_speed for way in (envelope.minus, envelope.plus))
     span = (high - low) or 1.0
     ax.set_xlim(low - (ROOM - 1.0) * span, high + (ROOM - 1.0) * span)
     most = []
-    for curve, sign, (color, _) in zip(curves, (1.0, -1.0, 0.0), looks, strict=True):
+    curves = zip((*envelope.accelerating, envelope.released), ENVELOPE_LOOKS, strict=True)
+    for (curve, (color, _)), sign in zip(curves, (1.0, -1.0, 0.0), strict=True):
         across, up = speed.factor * curve.speed, acceleration.factor * curve.acceleration
         if sign:  # of the full commands only what speeds up their own way counts
             up = sign * np.maximum(sign * up, 0.0)
@@ -127,7 +169,6 @@ def plot_envelope(envelope: Envelope, *, title: str | None = None) -> Figure:
     ax.set_ylim(-height, height)
     for way, color in ((envelope.plus, BLUE), (envelope.minus, VERMILION)):
         _mark_way(ax, way, color, height)
-    return figure
 
 
 def _mark_way(ax: Axes, way: Way, color: str, height: float) -> None:
@@ -184,7 +225,7 @@ def plot_limit_timeline(
     InputError
         If the wanted speed has another length than the run.
     """
-    acting, unit = [each for each in Limit if held_back(run, each).any()], display_unit("rad/s")
+    acting, unit = [each for each in Limit if run.held_back(each).any()], display_unit("rad/s")
     asked = None if wanted is None else np.asarray(wanted, dtype=np.float64)
     if asked is not None and asked.shape != run.time.shape:
         raise InputError(
@@ -215,7 +256,7 @@ def _bars(ax: Axes, run: Simulation, acting: list[Limit]) -> None:
     ax.set_yticks(range(count), [SHADES[limit].name for limit in acting])
     ax.grid(False, axis="y")
     for row, limit in enumerate(acting):
-        spans = merged(stretches(run.time, held_back(run, limit)))
+        spans = merged(stretches(run.time, run.held_back(limit)))
         ax.broken_barh(
             [(begin, end - begin) for begin, end in spans.tolist()],
             (row - 0.5 * BAR, BAR),
@@ -225,7 +266,7 @@ def _bars(ax: Axes, run: Simulation, acting: list[Limit]) -> None:
         )
         write(
             ax,
-            share_cell(time_share(run, limit)).text,
+            share_cell(run.time_share(limit)).text,
             (1.0, row),
             (5.0, 0.0),
             coords=ax.get_yaxis_transform(),
@@ -317,37 +358,68 @@ NOTHING = 1e-9
 """Swings below this part of the largest are not drawn."""
 
 
-def plot_tornado(result: OneAtATime, *, title: str | None = None) -> Figure:
+@overload
+def plot_tornado(result: OneAtATime, *, ax: None = None, title: str | None = None) -> Figure: ...
+
+
+@overload
+def plot_tornado(result: OneAtATime, *, ax: GivenAxes, title: str | None = None) -> GivenAxes: ...
+
+
+def plot_tornado(
+    result: OneAtATime,
+    *,
+    ax: Axes | Sequence[Axes] | None = None,
+    title: str | None = None,
+) -> Figure | Axes | Sequence[Axes]:
     """Figure of what each lever does by itself, a panel an outcome, the strongest at the top.
 
     Parameters
     ----------
     result : OneAtATime
         See `analysis.one_at_a_time`.
+    ax : matplotlib axes or sequence of them, optional
+        Where to draw, one for each outcome that is defined; by default in a new figure. The title,
+        if there is one, goes above the new figure alone.
+
+    Returns
+    -------
+    Figure, or `ax` as it was given
 
     Raises
     ------
     InputError
-        If no outcome is defined.
+        If no outcome is defined, or there is another number of axes.
     """
     shown = [k for k in range(len(result.outcomes)) if np.isfinite(result.base[k])]
     if not shown:
         raise InputError("None of the outcomes is defined for this command: nothing to draw.")
-    columns, levers = min(len(shown), 2), list(result.ranges)
-    rows = -(-len(shown) // columns)
-    figure = new_figure(WIDTH, HEAD + ROW + rows * (0.22 * len(result.ranges) + 0.75) + 0.5 * FOOT)
-    write_title(figure, "Each lever by itself" if title is None else title)
     legend = []
     for end, (words, color) in enumerate((("lower", BLUE), ("upper", VERMILION))):
         factors = {pair[end] for pair in result.ranges.values()}
         label = f"factor {factors.pop():g}" if len(factors) == 1 else f"{words} factor"
         legend.append(Patch(color=color, label=label))
-    how = {"ncols": 3, "frameon": False, "fontsize": SMALL}
-    figure.legend(handles=legend, loc="outside lower left", **how)
+    how: dict[str, Any] = {"frameon": False, "fontsize": SMALL}
+    if ax is not None:
+        axes = given_axes(ax, len(shown), "outcomes")
+        _draw_swings(axes, result, shown)
+        legend_within(axes[0], legend)
+        return ax
+    columns = min(len(shown), 2)
+    rows = -(-len(shown) // columns)
+    figure = new_figure(WIDTH, HEAD + ROW + rows * (0.22 * len(result.ranges) + 0.75) + 0.5 * FOOT)
+    write_title(figure, "Each lever by itself" if title is None else title)
+    figure.legend(handles=legend, loc="outside lower left", ncols=3, **how)
     panels = list(figure.subplots(rows, columns, squeeze=False).flat)
-    for ax in panels[len(shown) :]:
-        ax.axis("off")
-    for ax, k in zip(panels, shown, strict=False):
+    for empty in panels[len(shown) :]:
+        empty.axis("off")
+    _draw_swings(panels[: len(shown)], result, shown)
+    return figure
+
+
+def _draw_swings(panels: Sequence[Axes], result: OneAtATime, shown: Sequence[int]) -> None:
+    levers = list(result.ranges)
+    for ax, k in zip(panels, shown, strict=True):
         outcome, swings = result.outcomes[k], np.nan_to_num(result.swings[:, k])
         order, unit = np.argsort(swings, kind="stable"), outcome.shown
         base = unit.factor * result.base[k]
@@ -369,7 +441,6 @@ def plot_tornado(result: OneAtATime, *, title: str | None = None) -> Figure:
         ax.tick_params(axis="y", length=0.0, labelsize=SMALL)
         words = f"{outcome.words}, {base:z.{3 if outcome.unit == 's' else 2}f} {unit.name}"
         ax.set_title(words, loc="left", fontsize=NORMAL, color=INK)
-    return figure
 
 
 # --- inverse map ----------------------------------------------------------------------------------
@@ -383,9 +454,29 @@ MAP, RUNS = 2.9, 1.7
 """Heights. [inch]"""
 
 
+@overload
 def plot_compensation(
-    inverse: InverseMap, improvement: Improvement | None = None, *, title: str | None = None
-) -> Figure:
+    inverse: InverseMap,
+    improvement: Improvement | None = None,
+    *,
+    ax: None = None,
+    title: str | None = None,
+) -> Figure: ...
+
+
+@overload
+def plot_compensation(
+    inverse: InverseMap, *, ax: GivenAxes, title: str | None = None
+) -> GivenAxes: ...
+
+
+def plot_compensation(
+    inverse: InverseMap,
+    improvement: Improvement | None = None,
+    *,
+    ax: Axes | Sequence[Axes] | None = None,
+    title: str | None = None,
+) -> Figure | Axes | Sequence[Axes]:
     """Figure of the voltage over the wanted speed, with a close-up at standstill.
 
     Parameters
@@ -393,15 +484,35 @@ def plot_compensation(
     inverse : InverseMap
         The map.
     improvement : Improvement, optional
-        Runs to show below: the speeds and their errors.
+        Runs to show below: the speeds and their errors; a figure of its own is needed.
+    ax : matplotlib axes or two of them, optional
+        Where to draw the map, in the second one its close-up; by default in a new figure.
+
+    Returns
+    -------
+    Figure, or `ax` as it was given
+
+    Raises
+    ------
+    InputError
+        For more than two axes, or for axes and runs.
     """
+    legend = [handle("inverse map", INK), handle("straight line", GREY, "dashed")]
+    if ax is not None:
+        if improvement is not None:
+            raise InputError("The runs of an improvement need a figure of their own: leave out ax.")
+        axes = given_axes(ax, min(max(np.size(np.asarray(ax, dtype=object)), 1), 2), "panels")
+        _draw_map(inverse, *axes)
+        legend_within(axes[0], legend)
+        if title:
+            axes[0].set_title(title, loc="left", fontsize=NORMAL, color=INK)
+        return ax
     heights = [MAP] if improvement is None else [MAP, RUNS, RUNS]
     figure = new_figure(WIDTH, HEAD + ROW + sum(heights) + 2.0 * FOOT)
     how = {"width_ratios": (1.5, 1.0), "height_ratios": heights}
     grid = figure.add_gridspec(len(heights), 2, **how)
     whole, close = (figure.add_subplot(grid[0, column]) for column in (0, 1))
-    _draw_map(whole, close, inverse)
-    legend = [handle("inverse map", INK), handle("straight line", GREY, "dashed")]
+    _draw_map(inverse, whole, close)
     if improvement is not None:
         pairs = zip(improvement.runs, COLORS, strict=True)
         legend = [handle("map, wanted speed", INK)]
@@ -417,10 +528,13 @@ def plot_compensation(
     return figure
 
 
-def _draw_map(whole: Axes, close: Axes, inverse: InverseMap) -> None:
+def _draw_map(inverse: InverseMap, whole: Axes, close: Axes | None = None) -> None:
     unit, (low, high) = display_unit("rad/s"), inverse.limits
     narrow = max(CLOSE_UP * min(-low, high), 2.0 * max(map(abs, inverse.gap)))
-    for ax, ends in ((whole, (low, high)), (close, (max(low, -narrow), min(high, narrow)))):
+    panels = [(whole, (low, high))]
+    if close is not None:
+        panels.append((close, (max(low, -narrow), min(high, narrow))))
+    for ax, ends in panels:
         speed = np.union1d(np.linspace(*ends, POINTS), np.clip(inverse.gap, *ends))
         straight, across = proportional_command(inverse, speed), unit.factor * speed
         ax.plot(across, straight, color=GREY, linestyle="dashed", linewidth=1.0)
@@ -430,6 +544,15 @@ def _draw_map(whole: Axes, close: Axes, inverse: InverseMap) -> None:
     volts = [float(inverse.voltage(end)) for end in (low, high)]
     whole.set_ylim(1.25 * volts[0], 1.25 * volts[1])  # room for the words there
     whole.set_ylabel("voltage (V)", fontsize=NORMAL, color=INK)
+    for end, height, side, shift in zip(
+        (low, high), volts, ("left", "right"), (-10.0, 10.0), strict=True
+    ):
+        place = (unit.factor * end, height)
+        whole.plot(*([each] for each in place), "o", color=INK, markersize=4.5)
+        words = f"{place[0]:.4g} {unit.name}, {height:.3g} V".replace("-", "−")
+        write(whole, words, place, (0.0, shift), coords="data", ha=side, va="center")
+    if close is None:
+        return
     below, above = (unit.factor * each for each in inverse.gap)
     close.axvspan(below, above, color="#ededed", linewidth=0.0, zorder=0.5)
     write(
@@ -442,13 +565,6 @@ def _draw_map(whole: Axes, close: Axes, inverse: InverseMap) -> None:
         ha="center",
     )
     write(close, "close-up around standstill", (0.0, 1.0), (4.0, -10.0), color=GREY)
-    for end, height, side, shift in zip(
-        (low, high), volts, ("left", "right"), (-10.0, 10.0), strict=True
-    ):
-        place = (unit.factor * end, height)
-        whole.plot(*([each] for each in place), "o", color=INK, markersize=4.5)
-        words = f"{place[0]:.4g} {unit.name}, {height:.3g} V".replace("-", "−")
-        write(whole, words, place, (0.0, shift), coords="data", ha=side, va="center")
 
 
 def _draw_improvement(speed: Axes, error: Axes, improvement: Improvement) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import Any, overload
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -16,6 +16,7 @@ from swashplate.crane.judgment import mean_of
 from swashplate.errors import InputError
 from swashplate.report import style
 from swashplate.report.lines import SHADES, draw, fit_time, shade_handle, stretches
+from swashplate.results import GivenAxes
 from swashplate.simulation.result import Limit
 from swashplate.tables import count
 
@@ -249,34 +250,69 @@ def _polar(result: Sweep, title: str, looks: dict[str, style.Stroke], *said: str
     return figure
 
 
-def plot_follow(result: Followable, *, title: str = "") -> Figure:
-    """Figure of the amplitude that each axis can follow over the period, with seas as points."""
+@overload
+def plot_follow(result: Followable, *, ax: None = None, title: str = "") -> Figure: ...
+
+
+@overload
+def plot_follow(result: Followable, *, ax: GivenAxes, title: str = "") -> GivenAxes: ...
+
+
+def plot_follow(
+    result: Followable, *, ax: Axes | Sequence[Axes] | None = None, title: str = ""
+) -> Figure | Axes | Sequence[Axes]:
+    """Figure of the amplitude that each axis can follow over the period, with seas as points.
+
+    By default a new figure; with `ax` it is drawn there, without the remark above, and `ax`
+    returned.
+    """
     looks = style.strokes(("hoist, up", "slew, across the boom", "luff, along the boom"))
     said = f"boom at {result.boom_deg:.0f}°; points: what holding the tip asks of the luff"
     words = title or "What the axes can follow"
     labels = ("amplitude (m)",), "period (s)"
-    figure, (ax,) = _panels([3.3], *labels, words, looks, said, assumed(result.crane))
+    if ax is None:
+        figure, (panel,) = _panels([3.3], *labels, words, looks, said, assumed(result.crane))
+    else:
+        legend = [style.handle(name, *look) for name, look in looks.items()]
+        (panel,) = style.dress_given(ax, title, *labels, what="panel", legend=legend)
     for (color, dashes), values in zip(looks.values(), result.amplitude.T, strict=True):
-        ax.plot(result.periods, values, color=color, linestyle=dashes, linewidth=1.4)
+        panel.plot(result.periods, values, color=color, linestyle=dashes, linewidth=1.4)
     box = {"facecolor": "white", "edgecolor": "none", "pad": 0.6}
     for name, each in result.seas.items():
         place = each.period, each.amplitude[2]
-        ax.plot(*place, "D", color=style.INK, ms=4.5)
-        style.write(ax, name, place, (6.0, -3.0), coords="data", bbox=box)
+        panel.plot(*place, "D", color=style.INK, ms=4.5)
+        style.write(panel, name, place, (6.0, -3.0), coords="data", bbox=box)
     every = [*result.amplitude.ravel(), *(each.amplitude[2] for each in result.seas.values())]
-    _logarithmic(ax, 0.8 * min(every), 1.25 * max(every))
-    ax.set_xlim(result.periods[0], result.periods[-1])
-    return figure
+    _logarithmic(panel, 0.8 * min(every), 1.25 * max(every))
+    panel.set_xlim(result.periods[0], result.periods[-1])
+    return figure if ax is None else ax
 
 
-def plot_judgment(result: Judgment, *, title: str = "") -> Figure:
-    """Figure of a judgment: swing of every variant in every seaway, and what limits its drives."""
+@overload
+def plot_judgment(result: Judgment, *, ax: None = None, title: str = "") -> Figure: ...
+
+
+@overload
+def plot_judgment(result: Judgment, *, ax: GivenAxes, title: str = "") -> GivenAxes: ...
+
+
+def plot_judgment(
+    result: Judgment, *, ax: Axes | Sequence[Axes] | None = None, title: str = ""
+) -> Figure | Axes | Sequence[Axes]:
+    """Figure of a judgment: swing of every variant in every seaway, its mean and interval.
+
+    By default a new figure; with `ax` it is drawn there, without the remark above, and `ax`
+    returned.
+    """
     names, study = list(reversed(result.names)), result.study
     words = title or f"Swing in {count(len(study.seeds), 'seaway')}"
     below = "swing, RMS of a seaway (deg)"
-    figure, (ax,) = style.sheet([0.42 * len(names) + 0.3], words, below=below, lines=1)
-    said = "bars: mean with its 95 % interval"
-    remark(ax, seaway_words(study.sea), said, assumed(study.crane), right=True)
+    if ax is None:
+        figure, (panel,) = style.sheet([0.42 * len(names) + 0.3], words, below=below, lines=1)
+        said = "bars: mean with its 95 % interval"
+        remark(panel, seaway_words(study.sea), said, assumed(study.crane), right=True)
+    else:
+        (panel,) = style.dress_given(ax, title, [""], below, what="panel")
     random = np.random.default_rng(0)
     labels, edge = [], 0.0
     for row, name in enumerate(names):
@@ -286,15 +322,15 @@ def plot_judgment(result: Judgment, *, title: str = "") -> Figure:
         share = result.worse(name).value if name in result.names[1:] else 0.0
         color = style.VERMILION if share > result.allowed else style.BLUE
         spread = row + random.uniform(-0.25, 0.25, known.size)
-        ax.plot(known, spread, "o", color=color, ms=3.2, alpha=0.45, mew=0.0)
+        panel.plot(known, spread, "o", color=color, ms=3.2, alpha=0.45, mew=0.0)
         mean = mean_of(known, 0.0)
-        ax.hlines(row, mean.low, mean.high, color=style.INK, linewidth=3.0)
-        ax.vlines(mean.value, row - 0.3, row + 0.3, color=style.INK, linewidth=1.6)
+        panel.hlines(row, mean.low, mean.high, color=style.INK, linewidth=3.0)
+        panel.vlines(mean.value, row - 0.3, row + 0.3, color=style.INK, linewidth=1.6)
         of = f"{round(share * values.size)} of {values.size}"
         worse = f"\nworse than none: {of}" if name in result.names[1:] else ""
         labels.append(name + worse)
-    ax.grid(False, axis="y")
-    ax.set_yticks(range(len(names)), labels, fontsize=style.NORMAL)
-    ax.set_ylim(-0.6, len(names) - 0.4)
-    ax.set_xlim(0.0, 1.05 * edge)
-    return figure
+    panel.grid(False, axis="y")
+    panel.set_yticks(range(len(names)), labels, fontsize=style.NORMAL)
+    panel.set_ylim(-0.6, len(names) - 0.4)
+    panel.set_xlim(0.0, 1.05 * edge)
+    return figure if ax is None else ax

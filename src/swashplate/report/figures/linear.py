@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Sequence
+from typing import Any, overload
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -11,17 +12,19 @@ from matplotlib.ticker import FuncFormatter, LogLocator, MultipleLocator, NullFo
 from numpy.typing import NDArray
 
 from swashplate.errors import InputError
+from swashplate.full_order import SIGNAL_UNITS
 from swashplate.linear import FrequencyResponse, LinearDrive
-from swashplate.report.figures.simulation import SIGNAL_UNITS
 from swashplate.report.style import (
     FAINT,
     GREY,
     LINE,
+    dress_given,
     handle,
     sheet,
     strokes,
     write,
 )
+from swashplate.results import GivenAxes
 from swashplate.simulation.result import UNITS
 from swashplate.units import display_unit
 
@@ -36,13 +39,36 @@ MOST_STEPS = 7
 WORDS = {"shaft_speed": "speed"}
 
 
+@overload
 def plot_bode(
     response: FrequencyResponse,
     *,
     linear: LinearDrive | None = None,
     mark: float | None = 0.3,
+    ax: None = None,
     title: str | None = None,
-) -> Figure:
+) -> Figure: ...
+
+
+@overload
+def plot_bode(
+    response: FrequencyResponse,
+    *,
+    linear: LinearDrive | None = None,
+    mark: float | None = 0.3,
+    ax: GivenAxes,
+    title: str | None = None,
+) -> GivenAxes: ...
+
+
+def plot_bode(
+    response: FrequencyResponse,
+    *,
+    linear: LinearDrive | None = None,
+    mark: float | None = 0.3,
+    ax: Axes | Sequence[Axes] | None = None,
+    title: str | None = None,
+) -> Figure | Axes | Sequence[Axes]:
     """Figure of gain, phase and distortion over the frequency, a line for each amplitude.
 
     Lines end where nothing moves any more, which is said at the foot of the gain.
@@ -55,11 +81,20 @@ def plot_bode(
         Its first output is drawn dashed, for comparison.
     mark : float, optional
         A frequency to mark. [Hz]
+    ax : sequence of two or three matplotlib axes, optional
+        Where to draw gain and phase, and in the third the distortion, which share their frequency;
+        by default in a new figure. A single one is refused: a gain without its phase is no Bode
+        plot.
+
+    Returns
+    -------
+    Figure, or `ax` as it was given
 
     Raises
     ------
     InputError
-        If the linear model has another input or first output than the sweep.
+        If the linear model has another input or first output than the sweep, or for another number
+        of axes.
     """
     ends = (response.input, response.output)
     if linear is not None and (linear.input, linear.outputs[0]) != ends:
@@ -78,44 +113,48 @@ def plot_bode(
     words = f"{response.name}: {response.input} to {output}, sines about {response.bias:g} {unit}"
     shown = display_unit(SIGNAL_UNITS[response.output], float(response.gain.max()))
     by = f"({shown.name})" if "/" in shown.name else shown.name or "1"
-    labels = f"gain ({by}/{unit})", "phase (deg)", "distortion (%)"
-    words = words if title is None else title
-    figure, axes = sheet([2.3, 2.3, 1.3], words, labels, "frequency (Hz)", legend=legend)
+    labels = [f"gain ({by}/{unit})", "phase (deg)", "distortion (%)"]
+    if ax is None:
+        words = words if title is None else title
+        figure, axes = sheet([2.3, 2.3, 1.3], words, labels, "frequency (Hz)", legend=legend)
+    else:
+        count = min(max(np.size(np.asarray(ax, dtype=object)), 2), 3)
+        axes = dress_given(ax, title, labels[:count], "frequency (Hz)", legend=legend)
     swept = shown.factor * response.gain, np.degrees(response.phase), 100.0 * response.distortion
     marker = "o" if response.frequencies.size == 1 else None
-    for ax, rows in zip(axes, swept, strict=True):
+    for panel, rows in zip(axes, swept, strict=False):
         for row, moves, look in zip(rows, response.moves, looks.values(), strict=True):
             how: dict[str, Any] = {"color": look.color, "ls": look.dashes, "lw": LINE}
             shown_row = np.where(moves, row, np.nan)
-            ax.plot(response.frequencies, shown_row, marker=marker, ms=4.0, **how)
+            panel.plot(response.frequencies, shown_row, marker=marker, ms=4.0, **how)
     if linear is not None:
         highest = np.inf if linear.sample_time is None else 0.5 / linear.sample_time
         low, high = response.frequencies[0], response.frequencies[-1]
         fine = np.geomspace(low, min(high, highest), 400)
         ratio = linear.response(fine)[0]
         small = (shown.factor * np.abs(ratio), np.degrees(np.unwrap(np.angle(ratio))))
-        for ax, row in zip(axes, small, strict=False):
-            ax.plot(fine, row, color=GREY, linestyle="dashed", linewidth=LINE, zorder=1.8)
+        for panel, row in zip(axes, small, strict=False):
+            panel.plot(fine, row, color=GREY, linestyle="dashed", linewidth=LINE, zorder=1.8)
     _scale(axes, response)
     # the lines are at the top there
     write(axes[0], "\n".join(response.still()), (0.0, 0.0), (4.0, 4.0), color=GREY, va="bottom")
     if mark is not None and response.frequencies[0] <= mark <= response.frequencies[-1]:
-        for ax in axes:
-            ax.axvline(mark, color=FAINT, linewidth=1.0, zorder=1.3)
+        for panel in axes:
+            panel.axvline(mark, color=FAINT, linewidth=1.0, zorder=1.3)
         place: dict[str, Any] = {"coords": ("data", "axes fraction"), "va": "bottom"}
         write(axes[0], f"{mark:g} Hz", (mark, 0.0), (3.0, 3.0), color=GREY, **place)
-    return figure
+    return figure if ax is None else ax
 
 
 def _scale(axes: list[Axes], response: FrequencyResponse) -> None:
-    gain, phase, distortion = axes
-    for ax in axes:
-        ax.set_xscale("log")
-    gain.set_yscale("log")
+    gain, phase = axes[:2]
     ends = response.frequencies[0], response.frequencies[-1]
-    if ends[0] < ends[1]:
-        gain.set_xlim(*ends)
-    _number(gain, "x", ends[1] / ends[0])
+    for ax in axes:  # which need not share their abscissa
+        ax.set_xscale("log")
+        if ends[0] < ends[1]:
+            ax.set_xlim(*ends)
+        _number(ax, "x", ends[1] / ends[0])
+    gain.set_yscale("log")
     low, high = gain.get_ylim()
     low = max(low, high / DEEPEST)
     gain.set_ylim(low, high)
@@ -123,7 +162,8 @@ def _scale(axes: list[Axes], response: FrequencyResponse) -> None:
     low, high = phase.get_ylim()
     step = next((each for each in STEPS if (high - low) / each <= MOST_STEPS), STEPS[-1])
     phase.yaxis.set_major_locator(MultipleLocator(step))
-    distortion.set_ylim(0.0, max(1.05 * 100.0 * float(response.distortion.max()), 1e-3))
+    for distortion in axes[2:]:
+        distortion.set_ylim(0.0, max(1.05 * 100.0 * float(response.distortion.max()), 1e-3))
 
 
 def _number(ax: Axes, which: str, span: float) -> None:

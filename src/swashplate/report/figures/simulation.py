@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from math import inf
-from typing import NamedTuple
+from typing import NamedTuple, overload
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -13,8 +13,10 @@ from numpy.typing import NDArray
 
 from swashplate.equations import Run
 from swashplate.errors import InputError
-from swashplate.full_order import Comparison
+from swashplate.full_order import SIGNAL_UNITS, Comparison
+from swashplate.maneuvers import Maneuver
 from swashplate.report.lines import (
+    COLUMNS,
     SHADES,
     Array,
     draw,
@@ -33,30 +35,24 @@ from swashplate.report.style import (
     THIN,
     VERMILION,
     MarginLabel,
+    dress_given,
+    given_axes,
     handle,
     label_margin,
     new_figure,
+    root_figure,
     sheet,
     signed,
     strokes,
     write,
     zero_line,
 )
-from swashplate.simulation.result import UNITS, Limit, Simulation
-from swashplate.units import PLATE_RATE, SHAFT_ANGLE, display_unit
+from swashplate.results import GivenAxes
+from swashplate.simulation.result import Limit, Simulation
+from swashplate.units import display_unit
 
 Flags = NDArray[np.int8]
 Stops = tuple[float, float]
-SIGNAL_UNITS = {
-    **UNITS,
-    "shaft_position": SHAFT_ANGLE,
-    "time": "s",
-    "spool_velocity": "m/s",
-    "swash_rate": PLATE_RATE,
-    "valve_flow": "m^3/s",
-    "pump_flow": "m^3/s",
-}
-"""Unit of each signal of a run, as of `display_unit`."""
 
 WIDE, NARROW = 1.9, 0.9
 """Widths of two lines that lie on one another for long. [pt]"""
@@ -148,25 +144,42 @@ def plot_simulation(
     return _chain(panels, run.time, run.name if title is None else title, rows)
 
 
+@overload
+def plot_signals(
+    run: Run, signals: Sequence[str], *, ax: None = None, label: str = ""
+) -> Figure: ...
+
+
+@overload
+def plot_signals(
+    run: Run, signals: Sequence[str], *, ax: GivenAxes, label: str = ""
+) -> GivenAxes: ...
+
+
 def plot_signals(
     run: Run,
     signals: Sequence[str],
     *,
     ax: Axes | Sequence[Axes] | None = None,
     label: str = "",
-) -> Figure:
-    """Figure of some signals of a run over time, one below the other, or in axes of one's own.
+) -> Figure | Axes | Sequence[Axes]:
+    """Figure of some signals of a run over time, one below the other, or in given axes.
 
     Parameters
     ----------
-    run : Simulation or FullOrderSimulation
-        What to show.
+    run : Run
+        What to show: of a drive, a full-order drive or a model of one's own, whose signals have no
+        known unit.
     signals : sequence of str
         Names, as of ``run[name]``.
     ax : matplotlib axes or sequence of them, optional
         One for each signal; by default a new figure's.
     label : str
         Of the curves, for a legend.
+
+    Returns
+    -------
+    Figure, or `ax` as it was given
 
     Raises
     ------
@@ -178,19 +191,16 @@ def plot_signals(
         figure = new_figure(7.2, 0.7 + 1.6 * len(signals))
         axes = list(figure.subplots(len(signals), 1, sharex=True, squeeze=False)[:, 0])
     else:
-        axes = [ax] if isinstance(ax, Axes) else list(ax)
-    if len(axes) != len(signals):
-        raise InputError(
-            f"There are {len(axes)} axes for {len(signals)} signals: give one for each."
-        )
+        axes = given_axes(ax, len(signals), "signals")
     for place, name, value in zip(axes, signals, values, strict=True):
-        unit = display_unit(SIGNAL_UNITS[name], float(np.abs(value).max()) or inf)
-        place.plot(run.time, unit.factor * value, label=label or None)
-        place.set_ylabel(unit.label(name.replace("_", " ")))
+        words, factor = name.replace("_", " "), 1.0
+        if name in SIGNAL_UNITS:
+            unit = display_unit(SIGNAL_UNITS[name], float(np.abs(value).max()) or inf)
+            words, factor = unit.label(words), unit.factor
+        place.plot(run.time, factor * value, label=label or None)
+        place.set_ylabel(words)
     axes[-1].set_xlabel("time (s)")
-    whole = axes[0].get_figure(root=True)
-    assert isinstance(whole, Figure)
-    return whole
+    return root_figure(axes[0]) if ax is None else ax
 
 
 def plot_full_order(found: Comparison, *, title: str | None = None) -> Figure:
@@ -292,6 +302,54 @@ def _fill(ax: Axes, panel: Panel, time: Array, rows: slice) -> None:
         if trace.name:
             labels.append(MarginLabel(float(values[-1]), trace.name, trace.color))
     label_margin(ax, labels, panel.height)
+
+
+# --- a command ------------------------------------------------------------------------------------
+
+JUST_BEFORE = 1e-6
+"""Part of a maneuver's length before a jump at which the voltage before it is drawn."""
+
+
+@overload
+def plot_maneuver(maneuver: Maneuver, *, ax: None = None, title: str | None = None) -> Figure: ...
+
+
+@overload
+def plot_maneuver(maneuver: Maneuver, *, ax: GivenAxes, title: str | None = None) -> GivenAxes: ...
+
+
+def plot_maneuver(
+    maneuver: Maneuver,
+    *,
+    ax: Axes | Sequence[Axes] | None = None,
+    title: str | None = None,
+) -> Figure | Axes | Sequence[Axes]:
+    """Figure of the voltage of a maneuver over time.
+
+    Parameters
+    ----------
+    maneuver : Maneuver
+        What to show.
+    ax : matplotlib axes, optional
+        Where to draw; by default in a new figure.
+
+    Returns
+    -------
+    Figure, or `ax` as it was given
+    """
+    starts = np.array([start for start, _ in maneuver.pieces])
+    before = starts[starts > 0.0] - JUST_BEFORE * maneuver.length
+    even = np.linspace(0.0, maneuver.length, COLUMNS)
+    time = np.union1d(even, np.concatenate([starts, before]))
+    if ax is None:
+        words = maneuver.name if title is None else title
+        figure, (panel,) = sheet([2.4], words, ["voltage (V)"], "time (s)")
+    else:
+        (panel,) = dress_given(ax, title, ["voltage (V)"], "time (s)", what="panel")
+    zero_line(panel)
+    draw(panel, time, maneuver(time), INK)
+    fit_time(panel, time)
+    return figure if ax is None else ax
 
 
 # --- several simulations of one command -----------------------------------------------------------

@@ -11,8 +11,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 from markupsafe import Markup
 
-from swashplate.crane import CraneRun, Judgment
+from swashplate.crane import Crane, CraneRun, Judgment
+from swashplate.crane.drives import UNUSABLE
 from swashplate.crane.stepper import RATE
+from swashplate.crane.stick import AXES
 from swashplate.crane.study import NONE
 from swashplate.errors import DomainError, InputError
 from swashplate.report.fit_report.html_page import (
@@ -80,6 +82,7 @@ def write_scene(runs: CraneRun | Mapping[str, CraneRun], path: str | Path) -> No
         title=first.crane.title,
         names=list(named),
         assumed=first.crane.assumed,
+        provenance=first.crane.provenance(),
         data=script_json(content),
     )
     write_text(made, path)
@@ -120,7 +123,8 @@ def write_judgment(judgment: Judgment, path: str | Path) -> None:
     crane, setup = study.crane, study.cases[NONE].setup
     pose = {name: setup[name] for name in ("slew_deg", "boom_deg", "rope_m")}
     swings, worse, differences, limits, *remedies = judgment.tables()
-    verdict, *rests = judgment.sentences()
+    provenance = study.provenance()
+    _, *rests = (words for words in judgment.sentences() if words not in provenance)
     # a scene alone needs no figures
     from swashplate.report.figures.crane import (
         plot_crane,
@@ -133,9 +137,9 @@ def write_judgment(judgment: Judgment, path: str | Path) -> None:
     outcome = judgment.outcome
     looks: dict[str, Light] = {"works": "good", "not decided": "look", "fails": "bad"}
     look = looks[outcome]
-    headline = f"{outcome.capitalize()}: {verdict}"
     summary = [
-        Block("verdict", (light(look, outcome), headline), look),
+        Block("verdict", (light(look, outcome), judgment.headline()), look),
+        *_fit_verdicts(crane),
         _drawn(plot_judgment(judgment), "Swing of each variant in each seaway"),
         *(block for each in remedies for block in titled(each)),
     ]
@@ -161,7 +165,10 @@ def write_judgment(judgment: Judgment, path: str | Path) -> None:
         if name != NONE:
             drives = count(len(case.cranes), "crane") if case.driven else "ideal drives"
             basis.append(f"{name}: {case.setup['control']!r}, {drives}.")
-    basis += [f"{axis}: {getattr(crane, axis).parameters.title}." for axis in ("slew", "luff")]
+    for axis in AXES:
+        title = getattr(crane, axis).parameters.title.partition(f". {UNUSABLE}")[0]
+        basis.append(f"{axis}: {title.rstrip('.')}.")
+    basis += provenance
     blocks = [block for each in (swings, worse, differences) for block in titled(each)]
     geometry = Block("details", [Block("table", crane.table())], "Geometry, with its sources")
     sections = [
@@ -179,6 +186,16 @@ def write_judgment(judgment: Judgment, path: str | Path) -> None:
         f"{count(len(judgment.names) - 1, 'variant')} beside no control",
     )
     write_text(made, path)
+
+
+def _fit_verdicts(crane: Crane) -> list[Block]:
+    """The verdict on the fit of each drive that comes from one, or that none is known."""
+    looks: dict[str | None, Light] = {"Usable": "good", UNUSABLE: "bad"}
+    terms = [
+        (f"{axis.capitalize()}'s drive", looks.get(source.grade, "look"), [source.words()])
+        for axis, source in crane.sources.items()
+    ]
+    return [Block("terms", terms, "verdict")] if terms else []
 
 
 def _drawn(figure: Figure, caption: str) -> Block:

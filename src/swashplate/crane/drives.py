@@ -1,0 +1,172 @@
+"""Drives of a crane: what they are given as, where they come from, verdicts on their fits."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final, NamedTuple, Protocol
+
+from swashplate.crane.stick import AXES
+from swashplate.documents import parse_toml, read_text
+from swashplate.drive import Drive
+from swashplate.errors import ParameterError, SwashplateError
+from swashplate.parameters.files import preset_names
+
+if TYPE_CHECKING:
+    from swashplate.identification.assessment import StoredVerdict
+    from swashplate.identification.criteria import Grade
+
+DRIVE_FILE, FIT_FILE = "drive.toml", "fit.json"
+"""What a fit writes into its folder: the drive, and the fit itself with its verdict."""
+UNUSABLE: Final = "Not usable"
+"""Grade of a fit that nothing should rest on; the title of such a drive says it, too."""
+
+
+class Fitted(Protocol):
+    """What a fit returns, as far as a crane takes it; of one with a `verdict`, that too."""
+
+    @property
+    def drive(self) -> Drive:
+        """The drive that was fitted."""
+        ...
+
+
+DriveLike = Drive | Fitted | str | Path
+
+
+class DriveSource(NamedTuple):
+    """Where the drive of an axis comes from, and the verdict on its fit."""
+
+    place: str
+    """Its file, or how it was given."""
+    fit: Path | None
+    """Folder of the fit that found it; None if there is none, or it was changed since."""
+    grade: Grade | None
+    """Grade of that fit's verdict; None if no verdict is known."""
+    verdict: str
+    """Headline of the verdict, or the clause why none is known."""
+
+    @property
+    def usable(self) -> bool:
+        """Whether no verdict says that it is not."""
+        return self.grade != UNUSABLE
+
+    def words(self) -> str:
+        """Where the drive comes from, and what the verdict was, as the end of a sentence."""
+        if self.grade is None:
+            return f"{self.place}; no verdict on it is known, as {self.verdict}."
+        return f"{self.place}; the verdict on its fit is: {self.verdict}"
+
+    def sentence(self, axis: str) -> str:
+        """The same of the drive of an axis."""
+        return f"The {axis}'s drive is {self.words()}"
+
+
+def drives_of(
+    given: Mapping[Any, DriveLike], folder: Path
+) -> tuple[dict[str, Any], dict[str, DriveSource]]:
+    """Drives by axis, and the sources of those that come from a file or a fit.
+
+    Parameters
+    ----------
+    given : mapping of str to drive, fit, str or path
+        As `Crane.with_drive` takes them.
+    folder : path
+        Where files and folders of fits are looked for; packaged names go first.
+
+    Raises
+    ------
+    ParameterError, FileError
+        For a file that is not there or not a drive's, and a drive of another axis.
+    """
+    drives, sources = {}, {}
+    for axis, drive_like in given.items():
+        drive, path = _drive(drive_like, folder, axis)
+        # a packaged drive or a Drive is put onto another axis knowingly, a fit or file hardly
+        chosen = isinstance(drive_like, Drive) or str(drive_like) in preset_names()
+        if not chosen and drive.name in AXES and drive.name != axis:
+            raise ParameterError(
+                f"{axis}: {path or 'the fit'} has a drive of the {drive.name}. If it moves the "
+                f"{axis} as well, give it another name."
+            )
+        drives[axis] = drive
+        source = _source(drive_like, drive, path)
+        if source is not None:
+            sources[axis] = source
+    return drives, sources
+
+
+def _drive(given: DriveLike, folder: Path, axis: str) -> tuple[Drive, Path | None]:
+    """The drive of an axis as it is given, and its file, if it has one."""
+    if not isinstance(given, str | Path):
+        drive = getattr(given, "drive", given)
+        if isinstance(drive, Drive):
+            return drive, None
+    elif str(given) in preset_names():
+        return Drive.preset(str(given)), None
+    elif (path := folder / given).is_dir() or path.suffix == ".toml":
+        path = path / DRIVE_FILE if path.is_dir() else path
+        if path.is_file() and "runs" in parse_toml(read_text(path), str(path)):
+            raise ParameterError(
+                f"{axis}: {path} is a campaign: fit it first, and give the folder of the fit."
+            )
+        return Drive.from_toml(path), path
+    raise ParameterError(
+        f"{axis}: a crane's drive is a packaged one, {', '.join(preset_names())}, a .toml file, or "
+        f"the result or folder of a fit, but there is no such '{given}'."
+    )
+
+
+# --- verdicts -------------------------------------------------------------------------------------
+
+
+def _source(given: DriveLike, drive: Drive, path: Path | None) -> DriveSource | None:
+    """Where a drive comes from; None for a packaged one, and a `Drive` that says nothing of it."""
+    if path is not None:
+        return _source_of_file(path, drive)
+    if isinstance(given, str | Path):
+        return None
+    stated = _stated_in_title(drive)
+    if isinstance(given, Drive):
+        return DriveSource(f"'{drive.name}'", None, UNUSABLE, stated) if stated else None
+    verdict = getattr(given, "verdict", None)
+    if verdict is None:
+        return DriveSource("that of a fit", None, None, "the fit was not judged")
+    return DriveSource("that of a fit", None, verdict.grade, verdict.headline)
+
+
+def _source_of_file(path: Path, drive: Drive) -> DriveSource:
+    """The source of a drive's file, with the verdict of the fit beside it."""
+    stored = path.with_name(FIT_FILE)
+    fit, why = None, "there is no fit beside it"
+    if path.name == DRIVE_FILE and stored.is_file():
+        fit = path.parent
+        verdict, why = _stored_verdict(stored, drive)
+        if verdict is not None:
+            return DriveSource(str(path), fit, verdict.grade, verdict.headline)
+    stated = _stated_in_title(drive)
+    if stated:
+        return DriveSource(str(path), fit, UNUSABLE, stated)
+    return DriveSource(str(path), fit, None, why)
+
+
+def _stored_verdict(path: Path, drive: Drive) -> tuple[StoredVerdict | None, str]:
+    """The verdict of a stored fit on a drive; None and the clause why if it is not known."""
+    # only what comes from a fit needs the identification
+    from swashplate.identification.assessment import read_verdict
+
+    try:
+        verdict = read_verdict(path)
+    except SwashplateError as error:
+        return None, f"the fit beside it cannot be read ({str(error).rstrip('.')})"
+    if verdict is None:
+        return None, f"{path} has none: fit again"
+    if verdict.numbers != dict(drive.parameters.numbers):
+        return None, f"it is not the drive that {path} was written with"
+    return verdict, ""
+
+
+def _stated_in_title(drive: Drive) -> str:
+    """The verdict that the title of a drive which is not usable has, else an empty text."""
+    _, stated, reason = drive.parameters.title.partition(UNUSABLE)
+    return f"{stated}{reason.rstrip('.')}." if stated else ""

@@ -1,0 +1,203 @@
+"""Quantities of a crane: their units and plausible ranges, status and source of each value."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from math import degrees, isclose, isfinite
+from typing import Any, Literal, NamedTuple
+
+from pydantic import BaseModel, ConfigDict, FiniteFloat, model_validator
+
+from swashplate.errors import ParameterError
+from swashplate.tables import listed
+from swashplate.units import to_si
+
+
+class Quantity(BaseModel):
+    """A length, angle or number of a crane, with where it comes from."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
+
+    value: FiniteFloat | list[FiniteFloat]
+    unit: str
+    status: Literal["published", "measured", "assumed", "user"] = "user"
+    source: str = ""
+
+    @model_validator(mode="after")
+    def _published_somewhere(self) -> Quantity:
+        if self.status == "published" and not self.source.strip():
+            raise ValueError("a published value needs its source, or another status")
+        return self
+
+    @property
+    def values(self) -> list[float]:
+        """Its numbers, in its own unit."""
+        return self.value if isinstance(self.value, list) else [self.value]
+
+
+class Definition(NamedTuple):
+    """What a quantity may be: SI unit, how many numbers it has, and their plausible range."""
+
+    unit: str
+    size: int
+    low: float
+    high: float
+    """In SI, as `low`; an angle's are in degrees."""
+
+
+GEOMETRY: Mapping[str, Definition] = {
+    # from a knuckle boom on a small lorry to the longest booms of crawler cranes, about 200 m
+    "boom_length": Definition("m", 1, 1.0, 300.0),
+    # boom foot from the slew axis: 10 to 20 m on cranes of 5000 t
+    "foot_offset": Definition("m", 1, 0.0, 50.0),
+    # forward, port and up from the ship's origin, which may stand at its stern: ships reach 400 m
+    "slew_axis": Definition("m", 3, -450.0, 450.0),
+    # a mast beside the boom's foot; A-frames of heavy-lift cranes are about 60 m high
+    "tower_sheave_distance": Definition("m", 1, 0.1, 150.0),
+    "tower_sheave_angle": Definition("rad", 1, 0.0, 180.0),
+    # a hand winch's drum has 30 mm, those of deep-water winches 1 to 3 m
+    "hoist_drum_radius": Definition("m", 1, 0.01, 5.0),
+    # hooks of 5000 t hang on about 50 to 100 parts of rope
+    "hoist_falls": Definition("1", 1, 1.0, 250.0),
+    "luff_drum_radius": Definition("m", 1, 0.01, 5.0),
+    "luff_falls": Definition("1", 1, 1.0, 250.0),
+    # parts of rope from tower to tip over the falls: 1 with one of each
+    "rope_coupling": Definition("1", 1, 0.0, 4.0),
+    # the heaviest cranes at sea lift 10 000 t with one hook, gantries on land 20 000 t
+    "safe_load": Definition("kg", 1, 1.0, 3e7),
+    "boom_limits": Definition("rad", 2, 0.0, 90.0),
+    # cranes that lower to the sea bed have 3000 to 4000 m
+    "rope_limits": Definition("m", 2, 0.05, 6000.0),
+}
+"""Quantities of a crane by name, with ranges that every crane lies well within."""
+ROUNDING = 1e-9
+"""By which a number may lie beyond its range."""
+SAME = 1e-9
+"""Relative difference up to which two values are the same one."""
+
+
+def quantity_of(name: str, value: Any) -> Quantity:
+    """A value in SI as a quantity whose source is the user.
+
+    Parameters
+    ----------
+    value : float or sequence of float
+        As many as `GEOMETRY` has of this name.
+
+    Raises
+    ------
+    ParameterError
+        If it is not made of numbers.
+    """
+    numbers = value if isinstance(value, tuple | list) else [value]
+    try:
+        if any(isinstance(number, bool | str) for number in numbers):
+            raise TypeError
+        floats = [float(number) for number in numbers]
+    except (TypeError, ValueError, OverflowError):
+        raise ParameterError(f"{name} is {value!r:.60}, but must be {_shape(name)}.") from None
+    if not all(map(isfinite, floats)):
+        raise ParameterError(f"{name} is {value!r:.60}, but must be finite.")
+    return Quantity(value=floats if len(floats) > 1 else floats[0], unit=GEOMETRY[name].unit)
+
+
+def _shape(name: str) -> str:
+    """How many numbers a quantity has, in words."""
+    size = GEOMETRY[name].size
+    return "one number" if size == 1 else f"a list of {size} numbers"
+
+
+def _values(name: str, quantity: Quantity, origin: str) -> tuple[float, ...]:
+    """A quantity in SI, within its plausible range."""
+    definition, given = GEOMETRY[name], quantity.values
+    if len(given) != definition.size:
+        raise ParameterError(f"{origin}: {name} must be {_shape(name)}, not {len(given)}.")
+    values = [to_si(each, quantity.unit, definition.unit, f"{origin}: {name}") for each in given]
+    in_degrees = definition.unit == "rad"
+    for number, value in zip(given, values, strict=True):
+        shown = degrees(value) if in_degrees else value
+        # as an angle in degrees may come back a rounding beyond its end
+        if not definition.low - ROUNDING <= shown <= definition.high + ROUNDING:
+            unit = "deg" if in_degrees else definition.unit.replace("1", "")
+            written = f"{number:g} {quantity.unit}".removesuffix(" 1")
+            raise ParameterError(
+                f"{origin}: {name} is {written}, but on a crane it is {definition.low:g} to "
+                f"{definition.high:g} {unit}".rstrip()
+                + ": look at the number and its unit."
+            )
+    return tuple(values)
+
+
+def in_si(quantities: Mapping[str, Quantity], origin: str) -> dict[str, tuple[float, ...]]:
+    """All quantities in SI, angles in rad; `origin`, a file or a crane, names them in errors.
+
+    Raises
+    ------
+    ParameterError
+        For a quantity out of its plausible range, and limits or angles that make no crane.
+    InputError
+        For a unit that does not measure the quantity.
+    """
+    si = {name: _values(name, quantities[name], origin) for name in GEOMETRY}
+    low, high = map(degrees, si["boom_limits"])
+    if not 0.0 <= low < high < 90.0:
+        raise ParameterError(
+            f"{origin}: boom_limits are {low:g} and {high:g} deg, but must rise within 0 to 90 deg."
+        )
+    angle = degrees(si["tower_sheave_angle"][0])
+    if not high < angle < low + 180.0:
+        raise ParameterError(
+            f"{origin}: tower_sheave_angle is {angle:g} deg, but the luff rope only lifts a boom "
+            f"up to {high:g} deg from a sheave above that and below {low + 180.0:g} deg."
+        )
+    short, long = si["rope_limits"]
+    if not short < long:
+        raise ParameterError(
+            f"{origin}: rope_limits are {short:g} and {long:g} m, but the second must be larger."
+        )
+    return si
+
+
+def check_sources(
+    quantities: Mapping[str, Quantity], packaged: Mapping[str, Quantity], origin: str, name: str
+) -> None:
+    """Refuse a source that was written for another value.
+
+    Parameters
+    ----------
+    quantities : mapping of str to Quantity
+        Of a crane whose file began as a copy of a packaged one.
+    packaged : mapping of str to Quantity
+        The packaged crane's.
+    origin, name : str
+        The file, and the packaged crane, as errors name them.
+
+    Raises
+    ------
+    ParameterError
+        If values differ from the packaged ones but still have their sources; it names them all.
+    """
+    changed = [
+        quantity
+        for quantity in GEOMETRY
+        if quantities[quantity].source
+        and quantities[quantity].source == packaged[quantity].source
+        and not _same(
+            _values(quantity, quantities[quantity], origin),
+            _values(quantity, packaged[quantity], name),
+        )
+    ]
+    if changed:
+        raise ParameterError(
+            f"{origin}: {listed(changed)} {'has' if len(changed) == 1 else 'have'} another value "
+            f"than {name}, but still its source: write where the new value comes from, and the "
+            "status that fits, or delete source and status."
+        )
+
+
+def _same(values: tuple[float, ...], others: tuple[float, ...]) -> bool:
+    """Whether two quantities have the same values, in whatever units they were written."""
+    return all(
+        isclose(value, other, rel_tol=SAME, abs_tol=SAME)
+        for value, other in zip(values, others, strict=True)
+    )

@@ -1,0 +1,243 @@
+"""Progress of what takes long: in the log, and as a line to a person who waits.
+
+Work is announced with `working`. The logger ``"swashplate"`` gets its beginning and its end at
+level INFO, details at DEBUG; as a library's logger it prints nothing by itself. A notebook and an
+interactive prompt show the present state as a line, a script shows nothing. The command line shows
+it by its own means, see `shown_by`.
+"""
+
+from __future__ import annotations
+
+import logging
+import sys
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from html import escape
+from importlib import import_module
+from shutil import get_terminal_size
+from threading import RLock
+from time import perf_counter
+from typing import Any, Protocol, TypeVar
+
+T = TypeVar("T")
+
+LOGGER = logging.getLogger("swashplate")
+OFTEN = 0.1
+"""Least time between two details that are shown: a search has up to a thousand a second. [s]"""
+
+enabled = True
+"""Whether notebooks and prompts show a line; set it to False where the output is published."""
+
+
+class Display(Protocol):
+    """What shows a line of progress."""
+
+    def show(self, line: str) -> None:
+        """Show a line in the place of the one before."""
+
+    def end(self, work: Work) -> None:
+        """Show that the whole work is at its end."""
+
+
+class Work:
+    """Work under way, as `working` gives it."""
+
+    def __init__(self, words: str, detail: str = "") -> None:
+        self.words = words
+        self.detail = detail
+        self.started = perf_counter()
+
+    def at(self, detail: str) -> None:
+        """Say how far it is."""
+        self.detail = detail
+        LOGGER.debug("%s: %s", self.words, detail)
+        _refresh(OFTEN)
+
+    @property
+    def line(self) -> str:
+        """The work and how far it is."""
+        return f"{self.words}: {self.detail}" if self.detail else self.words
+
+    @property
+    def seconds(self) -> float:
+        """Time since it began. [s]"""
+        return perf_counter() - self.started
+
+
+class _State:
+    """Work under way, the outermost first, and what shows it; threads share it."""
+
+    def __init__(self) -> None:
+        self.lock = RLock()
+        self.works = list[Work]()
+        self.displays = list[Display]()
+        """Of `shown_by`, the innermost last."""
+        self.display: Display | None = None
+        """What shows the present work."""
+        self.shown = 0.0
+        """When a line was last shown. [s]"""
+
+
+_state = _State()
+
+
+@contextmanager
+def working(words: str) -> Iterator[Work]:
+    """Announce work that may take long: log its beginning and end, show it to who waits.
+
+    Parameters
+    ----------
+    words : str
+        What is done, such as ``"Fitting hoist to 10 runs"``.
+    """
+    work = begin(words)
+    try:
+        yield work
+    finally:
+        end(work)
+
+
+def counted(items: Iterable[T], total: int, what: str, words: str) -> Iterator[T]:
+    """Items as they come, each announced when it was dealt with: ``words: 3 of 40 seaways``.
+
+    Parameters
+    ----------
+    items : iterable
+        Such as what an executor's ``run`` yields.
+    total : int
+        How many there will be.
+    what, words : str
+        What an item is, in the plural, and what is done, as of `working`.
+    """
+    with working(words) as work:
+        for done, item in enumerate(items, 1):
+            yield item
+            work.at(f"{done} of {total} {what}")
+
+
+def begin(words: str, detail: str = "") -> Work:
+    """Begin work whose end is not in the same function; `end` must follow."""
+    work = Work(words, detail)
+    LOGGER.info("%s", work.line)
+    with _state.lock:
+        if not _state.works:
+            _state.display = _state.displays[-1] if _state.displays else _usual_display()
+        _state.works.append(work)
+    _refresh()
+    return work
+
+
+def end(work: Work) -> None:
+    """End work, and all that began within it and was broken off."""
+    LOGGER.info("%s: %.1f s", work.words, work.seconds)
+    with _state.lock:
+        if work not in _state.works:
+            return
+        del _state.works[_state.works.index(work) :]
+        if _state.works or _state.display is None:
+            _refresh()
+        else:
+            _state.display.end(work)
+            _state.display = None
+
+
+@contextmanager
+def shown_by(display: Display) -> Iterator[None]:
+    """Have all work within shown by a display instead of the usual one."""
+    with _state.lock:
+        _state.displays.append(display)
+    try:
+        yield
+    finally:
+        with _state.lock:
+            _state.displays.remove(display)
+
+
+def _joined(outer: str, inner: str) -> str:
+    """A work and what is done for it now, in one sentence."""
+    return f"{outer}: {inner[:1].lower()}{inner[1:]}"
+
+
+def _refresh(least: float = 0.0) -> None:
+    """Show the outermost work, and what is done for it now, unless it was just shown."""
+    with _state.lock:
+        now = perf_counter()
+        if _state.display is None or not _state.works or now - _state.shown < least:
+            return
+        _state.shown = now
+        outer, *inner = _state.works
+        _state.display.show(_joined(outer.words, inner[-1].line) if inner else outer.line)
+
+
+# --- a notebook and a prompt ----------------------------------------------------------------------
+
+
+def in_notebook() -> bool:
+    """Whether a notebook's kernel runs this code."""
+    ipython: Any = sys.modules.get("IPython")
+    return ipython is not None and hasattr(ipython.get_ipython(), "kernel")
+
+
+def _usual_display() -> Display | None:
+    """A line in a notebook or at a prompt, nothing for a script."""
+    if not enabled:
+        return None
+    if in_notebook():
+        return _notebook_line
+    at_prompt = hasattr(sys, "ps1") and sys.stderr is not None and sys.stderr.isatty()
+    return PromptLine() if at_prompt else None
+
+
+class NotebookLine:
+    """One grey line below a notebook's cell, which stays with the times that its works took."""
+
+    def __init__(self) -> None:
+        self._cell = -1
+        self._handle: Any = None
+        self._seconds = dict[str, float]()
+        """Times of the works of this cell that ended, in all, by their words. [s]"""
+
+    def show(self, line: str) -> None:
+        """Show a line in the place of the one before, behind what the cell did so far."""
+        cell = sys.modules["IPython"].get_ipython().execution_count
+        if cell != self._cell:
+            self._cell, self._handle, self._seconds = cell, None, {}
+        ended = [f"{words}: {seconds:.1f} s" for words, seconds in self._seconds.items()]
+        text = "; ".join([*ended, line] if line else ended)
+        words = {
+            "text/plain": text,
+            "text/html": f'<span style="opacity: 0.65">{escape(text)}</span>',
+        }
+        if self._handle is None:
+            display = import_module("IPython.display").display
+            self._handle = display(words, raw=True, display_id=True)
+        else:
+            self._handle.update(words, raw=True)
+
+    def end(self, work: Work) -> None:
+        """Show how long it took."""
+        self._seconds[work.words] = self._seconds.get(work.words, 0.0) + work.seconds
+        self.show("")
+
+
+_notebook_line = NotebookLine()
+
+
+class PromptLine:
+    """A line at a prompt, on standard error, which is wiped out at the end."""
+
+    def __init__(self) -> None:
+        self._length = 0
+
+    def show(self, line: str) -> None:
+        """Show a line in the place of the one before, cut to the terminal's width."""
+        width = get_terminal_size().columns - 1
+        shown = line if len(line) <= width else f"{line[: width - 1]}…"
+        sys.stderr.write(f"\r{shown:{self._length}}")
+        sys.stderr.flush()
+        self._length = len(shown)
+
+    def end(self, work: Work) -> None:
+        """Wipe out the line."""
+        sys.stderr.write(f"\r{'':{self._length}}\r")
+        sys.stderr.flush()

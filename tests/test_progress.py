@@ -1,0 +1,119 @@
+"""Progress: what is logged, what a person who waits is shown, and that scripts print nothing."""
+
+import logging
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from tests.identification.given import TWO_STAGES, virtual
+
+from swashplate import Drive, maneuvers, progress
+from swashplate.identification import Search, fit
+
+TESTS = [maneuvers.step(volts, stop=3.0, length=4.0) for volts in (4.0, -5.0)]
+
+
+class Lines:
+    """A display that keeps its lines."""
+
+    def __init__(self) -> None:
+        self.shown: list[str] = []
+        self.ended: list[str] = []
+
+    def show(self, line: str) -> None:
+        self.shown.append(line)
+
+    def end(self, work: progress.Work) -> None:
+        self.ended.append(work.words)
+
+
+def test_work_is_logged_and_shown_from_its_beginning_to_its_end(caplog) -> None:
+    lines = Lines()
+    with caplog.at_level(logging.INFO, "swashplate"), progress.shown_by(lines):
+        with progress.working("Fitting hoist"), progress.working("Stage card") as stage:
+            stage.at("evaluation 3")
+            stage.at("evaluation 4")  # too soon after the last
+        with pytest.raises(ZeroDivisionError), progress.working("Judging"):
+            raise ZeroDivisionError
+    assert lines.shown[:2] == ["Fitting hoist", "Fitting hoist: stage card"]
+    assert "Fitting hoist: stage card: evaluation 4" not in lines.shown
+    assert lines.shown[-1] == "Judging"
+    assert lines.ended == ["Fitting hoist", "Judging"]
+    said = [record.getMessage() for record in caplog.records]
+    assert said[:2] == ["Fitting hoist", "Stage card"]
+    assert [line.partition(":")[0] for line in said[2:]] == [
+        "Stage card",
+        "Fitting hoist",
+        "Judging",
+        "Judging",
+    ]
+
+
+def test_work_that_never_ended_is_not_shown_for_ever() -> None:
+    lines = Lines()
+    with progress.shown_by(lines):
+        with progress.working("Fitting hoist"):
+            progress.begin("Compiling")  # a compiler that fails does not say so
+        with progress.working("Judging"):
+            pass
+    assert lines.shown == ["Fitting hoist", "Fitting hoist: compiling", "Judging"]
+    assert len(lines.ended) == 2
+
+
+def test_items_are_counted(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(progress, "OFTEN", 0.0)
+    lines = Lines()
+    with progress.shown_by(lines):
+        assert list(progress.counted("abc", 3, "folds", "Validating")) == ["a", "b", "c"]
+    assert lines.shown[1:] == [f"Validating: {done} of 3 folds" for done in (1, 2, 3)]
+
+
+def test_a_prompt_gets_one_line_that_is_wiped_out(capsys, monkeypatch) -> None:
+    monkeypatch.setenv("COLUMNS", "20")
+    line = progress.PromptLine()
+    line.show("Fitting hoist: stage card")
+    line.show("Judging")
+    line.end(progress.Work("Judging"))
+    first, second, last = capsys.readouterr().err.split("\r")[1:4]
+    assert first == "Fitting hoist: sta…"
+    assert second == f"{'Judging':19}"
+    assert not last.strip()
+
+
+def test_a_fit_says_its_stages_evaluations_and_cost(tmp_path: Path, caplog) -> None:
+    campaign = virtual(tmp_path, "hoist", TESTS, seed=1)
+    lines = Lines()
+    with caplog.at_level(logging.INFO, "swashplate"), progress.shown_by(lines):
+        fitted = fit(Drive.preset("hoist"), campaign, TWO_STAGES, search=Search(0))
+    for stage in fitted.stages:
+        ending = f"Stage {stage.stage.name}: {stage.solution.message} after "
+        line = next(each for each in caplog.messages if each.startswith(ending))
+        assert f"{stage.solution.evaluations} evaluations, cost {stage.solution.cost:.5g}" in line
+        assert f"Fitting hoist: stage {stage.stage.name}" in lines.shown
+    assert len(lines.ended) == 1
+
+
+SCRIPT = """
+import sys
+import swashplate
+if "log" in sys.argv:
+    import logging
+    logging.basicConfig(level=logging.INFO)
+swashplate.Drive.preset("hoist").simulate(swashplate.maneuvers.parse("step:9"))
+"""
+
+
+@pytest.mark.slow  # compiles a drive in a process of its own
+def test_compiling_is_said_once_a_machine_and_only_to_who_asks(tmp_path: Path) -> None:
+    def errors(*words: str, cache: str) -> str:
+        place = os.environ | {"NUMBA_CACHE_DIR": str(tmp_path / cache)}
+        command = [sys.executable, "-c", SCRIPT, *words]
+        done = subprocess.run(command, env=place, capture_output=True, text=True, check=True)
+        assert not done.stdout
+        return done.stderr
+
+    assert errors(cache="first") == ""
+    assert "once on this machine: drive_march" in errors("log", cache="second")
+    assert "once on this machine" not in errors("log", cache="second")
