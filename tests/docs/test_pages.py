@@ -1,7 +1,7 @@
 """The pages that teach are run as they stand: what they show is what happens.
 
-A page is run from top to bottom in an empty folder; but what stands folded under the heading "Try it
-without a machine", the script that makes the logs of a reader who has none, is run first:
+A page is run from top to bottom in an empty folder; but what stands folded under the heading "Try
+it without a machine", the script that makes the logs of a reader who has none, is run first:
 
 - ``python`` blocks in one namespace; a ``text`` block right after one is what it printed; one that
   begins with ``# name.py`` is that file, too;
@@ -203,6 +203,8 @@ def test_a_page_does_what_it_shows(
             case "{toctree}":
                 for entry in re.findall(r"^[^:\n].*$", content, re.MULTILINE):
                     assert (page.parent / f"{entry}.md").exists(), entry
+            case _ if language.startswith("{include} "):
+                assert (page.parent / language.removeprefix("{include} ")).exists()
             case "{math}":
                 assert content.strip()
             case _:
