@@ -67,8 +67,9 @@ bench: $(STAMP) tools ## measure the speed against C (needs a C compiler)
 
 MINUTES ?= 3
 
-fuzz: $(STAMP) ## read damaged files for MINUTES=3: each must end in a sentence
+fuzz: $(STAMP) tools ## read damaged files, and call FMUs in any order, for MINUTES=3 each
 	@$(BIN)/python tests/fuzz/run.py --minutes $(MINUTES)
+	@$(BIN)/python -m tests.export.fuzzer --minutes $(MINUTES)
 
 cluster: $(STAMP) ## many starts on a local Dask cluster that loses a worker
 	@$(BIN)/pip install -qq -c constraints.txt -e '.[dask]'
@@ -96,7 +97,7 @@ binaries: $(STAMP) ## compile the libraries that FMUs carry, run them, write the
 	@$(BIN)/pip install -qq -c constraints.txt -e '.[binaries]'
 	@$(BIN)/python tools/build_binaries.py
 
-tools: ## make sure that there is a C compiler, for bench
+tools: ## make sure that there is a C compiler, for bench and fuzz
 	@if command -v cc >/dev/null; then :; \
 	elif [ "$$(id -u)" = 0 ] && command -v apt-get >/dev/null; then \
 	  echo "No C compiler found: installing gcc."; \

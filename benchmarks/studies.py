@@ -13,7 +13,7 @@ from swashplate import Campaign, maneuvers
 from swashplate.campaign import rig
 from swashplate.executors import Processes
 from swashplate.full_order.drive import FullOrderDrive
-from swashplate.identification.assessment import Judged
+from swashplate.identification.assessment import Identification
 from swashplate.identification.fitting import fit
 from swashplate.identification.resampling import bootstraps_of
 from swashplate.identification.setup import load_setup
@@ -37,11 +37,11 @@ def fit_study_rows() -> Iterator[Row]:
         # the first round is not counted: it compiles, or loads what was compiled
         for _ in range(ROUNDS + 1):
             begin = time.perf_counter()
-            found = Judged(campaign, fit(nominal, runs, setup))
+            found = Identification(campaign, fit(nominal, runs, setup))
             fitted.append(time.perf_counter() - begin)
             begin = time.perf_counter()
             # what a stage says is computed where it is asked for; the verdict judges held-out runs
-            stages = found.result.stages
+            stages = found.fit.stages
             for each in stages:
                 _ = each.identifiability, each.uncertainty, each.runs
             _ = found.verdict

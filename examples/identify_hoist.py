@@ -14,14 +14,13 @@ from pathlib import Path
 
 import numpy as np
 
-from swashplate import Campaign, Drive
+from swashplate import Campaign, Drive, identify
 from swashplate.campaign import rig
-from swashplate.identification.criteria import verdict
 from swashplate.identification.drive_model import true_value
 from swashplate.identification.experiment_design import outlook
-from swashplate.identification.fitting import drawn, fit, smooth
+from swashplate.identification.fitting import drawn, smooth
 from swashplate.identification.setup import load_setup
-from swashplate.identification.validation import predict, with_speeds
+from swashplate.identification.validation import with_speeds
 from swashplate.report.figures import plot_channel, save_figure
 
 parser = argparse.ArgumentParser(description="Identify a hoist.")
@@ -69,10 +68,9 @@ for stage in setup.stages:
 # that the fitted card makes.
 
 # %%
-result = fit(start, runs, setup)
-for each in result.stages:
+result = identify(campaign)
+for each in result.fit.stages:
     print(f"{each.stage.name}: {each.solution.message}")
-fitted = Drive(result.parameters)
 
 # %% [markdown]
 # ## The estimates, and the truth
@@ -80,10 +78,9 @@ fitted = Drive(result.parameters)
 
 # %%
 SHOWN = ("V_dz_plus", "G1_plus", "omega_plus", "Z8", "Z10", "Z13_plus", "Z16_plus")
-stages = result.stages
 true, inside = {}, []
 print("              truth   estimate     95 % from         to")
-for stage in stages:
+for stage in result.fit.stages:
     problem = stage.problem
     for unknown, each in zip(problem.unknowns, stage.uncertainty.estimates, strict=True):
         value = true_value(unknown, problem.model, truth.parameters)
@@ -104,22 +101,22 @@ print(f"{sum(inside)} of {len(inside)} intervals hold the truth")
 # The runs held back are predicted from their voltage alone.
 
 # %%
-predicted = predict(fitted.parameters, held_back)
 speeds = [
-    each for each in with_speeds(predicted) if each.experiment[each.channel].kind == "shaft_speed"
+    each
+    for each in with_speeds(result.predicted)
+    if each.experiment[each.channel].kind == "shaft_speed"
 ]
 for each in speeds:
     print(f"{each.experiment.run}: speed to {np.degrees(each.measures.rmse):.2f} deg/s rms")
-judged = verdict(stages, predicted, planned=[stage.name for stage in setup.stages])
-print(judged.headline)
+print(result.verdict.headline)
 
 # %% [markdown]
-# ## The set
-# A parameter file, which all commands and `Drive.from_toml` take.
+# ## The folder of the fit
+# All commands take it, and `Drive.from_toml` and `Identification.load` read it.
 
 # %%
-fitted.renamed("identified").to_toml(options.out / "drive.toml")
-for name, drive in (("identified", fitted), ("true", truth)):
+result.save(options.out)
+for name, drive in (("identified", result.drive), ("true", truth)):
     print(f"{name} limits:", *np.degrees(drive.steady_speed([-10.0, 10.0])).round(1), "deg/s")
 if options.figure:
     run = speeds[-1]

@@ -28,23 +28,20 @@ TESTS = {
 }
 CELLS = {
     "simulate": """\
-from swashplate import Campaign, Drive, maneuvers
+import swashplate
+from swashplate import Drive, maneuvers
 from swashplate.analysis import limit_shares
-from swashplate.identification import fit, judge_fit, load_setup
 
 hoist = Drive.preset("hoist")
 run = hoist.simulate(maneuvers.parse("step:9"))
 run""",
     "plot the run": "run.plot()",
     "fit": """\
-campaign = Campaign.from_toml("virtual/campaign.toml")
-fitted = fit(hoist, campaign, load_setup("setup.toml"))""",
-    "judge": """\
-judged = judge_fit(campaign, fitted)
-judged""",
-    "verdict": "judged.verdict",
-    "headline": 'print(judged.verdict.headline, end="")',
-    "plot a prediction": "judged.predicted[0].plot()",
+result = swashplate.identify("virtual/campaign.toml", hoist, "setup.toml")""",
+    "result": "result",
+    "verdict": "result.verdict",
+    "headline": 'print(result.verdict.headline, end="")',
+    "plot a prediction": "result.predicted[0].plot()",
     "limits": 'limits = limit_shares(hoist, run["voltage"])',
     "plot the limits": "limits.plot()",
     "plot into axes": """\

@@ -34,7 +34,7 @@ from swashplate.campaign import examine, guess_drive
 from swashplate.cli import app
 from swashplate.crane import Crane, Seaway, Stick, TransferFunctions, control
 from swashplate.full_order import compare
-from swashplate.identification import Fit, fit, judge_fit, outlook, predict
+from swashplate.identification import Fit, Identification, fit, outlook, predict
 from swashplate.results import LONGEST
 
 API = Path(__file__).parents[1] / "docs" / "api.toml"
@@ -53,7 +53,7 @@ class Work(NamedTuple):
 def work(tmp_path_factory: pytest.TempPathFactory) -> Work:
     campaign = virtual(tmp_path_factory.mktemp("tests"), "hoist", TESTS, seed=1)
     fitted = fit(Drive.preset("hoist"), campaign, TWO_STAGES)
-    judged = judge_fit(campaign, fitted)
+    judged = Identification(campaign, fitted)
     return Work(campaign, fitted, judged)
 
 

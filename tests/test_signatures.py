@@ -150,12 +150,12 @@ WRONG: list[tuple[Callable[..., Any], tuple[Any, ...], str]] = [
     (
         lambda each: HOIST.simulate([1.0, 1.0], supply_pressure=each),
         (0.0, -1.0, [1e6, -1.0]),
-        "The supply_pressure falls to .*, but must be 1 Pa or above",
+        "The supply_pressure falls to .*, but must be from 1 to",
     ),
     (
         lambda each: HOIST.simulate([1.0, 1.0], pump_speed=each),
         (-1.0, [1.0, -0.1]),
-        "The pump_speed falls to -.*, but must be 0 or above",
+        "The pump_speed falls to -.*, but must be from 0 to 10",
     ),
     (lambda name: HOIST.renamed(name), ("", " ", None), "A drive's name is text, not"),
     (

@@ -1,6 +1,8 @@
 """Tables: numbers for people in units of choice, and for files in SI."""
 
+import os
 import re
+import stat
 from collections.abc import Callable
 from pathlib import Path
 
@@ -294,3 +296,32 @@ def test_a_unit_that_would_take_for_ever(unit):
 )
 def test_powers_of_units(unit, si, value):
     assert to_si(1.0, unit, si, "x") == pytest.approx(value, rel=1e-12)
+
+
+@pytest.mark.skipif(os.name == "nt", reason="permissions are those of POSIX")
+@pytest.mark.parametrize("mode", [0o600, 0o640, 0o444])
+def test_a_file_that_is_replaced_keeps_its_permissions(tmp_path, mode):
+    target = tmp_path / "drive.toml"
+    target.write_text("old")
+    target.chmod(mode)
+    seen = []
+
+    def write(beside):
+        seen.append(stat.S_IMODE(beside.stat().st_mode))
+        beside.write_text("new")
+
+    write_whole(target, write)
+    assert target.read_text() == "new"
+    assert stat.S_IMODE(target.stat().st_mode) == mode
+    assert seen == [mode | stat.S_IWUSR]  # nobody else reads it while it is written either
+
+
+@pytest.mark.skipif(os.name == "nt", reason="links need rights there")
+def test_a_link_is_replaced_and_what_it_points_to_stays(tmp_path):
+    (tmp_path / "elsewhere.csv").write_text("old")
+    (tmp_path / "elsewhere.csv").chmod(0o600)
+    (tmp_path / "a.csv").symlink_to("elsewhere.csv")
+    write_whole(tmp_path / "a.csv", lambda beside: beside.write_text("new"))
+    assert not (tmp_path / "a.csv").is_symlink()
+    assert (tmp_path / "elsewhere.csv").read_text() == "old"
+    assert stat.S_IMODE((tmp_path / "a.csv").stat().st_mode) == 0o600

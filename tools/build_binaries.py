@@ -29,8 +29,9 @@ SAMPLES, STEP = 15360, 1.0 / 512.0
 AXES = ("hoist", "slew", "luff", "neutral")
 WATCHED = ("current", "shaft_speed", "shaft_position")
 """Signals that are compared; their value references stand in play.c."""
-MOST_COMPRESSED = 150_000
-"""Bytes that all of them together may add to the wheel."""
+MOST_COMPRESSED = 155_000
+"""Bytes that all of them together may add to the wheel: 146,000 without the refusals of calls
+outside their mode, odd times and damaged states, most of which are sentences."""
 LOADERS = ("/usr/aarch64-linux-gnu", "/usr/lib/aarch64-linux-gnu")
 
 
@@ -45,16 +46,18 @@ def main() -> None:
     made["flags"] = " ".join(libraries.FLAGS)
     made["wasm_flags"] = " ".join(libraries.WASM_FLAGS)
     entries = tomlkit.table()
-    contents = {}
+    contents, optimisation = {}, {libraries.WASM: libraries.WASM_FLAGS[1]}
     for each in libraries.PLATFORMS.values():
         print(f"{each.library} ...", flush=True)
         contents[each.library] = libraries.compiled(sources, each)
+        optimisation[each.library] = " ".join(each.optimize)
     print(f"{libraries.WASM} ...", flush=True)
     contents[libraries.WASM] = libraries.compiled_wasm(sources)
     for name, content in contents.items():
         entry = tomlkit.table()
         entry["sha256"] = sha256(content).hexdigest()
         entry["bytes"] = len(content)
+        entry["optimize"] = optimisation[name]
         entry["equal_bits"] = verdict(name, content)
         print(f"{name}: {len(content)} bytes; {entry['equal_bits']}")
         entries[name] = entry

@@ -11,7 +11,7 @@ from reprlib import Repr
 from stat import S_ISDIR, S_ISREG
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from swashplate.errors import FileError, ParameterError
+from swashplate.errors import FileError, MissingFileError, ParameterError
 
 if TYPE_CHECKING:
     from pydantic import BaseModel
@@ -22,8 +22,35 @@ if TYPE_CHECKING:
 
 LARGEST = 64 * 2**20
 """Bytes of a text that is read whole."""
+LARGEST_TOML = 8 * 2**20
+"""Characters of a TOML text: a thousand runs take 200,000, and more would be parsed for minutes."""
 DEEPEST = 40
-_DEEP = re.compile(rf"(?<![\w-])(?:[\w-]+\s*\.\s*){{{DEEPEST}}}")
+"""Parts of a dotted key. The parser's time grows with the cube of their number."""
+LONGEST_KEY = 200
+LONGEST_TEXT = 20_000
+"""Characters of a key and of a text."""
+_TOKEN = re.compile(
+    r"""
+      (?P<comment> \#[^\n]*+ )
+    | (?P<part>
+          \"{3} (?: [^"\\]++ | \\. | "(?!"") )*+ (?:"{3,5}+)?
+        | '{3} (?: [^']++ | '(?!'') )*+ (?:'{3,5}+)?
+        | " (?: [^"\\\n]++ | \\. )*+ "?
+        | ' [^'\n]*+ '?
+        | [\w-]++
+      )
+    | (?P<dot> \. )
+    | (?P<blank> [ \t]++ )
+    | (?P<other> . )
+    """,
+    re.VERBOSE | re.DOTALL,
+)
+"""Pieces of a TOML text, as far as a dotted key needs them; each character is looked at once."""
+_UNPRINTABLE = re.compile(
+    r"[\0-\x08\x0b\x0c\x0e-\x1f\x7f-\x9f\u202a-\u202e\u2066-\u2069\ud800-\udfff\ufffe\uffff]"
+)
+"""Characters that steer a terminal or turn the direction of writing, or that neither XML nor UTF-8
+can hold."""
 
 
 def read_text(path: str | Path) -> str:
@@ -44,7 +71,7 @@ def read_text(path: str | Path) -> str:
     except FileError:
         raise
     except FileNotFoundError:
-        raise FileError(f"There is no file {path}.") from None
+        raise MissingFileError(f"There is no file {path}.") from None
     except UnicodeDecodeError as error:
         raise FileError(
             f"{path} is not UTF-8 text: byte {error.start} is {error.object[error.start]:#04x}."
@@ -57,14 +84,22 @@ def read_text(path: str | Path) -> str:
 def parse_toml(text: str, origin: str) -> dict[str, Any]:
     """The tables of a TOML text; `origin` names it in errors.
 
-    A `FileError` if it is not TOML, with line and column, or has what nobody writes: keys or tables
-    nested a hundred deep, numbers of thousands of digits, control characters in a text.
+    Raises
+    ------
+    FileError
+        If it is not TOML, with line and column, or has what nobody writes: keys or tables nested a
+        hundred deep, integers beyond 64 bits, keys or texts of many pages, and characters that no
+        terminal, page or XML file can show.
     """
+    if len(text) > LARGEST_TOML:
+        raise FileError(
+            f"{origin} has more than {LARGEST_TOML // 2**20} MB: it is not such a text."
+        )
+    if _has_deep_key(text):
+        raise FileError(f"{origin} has a key of more than {DEEPEST} parts.")
     try:
-        if _DEEP.search(text):
-            raise FileError(f"{origin} has a key of more than {DEEPEST} parts.")
-        found = tomllib.loads(text)
-        _check_texts(found, origin)
+        content = tomllib.loads(text)
+        _check_values(content, origin)
     except tomllib.TOMLDecodeError as error:
         raise FileError(f"{origin} is not TOML: {error}.") from None
     except RecursionError:
@@ -73,20 +108,54 @@ def parse_toml(text: str, origin: str) -> dict[str, Any]:
         if isinstance(error, FileError):
             raise
         raise FileError(f"{origin} has a number with too many digits.") from None
-    return found
+    return content
 
 
-def _check_texts(found: Any, origin: str) -> None:
-    """Refuse characters that would steer a terminal or break a page."""
-    if isinstance(found, str):
-        for each in found:
-            if not each.isprintable() and each not in "\n\r\t" and ord(each) < 0xA0:
-                raise FileError(
-                    f"{origin} has the control character {ord(each):#04x} in the text {found!r:.60}"
-                )
-    elif isinstance(found, dict | list):
-        for each in (*found, *found.values()) if isinstance(found, dict) else found:
-            _check_texts(each, origin)
+def _has_deep_key(text: str) -> bool:
+    """Whether a key has more than `DEEPEST` parts, bare or in quotes, anywhere in a TOML text."""
+    parts = 0
+    after_dot = False
+    for token in _TOKEN.finditer(text):
+        kind = token.lastgroup
+        if kind == "part":
+            parts = parts + 1 if after_dot else 1
+            after_dot = False
+            if parts > DEEPEST:
+                return True
+        elif kind == "dot":
+            after_dot = parts > 0
+        elif kind != "blank":
+            parts = 0
+            after_dot = False
+    return False
+
+
+def _check_values(value: Any, origin: str) -> None:
+    """Refuse texts that would steer a terminal or break a page, and integers beyond 64 bits."""
+    if isinstance(value, str):
+        _check_text(value, LONGEST_TEXT, "text", origin)
+    elif isinstance(value, dict):
+        for key, entry in value.items():
+            _check_text(key, LONGEST_KEY, "key", origin)
+            _check_values(entry, origin)
+    elif isinstance(value, list):
+        for entry in value:
+            _check_values(entry, origin)
+    elif isinstance(value, int) and not -(2**63) <= value < 2**63:
+        raise FileError(f"{origin} has an integer beyond 64 bits, a number with too many digits.")
+
+
+def _check_text(text: str, longest: int, what: str, origin: str) -> None:
+    if character := _UNPRINTABLE.search(text):
+        raise FileError(
+            f"{origin} has the character U+{ord(character[0]):04X}, which cannot be shown, in the "
+            f"{what} {text[:60]!r}; leave it out."
+        )
+    if len(text) > longest:
+        raise FileError(
+            f"{origin} has a {what} of {len(text)} characters that begins with {text[:40]!r}; "
+            f"{longest} are the most."
+        )
 
 
 def toml_key(name: str) -> str:
@@ -138,7 +207,8 @@ _SHORT.maxstring = _SHORT.maxother = _SHORT.maxlong = 100
 
 
 def _sentence(error: ErrorDetails, model: type[BaseModel], others: list[ErrorDetails]) -> str:
-    where = [str(part) for part in error["loc"] if part not in _BRANCHES]
+    parts = map(str, error["loc"])
+    where = [part for part in parts if part not in _BRANCHES and "[" not in part]
     # of a list the entries count from 1, as in other sentences
     named = [f" {int(part) + 1}" if part.isdecimal() else f".{part}" for part in where]
     path, kind = "".join(named).removeprefix("."), error["type"]
@@ -179,7 +249,7 @@ _SHAPES = {
 """What an entry should be, by pydantic's kind of error."""
 
 _BRANCHES = ("str", "float", "list[float]", "constrained-list")
-"""Parts of a location that name a branch of a union, not an entry."""
+"""Parts of a location that name a branch of a union, not an entry; so does one with a bracket."""
 
 
 def _known_keys(model: type[BaseModel], where: list[str]) -> list[str]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple, TypedDict, Unpack, overload
@@ -18,7 +18,7 @@ from swashplate.equations.model import Equation
 from swashplate.equations.replacement import Replacement
 from swashplate.errors import InputError
 from swashplate.maneuvers import Maneuver
-from swashplate.parameters.files import dump_set, load_preset, load_set
+from swashplate.parameters.files import dump_set, load_preset, load_set, preset_names
 from swashplate.parameters.parameter_set import Change, Parameter, ParameterSet
 from swashplate.parameters.rules import FULL_VOLTAGE
 from swashplate.results import Result
@@ -36,6 +36,7 @@ from swashplate.simulation.run import (
     simulate_drive,
     steady_states,
 )
+from swashplate.units import in_si
 
 if TYPE_CHECKING:
     from swashplate.executors import Executor
@@ -65,8 +66,11 @@ class Given(TypedDict, total=False):
 
 
 @dataclass(frozen=True)
-class Drive(Result):
+class Drive(Result, Mapping[str, Parameter]):
     """A hydrostatic drive from joystick voltage to shaft speed. Immutable.
+
+    It is a mapping of its parameters by symbol: ``drive["Z16"]``, or ``drive["Z16_plus"]`` for one
+    direction.
 
     Examples
     --------
@@ -78,6 +82,18 @@ class Drive(Result):
     parameters: ParameterSet
     """Value, unit, bounds, source and status of every parameter, by symbol."""
 
+    def __post_init__(self) -> None:
+        """Refuse what is not a parameter set, with the call that takes it."""
+        given: object = self.parameters
+        if isinstance(given, ParameterSet):
+            return
+        way = "Drive(parameters) takes a ParameterSet"
+        if isinstance(given, str) and given in preset_names():
+            way = f'the packaged drive is Drive.preset("{given}")'
+        elif isinstance(given, str | Path):
+            way = f'a parameter file is read with Drive.from_toml("{given}")'
+        raise InputError(f"A Drive cannot be made of {given!r}: {way}.")
+
     @classmethod
     def preset(cls, name: str) -> Drive:
         """A packaged drive, ``"hoist"``, ``"slew"``, ``"luff"`` or ``"neutral"``, by its name."""
@@ -85,7 +101,21 @@ class Drive(Result):
 
     @classmethod
     def from_toml(cls, path: str | Path) -> Drive:
-        """A drive from a parameter file; a `ParameterError` names file, parameter and rule."""
+        """A drive from a parameter file, or from the folder of a fit.
+
+        Parameters
+        ----------
+        path : path
+            The file, or a folder that `Identification.save` or ``swashplate fit`` wrote, of which
+            ``drive.toml`` is read.
+
+        Raises
+        ------
+        FileError
+            If there is no such file, or the folder holds no drive.
+        ParameterError
+            If an entry is wrong; the sentence names file, parameter and rule.
+        """
         return cls(load_set(path))
 
     def to_toml(self, path: str | Path) -> None:
@@ -109,18 +139,33 @@ class Drive(Result):
         """Name of the parameter set."""
         return self.parameters.name
 
-    def __getitem__(self, symbol: str) -> Parameter:
-        """A parameter by symbol, e.g. ``drive["Z16"].value.plus``."""
-        return self.parameters[symbol]
+    def __getitem__(self, name: str) -> Parameter:
+        """A parameter by its symbol, ``drive["Z16"].value.plus``, or ``drive["Z16_plus"].value``.
+
+        Raises
+        ------
+        UnknownParameterError
+            If no parameter has the name; it is a ``KeyError`` as well.
+        """
+        return self.parameters[name]
+
+    def __contains__(self, name: object) -> bool:
+        return name in self.parameters
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.parameters)
+
+    def __len__(self) -> int:
+        return len(self.parameters)
 
     def replace(self, **changes: Change) -> Drive:
         """A drive with other values.
 
         Parameters
         ----------
-        **changes : float or (float, float)
+        **changes : float, Pint quantity, or a pair of them
             By symbol (``Z16=1.2e-4`` both ways, ``Z16=(1.2e-4, 1.5e-4)`` plus and minus) or by one
-            direction (``Z16_plus=1.2e-4``), in SI.
+            direction (``Z16_plus=1.2e-4``), in SI or with a unit (``Z16=0.12 * ureg.mm``).
 
         Raises
         ------
@@ -194,7 +239,7 @@ class Drive(Result):
 
         Parameters
         ----------
-        voltage : (n,) array_like or Maneuver
+        voltage : (n,) array_like, Pint quantity or Maneuver
             Command; a maneuver is sampled at `rate`. [V]
         rate : float
             Samples a second, 10 Hz to 100 kHz; with `time`, rate of the result's grid. [Hz]
@@ -335,6 +380,7 @@ class Drive(Result):
         `h` is the interval between samples [s]; other arguments as in `simulate`. Of `measured`,
         such as ``("load_torque", "pump_speed")``, each step takes a number behind the voltage.
         """
+        h = in_si(h, "s", "The interval")
         return drive_stepper(self.parameters, h, interpolation, start, measured)
 
     def compiled_step(
@@ -362,6 +408,7 @@ class Drive(Result):
         InputError
             For signals that a drive does not have, and a rate too low for the card's filter.
         """
+        rate = in_si(rate, "Hz", "The rate")
         check_rate(rate)
         check_filter_stability(self.parameters, 1.0 / rate)
         instance = instance_of(self.parameters, by_voltage=True)
@@ -416,6 +463,7 @@ class Drive(Result):
         """
         from swashplate.linear import linearize_drive
 
+        at, current = in_si(at, "V", "The voltage"), in_si(current, "A", "The current")
         return linearize_drive(self.parameters, at, current, input, outputs, coulomb)
 
     def frequency_response(
@@ -485,6 +533,7 @@ class Drive(Result):
         return self._steady(voltage)[0]
 
     def _steady(self, voltage: float | Sequence[float] | Array) -> tuple[float | Array, ...]:
+        voltage = in_si(voltage, "V", "The voltage")
         try:
             volts = np.atleast_1d(np.array(voltage, dtype=np.float64))
         except (TypeError, ValueError):

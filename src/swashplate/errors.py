@@ -1,24 +1,45 @@
-"""What goes wrong, said in one sentence that names what is wrong and what would be right."""
+"""What goes wrong, said in one sentence that names what is wrong and what would be right.
+
+All errors that a user can cause and mend are a `SwashplateError`, and with it a ``ValueError``.
+Those that Python has a word for are that as well: a missing file is a ``FileNotFoundError``, a
+missing key a ``KeyError``.
+"""
 
 
 class SwashplateError(ValueError):
     """Base of all errors that a user can cause and mend."""
+
+    def __str__(self) -> str:
+        # KeyError, a base of some, would put the sentence in quotes
+        return BaseException.__str__(self)
 
 
 class InputError(SwashplateError):
     """A record, maneuver, option or argument that cannot be simulated."""
 
 
+class UnknownNameError(InputError, KeyError):
+    """A signal, channel, run or estimate that does not exist; also a ``KeyError``."""
+
+
 class ParameterError(SwashplateError):
     """A parameter that is missing, unknown or breaks a rule."""
+
+
+class UnknownParameterError(ParameterError, KeyError):
+    """A name that no parameter has; also a ``KeyError``."""
 
 
 class DomainError(SwashplateError):
     """A simulation that left the range in which the model's equations hold."""
 
 
-class FileError(SwashplateError):
-    """A file that cannot be read or written."""
+class FileError(SwashplateError, OSError):
+    """A file that cannot be read or written; also an ``OSError``."""
+
+
+class MissingFileError(FileError, FileNotFoundError):
+    """A file or folder that does not exist; also a ``FileNotFoundError``."""
 
 
 class EquationError(SwashplateError):

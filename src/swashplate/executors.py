@@ -9,7 +9,7 @@ from functools import partial
 from itertools import islice
 from typing import TYPE_CHECKING, Any, Protocol
 
-from swashplate.errors import InputError
+from swashplate.errors import InputError, SwashplateError
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor as Pool
@@ -195,6 +195,8 @@ class Dask:
                             continue
                         raise ConnectionError from None
                     yield waiting.pop(future.key)[0], future.result()
+            except SwashplateError:
+                raise
             except (OSError, CancelledError) as error:
                 raise InputError(
                     f"The Dask scheduler at {self.address} was lost "

@@ -50,7 +50,10 @@ for it.
 """
 HALVINGS = 60  # Of the slope of a return until it is found, to the last bits.
 LONGEST = 100_000_000
-"""Samples that a maneuver may have; more is a mistake and would not fit into memory."""
+"""Samples that a maneuver may have, and sines that are computed to find the peak of a multisine;
+more is a mistake and would not fit into memory."""
+LARGEST = 1e12
+"""No voltage, time or frequency of a maneuver is larger; sums of larger ones would overflow."""
 
 # --- checks ---------------------------------------------------------------------------------------
 
@@ -63,6 +66,8 @@ def finite(name: str, value: float, least: float = -math.inf) -> float:
         raise InputError(f"{name} must be a number, not {value!r}.") from None
     if not math.isfinite(number):
         raise InputError(f"{name} must be finite, not {number}.")
+    if abs(number) > LARGEST:
+        raise InputError(f"{name} must be at most {LARGEST:g}, not {number:g}; check it.")
     if number < least:
         raise InputError(f"{name} must not be negative, not {number:g}.")
     return number
@@ -94,6 +99,8 @@ def row(name: str, values: npt.ArrayLike) -> Array:
     if wrong.size:
         where = f"row {wrong[0]} (the first is 0) is {numbers[wrong[0]]}"
         raise InputError(f"{name} must be finite, but {where}.")
+    if (largest := float(np.abs(numbers).max())) > LARGEST:
+        raise InputError(f"{name} must be at most {LARGEST:g}, not {largest:g}; check it.")
     return numbers
 
 
@@ -248,10 +255,11 @@ def _tones(
 
     Their `frequencies` [Hz] grow by `growth` [Hz/s]; `phases` [rad].
     """
-    waves = [
+    # one after another: many sines of a long time together would not fit into memory
+    waves = (
         (2.0 * np.pi * (frequency + 0.5 * growth * time) * time + phase, frequency + growth * time)
         for frequency, phase in zip(frequencies, phases, strict=True)
-    ]
+    )
     if slope:
         slopes = [amplitude * (2.0 * np.pi * now) * np.cos(angle) for angle, now in waves]
         return np.asarray(np.sum(slopes, axis=0))
@@ -474,6 +482,11 @@ def multisine(
     low, high = positive("the lowest frequency", lines.min()), lines.max()
     phases = np.random.default_rng(seed).uniform(0.0, 2.0 * np.pi, lines.size).tolist()
     points = math.ceil(POINTS_PER_PERIOD * high * (end - start)) + 1
+    if points * lines.size > LONGEST:
+        raise InputError(
+            f"{lines.size} frequencies up to {high:g} Hz in {end - start:g} s are too many: take "
+            "fewer, lower ones or a shorter time."
+        )
     time, spacing = np.linspace(0.0, end - start, points, retstep=True)
     # between two points it rises above the peak found by half its curvature at most
     curvature = float(((2.0 * np.pi * lines) ** 2).sum())
@@ -515,8 +528,10 @@ def _band(band: Sequence[float], period: float) -> Array:
             "give a list for the frequencies themselves."
         )
     low, high = positive("low", band[0]), positive("high", band[1])
-    periods = np.unique(np.floor(np.linspace(low, high, band[2]) * period + 0.5))
-    if periods[0] < 1.0 or periods.size < band[2]:
+    count = int(band[2])
+    apart = count <= abs(high - low) * period + 2.0  # else there are too many even to try
+    periods = np.unique(np.floor(np.linspace(low, high, count if apart else 1) * period + 0.5))
+    if periods[0] < 1.0 or periods.size < count:
         raise InputError(
             f"{band[2]} frequencies from {low:g} to {high:g} Hz cannot be told apart in "
             f"{period:g} s: take fewer, a wider band or a longer time."

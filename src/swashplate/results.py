@@ -136,7 +136,7 @@ class Tabular(Result, ABC):
         InputError
             If pandas is not installed.
         """
-        return _library("pandas").DataFrame(self.to_polars().to_dict(as_series=False))
+        return pandas_frame(self.to_polars())
 
     def to_xarray(self) -> Any:
         """The table of `to_polars` as an ``xarray.Dataset`` along its first column.
@@ -170,6 +170,11 @@ class Tabular(Result, ABC):
 def figures() -> Any:
     """The package of figures, imported when one is drawn; by name, as it stands above results."""
     return import_module("swashplate.report.figures")
+
+
+def pandas_frame(frame: polars.DataFrame) -> Any:
+    """A table as a ``pandas.DataFrame``; an `InputError` if pandas is not installed."""
+    return _library("pandas").DataFrame(frame.to_dict(as_series=False))
 
 
 def _library(name: str) -> Any:

@@ -15,6 +15,7 @@ from html import escape
 from math import floor, isfinite, isnan, log10
 from pathlib import Path
 from secrets import token_hex
+from stat import S_IMODE, S_IWUSR
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from swashplate.errors import FileError
@@ -356,6 +357,9 @@ def check_folder(folder: Path) -> None:
 def write_whole(path: str | Path, write: Callable[[Path], object]) -> None:
     """Have a file written at a path beside its place, and renamed when it is complete.
 
+    It has the permissions of the file that it replaces. A link in its place is replaced as a file
+    would be: what it points to stays as it is.
+
     Raises
     ------
     FileError
@@ -367,7 +371,13 @@ def write_whole(path: str | Path, write: Callable[[Path], object]) -> None:
     try:
         try:
             beside.touch(exist_ok=False)
+            mode = _permissions(target)
+            # before anybody else can read it, and again, as a library may have made another file
+            if mode is not None:
+                beside.chmod(mode | S_IWUSR)
             write(beside)
+            if mode is not None:
+                beside.chmod(mode)
             with beside.open("rb") as written:  # a power cut leaves the old file or the new one
                 os.fsync(written.fileno())
             beside.replace(target)
@@ -378,6 +388,8 @@ def write_whole(path: str | Path, write: Callable[[Path], object]) -> None:
                 # on Ctrl-C Polars raises one of its own and leaves Python's to come: it comes here
                 beside.unlink(missing_ok=True)
                 raise
+    except FileError:
+        raise
     except OSError as error:
         raise FileError(f"{target} cannot be written: {error.strerror or error}.") from None
     except Exception as error:  # libraries raise what they like; what is not the disk's goes on
@@ -385,6 +397,14 @@ def write_whole(path: str | Path, write: Callable[[Path], object]) -> None:
         if reason is None:
             raise
         raise FileError(f"{target} cannot be written: {reason}.") from None
+
+
+def _permissions(path: Path) -> int | None:
+    """Permissions of a file, None if there is none."""
+    try:
+        return S_IMODE(path.stat().st_mode)
+    except OSError:
+        return None
 
 
 def _of_the_disk(error: BaseException) -> str | None:

@@ -5,10 +5,9 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
 from functools import cache
-from math import pi
-from tokenize import TokenError
+from math import isfinite, pi
 from types import MappingProxyType
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Protocol, runtime_checkable
 
 from swashplate.errors import InputError
 
@@ -32,17 +31,6 @@ LONGEST = 80
 """Letters of a unit."""
 _POWER = re.compile(r"(?:\*\*|\^)\s*\(?\s*[+-]?\d{1,2}(?:[./]\d{1,3})?\s*\)?(?!\s*(?:\*\*|\^|\d))")
 """A power as a unit has it: a plain number, no power of a power."""
-
-_UNREADABLE = (
-    ArithmeticError,
-    AssertionError,
-    AttributeError,
-    RecursionError,
-    TokenError,
-    TypeError,
-    ValueError,
-)
-"""What Pint's parser meets unreadable text with."""
 
 
 def _written_out(unit: str) -> str:
@@ -96,7 +84,7 @@ def to_si(value: float, unit: str, si: str, what: str) -> float:
     try:
         # offsets (degC) are handled by Quantity, not by a factor
         quantity = registry.Quantity(value, _written_out(unit) if unit != "1" else "")
-        return float(quantity.to(_written_out(si) if si != "1" else "").magnitude)
+        number = float(quantity.to(_written_out(si) if si != "1" else "").magnitude)
     except UndefinedUnitError:
         raise InputError(f"{what} has the unknown unit '{unit}'; give it in {wanted}.") from None
     except DimensionalityError:
@@ -104,16 +92,50 @@ def to_si(value: float, unit: str, si: str, what: str) -> float:
             f"{what} is given in '{unit}', which does not measure the same as {si}; "
             f"give it in {wanted}."
         ) from None
-    except _UNREADABLE:
+    except Exception:  # Pint evaluates the text, and raises whatever the evaluation does
         raise InputError(
             f"{what} has the unreadable unit '{shown}'; give it in {wanted}."
         ) from None
+    if isfinite(value) and not isfinite(number):
+        raise InputError(f"{what} is {value:g} {unit}, too large a number in {si}; check it.")
+    return number
 
 
 def scaling(unit: str, si: str, what: str) -> tuple[float, float]:
     """Factor and zero of a unit, SI = factor x + zero; arguments and errors as of `to_si`."""
     zero = to_si(0.0, unit, si, what)
     return to_si(1.0, unit, si, what) - zero, zero
+
+
+@runtime_checkable
+class Quantity(Protocol):
+    """A number or array with a unit, such as Pint's."""
+
+    @property
+    def magnitude(self) -> Any:
+        """The number or array."""
+        ...
+
+    @property
+    def units(self) -> Any:
+        """Its unit, whose format ``~C`` is one that `to_si` reads, as of Pint."""
+        ...
+
+
+def in_si(value: Any, si: str, what: str) -> Any:
+    """The number or array of a quantity, in an SI unit; any other value as it is.
+
+    A quantity's array keeps its shape. `what` the value is stands in the error's sentence.
+
+    Raises
+    ------
+    InputError
+        If the quantity measures something else.
+    """
+    if not isinstance(value, Quantity):
+        return value
+    factor, zero = scaling(f"{value.units:~C}" or "1", si, what)
+    return value.magnitude * factor + zero
 
 
 _BASE = {
@@ -138,7 +160,7 @@ def si_exponents(unit: str) -> dict[str, int] | None:
     try:
         base = _registry().parse_units(_written_out(unit).replace("^", "**"))
         factor, root = _registry().get_base_units(base)
-    except _UNREADABLE:
+    except Exception:  # see `to_si`
         return None
     powers = {str(name): float(power) for name, power in root._units.items()}
     if factor != 1.0 or not all(n.is_integer() and k in _BASE for k, n in powers.items()):

@@ -94,7 +94,7 @@ def test_what_cannot_be_met_says_what_can(hoist, monkeypatch):
 @pytest.mark.parametrize(
     ("required", "ranges", "said"),
     [
-        ({}, {"pump": WIDEST}, "Require at least one"),
+        ({}, {"pump": WIDEST}, "give a speed, an acceleration, a tracking error"),
         ({"speed": -1.0}, {"pump": WIDEST}, "required speed is -1, but must be positive"),
         ({"speed": 1.0}, {}, "Name at least one lever"),
         ({"speed": 1.0}, {"pump": (1.2, 2.0)}, "rise from 0 or more and have 1 between them"),

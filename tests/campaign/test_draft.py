@@ -298,6 +298,7 @@ def test_what_tells_nothing_is_refused() -> None:
     for changes, said in (
         ({"values": -speed.values}, "against the command: reverse it with sign = -1"),
         ({"weight": np.zeros(TIME.size)}, "No run measures a motion"),
+        ({"weight": np.where(TIME[3] > TIME, 1.0, 0.0)}, "too short to guess from"),
     ):
         with pytest.raises(InputError, match=said):
             guess_drive([replace(sine, channels={"speed": replace(speed, **changes)})])

@@ -9,8 +9,20 @@ from tests.campaign.conftest import BOTH, RATE, TIME, Columns, Drafted, read_dra
 from tests.logs.writing import write_log
 
 from swashplate import Campaign, Drive, FileError, InputError, ParameterError
-from swashplate.campaign import campaign_findings, draft_campaign, examine, unsigned_currents
-from swashplate.identification.data_checks import beside_the_drives, check_runs, refuse_unsound
+from swashplate.campaign import (
+    campaign_findings,
+    draft_campaign,
+    examine,
+    guess_drive,
+    spiked,
+    unsigned_currents,
+)
+from swashplate.identification.data_checks import (
+    beside_the_drives,
+    check_runs,
+    refuse_unsound,
+    spike_findings,
+)
 
 SINE = 5.0 * np.sin(2.0 * np.pi * 0.4 * TIME)
 PER_TURN = {"counts_per_turn": 1000.0}
@@ -159,6 +171,44 @@ def test_a_spike_of_the_command_is_found_and_left_out(drafted: Drafted) -> None:
     assert tests["log"].input.at(TIME[900:901]) == pytest.approx(command[899:900])
 
 
+COUNTED = np.floor(200.0 * np.cumsum(lagged(BOTH)) / RATE)
+"""Counts of an encoder of 200 to a radian, of a speed of 1 rad/s for a volt."""
+
+
+def test_a_glitch_of_a_counter_is_found_with_the_line_that_leaves_it_out(drafted: Drafted) -> None:
+    glitch = 5000.0 * ((TIME > 3.498) & (TIME < 3.507))
+    tests = drafted(draft=PER_TURN, counts=COUNTED + glitch)
+    ((sentence, gross),) = spiked(tests).values()
+    assert "log: 'encoder_counts' has 1 spike, up to +5000 counts" in sentence
+    assert gross
+    with pytest.raises(InputError, match=r"from = 3\.4975, to = 3\.5075"):
+        guess_drive(tests)
+    tests = mended(tests, "1 spike, up to +5000 counts")
+    assert findings(tests) == []
+    assert spiked(tests) == {}
+
+
+def test_counts_lost_for_good_are_found_with_the_lines_that_cut_the_run(drafted: Drafted) -> None:
+    tests = drafted(draft=PER_TURN, counts=COUNTED - 300.0 * (TIME > 4.498))
+    (finding,) = findings(tests)
+    ((sentence, gross),) = spiked(tests).values()
+    assert sentence == f"log: 'encoder_counts' {finding}"
+    assert not gross
+    assert "-300 counts at 4.4975 s" in finding
+    doubts = refuse_unsound(spike_findings(tests.experiments, "linear"))
+    assert [each.startswith(sentence) for each in doubts] == [True]
+    # as the sentence says
+    first, second = "span = { to = 4.4975 }", "span = { from = 4.4975 }"
+    more = ['name = "log from 4.4975 s"', second, 'start = "estimated"']
+    assert all(each in finding for each in (first, *more))
+    run = '[[runs]]\nfile = "log.csv"\nrole = "fit"\n'
+    text = text_of(tests) + "\n".join([first, "", run, *more, ""])
+    tests.path.write_text(text, "utf-8")
+    tests = Campaign.from_toml(tests.path)
+    assert [each.name for each in tests] == ["log", "log from 4.4975 s"]
+    assert findings(tests) == []
+
+
 def test_a_tap_of_the_command_is_no_spike_but_a_drop_out_while_it_stands_still_is(drafted) -> None:
     command = 5.0 * ((TIME > 1.0) & (TIME < 1.019)) - 3.0 * (TIME > 4.0)
     assert findings(drafted(voltage=command, speed=lagged(command))) == []
@@ -185,7 +235,7 @@ def test_motions_and_zero_crossings_are_no_spikes(drafted, command, lag) -> None
         (
             {"counts": np.floor(200.0 * np.cumsum(lagged(BOTH)) / RATE)
              + 5000.0 * ((TIME > 3.498) & (TIME < 3.507))},
-            "jumps 2 times",
+            "ignore = [{ from = 3.4975, to = 3.5075",
             "gear_ratio = 1.0",
             "ignore = [{ from = 3.4975, to = 3.5075 }]\ngear_ratio = 1.0",
         ),
@@ -411,7 +461,7 @@ def test_the_unit_at_the_end_of_a_name_that_is_given(tmp_path, name, kind, unit)
 
 
 def test_a_log_without_a_clock_leaves_its_rate_open(drafted: Drafted, tmp_path: Path) -> None:
-    with pytest.raises(ParameterError, match="needs an entry 'time'"):
+    with pytest.raises(ParameterError, match="needs an entry 'time'; line 10 is marked FIXME"):
         drafted({"log.csv": {"voltage": BOTH, "speed": lagged(BOTH)}})
     path = tmp_path / "campaign.toml"
     text = path.read_text("utf-8")
@@ -473,3 +523,135 @@ def test_dashes_are_missing_numbers_and_commas_between_commas_are_named(drafted:
     assert tests["log"]["shaft_speed"].dropped == 3
     with pytest.raises(FileError, match="Do decimal commas stand between commas"):
         drafted({"log.csv": "time,voltage,speed\n0,0,1,0,2,0\n0,1,1,5,2,5\n"})
+
+
+# --- columns without a unit, and a PLC's words ----------------------------------------------------
+
+
+def drafted_entries(folder: Path, logged: Columns, **draft: object) -> tuple[str, dict, dict]:
+    """Text of a draft, and its input and channels by their columns."""
+    text = draft_campaign([write(folder, "log.csv", logged)], folder, **draft)
+    (axis,) = tomllib.loads(text)["axes"].values()
+    signals = (axis["input"], *axis["channels"].values())
+    return text, axis, {each["column"]: each for each in signals}
+
+
+def line_of(text: str, start: str) -> str:
+    """The only line that begins so."""
+    (line,) = [line for line in text.splitlines() if line.startswith(start)]
+    return line
+
+
+def test_a_declared_kind_restricts_the_units(tmp_path: Path) -> None:
+    """A rod's stroke is in mm, a pressure is not, whatever the column is called."""
+    columns = {"time": TIME, "u": BOTH, "PIW_STROKE": 3.7 + 0.1 * BOTH}
+    text, _, entries = drafted_entries(
+        tmp_path, columns, columns={"PIW_STROKE": "stroker_pressure"}
+    )
+    assert entries["PIW_STROKE"]["kind"] == "stroker_pressure"
+    assert entries["PIW_STROKE"]["unit"] == "Pa"
+    assert "guessed" not in line_of(text, 'kind = "stroker_pressure"')
+    assert "FIXME" in line_of(text, 'unit = "Pa"')
+    assert 'role = "fit"' in text
+    _, _, entries = drafted_entries(tmp_path, columns, columns={"PIW_STROKE": "position"})
+    assert entries["PIW_STROKE"]["unit"] == "mm"
+
+
+def test_a_unit_of_another_quantity_is_open_in_a_header_and_refused_if_given(tmp_path) -> None:
+    columns = {"time": TIME, "u": BOTH, "Kanal [mm]": 0.1 * BOTH}
+    given = {"Kanal [mm]": "stroker_pressure"}
+    text, _, entries = drafted_entries(tmp_path, columns, columns=given)
+    assert entries["Kanal [mm]"]["unit"] == "Pa"
+    line = line_of(text, 'unit = "Pa"')
+    assert "FIXME" in line
+    assert "'mm'" in line
+    with pytest.raises(InputError, match=r"'Kanal \[mm\]' .*'mm'.* Pa"):
+        drafted_entries(tmp_path, columns, columns=given, units={"Kanal [mm]": "mm"})
+    _, _, entries = drafted_entries(tmp_path, columns, columns=given, units={"Kanal [mm]": "bar"})
+    assert entries["Kanal [mm]"]["unit"] == "bar"
+
+
+@pytest.mark.parametrize(
+    ("ticks", "unit"),
+    [
+        (1.0 + 20.0 * np.arange(TIME.size), "ms"),
+        (5000.0 * np.arange(TIME.size), "us"),
+        (5e6 * np.arange(TIME.size), "ns"),
+        (TIME, "s"),
+    ],
+)
+def test_stamps_without_a_unit(tmp_path: Path, ticks: np.ndarray, unit: str) -> None:
+    """1, 21, 41 are no seconds: no machine is logged every 20 s."""
+    text, axis, _ = drafted_entries(tmp_path, {"TIME": ticks, "u [V]": BOTH, "n [rpm]": BOTH})
+    assert axis["time"] == {"column": "TIME", "unit": unit}
+    assert "guessed" in line_of(text, "time = ")
+    _, axis, _ = drafted_entries(
+        tmp_path, {"TIME": ticks, "u [V]": BOTH, "n [rpm]": BOTH}, units={"TIME": "ms"}
+    )
+    assert axis["time"]["unit"] == "ms"
+
+
+@pytest.mark.parametrize(
+    ("header", "kind", "unit"),
+    [
+        ("stick mV", "voltage", "mV"),
+        ("speed rpm", "shaft_speed", "rpm"),
+        ("Drehzahl 1/min", "shaft_speed", "1/min"),
+        ("Strom mA", "rectified_current", "mA"),
+        ("encoder speed", "shaft_speed", "rad/s"),
+    ],
+)
+def test_a_unit_behind_a_space(tmp_path: Path, header: str, kind: str, unit: str) -> None:
+    columns = {"time [s]": TIME, header: 0.5 + np.abs(BOTH)}
+    _, _, entries = drafted_entries(tmp_path, columns)
+    assert (entries[header]["kind"], entries[header]["unit"]) == (kind, unit)
+
+
+@pytest.mark.parametrize(
+    ("largest", "full"),
+    [(22118, 27648), (27648, 27648), (16384, 16384), (32767, 32767), (32768, 32768)],
+)
+def test_a_plc_s_words_of_a_command_are_volts(tmp_path: Path, largest: int, full: int) -> None:
+    words = np.round(0.25 * BOTH * largest)
+    columns = {"time [s]": TIME, "JOY_W": words, "n [rpm]": BOTH}
+    text, _, entries = drafted_entries(tmp_path, columns)
+    joystick = entries["JOY_W"]
+    assert (joystick["kind"], joystick["unit"]) == ("voltage", "V")
+    assert joystick["scale"] * full == pytest.approx(10.0)
+    assert "guessed" in line_of(text, "scale = ")
+    assert np.abs(read_draft(tmp_path, [tmp_path / "log.csv"])["log"].input.values).max() <= 10.0
+
+
+def test_a_plc_s_words_of_a_sensor_need_its_range(tmp_path: Path) -> None:
+    words = np.round(5000.0 * np.abs(BOTH))
+    columns = {"time [s]": TIME, "u": BOTH, "PIW640 druck": words}
+    text, _, _ = drafted_entries(tmp_path, columns, columns={"PIW640 druck": "stroker_pressure"})
+    line = line_of(text, "scale = ")
+    assert "FIXME" in line
+    assert "27648" in line
+
+
+def test_whole_numbers_of_a_command_in_thousands_are_millivolts(tmp_path: Path) -> None:
+    columns = {"time [s]": TIME, "u": 1000.0 * BOTH, "n [rpm]": BOTH}
+    text, _, entries = drafted_entries(tmp_path, columns)
+    assert entries["u"]["unit"] == "mV"
+    assert "guessed" in line_of(text, 'unit = "mV"')
+
+
+def test_the_comment_of_a_split_run_says_how_long_it_is(tmp_path: Path) -> None:
+    """A counter of 10 bits may have gone round within a second."""
+    counts = np.mod(np.floor(800.0 * TIME), 1024.0)
+    keep = (TIME < 3.0) | (TIME > 4.0)
+    columns = {"time [s]": TIME[keep], "u": BOTH[keep], "Drehgeber": counts[keep]}
+    text, _, _ = drafted_entries(tmp_path, columns, counts_per_turn=1000.0)
+    assert "7.995 s at 200 Hz in 2 parts" in line_of(text, "file = ")
+
+
+def test_a_draft_s_title_and_axis(tmp_path: Path) -> None:
+    """No machine is called like the start for any of them, so that no exported file is either."""
+    columns = {"time [s]": TIME, "u": BOTH, "n [rpm]": BOTH}
+    text, _, _ = drafted_entries(tmp_path, columns, drive="neutral")
+    assert "guessed" in line_of(text, "title = ")
+    assert [*tomllib.loads(text)["axes"]] == ["drive"]
+    text, _, _ = drafted_entries(tmp_path, columns, title="Winch 3, J. Weber")
+    assert line_of(text, "title = ") == 'title = "Winch 3, J. Weber"'

@@ -43,7 +43,7 @@ SHOWN = {
         "input",
         lambda t: np.delete(t, range(20, 30), axis=0),
     ),
-    "jumps once": ("counts", lambda t: t - np.outer(t[:, 0] >= 800.0, [0, 0, 0, 900])),
+    "-900 counts at 0.795 s": ("counts", lambda t: t - np.outer(t[:, 0] >= 800.0, [0, 0, 0, 900])),
     "is it connected": ("current", lambda t: t * [1, 1, 0, 1] + [0, 0, 12.0, 0]),
     "should it be signed_current": (
         "current",

@@ -96,6 +96,17 @@ def test_what_a_draft_leaves_out_stands_before_the_command_to_run(done, tmp_path
     assert "no channel measures its motion" in said
 
 
+def test_what_a_draft_leaves_open_is_printed_with_its_table(done, tmp_path) -> None:
+    rows = [f"{k},{1000 * k % 9000},{row}" for k, row in enumerate(ROWS)]
+    (tmp_path / "log.csv").write_text("\n".join(["Nr,PIW_DRUCK,time [s],u [V],i [A],n", *rows]))
+    pressure = ("--column", "stroker_pressure=PIW_DRUCK", "--title", "Winch 3")
+    said = done("campaign", "init", "log.csv", *pressure)
+    table = "  [axes.drive.channels.stroker_pressure]"
+    assert f'{table} unit = "Pa"    # FIXME' in said
+    assert f"{table} scale = 1.0    # FIXME" in said
+    assert 'title = "Winch 3"' in (tmp_path / "campaign.toml").read_text("utf-8")
+
+
 # --- virtual tests --------------------------------------------------------------------------------
 
 
@@ -178,3 +189,13 @@ def test_what_positive_steps_determine(done: Words, tmp_path: Path) -> None:
     assert set(shares.round(9)) == {0.0, 1.0}
     (tmp_path / "mine.toml").write_text(stages(pump="Z8 Z13_plus"), "utf-8")
     assert "The fit configuration can stay as it is." in done("excitation", *words, "mine.toml")
+
+
+def test_a_guess_looks_for_its_folder_first(refused, virtual, tmp_path, monkeypatch) -> None:
+    """Not after the search, which takes many times as long."""
+    from swashplate import campaign
+
+    monkeypatch.setattr(campaign, "guess_drive", lambda runs: pytest.fail("it searched"))
+    (tmp_path / "file").write_text("")
+    sentence = refused("guess", "virtual/campaign.toml", "--out", "file/guessed")
+    assert "file/guessed cannot be made" in sentence

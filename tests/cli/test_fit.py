@@ -15,10 +15,12 @@ import pytest
 from tests.cli.conftest import STEPS, stages
 from tests.shown import check_shown
 
+import swashplate
 from swashplate import Campaign, Drive
-from swashplate.identification.assessment import Judged
+from swashplate.identification.assessment import Identification
 from swashplate.identification.fitting import Fit, fit
 from swashplate.identification.setup import Setup
+from swashplate.locks import locked
 
 Words = Callable[..., str]
 CAMPAIGN = "virtual/campaign.toml"
@@ -62,7 +64,7 @@ def test_a_campaign_becomes_a_drive(done, refused, campaign, tmp_path) -> None:
     assert parameters.title.startswith("Virtual tests")
     assert "speed at the end" in done("simulate", "fitted/drive.toml", "step:4")
     header, *rows = (tmp_path / "fitted" / "estimates.csv").read_text("utf-8").splitlines()
-    assert header.startswith("stage,parameter,unit,nominal,estimate")
+    assert header.startswith("stage,parameter,unit,nominal,value,lower,upper,standard_error")
     assert len([row for row in rows if "offset" not in row]) == 6
     # the folder knows what was free: no packaged configuration bears the drive's name
     Drive(parameters).renamed("winch").to_toml(tmp_path / "fitted" / "drive.toml")
@@ -74,16 +76,50 @@ def test_a_campaign_becomes_a_drive(done, refused, campaign, tmp_path) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("how", [signal.SIGKILL, signal.SIGINT], ids=["kill", "Ctrl-C"])
+def test_from_logs_with_a_current_to_a_drive_named_by_its_axis(
+    run, done, virtual, tmp_path
+) -> None:
+    """From neutral: the amplifier is fitted to the current first, and nothing is called neutral."""
+    logs = [str(each) for each in sorted(virtual.parent.glob("*.csv"))]
+    counts = ("--counts-per-turn", "2526.315789473684")
+    done("campaign", "init", *logs, "--drive", "neutral", *counts, "--out", "campaign.toml")
+    path = tmp_path / "campaign.toml"
+    text = (
+        path.read_text("utf-8")
+        .replace("[axes.drive", "[axes.winch")
+        .replace('interpolation = "previous"', 'interpolation = "linear"')
+    )
+    path.write_text(text, "utf-8")
+    said = done("guess", "campaign.toml")
+    assert "rexroth_mdsd_1k_2x_2" in said
+    result = run("fit", "campaign.toml", "--from", "start.toml", "--setup", "setup.toml")
+    assert result.exit_code in (0, 1)
+    assert "no stage fits" not in result.output
+    fitted = Drive.from_toml(tmp_path / "fitted" / "drive.toml")
+    assert fitted.name == "winch"
+    # of steps of one size each way the current is known there alone
+    currents = [Drive.preset("hoist").steady_current(volts) for volts in (-5.0, 4.0)]
+    assert [fitted.steady_current(volts) for volts in (-5.0, 4.0)] == pytest.approx(
+        currents, rel=0.02
+    )
+    plain = run("fit", "campaign.toml", "--out", "plain", "--no-report")
+    assert "'rectified_current' is measured, but no stage fits it" in " ".join(plain.output.split())
+    assert Drive.from_toml(tmp_path / "plain" / "drive.toml").name == "winch"
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "how", [signal.SIGKILL, signal.SIGINT, signal.SIGTERM], ids=["kill", "Ctrl-C", "terminate"]
+)
 def test_an_interrupted_search_goes_on(campaign: Path, tmp_path: Path, how: signal.Signals) -> None:
     command = [sys.executable, "-m", "swashplate", "fit", CAMPAIGN, "--no-report", "--starts", "6"]
     command += ["--setup", "setup.toml", "--out"]
     store = tmp_path / "fitted" / "starts"
     running = subprocess.Popen(
-        [*command, "fitted", "--jobs", "2" if how == signal.SIGINT else "1"],
+        [*command, "fitted", "--jobs", "1" if how == signal.SIGKILL else "2"],
         cwd=tmp_path,
         stdout=subprocess.PIPE,
-        stderr=subprocess.DEVNULL,
+        stderr=subprocess.PIPE,
         text=True,
         start_new_session=True,
     )
@@ -93,8 +129,9 @@ def test_an_interrupted_search_goes_on(campaign: Path, tmp_path: Path, how: sign
         assert time.monotonic() < deadline
         time.sleep(0.005)
     os.killpg(running.pid, how)  # as a terminal does
-    said, _ = running.communicate(timeout=60.0)
-    if how == signal.SIGINT:
+    said, warnings = running.communicate(timeout=60.0)
+    if how != signal.SIGKILL:
+        assert "leaked" not in warnings
         assert running.returncode == 130
         assert "Interrupted in the stage 'card': interrupted after " in said
         assert "--resume goes on" in said
@@ -121,14 +158,14 @@ def test_all_that_can_be_asked_for_besides(done: Words, campaign: Path, tmp_path
         rows = [row for row in csv.DictReader(file) if "offset" not in row["parameter"]]
     # by other noise of the same kind the estimates move about as far as the errors say
     for row in rows:
-        low, high = (float(row[f"{side} 95 %"]) for side in ("lower", "upper"))
-        least, most = (float(row[f"bootstrap {side} 95 %"]) for side in ("lower", "upper"))
+        low, high = (float(row[side]) for side in ("lower", "upper"))
+        least, most = (float(row[f"bootstrap_{side}"]) for side in ("lower", "upper"))
         assert 0.3 < (most - least) / (high - low) < 2.0, row["parameter"]
     # nearly quadratic: the profile ends where the linear interval does
     (ends,) = re.findall(r"^ *pump +Z8 +(.*)$", said.partition("Profile likelihoods")[2], re.M)
     (linear,) = (row for row in rows if row["parameter"] == "Z8")
     found = [float(each) for each in re.findall(r"\d\S*", ends)][-3:]
-    wanted = [float(linear[each]) for each in ("estimate", "lower 95 %", "upper 95 %")]
+    wanted = [float(linear[each]) for each in ("value", "lower", "upper")]
     assert found == pytest.approx(wanted, rel=0.01)
     assert "profile" in (tmp_path / "fitted" / "report.html").read_text("utf-8").lower()
 
@@ -168,6 +205,28 @@ def test_fits_that_are_refused(refused: Words, virtual: Path, tmp_path: Path) ->
         assert said in refused("fit", CAMPAIGN, "--setup", "bad.toml")
     virtual.write_text(virtual.read_text("utf-8").replace('role = "fit"', 'role = "ignore"'))
     assert "no run of the axis 'hoist' has the role 'fit'" in refused("fit", CAMPAIGN)
+
+
+def test_one_fit_at_a_time_into_a_folder(refused: Words, virtual: Path, tmp_path: Path) -> None:
+    words = ("fit", CAMPAIGN, "--axis", "boom", "--out", "results/fitted")
+    with locked(tmp_path / "results" / "fitted"):
+        sentence = refused(*words)
+        assert "results/fitted is in use" in sentence
+        assert f"process {os.getpid()} on" in sentence
+        assert "--out" in sentence
+    assert "no axis 'boom'" in refused(*words)  # and leaves no folder behind
+
+
+def test_a_model_that_is_executed_says_so(run, virtual: Path, tmp_path: Path) -> None:
+    page = re.sub(r"[\s│]+", " ", run("fit", "--help").stdout)
+    assert "The file is executed: name only one that you trust" in page
+    (tmp_path / "ending.py").write_text("import sys\nsys.exit(7)\n")
+    done = run("fit", CAMPAIGN, "--model", "ending.py")
+    assert done.exit_code == 2
+    sentence = done.stderr
+    assert "ending.py" in sentence
+    assert "sys.exit(7)" in sentence
+    assert "__main__" in sentence
 
 
 # --- validate -------------------------------------------------------------------------------------
@@ -212,6 +271,15 @@ def test_validations_that_are_refused(refused: Words, held_out: Path) -> None:
     assert "no run of the axis 'hoist' has the role 'validate'; another" in said
 
 
+def test_the_command_and_python_write_the_same(done: Words, held_out: Path, tmp_path: Path) -> None:
+    (tmp_path / "setup.toml").write_text(stages(card="J_plus", pump="Z10"), "utf-8")
+    words = ("--setup", "setup.toml", "--profile", "Z10", "--starts", "1", "--seed", "4")
+    done("fit", CAMPAIGN, *words, "--jobs", "1", "--no-report")
+    result = swashplate.identify(CAMPAIGN, free="setup.toml", profiles="Z10", starts=1, seed=4)
+    for file in result.save("python"):
+        assert file.read_bytes() == (tmp_path / "fitted" / file.name).read_bytes(), file.name
+
+
 # --- report ---------------------------------------------------------------------------------------
 
 
@@ -221,9 +289,7 @@ def fitted(held_out: Path, tmp_path: Path) -> Fit:
     campaign = Campaign.from_toml(held_out)
     setup = Setup.model_validate(tomllib.loads(stages(card="J_plus", pump="Z10")))
     found = fit(Drive.preset("hoist").parameters, campaign.select(role="fit"), setup)
-    (tmp_path / "fitted").mkdir()
-    Drive(found.parameters).to_toml(tmp_path / "fitted" / "drive.toml")
-    Judged(campaign, found, notes={"seed": "7"}).store(tmp_path / "fitted" / "fit.json")
+    Identification(campaign, found, notes={"seed": "7"}).save(tmp_path / "fitted")
     return found
 
 

@@ -77,6 +77,8 @@ def test_what_a_command_does_not_import(tmp_path, typed, without):
     ("name", "value", "said"),
     [
         ("SOURCE_DATE_EPOCH", "yesterday", "SOURCE_DATE_EPOCH is 'yesterday', no number of sec"),
+        ("NUMBA_NUM_THREADS", "abc", "Error: NUMBA_NUM_THREADS is 'abc', no number of threads"),
+        ("NUMBA_NUM_THREADS", "0", "Error: NUMBA_NUM_THREADS is '0', no number of threads"),
         ("MPLBACKEND", "no_such_backend", None),
     ],
 )
@@ -87,6 +89,7 @@ def test_the_surroundings(tmp_path, name, value, said):
     assert done.stdout.isascii()  # a terminal without our characters
     assert done.returncode == (0 if said is None else 2), done.stderr
     assert (said or "") in done.stderr
+    assert said is None or done.stderr.count("\n") == 1
     assert (tmp_path / "run.png").exists() == (said is None)
 
 
@@ -132,6 +135,14 @@ def test_ctrl_c_leaves_whole_files_only(tmp_path):
     files = [path for path in tmp_path.rglob("*") if path.is_file()]
     assert [path for path in files if path.name.startswith(".")] == []
     assert all(path.read_bytes().endswith(b"\n") for path in files)
+
+
+@pytest.mark.parametrize("maneuver", ["step:1e308", "sine:1e308,0.1", "stairs:1e308/0"])
+def test_a_number_beyond_any_use_is_one_sentence(tmp_path, maneuver):
+    """NumPy's warnings of an overflow do not come before it."""
+    done = swashplate("simulate", "hoist", maneuver, cwd=tmp_path)
+    assert done.returncode == 2
+    assert re.fullmatch(r"Error: .*1e\+308.*\n", done.stderr)
 
 
 # --- doctor ---------------------------------------------------------------------------------------

@@ -158,7 +158,8 @@ def test_what_was_measured_beside_the_voltage_counts(done, refused):
     for wrong, said in (
         ("pump_speed=n", "a maneuver has no columns, so give a number in SI"),
         ("speed=1", "write NAME=COLUMN, once for each of load_torque, pump_speed"),
-        ("supply_pressure=-3", "falls to -3, but must be 1 Pa or above"),
+        ("supply_pressure=-3", "falls to -3, but must be from 1 to 1e+09"),
+        ("pump_speed=1e308", "rises to 1e+308, but must be from 0 to 10"),
     ):
         assert said in refused("simulate", "hoist", "step:9", "--measured", wrong)
 
@@ -166,6 +167,8 @@ def test_what_was_measured_beside_the_voltage_counts(done, refused):
 def test_a_recursion_for_another_rate_becomes_its_equation(done):
     text = done("simulate", "hoist", "step:9", "--rate", "1000", "--out", "run.parquet")
     assert "a recursion for 512 Hz; at 1000 Hz the differential equation" in text
+    slow = " ".join(done("simulate", "hoist", "step:9", "--rate", "100").split())
+    assert "at 100 Hz, computed in steps of 1/600 s, the differential equation" in slow
     exact = Drive.preset("hoist").at_every_rate()
     run = exact.simulate(maneuvers.step(9.0).sample(1000.0), 1000.0)
     assert np.array_equal(pl.read_parquet("run.parquet")["shaft_speed"], run.shaft_speed)
@@ -248,6 +251,9 @@ def test_a_packaged_name_goes_before_a_folder(done, refused, tmp_path):
     assert "There is no drive.toml in ./hoist: give a folder" in refused("limits", "./hoist")
     Path("hoist/parameters.toml").touch()
     assert "./hoist is the fit of a model of your own" in refused("limits", "./hoist")
+    said = refused("export", "./hoist", "--fmu", "hoist.fmu")
+    assert 'swashplate.export.fmu(model, "model.fmu", parameters=..., step=...)' in said
+    assert "hoist/parameters.toml" in said
 
 
 # --- export ---------------------------------------------------------------------------------------

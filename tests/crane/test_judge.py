@@ -14,7 +14,7 @@ from swashplate.crane.judgment import mean_of, more_seaways, share_of
 from swashplate.crane.result import PUMPS
 from swashplate.errors import InputError, ParameterError
 from swashplate.executors import Processes, Serial, Threads
-from swashplate.identification.assessment import Judged
+from swashplate.identification.assessment import Identification
 from swashplate.identification.fitting import fit
 from swashplate.identification.setup import Free, Setup, load_setup
 from swashplate.maneuvers import source_tests
@@ -231,8 +231,8 @@ def fitted(tmp_path_factory):
     free = {"Z16": Free(relative=(0.5, 2.0))}
     setup = Setup(stages=(stage.model_copy(update={"free": free, "forces": None}),))
     result = fit(Drive.preset("luff").parameters, campaign.experiments, setup)
-    judged = Judged(campaign, result)
-    judged.store(place / "fit.json")
+    judged = Identification(campaign, result)
+    judged.save(place)
     result.drive.to_toml(place / "drive.toml")
     return place, result, judged.verdict
 

@@ -136,6 +136,36 @@ def test_damaged_files_are_dropped(tmp_path: Path) -> None:
     assert (again["march"], again["march hits"], again["other hits"]) == (46.0, 1, 1)
 
 
+BYTEARRAY = b"\x80\x05\x96" + (1 << 20).to_bytes(8, "little") + b"x" * 64
+"""The beginning of a pickle that Python's own reader stumbles over on its way out."""
+
+
+@pytest.mark.slow
+def test_a_garbled_index_is_not_unpickled(tmp_path: Path) -> None:
+    run(tmp_path)
+    environment = {"NUMBA_CACHE_DIR": str(tmp_path / "cache")}
+    for garbled in (BYTEARRAY, b"cos\nsystem\n(S'echo run >&2'\ntR.", bytes(range(256))):
+        for path in (tmp_path / "cache").rglob("*.nbi"):
+            path.write_bytes(garbled)
+        done = python("-c", RUN, str(tmp_path), **environment)
+        assert json.loads(done.stdout)["march"] == 46.0
+        assert done.stderr == ""
+
+
+@pytest.mark.slow
+def test_a_folder_in_the_place_of_machine_code(tmp_path: Path) -> None:
+    """The kernel is compiled, and a warning names what is in the way."""
+    run(tmp_path)
+    paths = [*(tmp_path / "cache").rglob("machine.march-*.nbc")]
+    for path in paths:
+        path.unlink()
+        path.mkdir()
+    done = python("-c", RUN, str(tmp_path), NUMBA_CACHE_DIR=str(tmp_path / "cache"))
+    assert json.loads(done.stdout)["march"] == 46.0
+    assert len(paths) == 1
+    assert str(paths[0]) in done.stderr
+
+
 # --- closures -------------------------------------------------------------------------------------
 
 
@@ -311,6 +341,10 @@ def test_kernels_around_compiled_functions_are_kept_apart(tmp_path: Path) -> Non
 @pytest.mark.skipif(os.name == "nt", reason="a file is no folder everywhere, but not by this name")
 def test_without_a_place_it_works_with_a_warning(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
-    done = generate(tmp_path, NUMBA_CACHE_DIR=str(tmp_path / "file"))
+    (tmp_path / "temporary").mkdir()
+    done = generate(
+        tmp_path, NUMBA_CACHE_DIR=str(tmp_path / "file"), TMPDIR=str(tmp_path / "temporary")
+    )
     assert done.stdout.startswith("(15.0, 7.0, 4.0)")
     assert UNCACHED in done.stderr
+    assert not [*(tmp_path / "temporary").iterdir()]  # nothing is left behind

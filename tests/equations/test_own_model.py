@@ -177,7 +177,7 @@ def test_a_number_stands_for_a_constant_input() -> None:
     levels = {"command": COMMAND, "push": np.full(COMMAND.size, 0.2)}
     expected = simulate(both, P, levels, RATE)["position"]
     assert (simulate(both, P, {**levels, "push": 0.2}, RATE)["position"] == expected).all()
-    with pytest.raises(InputError, match="same number of samples: none is a record"):
+    with pytest.raises(InputError, match="single number: give an array"):
         simulate(both, P, {"command": 1.0, "push": 0.2}, RATE)
 
 

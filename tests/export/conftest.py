@@ -65,7 +65,8 @@ class InC:
         for name in ("find", "find_output", "find_input", "find_option"):
             self.function(name).argtypes = [ctypes.c_char_p]
         self.function("limits").restype = ctypes.c_uint
-        self.function("get_option").restype = ctypes.c_bool
+        for name in ("get_option", "valid"):
+            self.function(name).restype = ctypes.c_bool
         self.model = ctypes.create_string_buffer(self.function("size")())
         assert self.init(values) == 0
 

@@ -1,5 +1,6 @@
 """FMUs as an importer runs them: FMPy loads the library and calls its functions."""
 
+import re
 import shutil
 from collections.abc import Callable, Iterator
 from dataclasses import replace
@@ -300,6 +301,27 @@ def test_state_of_another_size_version_or_drive_is_refused(made, hoist):
     master.state = kept
 
 
+def test_a_damaged_state_is_refused_and_nothing_of_it_is_set(made, hoist):
+    voltage = command(300)
+    master = made(hoist).begin(voltage=voltage[0])
+    master.played(voltage[:200])
+    kept = master.state
+    rng = np.random.default_rng(2)
+    ends = len(kept) - 1 - rng.integers(0, 600, 40)  # modes, flags and places stand near the end
+    for at in (*rng.integers(0, len(kept), 40), *ends, *range(0, 48, 3)):
+        wrong = bytearray(kept)
+        for extra in rng.integers(0, 8, rng.integers(1, 5)):  # up to four bits within a byte or two
+            wrong[min(at + extra // 4, len(kept) - 1)] ^= 1 << (extra % 8)
+        if wrong == kept:
+            continue
+        with pytest.raises(FMICallException):
+            master.state = bytes(wrong)
+        assert re.search("is damaged|header or size|another set of", master.said[-1])
+    assert sum("this state is damaged" in each for each in master.said) > 60
+    after = master.played(voltage[200:], start=200 * H)
+    assert np.array_equal(after, stepped(hoist, voltage)[200:])
+
+
 def test_reset_gives_the_start_values_back(made, hoist):
     voltage = command(200)
     master = made(hoist).begin(voltage=voltage[0])
@@ -340,6 +362,8 @@ def refuses(master: Master, call: Callable[[], Any], said: str = "") -> None:
     [
         *(("voltage", np.nan), ("load_torque", np.inf), ("Z9", -np.inf), ("tau", np.nan)),
         *(("Z16_plus", -1e-4), ("Z9", 0.0), ("V_dz_minus", -1.0)),
+        *(("pump_speed", 1800.0), ("pump_speed", -0.1), ("load_torque", 1e300)),
+        ("supply_pressure", 0.0),
     ],
 )
 def test_refuses_what_is_no_number_or_out_of_range(made, hoist, name, value):
@@ -370,8 +394,36 @@ def test_a_step_that_cannot_be_made_fails_until_a_reset(made, hoist, begun, chan
 def test_time_does_not_go_back(made, hoist):
     master = made(hoist).begin()
     master.step(0.0, 0.5)
-    for at in ((0.1, H), (0.5, -H), (0.5, np.nan), (np.nan, H)):
+    for at in ((0.1, H), (0.5, -H), (0.5, np.nan), (np.nan, H), (0.5, np.inf), (-np.inf, H)):
         refuses(master, lambda at=at: master.step(*at))
+    master.step(0.5, H)
+
+
+def test_a_step_begins_where_the_model_stands(made, hoist):
+    master, voltage = made(hoist).begin(voltage=4.0), np.full(200, 4.0)
+    master.step(0.0, 0.125)
+    for time in (5.0, 0.125 + 2.0 * H, 0.0, 1e11):
+        refuses(master, lambda time=time: master.step(time, H), "stands at 0.125 s")
+    master.step(0.125 + 1e-3 * H, 0.125)  # the rounding of a master's sum
+    assert master.get(*OUTPUTS) == stepped(hoist, voltage)[128].tolist()
+
+
+def test_a_step_too_long_to_wait_for_is_refused(made, hoist):
+    master, voltage = made(hoist).begin(voltage=4.0), np.full(200, 4.0)
+    for interval in (1e9, 1e300, 2e4):
+        refuses(master, lambda interval=interval: master.step(0.0, interval), "at most 19531.25 s")
+    master.step(0.0, 64 * H)
+    assert master.get(*OUTPUTS) == stepped(hoist, voltage)[64].tolist()
+
+
+@pytest.mark.parametrize("times", [(np.nan,), (np.inf,), (-1e300,), (0.0, np.nan), (5.0, 1.0)])
+def test_start_and_stop_are_finite_and_in_order(made, hoist, times):
+    master = made(hoist)
+    master.instantiate()
+    names = ("startTime", "stopTime")
+    begin = master.fmu.setupExperiment if master.two else master.fmu.enterInitializationMode
+    refuses(master, lambda: begin(**dict(zip(names, times, strict=False))), "time")
+    master.initialize(0.5)
     master.step(0.5, H)
 
 
@@ -385,6 +437,66 @@ def test_calls_in_a_wrong_order_fail(made, hoist):
     refuses(master, lambda: master.set(start_steady=True))  # fixed by then
     for reference in (99, 310, 4_000_000_000):
         refuses(master, lambda reference=reference: master.read([reference]))
+
+
+def test_a_run_that_has_begun_keeps_its_start(made, hoist, fmi):
+    if fmi == "3.0":
+        pytest.skip("FMI 3.0 takes the start with the beginning of initialization")
+    master, voltage = made(hoist).begin(voltage=4.0), np.full(80, 4.0)
+    for start in (np.nan, 1e9, -1e9, 0.0):
+        refuses(master, lambda start=start: master.fmu.setupExperiment(startTime=start), "stepping")
+    master.step(0.0, 64 * H)
+    assert master.get(*OUTPUTS) == stepped(hoist, voltage)[64].tolist()
+
+
+def test_after_termination_values_can_be_read_and_nothing_else_done(made, hoist):
+    master = made(hoist)
+    master.instantiate()
+    refuses(master, master.fmu.terminate, "before initialization")
+    master.initialize(voltage=4.0)
+    master.step(0.0, 64 * H)
+    kept, last = master.state, master.get(*OUTPUTS)
+    master.fmu.terminate()
+    assert master.get(*OUTPUTS) == last
+    refuses(master, lambda: master.step(64 * H, H), "after termination")
+    refuses(master, lambda: master.set(voltage=1.0), "after termination")
+    refuses(master, master.fmu.terminate, "after termination")
+    assert master.get(*OUTPUTS) == last
+    master.state = kept
+    master.step(64 * H, H)
+    master.fmu.terminate()
+    master.fmu.reset()
+    master.initialize()
+    master.step(0.0, H)
+
+
+@pytest.mark.parametrize("cause", ["overflow", "delay"])
+def test_after_a_failure_outputs_are_refused_and_a_reset_heals(made, hoist, cause):
+    master = made(hoist.replace(Z10=1e308) if cause == "overflow" else hoist).begin(voltage=4.0)
+    master.step(0.0, H)
+    master.set(**({"pump_speed": 10.0} if cause == "overflow" else {"tau": 5.0}))
+    refuses(master, lambda: master.step(H, H), cause)
+    refuses(master, lambda: master.get("shaft_speed"), "after the failure")
+    refuses(master, lambda: master.step(H, H), "after the failure")
+    refuses(master, lambda: master.set(voltage=1.0), "after the failure")
+    assert master.get("voltage") == [4.0]
+    master.fmu.terminate()
+    master.fmu.reset()
+    master.initialize()
+    master.step(0.0, H)
+    assert np.isfinite(master.get(*OUTPUTS)).all()
+
+
+def test_ramps_that_lead_out_of_a_range_fail_with_the_name(made, hoist, fmi):
+    if fmi == "3.0":
+        pytest.skip("FMI 3.0 has no derivatives of inputs")
+    master = made(hoist).begin()
+    speed = master.by_name["pump_speed"].valueReference
+    for slope in (np.nan, -np.inf, 1e308):
+        refuses(master, lambda slope=slope: master.fmu.setRealInputDerivatives([0], [1], [slope]))
+    master.fmu.setRealInputDerivatives([speed], [1], [10.0])
+    refuses(master, lambda: master.step(0.0, 2.0), "pump_speed is 10.0")
+    refuses(master, lambda: master.get("shaft_speed"), "after the failure")
 
 
 def test_late_without_a_delay_unless_inputs_are_set_first(made):

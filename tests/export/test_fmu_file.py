@@ -81,6 +81,8 @@ def test_validators_find_nothing(axis, fmi, tmp_path):
     assert read.coSimulation.canGetAndSetFMUstate
     assert read.coSimulation.canSerializeFMUstate
     assert read.coSimulation.canHandleVariableCommunicationStepSize
+    assert "BSD-3-Clause" in read.license
+    assert "swashplate developers" in read.copyright
     text = zipfile.ZipFile(path).read("modelDescription.xml").decode()
     assert not re.search(r'"[+-]?(inf|nan)', text, re.IGNORECASE)
 
@@ -257,6 +259,7 @@ def test_manifest_has_hash_and_verdict_of_each_library():
         assert entry["sha256"] == sha256(content).hexdigest()
         assert entry["bytes"] == len(content)
         assert "equal" in entry["equal_bits"] or "not run" in entry["equal_bits"]
+        assert "-O" in entry["optimize"]
 
 
 def exported_by(header: str) -> list[str]:

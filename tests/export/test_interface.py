@@ -88,7 +88,34 @@ def test_a_domain_that_is_left_is_said_and_a_reset_heals_and_keeps_values(
     ).all()
 
 
+def test_outputs_that_overflow_are_said(hoist: Drive, in_c: Any) -> None:
+    model = in_c(hoist.replace(Z10=1e308))
+    assert [model.step(9.0) for _ in range(5)] == [OK] * 5
+    assert model.set_input(model.number("_input", "pump_speed"), 10.0) == OK
+    assert model.step(9.0) == DOMAIN
+
+
 # --- state ----------------------------------------------------------------------------------------
+
+
+def test_a_copy_with_a_place_or_a_flag_that_cannot_be_is_not_valid(hoist: Drive, in_c: Any) -> None:
+    """Any bit of the places and flags behind the delay line: valid ones go on without harm."""
+    model = in_c(hoist)
+    model.run(COMMAND[:50], NAMES)
+    good = bytes(model.model)
+    assert model.valid()
+    refused = 0
+    for bit in range(8 * (len(good) - 16), 8 * len(good)):  # newest, stale, settled
+        wrong = bytearray(good)
+        wrong[bit // 8] ^= 1 << bit % 8
+        model.model.raw = bytes(wrong)
+        if model.valid():
+            model.step(1.0)
+        else:
+            refused += 1
+    assert (
+        refused >= 22 + 14
+    )  # of a place up to 1,023 all bits above the tenth, of flags all but one
 
 
 @pytest.mark.parametrize(
@@ -170,6 +197,7 @@ def test_inputs_set_and_cleared(hoist: Drive, in_c: Any) -> None:
     assert model.set_input(speed, -0.1) == BAD_VALUE
     assert model.set_input(supply, 0.0) == BAD_VALUE
     assert model.set_input(supply, -5e6) == BAD_VALUE
+    assert model.set_input(supply, 1e10) == model.set_input(speed, 1800.0) == BAD_VALUE
     assert model.clear_input(speed) == OK
     one, two = model.run(COMMAND[300:], NAMES), plain.run(COMMAND[300:], NAMES)
     assert (one["shaft_speed"] == two["shaft_speed"]).all()

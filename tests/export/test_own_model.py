@@ -288,6 +288,22 @@ def test_webassembly_of_a_model_has_the_bits_of_its_march(tmp_path: Path) -> Non
     assert page.call("run", 1) == 1  # it has no equation for a settled start
 
 
+def test_webassembly_says_what_overflows_and_takes_no_place_beyond_its_rows(
+    hoist: Drive, tmp_path: Path
+) -> None:
+    page = Page(wasm(hoist, tmp_path / "hoist.wasm"))
+    step, volts = 1.0 / 512.0, np.full(20, 9.0)
+    names = [name for _, _, name in content_of(hoist, step).exported.named("parameters")]
+    expected = hoist.simulate(volts, interpolation="previous").current
+    assert page.call("begin", 2**31 - 1, step, 1) == 1
+    for place in (-1, 16, 2**31 - 1):
+        page.call("select", place, 0)
+    (current,) = page.run([volts], step, [2])
+    assert (current == expected).all()
+    assert page.call("set", names.index("pump_speed"), 1e308) == 0
+    assert page.call("run", 0) == 4  # SWP_DOMAIN
+
+
 # --- folders --------------------------------------------------------------------------------------
 
 

@@ -237,6 +237,7 @@ def whole_interface(model: Any) -> None:
         model.output(number)
         model.set_input(number, 1.0)
         model.set_input(number, float("nan"))
+        model.set_input(number, -1e300)
         model.clear_input(number)
         model.function("sentence")(number)
         model.function("parameter_name")(number)
@@ -265,6 +266,12 @@ def whole_interface(model: Any) -> None:
     for step in (0.0, 0.001, 0.001, 1.0):
         model.set_step(step)
     model.get_step(), model.limits(), model.update(), model.function("value_count")()
+    model.valid()
+    kept_model = bytes(model.model)
+    for at in range(len(kept_model)):
+        model.model[at] = b"\xff"
+        model.valid()
+        model.model[at] = kept_model[at : at + 1]
     values = values_of(Drive.preset("hoist"))
     for at in range(values.size):
         for bad in (float("nan"), 99.0, 1e9):

@@ -1,5 +1,8 @@
 """Fuzzing of all readers for some minutes: damaged files must end in one sentence, or be read.
 
+Logs are damaged byte by byte; campaigns, drives, fit configurations and cranes also by what nobody
+writes, such as keys of 20,000 parts, with logs whose headers have units that are none.
+
     python tests/fuzz/run.py [--minutes 3] [--kind hdf5] [--seed 1]
 
 Each kind is read in processes of its own, in turn until the time is over; every file is on disk
@@ -19,13 +22,16 @@ import tempfile
 import time
 from pathlib import Path
 
+import documents
 import numpy as np
-from seeds import KINDS, SHIPS, valid
+from seeds import KINDS as LOGS
+from seeds import SHIPS, valid
 
 from swashplate import SwashplateError
 from swashplate.crane import read_ship
 from swashplate.logs import open_log
 
+KINDS = (*LOGS, *documents.READERS)
 KEPT = Path(__file__).parents[2] / ".hypothesis" / "fuzz"
 SLICE = 20.0  # seconds that a process fuzzes
 PATIENCE = 80.0  # seconds that all of its files may take beyond that
@@ -111,6 +117,9 @@ def check(path: Path, error: SwashplateError, limited: bool) -> None:
 
 def work(kind: str, number: int, seconds: float, folder: Path) -> None:
     """Damage and read files of a kind for so many seconds."""
+    if kind in documents.READERS:
+        work_on_documents(kind, number, seconds, folder)
+        return
     # the others are read in a process that has a limit of its own
     limited = kind in ("text", "veres", "wamit", "ship table")
     sources, reader = list(valid(kind, folder / "valid")), read_of_ship if kind in SHIPS else read
@@ -133,6 +142,21 @@ def work(kind: str, number: int, seconds: float, folder: Path) -> None:
         reader(path, limited)
         grown = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before
         assert grown * 1024 < GIGABYTE, f"{grown >> 10} MB for a file of {len(content)} bytes"
+        count += 1
+    print(f"{count} files")
+
+
+def work_on_documents(kind: str, number: int, seconds: float, folder: Path) -> None:
+    """Spoil and read documents of a kind for so many seconds."""
+    random, count = np.random.default_rng(number), 0
+    text = documents.valid(kind, folder)
+    documents.read_document(kind, folder, text, random)
+    end = time.monotonic() + seconds
+    while time.monotonic() < end:
+        name = folder / f"log{Path(documents.READERS[kind][0]).suffix}"
+        spoiled = documents.spoiled(text, random)
+        name.write_text(spoiled, "utf-8")  # what is kept if it fails
+        documents.read_document(kind, folder, spoiled, random)
         count += 1
     print(f"{count} files")
 

@@ -17,6 +17,7 @@ from swashplate.identification.experiment_design import (
     Candidate,
     Outlook,
     Sensor,
+    advice_table,
     advise,
     bench,
     best_tests_table,
@@ -44,6 +45,10 @@ def test_a_candidate_that_mixes_known_and_unknown_tells_of_the_unknown_alone() -
     assert found.after[0] == pytest.approx(0.1)
     assert found.after[1] == pytest.approx(0.1, rel=1e-3)
     assert found.d_gain == pytest.approx(1.0)
+    # what was not known before has no error to come from
+    assert "b to 10 %" in str(advice_table("", [found]))
+    (sharper,) = advise(diagonal(0.1, 0.2), [Candidate("b", np.array([[0.0, 1e3]]))], AB)
+    assert "b 20 % to 0.1 %" in str(advice_table("", [sharper]))
 
 
 def test_the_order_is_that_of_determinants_computed_apart() -> None:
@@ -303,6 +308,9 @@ def test_weak_is_what_the_given_covariance_says() -> None:
     wider = judged(RNG.normal(size=(10, 3)), "abc", covariance=9.0 * given).sentences()
     assert sum("Weak" in each for each in wider) == 1
     assert "Weak, each with those before it fixed: a to ±35.3 % and c to ±23.5 %." in wider[-1]
+    assert "all 3 free parameters, 2 of them weakly" in wider[0]
+    widest = judged(RNG.normal(size=(10, 3)), "abc", covariance=1e4 * given).sentences()
+    assert "a not even to ±100 %" in widest[-1]
 
 
 EXACT = ["scale of pressure", "zero of pressure", "scale of spool travel", "scale of force"]

@@ -293,3 +293,14 @@ def test_a_channel_that_is_clipped_at_several_steps(noise: float, cut: bool) -> 
     assert len(found) == (cut and noise > 0.0)
     if found:
         assert "'y' stands at exactly 1 1 at inputs that differ by 2 1" in found[0]
+
+
+@pytest.mark.parametrize(
+    ("error", "said"),
+    [(0.004, "smaller than 0.8 % would not be noticed"), (0.6, "do not check it at all")],
+)
+def test_how_small_an_error_stays_unseen(error: float, said: str) -> None:
+    """Two standard errors; of one as large as the signal a number says nothing."""
+    kind = faults.SCALE._replace(plausible=1e3)
+    scale = faults.Fault(kind, "scale of counts", 0.0, 100.0 * error, 0.0, 0.0, ())
+    assert said in scale.assumption

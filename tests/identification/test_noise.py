@@ -91,6 +91,12 @@ def test_drifts_and_next_to_no_residuals() -> None:
     assert colour(np.zeros(100)).inflation == 1.0
 
 
+def test_what_correlation_does_to_intervals_is_said() -> None:
+    """First order with 0.9: 1.9/0.1 = 19 samples are worth one, intervals √19 times as wide."""
+    found = colour(first_order(0.9, np.random.default_rng(2), (400_000,)))
+    assert "about 4.4 times as wide" in found.sentence
+
+
 def test_channels_and_steps_have_their_own_colours() -> None:
     kinds = (("a", "speed", RATE), ("a", "current", RATE), ("b", "speed", 100.0))
     runs = [

@@ -20,7 +20,7 @@ from swashplate import (
 )
 from swashplate.equations import Model, Tap, equation, simulate
 from swashplate.identification import (
-    Judged,
+    Identification,
     ModelSetup,
     OwnModel,
     Problem,
@@ -28,7 +28,6 @@ from swashplate.identification import (
     Unknown,
     Unknowns,
     fit,
-    load_fit,
     predict,
     solve,
     verdict,
@@ -348,12 +347,14 @@ def test_a_name_that_begins_like_a_sensors_zero_is_the_models() -> None:
 def test_a_fit_comes_back_with_its_model_alone(tmp_path: Path) -> None:
     tests, path = campaign(*RUNS), tmp_path / "fit.json"
     made = fit(servo, tests, RANGES, noise=NOISE)
-    Judged(tests, made).store(path)
+    Identification(tests, made).save(tmp_path)
     with pytest.raises(InputError, match="give that, with --model"):
-        load_fit(path, tests)
+        Identification.load(path, tests)
     with pytest.raises(InputError, match="another model, or of other bounds"):
-        load_fit(path, tests, model=ModelSetup(servo, {**RANGES, "lag": (0.1, 0.2, 3.0)}))
-    again = load_fit(path, tests, model=ModelSetup(servo, RANGES, noise=NOISE)).result
+        Identification.load(
+            path, tests, model=ModelSetup(servo, {**RANGES, "lag": (0.1, 0.2, 3.0)})
+        )
+    again = Identification.load(path, tests, model=ModelSetup(servo, RANGES, noise=NOISE)).fit
     assert again.parameters.numbers == made.parameters.numbers
     assert again.stages[0].uncertainty.estimates == (made.stages[0].uncertainty.estimates)
 

@@ -9,8 +9,8 @@ import pytest
 from tests.identification.given import TWO_STAGES, put
 
 from swashplate import Campaign, Drive, FileError, InputError, ParameterError
-from swashplate.identification.assessment import Judged, fingerprint, load_fit
-from swashplate.identification.fitting import Fit, fit
+from swashplate.identification.assessment import Identification
+from swashplate.identification.fitting import Fit, fingerprint, fit
 from swashplate.identification.profiles import Point, Profile
 from swashplate.identification.resampling import CrossValidation, Fold
 from swashplate.identification.solving import Solution
@@ -37,20 +37,20 @@ def fitted(campaign: Campaign) -> Fit:
 
 @pytest.fixture
 def path(campaign: Campaign, fitted: Fit, tmp_path: Path) -> Path:
-    Judged(campaign, fitted).store(tmp_path / "fit.json")
+    Identification(campaign, fitted).save(tmp_path)
     return tmp_path / "fit.json"
 
 
 def test_a_fit_comes_back_as_it_was(path: Path, campaign: Campaign, fitted: Fit) -> None:
-    stored = load_fit(path, campaign)
+    stored = Identification.load(path, campaign)
     # others read it, too: it is JSON without numbers of its own
     content = json.loads(path.read_text("utf-8"), parse_constant=lambda word: pytest.fail(word))
     assert content["stages"][0]["starts"][1]["cost"] == "Infinity"
-    assert stored.result.runs == campaign.experiments
-    assert stored.result.setup == fitted.setup
-    assert stored.result.nominal == fitted.nominal
-    assert stored.result.parameters == fitted.parameters
-    for ours, theirs in zip(stored.result.stages, fitted.stages, strict=True):
+    assert stored.fit.runs == campaign.experiments
+    assert stored.fit.setup == fitted.setup
+    assert stored.fit.nominal == fitted.nominal
+    assert stored.fit.parameters == fitted.parameters
+    for ours, theirs in zip(stored.fit.stages, fitted.stages, strict=True):
         assert ours.stage == theirs.stage
         for one, other in zip(ours.starts, theirs.starts, strict=True):
             assert (one.number, one.cost) == (other.number, other.cost)
@@ -70,8 +70,9 @@ def test_profiles_folds_and_notes_come_back(tmp_path, campaign, fitted) -> None:
     fold = Fold(0, ("a",), ("J",), held, True)
     folds = CrossValidation(3, 2, (fold,), held, {"current": "A"})
     path = tmp_path / "fit.json"
-    Judged(campaign, fitted, profiles=[profile], folds=folds, notes={"seed": "3"}).store(path)
-    stored = load_fit(path, campaign)
+    result = Identification(campaign, fitted, profiles=[profile], folds=folds, notes={"seed": "3"})
+    result.save(tmp_path)
+    stored = Identification.load(path, campaign)
     assert stored.folds == folds
     assert stored.notes == {"seed": "3"}
     (back,) = stored.profiles
@@ -88,26 +89,26 @@ def test_profiles_folds_and_notes_come_back(tmp_path, campaign, fitted) -> None:
     del entry["name"]
     content["profiles"] = [[entry.pop("stage"), entry]]
     path.write_text(json.dumps(content), "utf-8")
-    (older,) = load_fit(path, campaign).profiles
+    (older,) = Identification.load(path, campaign).profiles
     assert (older.name, older.stage, older.rise) == (profile.name, "card", profile.rise)
     entry["index"] = 99
     path.write_text(json.dumps(content), "utf-8")
     with pytest.raises(FileError, match="stage card has no parameter 100"):
-        load_fit(path, campaign)
+        Identification.load(path, campaign)
 
 
 def test_another_campaign_is_refused(path: Path, campaign: Campaign) -> None:
     first, second = campaign.experiments
     alone = replace(campaign, experiments=(first,))
     with pytest.raises(InputError, match="was fitted to the run '.*', which .* has not"):
-        load_fit(path, alone)
+        Identification.load(path, alone)
     current = second["current"]
     current = replace(current, weight=current.weight * (current.time > 0.1))
     ignored = replace(second, channels={**second.channels, "current": current})
     assert fingerprint(ignored) != fingerprint(second)
     changed = replace(campaign, experiments=(first, ignored))
     with pytest.raises(InputError, match="is not as it was when .* was fitted"):
-        load_fit(path, changed)
+        Identification.load(path, changed)
 
 
 POISON = {
@@ -125,5 +126,5 @@ POISON = {
 def test_a_poisoned_file_ends_in_a_sentence(path, campaign, poison, sentence) -> None:
     path.write_text(poison(path.read_text("utf-8")), "utf-8")
     with pytest.raises((FileError, ParameterError), match=f"fit.json.*{sentence}") as caught:
-        load_fit(path, campaign)
+        Identification.load(path, campaign)
     assert len(str(caught.value)) < 500

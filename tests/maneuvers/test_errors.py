@@ -1,4 +1,5 @@
 import math
+import tracemalloc
 
 import pytest
 
@@ -41,6 +42,15 @@ from swashplate.errors import InputError
         (lambda: maneuvers.multisine(1, (0.0, 0.2, 3)), "low must be positive"),
         (lambda: maneuvers.multisine(1, (0.1, 0.2, 50)), "50 frequencies from 0.1 to 0.2 Hz"),
         (lambda: maneuvers.multisine(1, (1e-3, 0.2, 3)), "cannot be told apart in 56.5 s"),
+        (lambda: maneuvers.step(1e308), "amplitude must be at most 1e.12, not 1e.308"),
+        (lambda: maneuvers.stairs([1.0, -1e308]), "levels must be at most 1e.12, not 1e.308"),
+        (lambda: maneuvers.rest(1) * 1e308, "factor must be at most 1e.12"),
+        (
+            lambda: maneuvers.parse("multisine:4,0.1:2:100000000"),
+            "100000000 frequencies from 0.1 to 2 Hz cannot be told apart",
+        ),
+        (lambda: maneuvers.multisine(1, (0.1, 250.0, 9000)), "9000 frequencies .* are too many"),
+        (lambda: maneuvers.multisine(1, [1e9]), "1 frequencies up to 1e.09 Hz .* are too many"),
         (lambda: maneuvers.rest(1) * math.nan, "factor must be finite"),
         (lambda: "twice" * maneuvers.rest(1), "factor must be a number"),
         (lambda: maneuvers.rest(1.3).sample(), "rest 1.3 s lasts 1.3 s, at 512 Hz 665.6 samples"),
@@ -61,3 +71,13 @@ def test_errors_say_what_is_wrong(make, message):
     with pytest.raises(InputError, match=message) as caught:
         make()
     assert "\n" not in str(caught.value)
+
+
+def test_a_sentence_on_too_many_frequencies_takes_no_memory():
+    tracemalloc.start()
+    try:
+        with pytest.raises(InputError):
+            maneuvers.multisine(4, (0.1, 2.0, 100_000_000))
+        assert tracemalloc.get_traced_memory()[1] < 10e6
+    finally:
+        tracemalloc.stop()

@@ -192,7 +192,7 @@ def test_files_with_errors(
 def test_missing_file_and_card(lines: dict[str, str], tmp_path: Path) -> None:
     with pytest.raises(FileError, match="There is no file"):
         Drive.from_toml(tmp_path / "nothing.toml")
-    with pytest.raises(FileError, match="is a folder, not a file"):
+    with pytest.raises(FileError, match="no drive.toml in .*: give a folder that"):
         Drive.from_toml(tmp_path)
     with pytest.raises(ParameterError, match="rexroth_mdsd_1k_2x_4"):
         load(lines, tmp_path, HOIST.replace("2x_2", "9x_9"))

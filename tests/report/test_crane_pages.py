@@ -7,6 +7,7 @@ import re
 import numpy as np
 import pytest
 from matplotlib.figure import Figure
+from tests.report.conftest import injected
 
 from swashplate import InputError
 from swashplate.crane import (
@@ -94,6 +95,13 @@ def test_verdicts_page_says_what_the_judgment_does(tmp_path, judged):
 def test_verdicts_page_shows_in_a_browser_without_errors(tmp_path, judged, browsed):
     write_judgment(judged, tmp_path / "judge.html")
     assert "Limits of the drives" in browsed(tmp_path / "judge.html")
+
+
+@pytest.mark.slow
+def test_nothing_runs_in_a_page_but_its_own_scripts(tmp_path, scene, judged, browsed):
+    assert "data-drawn=" in injected(scene, tmp_path, browsed)
+    write_judgment(judged, tmp_path / "judge.html")
+    assert "Limits of the drives" in injected(tmp_path / "judge.html", tmp_path, browsed)
 
 
 def test_scenes_that_cannot_be_are_refused(tmp_path, crane, runs):

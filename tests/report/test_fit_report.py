@@ -15,9 +15,10 @@ import numpy as np
 import polars as pl
 import pytest
 from tests.identification.given import virtual
+from tests.report.conftest import injected, policy_of, with_script
 
 from swashplate import Campaign, Drive, FileError, InputError, maneuvers
-from swashplate.identification.assessment import Judged
+from swashplate.identification.assessment import Identification
 from swashplate.identification.criteria import verdict
 from swashplate.identification.fitting import Fit, fit
 from swashplate.identification.profiles import Point, Profile
@@ -77,13 +78,13 @@ def fitted(campaign: Campaign) -> Fit:
 
 
 @pytest.fixture(scope="module")
-def judged(campaign: Campaign, fitted: Fit) -> Judged:
+def judged(campaign: Campaign, fitted: Fit) -> Identification:
     """The fit with a profile, several starts and notes."""
     optimum = Point(0.0, 3.0, np.zeros(1))
     points = (Point(-0.1, 4.0, np.zeros(1)), optimum, Point(0.1, 4.5, np.zeros(1)))
     name, ends = fitted.stages[0].problem.unknowns.names[0], ("crossed", "crossed")
     profile = Profile(0, 3.0, points, 1.0, -0.1, 0.08, ends, None, name, "card")
-    return Judged(campaign, fitted, profiles=[profile], notes=NOTES)
+    return Identification(campaign, fitted, profiles=[profile], notes=NOTES)
 
 
 STARTS = tuple(
@@ -95,7 +96,7 @@ NOTES = {"command": HOSTILE, "seed": "4"}
 
 
 @pytest.fixture(scope="module")
-def page(tmp_path_factory: pytest.TempPathFactory, judged: Judged) -> Path:
+def page(tmp_path_factory: pytest.TempPathFactory, judged: Identification) -> Path:
     path = tmp_path_factory.mktemp("report") / "fit.html"
     write_fit_report(judged, path)
     return path
@@ -159,7 +160,7 @@ def read(page: Path) -> Page:
 
 
 @pytest.fixture
-def write(tmp_path: Path, judged: Judged):
+def write(tmp_path: Path, judged: Identification):
     """Write the report of the fit with other entries; what stands in it."""
 
     def written(truth=None, **entries) -> Page:
@@ -178,9 +179,9 @@ def number(text: str) -> float:
     return float(found[1]) * 10.0 ** int((found[2] or "0").translate(raised))
 
 
-def test_estimates_and_intervals_are_those_of_the_fit(read: Page, judged: Judged) -> None:
+def test_estimates_and_intervals_are_those_of_the_fit(read: Page, judged: Identification) -> None:
     rows = {row["name"]: row for row in read.rows("parameters")}
-    for stage in judged.result.stages:
+    for stage in judged.fit.stages:
         for estimate in stage.uncertainty.estimates:
             if estimate.name.startswith("offset"):
                 continue
@@ -266,9 +267,9 @@ def test_samples_of_a_run_are_in_the_page(read: Page, fitted: Fit) -> None:
     assert float(np.abs(error).max()) < rms / 16.0
 
 
-def test_every_sample_can_be_had_as_a_table(tmp_path: Path, judged: Judged) -> None:
+def test_every_sample_can_be_had_as_a_table(tmp_path: Path, judged: Identification) -> None:
     path = tmp_path / "samples.parquet"
-    write_samples(shown_runs(judged.result.stages, judged.predicted), path)
+    write_samples(shown_runs(judged.fit.stages, judged.predicted), path)
     table = pl.read_parquet(path)
     assert {*table["channel"]} == {"current", "counts", "speed from counts"}
     held = next(each for each in judged.predicted if each.channel == "current")
@@ -280,7 +281,7 @@ def test_every_sample_can_be_had_as_a_table(tmp_path: Path, judged: Judged) -> N
     assert 0.0 < ignored["time"].max() < 0.5
 
 
-def test_a_long_run_costs_few_bytes(judged: Judged) -> None:
+def test_a_long_run_costs_few_bytes(judged: Identification) -> None:
     quality = next(each for each in judged.predicted if each.channel == "current")
     channel = quality.experiment[quality.channel]
     many = 40
@@ -327,13 +328,13 @@ def test_the_panel_offers_first_what_was_fitted(read: Page) -> None:
     assert {each["symbol"] for each in values if each["main"]} == {"G1", "Z10", "omega"}
 
 
-def test_truth_stands_beside_the_estimates(write, judged: Judged, read: Page) -> None:
+def test_truth_stands_beside_the_estimates(write, judged: Identification, read: Page) -> None:
     truth = Drive.preset("hoist").replace(omega=(75.0, 80.0), G1=(0.051, 0.056)).parameters
     page = write(truth=truth)
     assert "truth" not in read.rows("parameters")[0]
     rows = {row["name"]: row for row in page.rows("parameters")}
     assert number(rows["G1_plus"]["truth"]) == pytest.approx(0.051, rel=1e-4)
-    estimates = judged.result.stages[0].uncertainty.estimates
+    estimates = judged.fit.stages[0].uncertainty.estimates
     (estimate,) = [each for each in estimates if each.name == "G1_plus"]
     holds = estimate.lower <= 0.051 <= estimate.upper
     assert rows["G1_plus"]["holds"] == ("yes" if holds else "no")
@@ -372,7 +373,9 @@ def test_the_first_screen_is_for_the_owner(read: Page, fitted: Fit, validated: P
     assert "Change first:" in read.words
 
 
-def test_each_run_has_a_light_and_links(read: Page, write, campaign, judged: Judged) -> None:
+def test_each_run_has_a_light_and_links(
+    read: Page, write, campaign, judged: Identification
+) -> None:
     rows = read.rows("overview")
     assert [row["role"] for row in rows] == ["fit", "fit", "validate"]
     assert rows[-1]["run"] == judged.predicted[0].experiment.name
@@ -402,7 +405,7 @@ def test_cross_validation_has_a_section(write) -> None:
 
 def test_starts_of_each_stage_are_listed(write, fitted: Fit) -> None:
     first, second = fitted.stages
-    page = write(result=replace(fitted, stages=(replace(first, starts=STARTS), second)))
+    page = write(fit=replace(fitted, stages=(replace(first, starts=STARTS), second)))
     assert "card: 2 of 4 starts reached the best cost, 3." in page.words
     assert "1 left the model's domain" in page.words
     listed = [row[:2] for row in page.tables["starts"][1:]]
@@ -441,7 +444,7 @@ def test_a_page_that_cannot_be_written_leaves_the_old_one(tmp_path, write, judge
     assert [each.read_text() for each in tmp_path.iterdir()] == ["old"]
 
 
-ZOOM = """<script>
+ZOOM = """
 addEventListener("load", () => {
   const stack = document.querySelector(".run .stack");
   const { left, width } = stack.getBoundingClientRect();
@@ -450,7 +453,7 @@ addEventListener("load", () => {
   stack.dispatchEvent(new PointerEvent("pointermove", at));
   dispatchEvent(new Event("beforeprint"));
 });
-</script></body>"""
+"""
 
 
 def test_the_page_renders_and_zooms_in_a_browser_without_errors(
@@ -458,7 +461,7 @@ def test_the_page_renders_and_zooms_in_a_browser_without_errors(
 ) -> None:
     assert browsed(validated).count('data-drawn="yes"') == 4
     zoomed = tmp_path / "zoomed.html"
-    zoomed.write_text(page.read_text("utf-8").replace("</body>", ZOOM), "utf-8")
+    zoomed.write_text(with_script(page.read_text("utf-8"), ZOOM), "utf-8")
     made = browsed(zoomed)
     # 3 runs, and one of those held out, which is alone on the first screen
     assert made.count('data-drawn="yes"') == made.count('class="stack"') == 4
@@ -475,6 +478,35 @@ def test_the_page_renders_and_zooms_in_a_browser_without_errors(
     assert len(ticks) > 4
 
 
+def test_nothing_runs_in_a_report_but_its_own_scripts(
+    page: Path, validated: Path, tmp_path: Path, browsed
+) -> None:
+    assert injected(validated, tmp_path, browsed).count('data-drawn="yes"') == 4
+    assert injected(page, tmp_path, browsed).count('data-drawn="yes"') == 4
+    # of the live page within it, which is folded until somebody opens it
+    opened = tmp_path / "opened.html"
+    text = page.read_text("utf-8").replace('<details class="screen">', "<details open>")
+    opened.write_text(with_script(text.replace('loading="lazy"', ""), FRAMED), "utf-8")
+    assert 'data-framed="yes"' in browsed(opened)
+
+
+FRAMED = """
+const wait = setInterval(() => {
+  const { contentDocument } = document.querySelector("iframe.live");
+  if (contentDocument?.body?.dataset.ready !== "yes") return;
+  clearInterval(wait);
+  document.body.dataset.framed = "yes";
+}, 5);
+"""
+
+
+def test_nothing_runs_in_a_live_page_but_its_own_scripts(tmp_path: Path, browsed) -> None:
+    page = tmp_path / "live.html"
+    write_live_page(Drive.preset("hoist"), page, command=parse("step:9"))
+    assert policy_of(page.read_text("utf-8"))["script-src"][-1] == "'wasm-unsafe-eval'"
+    assert 'data-ready="yes"' in injected(page, tmp_path, browsed)
+
+
 def test_a_report_is_printed(page: Path, tmp_path: Path, browsed) -> None:
     printed = tmp_path / "fit.pdf"
     print_report(page, printed)
@@ -488,7 +520,7 @@ def test_a_report_is_printed(page: Path, tmp_path: Path, browsed) -> None:
 # --- the live page --------------------------------------------------------------------------------
 
 
-ACTS = """<script>
+ACTS = """
 const act = (words, value) => {
   const range = document.querySelector(`input[type=range][aria-label="${words}"]`);
   range.value = value;
@@ -514,15 +546,14 @@ const wait = setInterval(() => {
   const textContent = JSON.stringify(made);
   document.body.append(Object.assign(document.createElement("pre"), { id: "made", textContent }));
 }, 5);
-</script></body>"""
+"""
 
 
 def acted(page: Path, tmp_path: Path, browsed, lever: str = "orifice") -> dict:
     """What a browser makes of a page of which one lever's slider is moved, and then reset."""
     tried = tmp_path / "tried.html"
-    tried.write_text(
-        page.read_text("utf-8").replace("</body>", ACTS.replace("LEVER", lever)), "utf-8"
-    )
+    script = ACTS.replace("LEVER", lever)
+    tried.write_text(with_script(page.read_text("utf-8"), script), "utf-8")
     found = re.search(r'<pre id="made">(.*?)</pre>', browsed(tried, ""), re.DOTALL)
     assert found is not None
     return json.loads(html.unescape(found[1]))

@@ -1,11 +1,13 @@
 """A drive with an equation of one's own has all that a drive has."""
 
 import pickle
+import sys
 from pathlib import Path
 from typing import Annotated, NamedTuple
 
 import numpy as np
 import pytest
+import tomlkit
 
 from swashplate import Drive, InputError, ParameterError, maneuvers
 from swashplate.analysis import envelope
@@ -131,3 +133,49 @@ def test_a_file_keeps_its_equations(tmp_path: Path) -> None:
     path.write_text(text.replace(f"{__name__}:faster", "nobodys_module:faster"))
     with pytest.raises(ParameterError, match="faster of the module nobodys_module: import that"):
         Drive.from_toml(path)
+
+
+PLACE = f"{__name__}:faster"
+USED = "swashplate.models.pump:shaft_speed"
+
+
+@pytest.mark.parametrize(
+    ("entry", "sentence"),
+    [
+        ({"old": "os:system", "new": "os:system"}, "os:system is no equation"),
+        ({"old": USED, "new": "json:dumps"}, "json:dumps is no equation"),
+        ({"old": USED, "new": "os:environ"}, "os:environ is no equation"),
+        ({"old": USED, "new": PLACE, "parameters": "os:environ"}, "os:environ is no class of"),
+        ({"old": USED, "new": PLACE, "parameters": "builtins:dict"}, "builtins:dict is no class"),
+        ({"old": PLACE, "new": PLACE}, "does not use faster"),
+        ({"old": USED, "new": f"{__name__}:sealed_balance"}, "arguments of shaft_speed"),
+        ({"old": "swashplate.cli:x", "new": PLACE}, "x of the module swashplate.cli"),
+        ({"old": "antigravity:geohash", "new": PLACE}, "geohash of the module antigravity"),
+        ({"old": USED}, "needs an entry 'new'"),
+        ({"old": USED, "new": PLACE, "code": "1"}, "has no entry 'code'"),
+        ({"old": USED, "new": True}, "equations 1.new is True"),
+        (
+            {
+                "old": "swashplate.models.channel:steady_current",
+                "new": "swashplate.models.channel:steady_current",
+                "parameters": f"{__name__}:Seal",
+            },
+            "steady_current is an equation of the card",
+        ),
+    ],
+)
+def test_a_file_names_equations_and_nothing_else(
+    entry: dict[str, object], sentence: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("TOKEN_OF_THE_TEST", "secret")
+    path = tmp_path / "drive.toml"
+    PLAIN.with_equation(shaft_speed, faster).to_toml(path)
+    content = tomlkit.parse(path.read_text("utf-8"))
+    content["model"]["equations"] = [entry]  # type: ignore[index]
+    path.write_text(tomlkit.dumps(content), "utf-8")
+    with pytest.raises(ParameterError) as refused:
+        Drive.from_toml(path)
+    assert str(refused.value).startswith(str(path))
+    assert sentence in str(refused.value)
+    assert "secret" not in str(refused.value)
+    assert "antigravity" not in sys.modules

@@ -90,14 +90,57 @@ def test_what_is_measured_goes_into_a_step_as_into_a_simulation(hoist: Drive, ra
     ("measured", "inputs", "said"),
     [
         (["lad"], (1.0, 2.0), "hoist has no input 'lad'; it has voltage, pump_speed"),
-        (["pump_speed"], (1.0, -1.0), "pump_speed is -1.0, but must be .* of 0 or above"),
-        (["supply_pressure"], (1.0, 0.0), "supply_pressure is 0.0, but must be .* of 1 or above"),
+        (["pump_speed"], (1.0, -1.0), "pump_speed is -1.0, but must be .* from 0 to 10"),
+        (["supply_pressure"], (1.0, 0.0), "supply_pressure is 0.0, but must be .* from 1 to"),
+        (["pump_speed"], (1.0, 1800.0), "pump_speed is 1800.0, but must be .* from 0 to 10"),
         (["pump_speed"] * 2, (1.0, 1.0, 1.0), "takes each input once"),
     ],
 )
 def test_measured_inputs_without_sense_are_refused(hoist: Drive, measured, inputs, said) -> None:
     with pytest.raises(InputError, match=said):
         hoist.stepper(measured=measured).step(*inputs)
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "least"),
+    [
+        ("pump_speed", 1e308, "0 to 10"),
+        ("pump_speed", 1800.0, "0 to 10"),
+        ("load_torque", -1e300, "-1e.12 to 1e.12"),
+        ("supply_pressure", 1e10, "1 to 1e.09"),
+    ],
+)
+def test_what_no_machine_has_is_refused_with_its_range(
+    hoist: Drive, name: str, value: float, least: str
+) -> None:
+    with pytest.raises(InputError, match=f"The {name} (rises|falls) to .* from {least}"):
+        hoist.simulate(np.full(10, 1.0), **{name: value})
+
+
+def test_a_sample_that_is_not_finite_is_an_error_that_names_it(hoist: Drive) -> None:
+    """Numbers that overflow in an output alone: the states stay finite."""
+    huge, voltage = hoist.replace(Z10=1e308), np.full(6000, 9.0)
+    speed = np.where(np.arange(6000) < 512, 1.0, 10.0)
+    with pytest.raises(DomainError, match=r"hoist: shaft_speed is \S+ at 1 s.* this voltage"):
+        huge.simulate(voltage, pump_speed=speed, interpolation="previous")
+    stepper = huge.stepper(measured=("pump_speed",))
+    with pytest.raises(DomainError, match=r"hoist: shaft_speed is \S+: .* this voltage"):
+        [stepper.step(*pair) for pair in zip(voltage, speed, strict=True)]
+    many = hoist.simulate_many({"Z10": np.array([12.0, 1e308])}, voltage=voltage, pump_speed=speed)
+    assert list(many.failures) == [1]
+    assert np.isfinite(many.output[0]).all()
+
+
+def test_an_integral_that_overflows_is_an_error_that_names_it(hoist: Drive) -> None:
+    huge, voltage = hoist.replace(Z10=1e308), np.full(6000, 9.0)
+    run = huge.simulate(voltage)
+    assert np.isfinite(run.shaft_speed).all()
+    for _ in range(2):
+        with pytest.raises(DomainError, match="hoist: shaft_position overflows"):
+            run["shaft_position"]
+    stepper = huge.stepper()
+    with pytest.raises(DomainError, match="integral overflows"):
+        [stepper.step(volts) for volts in voltage]
 
 
 def test_state_of_another_rate_is_refused(hoist: Drive) -> None:

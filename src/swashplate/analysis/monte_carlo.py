@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from json import JSONDecodeError, loads
 from pathlib import Path
 
 import numpy as np
@@ -12,11 +11,9 @@ from numpy.typing import NDArray
 
 from swashplate.analysis.outcomes import Outcome, Trial, outcome_matrix
 from swashplate.analysis.whatif import pulled
-from swashplate.campaign import Campaign
-from swashplate.documents import read_text
 from swashplate.drive import Drive
-from swashplate.errors import DomainError, FileError, InputError, ParameterError
-from swashplate.identification.assessment import load_fit
+from swashplate.errors import DomainError, InputError, ParameterError
+from swashplate.identification.assessment import Identification
 from swashplate.identification.drive_model import DriveModel
 from swashplate.identification.fitting import StageFit
 from swashplate.parameters.parameter_set import ParameterSet
@@ -25,8 +22,9 @@ from swashplate.results import Result
 
 Array = NDArray[np.float64]
 
-MOST_REDRAWN = 20
-"""Draws outside the model's domain for each one inside from which the drawing is given up."""
+MOST_REDRAWN, NARROWED = 20, 0.1
+"""Draws outside the model's domain for each one inside from which the drawing is given up, and part
+of all draws from which those that were left out narrow the bands."""
 
 # --- drives that the tests allow ------------------------------------------------------------------
 
@@ -59,10 +57,13 @@ class Draws(Result):
                 f"Not drawn, as fitted in all drives: {', '.join(self.fixed)}; the bands leave out "
                 "what their errors would add."
             )
-        if self.redrawn:
+        drawn = self.redrawn + len(self.drives)
+        if self.redrawn > NARROWED * drawn:
             said.append(
-                f"{self.redrawn} draws lay outside bounds or the model's domain and were drawn "
-                "again."
+                f"The bands are too narrow: {100.0 * self.redrawn / drawn:.0f} % of the drives "
+                "that the errors of the estimates allow lie beyond the parameters' bounds or the "
+                "model's domain, and were left out. Widen the bounds in the fit configuration, or "
+                "fix the parameters that are not determined."
             )
         return tuple(said)
 
@@ -158,8 +159,6 @@ def _drawn(stages: Sequence[StageFit], random: np.random.Generator) -> Parameter
 
 # --- drives of a stored fit -----------------------------------------------------------------------
 
-STORED = "fit.json"  # What a fit's folder holds of it.
-
 
 def stored_draws(
     folder: str | Path,
@@ -188,18 +187,8 @@ def stored_draws(
     FileError, InputError, ParameterError
         If the folder holds no fit, or campaign or drive are not those of the fit.
     """
-    place, path = Path(folder), Path(folder) / STORED
-    if not path.is_file():
-        raise InputError(f"{place} holds no {STORED}: give a folder that a fit wrote.")
-    try:
-        tests = Path(loads(read_text(path))["campaign"]) if campaign is None else Path(campaign)
-    except (JSONDecodeError, KeyError, TypeError) as error:
-        raise FileError(f"{path} is no stored fit: {error}.") from None
-    if campaign is None and not tests.is_file():
-        raise InputError(
-            f"{path} was fitted to {tests}, which is not there: say where the campaign is."
-        )
-    fit = load_fit(path, Campaign.from_toml(tests)).result
+    place = Path(folder)
+    fit = Identification.load(place, campaign).fit
     if drive is not None:
         given, found = drive.parameters.numbers, fit.drive.parameters.numbers
         other = [name for name, value in found.items() if given[name] != value]

@@ -95,7 +95,7 @@ class Requirements(Result):
     def __post_init__(self) -> None:
         if not self.given:
             raise InputError(
-                "Require at least one of a speed, an acceleration and a tracking error."
+                "Nothing is required: give a speed, an acceleration, a tracking error, or several."
             )
         for name, value in self.given.items():
             if not (np.isfinite(value) and value > 0.0):

@@ -1,4 +1,7 @@
 from . import rig as rig
+from .amplifier import AmplifierGuess as AmplifierGuess
+from .amplifier import amplifier_table as amplifier_table
+from .amplifier import guess_amplifier as guess_amplifier
 from .campaign import Campaign as Campaign
 from .campaign import json_schema as json_schema
 from .draft import draft_campaign as draft_campaign

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from difflib import get_close_matches
@@ -13,7 +14,7 @@ from swashplate.campaign import schema
 from swashplate.campaign.experiment import Experiment
 from swashplate.campaign.reading import read_run
 from swashplate.documents import parse_toml, read_text, validated
-from swashplate.errors import InputError
+from swashplate.errors import InputError, ParameterError, UnknownNameError
 from swashplate.logs import open_log
 from swashplate.results import Result, figures
 from swashplate.tables import Column as Head
@@ -24,6 +25,8 @@ if TYPE_CHECKING:
 
     from swashplate.drive import Drive
 
+_OPEN = re.compile("=.*FIXME")
+"""A line of a draft that a person has to fill in."""
 LISTED = 12
 """Runs that a sentence names."""
 
@@ -114,8 +117,8 @@ class Campaign(Result):
 
         Raises
         ------
-        InputError
-            If there is none of that name.
+        UnknownNameError
+            If there is none of that name; it is a ``KeyError`` as well.
         IndexError
             If there are not so many.
         """
@@ -125,12 +128,12 @@ class Campaign(Result):
         if name in by_name:
             return by_name[name]
         if any(name == run or name.startswith(f"{run} ") for run in self.ignored):
-            raise InputError(f"{self.path}: the run '{name}' has the role 'ignore'.")
+            raise UnknownNameError(f"{self.path}: the run '{name}' has the role 'ignore'.")
         near = get_close_matches(name, by_name, 1)
         meant = f" (did you mean {near[0]}?)" if near else ""
         known = ", ".join([*by_name][:LISTED])
         more = f" and {len(by_name) - LISTED} more" if len(by_name) > LISTED else ""
-        raise InputError(f"{self.path} has no run '{name}'{meant}; it has {known}{more}.")
+        raise UnknownNameError(f"{self.path} has no run '{name}'{meant}; it has {known}{more}.")
 
     def select(
         self, *, axis: str | None = None, role: schema.Role | None = None
@@ -189,5 +192,16 @@ def read_campaign_file(path: str | Path) -> schema.CampaignFile:
     ParameterError
         If an entry is wrong; the sentence names it.
     """
-    origin = str(path)
-    return validated(parse_toml(read_text(path), origin), schema.CampaignFile, origin)
+    origin, text = str(path), read_text(path)
+    try:
+        return validated(parse_toml(text, origin), schema.CampaignFile, origin)
+    except ParameterError as error:
+        # of a draft the entry that is wrong or missing is most often one that was left open
+        lines = enumerate(text.splitlines(), 1)
+        marked = [str(number) for number, line in lines if _OPEN.search(line)]
+        if not marked:
+            raise
+        which = f"lines {', '.join(marked)} are" if len(marked) > 1 else f"line {marked[0]} is"
+        raise ParameterError(
+            f"{str(error).rstrip('.')}; {which} marked FIXME: fill in what is missing."
+        ) from None

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
-from math import pi
+from math import floor, pi
 from pathlib import Path
 from typing import NamedTuple, get_args
 
@@ -23,6 +23,7 @@ from swashplate.campaign.schema import KINDS, ROD, TURNS, CampaignFile, InputKin
 from swashplate.documents import parse_toml, toml_key, toml_string, validated
 from swashplate.errors import FileError, InputError
 from swashplate.logs import Column, Log, open_log
+from swashplate.parameters.files import NEUTRAL, preset_names
 from swashplate.units import speed_unit, to_si
 
 Array = NDArray[np.float64]
@@ -47,6 +48,21 @@ OF = "(?: (?:of|der|des|du|de|del|della|do|da|van|av) .*)?"
 """What may follow in such a name: "Drehzahl der Trommel"."""
 INPUTS = get_args(InputKind)
 HALVES = {"current_plus", "current_minus"}
+PLC = re.compile(
+    r"(?:PIW|PEW|PQW|PAW|AIW|AQW|IW|EW)\d*[_ ](?P<after>.+)|(?P<before>.+)[_ ](?:W|WORD|INT|RAW)",
+    re.IGNORECASE,
+)
+"""Names of a PLC's words, such as "PIW_STROKE" and "JOY_W"."""
+SMALLEST_WORD, MILLIVOLTS, OVERRANGE = 100, 10_500, 32_511
+"""Whole numbers that reach no further than the first are no PLC's words; those that reach further
+than the second are no millivolts of a card; a SIMATIC's word, whose full scale is 27648, reaches to
+the third at most."""
+OPEN_UNITS = ("stroker_pressure", "swash_angle", "spool_position")
+"""Kinds that hardly a logger writes in SI."""
+TICKS = {"ms": 1e-3, "us": 1e-6, "ns": 1e-9}
+"""Units of whole numbers that count the time, and their size. [s]"""
+SLOWEST_LOG = 1.0
+"""Rate from which a log of a drive's motion is plausible. [Hz]"""
 MANY = 4
 """Runs from which on one is held back for validation."""
 
@@ -60,10 +76,18 @@ class _Guess(NamedTuple):
     axis: str = ""
     """What stands before the word in its name, such as the "boom" of "Boom Cmd", or empty."""
     unit: str | None = None
+    given: bool = False
+    """Whether somebody said so."""
     in_header: bool = True
     """Whether its unit stands in brackets, or in a row of its own, where it is read from again."""
     rolls_over_at: float = 0.0
     """Reading after which an encoder's counter or an angle begins anew; 0 if it does not."""
+    why: str = "from its name"
+    """What its unit rests on, for the comment beside it, if it does not stand in the header."""
+    of_plc: bool = False
+    """Whether its name is that of a PLC's word."""
+    full_scale: int = 0
+    """Reading of a PLC's word at full scale; 0 if the numbers are no such words."""
 
 
 class _Axis(NamedTuple):
@@ -81,6 +105,7 @@ def draft_campaign(
     *,
     columns: Mapping[str, str] | None = None,
     units: Mapping[str, str] | None = None,
+    title: str | None = None,
 ) -> str:
     """Text of a campaign file for some logs.
 
@@ -97,6 +122,8 @@ def draft_campaign(
         Of all encoders. Without it the entry stays open, and the file is refused until it is given.
     columns, units : mapping of str to str, optional
         What some columns are, ``"time"`` or a kind such as ``"voltage"``, and their units.
+    title : str, optional
+        Heading of the report; by default the folder's name, marked as guessed.
 
     Returns
     -------
@@ -110,7 +137,8 @@ def draft_campaign(
     FileError
         If a log cannot be opened.
     InputError
-        If there is no log, or none has a column that is named.
+        If there is no log, none has a column that is named, or a unit that is given measures
+        something else than the column's kind.
     """
     given, units, folder = dict(columns or {}), dict(units or {}), Path(folder).resolve()
     opened = [open_log(path) for path in logs]
@@ -125,11 +153,17 @@ def draft_campaign(
             why = f"'{name}' cannot be a '{what}': it is time, {', '.join(KINDS)}"
     if why:
         raise InputError(f"{why}.")
+    for name in sorted(given.keys() & units.keys()):
+        _check_unit(given[name], units[name], f"Column '{name}' ({given[name]})")
     numbers = [_numbers(log, [column.name for column in log.columns]) for log in opened]
     parts = {name: [each[name] for each in numbers if name in each] for name in headers}
     guesses = _guesses(headers, parts, counts_per_turn, given, units)
-    axes = _axes(guesses, Path(drive).stem if drive is not None else "drive")
-    lines = [HEADER, f"title = {toml_string(folder.name)}", ""]
+    # an axis is called like its drive, but no machine like the start for any of them
+    axes = _axes(guesses, "drive" if drive in (None, NEUTRAL) else Path(drive or "").stem)
+    heading = f"title = {toml_string(title or folder.name)}"
+    if title is None:
+        heading += "    # guessed, the folder's name: the report's heading; machine, place, author"
+    lines = [HEADER, heading, ""]
     for name, axis in axes.items():
         lines += _axis_lines(name, axis, guesses, parts, opened[0], drive, counts_per_turn)
     used = [each for axis in axes.values() for each in (*axis.inputs, *axis.channels.values())]
@@ -192,26 +226,43 @@ def _by_words(column: Column, name: str, unit: str | None) -> _Guess:
 def _by_header(column: Column, kind: str | None) -> _Guess:
     """What a header says, of a kind if one is given; the unit may be the end of its name."""
     name = re.sub(r"[\[(].*[\])]", "", column.name).strip()
+    word = PLC.fullmatch(name) if column.unit is None else None
+    if word is not None:
+        name = word["after"] or word["before"]
     unit = column.unit or ("rpm" if re.search(TURNS, name.lower()) else None)
     whole = _by_words(column, name, unit)
-    stem, _, ending = name.rpartition("_")
+    split = re.fullmatch(r"(.*)[_\s]+([^_\s]+)", name)
+    stem, ending = split.groups() if split else ("", name)
     short = _by_words(column, stem, None)
     if short.kind == "other" and ending in ("V", "mV"):
         short = short._replace(kind="voltage")
     if kind is not None:
         whole, short = (each._replace(kind=kind) for each in (whole, short))
-    measured = short.kind == "time" or (short.kind in KINDS and KINDS[short.kind].units)
-    if column.unit is None and measured and whole.kind not in HALVES:
-        try:
-            if short.kind == "time":
-                to_si(1.0, ending, "s", "")
-            else:
-                conversion(short.kind, ending, "")
-            return short._replace(unit=ending, in_header=False)
-        except InputError:
-            pass
+    if column.unit is None and whole.kind not in HALVES and _measures(short.kind, ending):
+        return short._replace(unit=ending, in_header=False)
     unit = unit if whole.kind == "shaft_speed" else column.unit
-    return whole._replace(unit=unit, in_header=column.unit is not None)
+    in_header = column.unit is not None
+    return whole._replace(unit=unit, in_header=in_header, of_plc=word is not None)
+
+
+def _check_unit(kind: str, unit: str, what: str) -> None:
+    """Refuse a unit that does not measure what a column is: time or a kind of signal."""
+    if kind == "time":
+        to_si(1.0, unit, "s", what)
+    else:
+        conversion(kind, unit, what)
+
+
+def _measures(kind: str, unit: str) -> bool:
+    """Whether a unit is one of time or of a kind that has units; counts are none."""
+    has_units = kind == "time" or (kind in KINDS and bool(KINDS[kind].units))
+    if not has_units or kind == "encoder_counts":
+        return False
+    try:
+        _check_unit(kind, unit, "")
+    except InputError:
+        return False
+    return True
 
 
 def _guesses(
@@ -234,7 +285,11 @@ def _guesses(
         values = [part for part in parts[name] if part.size]
         each = _by_header(column, given.get(name))
         kind = given.get(name, "" if each.kind in taken else each.kind)
-        each = each._replace(kind=kind, unit=units.get(name, each.unit))
+        each = each._replace(kind=kind, given=name in given)
+        if name in units:
+            each = each._replace(unit=units[name], in_header=False, why="given")
+        elif each.unit is None:
+            each = _with_unit_of_numbers(each, values)
         if kind == "encoder_counts" or not (kind or each.unit):
             size = max((rolls_over_at(part, counts_per_turn) for part in values), default=0)
             each = each._replace(kind="encoder_counts" if size else kind, rolls_over_at=size)
@@ -249,6 +304,59 @@ def _guesses(
         if alone and each.name not in given:
             met[n] = each._replace(kind="rectified_current")
     return met
+
+
+def _with_unit_of_numbers(signal: _Guess, parts: Sequence[Array]) -> _Guess:
+    """A column whose header gives no unit, with what its numbers say of one."""
+    finite = [part[np.isfinite(part)] for part in parts]
+    if signal.kind == "time":
+        unit, why = _time_unit(finite)
+        return signal._replace(unit=unit, why=why)
+    if signal.kind in ("", "encoder_counts", "position") or not finite:
+        return signal
+    full = _full_scale(finite, named=signal.of_plc)
+    if full:
+        return signal._replace(full_scale=full)
+    largest = max(float(np.abs(part).max(initial=0.0)) for part in finite)
+    if signal.kind == "voltage" and largest > SMALLEST_WORD and _whole(finite):
+        return signal._replace(unit="mV", why=f"guessed: whole numbers up to {largest:.9g}")
+    return signal
+
+
+def _whole(parts: Sequence[Array]) -> bool:
+    """Whether all numbers are whole."""
+    return all(bool(np.all(part == np.floor(part))) for part in parts)
+
+
+def _time_unit(parts: Sequence[Array]) -> tuple[str, str]:
+    """Unit of stamps without one, and why.
+
+    Seconds, unless they are whole numbers of which a step of one second or more would make a log
+    too slow for any motion: then the largest unit in which it is fast enough.
+    """
+    steps = [float(np.median(np.diff(part))) for part in parts if part.size > 1]
+    step = float(np.median(steps)) if steps else 0.0
+    if step < 1.0 / SLOWEST_LOG or not _whole(parts):
+        return "s", "guessed: the header gives none"
+    fast = (unit for unit, size in TICKS.items() if step * size <= 1.0 / SLOWEST_LOG)
+    unit = next(fast, "ns")
+    rate = 1.0 / (step * TICKS[unit])
+    return unit, f"guessed: whole numbers that step by {step:.9g}, {rate:.4g} Hz in {unit}"
+
+
+def _full_scale(parts: Sequence[Array], *, named: bool) -> int:
+    """Reading at full scale of what may be a PLC's word of 16 bits, or 0.
+
+    A word is a whole number too large to be of a physical unit, or called so by its column. 27648
+    is that of SIMATIC, 16384 and 32767 of others, whose words end there.
+    """
+    largest = max(float(np.abs(part).max(initial=0.0)) for part in parts)
+    least = SMALLEST_WORD if named else MILLIVOLTS
+    if not _whole(parts) or not least < largest <= 1 << 15:
+        return 0
+    if largest in (16383.0, 16384.0):
+        return 16384
+    return 27648 if largest <= OVERRANGE else max(int(largest), 32767)
 
 
 def _turn(values: Sequence[Array], unit: str) -> float:
@@ -293,8 +401,6 @@ def _axis_lines(
     counts_per_turn: float | None,
 ) -> list[str]:
     """Tables of an axis; what the first log does not show stays open."""
-    from swashplate.parameters.files import preset_names
-
     own = '# drive = "hoist"    # a packaged drive or a parameter file, to be fitted'
     if drive is not None:
         own = f"drive = {toml_string(name if name in preset_names() else drive)}"
@@ -328,31 +434,41 @@ def _clock(signal: _Guess, guesses: Sequence[_Guess]) -> str:
         return each.name.rpartition("/")[0] == signal.name.rpartition("/")[0]
 
     times = sorted((each for each in guesses if each.kind == "time"), key=beside, reverse=True)
-    for time in times[:1]:
-        unit = "" if time.in_header else f', unit = "{time.unit or "s"}"'
-        return f"time = {{ column = {toml_string(time.name)}{unit} }}"
-    return ""
+    if not times:
+        return ""
+    time = times[0]
+    column = f"column = {toml_string(time.name)}"
+    if time.in_header:
+        return f"time = {{ {column} }}"
+    return f"time = {{ {column}, unit = {toml_string(time.unit or 's')} }}    # {time.why}"
 
 
 def _signal_lines(each: _Guess, parts: Sequence[Array], counts_per_turn: float | None) -> list[str]:
     """Entries of an input or a channel."""
     percent = each.kind in ("other", "voltage") and each.unit == "%"
-    kind, scale = ("voltage", 0.1) if percent else (each.kind, 1.0)
+    command = percent or (each.kind in ("other", "voltage") and each.full_scale > 0)
+    kind, scale = ("voltage" if command else each.kind), 1.0
     known = KINDS[kind]
-    lines = [f'kind = "{kind}"    # guessed: {known.meaning}', f"column = {toml_string(each.name)}"]
+    guessed = "" if each.given and kind == each.kind else "guessed: "
+    lines = [f'kind = "{kind}"    # {guessed}{known.meaning}', f"column = {toml_string(each.name)}"]
     if percent:
+        scale = 0.1
         lines += ['unit = "V"', "scale = 0.1    # guessed: 100 % stand for the 10 V of a card"]
+    elif command:
+        # rounded down, or the largest word would be beyond the 10 V that a card takes
+        scale = floor(1e12 * 10.0 / each.full_scale) / 1e12
+        why = f"guessed: 10 V over {each.full_scale}, a PLC's word at full scale"
+        lines += ['unit = "V"', f"scale = {scale:.9g}    # {why}"]
     elif kind == "encoder_counts":
         unknown = f"# counts_per_turn = 1000    # {FIXME}: for one turn, quadrature included"
         stated = f"counts_per_turn = {counts_per_turn or 0:.12g}"
         lines.append(unknown if counts_per_turn is None else stated)
         lines.append("gear_ratio = 1.0    # turns of the encoder for one turn of the shaft")
-    elif not each.in_header:
-        rod = re.fullmatch(rf"(?:.* )?(?:{ROD}){OF}", _words(each.name))
-        usual = "mm" if rod else (*known.units, "1")[0]
-        usual = "deg" if each.rolls_over_at else usual
-        why = "from its name" if each.unit else "guessed: the header gives none"
-        lines.append(f"unit = {toml_string(each.unit or usual)}    # {why}")
+    else:
+        lines += _unit_lines(each)
+    if each.full_scale and not command:
+        why = f"range of the instrument over {each.full_scale}, as of a PLC's word at full scale"
+        lines.append(f"scale = 1.0    # {FIXME}: {why}")
     if size := each.rolls_over_at:
         lines.append(f"rolls_over_at = {size:.9g}    # guessed: begins anew there")
     if empty := sum(int(np.count_nonzero(~np.isfinite(part))) for part in parts):
@@ -362,6 +478,25 @@ def _signal_lines(each: _Guess, parts: Sequence[Array], counts_per_turn: float |
         why = "guessed: the first sample is neutral"
         lines.append(f"offset = {-scale * neutral:.9g}    # {why}")
     return lines
+
+
+def _unit_lines(signal: _Guess) -> list[str]:
+    """The entry of a signal's unit, none where the header has it."""
+    units = KINDS[signal.kind].units
+    usual = (*units, "1")[0]
+    if signal.unit is not None and units and not _measures(signal.kind, signal.unit):
+        why = f"'{signal.unit}', as the header has it, is no unit of a {signal.kind}"
+        return [f"unit = {toml_string(usual)}    # {FIXME}: {why}"]
+    if signal.in_header:
+        return []
+    if signal.unit is not None:
+        return [f"unit = {toml_string(signal.unit)}    # {signal.why}"]
+    if signal.rolls_over_at:
+        usual = "deg"
+    elif signal.kind == "position" and re.fullmatch(rf"(?:.* )?(?:{ROD}){OF}", _words(signal.name)):
+        usual = "mm"
+    mark = FIXME if signal.kind in OPEN_UNITS else "guessed"
+    return [f"unit = {toml_string(usual)}    # {mark}: the header gives none"]
 
 
 class _Run(NamedTuple):
@@ -410,10 +545,13 @@ def _run(
     except (FileError, InputError) as error:
         return made._replace(role=f'"ignore"    # {FIXME}: {error}')
     said, stratum, peak, seen = made.file, "", 0.0, set[str]()
+    parts = [each for each in experiments if each.axis == experiments[0].axis]
+    if NO_TIME not in text:
+        rate = 1.0 / float(np.median(np.diff(parts[0].input.time)))
+        lasts = float(parts[-1].input.time[-1] - parts[0].input.time[0])
+        said += f", {lasts:.4g} s at {rate:.4g} Hz"
+        said += f" in {len(parts)} parts" if len(parts) > 1 else ""
     for each in (each for each in experiments if each.axis not in seen):
-        if not seen and NO_TIME not in text:
-            rate = 1.0 / float(np.median(np.diff(each.input.time)))
-            said += f", {each.duration:.4g} s at {rate:.4g} Hz"
         seen.add(each.axis)
         said += f", {each.maneuver}" if each.input.kind == "voltage" else ""
         if moves_at_first(each):

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from swashplate.campaign.recognition import UNNAMED, Recognised
 from swashplate.campaign.schema import ChannelKind, InitialState, InputKind, Role, shown_unit
-from swashplate.errors import InputError
+from swashplate.errors import UnknownNameError
 from swashplate.results import Result, Tabular, figures
 from swashplate.tables import UNIT, Column, Table
 
@@ -248,7 +248,7 @@ class Experiment(Tabular):
         """
         if channel not in self.channels:
             known = ", ".join(self.channels)
-            raise InputError(f"{self.name} has no channel '{channel}'; it has {known}.")
+            raise UnknownNameError(f"{self.name} has no channel '{channel}'; it has {known}.")
         return self.channels[channel]
 
     def of_kind(self, *kinds: ChannelKind) -> tuple[Channel, ...]:

@@ -8,7 +8,7 @@ frees them, with bounds about them. Both are where a fit begins, not its result.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from itertools import product
 from math import inf, isfinite, log, sqrt
@@ -17,6 +17,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from swashplate.campaign.amplifier import CURRENTS, AmplifierGuess, guess_amplifier
 from swashplate.campaign.campaign import Campaign
 from swashplate.campaign.experiment import Channel, Experiment
 from swashplate.campaign.quality import spiked
@@ -58,6 +59,8 @@ ANGLE, FAR_STOP = 0.2, 0.39
 was not seen. [rad]"""
 ROUGH = 0.05
 """Error over the greatest speed from which the squares of errors grow as their sizes. [1]"""
+OFFSET = 0.1
+"""Largest neutral offset of the spool, over its travel at the greatest speed that was seen. [1]"""
 STEEPEST = 30.0
 """Volts that a radian takes at least, so that at 10 V and at the upper bounds of all gains the
 solenoids do not overpower the feedback spring. [V/rad]"""
@@ -107,6 +110,8 @@ class Guess(NamedTuple):
     """Greatest mean speed. [unit]"""
     fit_percent: float
     """100 (1 - error's RMS over the mean speeds' standard deviation). [%]"""
+    amplifier: AmplifierGuess | None = None
+    """What the current of the amplifier shows, None if no run measures one."""
 
 
 @inlined
@@ -246,9 +251,10 @@ def guess_drive(tests: Campaign | Sequence[Experiment]) -> Guess:
                 'needs a command in V: write kind = "voltage", unit = "V", and a scale that makes '
                 "its full range ±10 V; an offset is added after scaling, in V."
             )
-        sentence, gross = spoilt.get((each.name, channel.name), ("", False))
-        if gross:
-            raise InputError(f"{sentence}.")
+        for used in (channel, *each.of_kind(*CURRENTS)):
+            sentence, gross = spoilt.get((each.name, used.name), ("", False))
+            if gross:
+                raise InputError(f"{sentence}.")
         unit = f"{channel.unit}/s" if channel.is_position else channel.unit
         runs.append(_run(each, channel))
         if not _goes_with(runs[-1]):
@@ -261,7 +267,14 @@ def guess_drive(tests: Campaign | Sequence[Experiment]) -> Guess:
         )
     speeds = np.concatenate([np.zeros(0), *(run.speeds for run in runs)])
     weights = np.concatenate([np.zeros(0), *(run.windows.weights for run in runs)])
-    if np.sum(weights**2) < FEWEST:
+    worth = float(np.sum(weights**2))
+    moving = (channel for run in experiments for channel in run.of_kind(*kinds))
+    if worth < FEWEST and any(channel.used.any() for channel in moving):
+        raise InputError(
+            f"The runs are too short to guess from: they give {worth:.0f} mean speeds of "
+            f"{WINDOW:g} s, and at least {FEWEST} are needed."
+        )
+    if not speeds.size:
         raise InputError(
             "No run measures a motion that a guess could be read off: it needs a channel of the "
             "kind shaft_speed, position or encoder_counts that is not ignored."
@@ -287,6 +300,7 @@ def guess_drive(tests: Campaign | Sequence[Experiment]) -> Guess:
         command=command,
         speed=scale,
         fit_percent=100.0 * (1.0 - sqrt(unexplained)),
+        amplifier=guess_amplifier(experiments),
     )
 
 
@@ -499,11 +513,17 @@ def guessed_set(guess: Guess, source: str) -> ParameterSet:
     speed_of_flow = 1.0 / (max(guess.lag, SHORTEST) * flow * n["Z3"] * n["Z5"])
     pulls = [pull / (per_angle * flow * speed_of_flow) for pull in guess.acceleration]
     stops = [min(top / per_angle, FAR_STOP) for top in guess.top_speed]
-    changed: dict[str, float | tuple[float, float]] = {
-        "V_dz": guess.dead_zone,
-        "J": (guess.jump[0] / per_ampere, guess.jump[1] / per_ampere),
-        "G1": (guess.gain[0] / per_ampere, guess.gain[1] / per_ampere),
-        "tau": guess.delay,
+    changed: dict[str, float | tuple[float, float]]
+    if guess.amplifier is None:
+        changed = {
+            "V_dz": guess.dead_zone,
+            "J": (guess.jump[0] / per_ampere, guess.jump[1] / per_ampere),
+            "G1": (guess.gain[0] / per_ampere, guess.gain[1] / per_ampere),
+            "tau": guess.delay,
+        }
+    else:
+        changed = _with_current(guess, guess.amplifier, per_ampere / n["Z19_plus"])
+    changed |= {
         "Z8": speed_of_flow,
         "Z10": per_angle,
         "Z13": (stops[0], stops[1]),
@@ -517,14 +537,44 @@ def guessed_set(guess: Guess, source: str) -> ParameterSet:
         for symbol, each in made.parameters.items()
     }
     title = f"{guess.axis}: guessed from {source}"
-    return replace(made, name=guess.axis, title=title, parameters=said)
+    # of a current that was measured the filter has a meaning of its own, whatever the logs' rate
+    rate = made.rate if guess.amplifier is None else None
+    card = f"{guess.axis} card"
+    return replace(made, name=guess.axis, title=title, card=card, parameters=said, rate=rate)
+
+
+def _with_current(
+    guess: Guess, amplifier: AmplifierGuess, per_newton: float
+) -> dict[str, float | tuple[float, float]]:
+    """Numbers of the amplifier and of the solenoids, by symbol; speed per N of force given.
+
+    The machine moves from the current on that the amplifier has at the edge of the dead zone. A
+    jump of the speed is then one of the current beyond the solenoids' dead zone.
+    """
+    begins, forces = list[float](), list[float]()
+    for way in range(2):
+        per_ampere = guess.gain[way] / amplifier.gain[way]
+        edge = max(guess.dead_zone[way], amplifier.dead_zone[way] + 1e-6)
+        begins.append(max(amplifier.settled(way, edge) - guess.jump[way] / per_ampere, 0.0))
+        forces.append(per_ampere / per_newton)
+    tried = [current for current, command in zip(begins, guess.command, strict=True) if command]
+    return {
+        "V_dz": amplifier.dead_zone,
+        "J": amplifier.jump,
+        "G1": amplifier.gain,
+        **amplifier.dynamics,
+        "tau": amplifier.delay,
+        "Z17": sum(tried) / len(tried),
+        "Z19": (forces[0], forces[1]),
+    }
 
 
 CONFIGURATION = """\
 # Read off the logs of the axis '{0}' by `swashplate guess`: what they show is
 # free, within bounds about the first guess; what they do not show stays fixed.
 title = "{0}, guessed"
-
+"""
+CHAIN = """
 [[stages]]
 name = "drive"
 part = "chain"
@@ -532,38 +582,126 @@ channels = ["shaft_speed", "position", "encoder_counts"]
 
 [stages.free]
 """
+AMPLIFIER = """
+# The amplifier, from the current.
+[[stages]]
+name = "amplifier"
+part = "card"
+
+[stages.free]
+"""
+PUMP = """
+# Pump and motor, driven by the current of the fitted amplifier.
+[[stages]]
+name = "pump"
+part = "pump"
+channels = ["shaft_speed", "position", "encoder_counts"]
+
+[stages.free]
+"""
+SIDES = ("plus", "minus")
+NOT_TRIED = "# no run goes {}: its numbers are those of the other way, fixed"
 
 
 def fit_configuration(guess: Guess, start: ParameterSet | Drive) -> str:
-    """Text of a fit configuration that frees what was guessed, with bounds about it."""
+    """Text of a fit configuration that frees what was guessed, with bounds about it.
+
+    One stage from the command to the motion, or, if a current was measured, one of the amplifier
+    and one of the pump.
+    """
+    numbers, text = set_of(start).numbers, CONFIGURATION.format(guess.axis)
+    longest = max(2.0 * guess.delay, guess.delay + 0.1)
+    delay = f"tau = {{ bounds = [0.0, {longest:.4g}] }}    # delay"
+    if guess.amplifier is None:
+        lines = _command_lines(numbers, guess.command, [each > 0.0 for each in guess.jump])
+        lines += [*_limit_lines(guess), _lag_line(guess, 5.0), delay]
+        return text + CHAIN + "\n".join(lines) + "\n"
+    of_current = _command_lines(numbers, guess.amplifier.command, (True, True))
+    of_current += [*_dynamics_lines(numbers), delay]
+    # the guess's lag is that of amplifier and pump
+    of_motion = [*_solenoid_lines(guess, numbers), *_limit_lines(guess), _lag_line(guess, 20.0)]
+    text += AMPLIFIER + "\n".join(of_current) + "\n"
+    return text + PUMP + "\n".join(of_motion) + "\n"
+
+
+def _command_lines(
+    numbers: Mapping[str, float], command: Sequence[float], jumps: Sequence[bool]
+) -> list[str]:
+    """Dead zone, jump and gain of the amplifier each way."""
     lines = list[str]()
-    for side, way in (("plus", 0), ("minus", 1)):
-        if not guess.command[way]:
-            lines.append(f"# no run goes {side}: its numbers are those of the other way, fixed")
+    for side, largest, jumped in zip(SIDES, command, jumps, strict=True):
+        if not largest:
+            lines.append(NOT_TRIED.format(side))
             continue
-        numbers = set_of(start).numbers
         gain, jump = numbers[f"G1_{side}"], numbers[f"J_{side}"]
         # so that more command never means less current, whatever the gain within its bounds
-        curved = 0.2 * gain / guess.command[way]
+        curved = 0.2 * gain / largest
+        most = 4.0 * jump if jump else 0.5 * gain * largest
+        lines.append(f"V_dz_{side} = {{ bounds = [0.0, {0.95 * largest:.4g}] }}")
+        if jumped:
+            lines.append(f"J_{side} = {{ bounds = [0.0, {most:.4g}] }}    # jump")
         lines += [
-            f"V_dz_{side} = {{ bounds = [0.0, {0.95 * guess.command[way]:.4g}] }}",
-            *([f"J_{side} = {{ bounds = [0.0, {4.0 * jump:.4g}] }}    # jump"] if jump else []),
             f"G1_{side} = {{ relative = [0.5, 2.0], log = true }}",
             f"G2_{side} = {{ bounds = [{-curved:.4g}, {curved:.4g}] }}    # how the gain bends",
         ]
-        if isfinite(guess.top_speed[way]):
-            lines.append(f"Z13_{side} = {{ relative = [0.7, 1.4], log = true }}    # top speed")
-        if isfinite(guess.acceleration[way]):
-            lines.append(f"Z16_{side} = {{ relative = [0.3, 3.0], log = true }}    # acceleration")
-    longest = max(2.0 * guess.delay, guess.delay + 0.1)
-    lines += [
-        "Z8 = { relative = [0.2, 5.0], log = true }    # lag"
-        if guess.lag > TOLD
-        # the acceleration is that of Z8 times Z16: without a lag nothing tells them apart
-        else "# the lag is too short to be seen: Z8 stays fixed",
-        f"tau = {{ bounds = [0.0, {longest:.4g}] }}    # delay",
+    return lines
+
+
+def _dynamics_lines(numbers: Mapping[str, float]) -> list[str]:
+    """Filter and limits of rate of the current; a limit that is off stays off."""
+    lines = [
+        "zeta = { relative = [0.3, 3.0], log = true }    # damping of the current",
+        "omega = { relative = [0.2, 5.0], log = true }    # its natural frequency",
     ]
-    return CONFIGURATION.format(guess.axis) + "\n".join(lines) + "\n"
+    limits = {"lim1": "rate away from zero", "lim2": "rate towards zero", "a": "final decay"}
+    for symbol, meaning in limits.items():
+        if isfinite(numbers[f"{symbol}_plus"]):
+            lines.append(f"{symbol} = {{ relative = [0.3, 3.0], log = true }}    # {meaning}")
+    if isfinite(numbers["lim1_plus"]) and isfinite(numbers["I_t1_plus"]):
+        lines.append("I_t1 = { relative = [0.5, 2.0] }    # current above which lim1 acts")
+    return lines
+
+
+def _solenoid_lines(guess: Guess, numbers: Mapping[str, float]) -> list[str]:
+    """Dead zone and force of the solenoids."""
+    assert guess.amplifier is not None
+    currents = [guess.amplifier.settled(way, guess.command[way]) for way in range(2)]
+    begins = numbers["Z17"]
+    smallest = min(current for current, volts in zip(currents, guess.command, strict=True) if volts)
+    # below the largest current of either way, or nothing would move
+    most = min(2.0 * begins if begins else 0.5 * smallest, 0.95 * smallest)
+    lines = [f"Z17 = {{ bounds = [0.0, {max(most, 1.05 * begins):.4g}] }}    # dead zone"]
+    offset = OFFSET * numbers["Z5"] * numbers["Z3"] * guess.speed / numbers["Z10"]
+    lines.append(f"Z18 = {{ bounds = [{-offset:.4g}, {offset:.4g}] }}    # neutral offset")
+    for way, side in enumerate(SIDES):
+        if not guess.command[way]:
+            lines.append(NOT_TRIED.format(side))
+            continue
+        bends = 0.5 * numbers[f"Z19_{side}"] / max(currents[way] - begins, 1e-3)
+        lines += [
+            f"Z19_{side} = {{ relative = [0.5, 2.0], log = true }}    # force for a current",
+            f"Z20_{side} = {{ bounds = [{-bends:.4g}, {bends:.4g}] }}    # how it bends",
+        ]
+    return lines
+
+
+def _limit_lines(guess: Guess) -> list[str]:
+    """Top speed and acceleration of each way, if they were seen."""
+    lines = list[str]()
+    for way, side in enumerate(SIDES):
+        if guess.command[way] and isfinite(guess.top_speed[way]):
+            lines.append(f"Z13_{side} = {{ relative = [0.7, 1.4], log = true }}    # top speed")
+        if guess.command[way] and isfinite(guess.acceleration[way]):
+            lines.append(f"Z16_{side} = {{ relative = [0.3, 3.0], log = true }}    # acceleration")
+    return lines
+
+
+def _lag_line(guess: Guess, widest: float) -> str:
+    """The lag, up to so many times faster."""
+    if guess.lag > TOLD:
+        return f"Z8 = {{ relative = [0.2, {widest}], log = true }}    # lag"
+    # the acceleration is that of Z8 times Z16: without a lag nothing tells them apart
+    return "# the lag is too short to be seen: Z8 stays fixed"
 
 
 def guess_table(found: Guess) -> Table:

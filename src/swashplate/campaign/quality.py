@@ -8,8 +8,9 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from math import ceil, isnan, nan, pi
+from math import ceil, inf, isfinite, isnan, nan, pi
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -114,9 +115,6 @@ def examine(experiment: Experiment, unsigned: Collection[str] = ()) -> tuple[Qua
             said += _of_channel(experiment, signal, name not in unsigned)
             if signal.counts is not None:
                 lost = int(find_lost_counts(signal.time[used], signal.counts[used]).size)
-                if lost:
-                    times = "once" if lost == 1 else f"{lost} times"
-                    said.append(f"jumps {times} as no motion does: lost or doubled counts")
         else:
             if low == high:
                 said.append("the input never changes: nothing can be identified from this run")
@@ -151,6 +149,7 @@ def _of_channel(experiment: Experiment, channel: Channel, signed: bool) -> Itera
     if np.ptp(values) == 0.0 and np.ptp(drive.values) > 0.0:
         yield "never changes although the input does: is it connected?"
     yield from _of_spikes(experiment, channel)
+    yield from _of_lost_counts(experiment, channel)
     if channel.kind == "rectified_current" and has_sign([values], NEGATIVE):
         yield "turns negative, so it is not rectified: should it be signed_current?"
     steps = np.diff(np.unique(values))
@@ -284,7 +283,7 @@ def spikes(signal: Channel | InputSignal, drive: InputSignal) -> list[tuple[floa
     """Single samples that no motion explains: up to five in a row, of the input itself up to two.
 
     For each the instants before and after it, half an interval off [s], and its value farthest from
-    what lasts [unit of the signal]. An encoder has none; its are lost counts.
+    what lasts [unit of the signal]. Of an encoder, jumps of its counter that come back.
 
     Notes
     -----
@@ -296,7 +295,9 @@ def spikes(signal: Channel | InputSignal, drive: InputSignal) -> list[tuple[floa
     from scipy.ndimage import median_filter
 
     time, values = signal.time[signal.used], signal.values[signal.used]
-    if signal.kind in ("encoder_counts", "other") or time.size < 4 * NEIGHBOURS:
+    if isinstance(signal, Channel) and signal.counts is not None:
+        return [(each.begin, each.end, each.value) for each in lost_counts(signal) if each.returns]
+    if signal.kind == "other" or time.size < 4 * NEIGHBOURS:
         return []
     lasting = median_filter(values, size=NEIGHBOURS, mode="nearest")
     low, high = float(lasting.min()), float(lasting.max())
@@ -332,14 +333,85 @@ def _of_spikes(experiment: Experiment, signal: Channel | InputSignal) -> Iterato
     line = f"axes.{experiment.axis}.{place}.ignore = [{', '.join(windows[:NAMED])}]"
     if found:
         largest = f"{max((value for _, _, value in found), key=abs):.4g} {signal.unit}"
+        if isinstance(signal, Channel) and signal.counts is not None:
+            jumps = [each.counts for each in lost_counts(signal) if each.returns]
+            largest = f"{max(jumps, key=abs):+.0f} counts"
         spike = count(len(found), "spike")
         yield f"{spike}, up to {largest}{more}: leave out with {line} in this run"
 
 
-def spiked(experiments: Sequence[Experiment]) -> dict[tuple[str, str], tuple[str, bool]]:
-    """Channels with spikes, by run and name, and the line that leaves them out.
+class LostCounts(NamedTuple):
+    """A jump of an encoder's counter that no motion explains."""
 
-    Beside the sentence, whether a spike is gross: twice as far from the median as the channel moves
+    begin: float
+    """Half an interval before it. [s]"""
+    end: float
+    """Half an interval before it came back; infinite if it did not. [s]"""
+    counts: float
+    """Counts that it jumped by, less those of the motion before it."""
+    value: float
+    """Reading after it. [unit]"""
+
+    @property
+    def returns(self) -> bool:
+        """Whether the counter came back, so that leaving out the samples between is enough."""
+        return isfinite(self.end)
+
+
+def lost_counts(channel: Channel) -> list[LostCounts]:
+    """Jumps of an encoder's counter, see `samples.find_lost_counts`.
+
+    Two that cancel within five samples, but for what the shaft moves meanwhile, are one that came
+    back.
+    """
+    if channel.counts is None:
+        return []
+    time, counts = channel.time[channel.used], channel.counts[channel.used]
+    values, rows = channel.values[channel.used], find_lost_counts(time, counts).tolist()
+    half = 0.5 * float(np.median(np.diff(time))) if rows else 0.0
+    usual = float(np.median(np.abs(np.diff(counts)))) if rows else 0.0
+
+    def jump_at(row: int) -> float:
+        before = counts[row - 1] - counts[row - 2] if row > 1 else 0.0
+        return float(counts[row] - counts[row - 1] - before)
+
+    found, skip = list[LostCounts](), False
+    for number, row in enumerate(rows):
+        if skip:
+            skip = False
+            continue
+        jump, end = jump_at(row), inf
+        following = rows[number + 1] if number + 1 < len(rows) else len(counts)
+        if following < len(counts) and following - row <= NEIGHBOURS // 2:
+            room = max(0.1 * abs(jump), 2.0 * usual * (following - row))
+            back = float(counts[following] - counts[row - 1])
+            skip = abs(back) <= room
+            end = float(time[following]) - half if skip else inf
+        found.append(LostCounts(float(time[row]) - half, end, jump, float(values[row])))
+    return found
+
+
+def _of_lost_counts(experiment: Experiment, channel: Channel) -> Iterator[str]:
+    """A sentence on counts that are lost for good, with the lines that cut the run there."""
+    lasting = [each for each in lost_counts(channel) if not each.returns]
+    if not lasting:
+        return
+    times = ", ".join(f"{each.begin:.6g} s" for each in lasting[:NAMED])
+    times += f" and {len(lasting) - NAMED} times more" if len(lasting) > NAMED else ""
+    most = max((each.counts for each in lasting), key=abs)
+    cut = f"{lasting[0].begin:.6g}"
+    yield (
+        f"jumps by up to {most:+.0f} counts at {times} as no motion does, and stays there: lost or "
+        f"doubled counts. Cut the run there: span = {{ to = {cut} }} in this run, and a second one "
+        f'of the same file with name = "{experiment.run} from {cut} s", span = {{ from = {cut} }}, '
+        'start = "estimated"'
+    )
+
+
+def spiked(experiments: Sequence[Experiment]) -> dict[tuple[str, str], tuple[str, bool]]:
+    """Channels with spikes or lost counts, by run and name, and the line that mends each.
+
+    Beside the sentence, whether it is gross: twice as far from the median as the channel moves
     in any run, so that squared errors would be the spike's.
     """
     said, moves = dict[tuple[str, str], tuple[str, float]](), dict[str, float]()
@@ -352,8 +424,10 @@ def spiked(experiments: Sequence[Experiment]) -> dict[tuple[str, str], tuple[str
                 far = max(far, abs(value - middle))
             if kept.any():
                 moves[name] = max(moves.get(name, 0.0), float(np.ptp(channel.values[kept])))
-            for sentence in _of_spikes(each, channel) if far else ():
-                said[each.name, name] = f"{each.name}: '{name}' has {sentence}", far
+            sentences = [f"has {sentence}" for sentence in _of_spikes(each, channel)]
+            sentences += _of_lost_counts(each, channel)
+            if sentences:
+                said[each.name, name] = f"{each.name}: '{name}' {'; it '.join(sentences)}", far
     return {
         (run, name): (sentence, far > 2.0 * moves.get(name, 0.0))
         for (run, name), (sentence, far) in said.items()

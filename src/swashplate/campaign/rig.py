@@ -508,6 +508,8 @@ def write(tests: VirtualTests, folder: str | Path, *, overwrite: bool = False) -
         if place.is_dir() and not overwrite and any(place.iterdir()):
             raise FileError(f"{place} is not empty; name a new folder, or allow overwriting.")
         (place / "truth").mkdir(parents=True, exist_ok=True)
+    except FileError:
+        raise
     except OSError as error:
         raise FileError(f"{place} cannot be written: {error.strerror or error}.") from None
     refinements = f"refinements {', '.join(tests.drive.parameters.refinements) or 'none'}"

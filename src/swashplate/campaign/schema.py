@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from fnmatch import fnmatchcase
-from typing import Annotated, Any, Literal, NamedTuple, TypeVar, get_args
+from typing import Any, Literal, NamedTuple, TypeVar, get_args
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict, Field, PositiveFloat, model_validator
+from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
 
+from swashplate.entries import Finite, Flag, NotNegative, Positive, Sign
 from swashplate.errors import InputError
 from swashplate.logs import TextOptions
 from swashplate.results import short
@@ -60,7 +61,7 @@ KINDS: Mapping[str, Kind] = {
     "current": Kind(("A",), "", "signed current that drives the pump without a card"),
     # by its name an input: channels are of this kind where somebody says so
     "other": Kind((), "", "anything else, kept in the unit that it is written in",
-        "cmd|command|duty|setpoint|valve|stick|joystick|stellgröße|stellgroesse|sollwert|hebel|"
+        "cmd|command|duty|setpoint|valve|stick|joystick|joy|stellgröße|stellgroesse|sollwert|hebel|"
         "consigne|consigna|manette|palanca|spak|pådrag"),
     "encoder_counts": Kind(("rad",), "shaft_position",
         "counts of an encoder; an angle from a free zero",
@@ -141,9 +142,6 @@ def conversion(kind: str, unit: str | None, what: str) -> tuple[str, float, floa
 
 Role = Literal["fit", "validate", "ignore"]
 InitialState = Literal["rest", "steady", "given", "estimated"]
-Finite = Annotated[float, Field(allow_inf_nan=False)]
-Positive = Annotated[PositiveFloat, Field(allow_inf_nan=False)]
-NotNegative = Annotated[float, Field(ge=0.0, allow_inf_nan=False)]
 AnyWindow = TypeVar("AnyWindow", bound="Window")
 
 
@@ -227,7 +225,7 @@ class Signal(Entry):
     unit: str | None = Field(None, description="Unit after scaling; the header's, or SI.")
     scale: Finite = Field(1.0, description="Factor on the log's numbers.")
     offset: Finite = Field(0.0, description="Added after scaling, in `unit`.")
-    sign: Literal[1, -1] = Field(1, description="-1 turns the signal round.")
+    sign: Sign = Field(1, description="-1 turns the signal round.")
     time: Clock | None = Field(None, description="Its own clock, instead of the axis's.")
     missing: Literal["refuse", "drop"] = Field(
         "refuse",
@@ -359,9 +357,17 @@ class CampaignFile(Entry):
     """A campaign: the tests of a machine, beside their logs."""
 
     title: str = Field("", description="For the report.")
-    virtual: bool = Field(False, description="Whether the tests are simulated.")
+    virtual: Flag = Field(False, description="Whether the tests are simulated.")
     format: TextOptions = Field(
         TextOptions(), description="How text logs are written, where that cannot be recognised."
     )
     axes: dict[str, Axis] = Field(min_length=1, description="The drives, by name.")
     runs: tuple[Run, ...] = Field(min_length=1, description="Their tests, a log each.")
+
+    @field_validator("format", mode="before")
+    @classmethod
+    def _whole_row(cls, format: Any) -> Any:
+        row = format.get("header_row") if isinstance(format, Mapping) else None
+        if isinstance(row, bool | str):
+            raise ValueError(f"header_row is {row!r}, but should be the number of a line")
+        return format

@@ -7,6 +7,7 @@ it, so that no command waits for the imports of another.
 import gc
 import io
 import os
+import signal
 import sys
 from collections.abc import Iterator, Mapping
 from functools import cache
@@ -184,6 +185,9 @@ def _check_surroundings() -> None:
     epoch = os.environ.get("SOURCE_DATE_EPOCH", "0")
     if not epoch.isdecimal():
         raise InputError(f"SOURCE_DATE_EPOCH is '{epoch}', no number of seconds since 1970")
+    threads = os.environ.get("NUMBA_NUM_THREADS", "1")
+    if not threads.isdecimal() or int(threads) == 0:
+        raise InputError(f"NUMBA_NUM_THREADS is '{threads}', no number of threads; unset it")
     try:
         Path.cwd()
     except OSError:
@@ -200,6 +204,8 @@ def main() -> None:
     # a process that lives for seconds need not look for cycles among what its libraries define:
     # that takes a fifth of a fit, and a second more at the end
     gc.set_threshold(50_000, 20, 50)
+    # what a batch system sends ends a command as Ctrl-C does: workers too, and with a sentence
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
     # figures are drawn into files: what a user's own notebooks draw with is of no concern here
     os.environ.pop("MPLBACKEND", None)
     try:

@@ -298,6 +298,11 @@ def compensate(
     from swashplate.analysis import compensation
 
     check_output(out, compensation.INVERSE_MAP)
+    if stick is not None and stick.lstrip("+-").replace(".", "", 1).isdecimal():
+        raise InputError(
+            f"{stick} is a number, not what a stick does: for the voltage of a speed write "
+            f"--speed-deg-s {stick}."
+        )
     with working("Inverting"):
         chosen = words.at_rate(drive.chosen, sampling.rate)
         found, bought = compensation.inverse_map(chosen, points), None

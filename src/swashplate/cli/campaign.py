@@ -25,7 +25,17 @@ from swashplate.cli.terminal import (
     working,
 )
 from swashplate.errors import InputError
-from swashplate.tables import FIGURE, Column, Table, count, ended, joined, write_text
+from swashplate.tables import (
+    FIGURE,
+    Column,
+    Table,
+    check_folder,
+    count,
+    ended,
+    joined,
+    made_folder,
+    write_text,
+)
 
 LEGEND = (
     "jitter and longest gap in ms; clip: % of the samples at the ends of the instrument's range;\n"
@@ -59,12 +69,14 @@ def init(
     counts_per_turn: float | None = None,
     column: list[str] | None = None,
     unit: list[str] | None = None,
+    title: str | None = None,
 ) -> None:
     """Write the first draft of a campaign file from the headers of logs.
 
     What each column is gets guessed from its name and unit, and marked as such;
-    what cannot be told says FIXME. Read the file, mend what is wrong, then run
-    'swashplate campaign check'.
+    what cannot be told says FIXME. A PLC's words, 27648 or 32767 at full scale, are
+    scaled to volts if they are the command; for a sensor they need its range. Read
+    the file, mend what is wrong, then run 'swashplate campaign check'.
 
     Options:
       out FILE: The campaign file; by default campaign.toml beside the first log.
@@ -73,9 +85,10 @@ def init(
       column KIND=COLUMN: What a column is: time, voltage, shaft_speed or another kind; may be
           repeated.
       unit COLUMN=UNIT: Unit of a column; may be repeated.
+      title TEXT: Heading of the report: machine, place, author; by default the folder's name.
 
     For example:
-      swashplate campaign init logs/*.csv --drive hoist
+      swashplate campaign init logs/*.csv --drive hoist --title "Winch 3, harbour, J. Weber"
       swashplate campaign init trial1.mat trial2.mat --out trials.toml
       swashplate campaign init log.csv --column voltage=u --column shaft_speed=n --unit n=1/min
     """
@@ -93,16 +106,26 @@ def init(
     units = dict(words.pairs_of("--unit", unit, "u=mV"))
     with working("Reading"):
         text = draft_campaign(
-            logs, target.parent, drive, counts_per_turn, columns=kinds, units=units
+            logs,
+            target.parent,
+            drive,
+            counts_per_turn,
+            columns=kinds,
+            units=units,
+            title=title,
         )
     write_text(text, target)
     note(f"Draft: {target}")
     guessed = text.count("# guessed")
     note(f"{count(guessed, 'entry is', 'entries are')} guessed: look for '# guessed'.")
+    table, open_ends = "", (f"# {FIXME}", f'column = "{FIXME}"')
     for line in text.splitlines():
-        open_ends = (f"# {FIXME}", f'column = "{FIXME}"')
-        if line.startswith((UNUSED, NO_ENCODER)) or any(each in line for each in open_ends):
+        if line.startswith(("[", "file = ")):  # a run is known by its file
+            table = line.partition("    #")[0]
+        if line.startswith((UNUSED, NO_ENCODER)):
             note(f"  {line.lstrip('# ')}")
+        elif any(each in line for each in open_ends):
+            note(f"  {table} {line.lstrip('# ')}")
     note(f"Then run\n  swashplate campaign check {shlex.quote(str(target))}")
 
 
@@ -296,9 +319,10 @@ def rig(
 def guess(path: Path = CAMPAIGN, *, axis: AxisName = None, out: Path | None = None) -> None:
     """Read a machine's dead zones, gains, limits, delay and lag off its logs.
 
-    For a machine of unknown numbers: needs the command and a speed or a position,
-    no current. Writes a drive to start a fit from, start.toml, and what the fit
-    is to change within which bounds, setup.toml.
+    For a machine of unknown numbers: needs the command and a speed or a position.
+    If a current is measured, the amplifier is read off it and fitted first. Writes
+    a drive to start a fit from, start.toml, and what the fit is to change within
+    which bounds, setup.toml.
 
     Options:
       out DIR: Folder for start.toml and setup.toml; by default the campaign's.
@@ -310,19 +334,29 @@ def guess(path: Path = CAMPAIGN, *, axis: AxisName = None, out: Path | None = No
     """
     from swashplate import campaign as tests
     from swashplate.drive import Drive
+    from swashplate.identification.identifying import runs_to_fit
 
+    folder = path.parent if out is None else out
+    start, setup = folder / "start.toml", folder / "setup.toml"
     with working(f"Reading {path}"):
-        campaign, chosen = words.campaign_of(path, axis)
-        runs = words.runs_to_fit(campaign, chosen)
-        folder = path.parent if out is None else out
-        start, setup = folder / "start.toml", folder / "setup.toml"
         check_free(start, setup)
+        campaign, chosen = words.campaign_of(path, axis)
+        check_folder(folder)
+        runs = runs_to_fit(campaign, chosen)
         found = tests.guess_drive(runs)
         parameters = tests.guessed_set(found, path.name)
-        folder.mkdir(parents=True, exist_ok=True)
+        made_folder(folder)
         Drive(parameters).to_toml(start)
         write_text(tests.fit_configuration(found, parameters), setup)
     show(tests.guess_table(found))
+    if found.amplifier is not None:
+        show(tests.amplifier_table(found.amplifier))
+        card = found.amplifier.card
+        like = f"like that of the packaged card {card}" if card else "a plain one"
+        say(
+            f"Its filter is {like}; fit {found.amplifier.fit_percent:.1f} % of the currents. The "
+            "first stage fits the amplifier to the current, the second one the machine."
+        )
     for sentence, _ in tests.spiked(runs).values():
         note(f"! {sentence}.")
     note(f"These numbers alone: fit {found.fit_percent:.1f} % of the mean speeds (100 % is best).")

@@ -315,9 +315,9 @@ def judge(
     _end(study.chosen, found.tables(), *found.sentences()[1:])
     say_saved()
     if not found.passed:
-        side.print(found.headline())
+        side.print(found.headline)
         raise typer.Exit(1)
-    say(found.headline())
+    say(found.headline)
 
 
 def follow(

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from functools import partial
 from pathlib import Path
 from time import perf_counter, process_time
 from typing import TYPE_CHECKING, Annotated, Literal
@@ -16,6 +15,7 @@ from swashplate.cli.options import AxisName, Required, option
 from swashplate.cli.terminal import (
     bullets,
     check_free,
+    lock,
     long_work,
     note,
     save,
@@ -25,25 +25,26 @@ from swashplate.cli.terminal import (
     side,
     working,
 )
-from swashplate.cli.words import CONFIGURATION, DRIVE, NUMBERS
 from swashplate.errors import InputError
-from swashplate.tables import PRINTED, TABLE, check_folder, joined, made_folder, write_text
+from swashplate.tables import PRINTED, TABLE, check_folder, joined, made_folder
 
 if TYPE_CHECKING:
-    from swashplate.identification.assessment import Judged
+    from swashplate.identification.assessment import Identification
     from swashplate.identification.criteria import Verdict
     from swashplate.identification.drive_model import Parameters
-    from swashplate.identification.setup import Setup
-    from swashplate.identification.solving import Solution
     from swashplate.parameters.parameter_set import ParameterSet
 
 INTERRUPTED = 130
 """Exit code after Ctrl-C, as of other programs."""
 MOST_EVALUATIONS = 600
-FEWEST_DRAWS = 40
-"""Of a bootstrap: one beyond each end of a 95 % interval."""
-STORED = "fit.json"
-"""What a fit keeps of itself, beside the drive that it found."""
+FILES = {
+    "drive.toml": "Drive",
+    "parameters.toml": "Numbers",
+    "setup.toml": "Settings",
+    "estimates.csv": "Estimates",
+    "fit.json": "Fit",
+}
+"""What `Identification.save` writes, of a drive or of a user-defined model."""
 MEASURES = (
     "NRMSE is the RMSE over the standard deviation of what was measured, fit % is 100 (1 - NRMSE); "
     "'of its range' below means RMSE over the largest less the smallest value measured."
@@ -107,8 +108,8 @@ def fit(
     role 'validate', and says what the data determine. Writes the drive as a
     parameter file that 'simulate' takes, the fit configuration, the estimates
     with their intervals, and what 'report' needs to write the report again.
-    Ctrl-C keeps the best so far, of several starts those that ended, and the exit
-    code is 130. It is 1 if the result is not usable.
+    Ctrl-C or SIGTERM keeps the best so far, of several starts those that ended,
+    and the exit code is 130. It is 1 if the result is not usable.
 
     Options:
       out DIR: Folder for the fitted drive and its tables.
@@ -132,90 +133,74 @@ def fit(
       swashplate simulate fitted/drive.toml step:9
     """
     clock = Clock()
-    if 0 < bootstrap < FEWEST_DRAWS:
-        raise InputError(
-            f"{bootstrap} draws do not reach the ends of a 95 % interval; take {FEWEST_DRAWS} or "
-            "more, 1000 for smooth ones."
-        )
     check_folder(out)
+    lock(out)
     if not resume:
-        made = [DRIVE, CONFIGURATION, NUMBERS, "estimates.csv", STORED]
-        check_free(*(out / each for each in (*made, *["report.html"] * report)))
+        check_free(*(out / name for name in FILES))
+        if report:
+            check_free(out / "report.html")
     if model is not None and (setup is not None or begin is not None or joint):
         raise InputError(f"{model} says what is free and where it begins: leave out the others.")
     with working("Starting"), clock.part("start and kernels"):
         from swashplate.executors import Dask, Processes
-        from swashplate.identification.assessment import judge_fit
-        from swashplate.identification.fitting import Search
-        from swashplate.identification.fitting import fit as fit_runs
-        from swashplate.identification.setup import ModelSetup
+        from swashplate.identification.identifying import identify
     with working(f"Reading {path}"), clock.part("reading"):
-        nominal: Parameters
-        plan: Setup
-        if model is None:
-            campaign, runs, plan, nominal = words.fit_of(path, axis, setup, begin)
-        else:
-            campaign, chosen = words.campaign_of(path, axis)
-            runs = words.runs_to_fit(campaign, chosen)
-            nominal = ModelSetup.from_file(model).nominal(runs)
-            plan = nominal.setup
-    executor = Dask(dask) if dask is not None else Processes(jobs or None)
+        campaign, chosen = words.campaign_of(path, axis)
+        start: Path | ParameterSet | None = model
+        if begin is not None:
+            start = words.parameters_of(begin)
     with long_work("Fitting") as shown, clock.part("search"):
-
-        def ended(stage: str, one: Solution, done: int) -> None:
-            said = f"{stage}: {done} of {starts + 1} starts, the last to cost {one.cost:.6g}"
-            shown(said, done / (starts + 1))
-
-        search = Search(starts, seed, executor, out / "starts", resume, ended) if starts else None
-        fitted = partial(fit_runs, max_evaluations=evaluations)
-        result = first = fitted(nominal, runs, plan, loss=loss, search=search)
-        if joint and len(plan.stages) > 1 and not result.interrupted:
-            # from where the stages ended: from afar a joint fit is often caught on its way
-            result = fitted(result.parameters, runs, plan.joint())
-    if result.interrupted and starts:
-        last = result.stages[-1]
+        result = identify(
+            campaign,
+            start,
+            setup,
+            axis=chosen,
+            joint=joint,
+            starts=starts,
+            folds=folds,
+            bootstrap=bootstrap,
+            profiles=profile or (),
+            seed=seed,
+            loss=loss,
+            max_evaluations=evaluations,
+            required=require / 100.0,
+            executor=Dask(dask) if dask is not None else Processes(jobs or None),
+            store=out / "starts",
+            resume=resume,
+            watch=shown,
+        )
+    if result.fit.interrupted and starts:
+        last = result.fit.stages[-1]
         note(
             f"Interrupted in the stage '{last.stage.name}': {last.solution.message}. The same "
             "command with --resume goes on; nothing is written but the starts."
         )
         raise typer.Exit(INTERRUPTED)
     with working("Judging"), clock.part("judging"):
-        found = judge_fit(
-            campaign,
-            result,
-            first=first,
-            folds=folds,
-            bootstrap=bootstrap,
-            profiles=profile or (),
-            seed=seed,
-            executor=executor,
-            loss=loss,
-            required=require / 100.0,
-        )
-        verdict = found.verdict
+        verdict = result.verdict
     with clock.part("report"):
-        lines = _written(found, out)
-        lines += [_reported(found, out)] if report else []
+        lines = _written(result, out)
+        lines += [_reported(result, out)] if report else []
     note(f"{campaign.title}{' (virtual)' * campaign.virtual}")
-    _say_fit(found)
+    _say_fit(result)
     for line in [*lines, f"Time:      {clock}"] if timing else lines:
         note(line)
-    if result.interrupted:
+    if result.fit.interrupted:
         note("Interrupted: this is the best so far, not an optimum.")
         raise typer.Exit(INTERRUPTED)
     _say_verdict(verdict)
 
 
-def _say_fit(found: Judged) -> None:
+def _say_fit(found: Identification) -> None:
     """What was found, stage by stage, and how well each run is followed."""
     from swashplate.identification import tables
 
-    for run in found.result.runs:
+    for run in found.fit.runs:
         for sentence in run.notes:
             say(f"- {run.name}: {sentence}.")
-    for sentence in found.result.doubts:
+    for sentence in found.fit.doubts:
         say(f"! {sentence}")
-    for each in found.result.stages:
+    for each in found.fit.stages:
         name, solution = each.stage.name, each.solution
         bootstrap = found.bootstraps.get(name)
         show(tables.estimates_table(each, bootstrap=bootstrap))
@@ -227,51 +212,27 @@ def _say_fit(found: Judged) -> None:
         show(tables.profiles_table(found))
     for profile in found.profiles:
         bullets(profile.sentences())
-    say(tables.fixed_line(found.result))
+    say(tables.fixed_line(found.fit))
+    bullets(tables.unvalued_lines(found.fit))
     note("\nRuns that were fitted")
-    show(*tables.runs_tables([quality for each in found.result.stages for quality in each.runs]))
+    show(*tables.runs_tables([quality for each in found.fit.stages for quality in each.runs]))
     if found.predicted:
         note("Runs that were held out and predicted")
         show(*tables.runs_tables(found.predicted))
     if found.folds is not None:
-        show(tables.folds_tables(found.folds, found.result.stages)[0])
+        show(tables.folds_tables(found.folds, found.fit.stages)[0])
         bullets(found.folds.sentences())
 
 
-def _written(found: Judged, out: Path) -> list[str]:
-    """Write drive, estimates and what the report can be made from; lines that say so."""
-    from tomlkit import dumps
-
-    from swashplate.drive import Drive
-    from swashplate.identification.setup import ModelSetup, setup_text
-    from swashplate.identification.tables import estimates_table
-
-    made_folder(out)
-    parameters = found.result.parameters
-    if isinstance(parameters, ModelSetup):
-        numbers = {name: float(value) for name, value in parameters.numbers.items()}
-        write_text(dumps({parameters.name: numbers}), out / NUMBERS)
-        lines = [f"Numbers:   {out / NUMBERS}"]
-    else:
-        Drive(found.fitted_set()).to_toml(out / DRIVE)
-        write_text(setup_text(found.result.setup), out / CONFIGURATION)
-        lines = [f"Drive:     {out / DRIVE}", f"Settings:  {out / CONFIGURATION}"]
-    tables = [
-        estimates_table(each, bootstrap=found.bootstraps.get(each.stage.name), own=own)
-        for each in found.result.stages
-        for own in (False, True)
-    ]
-    joined(tables).write(out / "estimates.csv")
-    found.store(out / STORED)
-    return [*lines, f"Estimates: {out / 'estimates.csv'}", f"Fit:       {out / STORED}"]
+def _written(found: Identification, out: Path) -> list[str]:
+    """Write the folder of a fit; lines that name its files."""
+    return [f"{FILES[file.name] + ':':10} {file}" for file in found.save(out)]
 
 
-def _reported(found: Judged, out: Path, truth: ParameterSet | None = None) -> str:
+def _reported(found: Identification, out: Path, truth: ParameterSet | None = None) -> str:
     """Write the report; a line that says so."""
-    from swashplate.report.fit_report import write_fit_report
-
     with working("Writing the report"):
-        write_fit_report(found, out / "report.html", truth=truth)
+        found.report(out / "report.html", truth=truth)
     return f"Report:    {out / 'report.html'}"
 
 
@@ -394,42 +355,32 @@ def report(
       swashplate report fitted virtual/campaign.toml --truth virtual/truth
       swashplate report fitted virtual/campaign.toml --pdf report.pdf
     """
-    from swashplate.campaign import Campaign
-    from swashplate.documents import read_json
-    from swashplate.identification.assessment import FitFile, load_fit
-    from swashplate.identification.setup import ModelSetup
+    from swashplate.identification.assessment import Identification
     from swashplate.report.fit_report import find_browser, print_report, shown_runs, write_samples
 
     if pdf is not None:
         find_browser()
     folder = fitted if fitted.is_dir() else fitted.parent
-    place = folder / STORED
-    with working(f"Reading {place}"):
-        if not place.is_file():
-            raise InputError(
-                f"There is no {STORED} in {folder}: give a folder that 'swashplate fit' wrote, or "
-                "judge a drive alone with 'swashplate validate'."
-            )
+    with working(f"Reading {folder / 'fit.json'}"):
         true = None if truth is None else words.parameters_of(truth)
-        path = path or Path(read_json(place, FitFile, strict=False).campaign)
-        campaign = Campaign.from_toml(path)
-        if true is not None and not campaign.virtual:
-            raise InputError(f"{path} is not virtual: nobody knows its truth, leave out --truth.")
-        own = None if model is None else ModelSetup.from_file(model)
-        found = load_fit(place, campaign, model=own)
+        found = Identification.load(fitted, path, model=model)
+        if true is not None and not found.campaign.virtual:
+            raise InputError(
+                f"{found.campaign.path} is not virtual: nobody knows its truth, leave out --truth."
+            )
         if fitted.suffix.lower() == ".toml":
-            given, numbers = words.parameters_of(str(fitted)).numbers, found.result.parameters
+            given, numbers = words.parameters_of(str(fitted)).numbers, found.fit.parameters
             other = [name for name, value in numbers.numbers.items() if given[name] != value]
             if other:
                 raise InputError(
-                    f"{fitted} is not the drive that {place} found ({', '.join(other[:3])} "
-                    "differ): judge it with 'swashplate validate'."
+                    f"{fitted} is not the drive that {folder / 'fit.json'} found "
+                    f"({', '.join(other[:3])} differ): judge it with 'swashplate validate'."
                 )
     with working("Judging"):
         verdict = found.verdict
     note(_reported(found, folder, true))
     save(pdf, "Printed", lambda to: print_report(folder / "report.html", to))
-    runs = shown_runs(found.result.stages, found.predicted)
+    runs = shown_runs(found.fit.stages, found.predicted)
     save(data, "Samples, in SI", lambda to: write_samples(runs, to))
     say_saved()
     say(verdict.headline)
@@ -453,14 +404,15 @@ def demo(*, out: Path = Path("demo"), seed: int = 1) -> None:
     from swashplate.campaign import Campaign, rig
     from swashplate.drive import Drive
     from swashplate.identification import tables
-    from swashplate.identification.assessment import judge_fit
-    from swashplate.identification.fitting import drawn, fit
+    from swashplate.identification.fitting import drawn
+    from swashplate.identification.identifying import identify
     from swashplate.identification.setup import load_setup
     from swashplate.identification.validation import with_speeds
     from swashplate.report.figures import plot_channel, save_figure
 
     if not (out / "virtual" / "truth").is_dir():  # an earlier demo is replaced, nothing else
         check_free(out)
+    lock(out)
     setup = load_setup("hoist")
     with long_work("", 5) as begin:
         begin("testing the virtual hoist")
@@ -469,10 +421,8 @@ def demo(*, out: Path = Path("demo"), seed: int = 1) -> None:
         begin("reading its logs")
         campaign = Campaign.from_toml(path)
         begin("fitting the card, then pump and motor")
-        tests, start = campaign.select(role="fit"), campaign.drive("hoist").parameters
-        result = fit(start, tests, setup)
+        found = identify(campaign, seed=seed)
         begin("computing intervals and verdict")
-        found = judge_fit(campaign, result, seed=seed)
         verdict = found.verdict
         begin("writing the report")
         lines = [*_written(found, out), _reported(found, out, truth.parameters)]
@@ -484,7 +434,7 @@ def demo(*, out: Path = Path("demo"), seed: int = 1) -> None:
         figure = plot_channel(run.experiment[run.channel], run.simulated, title=title)
         save_figure(figure, out / "result.png")
     note(f"Campaign:  {path}")
-    made = [tables.estimates_table(e, truth=truth.parameters) for e in result.stages]
+    made = [tables.estimates_table(e, truth=truth.parameters) for e in found.fit.stages]
     show(*made)
     inside, counted = tables.truth_count(made)
     say(f"The truth lies within the 95 % interval for {inside} of {counted} parameters.")

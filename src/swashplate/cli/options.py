@@ -9,6 +9,7 @@ from __future__ import annotations
 import inspect
 import re
 from collections.abc import Callable, Mapping
+from contextlib import ExitStack
 from dataclasses import MISSING, dataclass, field, fields, is_dataclass
 from functools import cached_property
 from pathlib import Path
@@ -17,7 +18,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, get_type_hints
 import typer
 from typer.models import ParameterInfo
 
-from swashplate.cli.terminal import FORCED, SAVED, check_output, note, say_saved
+from swashplate.cli.terminal import FORCED, RESOURCES, SAVED, check_output, note, say_saved
 from swashplate.tables import FIGURE, TABLE, Form
 from swashplate.units import show_rod, shown_in
 
@@ -74,7 +75,8 @@ SHARED = """
       a FILE.
   levers --lever LEVER[=LOW/HIGH]: A lever or parameter, by itself or with its lowest and highest
       factor; may be repeated. 'swashplate whatif --levers' lists them.
-  model FILE.py: A Python file with a model of your own and what is free of it.
+  model FILE.py: A Python file with a model of your own and what is free of it. The file is
+      executed: name only one that you trust.
   path CAMPAIGN.toml: The campaign file, beside its logs.
   rate HZ: Samples a second, 10 to 100000.
   seed: Of everything drawn at random.
@@ -227,7 +229,9 @@ def command(
                 check_output(words[name], form)
             for name, group in groups.items():
                 words[name] = group(**{each.name: words.pop(each.name) for each in _spread(group)})
-            with shown_in([each.strip() for each in units.split(",") if each.strip()], drum):
+            shown = [unit.strip() for unit in units.split(",") if unit.strip()]
+            with shown_in(shown, drum), ExitStack() as resources:
+                RESOURCES.set(resources)
                 function(**words)
             say_saved()
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import sys
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from contextvars import ContextVar
 from pathlib import Path
 from textwrap import fill
@@ -24,6 +24,8 @@ FORCED: ContextVar[bool] = ContextVar("FORCED", default=False)
 """Whether older files may be replaced: --force."""
 SAVED: ContextVar[list[str]] = ContextVar("SAVED")
 """Lines on the files that a command wrote."""
+RESOURCES: ContextVar[ExitStack] = ContextVar("RESOURCES")
+"""What is released when a command ends, such as the lock of a folder."""
 ANY = Form("a file")
 BETWEEN = 2
 """Characters between two columns."""
@@ -213,6 +215,13 @@ def check_free(*paths: Path) -> None:
         if path.is_file() or (path.is_dir() and any(path.iterdir())):
             what = "is not empty" if path.is_dir() else "exists already"
             raise FileError(f"{path} {what}; name another place, or replace it with --force.")
+
+
+def lock(folder: Path) -> None:
+    """Keep other processes from writing into a folder until the command ends; see `locked`."""
+    from swashplate.locks import locked
+
+    RESOURCES.get().enter_context(locked(folder))
 
 
 def check_output(path: Path | None, form: Form = ANY) -> None:

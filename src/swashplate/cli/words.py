@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from swashplate.documents import parse_toml, read_text
-from swashplate.errors import FileError, InputError
+from swashplate.errors import FileError, InputError, MissingFileError, UnknownParameterError
 from swashplate.units import unit_text
 
 if TYPE_CHECKING:
@@ -28,9 +28,8 @@ if TYPE_CHECKING:
 _NUMBER = r"[+-]?(?:(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?|inf\b|nan\b)"
 _VALUE = re.compile(rf"\s*({_NUMBER})(?:/({_NUMBER}))?\s*((?:1/)?[^\W\d_].*|°.*)?")
 _ENDING = re.compile(r"\.[A-Za-z]\w*$")
-DRIVE, CONFIGURATION, NUMBERS = "drive.toml", "setup.toml", "parameters.toml"
-"""In a folder that a fit wrote: the drive, its fit configuration, and what stands in the place of
-both for a model of one's own."""
+CONFIGURATION, NUMBERS = "setup.toml", "parameters.toml"
+"""In a folder that a fit wrote: its fit configuration, or the numbers of a user-defined model."""
 UNFELT, FEELING = "load_torque", ("motor_leakage", "motor_constant")
 """A load, and what makes the speed depend on it."""
 SURPRISING = 1000.0
@@ -81,7 +80,7 @@ def campaign_of(path: Path, axis: str | None = None) -> tuple[Campaign, str]:
     from swashplate.campaign import Campaign
 
     if not path.exists():
-        raise FileError(
+        raise MissingFileError(
             f"There is no file {path}: name a campaign, or make one of your logs with 'swashplate "
             "campaign init LOGS'."
         )
@@ -94,58 +93,29 @@ def campaign_of(path: Path, axis: str | None = None) -> tuple[Campaign, str]:
     return campaign, axis or next(iter(campaign.axes))
 
 
-def runs_to_fit(campaign: Campaign, axis: str) -> tuple[Experiment, ...]:
-    """The runs of an axis with the role 'fit', at least one; gross spikes of others are refused."""
-    from swashplate.identification.data_checks import refuse_unsound, spike_findings
-
-    runs = campaign.select(axis=axis, role="fit")
-    refuse_unsound(spike_findings(campaign.select(axis=axis, role="validate"), "linear"))
-    if not runs:
-        raise InputError(f"{campaign.path}: no run of the axis '{axis}' has the role 'fit'.")
-    return tuple(runs)
-
-
 def fit_of(
     path: Path, axis: str | None, setup: str | None, begin: str | None
 ) -> tuple[Campaign, tuple[Experiment, ...], Setup, ParameterSet]:
     """What a fit is about: campaign, runs to fit, what is free, and the drive it begins at."""
     from swashplate.identification.drive_model import setup_of
+    from swashplate.identification.identifying import runs_to_fit
 
     campaign, chosen = campaign_of(path, axis)
-    plan = setup_of(campaign, chosen, setup)
     start = campaign.drive(chosen).parameters if begin is None else parameters_of(begin)
-    return campaign, runs_to_fit(campaign, chosen), plan, start
+    return campaign, runs_to_fit(campaign, chosen), setup_of(campaign, chosen, start, setup), start
 
 
 def drive_file(word: str) -> Path | None:
-    """The parameter file that a word means, None for a packaged set.
+    """The parameter file that a word means, as `swashplate.parameters.files.set_file` has it.
 
-    A folder means the drive.toml that 'fit' wrote into it; a packaged name goes before a folder of
-    that name, which can be written ``./hoist``.
+    A file that is plainly of another kind is refused.
     """
-    from swashplate.parameters.files import preset_names
+    from swashplate.parameters.files import set_file
 
-    place, packaged = Path(word), preset_names()
-    if word in packaged:
-        return None
-    if place.is_dir():
-        if not (place / DRIVE).is_file():
-            if (place / NUMBERS).is_file():
-                raise InputError(
-                    f"{word} is the fit of a model of your own: give its file by --model where the "
-                    "command has that option; simulate and export it from Python."
-                )
-            raise InputError(
-                f"There is no {DRIVE} in {word}: give a folder that 'swashplate fit' wrote, or a "
-                "parameter file."
-            )
-        return place / DRIVE
-    if place.suffix.lower() == ".toml" or len(place.parts) > 1 or place.is_file():
-        check_kind(place, "drive")
-        return place
-    raise InputError(
-        f"There is no packaged set, file or folder '{word}'; packaged are {', '.join(packaged)}."
-    )
+    file = set_file(word)
+    if file is not None:
+        check_kind(file, "drive")
+    return file
 
 
 def parameters_of(word: str) -> ParameterSet:
@@ -158,6 +128,7 @@ def parameters_of(word: str) -> ParameterSet:
 
 def model_parameters_of(folder: str, file: Path, runs: Sequence[Experiment]) -> ModelSetup:
     """A model of one's own with the numbers that a fit wrote into its folder."""
+    from swashplate.equations.fields import is_real
     from swashplate.identification.setup import ModelSetup
 
     setup = ModelSetup.from_file(file)
@@ -169,6 +140,9 @@ def model_parameters_of(folder: str, file: Path, runs: Sequence[Experiment]) -> 
             f"{place} has no table [{setup.name}] with {', '.join(nominal.numbers)}: give the "
             f"folder that 'swashplate fit --model {file}' wrote."
         )
+    for name, value in table.items():
+        if isinstance(value, bool) or not is_real(value):
+            raise InputError(f"{place}: {name} under [{setup.name}] is {value!r:.60}, no number.")
     return replace(nominal, numbers={name: float(value) for name, value in table.items()})
 
 
@@ -225,10 +199,19 @@ def drive_of(word: str, values: Sequence[str] = (), factors: Sequence[str] = ())
     scaled_as = "Z16=1.5, Z16=1.5/1.2 (plus/minus) or orifice=1.5"
     pulling = [word for word in factors if _is_lever(word.partition("=")[0].strip())]
     scaling = [word for word in factors if word not in pulling]
+
+    def scalable(name: str) -> Any:
+        try:
+            return find(name)
+        except UnknownParameterError:
+            from swashplate.analysis.whatif import find_lever
+
+            return find_lever(name)  # refuses it, and lists levers as well
+
     chosen = assigned("--set", values, set_as, valued, units=True)
     levers = assigned("--scale", pulling, scaled_as, str, (1,))
     drive = Drive(parameters_of(word)).replace(**chosen)
-    drive = drive.scale(**assigned("--scale", scaling, scaled_as, find))
+    drive = drive.scale(**assigned("--scale", scaling, scaled_as, scalable))
     if levers:
         from swashplate.analysis.whatif import pulled
 
@@ -344,8 +327,9 @@ def at_rate(drive: Drive, rate: float) -> Drive:
     own, marched = drive.parameters.rate, rate * least_substeps(rate)
     if own is None or abs(marched / own - 1.0) < 1e-9:
         return drive
+    steps = "" if marched == rate else f", computed in steps of 1/{marched:g} s,"
     note(
-        f"{drive.name}: the card's filter is a recursion for {own:g} Hz; at {marched:g} Hz the "
+        f"{drive.name}: the card's filter is a recursion for {own:g} Hz; at {rate:g} Hz{steps} the "
         "differential equation with the same poles takes its place."
     )
     return drive.at_every_rate()

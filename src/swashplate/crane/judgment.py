@@ -302,6 +302,7 @@ class Judgment(Tabular):
         """Whether the judged variant swings as no control does, in every seaway."""
         return np.allclose(self.counted(self.judged), self.counted(NONE), rtol=1e-3)
 
+    @property
     def headline(self) -> str:
         """The outcome, the verdict, and whether they rest on a drive whose fit is not usable."""
         words = f"{self.outcome.capitalize()}: {self.verdict()}"
@@ -433,11 +434,6 @@ class Judgment(Tabular):
             for name, values in zip(self.names, found, strict=True)
         ]
         return pl.DataFrame(rows)
-
-    @property
-    def headline(self) -> str:
-        """The outcome and the verdict in one sentence."""
-        return f"{self.outcome.capitalize()}: {self.verdict()}"
 
     def _sentences(self) -> list[str]:
         return list(self.sentences()[1:])  # the first one is the headline

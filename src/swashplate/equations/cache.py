@@ -27,7 +27,14 @@ from numba.core.caching import FunctionCache, IndexDataCacheFile
 from numba.misc.appdirs import AppDirs
 
 from swashplate import progress
-from swashplate.equations.declaration import JIT_OFF, closure_hash, hash_of, is_function, known
+from swashplate.equations.declaration import (
+    JIT_OFF,
+    closure_hash,
+    hash_of,
+    is_function,
+    known,
+    remember_text,
+)
 from swashplate.equations.syntax import plain
 
 P = ParamSpec("P")
@@ -54,16 +61,26 @@ DOCSTRING = re.compile(r'^ *""".*?"""\n', re.MULTILINE | re.DOTALL)
 class _Index(IndexDataCacheFile):
     """Numba's index and data files, which survive damage and workers that write at once.
 
-    Data are named by what they are for, so that no two signatures share a file, and carry a hash.
+    Data are named by what they are for, so that no two signatures share a file. Both kinds of file
+    begin with a hash of the rest: damaged ones are not unpickled.
     """
 
     def save(self, key: Any, data: Any) -> None:
         overloads = self._load_index()
         digest = blake2b(self._dump(key), digest_size=6).hexdigest()  # type: ignore[no-untyped-call]
         name = f"{self._index_name.removesuffix('.nbi')}.{digest}.nbc"
-        self._save_data(name, data)
         overloads[key] = name
-        self._save_index(overloads)  # type: ignore[no-untyped-call]
+        try:
+            self._save_data(name, data)
+            self._save_index(overloads)
+        except OSError as error:  # a full disk, or a folder of that name
+            path = error.filename2 or error.filename or self._cache_path
+            warn(
+                f"swashplate cannot keep the compiled kernel {path}: {error.strerror or error}. It "
+                "is compiled anew in every session; remove what is in the way.",
+                RuntimeWarning,
+                stacklevel=2,
+            )
 
     def load(self, key: Any) -> Any:
         try:
@@ -73,21 +90,29 @@ class _Index(IndexDataCacheFile):
 
     def _load_index(self) -> dict[Any, str]:
         try:
-            index = super()._load_index()  # type: ignore[no-untyped-call]
-            return index if isinstance(index, dict) else {}
-        except Exception:
+            stamp, overloads = self._unpickled(self._index_path)
+        except Exception:  # damaged, or of another version of Numba
             return {}
+        return overloads if stamp == self._source_stamp else {}
+
+    def _save_index(self, overloads: dict[Any, str]) -> None:
+        self._pickle((self._source_stamp, overloads), self._index_path)
 
     def _save_data(self, name: str, data: Any) -> None:
-        payload = self._dump(data)  # type: ignore[no-untyped-call]
-        path = self._data_path(name)  # type: ignore[no-untyped-call]
+        self._pickle(data, self._data_path(name))  # type: ignore[no-untyped-call]
+
+    def _load_data(self, name: str) -> Any:
+        return self._unpickled(self._data_path(name))  # type: ignore[no-untyped-call]
+
+    def _pickle(self, content: Any, path: str) -> None:
+        payload = self._dump(content)  # type: ignore[no-untyped-call]
         with self._open_for_write(path) as file:
             file.write(blake2b(payload, digest_size=16).digest() + payload)
 
-    def _load_data(self, name: str) -> Any:
-        content = Path(self._data_path(name)).read_bytes()  # type: ignore[no-untyped-call]
+    def _unpickled(self, path: str) -> Any:
+        content = Path(path).read_bytes()
         if blake2b(content[16:], digest_size=16).digest() != content[:16]:
-            raise ValueError(name)
+            raise ValueError(path)
         return pickle.loads(content[16:])
 
 
@@ -202,8 +227,8 @@ def on_disk(compiled: Any, function: Callable[..., Any]) -> None:
 
 
 @cache
-def _folder(chosen: str) -> Path:
-    """Where generated modules are kept."""
+def _folder(chosen: str) -> Path | None:
+    """Where generated modules are kept, None if no folder can be written."""
     if chosen:
         wanted = Path(chosen) / "swashplate_generated"
     else:
@@ -214,14 +239,14 @@ def _folder(chosen: str) -> Path:
         tempfile.TemporaryFile(dir=wanted).close()
     except OSError:
         warn(UNCACHED, RuntimeWarning, stacklevel=3)
-        return Path(tempfile.mkdtemp(prefix="swashplate_generated_"))
+        return None
     return wanted
 
 
 def cache_folder() -> Path | None:
     """Folder below which generated modules and their machine code are kept, None if nowhere."""
     folder = _folder(str(config.CACHE_DIR or ""))  # type: ignore[attr-defined]
-    if folder.name.startswith("swashplate_generated_"):
+    if folder is None:
         return None
     return folder.parent if config.CACHE_DIR else folder  # type: ignore[attr-defined]
 
@@ -231,7 +256,8 @@ def generated(name: str, text: str, names: Mapping[str, Any]) -> dict[str, Any]:
 
     Its file's name begins with `name` and carries a hash of the text without its docstrings, and of
     all that the `names` it refers to reach; many processes may write it at once. `kernel`s in it
-    are cached on disk as those of any file.
+    are cached on disk as those of any file. If no folder can be written, the module is kept in
+    memory alone, and its kernels are compiled in every session.
     """
     words = set(re.findall(r"\w+", text))
     used = {n: v for n, v in names.items() if n in words}
@@ -240,22 +266,35 @@ def generated(name: str, text: str, names: Mapping[str, Any]) -> dict[str, Any]:
     digest.update(DOCSTRING.sub("", text).encode())
     digest.update(hash_of(reached).encode())
     stem = f"{name}_{digest.hexdigest()}"
-    path = _folder(str(config.CACHE_DIR or "")) / f"{stem}.py"  # type: ignore[attr-defined]
-    if path.exists() and path.read_text("utf-8") == text:
-        if time() - path.stat().st_mtime > DAY:
-            path.touch()  # still in use
-    else:
-        handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=stem, suffix=".tmp")
-        with os.fdopen(handle, "w", encoding="utf-8") as file:
-            file.write(text)
-        Path(temporary).replace(path)
-        _tidy(path.parent)
+    folder = _folder(str(config.CACHE_DIR or ""))  # type: ignore[attr-defined]
+    file = None if folder is None else _written(folder / f"{stem}.py", text)
+    path = str(file) if file is not None else remember_text(stem, text)
     module = ModuleType(f"{GENERATED}.{stem}")
-    module.__file__ = str(path)
+    module.__file__ = path
     module.__dict__.update(names)
     sys.modules[module.__name__] = module
-    exec(compile(text, str(path), "exec"), module.__dict__)
+    exec(compile(text, path, "exec"), module.__dict__)
     return module.__dict__
+
+
+def _written(path: Path, text: str) -> Path | None:
+    """The file of a generated module, None if it cannot be written."""
+    try:
+        if path.exists() and path.read_text("utf-8") == text:
+            if time() - path.stat().st_mtime > DAY:
+                path.touch()  # still in use
+            return path
+        handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=path.stem, suffix=".tmp")
+        try:
+            with os.fdopen(handle, "w", encoding="utf-8") as file:
+                file.write(text)
+            Path(temporary).replace(path)
+        finally:
+            Path(temporary).unlink(missing_ok=True)
+    except (OSError, UnicodeDecodeError):  # a full disk, or something else of that name
+        return None
+    _tidy(path.parent)
+    return path
 
 
 def _tidy(folder: Path) -> None:

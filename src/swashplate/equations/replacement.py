@@ -13,7 +13,7 @@ from collections.abc import Mapping
 from dataclasses import fields, replace
 from functools import cache
 from importlib import import_module
-from types import CellType, FunctionType
+from types import CellType, FunctionType, ModuleType
 from typing import Any, NamedTuple, get_type_hints
 
 from swashplate.equations.declaration import closure, equation, equation_of_text, is_function
@@ -47,19 +47,54 @@ def _sent(places: Mapping[str, str]) -> Replacement:
     return found_at(places)
 
 
+OURS = "swashplate.models."
+"""What the modules begin with that are imported to find an equation; all others must be already."""
+
+
 def found_at(places: Mapping[str, str]) -> Replacement:
-    """A replacement by `Replacement.places`, all of whose modules must be imported."""
-    found: dict[str, Any] = {}
+    """A replacement by `Replacement.places`, each ``module:name``.
+
+    No code runs: modules of the package's models apart, a module must be imported already.
+
+    Raises
+    ------
+    InputError
+        If there is no such module, or what it has of that name is no equation, or no class of named
+        tuples. Nothing of the object is in the sentence.
+    """
+    members: dict[str, Any] = {}
     for what, place in places.items():
         module, _, name = place.partition(":")
-        ours = module.startswith("swashplate.")
-        home = import_module(module) if ours else sys.modules.get(module)
-        found[what] = getattr(home, name, None)
-        if found[what] is None:
+        home = sys.modules.get(module)
+        if home is None and module.startswith(OURS):
+            home = import_module(module)
+        members[what] = vars(home).get(name) if isinstance(home, ModuleType) else None
+        if members[what] is None:
             raise InputError(
                 f"an equation of one's own is {name} of the module {module}: import that first."
             )
-    return Replacement(**found)
+    check_members(members, places)
+    return Replacement(**members)
+
+
+def check_members(members: Mapping[str, Any], names: Mapping[str, str]) -> None:
+    """Refuse a replacement whose members are no equations, or bring no named tuple along.
+
+    Parameters
+    ----------
+    members : mapping of str to object
+        By the fields of `Replacement`; None for parameters that are not given.
+    names : mapping of str to str
+        What the sentence calls them.
+    """
+    for what in ("old", "new"):
+        if not is_function(members[what]):
+            raise InputError(
+                f"{names[what]} is no equation: give a function marked with @equation."
+            )
+    parameters = members.get("parameters")
+    if parameters is not None and not is_named_tuple(parameters):
+        raise InputError(f"{names['parameters']} is no class of named tuples.")
 
 
 def uses(model: Model, equation: Equation) -> bool:

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from swashplate.drive import Drive
 from swashplate.equations.c_source import Exported, c_name, interface, literal
 from swashplate.equations.c_source.model import Writer
-from swashplate.equations.c_source.text import filled
+from swashplate.equations.c_source.text import comment_line, filled
 from swashplate.equations.fields import declared_by, numbers_of
 from swashplate.equations.marching.record import SOURCE_RATE, check_rate
 from swashplate.equations.marching.run import Instance, called
@@ -28,11 +28,13 @@ from swashplate.models.card import stable_step
 from swashplate.models.displacement_control import steep_stops
 from swashplate.parameters.rules import FULL_VOLTAGE
 from swashplate.simulation.instance import check_filter_stability, instance_of, models_of
-from swashplate.simulation.run import LEAST, Sample
+from swashplate.simulation.run import RANGES, Sample
 from swashplate.tables import write_text
 
 Array = NDArray[np.float64]
 LONGEST_STEP = 1.0 / SOURCE_RATE
+LONGEST_IDENTIFIER = 63
+"""Characters of a name that every C99 compiler looks at."""
 FURTHER = ("main.c", "CMakeLists.txt", "README.md")
 """Files of a folder beside the model's own."""
 
@@ -54,7 +56,7 @@ def exported_drive(drive: Drive | None = None) -> Exported:
         parameters=columns,
         outputs=(*Sample._fields[1:], "motor_torque", "motor_pressure_drop"),
         bounds={"voltage": FULL_VOLTAGE},
-        least={name: least for name, (least, _) in LEAST.items()},
+        ranges={name: (least, most) for name, (least, most, _) in RANGES.items()},
         stable={0: stable_step},
         follows={(1, "steep"): steep_stops},
         internal=frozenset({"own"}),
@@ -131,9 +133,9 @@ class Content:
 
     @property
     def identifier(self) -> str:
-        """Its name as one of C's."""
+        """Its name as one of C's, of which C99 looks at 63 characters."""
         made = re.sub(r"\W", "_", self.name, flags=re.ASCII).strip("_").lower() or "model"
-        return f"_{made}" if made[0].isdigit() else made
+        return (f"_{made}" if made[0].isdigit() else made)[:LONGEST_IDENTIFIER]
 
 
 def content_of(
@@ -271,10 +273,9 @@ def _initialiser(exported: Exported, values: Array, name: str, title: str) -> st
     names = ["step [s]", *(each for each, _ in Writer(exported).values())]
     guard = f"{name.upper()}_VALUES_H"
     head = f"Values of {name} for {exported.prefix}_init, as swashplate computed them."
-    head = f"{head} {title}".strip().replace("*/", "* /")
-    lines = [f"/* {head} */",
+    lines = [f"/* {comment_line(f'{head} {title}'.strip())} */",
              f"#ifndef {guard}", f"#define {guard}", "", "#include <math.h>", "",
              f"static const double {name}_values[{len(values)}] = {{"]  # fmt: skip
     for value, what in zip(values.tolist(), names, strict=True):
-        lines.append(f"    {literal(value)}, /* {what} */")
+        lines.append(f"    {literal(value)}, /* {comment_line(what)} */")
     return "\n".join([*lines, "};", "", "#endif", ""])

@@ -6,6 +6,7 @@ drive is the package's own; the numbers are a resource that it reads.
 
 from __future__ import annotations
 
+import re
 import warnings
 import zipfile
 from collections.abc import Collection, Mapping, Sequence
@@ -48,6 +49,9 @@ DISPLAYED = {"rad": ("deg",), "rad/s": ("deg/s", "rpm"), "Pa": ("bar",), "m": ("
 """Units that people read, offered beside SI ones."""
 WHOLE = "fmu.c"
 """The source that an importer compiles."""
+COPYRIGHT = "Libraries and sources: the swashplate developers; numbers: their owner"
+LICENSE = "Libraries and sources: BSD-3-Clause; numbers: as their owner says"
+"""Of an FMU; who wrote it down is not known, so that it names no author."""
 ABILITIES_2 = (
     "canInterpolateInputs",
     "canGetAndSetFMUstate",
@@ -55,6 +59,7 @@ ABILITIES_2 = (
     "canNotUseMemoryManagementFunctions",
 )
 ABILITIES_3 = ("canGetAndSetFMUState", "canSerializeFMUState")
+_NOT_XML = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 _EARLIEST = (1980, 1, 1, 0, 0, 0)
 
 
@@ -204,7 +209,10 @@ def _zipped(members: Mapping[str, bytes]) -> bytes:
 
 
 def _xml(root: ET.Element) -> bytes:
-    """A document's bytes."""
+    """A document's bytes, without the characters that XML cannot have."""
+    for element in root.iter():
+        for name, value in element.attrib.items():
+            element.set(name, _NOT_XML.sub("\N{REPLACEMENT CHARACTER}", value))
     ET.indent(root)
     text = ET.tostring(root, "unicode")
     return f'<?xml version="1.0" encoding="UTF-8"?>\n{text}\n'.encode()
@@ -261,6 +269,8 @@ def _head(content: Content, table: Sequence[Variable], fmi: Version, token: str)
         "modelName": content.name,
         named: token,
         "description": words,
+        "copyright": COPYRIGHT,
+        "license": LICENSE,
         "generationTool": f"swashplate {__version__}",
         "variableNamingConvention": "structured",
     }

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from math import isfinite
+from math import inf, isfinite
 from typing import Any, Literal, NamedTuple
 
 from swashplate.equations.c_source import Exported, c_name, literal
@@ -119,7 +119,7 @@ def variables(
     r = references
     parameters = exported.named("parameters")
     starts = {name: min(values[1 + k], NONE) for k, (_, _, name) in enumerate(parameters)}
-    defaults = defaults_of(exported)
+    defaults, ranges = defaults_of(exported), exported.ranges
 
     def signal(name: str, number: int, kind: Literal["input", "output"], **more: Any) -> Variable:
         said = words.get(name, Words(f"{kind} {name}"))
@@ -131,7 +131,8 @@ def variables(
             number,
             "input",
             start=starts[defaults[name]] if name in defaults else 0.0,
-            lower=exported.least.get(name),
+            lower=ranges.get(name, (None, None))[0],
+            upper=ranges.get(name, (None, None))[1],
         )
         for number, name in enumerate((*exported.signals, *exported.measured), r.INPUT)
     ]
@@ -218,6 +219,8 @@ def c_header(exported: Exported, layout: int, references: References) -> str:
     places = ", ".join(f"SWP_PARAMETER_{c_name(defaults[name])}" for name in exported.measured)
     names = ", ".join(f'"{name}"' for name in (*signals, *exported.measured))
     bounds = ", ".join(literal(exported.bounds.get(name, 0.0)) for name in signals)
+    pairs = [exported.ranges.get(name, (-inf, inf)) for name in (*signals, *exported.measured)]
+    ranges = ", ".join(f"{{{literal(low)}, {literal(high)}}}" for low, high in pairs)
     free = f"swp_get_option(m, SWP_OPTION_{exported.free_step})" if exported.free_step else "1"
     return f"""\
 /* Made by swashplate: the model, value references and what goes with them. */
@@ -235,6 +238,7 @@ typedef {exported.type} swp_model;
 #define SWP_FMI_SETTLES {int(exported.settles)}
 #define SWP_FMI_FREE_STEP(m) {free}
 #define SWP_FMI_BOUNDS {{{bounds or "0.0"}}} /* largest magnitudes of inputs, 0 for none */
+#define SWP_FMI_INPUT_RANGES {{{ranges or "{0.0, 0.0}"}}} /* of all inputs, lowest and highest */
 #define SWP_FMI_INPUT_NAMES {{{names or "NULL"}}}
 #define SWP_FMI_INPUT_DEFAULTS {{{places or "-1"}}} /* parameters */
 

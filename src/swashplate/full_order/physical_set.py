@@ -19,7 +19,7 @@ import numpy as np
 from swashplate.documents import parse_toml, validated
 from swashplate.equations.declaration import interpreted
 from swashplate.equations.fields import Definition, Flag, declared_by
-from swashplate.errors import ParameterError
+from swashplate.errors import ParameterError, UnknownParameterError
 from swashplate.models import machine as equations
 from swashplate.models.machine import Machine
 from swashplate.parameters.files import AXES, Entry, FilePart, parameter_of
@@ -187,7 +187,7 @@ def quantity_of(name: str) -> Definition:
         if name in CHOICES
         else f"{hint}; the quantities are {', '.join(QUANTITIES)}"
     )
-    raise ParameterError(f"A physical set has no quantity '{name}'{choice}.")
+    raise UnknownParameterError(f"A physical set has no quantity '{name}'{choice}.")
 
 
 def chosen_quantity(name: str) -> Definition:

@@ -1,10 +1,9 @@
-from .assessment import Judged as Judged
-from .assessment import judge_fit as judge_fit
-from .assessment import load_fit as load_fit
+from .assessment import Identification as Identification
 from .criteria import Verdict as Verdict
 from .criteria import verdict as verdict
 from .determination import Identifiability as Identifiability
 from .drive_model import DriveModel as DriveModel
+from .drive_model import configuration as configuration
 from .experiment_design import Outlook as Outlook
 from .experiment_design import advise as advise
 from .experiment_design import bench as bench
@@ -13,6 +12,8 @@ from .fitting import Fit as Fit
 from .fitting import Search as Search
 from .fitting import StageFit as StageFit
 from .fitting import fit as fit
+from .identifying import identify as identify
+from .intervals import Estimate as Estimate
 from .intervals import Uncertainty as Uncertainty
 from .intervals import uncertainty as uncertainty
 from .model import Linearised as Linearised

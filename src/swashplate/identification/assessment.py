@@ -1,55 +1,83 @@
-"""A fit with all that is found out about it, and its file."""
+"""The result of an identification: a fit, its campaign and verdict; its folder on disk."""
 
 from __future__ import annotations
 
 import platform
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from datetime import date
 from functools import cached_property
+from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from pydantic import BaseModel, ConfigDict
+from tomlkit import dumps
 
 from swashplate.__about__ import __version__
 from swashplate.campaign.campaign import Campaign
 from swashplate.campaign.experiment import Experiment
 from swashplate.documents import read_json
-from swashplate.errors import FileError, InputError
+from swashplate.drive import Drive
+from swashplate.errors import FileError, InputError, MissingFileError
 from swashplate.identification import tables
 from swashplate.identification.criteria import REQUIRED, Grade, Verdict, verdict
 from swashplate.identification.drive_model import Parameters
-from swashplate.identification.fitting import Fit, Solved, StageFit, fingerprint, staged
-from swashplate.identification.problem import Loss, Problem
-from swashplate.identification.profiles import Profile, profiles_of
-from swashplate.identification.resampling import (
-    Bootstrap,
-    CrossValidation,
-    bootstraps_of,
-    cross_validate,
+from swashplate.identification.fitting import (
+    Estimated,
+    Fit,
+    Solved,
+    StageFit,
+    fingerprint,
+    staged,
 )
-from swashplate.identification.setup import ModelSetup, Setup, Stage
+from swashplate.identification.intervals import Estimate
+from swashplate.identification.problem import Problem
+from swashplate.identification.profiles import Profile
+from swashplate.identification.resampling import Bootstrap, CrossValidation
+from swashplate.identification.setup import ModelSetup, Setup, Stage, setup_text
 from swashplate.identification.solving import Solution
 from swashplate.identification.unknowns import Unknown, Unknowns
 from swashplate.identification.validation import RunQuality, predict
 from swashplate.parameters.definitions import find
-from swashplate.parameters.files import dump_set, read_set
+from swashplate.parameters.files import (
+    FITTED_DRIVE,
+    FITTED_NUMBERS,
+    NEUTRAL,
+    dump_set,
+    read_set,
+)
 from swashplate.parameters.parameter_set import Motion, ParameterSet
 from swashplate.progress import working
-from swashplate.results import Result, folded
-from swashplate.tables import Table, write_text
+from swashplate.results import folded
+from swashplate.tables import Table, made_folder, write_text
 
 if TYPE_CHECKING:
-    from swashplate.executors import Executor
+    import polars
+
+CONFIGURATION, ESTIMATES, STORED = "setup.toml", "estimates.csv", "fit.json"
+"""In a fit's folder, beside the drive or the model's numbers: the fit configuration, the table of
+estimates, and what the fit keeps of itself."""
 
 
 @dataclass(frozen=True, eq=False)
-class Judged(Result):
-    """A fit, just made or stored, and all that is found out about it."""
+class Identification(Estimated):
+    """What `identify` returns: a fitted drive or user-defined model, and what it is worth.
+
+    Estimates are there by name, intervals and verdict are computed when they are first asked for.
+
+    Examples
+    --------
+    >>> result = swashplate.identify("virtual/campaign.toml")
+    >>> result.verdict.headline
+    >>> result["Z8"].value, result["Z8"].standard_error, result["Z8"].interval
+    >>> result.save("fitted")
+    >>> again = swashplate.Identification.load("fitted")
+    """
 
     campaign: Campaign
-    result: Fit
+    fit: Fit
+    """Stage by stage what was estimated, from what it began."""
     bootstraps: Mapping[str, Bootstrap] = field(default_factory=dict)
     """By stage."""
     profiles: Sequence[Profile] = ()
@@ -59,33 +87,56 @@ class Judged(Result):
     required: float = REQUIRED
     """Largest error of held-out runs over their range."""
 
+    @property
+    def estimates(self) -> Mapping[str, Estimate]:
+        """Every number of the machine by name, estimated or fixed, and those of single runs."""
+        return self.fit.estimates
+
+    def to_polars(self) -> polars.DataFrame:
+        """What was estimated, one row for each parameter, SI; what ``estimates.csv`` holds.
+
+        Columns are stage, parameter, unit, nominal, value, lower and upper (ends of the 95 %
+        interval), with a bootstrap also bootstrap_lower and bootstrap_upper, standard_error and
+        status.
+        """
+        return tables.all_estimates(self.fit, self.bootstraps).to_polars()
+
+    @cached_property
+    def drive(self) -> Drive:
+        """The fitted drive, in which each parameter says whether it was fitted or fixed.
+
+        Raises
+        ------
+        InputError
+            If a user-defined model was fitted: its numbers are those of ``fit.parameters``.
+        """
+        return Drive(replace(self.fit.drive.parameters, **self._origins()))
+
     @cached_property
     def predicted(self) -> tuple[RunQuality, ...]:
         """Runs of the axis that were held out, predicted."""
-        runs = self.result.runs
+        runs = self.fit.runs
         names = {each.name for each in runs}
         out = self.campaign.select(axis=runs[0].axis, role="validate")
-        return predict(self.result.parameters, [each for each in out if each.name not in names])
+        return predict(self.fit.parameters, [each for each in out if each.name not in names])
 
     @cached_property
     def verdict(self) -> Verdict:
         """What it can be used for."""
-        planned = [each.name for each in self.result.setup.stages]
+        planned = [each.name for each in self.fit.setup.stages]
         with working("Judging the fit"):
-            return verdict(
-                self.result.stages, self.predicted, planned=planned, required=self.required
-            )
+            return verdict(self.fit.stages, self.predicted, planned=planned, required=self.required)
 
     def tables(self) -> list[Table]:
         """Criteria of the verdict, then the fit's tables and the errors of held-out runs."""
-        return [self.verdict.table(), *self.result.tables(), *self._held_out_tables()]
+        return [self.verdict.table(), *self.fit.tables(), *self._held_out_tables()]
 
     def _held_out_tables(self) -> list[Table]:
         made = tables.runs_tables(self.predicted)
         return [replace(table, title=f"{table.title}, held-out runs") for table in made]
 
     def _repr_html_(self) -> str:
-        estimates = folded("Estimates, and errors of fitted runs", self.result.tables())
+        estimates = folded("Estimates, and errors of fitted runs", self.fit.tables())
         held_out = self._held_out_tables()
         errors = folded("Errors of held-out runs", held_out) if held_out else ""
         return f"{self.verdict._repr_html_()}{estimates}{errors}"
@@ -100,19 +151,112 @@ class Judged(Result):
         """What the verdict says below its table."""
         return tuple(self.verdict.remarks())
 
-    def store(self, path: str | Path) -> None:
-        """Write what `load_fit` reads and the report can be made from again, whole or not at all.
+    def report(self, path: str | Path, *, truth: Drive | ParameterSet | None = None) -> None:
+        """Write the report: one HTML file, whole or not at all, that needs no network.
 
-        Samples stay in the campaign; a fingerprint of each run is stored.
+        Parameters
+        ----------
+        path : path
+            The file, which replaces an older one.
+        truth : Drive or ParameterSet, optional
+            What virtual tests were simulated with; it stands beside the estimates.
+
+        Raises
+        ------
+        FileError
+            If the file cannot be written.
         """
-        start = self.result.nominal
-        content = FitFile(
+        # by name, as it stands above this package
+        pages = import_module("swashplate.report.fit_report")
+        true = truth.parameters if isinstance(truth, Drive) else truth
+        pages.write_fit_report(self, path, truth=true)
+
+    def save(self, folder: str | Path) -> tuple[Path, ...]:
+        """Write the folder that `load`, `Drive.from_toml` and every command read.
+
+        Of a drive these are ``drive.toml`` and the fit configuration ``setup.toml``, of a
+        user-defined model its numbers, ``parameters.toml``; of both ``estimates.csv`` and
+        ``fit.json``. Samples stay in the campaign; a fingerprint of each run is stored. Older files
+        of these names are replaced, each whole or not at all.
+
+        Returns
+        -------
+        tuple of Path
+            The files in the order in which they were written.
+
+        Raises
+        ------
+        FileError
+            If one cannot be written.
+        """
+        place = made_folder(Path(folder))
+        parameters = self.fit.parameters
+        if isinstance(parameters, ModelSetup):
+            numbers = {name: float(value) for name, value in parameters.numbers.items()}
+            files = {FITTED_NUMBERS: dumps({parameters.name: numbers})}
+        else:
+            files = {
+                FITTED_DRIVE: dump_set(self.drive.parameters),
+                CONFIGURATION: setup_text(self.fit.setup),
+            }
+        for name, text in files.items():
+            write_text(text, place / name)
+        self.write(place / ESTIMATES)
+        write_text(self._stored().model_dump_json(indent=1, by_alias=True) + "\n", place / STORED)
+        return tuple(place / name for name in (*files, ESTIMATES, STORED))
+
+    @classmethod
+    def load(
+        cls,
+        path: str | Path,
+        campaign: str | Path | Campaign | None = None,
+        *,
+        model: str | Path | ModelSetup | None = None,
+        threads: int | None = None,
+    ) -> Identification:
+        """Read back what `save` or ``swashplate fit`` wrote, without fitting again.
+
+        Parameters
+        ----------
+        path : path
+            The folder, or a file in it.
+        campaign : path or Campaign, optional
+            The tests that were fitted; by default where the fit found them.
+        model : ModelSetup or path, optional
+            The user-defined model that was fitted, or the Python file that states it; the folder
+            does not have it.
+        threads : int, optional
+            As of `fit`.
+
+        Raises
+        ------
+        FileError
+            If there is no fit, the campaign is not there any more, or another version of the
+            package wrote it.
+        InputError
+            If a run of the campaign is not as it was; the sentence names it.
+        """
+        place = Path(path)
+        file = place.with_name(STORED) if place.is_file() else place / STORED
+        if not file.is_file():
+            raise MissingFileError(
+                f"There is no {STORED} in {file.parent}: give a folder that 'swashplate fit' or "
+                "Identification.save wrote."
+            )
+        if isinstance(model, str | Path):
+            model = ModelSetup.from_file(model)
+        return _loaded(file, campaign, model, threads)
+
+    def _stored(self) -> FitFile:
+        """What ``fit.json`` holds."""
+        start = self.fit.nominal
+        return FitFile(
             swashplate=__version__,
-            axis=self.result.runs[0].axis,
+            axis=self.fit.runs[0].axis,
             campaign=str(self.campaign.path),
-            runs={each.name: fingerprint(each) for each in self.result.runs},
+            runs={each.name: fingerprint(each) for each in self.fit.runs},
             nominal=dict(start.numbers) if isinstance(start, ModelSetup) else dump_set(start),
-            setup=self.result.setup,
+            setup=self.fit.setup,
             stages=tuple(
                 StoredStage(
                     name=each.stage.name,
@@ -120,7 +264,7 @@ class Judged(Result):
                     solution=each.solution,
                     starts=each.starts,
                 )
-                for each in self.result.stages
+                for each in self.fit.stages
             ),
             profiles=tuple(self.profiles),
             folds=self.folds,
@@ -128,20 +272,20 @@ class Judged(Result):
             verdict=StoredVerdict(
                 grade=self.verdict.grade,
                 headline=self.verdict.headline,
-                numbers=dict(self.result.parameters.numbers),
+                numbers=dict(self.fit.parameters.numbers),
             ),
         )
-        write_text(content.model_dump_json(indent=1, by_alias=True) + "\n", path)
 
-    def fitted_set(self) -> ParameterSet:
-        """The fitted set, where each number says whether it was fitted or fixed, and its source.
+    def _origins(self) -> dict[str, Any]:
+        """Title and motion of the fitted set, and where each of its parameters comes from.
 
         Of a fitted one the source is campaign, date and 95 % interval; of a fixed one that of the
-        set which the fit began from. The title of one that is not usable says so.
+        set which the fit began from. The title of one that is not usable says so. A machine that
+        began at the start for any machine is called like its axis.
         """
-        found, nominal = self.result.drive.parameters, self.result.nominal
+        found, nominal = self.fit.drive.parameters, self.fit.nominal
         assert isinstance(nominal, ParameterSet)
-        today, ends = f"{date.today():%d %b %Y}", _interval_words(self.result.stages, found)
+        today, ends = f"{date.today():%d %b %Y}", _interval_words(self.fit.stages, found)
         parameters = dict(found.parameters)
         for symbol, parameter in parameters.items():
             if symbol in ends:
@@ -151,13 +295,16 @@ class Judged(Result):
                 before = nominal.parameters.get(symbol, parameter).source
                 source = f"{nominal.name}: {before}" if before else nominal.name
                 parameters[symbol] = replace(parameter, status="fixed", source=source)
-        fitted = len(self.result.stages[0].problem.experiments)
+        fitted = len(self.fit.stages[0].problem.experiments)
         title = f"{self.campaign.title}: fitted to {fitted} runs, {today}"
         if not self.verdict.usable:
             title += f". {self.verdict.headline.rstrip('.')}"
-        return replace(
-            found, title=title, parameters=parameters, motion=motion_of(self.result.runs)
-        )
+        return {
+            "name": self.fit.runs[0].axis if found.name == NEUTRAL else found.name,
+            "title": title,
+            "parameters": parameters,
+            "motion": motion_of(self.fit.runs),
+        }
 
 
 def motion_of(runs: Iterable[Experiment]) -> Motion:
@@ -187,73 +334,6 @@ def _interval_words(stages: Sequence[StageFit], found: ParameterSet) -> dict[str
                     side = f"{side} " if side in ("plus", "minus") else ""
                     words.setdefault(find(target).symbol, []).append(f"{side}{ends}")
     return words
-
-
-def judge_fit(
-    campaign: Campaign,
-    result: Fit,
-    *,
-    first: Fit | None = None,
-    folds: int = 0,
-    bootstrap: int = 0,
-    profiles: Sequence[str] = (),
-    seed: int = 0,
-    executor: Executor | None = None,
-    loss: Loss = "linear",
-    required: float = REQUIRED,
-    watch: Callable[[str], None] = lambda _: None,
-) -> Judged:
-    """A fit with what was asked for besides: folds, bootstrap, profiles.
-
-    Parameters
-    ----------
-    campaign, result :
-        What was fitted, and what was found.
-    first : Fit, optional
-        The fit in stages that a joint one went on from: folds begin where it did.
-    folds, bootstrap : int
-        Folds of the cross-validation, and refits to new noise; 0 for none.
-    profiles : sequence of str
-        Unknowns by name, or ``"all"``; an `InputError` for one that there is not.
-    seed, executor, loss :
-        Of the refits.
-    required : float
-        Largest error of held-out runs over their range. [1]
-    watch : callable
-        Is given in words how far the work is.
-    """
-    stages = result.stages
-    known = [name for each in stages for name in each.problem.unknowns.names]
-    for name in profiles:
-        if name != "all" and name not in known:
-            machine = ", ".join(each for each in known if "(" not in each)
-            raise InputError(f"There is no parameter '{name}'; there are {machine}.")
-    how: dict[str, Any] = {"executor": executor, "seed": seed}
-    validated, bootstraps, made = None, {}, list[Profile]()
-    if folds:
-        begun = result if first is None else first
-        validated = cross_validate(
-            begun.runs,
-            begun.nominal,
-            begun.setup,
-            folds=folds,
-            loss=loss,
-            watch=lambda _, done: watch(f"{done} of {folds} folds"),
-            **how,
-        )
-    if bootstrap:
-        words = f"of {bootstrap} fits to new noise"
-        bootstraps = bootstraps_of(stages, bootstrap, watch=lambda n: watch(f"{n} {words}"), **how)
-    for each in stages if profiles else ():
-
-        def profiled(done: int, stage: str = each.stage.name) -> None:
-            watch(f"{stage}: {done} profiles")
-
-        own = each.problem.unknowns.names
-        names = None if "all" in profiles else [name for name in profiles if name in own]
-        made += profiles_of(each, names, executor=executor, watch=profiled).values()
-    notes = {**versions(), "seed": str(seed), "campaign": str(campaign.path)}
-    return Judged(campaign, result, bootstraps, made, validated, notes, required)
 
 
 def versions() -> dict[str, str]:
@@ -312,36 +392,29 @@ class FitFile(Entry):
 def read_verdict(path: str | Path) -> StoredVerdict | None:
     """The verdict that a stored fit had, without its campaign; None if the file has none.
 
-    A `FileError` or `ParameterError` if the file is none that `Judged.store` wrote.
+    A `FileError` or `ParameterError` if the file is not one that `Identification.save` wrote.
     """
     return read_json(path, FitFile, strict=False).verdict
 
 
-def load_fit(
-    path: str | Path,
-    campaign: Campaign,
-    *,
-    model: ModelSetup | None = None,
-    threads: int | None = None,
-) -> Judged:
-    """A stored fit with its campaign, without fitting again.
-
-    Parameters
-    ----------
-    path : path
-        What `Judged.store` wrote; a `FileError` if it is none, or was written by another version.
-    campaign : Campaign
-        The tests that were fitted; an `InputError` names the run that is not as it was.
-    model : ModelSetup, optional
-        The model of one's own that was fitted; the file does not have it.
-    threads : int, optional
-        As of `fitting.fit`.
-    """
+def _loaded(
+    path: Path,
+    tests: str | Path | Campaign | None,
+    model: ModelSetup | None,
+    threads: int | None,
+) -> Identification:
+    """See `Identification.load`."""
     file = read_json(path, FitFile, strict=False)
     if file.swashplate != __version__:
         raise FileError(
             f"{path} was written by swashplate {file.swashplate}, this is {__version__}: fit again."
         )
+    if tests is None and not Path(file.campaign).is_file():
+        raise MissingFileError(
+            f"{path} was fitted to {file.campaign}, which is not there: name the campaign."
+        )
+    tests = file.campaign if tests is None else tests
+    campaign = tests if isinstance(tests, Campaign) else Campaign.from_toml(tests)
     runs = {each.name: each for each in campaign}
     for name, mark in file.runs.items():
         if name not in runs:
@@ -389,4 +462,4 @@ def load_fit(
         if not 0 <= profile.index < len(names):
             raise FileError(f"{path}: stage {stage} has no parameter {profile.index + 1}.")
         profiles.append(replace(profile, stage=stage, name=names[profile.index]))
-    return Judged(campaign, found, {}, profiles, file.folds, file.notes)
+    return Identification(campaign, found, {}, profiles, file.folds, file.notes)

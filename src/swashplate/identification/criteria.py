@@ -12,7 +12,7 @@ import numpy as np
 from swashplate.campaign.experiment import Experiment
 from swashplate.errors import DomainError, InputError
 from swashplate.identification.data_checks import contradicting_runs
-from swashplate.identification.determination import WIDE, weak_unknowns
+from swashplate.identification.determination import WIDE, weak_unknowns, without_value
 from swashplate.identification.drive_model import CURRENTS, LIMITS, DriveModel, limits_reached
 from swashplate.identification.faults import DRIFT, LOSS, Fault, measurement_error
 from swashplate.identification.intervals import open_unknowns
@@ -370,12 +370,8 @@ def _consistent(stages: Sequence[StageFit]) -> Criterion:
 
 def _determined(stages: Sequence[StageFit]) -> Criterion:
     """That most unknowns that all runs share have values of their own."""
-    lost, total = 0, 0
-    for each in stages:
-        shared = {unknown.name for unknown in each.problem.unknowns if unknown.run is None}
-        found = each.identifiability
-        lost += len(shared & {*found.at_bounds, *found.to_fix})
-        total += len(shared)
+    lost = sum(len(without_value(each)) for each in stages)
+    total = sum(unknown.run is None for each in stages for unknown in each.problem.unknowns)
     name, value = "parameters without a value", f"{lost} of {total}"
     why = "a fit that determines few of its parameters has found nothing"
     failure = f"{value} parameters are at a bound or not determined" if lost > MOST * total else ""

@@ -21,10 +21,15 @@ from swashplate.campaign.quality import (
     wrapped_positions,
 )
 from swashplate.errors import InputError
-from swashplate.identification.drive_model import SIGNALS, simulated_run
+from swashplate.identification.drive_model import (
+    CURRENTS,
+    SIGNALS,
+    kinds_of,
+    simulated_run,
+)
 from swashplate.identification.model import EquationModel
 from swashplate.identification.problem import Loss, Problem
-from swashplate.identification.setup import ModelSetup
+from swashplate.identification.setup import ModelSetup, Setup
 from swashplate.parameters.parameter_set import ParameterSet
 from swashplate.parameters.rules import FULL_VOLTAGE
 from swashplate.tables import count
@@ -87,6 +92,28 @@ def check_runs(experiments: Sequence[Experiment], nominal: ParameterSet) -> list
             found += still
             found += contradictions(name, [each for each in ours if each.run not in seen])
     return sorted(found, key=lambda each: each.severity != "refuse")
+
+
+def unfitted_currents(experiments: Sequence[Experiment], setup: Setup) -> list[Finding]:
+    """Currents of an amplifier that are measured, and fitted by no stage."""
+    fitted = {kind for stage in setup.stages for kind in stage.channels or kinds_of(stage.part)}
+    driving = any(stage.current == "measured" for stage in setup.stages)
+    left = {
+        name: None
+        for each in experiments
+        for name, channel in each.channels.items()
+        if each.input.kind == "voltage" and channel.kind in CURRENTS and channel.kind not in fitted
+    }
+    return [
+        warning(
+            None,
+            name,
+            f"'{name}' is measured, but no stage fits it, so that the amplifier is not known: let "
+            "'swashplate guess' write a start and a fit configuration whose first stage fits the "
+            "amplifier to it, and give them by --from and --setup.",
+        )
+        for name in ([] if driving else left)
+    ]
 
 
 def check_model(experiments: Sequence[Experiment], setup: ModelSetup) -> list[Finding]:

@@ -153,12 +153,21 @@ class Direction(NamedTuple):
             moves += f" and {len(self.changes) - NAMED} others"
         if self.weak:
             along = f" ({moves} have little effect together)" if len(self.changes) > 1 else ""
+            known = f"is known {_within(self.half_width)} only"
+            if self.half_width >= 1.0:
+                known = f"is known {_within(self.half_width)}"
             return (
-                f"Weak: {self.fix} is known to ±{100.0 * self.half_width:.3g} % only{along}. Add a "
-                "test that determines it, or fix one whose value you know."
+                f"Weak: {self.fix} {known}{along}. Add a test that determines it, or fix one whose "
+                "value you know."
             )
         change = "together change" if len(self.changes) > 1 else "changes"
         return f"{moves} {change} nothing. Fix {self.fix}."
+
+
+def _within(half_width: float) -> str:
+    """The half-width of an interval over the value; beyond the value itself it says no more."""
+    percent = 100.0 * half_width
+    return f"to ±{percent:.3g} %" if percent < 100.0 else "not even to ±100 %"
 
 
 def _in_order(name: str) -> tuple[str | int, ...]:
@@ -203,7 +212,8 @@ class Identifiability(Result):
         free, rank = int(np.count_nonzero(self.variables.free)), self.rank
         told = f"{rank} combination{'' if rank == 1 else 's'} of {free} free parameters"
         told = f"all {free} free parameters" if rank == free else told
-        said = [f"The tests determine {told if rank else 'none of the parameters'}."]
+        weak = f", {len(self.weak)} of them weakly" if self.weak and rank == free else ""
+        said = [f"The tests determine {told if rank else 'none of the parameters'}{weak}."]
         if not free:
             said = ["All parameters are at a bound: there is nothing left to determine."]
         if self.unexcited:
@@ -214,7 +224,7 @@ class Identifiability(Result):
         if len(self.weak) == 1:
             said.append(self.weak[0].sentence)
         elif self.weak:
-            known = [f"{each.fix} to ±{100.0 * each.half_width:.3g} %" for each in self.weak]
+            known = [f"{each.fix} {_within(each.half_width)}" for each in self.weak]
             said.append(
                 f"Weak, each with those before it fixed: {listed(known)}. Add tests that determine "
                 "them, or fix those whose values you know."
@@ -335,6 +345,14 @@ def _fixing(places: list[int], vector: Array, null: Array, fixed: list[int]) -> 
             if singular.size == len(fixed) + 1 and singular[-1] > 1e-6:
                 return place
     return None
+
+
+def without_value(stage: StageFit) -> list[str]:
+    """Unknowns of the machine that ended at a bound, or that the tests do not determine."""
+    found = stage.identifiability
+    lost = {*found.at_bounds, *found.to_fix}
+    machine = (each.name for each in stage.problem.unknowns if each.run is None)
+    return [name for name in machine if name in lost]
 
 
 def weak_unknowns(stage: StageFit) -> list[str]:

@@ -6,6 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from math import sqrt
+from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Literal
 
@@ -13,10 +14,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swashplate.campaign import ChannelKind, applying, inside
+from swashplate.campaign.amplifier import CURRENTS as CURRENTS
 from swashplate.campaign.campaign import Campaign
 from swashplate.campaign.experiment import RISE, Channel, Edge, Experiment, InputSignal
 from swashplate.campaign.samples import signed_by_command
 from swashplate.campaign.schema import SIGNALS as SIGNALS
+from swashplate.documents import validated
 from swashplate.drive import Drive
 from swashplate.equations.marching.observation import Observation, ObservedRecord, Own
 from swashplate.equations.marching.record import SLOWEST, SOURCE_RATE, Record, even_rate, record_of
@@ -26,10 +29,12 @@ from swashplate.identification.model import EDGE, OFFSET, Asked, EquationModel
 from swashplate.identification.problem import Problem, noise_scales
 from swashplate.identification.setup import (
     Forces,
+    FreeParameters,
     ModelSetup,
     Setup,
     Stage,
     deviation,
+    free_entries,
     load_setup,
     setup_names,
 )
@@ -51,12 +56,6 @@ Parameters = ParameterSet | ModelSetup
 Starts = Mapping[str, Mapping[str, float]]
 """For some experiments by name the currents at the first sample, as `START_CURRENTS` has them."""
 
-CURRENTS: tuple[ChannelKind, ...] = (
-    "signed_current",
-    "rectified_current",
-    "current_plus",
-    "current_minus",
-)
 START_PRESSURE = "start_pressure"
 """Name of δP at the first sample, where it is an unknown of the experiment."""
 START_CURRENTS = ("start_current_plus", "start_current_minus")
@@ -360,16 +359,65 @@ def true_value(unknown: Unknown, model: DriveModel, truth: ParameterSet) -> floa
 # --- from a stage of a fit configuration to its problem -------------------------------------------
 
 
-def setup_of(campaign: Campaign, axis: str, name: str | None = None) -> Setup:
-    """The set-up of a name, or the packaged one of the axis's drive; an `InputError` for none."""
-    drive = campaign.drive(axis).name if name is None else ""
-    if name is None and drive not in setup_names():
+def configuration(free: FreeParameters, experiments: Sequence[Experiment]) -> Setup:
+    """A drive's fit configuration from any form that a caller may give it in.
+
+    Parameters
+    ----------
+    free : Setup, str, path or mapping
+        A fit configuration, a packaged one by name, a TOML file, or a mapping: the contents of such
+        a file, or free parameters by symbol as of `setup.free_entries`. Those are estimated in one
+        stage: of the card alone if currents were measured, of pump and motor alone, or through the
+        whole chain if both are free or no current was measured.
+    experiments : sequence of Experiment
+        The runs to fit.
+
+    Raises
+    ------
+    FileError, ParameterError
+        If the configuration cannot be read, or an entry is wrong.
+    """
+    if isinstance(free, Setup):
+        return free
+    if isinstance(free, str | Path):
+        return load_setup(free)
+    given: object = free
+    if not isinstance(given, Mapping) or not given:
         raise InputError(
-            f"There is no packaged fit configuration for the drive '{drive}': give one of your "
+            f"What is free is {free!r}, but must be a fit configuration, its name or file, or a "
+            "mapping such as {'Z8': (0.5, 2)}."
+        )
+    if "stages" in free:
+        return validated(dict(free), Setup, "the fit configuration")
+    entries = free_entries(free)
+    blocks = {"card" if find(name).block == "control_card" else "pump" for name in entries}
+    kinds = {channel.kind for run in experiments for channel in run.channels.values()}
+    part: Literal["card", "pump", "chain"] = "chain"
+    if blocks == {"pump"}:
+        part = "pump"
+    elif blocks == {"card"} and not kinds.isdisjoint(CURRENTS):
+        part = "card"
+    return Setup(stages=(Stage(name=part, part=part, free=entries),))
+
+
+def setup_of(
+    campaign: Campaign, axis: str, drive: ParameterSet, free: FreeParameters | None = None
+) -> Setup:
+    """The fit configuration of an axis.
+
+    By default the packaged one of the drive that the campaign names, or else of the given one; an
+    `InputError` if there is none. `free` as of `configuration`.
+    """
+    if free is not None:
+        return configuration(free, campaign.select(axis=axis, role="fit"))
+    name = drive.name if campaign.axes[axis].drive is None else campaign.drive(axis).name
+    if name not in setup_names():
+        raise InputError(
+            f"There is no packaged fit configuration for the drive '{name}': give one of your "
             "own, a .toml file with stages and free parameters; 'swashplate guess' reads one off "
             "the logs."
         )
-    return load_setup(name or drive)
+    return load_setup(name)
 
 
 def stage_problem(

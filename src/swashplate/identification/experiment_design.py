@@ -467,7 +467,8 @@ def advice_table(title: str, judged: Sequence[Advice]) -> Table:
         gained = ""
         if known:
             name, now, then = min(known, key=lambda pair: pair[2] / pair[1])
-            gained = f"{name} {_error(now)} to {_error(then)}"
+            before = f"{_error(now)} " if now <= KNOWN else ""
+            gained = f"{name} {before}to {_error(then)}"
         made.add(
             each.candidate,
             each.duration,

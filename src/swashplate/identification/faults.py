@@ -77,6 +77,8 @@ FASTEST, WINDOW = 0.99, 0.0625
 time over which that speed is taken. [s]"""
 TO_AND_FRO = 0.05
 """Share of a channel's changes that turn back by more than one step where it is noisy. [1]"""
+ALL_OF_IT = 100.0
+"""Error from which a number says nothing of what is seen. [%]"""
 DWELLS = 0.1
 """Time for which a noisy channel stands at its very largest value only if it is clipped. [s]"""
 
@@ -150,17 +152,27 @@ class Fault:
         size = "" if self.kind is LOSS else f" by {self.size:+.3g} {self.kind.unit}"
         return f"{self.name}{self.kind.also}{size}"
 
+    def _smaller_than(self, size: float) -> str:
+        """In words how small an error stays unseen; empty if one as large as the signal does."""
+        if not isfinite(size) or (self.kind.unit == "%" and size >= ALL_OF_IT):
+            return ""
+        shown = f"{size:.0f}" if size >= 100.0 else f"{size:.2g}"
+        return f" smaller than {shown} {self.kind.unit}"
+
     @property
     def assumption(self) -> str:
         """It as an assumption, in words."""
-        unit = self.kind.unit
         if self.visible:
-            known = isfinite(self.with_fixed)
-            below = f" below {2.0 * self.with_fixed:.2g} {unit}" if known else ""
-            return f"{self.name}: an error{below} can be one of the fixed {listed(self.fixed)}"
+            smaller = self._smaller_than(2.0 * self.with_fixed)
+            return (
+                f"{self.name}: an error{smaller} cannot be told from one of the fixed "
+                f"{listed(self.fixed)}"
+            )
+        smaller = self._smaller_than(2.0 * self.standard_error)
+        if smaller:
+            return f"{self.name}: an error{smaller} would not be noticed"
         if isfinite(self.standard_error):
-            least = f"{2.0 * self.standard_error:.2g} {unit}"
-            return f"{self.name}: an error below {least} is not visible"
+            return f"{self.name}: these runs do not check it at all; check it at the machine"
         others = ", ".join(self.same_as)
         return f"{self.name}: equal to other values of {others} for any measurement of these runs"
 

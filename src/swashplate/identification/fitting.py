@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from difflib import get_close_matches
 from functools import cached_property, partial
 from hashlib import blake2b
 from pathlib import Path
@@ -17,7 +19,7 @@ from swashplate.campaign.campaign import Campaign
 from swashplate.campaign.experiment import Experiment
 from swashplate.drive import Drive
 from swashplate.equations import Model as Equations
-from swashplate.errors import InputError
+from swashplate.errors import InputError, UnknownNameError
 from swashplate.executors import Executor, Serial
 from swashplate.identification import tables
 from swashplate.identification.data_checks import (
@@ -26,31 +28,36 @@ from swashplate.identification.data_checks import (
     check_runs,
     refuse_unsound,
     spike_findings,
+    unfitted_currents,
 )
 from swashplate.identification.determination import Identifiability, identifiability
 from swashplate.identification.drive_model import (
     DriveModel,
     Parameters,
     at_rate_of,
+    configuration,
     stage_problem,
     start_currents_of,
     with_estimates,
 )
 from swashplate.identification.faults import measurement_error
-from swashplate.identification.intervals import Uncertainty, stage_uncertainty, weighed
+from swashplate.identification.intervals import Estimate, Uncertainty, stage_uncertainty, weighed
 from swashplate.identification.model import EDGE, EquationModel, Model, OwnModel
 from swashplate.identification.problem import LinearisedFit, Loss, Problem, linearised_fit
-from swashplate.identification.setup import ModelSetup, Range, Setup, Stage
+from swashplate.identification.setup import FreeParameters, ModelSetup, Setup, Stage
 from swashplate.identification.solving import Progress, Solution, sobol_starts, solve, solve_from
-from swashplate.identification.unknowns import Prior, Unknown
+from swashplate.identification.unknowns import Prior
 from swashplate.identification.validation import RunQuality, run_qualities
 from swashplate.parameters.definitions import columns_of
 from swashplate.parameters.parameter_set import ParameterSet
+from swashplate.parameters.rules import SIDES
 from swashplate.progress import LOGGER, working
-from swashplate.results import Result
+from swashplate.results import Result, Tabular
 from swashplate.tables import count
 
 if TYPE_CHECKING:
+    import polars
+
     from swashplate.tables import Table
 
 P = TypeVar("P", bound=Parameters)
@@ -154,9 +161,48 @@ class StageFit(Result):
         return [tables.estimates_table(self), *tables.runs_tables(self.runs)]
 
 
+class Estimated(Tabular, ABC):
+    """A result with estimates by name: ``result["Z8"].value``, ``result["Z16_plus"].interval``."""
+
+    @property
+    @abstractmethod
+    def estimates(self) -> Mapping[str, Estimate]:
+        """Every number of the machine by name, estimated or fixed, and those of single runs."""
+
+    def __getitem__(self, name: str) -> Estimate:
+        """What the fit says of a number: its value, standard error, interval, unit and status.
+
+        Raises
+        ------
+        UnknownNameError
+            If there is none of that name; it is a ``KeyError`` as well.
+        """
+        if name in self.estimates:
+            return self.estimates[name]
+        sides = [f"{name}_{side}" for side in SIDES]
+        if all(side in self.estimates for side in sides):
+            raise UnknownNameError(f"{name} has two directions: ask for {' or '.join(sides)}.")
+        near = get_close_matches(str(name), self.estimates, 1)
+        meant = f" (did you mean {near[0]}?)" if near else ""
+        known = ", ".join(each for each in self.estimates if "(" not in each)
+        raise UnknownNameError(f"There is no parameter '{name}'{meant}; there are {known}.")
+
+    def __contains__(self, name: object) -> bool:
+        return name in self.estimates
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.estimates)
+
+    def __len__(self) -> int:
+        return len(self.estimates)
+
+
 @dataclass(frozen=True, eq=False)
-class Fit(Result):
-    """A fitted drive, or model of one's own, and how it came about."""
+class Fit(Estimated):
+    """A fitted drive, or a user-defined model, and how it came about.
+
+    Estimates are there by name: ``fit["Z8"].standard_error``.
+    """
 
     setup: Setup
     nominal: Parameters
@@ -181,13 +227,26 @@ class Fit(Result):
         """Whether it was stopped before the last stage's optimum."""
         return self.stages[-1].solution.interrupted
 
+    @cached_property
+    def estimates(self) -> Mapping[str, Estimate]:
+        """Every number of the machine by name, estimated or fixed, and those of single runs."""
+        return tables.estimates_of(self)
+
+    def to_polars(self) -> polars.DataFrame:
+        """What was estimated, one row for each parameter, SI.
+
+        Columns are stage, parameter, unit, nominal, value, lower and upper (ends of the 95 %
+        interval), standard_error and status.
+        """
+        return tables.all_estimates(self).to_polars()
+
     def stage(self, name: str) -> StageFit:
-        """The stage of a name; an `InputError` if there is none."""
+        """The stage of a name; an `UnknownNameError` if there is none."""
         for each in self.stages:
             if each.stage.name == name:
                 return each
         known = ", ".join(each.stage.name for each in self.stages)
-        raise InputError(f"The fit has no stage '{name}'; there are {known}.")
+        raise UnknownNameError(f"The fit has no stage '{name}'; there are {known}.")
 
     def tables(self) -> list[Table]:
         """Estimates with their intervals, stage by stage, then the errors of each fitted run."""
@@ -211,13 +270,13 @@ class Fit(Result):
         if jumps := sum(each.startswith(EDGE) for each in names):
             many = count(jumps, "time")
             said.append(f"Commands jump {many} between two samples: when is estimated.")
-        return (*said, tables.fixed_line(self))
+        return (*said, tables.fixed_line(self), *tables.unvalued_lines(self))
 
 
 def fit(
     model: Drive | Parameters | Model | Equations,
     tests: Campaign | Sequence[Experiment],
-    free: Setup | Mapping[str, Range | Unknown] | None = None,
+    free: FreeParameters | None = None,
     *,
     channels: Sequence[str] = (),
     noise: Mapping[str, float] | None = None,
@@ -229,7 +288,10 @@ def fit(
     search: Search | None = None,
     watch: Callable[[str, Progress], None] | None = None,
 ) -> Fit:
-    """Fit of a drive, or of a model of one's own, to tests.
+    """Estimate the parameters of a drive, or of a user-defined model, from tests.
+
+    The step of `identify` that estimates: it also takes experiments that no campaign file
+    describes, and gives no verdict.
 
     Parameters
     ----------
@@ -239,9 +301,10 @@ def fit(
         an `OwnModel` of them, any object with `simulate`, or a `ModelSetup`.
     tests : Campaign or sequence of Experiment
         The runs to fit; of a campaign those with the role ``"fit"``.
-    free : Setup or mapping of str to (low, nominal, high) or Unknown
-        Of a drive its stages and free parameters; of a model of one's own what is to be found,
-        see `ModelSetup`.
+    free : Setup, str, path or mapping
+        What to estimate. Of a drive a fit configuration: a `Setup`, a packaged one by name, a TOML
+        file, or a mapping as of `configuration`. Of a user-defined model a mapping to (low,
+        nominal, high) or an `Unknown`, see `ModelSetup`.
     channels, noise, fixed : optional
         Of a model of one's own, as of `ModelSetup`.
     loss, tolerance, max_evaluations :
@@ -282,12 +345,17 @@ def fit(
         doubts += refuse_unsound(check_model(runs, nominal))
         nominal = nominal if nominal.numbers else nominal.nominal(runs)
         free = nominal.setup
-    elif isinstance(free, Setup):
+    else:
+        if free is None:
+            raise InputError(
+                "A fit of a drive needs to know what is free, such as 'hoist' or {'Z8': (0.5, 2)}; "
+                "swashplate.identify takes drive and fit configuration from the campaign."
+            )
+        free = configuration(free, runs)
         doubts += refuse_unsound(check_runs(runs, smooth(nominal)))
+        doubts += refuse_unsound(unfitted_currents(runs, free))
         nominal, changed = at_rate_of(runs, nominal)
         doubts += changed
-    else:
-        raise InputError("A drive needs a Setup for what is free, such as load_setup('hoist').")
 
     def solved(stage: Stage, problem: Problem) -> Solved:
         def seen(now: Progress) -> None:

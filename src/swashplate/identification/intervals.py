@@ -43,7 +43,11 @@ Status = Literal[
     "undetermined",
     "no lower end",
     "no upper end",
+    "from the forces",
+    "fixed",
 ]
+"""How an estimate came about: ``"from the forces"`` are the solenoids' coefficients that stand for
+estimated forces, ``"fixed"`` is what no stage moved."""
 DECADES = 100.0
 """Factor each way from which an interval says nothing; for an unknown that is not logarithmic, half
 width in its scales."""
@@ -56,7 +60,12 @@ depends on that unknown."""
 
 
 class Estimate(NamedTuple):
-    """One unknown with what is known of its error."""
+    """One number of a model with what is known of its error.
+
+    Examples
+    --------
+    >>> result["Z8"].value, result["Z8"].standard_error, result["Z8"].interval
+    """
 
     name: str
     value: float
@@ -68,6 +77,17 @@ class Estimate(NamedTuple):
     """End of the interval; asymmetric about the value for a logarithmic unknown. None where there
     is no end."""
     upper: float | None
+    unit: str = ""
+
+    @property
+    def interval(self) -> tuple[float | None, float | None]:
+        """Both ends of the 95 % interval; None where there is no end."""
+        return self.lower, self.upper
+
+    @property
+    def free(self) -> bool:
+        """Whether the fit estimated it, or took it as it was."""
+        return self.status != "fixed"
 
     def ends(self, factor: float = 1.0) -> tuple[str, str]:
         """Both ends in words, times a factor; the status where there is none."""
@@ -134,6 +154,7 @@ def estimates(
                 float(errors[k]) if status == "estimated" else None,
                 float(lower[k]) if told and not below else None,
                 float(upper[k]) if told and not above else None,
+                variables.items[k].unit,
             )
         )
     return tuple(made)
@@ -311,8 +332,11 @@ class Uncertainty(Result):
             side, name = "upper" if end.upper else "lower", self.own.variables.names[end.number]
             words = f"{name} has no {side} end: the cost does not rise enough on that side."
             if end.better is not None:
-                words = f"The profile of {name} found a better optimum, cost {end.better:.6g}"
-                words += ": fit from more starts."
+                words = (
+                    f"The search had not found the best fit: the interval of {name} led to a "
+                    f"better one, cost {end.better:.6g}. Fit again with --starts 20 (in Python "
+                    "search = Search(20))."
+                )
             elif np.isfinite(end.distance):
                 words = f"The {side} end of {name} is that of its profile, which is asymmetric."
             said.append(words)

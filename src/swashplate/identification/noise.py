@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
+from math import sqrt
 from typing import NamedTuple
 
 import numpy as np
@@ -187,12 +188,15 @@ class NoiseColour(Result):
         """How long the residuals stay correlated, and what that makes the samples worth."""
         if not self.length:
             return f"Residuals of {self.channel} are white."
-        worth = f"{self.inflation:.3g} samples count as one independent sample"
-        if self.inflation <= 1.05:
-            worth = "positive and negative correlations cancel, and the samples count as "
-            worth += "independent ones"
         during = f"{self.length * self.step:.3g} s"
-        return f"Residuals of {self.channel} stay correlated over {during}: {worth}."
+        start = f"Residuals of {self.channel} stay correlated over {during}"
+        if self.inflation <= 1.05:
+            return f"{start}, but intervals are those of independent samples: correlations cancel."
+        wider = sqrt(self.inflation)
+        return (
+            f"{start}, so that intervals are about {wider:.2g} times as wide as for independent "
+            "samples."
+        )
 
 
 def noise_colours(fit: LinearisedFit) -> tuple[NoiseColour, ...]:
@@ -439,6 +443,12 @@ def without_lines(fit: LinearisedFit) -> tuple[LinearisedFit, tuple[SpectralLine
     return (replace(fit, runs=tuple(runs)) if found else fit), tuple(found)
 
 
+def _percent(share: float) -> str:
+    """A share in per cent, two digits of it, never as a power of ten."""
+    percent = 100.0 * share
+    return f"{percent:.0f} %" if percent >= 10.0 else f"{percent:.2g} %"
+
+
 def line_sentences(lines: Sequence[SpectralLine]) -> tuple[str, ...]:
     """What lines there are, one sentence a channel."""
     said = []
@@ -449,9 +459,9 @@ def line_sentences(lines: Sequence[SpectralLine]) -> tuple[str, ...]:
         what, largest = f"A spectral line at {low:.3g} Hz makes", ""
         if len(alike) > 1:
             what = f"{len(alike)} spectral lines between {low:.3g} and {high:.3g} Hz make"
-            largest = f", the largest {100.0 * most.share:.2g} % at {most.frequency:.3g} Hz"
-        share = 100.0 * sum(each.share for each in alike)
-        said.append(f"{what} {share:.2g} % of the residuals' variance of {channel}{largest}.")
+            largest = f", the largest {_percent(most.share)} at {most.frequency:.3g} Hz"
+        share = _percent(sum(each.share for each in alike))
+        said.append(f"{what} {share} of the residuals' variance of {channel}{largest}.")
     return tuple(said)
 
 

@@ -81,7 +81,8 @@ class Profile(Result):
         if self.better is not None:
             return (
                 f"The profile of {self.name} met a better optimum, cost {self.better.cost:.6g} "
-                f"against {self.cost:.6g}: fit again from there.",
+                f"against {self.cost:.6g}: fit again with --starts 20 (in Python search = "
+                "Search(20)).",
             )
         reasons: dict[Ending, str] = {
             "bound": "its bound",

@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cache
 from importlib import import_module
 from importlib.resources import files
 from math import inf
@@ -15,15 +15,16 @@ from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, PositiveFloat, model_validator
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
 
 from swashplate.campaign import ChannelKind
 from swashplate.campaign.experiment import Experiment
-from swashplate.campaign.schema import Finite, NotNegative, Positive, Weight, Window
+from swashplate.campaign.schema import Weight, Window
 from swashplate.documents import parse_toml, read_text, validated
+from swashplate.entries import Finite, Flag, NotNegative, Positive
 from swashplate.equations import Model as Equations
 from swashplate.equations.fields import check_mapping, is_real
-from swashplate.errors import FileError, InputError, ParameterError
+from swashplate.errors import FileError, InputError, MissingFileError, ParameterError
 from swashplate.identification.model import OFFSET, OwnModel, simulated
 from swashplate.identification.problem import Problem, noise_scales
 from swashplate.identification.solving import solve
@@ -37,10 +38,7 @@ from swashplate.simulation.instance import START
 Array = NDArray[np.float64]
 _SETUPS = files("swashplate.identification").joinpath("setups")
 Pair = tuple[Finite, Finite]
-StandardUncertainty = (
-    Annotated[PositiveFloat, Field(strict=True, allow_inf_nan=False)]
-    | Annotated[str, Field(pattern=r"^\d+(\.\d+)? ?%$")]
-)
+StandardUncertainty = Positive | Annotated[str, Field(pattern=r"^\d+(\.\d+)? ?%$")]
 """A standard uncertainty: in SI units, or as "5 %" of the value."""
 COEFFICIENTS = ("Z19", "Z20", "Z21", "Z22")
 """Of the solenoids: what forces stand for."""
@@ -73,8 +71,8 @@ class Free(Entry):
 
     relative: Bounds | None = Field(None, description="Bounds as factors on the nominal value.")
     bounds: Bounds | None = Field(None, description="Bounds in SI units.")
-    log: bool = Field(False, description="Move the logarithm: for positive numbers.")
-    tied: bool = Field(False, description="One value for both directions.")
+    log: Flag = Field(False, description="Move the logarithm: for positive numbers.")
+    tied: Flag = Field(False, description="One value for both directions.")
     prior: Prior | None = Field(None, description="A normal distribution, of the logarithm if log.")
 
     @model_validator(mode="after")
@@ -91,10 +89,10 @@ class Forces(Entry):
     of the current beyond the dead zone Z17.
     """
 
-    plus: tuple[PositiveFloat, PositiveFloat, PositiveFloat, PositiveFloat] = Field(
+    plus: tuple[Positive, Positive, Positive, Positive] = Field(
         description="Effective currents of the positive direction, increasing [A]."
     )
-    minus: tuple[PositiveFloat, PositiveFloat, PositiveFloat, PositiveFloat] = Field(
+    minus: tuple[Positive, Positive, Positive, Positive] = Field(
         description="Of the negative direction, as magnitudes [A]."
     )
     relative: Bounds = Field((0.5, 2.0), description="Bounds as factors on the nominal forces.")
@@ -104,13 +102,9 @@ class Forces(Entry):
     columns: ClassVar = tuple(f"{symbol}_{side}" for side in SIDES for symbol in COEFFICIENTS)
     """The parameters that they stand for."""
 
-    @cached_property
+    @property
     def _inverse(self) -> Array:
-        """(8, 8) map from forces to coefficients, of F = Z19 i + Z20 i² + Z21 i³ + Z22 i⁴."""
-        zero, orders = np.zeros((4, 4)), np.arange(1, 5)
-        plus = np.power.outer(self.plus, orders)
-        minus = np.power.outer(self.minus, orders) * (-1.0) ** (orders + 1)
-        return np.linalg.inv(np.block([[plus, zero], [zero, minus]]))
+        return _coefficients_of_forces(self.plus, self.minus)
 
     def values(self, parameters: ParameterSet) -> dict[str, float]:
         """The forces of a parameter set, by name. [N]"""
@@ -129,6 +123,18 @@ class Forces(Entry):
         """Derivatives by one force of the coefficients of its direction. [1/Aᵏ]"""
         column = self._inverse[:, self.names.index(name)].tolist()
         return {each: slope for each, slope in zip(self.columns, column, strict=True) if slope}
+
+
+@cache
+def _coefficients_of_forces(
+    plus: tuple[float, float, float, float], minus: tuple[float, float, float, float]
+) -> Array:
+    """(8, 8) map from forces to coefficients, of F = Z19 i + Z20 i² + Z21 i³ + Z22 i⁴."""
+    # not kept in the entry itself: entries are compared by all that they hold
+    zero, orders = np.zeros((4, 4)), np.arange(1, 5)
+    positive = np.power.outer(plus, orders)
+    negative = np.power.outer(minus, orders) * (-1.0) ** (orders + 1)
+    return np.linalg.inv(np.block([[positive, zero], [zero, negative]]))
 
 
 class InputWeight(Window):
@@ -290,6 +296,34 @@ def load_setup(name: str | Path) -> Setup:
     return validated(parse_toml(text, file), Setup, file)
 
 
+FreeParameters = Setup | str | Path | Mapping[str, Any]
+"""What a fit is to estimate: a fit configuration, its packaged name or file, or a mapping."""
+
+
+def free_entries(free: Mapping[str, Any]) -> dict[str, Free]:
+    """What a mapping frees of a drive, by symbol or column.
+
+    Each value is a pair of factors on the nominal value, ``{"Z8": (0.5, 2)}``, a `Free`, or a
+    mapping as in the TOML file, ``{"Z8": {"bounds": [1e5, 9e5]}}``. A `ParameterError` names what
+    is wrong.
+    """
+    entries: dict[str, Free] = {}
+    for name, entry in free.items():
+        find(name)
+        if isinstance(entry, Free):
+            entries[name] = entry
+        elif isinstance(entry, Mapping):
+            entries[name] = validated(dict(entry), Free, f"free, {name}")
+        elif isinstance(entry, Sequence) and len(entry) == 2 and all(map(is_real, entry)):
+            entries[name] = validated({"relative": tuple(entry)}, Free, f"free, {name}")
+        else:
+            raise ParameterError(
+                f"{name} is free as {entry!r}: give two factors on its nominal value, (0.5, 2), or "
+                "its bounds in SI, {'bounds': (LOW, HIGH)}."
+            )
+    return entries
+
+
 def setup_text(setup: Setup) -> str:
     """A fit configuration as TOML that `load_setup` reads as an equal one."""
     from tomlkit import dumps, inline_table
@@ -397,12 +431,20 @@ class ModelSetup(Result):
             If it lacks one of the names.
         """
         file = Path(path).resolve()
+        if not file.exists():
+            raise MissingFileError(f"There is no file {path}: name a Python file with a model.")
         if not file.is_file() or file.suffix != ".py" or not file.stem.isidentifier():
             raise FileError(f"{path} is no Python file with a model, such as valve.py.")
         if str(file.parent) not in sys.path:
             sys.path.insert(0, str(file.parent))
         try:
             module = import_module(file.stem)
+        except SystemExit as error:
+            sys.modules.pop(file.stem, None)
+            raise FileError(
+                f"{path} ended Python with sys.exit({error.code!r}) as it was loaded: guard what "
+                "the file does as a script by if __name__ == '__main__'."
+            ) from None
         except Exception as error:  # the user's own code, which can raise anything
             sys.modules.pop(file.stem, None)
             own = [e.lineno for e in extract_tb(error.__traceback__) if e.filename == str(file)]

@@ -5,25 +5,37 @@ Each is made once; the terminal, the report's page and the files render it.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from math import inf
+from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 from swashplate.errors import InputError
-from swashplate.identification.determination import GAUGES
+from swashplate.identification.determination import GAUGES, without_value
 from swashplate.identification.drive_model import START_PRESSURE, DriveModel, true_value
-from swashplate.identification.intervals import Estimate
+from swashplate.identification.intervals import Estimate, Status
 from swashplate.identification.model import EDGE
 from swashplate.identification.noise import LEVEL
 from swashplate.identification.setup import ModelSetup
 from swashplate.identification.validation import ignored_windows, pooled, with_speeds
 from swashplate.parameters.definitions import CATALOGUE, COLUMNS
-from swashplate.tables import NONE, UNIT, Cell, Column, Table, listed, percent, plain, spread
+from swashplate.tables import (
+    NONE,
+    UNIT,
+    Cell,
+    Column,
+    Table,
+    joined,
+    listed,
+    percent,
+    plain,
+    spread,
+)
 from swashplate.units import chosen_unit, display_unit
 
 if TYPE_CHECKING:
     from swashplate.campaign.experiment import Channel, Experiment
-    from swashplate.identification.assessment import Judged
+    from swashplate.identification.assessment import Identification
     from swashplate.identification.fitting import Fit, StageFit
     from swashplate.identification.resampling import Bootstrap, CrossValidation
     from swashplate.identification.validation import Measures, RunQuality
@@ -56,16 +68,16 @@ def estimates_table(
             Column("meaning", of="p"),
             UNIT if truth is None else Column("unit", of="pf"),
             Column("nominal", ".5g"),
-            Column("estimate", ".5g"),
+            Column("estimate", ".5g", key="value"),
             Column("change", "s", of="p"),
             Column("truth", ".5g", of=known),
             Column("holds", of=known),
-            Column(f"lower {ends}", ".5g", none=NONE),
-            Column(f"upper {ends}", ".5g", none=NONE),
+            Column(f"lower {ends}", ".5g", none=NONE, key="lower"),
+            Column(f"upper {ends}", ".5g", none=NONE, key="upper"),
             Column("half width", "s", of="p"),
-            Column(f"bootstrap lower {ends}", ".5g", none="-", of=drawn),
-            Column(f"bootstrap upper {ends}", ".5g", none="-", of=drawn),
-            Column("standard error", ".5g", of="f"),
+            Column(f"bootstrap lower {ends}", ".5g", none="-", of=drawn, key="bootstrap_lower"),
+            Column(f"bootstrap upper {ends}", ".5g", none="-", of=drawn, key="bootstrap_upper"),
+            Column("standard error", ".5g", of="f", key="standard_error"),
             Column("status", of="pf"),
         ),
         si=True,
@@ -74,7 +86,7 @@ def estimates_table(
     for k, (unknown, estimate) in enumerate(pairs):
         if (unknown.run is None) == own:
             continue
-        name, value, status, error, low, high = estimate
+        name, value, status, error, low, high, _ = estimate
         factor, true, holds = chosen_unit(unknown.unit).factor, None, ""
         if truth is not None:
             assert isinstance(stage.problem.model, DriveModel)
@@ -108,14 +120,14 @@ def estimates_table(
     return made
 
 
-def profiles_table(found: Judged) -> Table:
+def profiles_table(found: Identification) -> Table:
     """Ends of the intervals that profiles give; none where the cost does not rise enough."""
     ends = f"{100.0 * LEVEL:g} %"
     lower, upper = (Column(f"{side} {ends}", ".5g", none=NONE) for side in ("lower", "upper"))
     columns = (Column("stage"), Column("parameter"), UNIT, Column("estimate", ".5g"), lower, upper)
     made = Table("Profile likelihoods", columns, si=True)
     for one in found.profiles:
-        stage = found.result.stage(one.stage)
+        stage = found.fit.stage(one.stage)
         unknown = stage.problem.unknowns.items[one.index]
         ends_found = (None, None) if one.better is not None else (one.lower, one.upper)
         numbers = (float(stage.solution.vector[one.index]), *ends_found)
@@ -130,8 +142,41 @@ def _estimates(stage: StageFit) -> Sequence[Estimate]:
         return stage.uncertainty.estimates
     except InputError:
         point = stage.problem.unknowns.at(stage.solution.vector)
-        values = zip(point.names, point.estimates.tolist(), strict=True)
-        return [Estimate(name, value, "undetermined", *[None] * 3) for name, value in values]
+        values = zip(point, point.estimates.tolist(), strict=True)
+        return [
+            Estimate(name, value, "undetermined", None, None, None, unknown.unit)
+            for name, (unknown, value) in zip(point.names, values, strict=True)
+        ]
+
+
+def estimates_of(fit: Fit) -> dict[str, Estimate]:
+    """What a fit says of every number: what each stage estimated, then what stayed fixed.
+
+    A parameter that is tied in both directions is there by its symbol and by both columns.
+    """
+    made: dict[str, Estimate] = {}
+    for stage in fit.stages:
+        for unknown, estimate in zip(stage.problem.unknowns, _estimates(stage), strict=True):
+            made[estimate.name] = estimate
+            if unknown.run is None:
+                made.update(dict.fromkeys(unknown.targets, estimate))
+    parameters, moved = fit.parameters, _moved(fit)
+    for name, value in parameters.numbers.items():
+        unit = "" if isinstance(parameters, ModelSetup) else parameters[name].unit
+        status: Status = "from the forces" if name in moved else "fixed"
+        made.setdefault(name, Estimate(name, value, status, None, None, None, unit))
+    return made
+
+
+def all_estimates(fit: Fit, bootstraps: Mapping[str, Bootstrap] = MappingProxyType({})) -> Table:
+    """One table of what all stages estimated: of the machine, then of single runs."""
+    return joined(
+        [
+            estimates_table(stage, bootstrap=bootstraps.get(stage.stage.name), own=own)
+            for stage in fit.stages
+            for own in (False, True)
+        ]
+    )
 
 
 def truth_count(tables: Sequence[Table]) -> tuple[int, int]:
@@ -223,6 +268,18 @@ def fixed_line(fit: Fit) -> str:
     plain_names = (n.removesuffix("_plus").removesuffix("_minus") for n in fit.nominal.numbers)
     kept = [name for name in dict.fromkeys(plain_names) if not _is_moved(name, moved)]
     return f"Fixed at their nominal values: {', '.join(kept) or 'none'}."
+
+
+def unvalued_lines(fit: Fit) -> list[str]:
+    """A sentence on the parameters without a value of their own, if there are any."""
+    lost = [name for stage in fit.stages for name in without_value(stage)]
+    if not lost:
+        return []
+    return [
+        f"Without a value of their own, at a bound or not determined: {listed(lost)}. Fix them in "
+        "the fit configuration, widen their bounds, or add tests that determine them; for a drive "
+        "'swashplate advise' names some."
+    ]
 
 
 def scales_words(fit: StageFit) -> str:

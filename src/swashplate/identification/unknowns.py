@@ -11,8 +11,9 @@ from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field, PlainSerializer, PlainValidator
+from pydantic import PlainSerializer, PlainValidator
 
+from swashplate.entries import Finite, Positive
 from swashplate.errors import InputError, ParameterError
 from swashplate.results import Result
 
@@ -37,9 +38,9 @@ inside, and was seen to end 2e-5 of it off a bound that the data pulled at."""
 class Prior:
     """What is known of an unknown beforehand: a normal distribution."""
 
-    mean: Annotated[float, Field(allow_inf_nan=False)]
+    mean: Finite
     """In the unknown's unit."""
-    deviation: Annotated[float, Field(gt=0.0)]
+    deviation: Positive
     """Standard deviation, positive; of a logarithmic unknown that of its logarithm."""
 
 

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from swashplate.errors import FileError, InputError
+from swashplate.errors import FileError, InputError, MissingFileError
 from swashplate.units import scaling, speed_unit, to_si
 
 if TYPE_CHECKING:
@@ -272,7 +272,7 @@ def _check_readable(source: Path, why: str = "") -> None:
             with source.open("rb") as file:
                 why = "" if file.read(1) else "is empty"
     except FileNotFoundError:
-        raise FileError(f"There is no file {source}.") from None
+        raise MissingFileError(f"There is no file {source}.") from None
     except (OSError, ValueError) as error:
         why = f"cannot be read: {getattr(error, 'strerror', None) or said(error)}"
     if why:

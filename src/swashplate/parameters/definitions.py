@@ -14,7 +14,7 @@ from typing import Literal
 
 from swashplate.equations.fields import Definition as Definition
 from swashplate.equations.fields import declared_by
-from swashplate.errors import ParameterError
+from swashplate.errors import ParameterError, UnknownParameterError
 from swashplate.models.card import Card
 from swashplate.models.displacement_control import Pump
 
@@ -114,11 +114,11 @@ def find(name: str) -> Definition:
     raise unknown_parameter(name)
 
 
-def unknown_parameter(name: str) -> ParameterError:
+def unknown_parameter(name: str) -> UnknownParameterError:
     """Error for a name that no parameter has."""
     close = get_close_matches(str(name), [*CATALOGUE, *COLUMNS, *REFINEMENTS], n=1)
     hint = f" (did you mean {close[0]}?)" if close else ""
-    return ParameterError(
+    return UnknownParameterError(
         f"There is no parameter '{name}'{hint}; the parameters are {', '.join(CATALOGUE)}, "
         "those with two directions also as e.g. Z16_plus and Z16_minus, and the refinements "
         f"{', '.join(REFINEMENTS)}."

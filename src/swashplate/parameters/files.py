@@ -1,16 +1,17 @@
 """Parameter sets as TOML files: the packaged ones and the user's."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from functools import cache
 from importlib.resources import files
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated
 
-from pydantic import BaseModel, ConfigDict, Field, PositiveFloat
+from pydantic import BaseModel, ConfigDict, Field
 
 from swashplate.documents import parse_toml, read_text, validated
-from swashplate.equations.replacement import found_at
-from swashplate.errors import InputError, ParameterError
+from swashplate.entries import Name, Number, Positive, Version
+from swashplate.equations.replacement import Replacement, again, found_at, uses
+from swashplate.errors import InputError, MissingFileError, ParameterError
 from swashplate.parameters.definitions import Block, Definition, declare, find, options_of
 from swashplate.parameters.parameter_set import (
     CardSwitch,
@@ -27,7 +28,7 @@ from swashplate.units import to_si
 
 # --- what stands in a file ------------------------------------------------------------------------
 
-TwoNumbers = Annotated[list[float], Field(min_length=2, max_length=2)]
+TwoNumbers = Annotated[list[Number], Field(min_length=2, max_length=2)]
 
 
 class FilePart(BaseModel):
@@ -39,11 +40,19 @@ class FilePart(BaseModel):
 class Entry(FilePart):
     """One parameter: ``Z16 = { value = [1.2e-4, 1.5e-4], unit = "m", source = "table 7.2" }``."""
 
-    value: float | TwoNumbers
+    value: Number | TwoNumbers
     unit: str
     source: str = ""
     status: Status = "user"
     bounds: TwoNumbers | None = None
+
+
+class EquationPlaces(FilePart):
+    """An equation in the place of another one, each as ``module:name``."""
+
+    old: str
+    new: str
+    parameters: str | None = None
 
 
 class ModelOptions(FilePart):
@@ -52,12 +61,12 @@ class ModelOptions(FilePart):
     pressure_root: PressureRoot = "published"
     coulomb_sign: CoulombSign = "smooth"
     card_switch: CardSwitch = "sampled"
-    rate: PositiveFloat | None = None
+    rate: Positive | None = None
     """Samples a second that the recursion of the card's filter belongs to; none is the filter's
     differential equation, for any rate."""
     options: list[str] | None = None
     """Terms of the pump that count; where they are not given, those whose parameters are not 0."""
-    equations: list[dict[str, str]] = []
+    equations: list[EquationPlaces] = []
     """One's own equations in place of the package's, each as ``module:name``."""
     motion: Motion = "shaft"
 
@@ -65,10 +74,10 @@ class ModelOptions(FilePart):
 class CardFile(FilePart):
     """A control card by itself, so that several sets can use it."""
 
-    format: Literal[1] = 1
-    name: str
+    format: Version = 1
+    name: Name
     title: str = ""
-    rate: PositiveFloat | None = None
+    rate: Positive | None = None
     """Of the recursion that its filter belongs to."""
     control_card: dict[str, Entry]
 
@@ -76,11 +85,11 @@ class CardFile(FilePart):
 class SetFile(FilePart):
     """A whole drive; `control_card` is the name of a packaged card or the card's own table."""
 
-    format: Literal[1] = 1
-    name: str
+    format: Version = 1
+    name: Name
     title: str = ""
     control_card: str | dict[str, Entry]
-    card: str = ""
+    card: Name = ""
     """Name of a card that is given by its own table."""
     pump_motor: dict[str, Entry]
     model: ModelOptions = ModelOptions()
@@ -92,6 +101,10 @@ class SetFile(FilePart):
 
 AXES = ("hoist", "slew", "luff")  # Kruse's three axes.
 SETS = files("swashplate.parameters").joinpath("sets")
+
+
+NEUTRAL = "neutral"
+"""The packaged set that is no machine's, but where any may begin."""
 
 
 def preset_names() -> tuple[str, ...]:
@@ -111,8 +124,68 @@ def load_preset(name: str) -> ParameterSet:
 
 
 def load_set(path: str | Path) -> ParameterSet:
-    """A parameter set from a TOML file; a `ParameterError` names file, parameter and rule."""
-    return read_set(read_text(path), str(path))
+    """A parameter set from a TOML file, or from a fit's folder.
+
+    A `FileError` says that there is no such file, or that the folder holds no drive; a
+    `ParameterError` names file, parameter and rule.
+    """
+    file = fitted_drive(path) if Path(path).is_dir() else Path(path)
+    return read_set(read_text(file), str(file))
+
+
+FITTED_DRIVE, FITTED_NUMBERS = "drive.toml", "parameters.toml"
+"""In a folder that a fit wrote: the drive, or the numbers of a user-defined model."""
+
+
+def fitted_drive(folder: str | Path) -> Path:
+    """The parameter file in a fit's folder; a `MissingFileError` if it holds no drive."""
+    file = Path(folder) / FITTED_DRIVE
+    if file.is_file():
+        return file
+    if (Path(folder) / FITTED_NUMBERS).is_file():
+        raise MissingFileError(
+            f"{folder} is the fit of a model of your own: give its file by --model where the "
+            "command has that option. In Python swashplate.equations.simulate(model, ...) runs it, "
+            'and swashplate.export.fmu(model, "model.fmu", parameters=..., step=...) writes an FMU '
+            f"of it, with the numbers in {Path(folder) / FITTED_NUMBERS}."
+        )
+    raise MissingFileError(
+        f"There is no {FITTED_DRIVE} in {folder}: give a folder that 'swashplate fit' or "
+        "Identification.save wrote, or a parameter file."
+    )
+
+
+def set_file(name: str | Path) -> Path | None:
+    """The parameter file that a name means: a path, or a fit's folder; None for a packaged set.
+
+    A packaged name goes before a file or folder of that name, which can be written ``./hoist``. A
+    `MissingFileError` says that there is nothing of that name.
+    """
+    path = Path(name)
+    if str(name) in preset_names():
+        return None
+    if path.is_dir():
+        return fitted_drive(path)
+    if path.suffix.lower() == ".toml" or len(path.parts) > 1 or path.is_file():
+        return path
+    raise MissingFileError(
+        f"There is no packaged set, file or folder '{name}'; packaged are "
+        f"{', '.join(preset_names())}."
+    )
+
+
+def named_set(name: str | Path) -> ParameterSet:
+    """The packaged set of a name, the set in a TOML file, or the one in a fit's folder.
+
+    Raises
+    ------
+    FileError
+        If there is no packaged set, file or folder of that name.
+    ParameterError
+        If an entry of the file is wrong.
+    """
+    file = set_file(name)
+    return load_preset(str(name)) if file is None else load_set(file)
 
 
 def read_set(text: str, origin: str) -> ParameterSet:
@@ -124,15 +197,7 @@ def read_set(text: str, origin: str) -> ParameterSet:
         card_name, entries, rate = card.name, card.control_card, rate or card.rate
     else:
         card_name, entries = contents.card or f"{contents.name} card", contents.control_card
-    equations = []
-    for places in model.equations:
-        # a file runs no code, so that the equation's module must be imported already
-        try:
-            equations.append(found_at(places))
-        except (ImportError, InputError, TypeError) as error:
-            raise ParameterError(f"{origin}: [model] equations: {error}") from None
-        if equations[-1].parameters is not None:
-            declare(equations[-1].parameters)
+    equations = _replacements(model.equations, origin)
     blocks: dict[Block, Mapping[str, Entry]] = {
         "control_card": entries,
         "pump_motor": contents.pump_motor,
@@ -153,8 +218,32 @@ def read_set(text: str, origin: str) -> ParameterSet:
         *(contents.name, contents.title, card_name, parameters),
         *(model.pressure_root, model.coulomb_sign, model.card_switch, rate),
         options_of(values) if model.options is None else frozenset(model.options),
-        *(tuple(equations), model.motion),
+        *(equations, model.motion),
     )
+
+
+def _replacements(entries: Sequence[EquationPlaces], origin: str) -> tuple[Replacement, ...]:
+    """The equations that stand in the place of a drive's own."""
+    if not entries:
+        return ()
+    from swashplate.models.drive import drive, pump_drive
+
+    replacements = []
+    model, pump_model = drive, pump_drive
+    for entry in entries:
+        try:
+            replacement = found_at(entry.model_dump(exclude_none=True))
+            model = again(model, replacement)
+            if uses(pump_model, replacement.old):
+                pump_model = again(pump_model, replacement)
+            elif replacement.parameters is not None:
+                raise InputError(f"{entry.old} is an equation of the card and takes no parameters.")
+        except (ImportError, InputError) as error:
+            raise ParameterError(f"{origin}: [model] equations: {error}") from None
+        if replacement.parameters is not None:
+            declare(replacement.parameters)
+        replacements.append(replacement)
+    return tuple(replacements)
 
 
 def _packaged_card(name: str, origin: str) -> CardFile:

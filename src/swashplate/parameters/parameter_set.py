@@ -1,5 +1,7 @@
 """A parameter set: values with their origin, immutable, always valid."""
 
+from __future__ import annotations
+
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, fields, replace
 from itertools import groupby
@@ -10,9 +12,10 @@ import numpy as np
 
 from swashplate.equations.fields import is_real
 from swashplate.equations.replacement import Replacement
-from swashplate.errors import ParameterError
+from swashplate.errors import InputError, ParameterError
 from swashplate.parameters.definitions import (
     CATALOGUE,
+    COLUMNS,
     OWN,
     REFINEMENTS,
     SWITCHES,
@@ -26,6 +29,7 @@ from swashplate.parameters.definitions import (
 from swashplate.parameters.rules import broken_rules, check_options, refuse
 from swashplate.results import Result
 from swashplate.tables import UNIT, Column, Table
+from swashplate.units import Quantity, in_si
 
 PressureRoot = Literal["published", "symmetric"]
 CoulombSign = Literal["smooth", "literal"]
@@ -42,7 +46,8 @@ class Pair(NamedTuple):
 
 
 Value = float | Pair
-Change = float | tuple[float, float]
+Change = float | Quantity | tuple[float | Quantity, float | Quantity]
+"""A new value in SI or with a unit, or a pair of them, plus and minus."""
 
 
 @dataclass(frozen=True)
@@ -97,6 +102,18 @@ class Parameter(Result):
         """The same by column."""
         return dict(zip(self.definition.columns, self.values, strict=True))
 
+    def in_direction(self, column: str) -> Parameter:
+        """One direction of a parameter with two by itself, ``Z16_plus`` of ``Z16``."""
+        index = self.definition.columns.index(column)
+        side = ("positive", "negative")[index]
+        definition = replace(
+            self.definition,
+            name=f"{self.name}, {side}",
+            symbol=column,
+            fields=(self.definition.fields[index],),
+        )
+        return replace(self, definition=definition, value=self.values[index])
+
 
 class Entries(Mapping[str, Parameter]):
     """Parameters by symbol, read-only, of a frozen dataclass that has them as `parameters`."""
@@ -135,7 +152,9 @@ class Entries(Mapping[str, Parameter]):
 class ParameterSet(Entries):
     """All parameters of a drive, by symbol; of the refinements those that are given.
 
-    A refinement that is not given can be asked for by its symbol all the same, and is off.
+    One direction has a name of its own: ``parameters["Z16_plus"]``. Iteration and length count
+    symbols. A refinement that is not given can be asked for by its symbol all the same, and is off;
+    ``in`` is true for what the set gives.
 
     Raises
     ------
@@ -195,13 +214,25 @@ class ParameterSet(Entries):
     def __repr__(self) -> str:
         return f"ParameterSet({self.name!r}, {len(self)} parameters)"
 
-    def __getitem__(self, symbol: str) -> Parameter:
-        if symbol in self.parameters:
-            return self.parameters[symbol]
-        definition = REFINEMENTS.get(symbol, OWN.get(symbol))
+    def __getitem__(self, name: str) -> Parameter:
+        """A parameter by its symbol (``Z16``), or one direction of it (``Z16_plus``).
+
+        Raises
+        ------
+        UnknownParameterError
+            If no parameter has the name; it is a ``KeyError`` as well.
+        """
+        if name in self.parameters:
+            return self.parameters[name]
+        if name in COLUMNS:
+            return self.parameters[COLUMNS[name]].in_direction(name)
+        definition = REFINEMENTS.get(name, OWN.get(name))
         if definition is None or definition.default is None:
-            raise unknown_parameter(symbol)
+            raise unknown_parameter(name)
         return Parameter(definition, definition.default, status="inactive")
+
+    def __contains__(self, name: object) -> bool:
+        return name in self.parameters or name in self.numbers
 
     def __hash__(self) -> int:
         return hash((self.name, self.options, self.equations, *self.numbers.values()))
@@ -257,7 +288,8 @@ class ParameterSet(Entries):
         Parameters
         ----------
         changes : mapping
-            Symbol (``Z16``, both directions or a pair) or column (``Z16_plus``) to value, SI.
+            Symbol (``Z16``, both directions or a pair) or column (``Z16_plus``) to value: a number
+            in SI, or a Pint quantity.
         options : frozenset of str, optional
             Terms that count then. By default a refinement whose parameters are changed comes on
             where one of them is not 0, and goes off where all are.
@@ -303,8 +335,12 @@ def value_of(
         raise ParameterError(f"{name} has one value, not a plus and a minus one.")
     if isinstance(change, tuple) and len(change) != 2:
         raise ParameterError(f"{name} takes one value or two (plus, minus), not {len(change)}.")
+    given = change if isinstance(change, tuple) else (change,)
+    what = f"{name} ({definition.name})"
     try:
-        numbers = [float(each) for each in (change if isinstance(change, tuple) else (change,))]
+        numbers = [float(in_si(number, definition.unit, what)) for number in given]
+    except InputError as error:
+        raise ParameterError(str(error)) from None
     except (TypeError, ValueError):
         raise ParameterError(
             f"{name} must be a number in {definition.unit}, or a pair of them, not {change!r}."

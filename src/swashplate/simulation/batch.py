@@ -26,7 +26,7 @@ from swashplate.equations.marching.run import outside
 from swashplate.equations.marching.use import inputs_of
 from swashplate.errors import FileError, InputError
 from swashplate.executors import Executor, Threads
-from swashplate.parameters.definitions import SWITCHES, columns_of
+from swashplate.parameters.definitions import SWITCHES, columns_of, find
 from swashplate.parameters.parameter_set import ParameterSet
 from swashplate.parameters.rules import broken_rules
 from swashplate.results import Result
@@ -39,6 +39,7 @@ from swashplate.simulation.instance import (
 )
 from swashplate.simulation.result import check_output
 from swashplate.tables import write_table
+from swashplate.units import in_si
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
@@ -164,7 +165,10 @@ def simulate_drives(
     executor: Executor | None,
 ) -> Batch:
     """March many sets over one record; see `Drive.simulate_many`."""
-    given, count = _given_sets(changes)
+    check_mapping("changes", changes)
+    given, count = _given_sets(
+        {name: in_si(values, find(name).unit, name) for name, values in changes.items()}
+    )
     numbers = {name: np.full(count, value) for name, value in parameters.numbers.items()}
     changed = [(column, each) for name, each in given.items() for column in columns_of([name])]
     for k, (column, values) in enumerate(changed):

@@ -6,7 +6,6 @@ from cmath import log, sqrt
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from functools import lru_cache
-from types import FunctionType
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -16,8 +15,8 @@ from swashplate.equations.declaration import interpreted
 from swashplate.equations.fields import declared_by
 from swashplate.equations.marching.run import Instance, Part
 from swashplate.equations.model import Model
-from swashplate.equations.replacement import Replacement, again, uses
-from swashplate.equations.syntax import is_named_tuple, plain
+from swashplate.equations.replacement import Replacement, again, check_members, uses
+from swashplate.equations.syntax import plain
 from swashplate.errors import InputError
 from swashplate.models.card import Card
 from swashplate.models.channel import CardOptions, Channel
@@ -82,11 +81,8 @@ def models_of(equations: tuple[Replacement, ...]) -> Models:
 
 def with_equation(parameters: ParameterSet, made: Replacement) -> ParameterSet:
     """The set with an equation of one's own; see `Drive.with_equation`."""
-    for each in (made.old, made.new):
-        if not isinstance(plain(each), FunctionType):
-            raise InputError(f"{each!r} is no equation: give a function marked with @equation.")
-    if made.parameters is not None and not is_named_tuple(made.parameters):
-        raise InputError(f"{made.parameters!r} is no class of named tuples.")
+    members = made._asdict()
+    check_members(members, {what: repr(member) for what, member in members.items()})
     own, models = (*parameters.equations, made), models_of(parameters.equations)
     if not uses(models.drive, made.old):
         raise InputError(

@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from enum import IntFlag
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, cast, overload
+from math import inf
+from typing import TYPE_CHECKING, Any, Literal, cast, overload
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,11 +14,12 @@ from numpy.typing import NDArray
 from swashplate.equations.marching.use import Run, read_only
 from swashplate.errors import InputError
 from swashplate.models.displacement_control import Pump
-from swashplate.results import GivenAxes, figures
+from swashplate.results import GivenAxes, figures, pandas_frame
 from swashplate.tables import UNIT, Column, Table, share_cell
 from swashplate.units import SHAFT_ANGLE, display_unit
 
 if TYPE_CHECKING:
+    import polars
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
@@ -74,6 +76,10 @@ class Limit(IntFlag):
     """The relief valve holds the stroking pressure at ±Z15."""
 
 
+SPOOL_STROKE = 0.01
+"""What lengths of a run are at most, by which their unit is chosen. [m]"""
+
+
 def check_output(signal: str) -> None:
     """Refuse a signal that is none of `OUTPUTS`; states of the equations may stay at zero."""
     if signal not in OUTPUTS:
@@ -90,6 +96,19 @@ class Named:
         if result is None:
             return self  # type: ignore[return-value]  # the class's own attribute
         return cast("Array", result[self._name])
+
+
+def _displayed(column: polars.Series) -> polars.Series:
+    """A column of a run's table in the unit that people read, which its name then has."""
+    name = column.name
+    if name == "time":
+        return column.alias("time [s]")
+    if name not in UNITS:
+        return column
+    si = SHAFT_ANGLE if name == "shaft_position" else UNITS[name]
+    # not by the numbers of the run: the same column has the same unit in every table
+    unit = display_unit(si, SPOOL_STROKE if si == "m" else inf)
+    return (column * unit.factor).alias(f"{name} [{unit.name}]" if unit.name else name)
 
 
 class Simulation(Run):
@@ -223,6 +242,32 @@ class Simulation(Run):
             words = str(limit.name).lower().replace("_", " ")
             limits.add(words, share_cell(self.time_share(limit)))
         return did, limits
+
+    def to_polars(self, units: Literal["SI", "display"] = "SI") -> polars.DataFrame:
+        """Table of time, all signals and a true/false column ``limit_NAME`` for each limit.
+
+        Parameters
+        ----------
+        units : {"SI", "display"}
+            SI, or the units that the terminal shows: ``"shaft_speed [deg/s]"``, each named in its
+            column's name.
+        """
+        frame = super().to_polars()
+        if units == "SI":
+            return frame
+        if units != "display":
+            raise InputError(f"units is {units!r}; it is 'SI' or 'display'.")
+        return frame.select(map(_displayed, frame.iter_columns()))
+
+    def to_pandas(self, units: Literal["SI", "display"] = "SI") -> Any:
+        """The table of `to_polars` as a ``pandas.DataFrame``.
+
+        Raises
+        ------
+        InputError
+            If pandas is not installed.
+        """
+        return pandas_frame(self.to_polars(units))
 
     @overload
     def plot(

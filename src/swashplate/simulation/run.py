@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from swashplate.equations.fields import is_real
 from swashplate.equations.marching.part import Stored
 from swashplate.equations.marching.record import (
     Interpolation,
@@ -18,7 +19,7 @@ from swashplate.equations.marching.record import (
     on_grid,
 )
 from swashplate.equations.marching.run import Instance, Start, Started, marched
-from swashplate.equations.marching.use import LARGEST, Stepper
+from swashplate.equations.marching.use import Stepper
 from swashplate.errors import DomainError, InputError
 from swashplate.maneuvers import Maneuver, sampled
 from swashplate.parameters.parameter_set import ParameterSet
@@ -29,17 +30,21 @@ from swashplate.simulation.instance import (
     models_of,
     without_ripple,
 )
-from swashplate.simulation.result import Simulation
+from swashplate.simulation.result import UNITS, Simulation
+from swashplate.units import in_si
 
 Array = NDArray[np.float64]
-LEAST: Mapping[str, tuple[float, str]] = {
-    "supply_pressure": (1.0, "1 Pa or above: it is the supply less the static pressure"),
+RANGES: Mapping[str, tuple[float, float, str]] = {
+    "load_torque": (-1e12, 1e12, "it is a torque at the shaft in N m"),
+    "supply_pressure": (1.0, 1e9, "it is the supply less the static pressure in Pa"),
     "pump_speed": (
         0.0,
-        "0 or above: it is that of the prime mover over the one that Z10 belongs to",
+        10.0,
+        "it is the speed of the prime mover over the one that Z10 belongs to, 1 if they are equal",
     ),
 }
-"""Least values of measured inputs, and what they must be in words."""
+"""Least and largest value of each measured input, and what it is: beyond any machine, so that what
+lies outside is in another unit or no measurement."""
 
 
 def drive_records(
@@ -55,9 +60,22 @@ def drive_records(
 ) -> dict[str, Record]:
     """A drive's command and what was measured beside it on the march's grid, checked.
 
-    What was measured is a straight line between samples, whatever the command is.
+    What was measured is a straight line between samples, whatever the command is. Pint quantities
+    are turned into SI.
     """
-    beside = {name: values for name, values in measured.items() if values is not None}
+    command = in_si(command, UNITS[driver], f"The {driver}")
+    rate, time = in_si(rate, "Hz", "The rate"), in_si(time, "s", "The time")
+    if is_real(command):
+        instead = f", or a maneuver such as maneuvers.step({command:g})"
+        raise InputError(
+            f"The {driver} is a single number, {command:g}: give an array with a number for each "
+            f"sample{instead if driver == 'voltage' else ''}."
+        )
+    beside = {
+        name: in_si(values, UNITS[name], f"The {name}")
+        for name, values in measured.items()
+        if values is not None
+    }
     between: dict[str, Interpolation | None] = {driver: interpolation}
     between |= dict.fromkeys(beside, "linear")
     steps = least_substeps(rate, substeps)
@@ -65,9 +83,15 @@ def drive_records(
     found = on_grid(inputs, rate, time=time, interpolation=between, substeps=steps)
     if driver == "voltage":
         found["voltage"] = check_voltage(found["voltage"], clip)
-    for name, (least, must) in LEAST.items():
-        if name in found and not (low := found[name].values.min()) >= least:
-            raise InputError(f"The {name} falls to {low:g}, but must be {must}.")
+    for name, (least, most, meaning) in RANGES.items():
+        if name not in found:
+            continue
+        low, high = float(found[name].values.min()), float(found[name].values.max())
+        if not (low >= least and high <= most):
+            reached = f"falls to {low:g}" if low < least else f"rises to {high:g}"
+            raise InputError(
+                f"The {name} {reached}, but must be from {least:g} to {most:g}: {meaning}."
+            )
     return found
 
 
@@ -159,7 +183,7 @@ def drive_stepper(
         substeps=substeps,
         ranges={
             "voltage": (-FULL_VOLTAGE, FULL_VOLTAGE),
-            **{name: (least, LARGEST) for name, (least, _) in LEAST.items()},
+            **{name: (least, most) for name, (least, most, _) in RANGES.items()},
         },
     )
 

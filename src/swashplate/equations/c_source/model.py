@@ -6,7 +6,7 @@ samples every part in the order of the flow, and then takes all states to the ne
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from math import inf
@@ -27,12 +27,12 @@ OWN = """
 number_at put_at is_finite all_finite in_range number_of placed seen constant_window before_all
 good_inputs put_inputs taken one_sample rested_start settled_start checked computed switched
 ranges value_table option_places parameter_names output_names input_names option_names name_of
-one_of flag_at put_flag
+one_of flag_at put_flag input_ranges flag_places finite_outputs
 """
 PUBLIC = """
 size value_count init reset settle step correct output limits set_input clear_input set get
 set_option get_option set_step get_step update find find_output find_input find_option
-parameter_name output_name sentence memory inputs measured value range
+parameter_name output_name sentence valid memory inputs measured value range
 """
 """Names that the interface takes, of its own and behind the prefix."""
 
@@ -52,8 +52,8 @@ class Exported:
     """Signals that can be read; by default all."""
     bounds: Mapping[str, float] = field(default_factory=dict)
     """Largest magnitude of an input."""
-    least: Mapping[str, float] = field(default_factory=dict)
-    """Least value of a measured input."""
+    ranges: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    """Least and largest value of a measured input."""
     stable: Mapping[int, Equation] = field(default_factory=dict)
     """By part: margin above 0 where its equations bear the step, of ``p, h, options``."""
     follows: Mapping[tuple[int, str], Equation] = field(default_factory=dict)
@@ -145,6 +145,14 @@ class Exported:
         """Part and name of every limit."""
         return [(part, name) for name, (part, _) in self.model.limit_bits.items()]
 
+    @cached_property
+    def flags(self) -> list[str]:
+        """Places in the struct of all that is true or false."""
+        options = [f"{self.members[i]}_options.{c_name(name)}" for i, name in self.options]
+        limits = [f"{self.members[i]}_limits.{c_name(name)}" for i, name in self.limits]
+        given = [f"inputs.measured[{k}].given" for k in range(max(len(self.measured), 1))]
+        return [*options, *limits, *given, "now.begun", "before.begun", "stale", "settled"]
+
     @property
     def taps(self) -> tuple[TapOf, ...]:
         """What is read through a line."""
@@ -199,7 +207,7 @@ class Writer:
 
     def functions(self) -> list[str]:
         """The functions around one sample."""
-        made = [self.updates(), self.finite(), self.starts(False)]
+        made = [self.updates(), *self.finite(), self.starts(False)]
         made += [self.starts(True)] if self.e.settles else []
         return [*made, self.sample()]
 
@@ -322,7 +330,8 @@ class Writer:
             grown = f"m->before.{own} + 0.5 * m->step * (m->before.{own}_rate + m->now.{own}_rate)"
             body.append(f"m->now.{own} = m->before.begun ? {grown} : 0.0;")
         body.append("m->now.begun = true;")
-        body.append(f"return good && all_finite(&m->now) ? {self.P}_OK : {self.P}_DOMAIN;")
+        good = "good && all_finite(&m->now) && finite_outputs(m)"
+        body.append(f"return {good} ? {self.P}_OK : {self.P}_DOMAIN;")
         says = "One sample: everything at this instant, then all states to the next."
         head = f"static int one_sample({self.e.type} *m)"
         return function(says, head, ["bool good = true;", *body])
@@ -382,16 +391,16 @@ class Writer:
         computed = function(says, f"{head}({self.e.type} *m)", constants or ["(void)m;"])
         return f"{checked}\n\n{computed}"
 
-    def finite(self) -> str:
-        """Whether all states are finite: without a branch for each."""
-        lines = ["double none = 0.0;"]
-        for i, path in self.model.places("state"):
-            place = f"s->{self.e.members[i]}.{path_of(path)}"
-            lines.append(f"none += {place} - {place};")
-        lines += ["return none == 0.0;"] if len(lines) > 1 else ["(void)s;", "return none == 0.0;"]
+    def finite(self) -> tuple[str, str]:
+        """Whether all states, and all outputs, are finite: without a branch for each."""
+        members = self.e.members
+        states = [f"s->{members[i]}.{path_of(path)}" for i, path in self.model.places("state")]
         says = "Whether all states are finite: what is not leaves no zero behind."
         head = f"static bool all_finite(const struct {self.e.prefix}_memory *s)"
-        return function(says, head, lines)
+        of_states = function(says, head, _finite(states, "s"))
+        says = "Whether all outputs of the sample are finite."
+        head = f"static bool finite_outputs(const {self.e.type} *m)"
+        return of_states, function(says, head, _finite([*map(self.output, self.e.names)], "m"))
 
     # -- numbers -----------------------------------------------------------------------------------
 
@@ -446,6 +455,12 @@ class Writer:
 def path_of(path: str) -> str:
     """A path of Python's as one of C's."""
     return ".".join(c_name(each) for each in path.split("."))
+
+
+def _finite(places: Sequence[str], owner: str) -> list[str]:
+    """Statements that return whether all numbers are finite, without a branch for each."""
+    lines = [f"none += {place} - {place};" for place in places] or [f"(void){owner};"]
+    return ["double none = 0.0;", *lines, "return none == 0.0;"]
 
 
 def _wider(named: Any, kind: Any) -> Iterator[tuple[Any, Any]]:

@@ -9,6 +9,7 @@ from swashplate.equations.c_source.model import Exported, Writer, path_of
 from swashplate.equations.c_source.text import (
     HELPERS,
     c_name,
+    comment_line,
     filled,
     function,
     indented,
@@ -46,7 +47,7 @@ class _Interface(Writer):
             "p": e.prefix,
             "P": self.P,
             "samples": e.widest,
-            "title": e.title or f"The model {self.model.name}, one sample at a time.",
+            "title": comment_line(e.title or f"The model {self.model.name}, one sample at a time."),
             "file": e.file,
             "GUARD": f"{e.file.upper()}_H",
             "signals": signals,
@@ -158,6 +159,7 @@ class _Interface(Writer):
                 move=self.moved(),
                 outputs=self.outputs(),
                 limits=self.limits(),
+                places=self.places(),
             ),
         ]
         return "\n".join(sections)
@@ -221,8 +223,11 @@ class _Interface(Writer):
         lines.append("static const unsigned option_places[] = {")
         lines += [f"    offsetof({e.type}, {place})," for place in options] or ["    0,"]
         lines += ["};", ""]
-        least = [literal(e.least.get(name, -inf)) for name in e.measured] or ["0.0"]
-        lines += [f"static const double least_inputs[] = {{{', '.join(least)}}};", ""]
+        pairs = [e.ranges.get(name, (-inf, inf)) for name in e.measured] or [(0.0, 0.0)]
+        listed = ", ".join(f"{{{literal(low)}, {literal(high)}}}" for low, high in pairs)
+        lines += [*wrapped(f"static const double input_ranges[][2] = {{{listed}}};"), ""]
+        lines.append("static const unsigned flag_places[] = {")
+        lines += [*(f"    offsetof({e.type}, {place})," for place in e.flags), "};", ""]
         for word, names in (
             ("parameter", [name for name, _, _ in self.rows]),
             ("output", e.names),
@@ -251,6 +256,14 @@ class _Interface(Writer):
         for line, numbers in cases.items():
             lines += [*(f"case {number}:" for number in numbers), f"    {line}", "    break;"]
         return function(says, head, [*lines, "default:", "    break;", "}"]) + "\n"
+
+    def places(self) -> str:
+        """Whether taps and the newest sample lie within their lines."""
+        most = f"{self.P}_LINE - {{}}"
+        ends = [(f"m->whole[{tap.number}]", most.format(tap.tap.samples)) for tap in self.e.taps]
+        ends += [("m->newest", most.format(1))] if self.e.lines else []
+        tests = [f"{place} >= 0 && {place} <= {end}" for place, end in ends]
+        return _body([f"return {' && '.join(tests) or 'true'};"])
 
     def outputs(self) -> str:
         lines = []

@@ -14,6 +14,8 @@ from swashplate.equations.syntax import MATH
 
 WIDTH = 100
 """Longest line of C."""
+_OF_COMMENTS = re.compile(r"\*(?=/)|/(?=\*)|\?(?=\?)")
+"""First characters of what ends or begins a comment, or begins a trigraph."""
 _SECTION = re.compile(r"^/\*== (\w+) ==\*/\n", re.MULTILINE)
 
 
@@ -109,9 +111,20 @@ def wrapped(line: str) -> list[str]:
     return [*lines, rest]
 
 
+def comment_line(text: str) -> str:
+    """A text as one line within a comment, which nothing in it can begin or end.
+
+    C removes a backslash at the end of a line, and C99 replaces trigraphs such as ``??/``, before
+    it looks for comments: two harmless lines could be joined to the end of one.
+    """
+    line = "".join(c if c.isprintable() else " " for c in text)
+    line = line.replace("\\", "|")
+    return _OF_COMMENTS.sub(lambda pair: f"{pair[0]} ", line)
+
+
 def comment(text: str) -> list[str]:
     """A docstring as a comment."""
-    lines = inspect.cleandoc(text).replace("*/", "* /").splitlines()
+    lines = [comment_line(line) for line in inspect.cleandoc(text).splitlines()] or [""]
     if len(lines) == 1 and len(lines[0]) < WIDTH - 6:
         return [f"/* {lines[0]} */"]
     return [f"/* {lines[0]}", *(f" * {line}".rstrip() for line in lines[1:]), " */"]
@@ -130,7 +143,7 @@ def indented(lines: Iterable[str]) -> list[str]:
 
 def function(says: str, head: str, body: Iterable[str]) -> str:
     """Text of a function of C."""
-    return "\n".join([f"/* {says} */", head, "{", *indented(body), "}"])
+    return "\n".join([f"/* {comment_line(says)} */", head, "{", *indented(body), "}"])
 
 
 def filled(text: str, words: Mapping[str, Any]) -> str:

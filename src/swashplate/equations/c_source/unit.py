@@ -21,6 +21,7 @@ from swashplate.equations.c_source.text import (
     Kind,
     c_name,
     comment,
+    comment_line,
     fields_of,
     literal,
     snake,
@@ -103,7 +104,7 @@ class Unit:
             doc = "" if doc.startswith(f"{cls.__name__}(") else doc.splitlines()[0]
             lines = [*(comment(doc) if doc else []), f"struct {tag} {{"]
             for text, note in fields:
-                lines.append(f"    {text};" + (f" /* {note} */" if note else ""))
+                lines.append(f"    {text};" + (f" /* {comment_line(note)} */" if note else ""))
             lines += [] if fields else ["    char nothing;"]
             self.structs[cls] = (tag, "\n".join([*lines, "};"]))
         return self.structs[cls][0]

@@ -76,7 +76,12 @@ def on_grid(
     data = {name: column(v, f"The {name}") for name, v in inputs.items() if not is_real(v)}
     sizes = {name: samples.size for name, samples in data.items()}
     if len(set(sizes.values())) != 1:
-        listed = ", ".join(f"{name} {size}" for name, size in sizes.items()) or "none is a record"
+        if not sizes:
+            first = next(iter(inputs), "input")
+            raise InputError(
+                f"The {first} is a single number: give an array with a number for each sample."
+            )
+        listed = ", ".join(f"{name} {size}" for name, size in sizes.items())
         raise InputError(f"All inputs need the same number of samples: {listed}.")
     what, size = next(iter(sizes.items()))
     columns = {
@@ -182,7 +187,9 @@ def column(values: ArrayLike, what: str, *, finite: bool = True) -> Array:
         raise InputError(f"{what} is empty.")
     data = np.array(given, dtype=np.float64, order="C")  # not changed with the user's array
     # one pass: a sum is finite if and only if no sample is NaN or infinite, overflow apart
-    if finite and not np.isfinite(data.sum()):
+    with np.errstate(all="ignore"):
+        total = data.sum()
+    if finite and not np.isfinite(total):
         bad = np.flatnonzero(~np.isfinite(data))
         if bad.size:
             raise InputError(

@@ -364,7 +364,28 @@ def marched(
     arrays = arrays_of(instance, values, started, places, states, met, table.reshape(-1))
     run_once(addresses((planned,), (0,)), arrays, size, h)
     check_domain(instance, states, float(met[0]), cause)
+    check_outputs(instance, stored, table, h, cause)
     return table
+
+
+def check_outputs(
+    instance: Instance, stored: Sequence[Stored], table: Array, h: float, cause: str
+) -> None:
+    """Refuse samples that are not finite; of (r, n) or (r,) numbers the first one is named."""
+    with np.errstate(all="ignore"):
+        if math.isfinite(table.sum()):  # of finite numbers it may overflow, of others it is none
+            return
+    samples = table.reshape(len(stored), -1)
+    bad = ~np.isfinite(samples)
+    if not bad.any():
+        return
+    first = int(np.argmax(bad.any(axis=0)))
+    row = int(np.argmax(bad[:, first]))
+    when = f" at {first * h:g} s" if table.ndim > 1 else ""
+    raise DomainError(
+        f"{instance.name}: {stored[row].path} is {samples[row, first]}{when}: a number overflows "
+        f"under this {cause}; check the size of the parameters and of what was measured."
+    )
 
 
 def begun(instance: Instance, started: Started, begin: Mapping[str, float]) -> Array:

@@ -28,7 +28,14 @@ from swashplate.equations.code import generating
 from swashplate.equations.marching.march import output_of, step_source
 from swashplate.equations.marching.part import Stored
 from swashplate.equations.marching.record import check_rate
-from swashplate.equations.marching.run import Instance, Start, check_domain, instance_of, module
+from swashplate.equations.marching.run import (
+    Instance,
+    Start,
+    check_domain,
+    check_outputs,
+    instance_of,
+    module,
+)
 from swashplate.equations.model import Model
 from swashplate.errors import InputError
 
@@ -89,7 +96,7 @@ class CompiledStep:
     def __init__(
         self, instance: Instance, inputs: Sequence[str], stored: Sequence[Stored], h: float
     ) -> None:
-        self._instance, self._h = instance, h
+        self._instance, self._h, self._stored = instance, h, tuple(stored)
         self.inputs = tuple(inputs)
         self.outputs = tuple(each.path or each.kind for each in stored)
         instance.check_inputs(self.inputs)
@@ -128,9 +135,11 @@ class CompiledStep:
         Raises
         ------
         DomainError
-            If the margin is not above 0, or a number of the state is not finite.
+            If the margin is not above 0, or a number of the state or of the newest outputs is not
+            finite.
         """
         check_domain(self._instance, machine.states, margin, cause)
+        check_outputs(self._instance, self._stored, machine.outputs, self._h, cause)
 
 
 def compiled_step(

@@ -48,7 +48,7 @@ from swashplate.equations.marching.run import (
 )
 from swashplate.equations.marching.stepping import CompiledStep, Machine
 from swashplate.equations.model import Model, parameter_paths
-from swashplate.errors import DomainError, InputError
+from swashplate.errors import DomainError, InputError, UnknownNameError
 from swashplate.results import GivenAxes, Tabular, figures
 
 if TYPE_CHECKING:
@@ -219,7 +219,7 @@ class Run(Tabular):
         if signal not in self.names:
             near = get_close_matches(str(signal), self.names, 1)
             meant = f"did you mean {near[0]}? It" if near else "it"
-            raise InputError(
+            raise UnknownNameError(
                 f"A run of {self.name} has no signal '{signal}': {meant} has "
                 f"{', '.join(self.names)}."
             )
@@ -234,8 +234,15 @@ class Run(Tabular):
         found, integrals = self.found, self.instance.model.integrals
         if signal in integrals and signal not in found:
             rate, step = self.fine(integrals[signal]), self.record.step
-            total = found[signal] = np.zeros_like(rate)
-            np.cumsum(0.5 * step * (rate[:-1] + rate[1:]), out=total[1:])
+            total = np.zeros_like(rate)
+            with np.errstate(all="ignore"):
+                np.cumsum(0.5 * step * (rate[:-1] + rate[1:]), out=total[1:])
+            if not np.isfinite(total[-1]):  # what is not finite stays so
+                raise DomainError(
+                    f"{self.name}: {signal} overflows under this {self.driven_by}; check the size "
+                    "of the parameters and of what was measured."
+                )
+            found[signal] = total
         if signal not in found:
             self._march_again(self.later if signal in self.later else (signal,))
         return found[signal]
@@ -408,7 +415,7 @@ def _steps(step: Callable[[Machine], float]) -> Callable[..., tuple[float, bool]
     ) -> tuple[float, bool]:  # fmt: skip
         """Advance by one sample, from the inputs before to these; `totals` as in `StepperState`.
 
-        Returns the least margin of the domain, and whether the state is finite.
+        Returns the least margin of the domain, and whether state and outputs are finite.
         """
         worst = np.inf
         for j in range(substeps):
@@ -426,6 +433,10 @@ def _steps(step: Callable[[Machine], float]) -> Callable[..., tuple[float, bool]
         finite = True
         for state in machine.states:
             finite = finite and np.isfinite(state)
+        for output in machine.outputs:
+            finite = finite and np.isfinite(output)
+        for total in totals[0]:
+            finite = finite and np.isfinite(total)
         return worst, finite
 
     return steps
@@ -472,7 +483,7 @@ class Stepper(Generic[S]):
         if len(set(inputs)) < len(inputs):
             raise InputError(f"A step takes each input once, not {', '.join(inputs)}.")
         between, self._substeps = checked_sampling(inputs, rate, interpolation, substeps)
-        self._start, self._sample = start, sample
+        self._start, self._sample, self._name = start, sample, instance.name
         self._ranges = [ranges.get(name, (-LARGEST, LARGEST)) for name in inputs]
         self.inputs, limits = tuple(inputs), instance.model.limit_bits
         found = [
@@ -544,7 +555,7 @@ class Stepper(Generic[S]):
             except (TypeError, ValueError):
                 within = False
             if not within:
-                room = f" within ±{high:g}" if low == -high else f" of {low:g} or above"
+                room = f" within ±{high:g}" if low == -high else f" from {low:g} to {high:g}"
                 room = "" if low == -LARGEST else room
                 raise InputError(f"The {name} is {value!r}, but must be a finite number{room}.")
         machine, totals, values, begun = self._state
@@ -560,6 +571,7 @@ class Stepper(Generic[S]):
             totals[0] = 0.0
         if not (worst > 0.0 and finite):
             self._compiled.check(machine, worst, self.inputs[0])
+            raise DomainError(f"{self._name}: an integral overflows under this {self.inputs[0]}.")
         row = [*inputs, *machine.outputs.tolist(), *totals[0].tolist()]
         return self._sample([row[at] for at in self._order])
 

@@ -48,7 +48,13 @@ typedef struct {
     unsigned char changed[SWP_PARAMETERS];     /* whether it is not the model's own yet */
 } swp_memory;
 
-enum { SWP_FMU_INSTANTIATED, SWP_FMU_INITIALIZING, SWP_FMU_STEPPING, SWP_FMU_FAILED };
+enum {
+    SWP_FMU_INSTANTIATED,
+    SWP_FMU_INITIALIZING,
+    SWP_FMU_STEPPING,
+    SWP_FMU_TERMINATED,
+    SWP_FMU_FAILED
+};
 
 struct swp_fmu {
     swp_memory memory;
@@ -66,8 +72,11 @@ SWP_FMU_API swp_fmu *swp_fmu_new(const char *name, const char *token, const char
                                  swp_fmu_logger *say, void *environment,
                                  swp_fmu_callback *log);
 SWP_FMU_API void swp_fmu_free(swp_fmu *);
-SWP_FMU_API int swp_fmu_begin(swp_fmu *, double start);
+/* Start and, if `ends`, stop of the simulation; swp_fmu_begin takes the start. */
+SWP_FMU_API int swp_fmu_setup(swp_fmu *, double start, int ends, double stop);
+SWP_FMU_API int swp_fmu_begin(swp_fmu *);
 SWP_FMU_API int swp_fmu_ready(swp_fmu *);
+SWP_FMU_API int swp_fmu_end(swp_fmu *);
 SWP_FMU_API int swp_fmu_advance(swp_fmu *, double time, double interval);
 SWP_FMU_API int swp_fmu_reset(swp_fmu *);
 SWP_FMU_API int swp_fmu_get_real(swp_fmu *, const uint32_t *, size_t, double *);
@@ -77,10 +86,12 @@ SWP_FMU_API int swp_fmu_set_boolean(swp_fmu *, uint32_t, int);
 SWP_FMU_API int swp_fmu_set_slope(swp_fmu *, uint32_t, double);
 SWP_FMU_API int swp_fmu_fail(swp_fmu *, const char *message);
 SWP_FMU_API int swp_fmu_none(swp_fmu *, size_t count); /* fails unless nothing is asked for */
+SWP_FMU_API int swp_fmu_missing(swp_fmu *); /* fails for a pointer that is NULL */
 
 /* Booleans, which are `int` in FMI 2 and `bool` in FMI 3, until one fails. */
 #define SWP_FMU_GET_BOOLEANS(STATUS, fmu, references, count, values)            \
     int status = fmu ? SWP_FMU_OK : SWP_FMU_ERROR;                              \
+    if (count > 0 && (!references || !values)) status = swp_fmu_missing(fmu);   \
     for (size_t i = 0; i < count && status == SWP_FMU_OK; i++) {                \
         int on = 0;                                                             \
         status = swp_fmu_get_boolean(fmu, references[i], &on);                  \
@@ -89,11 +100,13 @@ SWP_FMU_API int swp_fmu_none(swp_fmu *, size_t count); /* fails unless nothing i
     return (STATUS)status
 #define SWP_FMU_SET_BOOLEANS(STATUS, fmu, references, count, values)            \
     int status = fmu ? SWP_FMU_OK : SWP_FMU_ERROR;                              \
+    if (count > 0 && (!references || !values)) status = swp_fmu_missing(fmu);   \
     for (size_t i = 0; i < count && status == SWP_FMU_OK; i++)                  \
         status = swp_fmu_set_boolean(fmu, references[i], values[i] != 0);       \
     return (STATUS)status
 
-/* States. The serialised form has a header: magic, version, size, and whose numbers they are. */
+/* States. The serialised form has a header: magic, version, size, whose numbers they are, and a hash
+ * of what follows, so that a damaged state is refused. */
 SWP_FMU_API int swp_fmu_save(swp_fmu *, void **state);
 SWP_FMU_API int swp_fmu_restore(swp_fmu *, const void *state);
 SWP_FMU_API int swp_fmu_forget(swp_fmu *, void **state);

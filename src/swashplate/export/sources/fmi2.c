@@ -77,23 +77,19 @@ void fmi2FreeInstance(fmi2Component c) { swp_fmu_free(c); }
 
 fmi2Status fmi2SetupExperiment(fmi2Component c, fmi2Boolean toleranceDefined, fmi2Real tolerance,
                                fmi2Real startTime, fmi2Boolean stopTimeDefined, fmi2Real stopTime) {
-    swp_fmu *fmu = c;
-    (void)toleranceDefined, (void)tolerance, (void)stopTimeDefined, (void)stopTime;
-    if (!fmu) return fmi2Error;
-    fmu->memory.start = startTime;
-    return fmi2OK;
+    (void)toleranceDefined, (void)tolerance;
+    return (fmi2Status)swp_fmu_setup(c, startTime, stopTimeDefined, stopTime);
 }
 
 fmi2Status fmi2EnterInitializationMode(fmi2Component c) {
-    swp_fmu *fmu = c;
-    return fmu ? (fmi2Status)swp_fmu_begin(fmu, fmu->memory.start) : fmi2Error;
+    return (fmi2Status)swp_fmu_begin(c);
 }
 
 fmi2Status fmi2ExitInitializationMode(fmi2Component c) {
     return (fmi2Status)swp_fmu_ready(c);
 }
 
-fmi2Status fmi2Terminate(fmi2Component c) { return c ? fmi2OK : fmi2Error; }
+fmi2Status fmi2Terminate(fmi2Component c) { return (fmi2Status)swp_fmu_end(c); }
 fmi2Status fmi2Reset(fmi2Component c) { return (fmi2Status)swp_fmu_reset(c); }
 
 fmi2Status fmi2GetReal(fmi2Component c, const fmi2ValueReference vr[], size_t nvr,
@@ -142,6 +138,7 @@ fmi2Status fmi2DeSerializeFMUstate(fmi2Component c, const fmi2Byte serializedSta
 fmi2Status fmi2SetRealInputDerivatives(fmi2Component c, const fmi2ValueReference vr[], size_t nvr,
                                        const fmi2Integer order[], const fmi2Real value[]) {
     int status = c ? SWP_FMU_OK : SWP_FMU_ERROR;
+    if (nvr > 0 && (!vr || !order || !value)) status = swp_fmu_missing(c);
     for (size_t i = 0; i < nvr && status == SWP_FMU_OK; i++)
         status = order[i] == 1 ? swp_fmu_set_slope(c, vr[i], value[i])
                                : swp_fmu_fail(c, "inputs have first derivatives only");
@@ -165,12 +162,13 @@ fmi2Status fmi2CancelStep(fmi2Component c) {
 
 fmi2Status fmi2GetStatus(fmi2Component c, const fmi2StatusKind s, fmi2Status *value) {
     (void)s;
+    if (!value) return (fmi2Status)swp_fmu_missing(c);
     *value = fmi2OK; /* no step is ever pending */
     return c ? fmi2OK : fmi2Error;
 }
 fmi2Status fmi2GetRealStatus(fmi2Component c, const fmi2StatusKind s, fmi2Real *value) {
     const swp_fmu *fmu = c;
-    if (!fmu || s != fmi2LastSuccessfulTime) return fmi2Discard;
+    if (!fmu || !value || s != fmi2LastSuccessfulTime) return fmi2Discard;
     *value = fmu->memory.now;
     return fmi2OK;
 }
@@ -180,7 +178,7 @@ fmi2Status fmi2GetIntegerStatus(fmi2Component c, const fmi2StatusKind s, fmi2Int
 }
 fmi2Status fmi2GetBooleanStatus(fmi2Component c, const fmi2StatusKind s, fmi2Boolean *value) {
     const swp_fmu *fmu = c;
-    if (!fmu || s != fmi2Terminated) return fmi2Discard;
+    if (!fmu || !value || s != fmi2Terminated) return fmi2Discard;
     *value = fmu->memory.mode == SWP_FMU_FAILED;
     return fmi2OK;
 }

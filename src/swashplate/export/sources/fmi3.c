@@ -67,15 +67,16 @@ void fmi3FreeInstance(fmi3Instance instance) { swp_fmu_free(instance); }
 fmi3Status fmi3EnterInitializationMode(fmi3Instance instance, fmi3Boolean toleranceDefined,
                                        fmi3Float64 tolerance, fmi3Float64 startTime,
                                        fmi3Boolean stopTimeDefined, fmi3Float64 stopTime) {
-    (void)toleranceDefined, (void)tolerance, (void)stopTimeDefined, (void)stopTime;
-    return (fmi3Status)swp_fmu_begin(instance, startTime);
+    (void)toleranceDefined, (void)tolerance;
+    int status = swp_fmu_setup(instance, startTime, stopTimeDefined, stopTime);
+    return (fmi3Status)(status == SWP_FMU_OK ? swp_fmu_begin(instance) : status);
 }
 
 fmi3Status fmi3ExitInitializationMode(fmi3Instance instance) {
     return (fmi3Status)swp_fmu_ready(instance);
 }
 
-fmi3Status fmi3Terminate(fmi3Instance instance) { return instance ? fmi3OK : fmi3Error; }
+fmi3Status fmi3Terminate(fmi3Instance instance) { return (fmi3Status)swp_fmu_end(instance); }
 fmi3Status fmi3Reset(fmi3Instance instance) {
     return (fmi3Status)swp_fmu_reset(instance);
 }

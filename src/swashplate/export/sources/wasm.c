@@ -5,9 +5,12 @@
  */
 #include "variables.h"
 
+#include <limits.h>
+
 #define EXPORTED __attribute__((visibility("default")))
 #define PAGE_SIZE 65536
 #define MOST_ROWS 16
+#define MOST_SAMPLES (INT_MAX / (int)sizeof(double) / (SWP_FMI_SIGNALS + MOST_ROWS + 1))
 
 extern unsigned char __heap_base; /* what lies behind the program's own data */
 
@@ -69,7 +72,7 @@ EXPORTED const char *swp_page_sentence(int status)
 EXPORTED int swp_page_begin(int count, double step, int wanted)
 {
     samples = rows = 0;
-    if (count < 1 || wanted < 0 || wanted > MOST_ROWS) {
+    if (count < 1 || count > MOST_SAMPLES || wanted < 0 || wanted > MOST_ROWS) {
         return SWP_BAD_VALUE;
     }
     if (step != swp_get_step(&model)) {
@@ -100,7 +103,9 @@ EXPORTED double *swp_page_input(int which)
 
 EXPORTED void swp_page_select(int place, int output)
 {
-    chosen[place] = output;
+    if (place >= 0 && place < MOST_ROWS) {
+        chosen[place] = output;
+    }
 }
 
 EXPORTED double *swp_page_row(int place)

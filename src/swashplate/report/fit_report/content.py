@@ -15,7 +15,7 @@ from swashplate.campaign.schema import Weight
 from swashplate.drive import Drive
 from swashplate.errors import InputError
 from swashplate.identification import tables
-from swashplate.identification.assessment import Judged, motion_of
+from swashplate.identification.assessment import Identification, motion_of
 from swashplate.identification.criteria import Verdict, starts_of, verdict
 from swashplate.identification.determination import Identifiability
 from swashplate.identification.drive_model import Parameters
@@ -45,12 +45,14 @@ _PARTS = {
 }
 
 
-def write_fit_report(found: Judged, path: str | Path, *, truth: ParameterSet | None = None) -> None:
+def write_fit_report(
+    found: Identification, path: str | Path, *, truth: ParameterSet | None = None
+) -> None:
     """Write the report of a fit: one HTML file, whole or not at all, that needs no network.
 
     Parameters
     ----------
-    found : Judged
+    found : Identification
         The fit, its campaign, and what was found out about it.
     path : path
         The file, which replaces an older one.
@@ -69,7 +71,7 @@ def write_fit_report(found: Judged, path: str | Path, *, truth: ParameterSet | N
     The page holds what the eye can tell of every run, a few bytes a sample (`runs.run_data`): it
     grows with the number of runs, not with their length.
     """
-    fit, stages = found.result, found.result.stages
+    fit, stages = found.fit, found.fit.stages
     runs = shown_runs(stages, found.predicted)
     held_out = sum(run.role == "validate" for run in runs)
     facts = (

@@ -5,11 +5,14 @@ from __future__ import annotations
 import json
 import os
 import re
+from base64 import b64encode
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from datetime import date
+from hashlib import sha256
 from importlib.resources import files
+from importlib.resources.abc import Traversable
 from pathlib import Path
 from shutil import which
 from subprocess import TimeoutExpired, run
@@ -70,10 +73,12 @@ def page(
     run_data: Iterable[Mapping[str, Any]] = (),
 ) -> str:
     """HTML of a report's page; sections without blocks are left out."""
+    kinds = {block.kind for section in sections for block in section.blocks}
     return rendered(
         "fit_report/page.html",
         ("curves.js", "page.js"),
         ("page.css",),
+        embedded=LIVE_SCRIPTS if "live" in kinds else (),
         sections=[each for each in sections if each.blocks],
         what=what,
         title=title,
@@ -84,9 +89,19 @@ def page(
 
 
 def rendered(
-    template: str, scripts: Sequence[str], looks: Sequence[str], more: str = "", **content: Any
+    template: str,
+    scripts: Sequence[str],
+    looks: Sequence[str],
+    more: str = "",
+    *,
+    embedded: Sequence[str] = (),
+    **content: Any,
 ) -> str:
-    """HTML of a template, with scripts in a scope of their own and looks from its folder."""
+    """HTML of a template, with scripts in a scope of their own and looks from its folder.
+
+    The page allows these scripts to run and no other, whatever a name or a title in it holds; see
+    `content_policy`. `embedded` are the scripts of a live page within it.
+    """
     environment = Environment(
         loader=PackageLoader("swashplate.report", ""),
         autoescape=True,
@@ -96,15 +111,61 @@ def rendered(
     )
     environment.globals["html_table"] = html_table
     folder = files("swashplate.report") / template.partition("/")[0]
-    code, css = ([(folder / each).read_text("utf-8") for each in of] for of in (scripts, looks))
+    css = [(folder / name).read_text("utf-8") for name in looks]
+    script = _scoped(folder, scripts)
+    allowed = [script]
+    if embedded:
+        allowed.append(_scoped(folder, embedded))
+    live = LIVE_SCRIPTS in (scripts, embedded)
     made: str = environment.get_template(template).render(
         content,
         css=Markup("".join(css) + more),
-        js=Markup('"use strict";\n(() => {\n' + "\n".join(code) + "})();"),
+        js=Markup(script),
+        policy=content_policy(allowed, compiles=live),
         date=f"{date.today():%d %B %Y}",
     )
     # control characters of a name, and what turns the direction of writing, are no part of HTML
-    return re.sub("[\x00-\x08\x0b-\x1f\x7f-\x9f\u202a-\u202e\u2066-\u2069]", "\ufffd", made)
+    return re.sub(
+        "[\x00-\x08\x0b-\x1f\x7f-\x9f\u202a-\u202e\u2066-\u2069\ud800-\udfff\ufffe\uffff]",
+        "\ufffd",
+        made,
+    )
+
+
+LIVE_SCRIPTS = ("curves.js", "live.js")
+"""Of a live page, which compiles the drive's WebAssembly."""
+
+
+def _scoped(folder: Traversable, scripts: Sequence[str]) -> str:
+    """Scripts of a folder as the text of one element, in a scope of their own."""
+    code = "\n".join((folder / name).read_text("utf-8") for name in scripts)
+    return f'"use strict";\n(() => {{\n{code}}})();'
+
+
+def content_policy(scripts: Sequence[str], *, compiles: bool = False) -> str:
+    """Content-Security-Policy of a page: what of it a browser runs and loads.
+
+    Parameters
+    ----------
+    scripts : sequence of str
+        Texts of the script elements that may run, known by their hashes; no other script does, no
+        attribute such as ``onclick``, and no `eval`.
+    compiles : bool
+        Whether they may compile WebAssembly.
+
+    Returns
+    -------
+    str
+        A policy under which nothing is loaded but images in the page itself, nothing is sent, and
+        styles may stand in attributes, as in Matplotlib's SVG.
+    """
+    sources = [f"'sha256-{b64encode(sha256(text.encode()).digest()).decode()}'" for text in scripts]
+    if compiles:
+        sources.append("'wasm-unsafe-eval'")
+    return (
+        f"default-src 'none'; script-src {' '.join(sources)}; style-src 'unsafe-inline'; "
+        "img-src data:; base-uri 'none'; form-action 'none'"
+    )
 
 
 def html_table(table: Table, look: str = "") -> Markup:

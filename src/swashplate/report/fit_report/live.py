@@ -24,7 +24,7 @@ from swashplate.identification.drive_model import SIGNALS, at_rate_of, voltage_r
 from swashplate.identification.validation import at_instants, ignored_windows
 from swashplate.maneuvers import Maneuver
 from swashplate.parameters.parameter_set import HasParameters, Parameter, ParameterSet, set_of
-from swashplate.report.fit_report.html_page import rendered, script_json
+from swashplate.report.fit_report.html_page import LIVE_SCRIPTS, rendered, script_json
 from swashplate.report.fit_report.runs import packed
 from swashplate.report.lines import SHADES, gap_rows
 from swashplate.report.style import in_lines
@@ -144,7 +144,7 @@ def live_page(
     )
     return rendered(
         "fit_report/live.html",
-        ("curves.js", "live.js"),
+        LIVE_SCRIPTS,
         ("page.css", "live.css"),
         colours,
         data=script_json(content),

@@ -138,7 +138,7 @@ def write_judgment(judgment: Judgment, path: str | Path) -> None:
     looks: dict[str, Light] = {"works": "good", "not decided": "look", "fails": "bad"}
     look = looks[outcome]
     summary = [
-        Block("verdict", (light(look, outcome), judgment.headline()), look),
+        Block("verdict", (light(look, outcome), judgment.headline), look),
         *_fit_verdicts(crane),
         _drawn(plot_judgment(judgment), "Swing of each variant in each seaway"),
         *(block for each in remedies for block in titled(each)),

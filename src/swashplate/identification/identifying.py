@@ -1,0 +1,291 @@
+"""From a campaign to a drive and its verdict in one call."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from swashplate.campaign.campaign import Campaign
+from swashplate.campaign.experiment import Experiment
+from swashplate.drive import Drive
+from swashplate.equations import Model as Equations
+from swashplate.errors import InputError
+from swashplate.executors import Executor, Serial
+from swashplate.identification.assessment import Identification, versions
+from swashplate.identification.criteria import REQUIRED
+from swashplate.identification.data_checks import refuse_unsound, spike_findings
+from swashplate.identification.drive_model import Parameters, setup_of
+from swashplate.identification.fitting import Fit, Search, StageFit, fit
+from swashplate.identification.model import Model
+from swashplate.identification.problem import Loss
+from swashplate.identification.profiles import Profile, profiles_of
+from swashplate.identification.resampling import bootstraps_of, cross_validate
+from swashplate.identification.setup import FreeParameters, ModelSetup, Setup
+from swashplate.parameters.files import named_set
+from swashplate.parameters.parameter_set import ParameterSet
+
+if TYPE_CHECKING:
+    from swashplate.identification.solving import Progress, Solution
+
+Watch = Callable[[str, float | None], None]
+"""Is called with what is being done, and with the share that is done where that is known."""
+FEWEST_DRAWS = 40
+"""Of a bootstrap: one beyond each end of a 95 % interval."""
+MOST_EVALUATIONS = 600
+
+
+def identify(
+    tests: str | Path | Campaign,
+    model: str | Path | Drive | ParameterSet | ModelSetup | Model | Equations | None = None,
+    free: FreeParameters | None = None,
+    *,
+    axis: str | None = None,
+    joint: bool = False,
+    starts: int = 0,
+    folds: int = 0,
+    bootstrap: int = 0,
+    profiles: str | Sequence[str] = (),
+    seed: int = 0,
+    loss: Loss = "linear",
+    max_evaluations: int = MOST_EVALUATIONS,
+    required: float = REQUIRED,
+    executor: Executor | None = None,
+    store: str | Path | None = None,
+    resume: bool = False,
+    watch: Watch | None = None,
+) -> Identification:
+    """Identify a drive, or a user-defined model, from the tests of a campaign.
+
+    Fits the runs with the role ``"fit"``, stage after stage, predicts those with the role
+    ``"validate"``, and judges the result: what ``swashplate fit`` does, which calls this function.
+
+    Parameters
+    ----------
+    tests : path or Campaign
+        The campaign, or its file.
+    model : Drive, ParameterSet, str or path, or user-defined model, optional
+        The drive to begin at: by default the one that the campaign names; a packaged one by its
+        name, a parameter file, or the folder of a fit. Or what is fitted instead of a drive: a
+        model of equations or any object with `simulate`, with `free`; a `ModelSetup`; a Python file
+        that states one.
+    free : Setup, str, path or mapping, optional
+        What to estimate. By default the packaged fit configuration of the campaign's drive. Or
+        another packaged one by its name, a TOML file, a `Setup`, or a mapping of the drive's
+        parameters to factors on their nominal values, ``{"Z8": (0.5, 2)}``; see
+        `swashplate.identification.configuration`. Of a user-defined model (low, nominal, high) by
+        name, see `ModelSetup`.
+    axis : str, optional
+        The axis; needed if the campaign has several.
+    joint : bool
+        After the stages, estimate all parameters at once, through the whole drive.
+    starts : int
+        More starts, spread over the bounds; the best is refined.
+    folds, bootstrap : int
+        Folds of a cross-validation, and refits to new noise (40 or more); 0 for none.
+    profiles : str or sequence of str
+        Parameters to profile the cost along, by name, or ``"all"``.
+    seed : int
+        Random seed of starts, folds and bootstrap.
+    loss : {"linear", "soft_l1", "cauchy"}
+        Robust loss functions reduce the weight of outliers.
+    max_evaluations : int
+        Evaluations of the model that a search may take.
+    required : float
+        Largest error of held-out runs, over their range, for the verdict "usable". [1]
+    executor : Executor, optional
+        Of `swashplate.executors`, for starts, folds, refits and profiles; one after another by
+        default. The result does not depend on it.
+    store : path, optional
+        Folder that keeps the result of each start as it is ready.
+    resume : bool
+        Take what is in `store` instead of computing it again.
+    watch : callable, optional
+        Called with what is being done, in words, and the share that is done, None if unknown.
+
+    Returns
+    -------
+    Identification
+        Estimates by name, drive, verdict; `Identification.report` and `Identification.save` write
+        them. After Ctrl-C it is the best result so far, without folds, bootstrap and profiles.
+
+    Raises
+    ------
+    FileError
+        If the campaign, a log or another file cannot be read; a missing one is a
+        ``FileNotFoundError`` as well.
+    ParameterError
+        If an entry of a file, or of `free`, is wrong.
+    InputError
+        If tests, model and what is free do not fit each other, or no fit of these runs can mean
+        anything.
+    DomainError
+        If the model does not hold at the nominal values.
+
+    Examples
+    --------
+    >>> result = identify("virtual/campaign.toml")
+    >>> result = identify("harbour/campaign.toml", "hoist", {"Z8": (0.5, 2), "Z16": (0.5, 2)})
+    >>> result = identify("valve/campaign.toml", valve, {"lag": (0.005, 0.06, 0.5)})
+    """
+    if 0 < bootstrap < FEWEST_DRAWS:
+        raise InputError(
+            f"{bootstrap} draws do not reach the ends of a 95 % interval; take {FEWEST_DRAWS} or "
+            "more, 1000 for smooth ones."
+        )
+    show = watch or _silent
+    profiles = (profiles,) if isinstance(profiles, str) else profiles
+    campaign = tests if isinstance(tests, Campaign) else Campaign.from_toml(tests)
+    axis = only_axis(campaign, axis)
+    runs = runs_to_fit(campaign, axis)
+    nominal, setup = _stated(campaign, axis, model, free, runs)
+
+    def progress(stage: str, now: Progress) -> None:
+        words = f"{stage}: iteration {now.iteration}, evaluation {now.evaluations} of at most "
+        show(f"{words}{max_evaluations}, cost {now.cost:.6g}", None)
+
+    def ended(stage: str, one: Solution, done: int) -> None:
+        words = f"{stage}: {done} of {starts + 1} starts, the last to cost {one.cost:.6g}"
+        show(words, done / (starts + 1))
+
+    search = None
+    if starts:
+        folder = None if store is None else Path(store)
+        search = Search(
+            starts, seed, executor or Serial(), store=folder, resume=resume, watch=ended
+        )
+    staged = result = fit(
+        nominal,
+        runs,
+        setup,
+        loss=loss,
+        max_evaluations=max_evaluations,
+        search=search,
+        watch=progress,
+    )
+    _check_profiles(result, profiles)
+    if joint and len(setup.stages) > 1 and not result.interrupted:
+        # from where the stages ended: from afar a joint fit is often caught on its way
+        result = fit(
+            result.parameters,
+            runs,
+            setup.joint(),
+            loss=loss,
+            max_evaluations=max_evaluations,
+            watch=progress,
+        )
+    notes = {**versions(), "seed": str(seed), "campaign": str(campaign.path)}
+    identification = Identification(campaign, result, notes=notes, required=required)
+    if result.interrupted:
+        return identification
+    if folds:
+        cross_validation = cross_validate(
+            staged.runs,
+            staged.nominal,
+            staged.setup,
+            folds=folds,
+            loss=loss,
+            watch=lambda _, done: show(f"{done} of {folds} folds", done / folds),
+            executor=executor,
+            seed=seed,
+        )
+        identification = replace(identification, folds=cross_validation)
+    if bootstrap:
+        refits = bootstraps_of(
+            result.stages,
+            bootstrap,
+            watch=lambda done: show(f"{done} of {bootstrap} fits to new noise", None),
+            executor=executor,
+            seed=seed,
+        )
+        identification = replace(identification, bootstraps=refits)
+    if profiles:
+        curves = [
+            curve for stage in result.stages for curve in _profiles(stage, profiles, executor, show)
+        ]
+        identification = replace(identification, profiles=curves)
+    return identification
+
+
+def _silent(words: str, share: float | None) -> None:
+    """Show nothing."""
+
+
+def only_axis(campaign: Campaign, axis: str | None) -> str:
+    """The axis of a name, or the only one of a campaign; an `InputError` if it has several."""
+    if axis is not None:
+        campaign.select(axis=axis)
+        return axis
+    if len(campaign.axes) > 1:
+        known = ", ".join(campaign.axes)
+        raise InputError(f"{campaign.path} has the axes {known}; name one of them as the axis.")
+    return next(iter(campaign.axes))
+
+
+def runs_to_fit(campaign: Campaign, axis: str) -> tuple[Experiment, ...]:
+    """The runs of an axis with the role 'fit', at least one; gross spikes of others are refused."""
+    runs = campaign.select(axis=axis, role="fit")
+    refuse_unsound(spike_findings(campaign.select(axis=axis, role="validate"), "linear"))
+    if not runs:
+        raise InputError(f"{campaign.path}: no run of the axis '{axis}' has the role 'fit'.")
+    return runs
+
+
+def _stated(
+    campaign: Campaign,
+    axis: str,
+    model: object,
+    free: FreeParameters | None,
+    runs: Sequence[Experiment],
+) -> tuple[Parameters, Setup]:
+    """The nominal parameters, and what is estimated of them in which stages."""
+    if isinstance(model, str | Path) and Path(model).suffix == ".py":
+        model = ModelSetup.from_file(model)
+    if isinstance(model, ModelSetup):
+        if free is not None:
+            raise InputError(f"{model.name} says what is free: leave out the other 'free'.")
+        nominal = model.nominal(runs)
+        return nominal, nominal.setup
+    drive: object = model
+    if model is None:
+        drive = campaign.drive(axis).parameters
+    elif isinstance(model, str | Path):
+        drive = named_set(model)
+    elif isinstance(model, Drive):
+        drive = model.parameters
+    if isinstance(drive, ParameterSet):
+        return drive, setup_of(campaign, axis, drive, free)
+    if not isinstance(free, Mapping):
+        raise InputError(
+            "A user-defined model needs a mapping of what is free of it, by name: "
+            "{'lag': (0.005, 0.06, 0.5)}, lower bound, nominal value and upper bound."
+        )
+    nominal = ModelSetup(drive, free).nominal(runs)
+    return nominal, nominal.setup
+
+
+def _check_profiles(result: Fit, profiles: Sequence[str]) -> None:
+    """Refuse names of profiles that the fit does not estimate."""
+    known = [name for stage in result.stages for name in stage.problem.unknowns.names]
+    for name in profiles:
+        if name != "all" and name not in known:
+            machine = ", ".join(each for each in known if "(" not in each)
+            raise InputError(f"There is no parameter '{name}'; there are {machine}.")
+
+
+def _profiles(
+    stage: StageFit, profiles: Sequence[str], executor: Executor | None, show: Watch
+) -> list[Profile]:
+    """Profiles of the parameters of one stage that are named."""
+    names = None
+    if "all" not in profiles:
+        names = [name for name in profiles if name in stage.problem.unknowns.names]
+    return list(
+        profiles_of(
+            stage,
+            names,
+            executor=executor,
+            watch=lambda done: show(f"{stage.stage.name}: {done} profiles", None),
+        ).values()
+    )

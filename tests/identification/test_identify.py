@@ -1,0 +1,388 @@
+"""From a campaign to drive and verdict in one call, and back from the folder that it wrote."""
+
+import csv
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from math import exp
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+import pytest
+from tests.identification.given import TWO_STAGES, virtual
+
+import swashplate
+from swashplate import Campaign, Drive, Identification, InputError, ParameterError, maneuvers
+from swashplate.equations import Model
+from swashplate.identification import ModelSetup, fit, load_setup
+from swashplate.identification.setup import Free, setup_text
+
+TRUTH = {"J_plus": 0.26, "J_minus": 0.31, "Z10": 13.0}
+
+
+@pytest.fixture(scope="module")
+def campaign(tmp_path_factory: pytest.TempPathFactory) -> Campaign:
+    """Two short tests of a hoist to fit and one to predict, as a campaign file."""
+    levels = (4.0, -4.0, 5.0)
+    commands = [maneuvers.step(level, start=0.5, stop=2.5, length=4.0) for level in levels]
+    drive = Drive.preset("hoist").replace(J=(0.26, 0.31), Z10=13.0)
+    folder = tmp_path_factory.mktemp("tests")
+    virtual(folder, "hoist", commands, seed=2, truth=drive)
+    (path,) = folder.rglob("campaign.toml")
+    before, _, after = path.read_text("utf-8").rpartition('role = "fit"')
+    path.write_text(f'{before}role = "validate"{after}', "utf-8")
+    return Campaign.from_toml(path)
+
+
+@pytest.fixture(scope="module")
+def result(campaign: Campaign) -> Identification:
+    """Of two stages, the card's and the pump's."""
+    return swashplate.identify(campaign, free=TWO_STAGES)
+
+
+def test_the_truth_is_found_and_judged(result: Identification) -> None:
+    for name, true in TRUTH.items():
+        estimate = result[name]
+        low, high = estimate.interval
+        assert low is not None
+        assert high is not None
+        assert low < true < high, name
+        assert estimate.value == pytest.approx(true, rel=0.01)
+        assert estimate.free
+        assert estimate.standard_error is not None
+        assert 0.0 < estimate.standard_error < high - low
+    assert (result["Z10"].unit, result["J_plus"].unit) == ("1/s", "A")
+    assert result.verdict.usable
+    assert len(result.predicted) == 2  # counts and current of the run that was held out
+
+
+def test_what_stayed_fixed_says_so(result: Identification) -> None:
+    hoist = Drive.preset("hoist")
+    fixed = result["Z9"]
+    assert (fixed.status, fixed.free) == ("fixed", False)
+    assert fixed.value == hoist["Z9"].value
+    assert (fixed.standard_error, fixed.interval, fixed.unit) == (None, (None, None), "Pa")
+
+
+def test_names_follow_the_contract_of_a_mapping(result: Identification) -> None:
+    assert "Z10" in result
+    assert "Z99" not in result
+    assert set(result) == set(result.fit.estimates)
+    assert len(result) == len(list(result))
+    assert result["Z10"] == result.fit["Z10"]
+    with pytest.raises(KeyError, match="J has two directions: ask for J_plus or J_minus"):
+        result["J"]
+    with pytest.raises(KeyError, match="did you mean Z10"):
+        result["Z100"]
+
+
+def test_the_fitted_drive_knows_where_it_is_from(result: Identification) -> None:
+    drive = result.drive
+    assert drive["Z10"].value == result["Z10"].value
+    assert drive["Z10"].status == "fitted"
+    assert "campaign.toml" in drive["Z10"].source
+    assert drive["Z9"].status == "fixed"
+    assert drive["Z9"].source.startswith("hoist")
+
+
+def test_a_table_of_what_was_estimated(result: Identification, tmp_path: Path) -> None:
+    frame = result.to_polars()
+    rows = {row["parameter"]: row for row in frame.iter_rows(named=True)}
+    assert "Z9" not in rows
+    for name in TRUTH:
+        estimate, row = result[name], rows[name]
+        assert [row[key] for key in ("value", "standard_error", "lower", "upper", "unit")] == [
+            estimate.value,
+            estimate.standard_error,
+            estimate.lower,
+            estimate.upper,
+            estimate.unit,
+        ]
+    assert [*result.to_pandas().columns] == frame.columns
+    result.save(tmp_path)
+    with (tmp_path / "estimates.csv").open(encoding="utf-8") as file:
+        reader = csv.DictReader(file)
+        assert reader.fieldnames == frame.columns
+        stored = {row["parameter"]: float(row["value"]) for row in reader}
+    assert stored == {name: row["value"] for name, row in rows.items()}
+
+
+def test_a_folder_comes_back_with_the_same_interface(
+    result: Identification, tmp_path: Path
+) -> None:
+    files = result.save(tmp_path / "fitted")
+    names = ["drive.toml", "setup.toml", "estimates.csv", "fit.json"]
+    assert [file.name for file in files] == names
+    assert all(file.is_file() for file in files)
+    assert load_setup(tmp_path / "fitted" / "setup.toml") == TWO_STAGES
+    for place in (tmp_path / "fitted", str(tmp_path / "fitted"), files[-1], files[0]):
+        again = Identification.load(place)
+        assert again["Z10"] == result["Z10"]
+    assert again.drive == result.drive
+    assert again.verdict.headline == result.verdict.headline
+    # every face that takes a drive takes the folder
+    assert Drive.from_toml(tmp_path / "fitted") == result.drive
+    went_on = swashplate.identify(result.campaign, tmp_path / "fitted", {"Z8": (0.5, 2.0)})
+    assert went_on["Z10"].value == result["Z10"].value
+    assert went_on["Z10"].status == "fixed"
+
+
+def test_a_report_is_written(result: Identification, tmp_path: Path) -> None:
+    result.report(tmp_path / "report.html", truth=Drive.preset("hoist"))
+    page = (tmp_path / "report.html").read_text("utf-8")
+    assert "Usable" in result.verdict.headline
+    assert "Usable" in page
+    assert f"{result['Z10'].value:.2f}" in page
+    assert '<th class="n">truth</th>' in page
+
+
+def estimates(result: Identification) -> Mapping[str, float]:
+    return {name: result[name].value for name in result if "(" not in name}
+
+
+def configured(path: Path) -> Path:
+    path.write_text(setup_text(TWO_STAGES), "utf-8")
+    return path
+
+
+FORMS: Mapping[str, Callable[[Campaign, Path], tuple[Any, Any, Any]]] = {
+    "paths": lambda tests, folder: (tests.path, None, configured(folder / "mine.toml")),
+    "texts": lambda tests, folder: (str(tests.path), "hoist", str(configured(folder / "x.toml"))),
+    "a drive": lambda tests, _: (tests, Drive.preset("hoist"), TWO_STAGES),
+    "a set": lambda tests, _: (tests, Drive.preset("hoist").parameters, TWO_STAGES),
+    "a file's contents": lambda tests, _: (tests, None, TWO_STAGES.model_dump()),
+}
+
+
+@pytest.mark.parametrize("form", FORMS.values(), ids=FORMS)
+def test_each_form_of_the_arguments_is_the_same(form, result, campaign, tmp_path) -> None:
+    tests, model, free = form(campaign, tmp_path)
+    again = swashplate.identify(tests, model, free)
+    assert again.fit.setup == TWO_STAGES
+    assert estimates(again) == estimates(result)
+
+
+@pytest.mark.slow
+def test_drive_and_configuration_come_from_the_campaign(campaign: Campaign) -> None:
+    found = swashplate.identify(campaign.path)
+    assert found.fit.setup == load_setup("hoist")
+    assert found.fit.nominal.name == "hoist"
+    assert swashplate.identify(campaign, free="hoist").fit.setup == found.fit.setup
+
+
+PARTS: Mapping[str, tuple[Mapping[str, Any], str]] = {
+    "pump and motor": ({"Z8": (0.5, 2), "Z16_plus": [0.5, 2.0]}, "pump"),
+    "the card": ({"J": Free(relative=(0.5, 2.0), log=True)}, "card"),
+    "both": ({"G1": (0.5, 2), "Z10": {"bounds": [5.0, 20.0], "log": True}}, "chain"),
+}
+
+
+@pytest.mark.parametrize(("free", "part"), PARTS.values(), ids=PARTS)
+def test_a_mapping_names_what_is_free(campaign: Campaign, free, part: str) -> None:
+    found = swashplate.identify(campaign, free=free)
+    (stage,) = found.fit.stages
+    assert stage.stage.part == part
+    machine = {each.name: each for each in stage.problem.unknowns if each.run is None}
+    symbols = {name.removesuffix("_plus").removesuffix("_minus") for name in machine}
+    assert symbols == {name.removesuffix("_plus") for name in free}
+    for name, entry in free.items():
+        unknown = machine.get(name, machine.get(f"{name}_plus"))
+        assert unknown is not None
+        nominal = Drive.preset("hoist")[unknown.name].value
+        if isinstance(entry, Mapping):
+            assert (unknown.low, unknown.high, unknown.log) == (5.0, 20.0, True)
+        else:
+            assert (unknown.low, unknown.high) == (0.5 * nominal, 2.0 * nominal)
+    assert fit(Drive.preset("hoist"), campaign, free).setup == found.fit.setup
+
+
+def test_a_tied_parameter_has_its_estimate_by_every_name(campaign: Campaign) -> None:
+    found = swashplate.identify(campaign, free={"J": {"relative": (0.5, 2), "tied": True}})
+    assert found["J"] is found["J_plus"] is found["J_minus"]
+    assert found["J"].free
+
+
+def two_axes(campaign: Campaign) -> Campaign:
+    return replace(campaign, axes={**campaign.axes, "slew": campaign.axes["hoist"]})
+
+
+REFUSED: Mapping[str, tuple[Callable[[Campaign], object], type[Exception], str]] = {
+    "another axis": (
+        lambda tests: swashplate.identify(tests, axis="slew"),
+        InputError,
+        "no axis 'slew'; it has hoist",
+    ),
+    "several axes": (
+        lambda tests: swashplate.identify(two_axes(tests)),
+        InputError,
+        "the axes hoist, slew; name one",
+    ),
+    "no run": (
+        lambda tests: swashplate.identify(replace(tests, experiments=tests.experiments[2:])),
+        InputError,
+        "no run of the axis 'hoist' has the role 'fit'",
+    ),
+    "an unknown parameter": (
+        lambda tests: swashplate.identify(tests, free={"Z88": (0.5, 2)}),
+        ParameterError,
+        "did you mean Z8",
+    ),
+    "one number": (
+        lambda tests: swashplate.identify(tests, free={"Z8": 0.5}),
+        ParameterError,
+        "Z8 is free as 0.5: give two factors",
+    ),
+    "falling factors": (
+        lambda tests: swashplate.identify(tests, free={"Z8": (2, 0.5)}),
+        ParameterError,
+        r"free, Z8: .*must rise: write \[0.5, 2\]",
+    ),
+    "nothing": (
+        lambda tests: swashplate.identify(tests, free={}),
+        InputError,
+        "What is free is {}",
+    ),
+    "an unknown configuration": (
+        lambda tests: swashplate.identify(tests, free="hoost"),
+        ParameterError,
+        "no packaged fit configuration 'hoost'",
+    ),
+    "an unknown drive": (
+        lambda tests: swashplate.identify(tests, "hoost"),
+        FileNotFoundError,
+        "no packaged set, file or folder 'hoost'",
+    ),
+    "a model without what is free": (
+        lambda tests: swashplate.identify(tests, lag_model()),
+        InputError,
+        "needs a mapping of what is free",
+    ),
+    "too few draws": (
+        lambda tests: swashplate.identify(tests, bootstrap=10),
+        InputError,
+        "take 40 or more",
+    ),
+    "a profile of nothing": (
+        lambda tests: swashplate.identify(tests, free={"Z8": (0.5, 2)}, profiles=["Z9"]),
+        InputError,
+        "no parameter 'Z9'; there are Z8",
+    ),
+    "a fit without what is free": (
+        lambda tests: fit(Drive.preset("hoist"), tests),
+        InputError,
+        "swashplate.identify takes drive and fit configuration from the campaign",
+    ),
+}
+
+
+@pytest.mark.parametrize(("call", "kind", "sentence"), REFUSED.values(), ids=REFUSED)
+def test_what_does_not_fit_is_refused(campaign: Campaign, call, kind, sentence: str) -> None:
+    with pytest.raises(kind, match=sentence):
+        call(campaign)
+
+
+def test_more_than_a_fit_is_asked_for_by_keywords(campaign: Campaign) -> None:
+    said: list[tuple[str, float | None]] = []
+    found = swashplate.identify(
+        campaign,
+        free={"Z10": (0.5, 2.0)},
+        folds=2,
+        bootstrap=40,
+        profiles=["Z10"],
+        starts=2,
+        seed=3,
+        watch=lambda words, share: said.append((words, share)),
+    )
+    assert found.folds is not None
+    assert len(found.folds.folds) == 2
+    assert [profile.name for profile in found.profiles] == ["Z10"]
+    assert len(found.fit.stages[0].starts) == 3
+    frame = found.to_polars()
+    assert frame.columns[-4:] == ["bootstrap_lower", "bootstrap_upper", "standard_error", "status"]
+    assert found.notes["seed"] == "3"
+    assert ("pump: 3 of 3 starts", 1.0) in [(w.partition(",")[0], share) for w, share in said]
+    assert ("2 of 2 folds", 1.0) in said
+    assert any("fits to new noise" in words for words, _ in said)
+
+
+def test_after_an_interruption_nothing_else_is_computed(campaign: Campaign) -> None:
+    def stop(words: str, share: float | None) -> None:
+        raise KeyboardInterrupt
+
+    found = swashplate.identify(
+        campaign, free={"Z10": (0.5, 2.0)}, folds=2, profiles="all", watch=stop
+    )
+    assert found.fit.interrupted
+    assert found.folds is None
+    assert not found.profiles
+
+
+# --- user-defined models --------------------------------------------------------------------------
+
+
+class Lag(NamedTuple):
+    lag: float
+    gain: float
+
+
+class Speed(NamedTuple):
+    speed: float
+
+
+def step(state: Speed, voltage: float, p: Lag, h: float) -> Speed:
+    share = 1.0 - exp(-h / p.lag)
+    return Speed(state.speed + share * (p.gain * voltage - state.speed))
+
+
+def lag_model() -> Model:
+    return Model("lag", parameters=Lag, state=Speed, step=step)
+
+
+RANGES = {"lag": (0.01, 0.1, 3.0, "s"), "gain": (0.05, 0.5, 5.0, "rad/(s V)")}
+
+
+@pytest.fixture(scope="module")
+def turning(tmp_path_factory: pytest.TempPathFactory) -> Campaign:
+    """A motor of first order, 0.3 s and 0.8 rad/s per volt, in three logs."""
+    folder = tmp_path_factory.mktemp("turning")
+    random, time = np.random.default_rng(1), np.arange(400) / 50.0
+    text = '[axes.motor]\ntime = { column = "time" }\nstart = "rest"\n'
+    text += 'input = { column = "voltage", kind = "voltage", interpolation = "previous" }\n'
+    text += "channels.speed = { column = 'speed', kind = 'shaft_speed', "
+    text += "noise = 0.01 }\n"
+    for name, level, role in (("a", 4.0, "fit"), ("b", -3.0, "fit"), ("c", 5.0, "validate")):
+        voltage, speed = np.where(time % 4.0 < 2.0, level, 0.0), np.zeros(time.size)
+        for k in range(1, time.size):
+            change = 1.0 - exp(-0.02 / 0.3)
+            speed[k] = speed[k - 1] + change * (0.8 * voltage[k - 1] - speed[k - 1])
+        rows = np.column_stack([time, voltage, speed + random.normal(0.0, 0.01, time.size)])
+        lines = [",".join(f"{number:.6g}" for number in row) for row in rows]
+        (folder / f"{name}.csv").write_text("\n".join(["time,voltage,speed", *lines]), "utf-8")
+        text += f'[[runs]]\nfile = "{name}.csv"\nrole = "{role}"\n'
+    (folder / "campaign.toml").write_text(text, "utf-8")
+    return Campaign.from_toml(folder / "campaign.toml")
+
+
+def test_a_user_defined_model_has_the_same_interface(turning: Campaign, tmp_path: Path) -> None:
+    found = swashplate.identify(turning, lag_model(), RANGES)
+    for name, true in {"lag": 0.3, "gain": 0.8}.items():
+        low, high = found[name].interval
+        assert low is not None
+        assert high is not None
+        assert low < true < high
+    assert found["lag"].unit == "s"
+    assert found.verdict.usable
+    assert found.to_polars()["parameter"].to_list() == ["lag", "gain"]
+    with pytest.raises(InputError, match="user-defined|model of your own"):
+        _ = found.drive
+    setup = ModelSetup(lag_model(), RANGES)
+    again = swashplate.identify(turning, setup)
+    assert again["lag"].value == found["lag"].value
+    with pytest.raises(InputError, match="says what is free"):
+        swashplate.identify(turning, setup, RANGES)
+    files = found.save(tmp_path)
+    assert [file.name for file in files] == ["parameters.toml", "estimates.csv", "fit.json"]
+    back = Identification.load(tmp_path, model=setup)
+    assert back["gain"] == found["gain"]
+    with pytest.raises(FileNotFoundError, match="fit of a model of your own"):
+        Drive.from_toml(tmp_path)
