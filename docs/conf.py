@@ -15,6 +15,7 @@ copyright = author
 version = release = __version__
 
 extensions = [
+    "code_links",
     "myst_parser",
     "numpydoc",
     "sphinx.ext.autodoc",

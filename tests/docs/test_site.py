@@ -64,6 +64,8 @@ def test_the_site_builds(tmp_path: Path) -> None:
     assert len(pages) > 80
     for path in pages:
         assert left_raw(path.read_text("utf-8")) == [], path
+    page = (tmp_path / "how-to" / "export.html").read_text("utf-8")
+    assert re.search(r'href="[^"]*api-drive.html#swashplate.Drive.stepper"[^>]*><code', page)
 
 
 def left_raw(html: str) -> list[str]:
@@ -74,6 +76,21 @@ def left_raw(html: str) -> list[str]:
         r"^: |^:::|```|\*\*\w[^*\n]*\*\*|\]\(|\{[a-z-]+\}`|^\|.*\|$|^#+ ", re.MULTILINE
     )
     return [text for text in paragraphs if raw.search(text)]
+
+
+def test_code_that_several_objects_could_be_is_no_link(scripts: ModuleType) -> None:
+    links = scripts.import_module("code_links")
+    names = ["a.Drive.step", "a.fit", "a.Drive", "b.Model", "c.Model"]
+    endings = links.objects_by_ending(dict.fromkeys(names))
+    assert {ending: name for ending, (name, _) in endings.items()} == {
+        "a.Drive.step": "a.Drive.step",
+        "Drive.step": "a.Drive.step",
+        "a.fit": "a.fit",
+        "a.Drive": "a.Drive",
+        "Drive": "a.Drive",
+        "b.Model": "b.Model",
+        "c.Model": "c.Model",
+    }
 
 
 def test_raw_markup_is_seen() -> None:
