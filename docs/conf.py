@@ -15,6 +15,7 @@ copyright = author
 version = release = __version__
 
 extensions = [
+    "code_links",
     "myst_parser",
     "numpydoc",
     "sphinx.ext.autodoc",
@@ -24,7 +25,7 @@ extensions = [
 exclude_patterns = ["_build"]
 
 # $ and $$ for equations; headings can be linked as page.md#heading
-myst_enable_extensions = ["amsmath", "colon_fence", "dollarmath"]
+myst_enable_extensions = ["amsmath", "colon_fence", "deflist", "dollarmath"]
 myst_heading_anchors = 3
 smartquotes_action = "qe"  # quotes and dots, but no dashes: --out is an option
 

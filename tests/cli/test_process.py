@@ -114,6 +114,7 @@ def test_a_broken_pipe_is_silent(tmp_path):
             check=False,
         )
     assert done.stderr == b""
+    assert done.returncode == 141  # as a shell reports SIGPIPE; 1 is a verdict
 
 
 def test_ctrl_c_leaves_whole_files_only(tmp_path):

@@ -1,13 +1,14 @@
 """The pages that teach are run as they stand: what they show is what happens.
 
-A page is run from top to bottom in an empty folder:
+A page is run from top to bottom in an empty folder; but what stands folded under the heading "Try
+it without a machine", the script that makes the logs of a reader who has none, is run first:
 
 - ``python`` blocks in one namespace; a ``text`` block right after one is what it printed; one that
   begins with ``# name.py`` is that file, too;
 - ``console`` blocks line by line: ``$ swashplate ...`` is run, 80 columns wide, and the lines below
   it must be what it printed, ``...`` standing for lines left out;
 - ``$ cc ...`` and ``$ ./program`` are run where there is a compiler, ``$ node ...`` where there is
-  Node;
+  Node; ``$ head -n 4 FILE`` shows the first lines of a file;
 - ``c`` and ``js`` blocks begin with ``/* name.c */`` and are that file;
 - ``toml`` and ``csv`` blocks that begin with ``# name`` are that file; campaigns and fit
   configurations are valid, other ``toml`` is a fragment;
@@ -52,6 +53,14 @@ each_page = pytest.mark.parametrize("page", PAGES, ids=lambda path: str(path.rel
 BLOCK = re.compile(r"^```([^\n`]*)\n(.*?)^```[ \t]*$", re.MULTILINE | re.DOTALL)
 TARGETS = set(re.findall(r"^([.a-z-]+):.*##", (ROOT / "Makefile").read_text("utf-8"), re.MULTILINE))
 NOT_RUN = (r"(cd|mkdir) \S+", r"source \.venv/bin/activate", r"dask (scheduler|worker) .*")
+
+
+FOLDED = re.compile(r"^## Try it without a machine\n(.*?)(?=^## |\Z)", re.MULTILINE | re.DOTALL)
+
+
+def as_run(text: str) -> str:
+    """A page with the scripts that make its logs at its beginning."""
+    return "\n".join([*FOLDED.findall(text), FOLDED.sub("", text)])
 
 
 def blocks(text: str) -> list[tuple[str, str]]:
@@ -115,6 +124,10 @@ def run_command(command: str, shown: str) -> None:
         done = subprocess.run([program, *words], capture_output=True, text=True, check=False)
         assert done.returncode == 0, done.stderr
         check_shown(shown, done.stdout, command)
+    elif program == "head":
+        _, number, file = words
+        first = Path(file).read_text("utf-8").splitlines()[: int(number)]
+        check_shown(shown, "\n".join(first), command)
     else:
         known = any(re.fullmatch(each, command) for each in NOT_RUN)
         assert known, f"this cannot be run here: {command}"
@@ -166,7 +179,7 @@ def test_a_page_does_what_it_shows(
     monkeypatch.setenv("COLUMNS", "80")
     names: dict[str, object] = {"__name__": page.stem}
     printed: str | None = None  # by the Python block before
-    for language, content in blocks(page.read_text("utf-8")):
+    for language, content in blocks(as_run(page.read_text("utf-8"))):
         before, printed = printed, None
         match language:
             case "text" if before is not None:
@@ -190,6 +203,8 @@ def test_a_page_does_what_it_shows(
             case "{toctree}":
                 for entry in re.findall(r"^[^:\n].*$", content, re.MULTILINE):
                     assert (page.parent / f"{entry}.md").exists(), entry
+            case _ if language.startswith("{include} "):
+                assert (page.parent / language.removeprefix("{include} ")).exists()
             case "{math}":
                 assert content.strip()
             case _:
@@ -211,6 +226,19 @@ def test_links_lead_somewhere(page: Path) -> None:
         path = (page.parent / name).resolve() if name else page
         assert path.exists(), target
         assert not anchor or anchor in anchors(path), target
+
+
+@each_page
+def test_a_script_that_makes_logs_stands_folded_at_the_end(page: Path) -> None:
+    """Readers with a machine see their own commands first."""
+    text = page.read_text("utf-8")
+    for section in FOLDED.findall(text):
+        assert section.strip().startswith("<details>\n<summary>")
+        assert section.strip().endswith("</details>")
+    assert (
+        not FOLDED.search(text)
+        or FOLDED.sub("", text).rstrip() == text[: text.index("## Try it")].rstrip()
+    )
 
 
 @each_page

@@ -62,6 +62,44 @@ def test_the_site_builds(tmp_path: Path) -> None:
         assert f'id="swashplate-{name}' in page, name
     for name, key in KEYS.items():
         assert f">{key}<" in (tmp_path / "generated" / f"{name}.html").read_text("utf-8")
+    pages = sorted(tmp_path.rglob("*.html"))
+    assert len(pages) > 80
+    for path in pages:
+        assert left_raw(path.read_text("utf-8")) == [], path
+    page = (tmp_path / "how-to" / "export.html").read_text("utf-8")
+    assert re.search(r'href="[^"]*api-drive.html#swashplate.Drive.stepper"[^>]*><code', page)
+
+
+def left_raw(html: str) -> list[str]:
+    """Paragraphs with markup that was not turned into what it stands for."""
+    prose = re.sub(r"<(pre|code|script|style)\b.*?</\1>", "code", html, flags=re.DOTALL)
+    paragraphs = re.findall(r"<(?:p|h\d)\b[^>]*>(.*?)</(?:p|h\d)>", prose, re.DOTALL)
+    raw = re.compile(
+        r"^: |^:::|```|\*\*\w[^*\n]*\*\*|\]\(|\{[a-z-]+\}`|^\|.*\|$|^#+ ", re.MULTILINE
+    )
+    return [text for text in paragraphs if raw.search(text)]
+
+
+def test_code_that_several_objects_could_be_is_no_link(scripts: ModuleType) -> None:
+    links = scripts.import_module("code_links")
+    names = ["a.Drive.step", "a.fit", "a.Drive", "b.Model", "c.Model"]
+    endings = links.objects_by_ending(dict.fromkeys(names))
+    assert {ending: name for ending, (name, _) in endings.items()} == {
+        "a.Drive.step": "a.Drive.step",
+        "Drive.step": "a.Drive.step",
+        "a.fit": "a.fit",
+        "a.Drive": "a.Drive",
+        "Drive": "a.Drive",
+        "b.Model": "b.Model",
+        "c.Model": "c.Model",
+    }
+
+
+def test_raw_markup_is_seen() -> None:
+    rendered = "<p><code>z</code>: <b>bold</b>, **kwargs</p><pre>: kept\n```</pre>"
+    assert left_raw(rendered) == []
+    for text in ("Inputs\n: voltage", "```text", "**bold**", "[Start](start.md)", "{ref}`x`"):
+        assert left_raw(f"<section><p>{text}</p></section>") == [text]
 
 
 def test_the_reference_has_all_that_the_package_exports() -> None:
@@ -113,22 +151,34 @@ def test_every_ending_of_a_log_is_named() -> None:
         assert re.search(rf"{re.escape(suffix)}\b", text), suffix
 
 
-def test_notes_of_a_fit_are_worded_as_they_are_printed() -> None:
-    """What stands between numbers, names and ``...`` in a note is within a message."""
-    messages = "\n".join(
+EXAMPLES = (
+    r"\.\.\.|[;:,±%()'\"]|\bZ\w+|\bcounts\b|\bstep4\b|\b(?:upper|lower)\b|to ±"
+    r"|[-\d.]*\d[-\d.]*(?: (?:s|V|deg/s|times)\b)?"
+)
+"""What is not the same in each message: numbers with units, and example names."""
+
+
+def messages_of(package: str) -> list[str]:
+    """Texts in a package's code; what is put into them stands as a line's end."""
+    return [
         "".join(str(part.value) if isinstance(part, ast.Constant) else "\n" for part in parts)
-        for path in (ROOT / "src" / "swashplate" / "identification").glob("*.py")
+        for path in (ROOT / "src" / "swashplate" / package).glob("*.py")
         for node in ast.walk(ast.parse(path.read_text("utf-8")))
         for parts in [node.values if isinstance(node, ast.JoinedStr) else [node]]
         if isinstance(parts[0], (ast.Constant, ast.FormattedValue))
-    )
+    ]
+
+
+def test_notes_of_a_fit_are_worded_as_they_are_printed() -> None:
+    """What stands between numbers, names and ``...`` in a note is within a message."""
+    messages = "\n".join([*messages_of("identification"), *messages_of("campaign")])
     page = (DOCS / "how-to" / "fit-notes.md").read_text("utf-8")
     notes = re.findall(r"^\| (?!note|-)(.+?) \|", page, re.MULTILINE)
     assert len(notes) > 20
     for note in notes:
-        pieces = re.split(r"\.\.\.|[;:,±%()]|\bZ\w+|[-\d.]*\d[-\d.]*", note)
-        for piece in filter(None, (each.strip() for each in pieces)):
-            assert piece in messages, note
+        assert re.match(r"[\w']", note), f"does not begin as on the screen: {note}"
+        for piece in filter(None, (each.strip() for each in re.split(EXAMPLES, note))):
+            assert piece in messages, (note, piece)
 
 
 def test_every_figure_can_be_made_again(scripts: ModuleType) -> None:
@@ -187,3 +237,55 @@ def test_the_index_links_every_page() -> None:
     index = (THEORY / "index.md").read_text("utf-8")
     for path in THEORY.glob("*.md"):
         assert path.stem == "index" or f"({path.name})" in index
+
+
+# --- lists that stand in two places ---------------------------------------------------------------
+
+
+def table_below(page: str, head: str) -> list[str]:
+    """First cells of the table whose first heading is `head`."""
+    rows = re.search(rf"^\| {head} \|.*\n\|[-|: ]+\n((?:\|.*\n)+)", page, re.MULTILINE)
+    assert rows, head
+    return re.findall(r"^\| (.*?) \|", rows[1], re.MULTILINE)
+
+
+def libraries(requirements: Iterable[str]) -> set[str]:
+    """Names of libraries as an index spells them, without versions and markers."""
+    return {re.match(r"[\w.-]+", text)[0].lower().replace("_", "-") for text in requirements}
+
+
+def named(cells: Iterable[str]) -> set[str]:
+    """Libraries that cells name, spelt likewise: notes in brackets left out."""
+    texts = [re.sub(r"\(.*?\)", "", cell) for cell in cells]
+    return {name.strip().lower() for text in texts for name in text.split(",")}
+
+
+def test_the_decision_on_dependencies_names_those_of_the_project() -> None:
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]
+    extras = dict(project["optional-dependencies"])
+    tools = libraries(extras.pop("dev"))
+    page = (DOCS / "decisions" / "0001-dependencies.md").read_text("utf-8")
+    assert named(table_below(page, "at run time")) == libraries(project["dependencies"])
+    cells = table_below(page, "as an extra")
+    assert named(cells) == libraries(text for texts in extras.values() for text in texts)
+    assert {name for cell in cells for name in re.findall(r"`(\w+)`", cell)} == set(extras)
+    # what runs an extra in a test is explained with the extra
+    assert named(table_below(page, "for development")) == tools - named(cells)
+
+
+def test_the_layout_names_folders_and_modules_of_the_package() -> None:
+    source = ROOT / "src" / "swashplate"
+    cells = table_below((ROOT / "CONTRIBUTING.md").read_text("utf-8"), "where")
+    cells = [cell for cell in cells if "beside `src/`" not in cell]
+    names = {name for cell in cells for name in re.findall(r"`([\w./]+)`", cell)}
+    folders = {f"{path.parent.name}/" for path in source.glob("*/__init__.py")}
+    modules = {path.name for path in source.glob("*.py") if not path.name.startswith("__")}
+    assert names >= folders | modules
+    for name in names:
+        assert (source / name).exists(), name
+
+
+def test_the_extras_of_the_installation_page_are_those_of_the_project() -> None:
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]
+    cells = table_below((DOCS / "installation.md").read_text("utf-8"), "extra")
+    assert {cell.strip("`") for cell in cells} == set(project["optional-dependencies"]) - {"dev"}

@@ -20,7 +20,7 @@ from typer.core import TyperGroup
 
 from swashplate.__about__ import __version__
 from swashplate.cli.options import command
-from swashplate.cli.terminal import say_error
+from swashplate.cli.terminal import CLOSED_PIPE, close_output, say_error
 from swashplate.errors import FileError, InputError, SwashplateError
 
 HELP = """\
@@ -59,9 +59,9 @@ Examples:
   swashplate export hoist --fmu hoist.fmu             for other programs
   swashplate demo                                     everything at once
 
-Files are written in SI, whole or not at all. What is wrong is said in one
-sentence on standard error, with exit code 2. 'swashplate COMMAND --help'
-says more about a command.
+Files are written in SI units, whole or not at all. Errors are one sentence on
+standard error, with exit code 2; a verdict that is not met ends with 1, an
+interrupted command with 130. 'swashplate COMMAND --help' says more.
 """
 
 
@@ -143,6 +143,9 @@ class Commands(TyperGroup):
         """Run a command."""
         try:
             return super().invoke(ctx)
+        except BrokenPipeError:
+            close_output()
+            raise typer.Exit(CLOSED_PIPE) from None
         except SwashplateError as error:
             say_error(error)
         except MemoryError:
@@ -213,8 +216,7 @@ def main() -> None:
         sys.exit(2)
     except OSError as error:  # such as a full disk behind > FILE
         say_error(FileError(f"The output cannot be written: {error.strerror or error}"))
-        # what is left in the buffer could not be written either
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        close_output()  # what is left in the buffer could not be written either
         sys.exit(2)
     finally:
         gc.freeze()

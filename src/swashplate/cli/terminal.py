@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import sys
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from contextvars import ContextVar
@@ -30,8 +32,26 @@ BETWEEN = 2
 NARROW = "\N{NO-BREAK SPACE}%"
 LEAST, LONGEST = 9, 30
 """Characters of a head that is broken, and of a name beside too many numbers."""
+CLOSED_PIPE = 141
+"""Exit code if whoever reads the output has closed it, as a shell reports a SIGPIPE: 128 + 13."""
+
+
+class Terminal(Console):
+    """A console that does not take a closed pipe for a verdict, whose exit code is 1."""
+
+    def on_broken_pipe(self) -> None:
+        """End quietly, as ``| head`` closes what it has read enough of."""
+        close_output()
+        raise SystemExit(CLOSED_PIPE)
+
+
+def close_output() -> None:
+    """Let what is still in the buffer of standard output go nowhere."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+
+
 # names of files and maneuvers are printed as they are, whatever brackets and colons they hold
-output = Console(markup=False, highlight=False, emoji=False)
+output = Terminal(markup=False, highlight=False, emoji=False)
 side = Console(stderr=True, markup=False, highlight=False, emoji=False)
 """Standard error: what a pipe must not carry."""
 

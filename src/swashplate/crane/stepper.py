@@ -48,8 +48,8 @@ would swing against each other from sample to sample."""
 class Setup(TypedDict, total=False):
     """How a run is set up: keywords of `Crane.simulate` and `Crane.stepper`, each as it likes.
 
-    Keys
-    ----
+    Parameters
+    ----------
     control : Control, default None
         Of `swashplate.crane.control`; by default the stick's commands as they are.
     actuation : {"inverse", "volts", "ideal", "direct"}, default "inverse"
