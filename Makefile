@@ -15,11 +15,11 @@ export PIP_DISABLE_PIP_VERSION_CHECK := 1
 unexport PYTHONDONTWRITEBYTECODE
 
 .DEFAULT_GOAL := help
-.PHONY: help .venv demo test test-slow lint docs figures reproduce bench cluster fuzz tools browser packages calibration owner-table \
+.PHONY: help .venv demo test test-slow test-kernels lint docs figures reproduce bench cluster fuzz tools browser packages calibration owner-table \
   coverage dist matrix binaries format clean
 
 help: ## list the targets
-	@awk -F ':.*## ' '/^[.a-z-]+:.*## / { printf "  make %-8s %s\n", $$1, $$2 }' Makefile
+	@awk -F ':.*## ' '/^[.a-z-]+:.*## / { printf "  make %-12s %s\n", $$1, $$2 }' Makefile
 
 .venv: $(STAMP) ## install the package and its tools into .venv
 
@@ -44,6 +44,20 @@ test-slow: $(STAMP) ## the slow tests: pages, examples, reproduction, searches, 
 	@$(BIN)/pytest -n 2 --durations=40 -m slow
 	@echo; echo "== Tests marked 'interpreted', without the JIT"
 	@NUMBA_DISABLE_JIT=1 $(BIN)/pytest -n 2 -m interpreted
+	@$(MAKE) --no-print-directory test-kernels KERNELS="$(firstword $(KERNELS)) $(lastword $(KERNELS))" TESTS="$(ROUNDED)"
+
+# Kernels of the linear algebra that differ in the order of sums: without and with fused operations, and with those of
+# 512 bits on processors that have them.
+KERNELS ?= Prescott Haswell Zen $(shell grep -qs avx512f /proc/cpuinfo && echo SkylakeX)
+# What depends on rounding: searches, and what is computed from their results.
+ROUNDED := tests/analysis tests/campaign tests/identification tests/linear tests/recovery tests/thesis
+TESTS ?= tests
+
+test-kernels: $(STAMP) ## the quick tests with other kernels of the linear algebra, and compiled for any processor
+	@for kernel in $(KERNELS); do \
+	  echo; echo "== Linear algebra for $$kernel, compiled for any processor"; \
+	  OPENBLAS_CORETYPE=$$kernel NUMBA_CPU_NAME=generic $(BIN)/pytest -n 2 --dist loadfile -m "not slow" $(TESTS) || exit 1; \
+	done
 
 lint: $(STAMP) ## style, format, types and the direction of imports
 	@echo "== Style";   $(BIN)/ruff check .
