@@ -15,7 +15,7 @@ export PIP_DISABLE_PIP_VERSION_CHECK := 1
 unexport PYTHONDONTWRITEBYTECODE
 
 .DEFAULT_GOAL := help
-.PHONY: help .venv demo test test-slow lint docs figures reproduce bench cluster fuzz tools browser calibration coverage dist binaries \
+.PHONY: help .venv demo test test-slow lint docs figures reproduce bench cluster fuzz tools browser calibration owner-table coverage dist binaries \
   format clean
 
 help: ## list the targets
@@ -77,6 +77,9 @@ cluster: $(STAMP) ## many starts on a local Dask cluster that loses a worker
 
 calibration: $(STAMP) ## how often intervals hold the truth, over 400 virtual campaigns an axis (hours)
 	@$(BIN)/python benchmarks/calibration.py
+
+owner-table: $(STAMP) ## whether the numbers of a report's first page hold, over 40 virtual winches
+	@$(BIN)/python benchmarks/owner_table.py
 
 coverage: $(STAMP) ## which lines of src no test reaches; the kernels interpreted (ten minutes)
 	@$(BIN)/coverage erase

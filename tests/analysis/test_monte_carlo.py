@@ -13,6 +13,7 @@ from swashplate.analysis import (
     bands,
     drives,
     find_outcomes,
+    standard_errors,
     stored_draws,
     trial,
 )
@@ -61,6 +62,31 @@ def test_draws_outside_the_bounds_are_drawn_again(hoist):
         drawn(1e-4, 0)
     with pytest.raises(InputError, match="at least one stage"):
         drives([])
+
+
+def test_standard_errors_where_no_draw_stays_within_the_bounds(hoist):
+    """Of a pump that is hardly known, at its lower bound: the speed goes with it, the time not."""
+    unknowns = Unknowns((Unknown("Z10", 12.396, 12.396, 24.0),))
+    own = SimpleNamespace(matrix=np.diag([1e4]), determined=np.array([True]))
+    stage = SimpleNamespace(
+        stage=SimpleNamespace(name="pump"),
+        problem=SimpleNamespace(
+            unknowns=unknowns, model=DriveModel(hoist.parameters), uncertain=()
+        ),
+        solution=SimpleNamespace(vector=unknowns.start),
+        uncertainty=SimpleNamespace(own=own, handed=(), fixed=np.zeros((1, 0))),
+        drive=hoist,
+    )
+
+    def numbers(drive: Drive) -> np.ndarray:
+        return np.array([float(drive.steady_speed(10.0)), drive.parameters.numbers["tau"]])
+
+    speed, delay = standard_errors([stage], numbers)
+    without_creep = hoist.parameters.numbers["Z10"] * hoist.parameters.numbers["Z13_plus"]
+    assert speed == pytest.approx(100.0 * without_creep, rel=1e-6)
+    assert delay == 0.0
+    with pytest.raises(InputError, match="errors are too large for a Monte Carlo"):
+        drives([stage], 10)
 
 
 def pumps(drive: Drive, error: float, count: int) -> Draws:

@@ -310,7 +310,16 @@ def test_weak_is_what_the_given_covariance_says() -> None:
     assert "Weak, each with those before it fixed: a to ±35.3 % and c to ±23.5 %." in wider[-1]
     assert "all 3 free parameters, 2 of them weakly" in wider[0]
     widest = judged(RNG.normal(size=(10, 3)), "abc", covariance=1e4 * given).sentences()
-    assert "a not even to ±100 %" in widest[-1]
+    assert "a to no better than ±100 %" in widest[-1]
+
+
+def test_an_unknown_that_is_hardly_known_is_not_called_determined() -> None:
+    given = np.diag([900.0**2, 0.01**2, 0.04**2])
+    first, last = judged(RNG.normal(size=(10, 3)), "abc", covariance=given).sentences()
+    assert "all 3" not in first
+    assert first.endswith("hardly a.")
+    assert "±176400 %" not in last
+    assert "±1.76e+05 %" not in last
 
 
 EXACT = ["scale of pressure", "zero of pressure", "scale of spool travel", "scale of force"]

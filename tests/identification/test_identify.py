@@ -1,6 +1,7 @@
 """From a campaign to drive and verdict in one call, and back from the folder that it wrote."""
 
 import csv
+import logging
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from math import exp
@@ -12,7 +13,14 @@ import pytest
 from tests.identification.given import TWO_STAGES, virtual
 
 import swashplate
-from swashplate import Campaign, Drive, Identification, InputError, ParameterError, maneuvers
+from swashplate import (
+    Campaign,
+    Drive,
+    Identification,
+    InputError,
+    ParameterError,
+    maneuvers,
+)
 from swashplate.equations import Model
 from swashplate.identification import ModelSetup, fit, load_setup
 from swashplate.identification.setup import Free, setup_text
@@ -281,8 +289,10 @@ def test_what_does_not_fit_is_refused(campaign: Campaign, call, kind, sentence: 
         call(campaign)
 
 
-def test_more_than_a_fit_is_asked_for_by_keywords(campaign: Campaign) -> None:
-    said: list[tuple[str, float | None]] = []
+def test_more_than_a_fit_is_asked_for_by_keywords(
+    campaign: Campaign, caplog: pytest.LogCaptureFixture
+) -> None:
+    caplog.set_level("DEBUG", "swashplate")
     found = swashplate.identify(
         campaign,
         free={"Z10": (0.5, 2.0)},
@@ -291,7 +301,6 @@ def test_more_than_a_fit_is_asked_for_by_keywords(campaign: Campaign) -> None:
         profiles=["Z10"],
         starts=2,
         seed=3,
-        watch=lambda words, share: said.append((words, share)),
     )
     assert found.folds is not None
     assert len(found.folds.folds) == 2
@@ -300,18 +309,25 @@ def test_more_than_a_fit_is_asked_for_by_keywords(campaign: Campaign) -> None:
     frame = found.to_polars()
     assert frame.columns[-4:] == ["bootstrap_lower", "bootstrap_upper", "standard_error", "status"]
     assert found.notes["seed"] == "3"
-    assert ("pump: 3 of 3 starts", 1.0) in [(w.partition(",")[0], share) for w, share in said]
-    assert ("2 of 2 folds", 1.0) in said
-    assert any("fits to new noise" in words for words, _ in said)
+    for done in ("3 of 3 starts", "2 of 2 folds", "40 of 40 "):
+        assert any(done in message for message in caplog.messages)
 
 
-def test_after_an_interruption_nothing_else_is_computed(campaign: Campaign) -> None:
-    def stop(words: str, share: float | None) -> None:
-        raise KeyboardInterrupt
+def test_after_an_interruption_nothing_else_is_computed(
+    campaign: Campaign, caplog: pytest.LogCaptureFixture
+) -> None:
+    def press_ctrl_c(record: logging.LogRecord) -> bool:
+        if record.levelno == logging.DEBUG:
+            raise KeyboardInterrupt
+        return True
 
-    found = swashplate.identify(
-        campaign, free={"Z10": (0.5, 2.0)}, folds=2, profiles="all", watch=stop
-    )
+    caplog.set_level("DEBUG", "swashplate")
+    logger = logging.getLogger("swashplate")
+    logger.addFilter(press_ctrl_c)
+    try:
+        found = swashplate.identify(campaign, free={"Z10": (0.5, 2.0)}, folds=2, profiles="all")
+    finally:
+        logger.removeFilter(press_ctrl_c)
     assert found.fit.interrupted
     assert found.folds is None
     assert not found.profiles

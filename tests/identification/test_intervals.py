@@ -63,7 +63,7 @@ def test_intervals_by_hand() -> None:
     assert (positive.lower, positive.upper) == pytest.approx((1.351418, 2.959854), rel=1e-6)
     plain, positive = estimates(covariance(at_bound=[-1, 1]))
     assert (plain.status, positive.status) == ("at its lower bound", "at its upper bound")
-    assert plain[3:] == (None, None, None)
+    assert (plain.standard_error, plain.lower, plain.upper) == (None, None, None)
 
 
 def test_an_interval_beyond_a_hundredfold_is_none() -> None:

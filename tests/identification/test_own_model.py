@@ -419,7 +419,7 @@ def test_files_without_a_model_are_refused(tmp_path: Path, monkeypatch) -> None:
     for name, text, error, sentence in (
         ("bare", "model = 1\n", InputError, "bare.py has no 'free'"),
         ("json", "model = free = 1\n", FileError, "another module is called json"),
-        ("none", "", FileError, "no Python file"),
+        ("none", "", FileError, "name a Python file"),
         ("half", "model = 1\nfree = (\n", FileError, "half.py, line 2: SyntaxError"),
         ("fails", "import math\nmath.sqrt(-1)\n", FileError, "fails.py, line 2: ValueError"),
         ("listed", "model = 1\nfree = ['lag']\n", InputError, "free is .'lag'., but must be a map"),

@@ -214,3 +214,12 @@ def test_neutral_set_is_a_straight_line_with_one_lag() -> None:
     ideal = 2.0 * (1.0 - np.exp(-t / 0.3))
     speed = neutral.simulate(voltage).shaft_speed
     assert np.abs(speed - ideal).max() < 0.04  # two samples of the current filter
+
+
+def test_a_limit_that_no_test_reached_must_be_a_parameter(tmp_path: Path) -> None:
+    path = tmp_path / "drive.toml"
+    Drive.preset("neutral").to_toml(path)
+    text = path.read_text("utf-8")
+    path.write_text(text.replace("[model]", "[model]\nunreached = { Z99_plus = 0.1 }"), "utf-8")
+    with pytest.raises(ParameterError, match="Z99_plus"):
+        Drive.from_toml(path)

@@ -6,6 +6,7 @@ from .capability import acceleration_curve as acceleration_curve
 from .capability import dead_zone as dead_zone
 from .capability import envelope as envelope
 from .capability import speed_limits as speed_limits
+from .capability import without_limits as without_limits
 from .compensation import Improvement as Improvement
 from .compensation import InverseMap as InverseMap
 from .compensation import improvement as improvement
@@ -15,10 +16,14 @@ from .compensation import wanted_of_stick as wanted_of_stick
 from .limits import LimitShare as LimitShare
 from .limits import LimitShares as LimitShares
 from .limits import limit_shares as limit_shares
+from .monte_carlo import ASSUMED as ASSUMED
 from .monte_carlo import Bands as Bands
 from .monte_carlo import Draws as Draws
+from .monte_carlo import assumed_parameters as assumed_parameters
 from .monte_carlo import bands as bands
+from .monte_carlo import changes_left_open as changes_left_open
 from .monte_carlo import drives as drives
+from .monte_carlo import standard_errors as standard_errors
 from .monte_carlo import stored_draws as stored_draws
 from .outcomes import OUTCOMES as OUTCOMES
 from .outcomes import Outcome as Outcome

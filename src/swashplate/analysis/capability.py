@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, fields
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, field, fields, replace
+from math import atan, inf
 from typing import TYPE_CHECKING, Any, Literal, cast, get_args, overload
 
 import numpy as np
@@ -17,7 +18,8 @@ from swashplate.models.pump import PumpState
 from swashplate.parameters.rules import FULL_VOLTAGE
 from swashplate.results import GivenAxes, Result, Tabular, figures
 from swashplate.simulation.instance import instance_of
-from swashplate.tables import UNIT, Cell, Column, Table
+from swashplate.tables import UNIT, Cell, Column, Table, plain
+from swashplate.units import display_unit
 
 if TYPE_CHECKING:
     import polars
@@ -68,6 +70,26 @@ def saturation(drive: Drive, way: float) -> float | None:
     full = drive.steady_speed(way * FULL_VOLTAGE)
     inside, outside = edge(lambda volts: drive.steady_speed(volts) != full, way * FULL_VOLTAGE)
     return None if abs(inside) > NEARLY_FULL else outside
+
+
+# --- limits that may be elsewhere -----------------------------------------------------------------
+
+FEEDBACK_ARM = 0.98
+"""Sine of the feedback arm's angle at which a plate without a stop is still held: at 1 the closed
+form of the spool ends."""
+WIDEST = 1.5  # Largest angle of a plate without a stop; the model ends at a right angle. [rad]
+
+
+def farthest_stop(drive: Drive) -> float:
+    """Angle of the swash plate up to which the model holds without a stop. [rad]"""
+    return min(atan(FEEDBACK_ARM / drive.parameters.numbers["Z3"]), WIDEST)
+
+
+def without_limits(drive: Drive, columns: Iterable[str]) -> Drive:
+    """A drive whose limits of these columns lie as far as its model can take."""
+    numbers = drive.parameters.numbers
+    far = {column: farthest_stop(drive) if column.startswith("Z13") else inf for column in columns}
+    return drive.replace(**{column: max(value, numbers[column]) for column, value in far.items()})
 
 
 # --- acceleration ---------------------------------------------------------------------------------
@@ -161,6 +183,8 @@ def _curve(drive: Drive, voltage: float, pressure: Array) -> AccelerationCurve:
 
 GAIN_POINTS = 401  # Commands between dead zone and saturation at which the gain is taken.
 LOW, HIGH = 0.1, 0.9  # Parts of the change of speed between which a rise time counts.
+DECIDES = 0.01
+"""Share of a number that a limit must be able to change to decide it. [1]"""
 SHORTEST, LONGEST = 8.0, 256.0
 """A step lasts so long at first, and at most, until the speed has come to stay. [s]"""
 
@@ -209,6 +233,12 @@ class Envelope(Tabular):
     """Largest acceleration over the speed under +10 V and -10 V."""
     released: AccelerationCurve
     """Acceleration over the speed with the stick let go."""
+    nearest: tuple[Way, Way] | None = None
+    """Both ways if limits that no test reached lie where the tests ended; None without such."""
+    farthest: tuple[Way, Way] | None = None
+    """Both ways if there are no such limits."""
+    orifice_unknown: tuple[bool, bool] = (False, False)
+    """Whether it is not known how far the tests opened the orifice of a way."""
 
     def table(self) -> Table:
         """Dead zone, gains, limits and times of both ways."""
@@ -218,14 +248,44 @@ class Envelope(Tabular):
         for each in fields(Way):
             if "row" in each.metadata:
                 words, unit, spec = each.metadata["row"]
-                values = (getattr(way, each.name) for way in (self.plus, self.minus))
-                made.add(Cell(each.name, words), *values, unit=unit, spec=spec)
+                cells = (self._cell(each.name, way, unit) for way in (0, 1))
+                made.add(Cell(each.name, words), *cells, unit=unit, spec=spec)
             if each.name == "acceleration":
-                by = (Cell(None, way.accelerated_by) for way in (self.plus, self.minus))
+                by = (self._accelerated_by(way) for way in (0, 1))
                 made.add(Cell("accelerated_by", "... set by the"), *by)
         both = self.creep, Cell(self.creep, "")
         made.add(Cell("creep", "creep at 0 V"), *both, unit="rad/s", section=True)
         return made
+
+    def _open(self, name: str, way: int) -> tuple[float | None, float | None] | None:
+        """A number by its nearest and farthest limits, if those that no test reached decide it."""
+        if self.nearest is None or self.farthest is None:
+            return None
+        near, far = getattr(self.nearest[way], name), getattr(self.farthest[way], name)
+        if near is None or far is None:
+            return None if near is far else (near, far)
+        return (near, far) if abs(far - near) > DECIDES * abs(near) else None
+
+    def _cell(self, name: str, way: int, unit: str) -> float | Cell | None:
+        """A number, or the end that is known of it."""
+        ends = self._open(name, way)
+        if ends is None:
+            value: float | None = getattr((self.plus, self.minus)[way], name)
+            return value
+        near, far = ends
+        if near is None or far is None or self._reach_unknown(way, name):
+            return Cell(None, "not seen")
+        words = "at least" if abs(far) > abs(near) else "at most"
+        return Cell(near, f"{words} {plain(display_unit(unit).factor * near, 4)}, not seen")
+
+    def _reach_unknown(self, way: int, name: str) -> bool:
+        """Whether the tests do not tell how far an orifice, which decides a number, was opened."""
+        return self.orifice_unknown[way] and name.startswith(("acceleration", "start", "stop"))
+
+    def _accelerated_by(self, way: int) -> Cell:
+        if self._open("acceleration", way) is not None:
+            return Cell(None, "not seen")
+        return Cell(None, (self.plus, self.minus)[way].accelerated_by)
 
     def to_polars(self) -> polars.DataFrame:
         """Table in SI: ``quantity``, ``plus``, ``minus``, ``unit``; null where there is none."""
@@ -254,15 +314,34 @@ def envelope(drive: Drive) -> Envelope:
     """What a drive can do each way.
 
     Dead zone, creep and gains of the steady map, limits of speed and acceleration, and the times
-    of a full step, which are those of a simulation.
+    of a full step, which are those of a simulation. Of a drive that was fitted or guessed, a number
+    that a limit decides which no test reached has one end, or none.
     """
-    low, high = speed_limits(drive)
     up, down, released = (
         acceleration_curve(drive, volts) for volts in (FULL_VOLTAGE, -FULL_VOLTAGE, 0.0)
     )
-    ways = _way(drive, 1.0, high), _way(drive, -1.0, low)
+    ways = _both_ways(drive)
     creep = float(drive.steady_speed(0.0))
-    return Envelope(drive.name, creep, *ways, (up, down), released)
+    found = Envelope(drive.name, creep, *ways, (up, down), released)
+    unreached = drive.parameters.unreached
+    if not unreached:
+        return found
+    nearest = drive.replace(**{column: value for column, value in unreached.items() if value})
+    farthest = without_limits(drive, unreached)
+    return replace(
+        found,
+        nearest=_both_ways(nearest),
+        farthest=_both_ways(farthest),
+        orifice_unknown=(
+            unreached.get("Z16_plus") == 0.0,
+            unreached.get("Z16_minus") == 0.0,
+        ),
+    )
+
+
+def _both_ways(drive: Drive) -> tuple[Way, Way]:
+    low, high = speed_limits(drive)
+    return _way(drive, 1.0, high), _way(drive, -1.0, low)
 
 
 def _way(drive: Drive, way: float, limit: float) -> Way:

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from math import atan, inf
+from math import inf
 from typing import TYPE_CHECKING, Unpack, cast
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from swashplate.analysis.capability import farthest_stop
 from swashplate.analysis.outcomes import checked_speed, rms_difference
 from swashplate.drive import Drive, Given
 from swashplate.equations.marching.record import SOURCE_RATE
@@ -19,7 +20,7 @@ from swashplate.parameters.parameter_set import Change
 from swashplate.results import Result, Tabular, figures
 from swashplate.simulation.result import Limit, Simulation
 from swashplate.simulation.run import simulate_drive
-from swashplate.tables import Column, Table, quantity, share_cell
+from swashplate.tables import Column, Table, listed, quantity, share_cell
 
 if TYPE_CHECKING:
     import polars
@@ -28,11 +29,6 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 # --- limits that can be taken away ----------------------------------------------------------------
-
-FEEDBACK_ARM = 0.98
-"""Sine of the feedback arm's angle at which a plate without a stop is still held: at 1 the closed
-form of the spool ends."""
-WIDEST = 1.5  # Largest angle of a plate without a stop; the model ends at a right angle. [rad]
 
 
 @dataclass(frozen=True)
@@ -64,7 +60,7 @@ def removals(drive: Drive) -> list[Removal]:
     numbers = drive.parameters.numbers
     # with the card's jump left as it is, a solenoid's dead zone beyond it would stay
     jump = min(numbers["Z17"], numbers["J_plus"], numbers["J_minus"])
-    plate = min(atan(FEEDBACK_ARM / numbers["Z3"]), WIDEST)
+    plate = farthest_stop(drive)
     stops = {name: max(plate, numbers[name]) for name in ("Z13_plus", "Z13_minus")}
     larger = "pump: larger, or a smaller motor (Z10, Z13)"
     orifice = "in-line orifice: larger bore (Z16)"
@@ -127,6 +123,10 @@ class LimitShares(Tabular):
     error: float
     """Rms tracking error of the drive as it is. [rad/s]"""
     shares: tuple[LimitShare, ...]
+    reference: str = "the speed of a drive without limits"
+    """What is compared with, in words."""
+    unseen: tuple[str, ...] = ()
+    """Columns of limits that act here and that no test of the drive reached."""
 
     @property
     def first(self) -> LimitShare | None:
@@ -139,9 +139,15 @@ class LimitShares(Tabular):
         if first is not None and first.error is not None:
             share = 1.0 - first.error / self.error
             said = [
-                f"Change first: {first.component}. Without this limit the error falls by "
-                f"{100.0 * share:.1f} % to {quantity(first.error, 'rad/s', spec='.3f')} rms."
+                f"Change first: {first.component}. Without this limit the rms difference from "
+                f"{self.reference} falls by {100.0 * share:.1f} % to "
+                f"{quantity(first.error, 'rad/s', spec='.3f')}."
             ]
+        if self.unseen:
+            said.append(
+                f"No test reached {listed(self.unseen)}: what is said of it here is no more than "
+                "where the tests ended."
+            )
         failed = (each for each in self.shares if each.failure)
         return said + [f"Not without the {each.limit}: {each.failure}" for each in failed]
 
@@ -270,4 +276,7 @@ def shares_of(drive: Drive, run: Simulation, wanted: ArrayLike | None = None) ->
             )
         )
     shares.sort(key=lambda each: inf if each.error is None else each.error)
-    return LimitShares(drive.name, run, asked, error, tuple(shares))
+    acting = {column for each in shares if each.time_share for column in each.changes}
+    unseen = tuple(column for column in drive.parameters.unreached if column in acting)
+    made = LimitShares(drive.name, run, asked, error, tuple(shares), unseen=unseen)
+    return made if wanted is None else replace(made, reference="the wanted speed")

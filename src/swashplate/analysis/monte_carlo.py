@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
+from math import isfinite, sqrt
 from pathlib import Path
+from types import MappingProxyType
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,14 +16,22 @@ from swashplate.analysis.whatif import pulled
 from swashplate.drive import Drive
 from swashplate.errors import DomainError, InputError, ParameterError
 from swashplate.identification.assessment import Identification
-from swashplate.identification.drive_model import DriveModel
+from swashplate.identification.drive_model import LIMIT_COLUMNS, DriveModel
 from swashplate.identification.fitting import StageFit
+from swashplate.identification.intervals import slopes_by
+from swashplate.identification.setup import Forces
 from swashplate.parameters.parameter_set import ParameterSet
 from swashplate.parameters.rules import FULL_VOLTAGE
 from swashplate.results import Result
 
 Array = NDArray[np.float64]
 
+ASSUMED = 0.2
+"""Standard deviation of an assumed parameter over its value: a guess takes 0.2 rad for the plate's
+largest angle, machines have 0.25 to 0.35. [1]"""
+STEP, LARGEST_STEP, NEGLIGIBLE = 0.1, 0.05, 1e-12
+"""Of a derivative along an error of estimates: part of a standard error, change of the solver's
+numbers at most, and changes of them that count as none. [1]"""
 MOST_REDRAWN, NARROWED = 20, 0.1
 """Draws outside the model's domain for each one inside from which the drawing is given up, and part
 of all draws from which those that were left out narrow the bands."""
@@ -120,32 +130,176 @@ def drives(stages: Sequence[StageFit], draws: int = 200, seed: int = 0) -> Draws
     return Draws(tuple(made), redrawn, fixed)
 
 
+def assumed_parameters(stages: Sequence[StageFit]) -> list[dict[str, float]]:
+    """Fixed parameters that nobody measured, by column, and what they may be off by.
+
+    Those of the set that a fit begins from whose status is "assumed" or "approximate", both
+    directions together, without those that a stage moves or whose uncertainty is stated.
+    """
+    model = stages[0].problem.model
+    assert isinstance(model, DriveModel)
+    moved = {
+        target
+        for stage in stages
+        for unknown in stage.problem.unknowns
+        for target in unknown.targets
+    }
+    stated = {name for together in stages[0].problem.uncertain for name in together}
+    if any(stage.stage.forces is not None for stage in stages):
+        moved |= set(Forces.columns)
+    known = moved | stated | LIMIT_COLUMNS.keys()
+    found = []
+    for parameter in model.parameters.values():
+        numbers = {
+            column: ASSUMED * value
+            for column, value in parameter.numbers.items()
+            if isfinite(value) and value != 0.0
+        }
+        if parameter.status in ("assumed", "approximate") and known.isdisjoint(numbers) and numbers:
+            found.append(numbers)
+    return found
+
+
+def standard_errors(
+    stages: Sequence[StageFit],
+    numbers: Callable[[Drive], Array],
+    assumed: Sequence[Mapping[str, float]] = (),
+) -> Array:
+    """Standard errors of numbers of the fitted drive, from those of the estimates.
+
+    Parameters
+    ----------
+    stages : sequence of StageFit
+        All stages of the fit.
+    numbers : callable
+        From a drive to an array of any shape.
+    assumed : sequence of mappings
+        What fixed numbers may be off by besides, by column, as of `assumed_parameters`. The
+        estimates follow them, so that what the tests show counts, whatever the scales. [SI]
+
+    Raises
+    ------
+    InputError
+        If no small step along an error keeps the bounds and the model's domain.
+
+    Notes
+    -----
+    To first order: the root of the sum of squares of what the numbers change by for one standard
+    error along each principal axis of every stage's covariance, from a step of a tenth of it or of
+    5 % of the parameter that moves most. Draws would leave the bounds where one estimate is hardly
+    known; its neighbours, and what depends on them alone, are known all the same.
+    """
+    base = numbers(stages[-1].drive)
+    variance, uncertain = np.zeros_like(base), len(stages[0].problem.uncertain)
+    none = np.zeros(uncertain)
+    for stage in stages:
+        sizes, axes = np.linalg.eigh(stage.uncertainty.own.matrix)
+        machine = np.array([unknown.run is None for unknown in stage.problem.unknowns])
+        for size, axis in zip(sizes, axes.T, strict=True):
+            error = sqrt(max(size, 0.0)) * axis
+            # what belongs to a run alone is no part of the drive
+            if np.abs(error[machine]).max(initial=0.0) > NEGLIGIBLE:
+                slope = _slope(stages, {stage.stage.name: error}, none, numbers, base)
+                variance += slope**2
+    for axis in np.eye(uncertain):
+        variance += _slope(stages, {}, axis, numbers, base) ** 2
+    for off in assumed:
+        follow = {stage.stage.name: slopes_by(stage, [off])[:, 0] for stage in stages}
+        variance += _slope(stages, follow, none, numbers, base, off) ** 2
+    return np.asarray(np.sqrt(variance))
+
+
+def changes_left_open(
+    stages: Sequence[StageFit], numbers: Callable[[Drive], Array], but: Collection[str] = ()
+) -> Array:
+    """Largest changes of numbers for 5 % along what the tests do not determine.
+
+    Along each direction in which parameters can move together unseen, and for each parameter that
+    no test exercises, `but` some. Arguments and errors are those of `standard_errors`.
+    """
+    base = numbers(stages[-1].drive)
+    largest, none = np.zeros_like(base), np.zeros(len(stages[0].problem.uncertain))
+    for stage in stages:
+        seen, names = stage.identifiability, stage.problem.unknowns.names
+        directions = [direction.changes for direction in seen.null]
+        directions += [{name: 1.0} for name in seen.unexcited if name not in but]
+        for changes in directions:
+            error = np.zeros(len(names))
+            for name, by in changes.items():
+                error[names.index(name)] = by
+            slope = _slope(stages, {stage.stage.name: error}, none, numbers, base)
+            largest = np.maximum(largest, LARGEST_STEP * np.abs(slope))
+    return largest
+
+
+def _slope(
+    stages: Sequence[StageFit],
+    errors: Mapping[str, Array],
+    off: Array,
+    numbers: Callable[[Drive], Array],
+    base: Array,
+    assumed: Mapping[str, float] = MappingProxyType({}),
+) -> Array:
+    """Change of numbers for errors of the stages' vectors, by a small step along them."""
+    largest = max((float(np.abs(error).max()) for error in errors.values()), default=0.0)
+    first = min(STEP, LARGEST_STEP / largest) if largest else STEP
+    for step in (first, -first, 0.1 * first, -0.1 * first):
+        moved = {name: step * error for name, error in errors.items()}
+        other = {column: step * size for column, size in assumed.items()}
+        parameters = _moved(stages, moved, step * off, other)
+        if parameters is not None:
+            return np.asarray((numbers(Drive(parameters)) - base) / step)
+    raise InputError(
+        "A small step along the errors of the estimates leaves the bounds or the model's domain "
+        "either way: widen the bounds, or free fewer parameters."
+    )
+
+
 def _drawn(stages: Sequence[StageFit], random: np.random.Generator) -> ParameterSet | None:
     """A set with each stage's vector off by a drawn error, None outside bounds or domain."""
+    # of the fixed numbers, in standard uncertainties
+    off = random.normal(size=len(stages[0].problem.uncertain))
+    errors = {}
+    for stage in stages:
+        own = stage.uncertainty.own.matrix
+        errors[stage.stage.name] = random.multivariate_normal(
+            np.zeros(len(own)), own, check_valid="ignore", method="eigh"
+        )
+    return _moved(stages, errors, off)
+
+
+def _moved(
+    stages: Sequence[StageFit],
+    own: Mapping[str, Array],
+    off: Array,
+    assumed: Mapping[str, float] = MappingProxyType({}),
+) -> ParameterSet | None:
+    """A set with each stage's vector off by an error of its own, 0 if none is given.
+
+    `off` are errors of fixed numbers, in standard uncertainties, `assumed` those of others. None
+    outside bounds or domain.
+    """
     model, uncertain = stages[0].problem.model, stages[0].problem.uncertain
     assert isinstance(model, DriveModel)
     parameters = model.parameters
-    # of the fixed numbers, in standard uncertainties
-    off = random.normal(size=len(uncertain))
     fixed = {
-        name: parameters.numbers[name] + size * each
-        for together, each in zip(uncertain, off.tolist(), strict=True)
+        name: parameters.numbers[name] + size * number
+        for together, number in zip(uncertain, off.tolist(), strict=True)
         for name, size in together.items()
     }
+    fixed |= {column: parameters.numbers[column] + size for column, size in assumed.items()}
     errors = dict[str, Array]()  # of each stage, by its name
     try:
         if fixed:
             parameters = parameters.replace(fixed, parameters.options)
-        for each in stages:
-            problem, known, own = each.problem, each.uncertainty, each.uncertainty.own.matrix
+        for stage in stages:
+            problem, known = stage.problem, stage.uncertainty
             assert isinstance(problem.model, DriveModel)
-            error = random.multivariate_normal(
-                np.zeros(len(own)), own, check_valid="ignore", method="eigh"
-            )
+            error = own.get(stage.stage.name, np.zeros(len(problem.unknowns)))
             for handed in known.handed:
                 error = error + handed.slopes @ errors[handed.stage]
-            errors[each.stage.name] = error
-            vector = each.solution.vector + error + known.fixed @ off
+            errors[stage.stage.name] = error
+            vector = stage.solution.vector + error + known.fixed @ off
             low, high = problem.unknowns.bounds
             if ((vector < low) | (vector > high))[known.own.determined].any():
                 return None

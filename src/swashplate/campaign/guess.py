@@ -27,8 +27,10 @@ from swashplate.equations.cache import kernel
 from swashplate.equations.declaration import inlined
 from swashplate.errors import InputError
 from swashplate.parameters.parameter_set import ParameterSet, set_of
+from swashplate.parameters.rules import SIDES
 from swashplate.results import short
 from swashplate.tables import UNIT, Cell, Column, Table
+from swashplate.units import display_unit
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -54,13 +56,16 @@ SEEN, NEXT_TO_NOTHING = 1.02, 1e-4
 nor by less than this share of all that moves. [1]"""
 ONE_WAY = 0.05
 """A way that gets less than this share of the command of the other is not exercised. [1]"""
-ANGLE, FAR_STOP = 0.2, 0.39
-"""Angle of the swash plate at the greatest speed that was seen, at most, and that of a stop that
-was not seen. [rad]"""
 ROUGH = 0.05
 """Error over the greatest speed from which the squares of errors grow as their sizes. [1]"""
 OFFSET = 0.1
 """Largest neutral offset of the spool, over its travel at the greatest speed that was seen. [1]"""
+ANGLE = 0.2
+"""Angle of the swash plate at the greatest speed that was seen, at most. [rad]"""
+STOP_FIRST, ORIFICE_FIRST = 0.9, 0.8
+"""Shares of what the largest command asks for at which a stop and an orifice that were not seen are
+put first: there they act, so that a fit can tell whether they are there. A stop farther inside
+bends the gain, and a search can end with both. [1]"""
 STEEPEST = 30.0
 """Volts that a radian takes at least, so that at 10 V and at the upper bounds of all gains the
 solenoids do not overpower the feedback spring. [V/rad]"""
@@ -504,6 +509,10 @@ def guessed_set(guess: Guess, source: str) -> ParameterSet:
     measurement of a speed could tell it. With sin φ = Z5 Z19 I/√Z4 and tan α = sin φ/Z3 the gain is
     Z10 Z5 Z19 G1/(√Z4 Z3), and the jump likewise one of J; the lag is 1/(Z1 Z3 Z5 Z8 √(Z9/2)); the
     acceleration beyond which the orifice opens no further is Z10 Z1 Z8 √(Z9/2) Z16.
+
+    A limit that the guess did not see may still be there: a lag that is too short can stand for it.
+    It is put a little below what the largest command asks for, where a fit can tell, and the set
+    says that no test reached it.
     """
     base = Drive.preset("neutral").parameters
     n = base.numbers
@@ -511,8 +520,20 @@ def guessed_set(guess: Guess, source: str) -> ParameterSet:
     per_ampere = per_angle * n["Z5"] * n["Z19_plus"] / (sqrt(n["Z4"]) * n["Z3"])
     flow = n["Z1"] * sqrt(0.5 * n["Z9"])
     speed_of_flow = 1.0 / (max(guess.lag, SHORTEST) * flow * n["Z3"] * n["Z5"])
-    pulls = [pull / (per_angle * flow * speed_of_flow) for pull in guess.acceleration]
-    stops = [min(top / per_angle, FAR_STOP) for top in guess.top_speed]
+    per_opening = per_angle * flow * speed_of_flow
+    stops, openings, unreached = list[float](), list[float](), dict[str, float]()
+    for way, side in enumerate(SIDES):
+        fastest = _steady(guess, way)
+        top, pull = guess.top_speed[way], guess.acceleration[way]
+        if not isfinite(top):
+            unreached[f"Z13_{side}"] = fastest / per_angle
+            top = STOP_FIRST * fastest
+        if not isfinite(pull):
+            # how fast it accelerated is not known: a lag that is too short may stand for the limit
+            unreached[f"Z16_{side}"] = 0.0
+            pull = ORIFICE_FIRST * fastest / max(guess.lag, SHORTEST)
+        stops.append(top / per_angle)
+        openings.append(pull / per_opening)
     changed: dict[str, float | tuple[float, float]]
     if guess.amplifier is None:
         changed = {
@@ -527,7 +548,7 @@ def guessed_set(guess: Guess, source: str) -> ParameterSet:
         "Z8": speed_of_flow,
         "Z10": per_angle,
         "Z13": (stops[0], stops[1]),
-        "Z16": (pulls[0], pulls[1]),
+        "Z16": (openings[0], openings[1]),
     }
     made = base.replace(changed)
     said = {
@@ -540,7 +561,15 @@ def guessed_set(guess: Guess, source: str) -> ParameterSet:
     # of a current that was measured the filter has a meaning of its own, whatever the logs' rate
     rate = made.rate if guess.amplifier is None else None
     card = f"{guess.axis} card"
-    return replace(made, name=guess.axis, title=title, card=card, parameters=said, rate=rate)
+    return replace(
+        made,
+        name=guess.axis,
+        title=title,
+        card=card,
+        parameters=said,
+        rate=rate,
+        unreached=unreached,
+    )
 
 
 def _with_current(
@@ -569,9 +598,18 @@ def _with_current(
     }
 
 
+def _steady(guess: Guess, way: int) -> float:
+    """Speed that settles under the largest command one way, as a magnitude. [unit]"""
+    volts = guess.command[way] or max(guess.command)
+    beyond = max(volts - guess.dead_zone[way], 0.0)
+    speed = guess.gain[way] * beyond + guess.jump[way]
+    return min(speed, guess.top_speed[way]) or guess.speed
+
+
 CONFIGURATION = """\
 # Read off the logs of the axis '{0}' by `swashplate guess`: what they show is
-# free, within bounds about the first guess; what they do not show stays fixed.
+# free, within bounds about the first guess. A limit that the guess did not see is
+# free as well, within wide ones: a fit tells it from a lag.
 title = "{0}, guessed"
 """
 CHAIN = """
@@ -599,7 +637,6 @@ channels = ["shaft_speed", "position", "encoder_counts"]
 
 [stages.free]
 """
-SIDES = ("plus", "minus")
 NOT_TRIED = "# no run goes {}: its numbers are those of the other way, fixed"
 
 
@@ -634,15 +671,16 @@ def _command_lines(
             lines.append(NOT_TRIED.format(side))
             continue
         gain, jump = numbers[f"G1_{side}"], numbers[f"J_{side}"]
-        # so that more command never means less current, whatever the gain within its bounds
-        curved = 0.2 * gain / largest
+        # so that more command never means less current, whatever the gain within its bounds; a gain
+        # that grows needs no such care, and a stop must not stand for it
+        down, up = 0.2 * gain / largest, 0.6 * gain / largest
         most = 4.0 * jump if jump else 0.5 * gain * largest
         lines.append(f"V_dz_{side} = {{ bounds = [0.0, {0.95 * largest:.4g}] }}")
         if jumped:
             lines.append(f"J_{side} = {{ bounds = [0.0, {most:.4g}] }}    # jump")
         lines += [
             f"G1_{side} = {{ relative = [0.5, 2.0], log = true }}",
-            f"G2_{side} = {{ bounds = [{-curved:.4g}, {curved:.4g}] }}    # how the gain bends",
+            f"G2_{side} = {{ bounds = [{-down:.4g}, {up:.4g}] }}    # how the gain bends",
         ]
     return lines
 
@@ -686,13 +724,15 @@ def _solenoid_lines(guess: Guess, numbers: Mapping[str, float]) -> list[str]:
 
 
 def _limit_lines(guess: Guess) -> list[str]:
-    """Top speed and acceleration of each way, if they were seen."""
+    """Top speed and acceleration of each way that was tried, within wide bounds if not seen."""
     lines = list[str]()
     for way, side in enumerate(SIDES):
-        if guess.command[way] and isfinite(guess.top_speed[way]):
-            lines.append(f"Z13_{side} = {{ relative = [0.7, 1.4], log = true }}    # top speed")
-        if guess.command[way] and isfinite(guess.acceleration[way]):
-            lines.append(f"Z16_{side} = {{ relative = [0.3, 3.0], log = true }}    # acceleration")
+        if not guess.command[way]:
+            continue
+        reach = (0.7, 1.4) if isfinite(guess.top_speed[way]) else (0.7, 3.0)
+        lines.append(_limit_line(f"Z13_{side}", reach, "top speed"))
+        reach = (0.3, 3.0) if isfinite(guess.acceleration[way]) else (0.1, 10.0)
+        lines.append(_limit_line(f"Z16_{side}", reach, "acceleration"))
     return lines
 
 
@@ -702,6 +742,11 @@ def _lag_line(guess: Guess, widest: float) -> str:
         return f"Z8 = {{ relative = [0.2, {widest}], log = true }}    # lag"
     # the acceleration is that of Z8 times Z16: without a lag nothing tells them apart
     return "# the lag is too short to be seen: Z8 stays fixed"
+
+
+def _limit_line(column: str, reach: tuple[float, float], words: str) -> str:
+    low, high = reach
+    return f"{column} = {{ relative = [{low}, {high}], log = true }}    # {words}"
 
 
 def guess_table(found: Guess) -> Table:
@@ -716,10 +761,18 @@ def guess_table(found: Guess) -> Table:
         ("acceleration", found.acceleration, f"{found.unit}^2", ""),
     )
     for name, values, unit, spec in rows:
-        cells = (
-            Cell(None, "not tried") if not tried else value if isfinite(value) else None
-            for value, tried in zip(values, found.command, strict=True)
-        )
+        cells = list[Cell | float | None]()
+        for way, (value, tried) in enumerate(zip(values, found.command, strict=True)):
+            if not tried:
+                cells.append(Cell(None, "not tried"))
+            elif isfinite(value):
+                cells.append(value)
+            elif name == "top speed":
+                factor = display_unit(unit, _steady(found, way)).factor
+                speed = f"{factor * _steady(found, way):.3g}"
+                cells.append(Cell(None, f"at least {speed}, not seen"))
+            else:
+                cells.append(None)
         made.add(name, *cells, unit=unit, spec=spec)
     made.add("delay", 1e3 * found.delay, "", unit="ms", spec=".3g")
     made.add("lag", 1e3 * found.lag, "", unit="ms", spec=".3g")

@@ -74,9 +74,9 @@ def init(
     """Write the first draft of a campaign file from the headers of logs.
 
     What each column is gets guessed from its name and unit, and marked as such;
-    what cannot be told says FIXME. A PLC's words, 27648 or 32767 at full scale, are
-    scaled to volts if they are the command; for a sensor they need its range. Read
-    the file, mend what is wrong, then run 'swashplate campaign check'.
+    what cannot be told says FIXME. A PLC's words, 27648 or 32767 at full scale,
+    are scaled to volts if they are the command; for a sensor they need its range.
+    Read the file, mend what is wrong, then run 'swashplate campaign check'.
 
     Options:
       out FILE: The campaign file; by default campaign.toml beside the first log.
@@ -320,9 +320,9 @@ def guess(path: Path = CAMPAIGN, *, axis: AxisName = None, out: Path | None = No
     """Read a machine's dead zones, gains, limits, delay and lag off its logs.
 
     For a machine of unknown numbers: needs the command and a speed or a position.
-    If a current is measured, the amplifier is read off it and fitted first. Writes
-    a drive to start a fit from, start.toml, and what the fit is to change within
-    which bounds, setup.toml.
+    If a current is measured, the amplifier is read off it and fitted first.
+    Writes a drive to start a fit from, start.toml, and what the fit is to change
+    within which bounds, setup.toml.
 
     Options:
       out DIR: Folder for start.toml and setup.toml; by default the campaign's.

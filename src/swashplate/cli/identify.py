@@ -149,7 +149,7 @@ def fit(
         start: Path | ParameterSet | None = model
         if begin is not None:
             start = words.parameters_of(begin)
-    with long_work("Fitting") as shown, clock.part("search"):
+    with working("Fitting"), clock.part("search"):
         result = identify(
             campaign,
             start,
@@ -167,7 +167,6 @@ def fit(
             executor=Dask(dask) if dask is not None else Processes(jobs or None),
             store=out / "starts",
             resume=resume,
-            watch=shown,
         )
     if result.fit.interrupted and starts:
         last = result.fit.stages[-1]

@@ -19,7 +19,7 @@ from swashplate.campaign.campaign import Campaign
 from swashplate.campaign.experiment import Experiment
 from swashplate.documents import read_json
 from swashplate.drive import Drive
-from swashplate.errors import FileError, InputError, MissingFileError
+from swashplate.errors import DomainError, FileError, InputError, MissingFileError
 from swashplate.identification import tables
 from swashplate.identification.criteria import REQUIRED, Grade, Verdict, verdict
 from swashplate.identification.drive_model import Parameters
@@ -31,7 +31,7 @@ from swashplate.identification.fitting import (
     fingerprint,
     staged,
 )
-from swashplate.identification.intervals import Estimate
+from swashplate.identification.intervals import Estimate, unseen_limits
 from swashplate.identification.problem import Problem
 from swashplate.identification.profiles import Profile
 from swashplate.identification.resampling import Bootstrap, CrossValidation
@@ -304,7 +304,15 @@ class Identification(Estimated):
             "title": title,
             "parameters": parameters,
             "motion": motion_of(self.fit.runs),
+            "unreached": self._unreached(),
         }
+
+    def _unreached(self) -> dict[str, float]:
+        """Limits that the fitted runs do not reach; none of a drive that cannot be simulated."""
+        try:
+            return unseen_limits(self.fit.stages)
+        except (DomainError, InputError):
+            return {}
 
 
 def motion_of(runs: Iterable[Experiment]) -> Motion:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from math import inf, isfinite
+from math import inf, isfinite, isinf
 from typing import TYPE_CHECKING, Literal, NamedTuple
 
 import numpy as np
@@ -13,7 +13,13 @@ from swashplate.campaign.experiment import Experiment
 from swashplate.errors import DomainError, InputError
 from swashplate.identification.data_checks import contradicting_runs
 from swashplate.identification.determination import WIDE, weak_unknowns, without_value
-from swashplate.identification.drive_model import CURRENTS, LIMITS, DriveModel, limits_reached
+from swashplate.identification.drive_model import (
+    CURRENTS,
+    LIMIT_COLUMNS,
+    LIMITS,
+    DriveModel,
+    limits_reached,
+)
 from swashplate.identification.faults import DRIFT, LOSS, Fault, measurement_error
 from swashplate.identification.intervals import open_unknowns
 from swashplate.identification.misfit import Alone, ChannelFit, LackOfFit, lack_of_fit
@@ -627,7 +633,7 @@ def _maneuvers(tested: Mapping[str, Experiment]) -> str:
 
 
 def _validity(stages: Sequence[StageFit], tested: Mapping[str, Experiment]) -> str:
-    """What the fit holds for, and what of the drive the fitted runs never reach."""
+    """What the fit holds for, which limits its runs never reach, and which the model has not."""
     said, stage = f"Holds for {_maneuvers(tested)}", stages[-1]
     if not isinstance(stage.problem.model, DriveModel):
         return f"{said}."
@@ -636,13 +642,25 @@ def _validity(stages: Sequence[StageFit], tested: Mapping[str, Experiment]) -> s
         reached = {limit for each in runs for limit in limits_reached(each, parameters)}
     except (DomainError, InputError):
         return f"{said}."
-    never = [
-        words for name, words in LIMITS.items() if not any(r.startswith(name) for r in reached)
-    ]
-    never += [
-        f"{LIMITS[name]} in {way} direction"
-        for name in ("Z13", "Z16")
-        for side, other, way in (("plus", "minus", "positive"), ("minus", "plus", "negative"))
-        if f"{name}_{side}" not in reached and f"{name}_{other}" in reached
-    ]
-    return f"{said}; never reached: {listed(never)}." if never else f"{said}."
+    never, lacking = list[str](), list[str]()
+    for name, words in LIMITS.items():
+        columns = [column for column in LIMIT_COLUMNS if column.startswith(name)]
+        unreached = [column for column in columns if column not in reached]
+        absent = [column for column in unreached if isinf(parameters.numbers[column])]
+        lacking += _limits_named(words, absent, columns)
+        never += _limits_named(words, [c for c in unreached if c not in absent], columns)
+    if never:
+        said += f"; never reached: {listed(never)}"
+    if lacking:
+        said += f"; not in the model: {listed(lacking)}"
+    return f"{said}."
+
+
+def _limits_named(words: str, some: Sequence[str], columns: Sequence[str]) -> list[str]:
+    """A limit in words, by its direction if only some of its columns are meant."""
+    if not some:
+        return []
+    if len(some) == len(columns):
+        return [words]
+    ways = {"plus": "positive", "minus": "negative"}
+    return [f"{words} in {ways[column.rpartition('_')[2]]} direction" for column in some]

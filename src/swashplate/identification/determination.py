@@ -30,6 +30,9 @@ Move = Callable[[float, Known], float]
 
 WIDE = 0.1
 """Half width of a 95 % interval, of the value or the scale, from which an unknown is weak. [1]"""
+VAGUE = 1.0
+"""Half width of a 95 % interval, of the value or the scale, from which an unknown is hardly known.
+[1]"""
 HALF = 1.96
 """Half width of a 95 % interval, in standard errors."""
 MENTIONED, NAMED = 0.02, 6
@@ -142,6 +145,13 @@ class Direction(NamedTuple):
         return isfinite(self.half_width)
 
     @property
+    def precision(self) -> str:
+        """How well the unknown to fix is known; beyond its own size a percentage says nothing."""
+        if self.half_width >= VAGUE:
+            return "to no better than ±100 %"
+        return f"to ±{100.0 * self.half_width:.3g} %"
+
+    @property
     def sentence(self) -> str:
         """What an engineer would say."""
         if self.gauge is not None:
@@ -153,21 +163,12 @@ class Direction(NamedTuple):
             moves += f" and {len(self.changes) - NAMED} others"
         if self.weak:
             along = f" ({moves} have little effect together)" if len(self.changes) > 1 else ""
-            known = f"is known {_within(self.half_width)} only"
-            if self.half_width >= 1.0:
-                known = f"is known {_within(self.half_width)}"
             return (
-                f"Weak: {self.fix} {known}{along}. Add a test that determines it, or fix one whose "
-                "value you know."
+                f"Weak: {self.fix} is known {self.precision} only{along}. Add a "
+                "test that determines it, or fix one whose value you know."
             )
         change = "together change" if len(self.changes) > 1 else "changes"
         return f"{moves} {change} nothing. Fix {self.fix}."
-
-
-def _within(half_width: float) -> str:
-    """The half-width of an interval over the value; beyond the value itself it says no more."""
-    percent = 100.0 * half_width
-    return f"to ±{percent:.3g} %" if percent < 100.0 else "not even to ±100 %"
 
 
 def _in_order(name: str) -> tuple[str | int, ...]:
@@ -212,8 +213,14 @@ class Identifiability(Result):
         free, rank = int(np.count_nonzero(self.variables.free)), self.rank
         told = f"{rank} combination{'' if rank == 1 else 's'} of {free} free parameters"
         told = f"all {free} free parameters" if rank == free else told
-        weak = f", {len(self.weak)} of them weakly" if self.weak and rank == free else ""
-        said = [f"The tests determine {told if rank else 'none of the parameters'}{weak}."]
+        vague = [each.fix for each in self.weak if each.half_width >= VAGUE]
+        if vague and rank > len(vague):
+            clear = rank - len(vague)
+            told = f"{clear} combination{'' if clear == 1 else 's'} of {free} free parameters"
+            told += f", and hardly {listed(vague)}"
+        elif self.weak and rank == free:
+            told += f", {len(self.weak)} of them weakly"
+        said = [f"The tests determine {told if rank else 'none of the parameters'}."]
         if not free:
             said = ["All parameters are at a bound: there is nothing left to determine."]
         if self.unexcited:
@@ -224,7 +231,7 @@ class Identifiability(Result):
         if len(self.weak) == 1:
             said.append(self.weak[0].sentence)
         elif self.weak:
-            known = [f"{each.fix} {_within(each.half_width)}" for each in self.weak]
+            known = [f"{each.fix} {each.precision}" for each in self.weak]
             said.append(
                 f"Weak, each with those before it fixed: {listed(known)}. Add tests that determine "
                 "them, or fix those whose values you know."

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -27,10 +27,8 @@ from swashplate.parameters.files import named_set
 from swashplate.parameters.parameter_set import ParameterSet
 
 if TYPE_CHECKING:
-    from swashplate.identification.solving import Progress, Solution
+    pass
 
-Watch = Callable[[str, float | None], None]
-"""Is called with what is being done, and with the share that is done where that is known."""
 FEWEST_DRAWS = 40
 """Of a bootstrap: one beyond each end of a 95 % interval."""
 MOST_EVALUATIONS = 600
@@ -54,7 +52,6 @@ def identify(
     executor: Executor | None = None,
     store: str | Path | None = None,
     resume: bool = False,
-    watch: Watch | None = None,
 ) -> Identification:
     """Identify a drive, or a user-defined model, from the tests of a campaign.
 
@@ -101,8 +98,6 @@ def identify(
         Folder that keeps the result of each start as it is ready.
     resume : bool
         Take what is in `store` instead of computing it again.
-    watch : callable, optional
-        Called with what is being done, in words, and the share that is done, None if unknown.
 
     Returns
     -------
@@ -134,27 +129,16 @@ def identify(
             f"{bootstrap} draws do not reach the ends of a 95 % interval; take {FEWEST_DRAWS} or "
             "more, 1000 for smooth ones."
         )
-    show = watch or _silent
     profiles = (profiles,) if isinstance(profiles, str) else profiles
     campaign = tests if isinstance(tests, Campaign) else Campaign.from_toml(tests)
     axis = only_axis(campaign, axis)
     runs = runs_to_fit(campaign, axis)
     nominal, setup = _stated(campaign, axis, model, free, runs)
 
-    def progress(stage: str, now: Progress) -> None:
-        words = f"{stage}: iteration {now.iteration}, evaluation {now.evaluations} of at most "
-        show(f"{words}{max_evaluations}, cost {now.cost:.6g}", None)
-
-    def ended(stage: str, one: Solution, done: int) -> None:
-        words = f"{stage}: {done} of {starts + 1} starts, the last to cost {one.cost:.6g}"
-        show(words, done / (starts + 1))
-
     search = None
     if starts:
         folder = None if store is None else Path(store)
-        search = Search(
-            starts, seed, executor or Serial(), store=folder, resume=resume, watch=ended
-        )
+        search = Search(starts, seed, executor or Serial(), store=folder, resume=resume)
     staged = result = fit(
         nominal,
         runs,
@@ -162,7 +146,6 @@ def identify(
         loss=loss,
         max_evaluations=max_evaluations,
         search=search,
-        watch=progress,
     )
     _check_profiles(result, profiles)
     if joint and len(setup.stages) > 1 and not result.interrupted:
@@ -173,7 +156,6 @@ def identify(
             setup.joint(),
             loss=loss,
             max_evaluations=max_evaluations,
-            watch=progress,
         )
     notes = {**versions(), "seed": str(seed), "campaign": str(campaign.path)}
     identification = Identification(campaign, result, notes=notes, required=required)
@@ -186,7 +168,6 @@ def identify(
             staged.setup,
             folds=folds,
             loss=loss,
-            watch=lambda _, done: show(f"{done} of {folds} folds", done / folds),
             executor=executor,
             seed=seed,
         )
@@ -195,21 +176,16 @@ def identify(
         refits = bootstraps_of(
             result.stages,
             bootstrap,
-            watch=lambda done: show(f"{done} of {bootstrap} fits to new noise", None),
             executor=executor,
             seed=seed,
         )
         identification = replace(identification, bootstraps=refits)
     if profiles:
         curves = [
-            curve for stage in result.stages for curve in _profiles(stage, profiles, executor, show)
+            curve for stage in result.stages for curve in _profiles(stage, profiles, executor)
         ]
         identification = replace(identification, profiles=curves)
     return identification
-
-
-def _silent(words: str, share: float | None) -> None:
-    """Show nothing."""
 
 
 def only_axis(campaign: Campaign, axis: str | None) -> str:
@@ -274,18 +250,9 @@ def _check_profiles(result: Fit, profiles: Sequence[str]) -> None:
             raise InputError(f"There is no parameter '{name}'; there are {machine}.")
 
 
-def _profiles(
-    stage: StageFit, profiles: Sequence[str], executor: Executor | None, show: Watch
-) -> list[Profile]:
+def _profiles(stage: StageFit, profiles: Sequence[str], executor: Executor | None) -> list[Profile]:
     """Profiles of the parameters of one stage that are named."""
     names = None
     if "all" not in profiles:
         names = [name for name in profiles if name in stage.problem.unknowns.names]
-    return list(
-        profiles_of(
-            stage,
-            names,
-            executor=executor,
-            watch=lambda done: show(f"{stage.stage.name}: {done} profiles", None),
-        ).values()
-    )
+    return list(profiles_of(stage, names, executor=executor).values())

@@ -12,7 +12,12 @@ from typing import TYPE_CHECKING, Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from swashplate.identification.drive_model import LIMITS, DriveModel
+from swashplate.identification.drive_model import (
+    LIMIT_COLUMNS,
+    LIMITS,
+    DriveModel,
+    limits_unreached,
+)
 from swashplate.identification.model import Model
 from swashplate.identification.model import linearised as linearised_model
 from swashplate.identification.noise import (
@@ -204,7 +209,14 @@ def slopes_by_earlier(stage: StageFit, earlier: StageFit) -> Array:
 
 def slopes_by_fixed(stage: StageFit) -> Array:
     """(K, F) changes of a stage's estimates for a standard uncertainty of each fixed number."""
-    uncertain = stage.problem.uncertain
+    return slopes_by(stage, stage.problem.uncertain)
+
+
+def slopes_by(stage: StageFit, uncertain: Sequence[Mapping[str, float]]) -> Array:
+    """(K, F) changes of a stage's estimates if fixed numbers, by column, change together by these.
+
+    Without what follows from earlier stages.
+    """
     names = [name for together in uncertain for name in together]
     if not names:
         return np.zeros((len(stage.linearised.variables), 0))
@@ -443,6 +455,22 @@ def prior_sentences(unknowns: Unknowns, vector: Array, quoted: Covariance) -> tu
             f"{abs(pull):.2g} deviations {'above' if pull >= 0.0 else 'below'} its mean."
         )
     return tuple(said)
+
+
+def unseen_limits(stages: Sequence[StageFit]) -> dict[str, float]:
+    """Limits that may lie anywhere beyond a value, by column, and that value. [SI]
+
+    Those that no fitted run reached, from where these ended, and those whose estimate has no upper
+    end, from its lower one.
+    """
+    runs = {run.name: run for stage in stages for run in stage.problem.experiments}
+    unseen = limits_unreached(list(runs.values()), stages[-1].drive.parameters)
+    for stage in stages:
+        for estimate in stage.uncertainty.estimates:
+            one_sided = estimate.upper is None and estimate.lower is not None
+            if estimate.name in LIMIT_COLUMNS and one_sided:
+                unseen.setdefault(estimate.name, float(estimate.lower or 0.0))
+    return {column: value for column, value in unseen.items() if value > 0.0}
 
 
 def open_unknowns(stage: StageFit, experiments: Iterable[Experiment]) -> Iterator[str]:

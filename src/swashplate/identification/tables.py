@@ -91,7 +91,6 @@ def estimates_table(
         if truth is not None:
             assert isinstance(stage.problem.model, DriveModel)
             true = true_value(unknown, stage.problem.model, truth)
-        both = low is not None and high is not None
         shown: Sequence[str] = (f"{factor * value:.5g}", *estimate.ends(factor))
         if low is not None and high is not None:
             shown = spread(factor * value, factor * low, factor * high)
@@ -110,7 +109,7 @@ def estimates_table(
             holds,
             Cell(low, shown[1]),
             Cell(high, shown[2]),
-            f"±{percent(0.5 * ((high or 0.0) - (low or 0.0)), value)}" if both else NONE,
+            _half_width(value, low, high),
             *((redrawn[k] if redrawn else None) or (None, None)),
             error,
             status,
@@ -118,6 +117,13 @@ def estimates_table(
             look=status != "estimated",
         )
     return made
+
+
+def _half_width(value: float, low: float | None, high: float | None) -> str:
+    """Half of an interval in per cent of the value, which means nothing about 0."""
+    if low is None or high is None:
+        return NONE
+    return "includes 0" if low < 0.0 < high else f"±{percent(0.5 * (high - low), value)}"
 
 
 def profiles_table(found: Identification) -> Table:

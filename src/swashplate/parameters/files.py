@@ -9,7 +9,7 @@ from typing import Annotated
 from pydantic import BaseModel, ConfigDict, Field
 
 from swashplate.documents import parse_toml, read_text, validated
-from swashplate.entries import Name, Number, Positive, Version
+from swashplate.entries import Name, NotNegative, Number, Positive, Version
 from swashplate.equations.replacement import Replacement, again, found_at, uses
 from swashplate.errors import InputError, MissingFileError, ParameterError
 from swashplate.parameters.definitions import Block, Definition, declare, find, options_of
@@ -69,6 +69,8 @@ class ModelOptions(FilePart):
     equations: list[EquationPlaces] = []
     """One's own equations in place of the package's, each as ``module:name``."""
     motion: Motion = "shaft"
+    unreached: dict[str, NotNegative] = {}
+    """Limits that the tests never reached, by column, and how far they went. [SI]"""
 
 
 class CardFile(FilePart):
@@ -205,6 +207,8 @@ def read_set(text: str, origin: str) -> ParameterSet:
     }
     parameters: dict[str, Parameter] = {}
     try:
+        for column in model.unreached:
+            find(column)
         for block, table in blocks.items():
             for symbol, entry in table.items():
                 definition = find(symbol)
@@ -215,10 +219,18 @@ def read_set(text: str, origin: str) -> ParameterSet:
         raise ParameterError(f"{origin}: {error}") from None
     values = {symbol: each.values[0] for symbol, each in parameters.items()}
     return ParameterSet(
-        *(contents.name, contents.title, card_name, parameters),
-        *(model.pressure_root, model.coulomb_sign, model.card_switch, rate),
-        options_of(values) if model.options is None else frozenset(model.options),
-        *(equations, model.motion),
+        name=contents.name,
+        title=contents.title,
+        card=card_name,
+        parameters=parameters,
+        pressure_root=model.pressure_root,
+        coulomb_sign=model.coulomb_sign,
+        card_switch=model.card_switch,
+        rate=rate,
+        options=options_of(values) if model.options is None else frozenset(model.options),
+        equations=equations,
+        motion=model.motion,
+        unreached=model.unreached,
     )
 
 
@@ -294,6 +306,10 @@ def dump_set(parameters: ParameterSet) -> str:
         options["equations"] = [each.places for each in parameters.equations]
     if parameters.motion != "shaft":
         options["motion"] = parameters.motion
+    if parameters.unreached:
+        unreached = inline_table()
+        unreached.update(parameters.unreached)
+        options["unreached"] = unreached
     blocks: dict[str, dict[str, object]] = {"model": options}
     for symbol, each in parameters.items():
         entry = inline_table()

@@ -180,6 +180,9 @@ class ParameterSet(Entries):
     motion: Motion = "shaft"
     """What its last number moves: a shaft, or a rod, whose position in m then stands in the place
     of the shaft's in rad."""
+    unreached: Mapping[str, float] = field(default_factory=dict)
+    """Limits that the tests of this drive never reached, by column, and how far they went, 0 if
+    that is not known: such a limit lies there or beyond, wherever its value stands. [SI]"""
     numbers: Mapping[str, float] = field(init=False, repr=False, compare=False)
     """Every single value by column, e.g. ``Z16_plus``."""
 
@@ -309,7 +312,10 @@ class ParameterSet(Entries):
             numbers = {symbol: parameters[symbol].values[0] for symbol in parameters}
             touched = {SWITCHES[name] for name in changes if name in SWITCHES}
             options = (self.options - touched) | (options_of(numbers) & touched)
-        return replace(self, parameters=parameters, options=options)
+        # a number that someone gives is no longer one that tests left open
+        given = columns_of(changes)
+        unreached = {k: v for k, v in self.unreached.items() if k not in given}
+        return replace(self, parameters=parameters, options=options, unreached=unreached)
 
     def scale(self, factors: Mapping[str, Change]) -> Self:
         """Copy with values multiplied by factors; names as in `replace`."""

@@ -2,15 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from math import ceil, floor, log10
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
 from markupsafe import Markup
 from numpy.typing import NDArray
 
-from swashplate.analysis import dead_zone, drives, limit_shares
+from swashplate.analysis import (
+    ASSUMED,
+    assumed_parameters,
+    changes_left_open,
+    dead_zone,
+    limit_shares,
+    standard_errors,
+    without_limits,
+)
 from swashplate.campaign import Campaign
 from swashplate.drive import Drive
 from swashplate.errors import SwashplateError
@@ -22,6 +30,7 @@ from swashplate.identification.criteria import (
 )
 from swashplate.identification.determination import weak_unknowns
 from swashplate.identification.fitting import StageFit
+from swashplate.identification.intervals import unseen_limits
 from swashplate.identification.validation import (
     following,
     percent,
@@ -42,80 +51,218 @@ LIGHTS: dict[Grade, Light] = {
     "Usable for prediction": "look",
     "Not usable": "bad",
 }
-DRAWS = 64
-"""Drives that the tests allow, from whose spread the intervals of the numbers come: it is known to
-9 %."""
 RATE, SECONDS = 512.0, 8.0
 """Of the full step that the numbers are read from. [Hz, s]"""
 MOVES, MOST_OF_IT = 0.02, 0.63
 """Parts of the top speed at which the delay ends, and the lag."""
 QUANTILE = 1.96
 """Standard deviations on either side of a 95 % interval."""
+OPEN = 0.1
+"""Share of a number by which limits that no test reached can move it, from which it has one end
+alone; what moves it by less is taken into its interval. [1]"""
+NO_COMMAND = 0.05
+"""Share of the largest command up to which one the other way is none. [1]"""
+FOLLOWS = 0.01
+"""Share of a number by which 5 % of what the tests do not determine can move it, from which it has
+no interval. [1]"""
 
 
 # --- numbers --------------------------------------------------------------------------------------
 
+Commands = tuple[float, float]
+"""Largest command each way, positive and negative, as magnitudes. [V]"""
+ACCELERATION, DELAY, LAG, CREEP = 2, 3, 4, 5
+"""Rows of the numbers."""
+FULL: Commands = (FULL_VOLTAGE, FULL_VOLTAGE)
 
-def numbers_of(drive: Drive) -> Array:
+
+def numbers_of(drive: Drive, largest: Commands = FULL) -> Array:
     """What matters about a drive, (6, 2): each way, positive and negative. SI
 
     Dead zone [V]; top speed [rad/s], steady under ±10 V; largest acceleration [rad/s²], delay and
-    lag [s] of a full step from rest, the delay up to 2 % of the change to the top speed, the lag
-    from there to 63 %; creep, the steady speed at 0 V [rad/s]. NaN where the drive has none.
+    lag [s] of a step from rest to the largest command, the delay up to 2 % of the change to the
+    speed that settles, the lag from there to 63 %; creep, the steady speed at 0 V [rad/s]. NaN
+    where the drive has none.
     """
     rest = float(drive.steady_speed(0.0))
     made = np.full((6, 2), np.nan)
     for column, way in enumerate((1.0, -1.0)):
-        command = np.full(int(SECONDS * RATE) + 1, way * FULL_VOLTAGE)
+        volts = way * largest[column]
+        command = np.full(int(SECONDS * RATE) + 1, volts)
         command[0] = 0.0
         run = drive.simulate(command, RATE, start="steady")
-        top = float(drive.steady_speed(way * FULL_VOLTAGE))
+        final = float(drive.steady_speed(volts))
         made[0, column] = dead_zone(drive, way)[0]
-        made[1, column], made[5, column] = top, rest
-        if top == rest:
+        made[1, column] = float(drive.steady_speed(way * FULL_VOLTAGE))
+        made[5, column] = rest
+        if final == rest:
             continue
         made[2, column] = way * RATE * float((way * np.diff(run.shaft_speed)).max())
-        done = np.maximum.accumulate((run.shaft_speed - rest) / (top - rest))
+        done = np.maximum.accumulate((run.shaft_speed - rest) / (final - rest))
         if done[-1] >= MOST_OF_IT:
             first, last = np.interp((MOVES, MOST_OF_IT), done, run.time)
             made[3:5, column] = first, last - first
     return made
 
 
+def largest_commands(stages: Sequence[StageFit]) -> Commands:
+    """Largest command each way of the runs that a fit is of, ±10 V for a way that none goes.
+
+    A step to a larger one would show what no test did.
+    """
+    plus, minus = (volts or FULL_VOLTAGE for volts in tested_commands(stages))
+    return plus, minus
+
+
+def tested_commands(stages: Sequence[StageFit]) -> Commands:
+    """Largest command each way of the runs that a fit is of, 0 for a way that none goes."""
+    commands = [
+        run.input.values
+        for stage in stages
+        for run in stage.problem.experiments
+        if run.input.kind == "voltage"
+    ]
+    size = max((float(np.abs(values).max()) for values in commands), default=0.0)
+    plus = max((float(values.max()) for values in commands), default=0.0)
+    minus = max((float(-values.min()) for values in commands), default=0.0)
+    # noise about 0 V is no command
+    tested = [
+        min(each, FULL_VOLTAGE) if each > NO_COMMAND * size else 0.0 for each in (plus, minus)
+    ]
+    return tested[0], tested[1]
+
+
+class _Range(NamedTuple):
+    """How far numbers (6, 2) can be off."""
+
+    half: Array
+    """Half widths of 95 % intervals, NaN where there is none."""
+    doubt: NDArray[np.object_]
+    """Why a number has no interval, in words; empty if it has one."""
+    near: Array
+    """The numbers if limits that were not seen lie where the tests ended, as cautious ends."""
+    far: Array
+    """The numbers if there are no such limits."""
+
+
 def numbers_table(drive: Drive, stages: Sequence[StageFit]) -> tuple[Table, list[str]]:
     """The numbers that matter, each with its 95 % interval, and what these leave out.
 
+    A number that a limit decides which no test reached has one end alone, "at least" or "at most".
     Without stages of a fit there are no intervals.
     """
-    values, half, said = numbers_of(drive), np.full((6, 2), np.nan), list[str]()
+    largest = largest_commands(stages)
+    values, sentences = numbers_of(drive, largest), list[str]()
+    range_ = _Range(np.full((6, 2), np.nan), np.full((6, 2), "", dtype=object), values, values)
     if stages:
         try:
-            drawn = drives(stages, DRAWS)
-            half = QUANTILE * np.std([numbers_of(each) for each in drawn.drives], axis=0)
-            said += drawn.sentences()
+            range_ = _range_of(drive, stages, values, largest)
         except SwashplateError as error:
-            said.append(f"There are no intervals: {error}")
+            sentences.append(f"There are no intervals: {error}")
     made = Table("", (Column("quantity"), Column("positive", "s"), Column("negative", "s"), UNIT))
     rows = (
         ("Dead zone, up to", "V"),
         ("Top speed at ±10 V", "rad/s"),
         ("Largest acceleration", "rad/s^2"),
-        ("Delay, to 2 % of top speed", "s"),
+        ("Delay, to 2 % of final speed", "s"),
         ("Lag, from there to 63 %", "s"),
         ("Creep at 0 V", "rad/s"),
     )
-    for (words, unit), row, width in zip(rows, values, half, strict=True):
-        factor = display_unit(unit, float(np.nanmax(np.abs(row), initial=0.0))).factor
-        cells = [_with_interval(factor * v, factor * w) for v, w in zip(row, width, strict=True)]
+    for row, (words, unit) in enumerate(rows):
+        factor = display_unit(unit, float(np.nanmax(np.abs(values[row]), initial=0.0))).factor
+        cells = [_cell(factor, values, range_, (row, way)) for way in (0, 1)]
         if words.startswith("Creep"):
             cells[1] = Cell(None, "")
         made.add(words, *cells, unit=unit, spec=".3f")
-    return made, said
+    if stages and assumed_parameters(stages):
+        sentences.append(
+            f"Parameters that were assumed count as known to {percent(ASSUMED)}, their standard "
+            "deviation."
+        )
+    if largest != FULL:
+        sentences.append(
+            "Acceleration, delay and lag are those of steps from rest to "
+            f"{largest[0]:.3g} and -{largest[1]:.3g} V, the largest commands of the fitted runs."
+        )
+    return made, sentences
 
 
-def _with_interval(value: float, half: float) -> Cell:
+def _range_of(drive: Drive, stages: Sequence[StageFit], values: Array, largest: Commands) -> _Range:
+    """Errors of the numbers: of what the tests determine, and of unseen limits by both ends."""
+
+    def numbers(one: Drive) -> Array:
+        return numbers_of(one, largest)
+
+    unseen, assumed = unseen_limits(stages), assumed_parameters(stages)
+    half = QUANTILE * standard_errors(stages, numbers, assumed)
+    doubt = np.full((6, 2), "", dtype=object)
+    doubt[changes_left_open(stages, numbers, unseen) > FOLLOWS * np.abs(values)] = "not determined"
+    for way, volts in enumerate(tested_commands(stages)):
+        if volts == 0.0:
+            doubt[:CREEP, way] = "not tested"
+    for way, column in enumerate(("Z16_plus", "Z16_minus")):
+        if mistaken_for_a_lag(column, stages, unseen):
+            # the lag is the same both ways, and the delay follows it
+            doubt[ACCELERATION, way] = doubt[DELAY : LAG + 1] = f"{column} fixed"
+    nearest, farthest = drive.replace(**unseen), without_limits(drive, unseen)
+    near, far = numbers_of(nearest, largest), numbers_of(farthest, largest)
+    moved = np.maximum(np.abs(near - values), np.abs(far - values))
+    left_open = np.abs(far - near) > OPEN * np.abs(near)
+    if left_open.any():
+        errors = standard_errors(stages, lambda one: numbers_of(one.replace(**unseen), largest))
+        cautious = QUANTILE * errors * np.sign(near)
+        near = np.where(np.abs(far) > np.abs(near), near - cautious, near + cautious)
+    half = np.where(left_open, np.nan, half + moved)
+    near, far = np.where(left_open, near, values), np.where(left_open, far, values)
+    return _Range(half, doubt, near, far)
+
+
+INTERVALS = (
+    "With 95 % intervals of the fit, rounded up, which do not cover what the model leaves out."
+)
+MEANINGS = {
+    "not seen": "Not seen: no test reached the limit that decides it.",
+    "not tested": "Not tested: no run goes that way.",
+    "not determined": "Not determined: the tests leave open what it follows from.",
+    "(fixed)": "Fixed: follows from parameters that were not fitted.",
+    "Z16_": "Z16 fixed: an orifice that the fit did not look for can be mistaken for a lag.",
+}
+"""What words beside a number mean."""
+
+
+def _meanings(table: Table) -> list[str]:
+    """Meanings of the words that a table of numbers uses."""
+    cells = [cell.text for row in table.rows for cell in row.cells if isinstance(cell, Cell)]
+    return [words for word, words in MEANINGS.items() if any(word in cell for cell in cells)]
+
+
+def mistaken_for_a_lag(
+    column: str, stages: Sequence[StageFit], unseen: Mapping[str, float]
+) -> bool:
+    """Whether an orifice that no stage looks for may have been taken for a lag that one estimates.
+
+    Of a limited acceleration a fit without the limit makes a longer lag, and says nothing.
+    """
+    free = {
+        target
+        for stage in stages
+        for unknown in stage.problem.unknowns
+        for target in unknown.targets
+    }
+    return column in unseen and column not in free and "Z8" in free
+
+
+def _cell(factor: float, values: Array, range_: _Range, index: tuple[int, int]) -> Cell:
+    """A number as it is printed: with its interval, or as the end of what is possible."""
+    value, half = factor * values[index], factor * range_.half[index]
+    near, far = factor * range_.near[index], factor * range_.far[index]
     if not np.isfinite(value):
         return Cell(None, NONE)
+    if range_.doubt[index]:
+        return Cell(value, f"{value:.4g} ({range_.doubt[index]})")
+    if near != far:
+        least = abs(far) > abs(near)
+        return Cell(near, f"at {'least' if least else 'most'} {_rounded(near, least)}, not seen")
     if half <= 1e-9 * abs(value):
         # it follows from what the fit left at its nominal value alone
         return Cell(value, f"{value:.4g} (fixed)")
@@ -126,6 +273,16 @@ def _with_interval(value: float, half: float) -> Cell:
     decimals = max(min(decimals, 3 - floor(log10(max(abs(value), half)))), 0)
     shown = ceil(half * 10.0**decimals - 1e-9) / 10.0**decimals
     return Cell(value, f"{value:.{decimals}f} ± {shown:.{decimals}f}")
+
+
+def _rounded(value: float, down: bool) -> str:
+    """Three digits of a number, towards 0 or away from it."""
+    if value == 0.0:
+        return "0"
+    decimals = 2 - floor(log10(abs(value)))
+    digits = abs(value) * 10.0**decimals
+    size = (floor(digits) if down else ceil(digits)) / 10.0**decimals
+    return f"{np.copysign(size, value):.{max(decimals, 0)}f}"
 
 
 # --- lights ---------------------------------------------------------------------------------------
@@ -199,18 +356,17 @@ def summary_section(
     numbers, limits = [], []
     if drive is not None:
         numbers.append(Block("heading", "Numbers that matter", "h3"))
+        table = None
         try:
             table, said = numbers_table(drive, stages)
             numbers.append(Block("table", table, "numbers"))
         except SwashplateError as error:
             said = [f"This drive has none: {error}"]
-        words = (
-            "With 95 % intervals of the fit, rounded up, which do not cover what the model leaves "
-            "out. Fixed: follows from parameters that were not fitted."
-        )
-        numbers.append(text(" ".join([words, *said] if stages else said), "remark"))
+        if stages:
+            said = [INTERVALS, *(_meanings(table) if table else ()), *said]
+        numbers.append(text(" ".join(said), "remark"))
         limits.append(Block("heading", "What limits it", "h3"))
-        limits += listed_block(_limits(drive))
+        limits += listed_block(_limits(drive, stages))
     limits.append(Block("heading", "What to do next", "h3"))
     limits += listed_block(_next(judged, campaign, stages, runs, findings))
     shown.append(Block("pair", [Block("tile", each) for each in (numbers, limits) if each]))
@@ -236,17 +392,21 @@ def _curves(runs: Sequence[ShownRun], virtual: bool) -> Iterable[Block]:
         yield Block("curve", content)
 
 
-def _limits(drive: Drive) -> list[str]:
-    """What acts during a full step each way, and what to change first."""
-    length = int(2.0 * RATE)
-    command = np.repeat((0.0, FULL_VOLTAGE, 0.0, -FULL_VOLTAGE, 0.0), length)
+def _limits(drive: Drive, stages: Sequence[StageFit]) -> list[str]:
+    """What acts during a step each way, and what to change first.
+
+    The steps go to the largest commands that were tested; what no test reached is no limit here.
+    """
+    length, (plus, minus) = int(2.0 * RATE), largest_commands(stages)
+    command = np.repeat((0.0, plus, 0.0, -minus, 0.0), length)
     try:
-        found = limit_shares(drive, command, RATE, interpolation="previous")
+        limited = without_limits(drive, unseen_limits(stages)) if stages else drive
+        found = limit_shares(limited, command, RATE, interpolation="previous")
     except SwashplateError as error:
         return [str(error)]
     acting = sorted(found.shares, key=lambda each: each.time_share or 0.0, reverse=True)
     shares = [f"{e.limit} {percent(e.time_share)}" for e in acting[:3] if e.time_share]
-    head = "Share of the time of steps from rest to ±10 V and back"
+    head = f"Share of the time of steps from rest to {plus:.3g} and -{minus:.3g} V and back"
     return [f"{head}: {', '.join(shares) or 'nothing acts'}.", *found.sentences()[:1]]
 
 
