@@ -15,8 +15,8 @@ export PIP_DISABLE_PIP_VERSION_CHECK := 1
 unexport PYTHONDONTWRITEBYTECODE
 
 .DEFAULT_GOAL := help
-.PHONY: help .venv demo test test-slow lint docs figures reproduce bench cluster fuzz tools browser calibration owner-table coverage dist binaries \
-  format clean
+.PHONY: help .venv demo test test-slow lint docs figures reproduce bench cluster fuzz tools browser packages calibration owner-table \
+  coverage dist matrix binaries format clean
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[.a-z-]+:.*## / { printf "  make %-8s %s\n", $$1, $$2 }' Makefile
@@ -91,24 +91,29 @@ coverage: $(STAMP) ## which lines of src no test reaches; the kernels interprete
 dist: $(STAMP) ## build wheel and sdist, and run the demo from the wheel in an environment of its own
 	@rm -rf dist build/clean
 	@$(BIN)/python -m build --no-isolation --outdir dist . >/dev/null
-	@ls dist
+	@$(BIN)/python tools/check_dist.py dist
 	@$(PYTHON) -m venv build/clean
 	@build/clean/bin/pip install -qq -c constraints.txt dist/*.whl
 	@cd build && clean/bin/swashplate demo --out clean/demo
+
+matrix: $(STAMP) ## try the wheel on each Python, with newest and lowest versions (an hour)
+	@$(BIN)/python tools/matrix.py --write $(ENVIRONMENTS)
 
 binaries: $(STAMP) ## compile the libraries that FMUs carry, run them, write their manifest
 	@$(BIN)/pip install -qq -c constraints.txt -e '.[binaries]'
 	@$(BIN)/python tools/build_binaries.py
 
-tools: ## make sure that there is a C compiler, for bench and fuzz
+tools: ## make sure that there is a C compiler, for bench, fuzz and the tests of exported C
 	@if command -v cc >/dev/null; then :; \
 	elif [ "$$(id -u)" = 0 ] && command -v apt-get >/dev/null; then \
 	  echo "No C compiler found: installing gcc."; \
 	  apt-get update -qq && apt-get install -qq -y gcc libc6-dev; \
 	else \
-	  echo "The bench needs a C compiler: install gcc and the C library's headers (libc6-dev)."; \
+	  echo "bench and exported C need a C compiler: install gcc and the C library's headers (libc6-dev)."; \
 	  exit 1; \
 	fi
+
+packages: tools browser ## install what the tests need beside Python: a C compiler, a Chromium
 
 browser: ## make sure that there is a Chromium, for the test of the report's page
 	@if command -v chromium >/dev/null || command -v chromium-browser >/dev/null; then :; \

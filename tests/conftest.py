@@ -1,5 +1,6 @@
 """What many tests need: derivatives by differences, the drives, Kruse's numbers."""
 
+import os
 import tomllib
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -17,6 +18,9 @@ settings.register_profile(
     suppress_health_check=[HealthCheck.filter_too_much, HealthCheck.too_slow],
 )
 settings.load_profile("swashplate")
+
+# Warnings are errors in the processes that tests start, too: filterwarnings sees this one alone.
+os.environ.setdefault("PYTHONWARNINGS", "error")
 
 
 SLOW = {"docs", "examples", "reproduction"}

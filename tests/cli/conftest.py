@@ -4,6 +4,8 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from rich.console import Console
+from rich.live import Live
 from typer.testing import CliRunner, Result
 
 from swashplate.cli import app
@@ -24,6 +26,24 @@ def stages(**free: str) -> str:
         for name in names.split():
             text += f"free.{name} = {{ relative = [0.5, 2.0], log = true }}\n"
     return text
+
+
+@pytest.fixture(autouse=True)
+def one_spinner_at_a_time(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Refuse a spinner or a bar inside another, as rich before 14.1 does."""
+    start, stop, running = Console.set_live, Console.clear_live, list[Live]()
+
+    def set_live(console: Console, live: Live) -> bool | None:
+        assert not running, "a spinner is shown inside another"
+        running.append(live)
+        return start(console, live)
+
+    def clear_live(console: Console) -> None:
+        running.clear()
+        stop(console)
+
+    monkeypatch.setattr(Console, "set_live", set_live)
+    monkeypatch.setattr(Console, "clear_live", clear_live)
 
 
 @pytest.fixture(scope="session")

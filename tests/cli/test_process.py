@@ -161,6 +161,19 @@ def test_it_prints_versions_extras_cache_and_a_simulated_speed(run) -> None:
     assert set(re.findall(r"^extra (\w+)", done.stdout, re.MULTILINE)) == extras
 
 
+@pytest.mark.parametrize("kept", [True, False])
+def test_byte_code_that_is_not_kept_is_said(tmp_path: Path, kept: bool) -> None:
+    """An image whose installer compiles nothing, and whose environment lets nobody do it."""
+    # where byte code is looked for: in its place, or in a folder without any
+    elsewhere = {} if kept else {"PYTHONPYCACHEPREFIX": str(tmp_path)}
+    python("-m", "swashplate", "doctor", cwd=tmp_path, PYTHONDONTWRITEBYTECODE="")
+    done = swashplate("doctor", cwd=tmp_path, PYTHONDONTWRITEBYTECODE="1", **elsewhere)
+    assert done.returncode == 0, done.stderr
+    words = " ".join(done.stdout.split())
+    assert ("byte code" in words) is not kept
+    assert ("compileall" in words and "unset PYTHONDONTWRITEBYTECODE" in words) is not kept
+
+
 def test_a_wrong_speed_is_said_and_ends_with_code_1(run, monkeypatch: pytest.MonkeyPatch) -> None:
     slow = Drive.preset("hoist").scale(Z10=0.75)
     monkeypatch.setattr(Drive, "preset", lambda name: slow)

@@ -343,7 +343,10 @@ def test_without_a_place_it_works_with_a_warning(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
     (tmp_path / "temporary").mkdir()
     done = generate(
-        tmp_path, NUMBA_CACHE_DIR=str(tmp_path / "file"), TMPDIR=str(tmp_path / "temporary")
+        tmp_path,
+        NUMBA_CACHE_DIR=str(tmp_path / "file"),
+        TMPDIR=str(tmp_path / "temporary"),
+        PYTHONWARNINGS="default",
     )
     assert done.stdout.startswith("(15.0, 7.0, 4.0)")
     assert UNCACHED in done.stderr

@@ -485,17 +485,18 @@ def full_order(
     with working("Simulating"):
         if command is None:
             found = full.validity(whole, sampling.rate)
-            save(out, "Table", found.write)
             title, said = drive.title, f"{len(found.rows)} maneuvers"
         else:
             name, run = words.simulated(whole.drive, command, sampling)
             both = full.compare(whole, run, start=sampling.start)
             found = full.validity_table(whole.physical.name, [(name, both)])
             title = f"{drive.title}, {name}"
-            save(out, "All signals, in SI", both.write)
-            drawn = f"{title}, five states against one"
-            draw(plot, "plot_full_order", both, title=drawn)
             said = f"{both.time.size} samples at {sampling.rate:g} Hz"
+    if command is None:
+        save(out, "Table", found.write)
+    else:
+        save(out, "All signals, in SI", both.write)
+        draw(plot, "plot_full_order", both, title=f"{title}, five states against one")
     drive.note(f"{title}, five states against one: {said}")
     if chosen.parameters.refinements:
         listed = ", ".join(chosen.parameters.refinements)

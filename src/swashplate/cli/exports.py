@@ -64,27 +64,26 @@ def export(
         from swashplate import export as exporting
 
         chosen = drive.chosen
-        own = exporting.LONGEST_STEP if step is None else step
-        names = None if platforms is None else [each.strip() for each in platforms.split(",")]
-        with said():
-            if fmu is not None:
-                version: Literal["2.0", "3.0"] = "2.0" if fmi.startswith("2") else "3.0"
-                save(
-                    fmu,
-                    f"FMU {version}",
-                    lambda path: exporting.fmu(
-                        chosen, path, fmi=version, step=own, platforms=names
-                    ),
-                )
-            if c is not None:
+    own = exporting.LONGEST_STEP if step is None else step
+    names = None if platforms is None else [each.strip() for each in platforms.split(",")]
+    with said():
+        if fmu is not None:
+            version: Literal["2.0", "3.0"] = "2.0" if fmi.startswith("2") else "3.0"
+            save(
+                fmu,
+                f"FMU {version}",
+                lambda path: exporting.fmu(chosen, path, fmi=version, step=own, platforms=names),
+            )
+        if c is not None:
+            with working(f"Writing {c}"):
                 written = exporting.c(chosen, c, own)
                 if compile:
                     (header,) = (each.name for each in written if each.name.endswith("drive.h"))
                     written.append(exporting.compiled_c(c, header))
-                for made in written:
-                    note(f"C: {made}")
-            if wasm is not None:
-                save(wasm, "WebAssembly", lambda path: exporting.wasm(chosen, path, step=own))
+            for made in written:
+                note(f"C: {made}")
+        if wasm is not None:
+            save(wasm, "WebAssembly", lambda path: exporting.wasm(chosen, path, step=own))
     drive.warn()
     for line in drive.changes:
         note(line)

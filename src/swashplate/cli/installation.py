@@ -6,7 +6,9 @@ import os
 import platform
 import sys
 from importlib import metadata
+from importlib.util import find_spec
 from math import degrees
+from pathlib import Path
 
 import typer
 
@@ -30,6 +32,12 @@ FULL_SPEED_DEG_S = 196.0
 """At which the published hoist's step of 9 V ends: the swash plate's stop times Z10. [deg/s]"""
 DIGITS = 0.05
 """Half a unit of its last digit. [deg/s]"""
+WITHOUT_BYTE_CODE = (
+    "not kept for {names}: every start compiles their source again, for seconds. Run "
+    "'python -m compileall -q' on the folder of the installed packages, or unset "
+    "PYTHONDONTWRITEBYTECODE"
+)
+"""{names} are those of the libraries, or the package itself."""
 
 
 def doctor() -> None:
@@ -48,6 +56,8 @@ def doctor() -> None:
     made.add("cores", str(available_cores()), "")
     if os.environ.get("NUMBA_DISABLE_JIT", "0") != "0":
         made.add("NUMBA_DISABLE_JIT", "set", "nothing is compiled, all is a hundred times slower")
+    if sys.dont_write_bytecode and (names := _without_byte_code()):
+        made.add("byte code", "-", WITHOUT_BYTE_CODE.format(names=", ".join(names)))
     extras = {f"extra {name}": entry for name, entry in EXTRAS.items()}
     for what, (library, enables) in {**{e: (e, "") for e in LIBRARIES}, **extras}.items():
         try:
@@ -74,3 +84,16 @@ def doctor() -> None:
         note(f"Compiled kernels: {len(sizes)} files, {sum(sizes) / 1e6:.1f} MB, below {kept}")
     if not well:
         raise typer.Exit(1)
+
+
+def _without_byte_code() -> list[str]:
+    """Packages whose modules were never compiled to byte code, or were before they changed.
+
+    An installer may have left it out, as container images do to be small.
+    """
+    specs = {name: find_spec(name) for name in ("swashplate.cli.installation", *LIBRARIES)}
+    return [
+        name.partition(".")[0]
+        for name, spec in specs.items()
+        if spec is not None and spec.cached is not None and not Path(spec.cached).exists()
+    ]

@@ -176,7 +176,10 @@ class Shown:
 
 @contextmanager
 def working(text: str) -> Iterator[Status]:
-    """A spinner while something may take longer than a second; nothing in a pipe."""
+    """A spinner while something may take longer than a second; nothing in a pipe.
+
+    Not inside another one, nor inside `long_work`: rich before 14.1 refuses a second.
+    """
     with (
         side.status(f"{text} ...") as status,
         shown_by(Shown(lambda line: status.update(f"{line} ..."))),
