@@ -71,5 +71,5 @@ def test_the_page_gives_the_bounds_that_are_stated() -> None:
     """Those with a reason of their own."""
     page = (ROOT / "docs" / "environments.md").read_text("utf-8")
     bounds = {canonicalize_name(each.name): str(each.specifier)[2:] for each in STATED}
-    for name in ("SciPy", "Pint", "Polars", "pydantic", "npTDMS", "asammdf"):
+    for name in ("SciPy", "Pint", "Polars", "pydantic", "Rich", "Matplotlib", "npTDMS", "asammdf"):
         assert re.search(rf"{name} {re.escape(bounds[canonicalize_name(name)])}\b", page), name

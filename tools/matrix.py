@@ -105,7 +105,7 @@ def surroundings(environment: Environment) -> dict[str, str]:
         variables.pop(name, None)
     variables["XDG_CACHE_HOME"] = str(environment.folder / "cache")
     variables["PATH"] = f"{environment.executable.parent}{os.pathsep}{variables['PATH']}"
-    variables["PYTHONWARNINGS"] = "error" if environment.versions == "newest" else "default"
+    variables["PYTHONWARNINGS"] = "error" if environment.versions == "newest" else "ignore"
     return variables
 
 
@@ -157,7 +157,7 @@ def run_check(environment: Environment, check: Check) -> dict[str, Any]:
     log = environment.folder / f"{check.name.replace(' ', '-')}.log"
     words = list(check.words)
     if check.name == TESTS and environment.versions == "lowest":
-        words += ["-W", "default"]
+        words += ["-W", "ignore"]
     before = resource.getrusage(resource.RUSAGE_CHILDREN)
     with log.open("w", encoding="utf-8") as file:
         done = subprocess.run(
