@@ -14,6 +14,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from tests.identification.given import TWO_STAGES, virtual
 from typer.testing import CliRunner
@@ -321,6 +322,32 @@ def test_only_what_can_be_drawn_has_a_plot(work: Work) -> None:
     assert isinstance(TESTS[0].plot(), Figure)
     assert isinstance(work.campaign.experiments[0]["current"].plot(), Figure)
     assert isinstance(work.fitted.stages[0].runs[0].plot(), Figure)
+
+
+def test_a_prediction_shows_what_the_verdict_judges(work: Work) -> None:
+    hoist = Drive.preset("hoist").scale(Z16=1.2)
+    qualities = predict(hoist, work.campaign.experiments)
+    counts = next(each for each in qualities if each.channel == "counts")
+    position, speed, residual = counts.plot().axes
+    labels = [ax.get_ylabel() for ax in (position, speed, residual)]
+    assert labels == ["angle (deg)", "shaft speed (deg/s)", "residual (deg/s)"]
+
+    def curves(ax: Axes) -> list[Any]:
+        return [each.get_ydata() for each in ax.lines if len(each.get_xdata()) > 2]
+
+    measured, simulated = curves(speed)
+    (difference,) = curves(residual)
+    assert np.allclose(difference, simulated - measured, atol=1e-9)
+    # at the end of the plateau the filters' delay does not count
+    plateau = hoist.simulate(TESTS[0])
+    steady = np.degrees(np.interp(2.9, plateau.time, plateau["shaft_speed"]))
+    time = speed.lines[-1].get_xdata()
+    assert np.interp(2.9, time, simulated) == pytest.approx(steady, rel=1e-2)
+    current = next(each for each in qualities if each.channel == "current")
+    assert [ax.get_ylabel() for ax in current.plot(window=(1.0, 2.0)).axes] == [
+        "rectified current (A)",
+        "residual (mA)",
+    ]
 
 
 def test_a_frequency_response_is_shown_in_units_of_people() -> None:

@@ -212,14 +212,13 @@ class RunQuality(Result):
     def plot(
         self, *, window: tuple[float, float] | None = None, title: str | None = None
     ) -> Figure:
-        """Figure of what was measured and what is simulated, and below of their difference.
+        """Figure of what was measured and what is simulated, and of the residual that is judged.
 
-        With `window` as of `swashplate.report.figures.plot_channel`.
+        As of `swashplate.report.figures.plot_prediction`: of a position also the speed, by which
+        the verdict judges it.
         """
-        channel = self.experiment[self.channel]
-        words = f"{self.experiment.name}, {channel.name}" if title is None else title
-        draw = figures().plot_channel
-        return cast("Figure", draw(channel, self.simulated, window=window, title=words))
+        draw = figures().plot_prediction
+        return cast("Figure", draw(self, window=window, title=title))
 
 
 def run_qualities(problem: Problem, vector: Array) -> tuple[RunQuality, ...]:

@@ -1,4 +1,4 @@
-"""Figures of measured tests: the pages of a campaign, and one channel closely."""
+"""Figures of measured tests: a campaign, one channel closely, one channel against a model."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ from matplotlib.patches import Patch
 from matplotlib.ticker import MaxNLocator
 
 from swashplate.errors import InputError
+from swashplate.identification.validation import with_speeds
 from swashplate.report.lines import (
     COARSE,
     GAP_MARK,
@@ -53,6 +54,7 @@ from swashplate.units import DisplayUnit, display_unit
 
 if TYPE_CHECKING:
     from swashplate.campaign import Channel, Experiment, InputSignal
+    from swashplate.identification.validation import RunQuality
 
 # --- pages of a campaign --------------------------------------------------------------------------
 
@@ -362,3 +364,81 @@ def plot_channel(
         mark_gaps(ax, time)
     axes[-1].set_xlim(float(time[0]), float(time[-1]))
     return figure
+
+
+# --- one channel against a model ------------------------------------------------------------------
+
+WIDE, NARROW = 2.2, 1.3
+"""Widths of measured and simulated lines, which lie on one another for long. [pt]"""
+
+
+def plot_prediction(
+    quality: RunQuality,
+    *,
+    window: tuple[float, float] | None = None,
+    title: str | None = None,
+) -> Figure:
+    """Figure of one channel of a run, measured and simulated, and of the residual it is judged by.
+
+    Parameters
+    ----------
+    quality : RunQuality
+        The channel. Below a position stands the speed, by which it is judged: measured and
+        simulated positions go through the same filters. The lowest panel is the residual, simulated
+        less measured, of that speed; of a position from which no speed can be told, and of any
+        other channel, its own.
+    window : (float, float), optional
+        First and last instant to show [s]. Everything is computed from the whole record.
+
+    Raises
+    ------
+    InputError
+        If the window holds fewer than two samples.
+    """
+    signals = with_speeds((quality,))
+    channel = quality.experiment[quality.channel]
+    rows = rows_within(channel.time, window, str(channel.source))
+    time, used = channel.time[rows], channel.used[rows]
+    counted = used if used.any() else np.ones_like(used)
+    panels = [_overlay(each, rows) for each in signals]
+    judged = signals[-1]
+    residual = judged.residual[rows]
+    panels.append(Overlay("residual", judged.experiment[judged.channel].unit, [(residual, INK)]))
+    largest = [max(float(np.abs(v[counted]).max()) for v, _ in each.curves) for each in panels]
+    pairs = zip(panels, largest, strict=True)
+    units = [display_unit(panel.unit, size or 1.0) for panel, size in pairs]
+    labels = [unit.label(panel.words) for panel, unit in zip(panels, units, strict=True)]
+    legend = [handle("measured", BLUE, width=WIDE), handle("simulated", VERMILION, width=NARROW)]
+    words = f"{quality.experiment.name}, {channel.name}" if title is None else title
+    heights = [2.2] * len(signals) + [1.5]
+    figure, axes = sheet(heights, words, labels, "time (s)", legend=legend)
+    for ax, panel, unit in zip(axes, panels, units, strict=True):
+        shown = [unit.factor * values[counted] for values, _ in panel.curves]
+        low = min(float(each.min()) for each in shown)
+        high = max(float(each.max()) for each in shown)
+        room = 0.1 * (high - low) or 1.0
+        ax.set_ylim(low - room, high + room)
+        zero_line(ax)
+        for values, color in panel.curves:
+            width = WIDE if color == BLUE else NARROW
+            draw(ax, time, unit.factor * values, color, width=width)
+        shade(ax, stretches(time, ~used), IGNORED)
+        mark_gaps(ax, time)
+    axes[-1].set_xlim(float(time[0]), float(time[-1]))
+    return figure
+
+
+class Overlay(NamedTuple):
+    """Curves of one panel, SI, each with its colour."""
+
+    words: str
+    unit: str
+    curves: list[tuple[Array, str]]
+
+
+def _overlay(quality: RunQuality, rows: slice) -> Overlay:
+    """What was measured of a channel, and what is simulated on top of it."""
+    channel = quality.experiment[quality.channel]
+    words = channel.kind.replace("_", " ").replace("encoder counts", "angle")
+    curves = [(channel.values[rows], BLUE), (quality.simulated[rows], VERMILION)]
+    return Overlay(channel.name if channel.kind == "other" else words, channel.shown_unit, curves)
