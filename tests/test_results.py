@@ -264,10 +264,43 @@ def test_a_verdict_is_the_first_that_is_read(work: Work) -> None:
         assert all(escape(criterion.name) in html for criterion in verdict.criteria)
         assert html.count(escape(verdict.headline)) == 1
         assert len(repr(result)) <= LONGEST + 40
-    # the long tables are there, for those who open them
-    estimates = html.partition("<details>")[2]
-    assert work.fitted.stages[-1].problem.unknowns.names[0] in estimates
+    # estimates, then criteria that are not met or not judged; what is met is there to be opened
+    before, _, after = html.partition("<details>")
+    assert work.fitted.stages[-1].problem.unknowns.names[0] in before
+    states = {each.state: each for each in verdict.criteria}
+    assert before.index("Stage card") < before.index("Acceptance criteria")
+    assert before.index("Stage pump") < before.index(escape(states["not judged"].name) + "</td>")
+    assert f"{escape(states['met'].name)}</td>" not in before
+    assert f"{escape(states['met'].name)}</td>" in after
+    assert "The tests determine all 2 free parameters" in after
     assert "held-out runs" not in html  # there are none
+    # the free zeros of the runs' counts are in no table for people
+    zeros = [name for name in work.judged if name.startswith("offset")]
+    assert f"{len(zeros)} numbers of single runs, such as {zeros[0]}" in before
+    assert set(zeros) <= set(work.judged.to_polars()["parameter"])
+
+
+def test_profiles_folds_and_draws_show_tables(work: Work) -> None:
+    result = swashplate.identify(
+        work.campaign, Drive.preset("hoist"), TWO_STAGES, folds=3, bootstrap=40, profiles=["Z10"]
+    )
+    whole = result.summary()
+    (profile,) = result.profiles
+    lines = [line.split() for line in profile.summary().splitlines()]
+    values = [float(cells[0]) for cells in lines if cells[1:2] == ["1/s"]]
+    # the profile's ends are among its points, and its least cost is at the estimate
+    assert values == sorted(values)
+    assert values[0] < result["Z10"].value < values[-1]
+    rises = [float(cells[2]) for cells in lines if cells[1:2] == ["1/s"]]
+    assert min(rises) == 0.0
+    assert values[rises.index(0.0)] == pytest.approx(result["Z10"].value, rel=1e-3)
+    assert "Cross-validation" in result.folds.summary()
+    assert "Cross-validation" in whole
+    assert all(name in result.folds.summary() for name in result.fit.runs[0].channels)
+    draws = result.bootstraps["pump"]
+    (median,) = np.median(draws.values[:, [draws.variables.index("Z10")]], axis=0)
+    row = next(line for line in draws.summary().splitlines() if line.startswith("Z10"))
+    assert float(row.split()[2]) == pytest.approx(median, rel=1e-4)
 
 
 def test_a_run_says_what_the_command_prints() -> None:

@@ -101,8 +101,7 @@ class Result:
     def _repr_html_(self) -> str | None:
         headline, tables = self._headline(), self._tables()
         shown = "".join(table._repr_html_() for table in tables)
-        items = "".join(f"<li>{escape(sentence)}</li>" for sentence in self._sentences())
-        sentences = f"<ul>{items}</ul>" if items else ""
+        sentences = listing(self._sentences())
         if headline:
             return f"<p><strong>{escape(headline)}</strong></p>{sentences}{shown}"
         return f"{shown}{sentences}" or None
@@ -115,10 +114,16 @@ class Result:
         return "\n\n".join(part for part in parts if part)
 
 
-def folded(title: str, tables: Sequence[Table]) -> str:
-    """HTML of tables that are shown when a reader opens them by their title."""
+def listing(sentences: Sequence[str]) -> str:
+    """HTML of a list of sentences, empty if there are none."""
+    items = "".join(f"<li>{escape(sentence)}</li>" for sentence in sentences)
+    return f"<ul>{items}</ul>" if items else ""
+
+
+def folded(title: str, tables: Sequence[Table], sentences: Sequence[str] = ()) -> str:
+    """HTML of tables and sentences that are shown when a reader opens them by their title."""
     shown = "".join(table._repr_html_() for table in tables)
-    return f"<details><summary>{escape(title)}</summary>{shown}</details>"
+    return f"<details><summary>{escape(title)}</summary>{shown}{listing(sentences)}</details>"
 
 
 class Tabular(Result, ABC):

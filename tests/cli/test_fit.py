@@ -168,6 +168,18 @@ def test_all_that_can_be_asked_for_besides(done: Words, campaign: Path, tmp_path
     wanted = [float(linear[each]) for each in ("value", "lower", "upper")]
     assert found == pytest.approx(wanted, rel=0.01)
     assert "profile" in (tmp_path / "fitted" / "report.html").read_text("utf-8").lower()
+    # in Python the same is there
+    profiles = ["Z8", "J_plus"]
+    setup = tmp_path / "setup.toml"
+    result = swashplate.identify(campaign, None, setup, folds=2, bootstrap=40, profiles=profiles)
+    summary, printed = result.summary().partition("Stage card")[2], " ".join(said.split())
+    printed = printed.partition("Stage card")[2].partition("Acceptance criteria")[0]
+    sentences = [line for line in summary.splitlines() if re.match(r"(- |\w+: |Fixed at)", line)]
+    assert len(sentences) >= 8
+    assert [line for line in sentences if " ".join(line.split()) not in printed] == []
+    assert printed.count(" - ") == sum(line.startswith("- ") for line in sentences)
+    titles = ("bootstrap lower", "Profile likelihoods", "Runs that were fitted", "Cross-validation")
+    assert all(title in text for title in titles for text in (summary, printed))
 
 
 def test_a_result_that_is_of_no_use_ends_with_1(run, campaign, tmp_path) -> None:

@@ -192,35 +192,18 @@ def fit(
 
 def _say_fit(found: Identification) -> None:
     """What was found, stage by stage, and how well each run is followed."""
-    from swashplate.identification import tables
+    from swashplate.identification.tables import parts_of
 
-    for run in found.fit.runs:
-        for sentence in run.notes:
-            say(f"- {run.name}: {sentence}.")
-    for sentence in found.fit.doubts:
-        say(f"! {sentence}")
-    for each in found.fit.stages:
-        name, solution = each.stage.name, each.solution
-        bootstrap = found.bootstraps.get(name)
-        show(tables.estimates_table(each, bootstrap=bootstrap))
-        say(f"{name}: {solution.message} after {solution.evaluations} evaluations.")
-        drawn = () if bootstrap is None else bootstrap.sentences()
-        bullets(each.identifiability.sentences(), each.uncertainty.sentences(), drawn)
-        bullets(each.bounds_reached())
-    if found.profiles:
-        show(tables.profiles_table(found))
-    for profile in found.profiles:
-        bullets(profile.sentences())
-    say(tables.fixed_line(found.fit))
-    bullets(tables.unvalued_lines(found.fit))
-    note("\nRuns that were fitted")
-    show(*tables.runs_tables([quality for each in found.fit.stages for quality in each.runs]))
-    if found.predicted:
-        note("Runs that were held out and predicted")
-        show(*tables.runs_tables(found.predicted))
-    if found.folds is not None:
-        show(tables.folds_tables(found.folds, found.fit.stages)[0])
-        bullets(found.folds.sentences())
+    text_above = False
+    for part in parts_of(found):
+        if part.heading:
+            note(f"\n{part.heading}" if text_above else part.heading)
+        if part.tables:
+            show(*part.tables)
+        for remark in part.remarks:
+            say(remark)
+        bullets(part.sentences)
+        text_above = bool(part.remarks or part.sentences)
 
 
 def _written(found: Identification, out: Path) -> list[str]:

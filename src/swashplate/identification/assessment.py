@@ -7,6 +7,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from datetime import date
 from functools import cached_property
+from html import escape
 from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -128,18 +129,26 @@ class Identification(Estimated):
             return verdict(self.fit.stages, self.predicted, planned=planned, required=self.required)
 
     def tables(self) -> list[Table]:
-        """Criteria of the verdict, then the fit's tables and the errors of held-out runs."""
-        return [self.verdict.table(), *self.fit.tables(), *self._held_out_tables()]
+        """Criteria of the verdict, then estimates, profiles, errors of runs, cross-validation."""
+        shown = [table for part in tables.parts_of(self) for table in part.tables]
+        return [self.verdict.table(), *shown]
 
-    def _held_out_tables(self) -> list[Table]:
-        made = tables.runs_tables(self.predicted)
-        return [replace(table, title=f"{table.title}, held-out runs") for table in made]
+    def summary(self) -> str:
+        """Text: the verdict, then what the command ``fit`` prints."""
+        single = "\n".join(tables.single_runs_line(self.fit))
+        parts = [self.verdict.summary(), *map(str, tables.parts_of(self)), single]
+        return "\n\n".join(part for part in parts if part)
 
     def _repr_html_(self) -> str:
-        estimates = folded("Estimates, and errors of fitted runs", self.fit.tables())
-        held_out = self._held_out_tables()
-        errors = folded("Errors of held-out runs", held_out) if held_out else ""
-        return f"{self.verdict._repr_html_()}{estimates}{errors}"
+        parts, estimates, details = tables.parts_of(self), "", ""
+        for part in parts:
+            if part.opened:
+                estimates += "".join(table._repr_html_() for table in part.tables)
+            shown = () if part.opened else part.tables
+            details += folded(part.title, shown, [*part.remarks, *part.sentences])
+        for line in tables.single_runs_line(self.fit):
+            estimates += f"<p>{escape(line)}</p>"
+        return f"{self.verdict.html(estimates)}{details}"
 
     @property
     def headline(self) -> str:
@@ -466,8 +475,9 @@ def _loaded(
     found, profiles = Fit(file.setup, nominal, experiments, stages), list[Profile]()
     for each in file.profiles:
         stage, profile = (each.stage, each) if isinstance(each, Profile) else each
-        names = found.stage(stage).problem.unknowns.names
-        if not 0 <= profile.index < len(names):
+        unknowns = found.stage(stage).problem.unknowns
+        if not 0 <= profile.index < len(unknowns.names):
             raise FileError(f"{path}: stage {stage} has no parameter {profile.index + 1}.")
-        profiles.append(replace(profile, stage=stage, name=names[profile.index]))
+        name, unknown = unknowns.names[profile.index], unknowns.items[profile.index]
+        profiles.append(replace(profile, stage=stage, name=name, unknown=unknown))
     return Identification(campaign, found, {}, profiles, file.folds, file.notes)

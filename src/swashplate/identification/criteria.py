@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from html import escape
 from math import inf, isfinite, isinf
 from typing import TYPE_CHECKING, Literal, NamedTuple
 
@@ -32,7 +33,7 @@ from swashplate.identification.validation import (
     percent,
     pooled,
 )
-from swashplate.results import Result
+from swashplate.results import Result, folded, listing
 from swashplate.tables import Column, Table, listed
 
 if TYPE_CHECKING:
@@ -130,6 +131,19 @@ class Verdict(Result):
             state = "NOT MET" if each.failure else each.state
             made.add(each.name, each.value, each.limit, state, each.reason, look=state != "met")
         return made
+
+    def html(self, between: str = "") -> str:
+        """HTML: headline and sentences, other HTML, criteria; those that are met are folded."""
+        table = self.table()
+        opened = replace(table, rows=[row for row in table.rows if row.look])
+        met = replace(table, title="", rows=[row for row in table.rows if not row.look])
+        headline = f"<p><strong>{escape(self.headline)}</strong></p>"
+        unmet = opened._repr_html_() if opened.rows else ""
+        kept = folded(f"Criteria that are met: {len(met.rows)}", [met]) if met.rows else ""
+        return f"{headline}{listing(self.remarks())}{between}{unmet}{kept}"
+
+    def _repr_html_(self) -> str:
+        return self.html()
 
     def remarks(self) -> list[str]:
         """What it holds for, what asks for attention, what is open and what is assumed."""

@@ -259,18 +259,15 @@ class Fit(Estimated):
     def sentences(self) -> tuple[str, ...]:
         """How each stage ended, what its estimates lack, and what stayed fixed."""
         said = list(self.doubts)
-        for each in self.stages:
-            found = each.solution
-            said.append(
-                f"{each.stage.name}: {found.message} after {found.evaluations} evaluations."
-            )
-            said += [*each.identifiability.sentences(), *each.uncertainty.sentences()]
-            said += each.bounds_reached()
+        for part in map(tables.stage_part, self.stages):
+            said += [*part.remarks, *part.sentences]
         names = {each for stage in self.stages for each in stage.problem.unknowns.names}
         if jumps := sum(each.startswith(EDGE) for each in names):
             many = count(jumps, "time")
             said.append(f"Commands jump {many} between two samples: when is estimated.")
-        return (*said, tables.fixed_line(self), *tables.unvalued_lines(self))
+        said += tables.single_runs_line(self)
+        fixed = tables.fixed_part(self)
+        return (*said, *fixed.remarks, *fixed.sentences)
 
 
 def fit(

@@ -14,9 +14,10 @@ from swashplate.executors import Executor, Serial
 from swashplate.identification.drive_model import DriveModel
 from swashplate.identification.problem import TOLERANCE, LinearisedFit, Problem
 from swashplate.identification.solving import solve
-from swashplate.identification.unknowns import Vector
+from swashplate.identification.unknowns import Unknown, Vector
 from swashplate.progress import counted
 from swashplate.results import Result
+from swashplate.tables import UNIT, Column, Table
 
 if TYPE_CHECKING:
     from swashplate.identification.fitting import StageFit
@@ -75,6 +76,24 @@ class Profile(Result):
     """The unknown's."""
     stage: str = ""
     """That of the unknown."""
+    unknown: Unknown | None = None
+    """By which its numbers are values; None if only the solver's numbers are given."""
+
+    def tables(self) -> list[Table]:
+        """The points: value, and rise of the cost over that at an interval's end."""
+        if self.unknown is None:
+            return []
+        columns = (Column(self.name, ".5g"), UNIT, Column("rise of the cost", ".2f", "1"))
+        made = Table(
+            f"Profile likelihood of {self.name}, stage {self.stage}",
+            columns,
+            "A rise of 1 ends the 95 % interval.",
+            si=True,
+        )
+        for point in self.points:
+            rise = (point.cost - self.cost) / self.rise
+            made.add(self.unknown.to_value(point.number), rise, unit=self.unknown.unit)
+        return [made]
 
     def sentences(self) -> tuple[str, ...]:
         """What stands in the way of an interval, if anything does."""
@@ -407,7 +426,8 @@ def profiles_of(
     words = f"Profiling {stage.stage.name}"
     for position, each in counted(profiles, len(chosen), "parameters", words):
         name = variables.names[chosen[position]]
-        made[name] = replace(each, name=name, stage=stage.stage.name)
+        unknown = problem.unknowns.items[chosen[position]]
+        made[name] = replace(each, name=name, stage=stage.stage.name, unknown=unknown)
         if watch is not None:
             watch(len(made))
     return {variables.names[k]: made[variables.names[k]] for k in chosen}

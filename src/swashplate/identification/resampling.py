@@ -14,6 +14,7 @@ from scipy.fft import irfft, next_fast_len, rfft
 from swashplate.campaign.experiment import Experiment
 from swashplate.errors import DomainError, InputError
 from swashplate.executors import Executor, Serial
+from swashplate.identification import tables
 from swashplate.identification.drive_model import (
     DriveModel,
     Parameters,
@@ -31,6 +32,7 @@ from swashplate.identification.validation import Measures, measures, predict, wi
 from swashplate.parameters.parameter_set import ParameterSet
 from swashplate.progress import counted
 from swashplate.results import Result
+from swashplate.tables import Table
 
 Array = NDArray[np.float64]
 
@@ -64,6 +66,10 @@ class CrossValidation(Result):
     """Measures of each channel over all runs, each predicted by a fit that did not see it."""
     units: Mapping[str, str]
     """SI unit of each channel."""
+
+    def tables(self) -> list[Table]:
+        """Errors held out, by channel, and the folds."""
+        return tables.folds_tables(self)
 
     def sentences(self) -> tuple[str, ...]:
         """What must be known besides the numbers."""
@@ -290,6 +296,10 @@ class Bootstrap(Result):
             (float(low), float(high)) if known else None
             for low, high, known in zip(*ends, self.determined, strict=True)
         )
+
+    def table(self) -> Table:
+        """Median and spread of the draws of each unknown of the machine, and its interval."""
+        return tables.bootstrap_table(self)
 
     def sentences(self) -> tuple[str, ...]:
         """How it was done, and what failed."""

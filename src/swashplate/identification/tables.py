@@ -8,7 +8,9 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping, Sequence
 from math import inf
 from types import MappingProxyType
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
 
 from swashplate.errors import InputError
 from swashplate.identification.determination import GAUGES, without_value
@@ -25,6 +27,7 @@ from swashplate.tables import (
     Cell,
     Column,
     Table,
+    count,
     joined,
     listed,
     percent,
@@ -139,6 +142,23 @@ def profiles_table(found: Identification) -> Table:
         numbers = (float(stage.solution.vector[one.index]), *ends_found)
         values = (None if each is None else unknown.to_value(each) for each in numbers)
         made.add(one.stage, one.name, *values, unit=unknown.unit)
+    return made
+
+
+def bootstrap_table(found: Bootstrap) -> Table:
+    """Median and 95 % interval of the draws of each unknown of the machine."""
+    ends = f"{100.0 * LEVEL:g} %"
+    lower, upper = (Column(f"{side} {ends}", ".5g", none=NONE) for side in ("lower", "upper"))
+    made = Table("Bootstrap", (Column("parameter"), UNIT, Column("median", ".5g"), lower, upper))
+    made.si = True
+    medians = np.median(found.values, axis=0)
+    try:
+        intervals = found.intervals()
+    except InputError:  # too few draws
+        intervals = (None,) * medians.size
+    for unknown, median, interval in zip(found.variables, medians, intervals, strict=True):
+        if unknown.run is None:
+            made.add(unknown.name, float(median), *(interval or (None, None)), unit=unknown.unit)
     return made
 
 
@@ -375,8 +395,9 @@ def ignored_words(experiment: Experiment, channel: Channel) -> str:
 # --- cross-validation -----------------------------------------------------------------------------
 
 
-def folds_tables(found: CrossValidation, stages: Sequence[StageFit]) -> list[Table]:
-    """Errors held out beside those of the fit to all runs, and the folds."""
+def folds_tables(found: CrossValidation, stages: Sequence[StageFit] = ()) -> list[Table]:
+    """Errors held out, beside those of the fit to all runs if its stages are given; the folds."""
+    fitted_columns = "tpf" if stages else ""
     whole = pooled(with_speeds(each for stage in stages for each in stage.runs))
     held_out = Table(
         "Cross-validation: each part predicted by a fit to the others",
@@ -384,9 +405,9 @@ def folds_tables(found: CrossValidation, stages: Sequence[StageFit]) -> list[Tab
             Column("channel"),
             Column("fit %", ".2f", "1", none="-"),
             Column("RMSE held out", ".3g"),
-            Column("RMSE fitted", ".3g", none=NONE),
+            Column("RMSE fitted", ".3g", none=NONE, of=fitted_columns),
             UNIT,
-            Column("ratio", ".2f", "1", none=NONE),
+            Column("ratio", ".2f", "1", none=NONE, of=fitted_columns),
             Column("samples", ",d", "1", of="pf"),
         ),
     )
@@ -406,3 +427,82 @@ def folds_tables(found: CrossValidation, stages: Sequence[StageFit]) -> list[Tab
         )
         folds.add(fold.number + 1, ", ".join(fold.held), state, ", ".join(fits) or NONE)
     return [held_out, folds]
+
+
+# --- a fit as it is read --------------------------------------------------------------------------
+
+
+class Part(NamedTuple):
+    """A part of what a fit says, as the command, a summary and a notebook show it."""
+
+    title: str
+    """Of the part in a notebook."""
+    tables: Sequence[Table] = ()
+    remarks: Sequence[str] = ()
+    """Lines below the tables,"""
+    sentences: Sequence[str] = ()
+    """and a list below these."""
+    heading: str = ""
+    """Line above the tables where they do not say what they are of."""
+    opened: bool = False
+    """Whether a notebook shows its tables without being asked."""
+
+    def __str__(self) -> str:
+        listing = (f"- {sentence}" for sentence in self.sentences)
+        lines = "\n".join([*self.remarks, *listing])
+        blocks = [self.heading, *(str(table) for table in self.tables), lines]
+        return "\n\n".join(block for block in blocks if block)
+
+
+def stage_part(stage: StageFit, bootstrap: Bootstrap | None = None) -> Part:
+    """Estimates of a stage, how it ended, and what its estimates lack."""
+    name, solution = stage.stage.name, stage.solution
+    return Part(
+        f"How stage {name} ended, and what its intervals are worth",
+        [estimates_table(stage, bootstrap=bootstrap)],
+        [f"{name}: {solution.message} after {solution.evaluations} evaluations."],
+        [
+            *stage.identifiability.sentences(),
+            *stage.uncertainty.sentences(),
+            *(() if bootstrap is None else bootstrap.sentences()),
+            *stage.bounds_reached(),
+        ],
+        opened=True,
+    )
+
+
+def fixed_part(fit: Fit) -> Part:
+    """What stayed as it was, and what has no value of its own."""
+    return Part("Fixed parameters", (), [fixed_line(fit)], unvalued_lines(fit))
+
+
+def parts_of(found: Identification) -> list[Part]:
+    """What a fit says besides its verdict, in the order in which the command prints it."""
+    fit = found.fit
+    notes = [f"{run.name}: {sentence}." for run in fit.runs for sentence in run.notes]
+    doubts = [f"! {sentence}" for sentence in fit.doubts]
+    made = [Part("Runs", (), (), notes), Part("Doubts", (), doubts)]
+    made += [stage_part(each, found.bootstraps.get(each.stage.name)) for each in fit.stages]
+    if found.profiles:
+        said = [sentence for profile in found.profiles for sentence in profile.sentences()]
+        made.append(Part("Profile likelihoods", [profiles_table(found)], (), said))
+    made.append(fixed_part(fit))
+    fitted = runs_tables([quality for each in fit.stages for quality in each.runs])
+    made.append(Part("Errors of fitted runs", fitted, heading="Runs that were fitted"))
+    if found.predicted:
+        heading = "Runs that were held out and predicted"
+        made.append(Part("Errors of held-out runs", runs_tables(found.predicted), heading=heading))
+    if found.folds is not None:
+        held_out = folds_tables(found.folds, fit.stages)[:1]
+        made.append(Part("Cross-validation", held_out, (), found.folds.sentences()))
+    return [part for part in made if part.tables or part.remarks or part.sentences]
+
+
+def single_runs_line(fit: Fit) -> list[str]:
+    """A sentence on the numbers of single runs, which no table for people shows, if any."""
+    unknowns = [unknown for each in fit.stages for unknown in each.problem.unknowns]
+    names = [f"{each.name} ({each.run})" for each in unknowns if each.run is not None]
+    if not names:
+        return []
+    many = count(len(names), "number of a single run", "numbers of single runs")
+    return [f"Estimated, too: {many}, such as {names[0]}; all are in to_pandas()."]
