@@ -228,6 +228,14 @@ def test_a_figure_of_chosen_signals() -> None:
     run.plot("shaft_speed", ax=axes, label="as it is")
     Drive.preset("hoist").scale(Z10=1.2).simulate(TESTS[0]).plot(ax=axes, label="faster")
     assert [each.get_label() for each in axes.lines] == ["as it is", "faster"]
+    legend = axes.get_legend()
+    assert legend is not None
+    assert [each.get_text() for each in legend.get_texts()] == ["as it is", "faster"]
+    colors = [each.get_color() for each in legend.get_lines()]
+    assert colors == [each.get_color() for each in axes.lines]
+    bare = Figure().subplots()
+    run.plot("shaft_speed", ax=bare)
+    assert bare.get_legend() is None
     assert np.allclose(axes.lines[0].get_ydata(), np.degrees(run.shaft_speed))
     with pytest.raises(InputError, match="1 axes for 2 signals"):
         run.plot(["current", "shaft_speed"], ax=axes)

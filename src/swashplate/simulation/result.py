@@ -303,7 +303,7 @@ class Simulation(Run):
         ax : matplotlib axes or sequence of them, optional
             Where to draw the signals, one for each; the shaft's speed if none is named.
         label : str
-            Of the curves, for a legend.
+            Of the curves: each panel gets a legend of all labelled curves in it.
         window : (float, float), optional
             Of the chain, first and last instant to show. [s]
         title : str, optional

@@ -189,7 +189,7 @@ class Run(Tabular):
         ax : matplotlib axes or sequence of them, optional
             Where to draw the signals, one for each; by default in a new figure.
         label : str
-            Of the curves, for a legend.
+            Of the curves: each panel gets a legend of all labelled curves in it.
 
         Returns
         -------

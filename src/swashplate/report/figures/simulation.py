@@ -39,6 +39,7 @@ from swashplate.report.style import (
     given_axes,
     handle,
     label_margin,
+    legend_within,
     new_figure,
     root_figure,
     sheet,
@@ -175,7 +176,7 @@ def plot_signals(
     ax : matplotlib axes or sequence of them, optional
         One for each signal; by default a new figure's.
     label : str
-        Of the curves, for a legend.
+        Of the curves: each panel gets a legend of all labelled curves in it.
 
     Returns
     -------
@@ -199,6 +200,9 @@ def plot_signals(
             words, factor = unit.label(words), unit.factor
         place.plot(run.time, factor * value, label=label or None)
         place.set_ylabel(words)
+        # with those of the lines that were there before
+        if label:
+            legend_within(place, place.get_legend_handles_labels()[0])
     axes[-1].set_xlabel("time (s)")
     return root_figure(axes[0]) if ax is None else ax
 
