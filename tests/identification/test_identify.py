@@ -136,7 +136,8 @@ def test_a_folder_comes_back_with_the_same_interface(
 
 
 def test_a_report_is_written(result: Identification, tmp_path: Path) -> None:
-    result.report(tmp_path / "report.html", truth=Drive.preset("hoist"))
+    page = tmp_path / "report.html"
+    assert result.report(page, truth=Drive.preset("hoist")) == page
     page = (tmp_path / "report.html").read_text("utf-8")
     assert "Usable" in result.verdict.headline
     assert "Usable" in page

@@ -160,7 +160,7 @@ class Identification(Estimated):
         """What the verdict says below its table."""
         return tuple(self.verdict.remarks())
 
-    def report(self, path: str | Path, *, truth: Drive | ParameterSet | None = None) -> None:
+    def report(self, path: str | Path, *, truth: Drive | ParameterSet | None = None) -> Path:
         """Write the report: one HTML file, whole or not at all, that needs no network.
 
         Parameters
@@ -169,6 +169,11 @@ class Identification(Estimated):
             The file, which replaces an older one.
         truth : Drive or ParameterSet, optional
             What virtual tests were simulated with; it stands beside the estimates.
+
+        Returns
+        -------
+        Path
+            The file.
 
         Raises
         ------
@@ -179,6 +184,7 @@ class Identification(Estimated):
         pages = import_module("swashplate.report.fit_report")
         true = truth.parameters if isinstance(truth, Drive) else truth
         pages.write_fit_report(self, path, truth=true)
+        return Path(path)
 
     def save(self, folder: str | Path) -> tuple[Path, ...]:
         """Write the folder that `load`, `Drive.from_toml` and every command read.
