@@ -348,7 +348,7 @@ def test_a_fit_comes_back_with_its_model_alone(tmp_path: Path) -> None:
     tests, path = campaign(*RUNS), tmp_path / "fit.json"
     made = fit(servo, tests, RANGES, noise=NOISE)
     Identification(tests, made).save(tmp_path)
-    with pytest.raises(InputError, match="give that, with --model"):
+    with pytest.raises(InputError, match=r"user-defined.* Python by model=.*--model FILE"):
         Identification.load(path, tests)
     with pytest.raises(InputError, match="another model, or of other bounds"):
         Identification.load(

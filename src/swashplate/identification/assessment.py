@@ -456,7 +456,10 @@ def _loaded(
     if isinstance(file.nominal, str):
         nominal = read_set(file.nominal, str(path))
     elif model is None:
-        raise InputError(f"{path} is the fit of a model of your own: give that, with --model FILE.")
+        raise InputError(
+            f"{path} is the fit of a user-defined model, which it does not hold: give the model, "
+            "in Python by model=, on the command line by --model FILE."
+        )
     else:
         nominal = model.nominal(experiments)
     if isinstance(nominal, ModelSetup) and nominal.setup != file.setup:
