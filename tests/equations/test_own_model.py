@@ -95,6 +95,14 @@ def test_simulation_is_the_loop_by_hand() -> None:
     run = simulate(valve, P, {"command": COMMAND}, RATE, given=STROKE)
     assert run["position"] == pytest.approx(by_hand(P), abs=1e-9)
     assert run.names == ("time", "command", "opening", "position")
+    assert run.to_polars("SI").columns == list(run.names)
+
+
+@pytest.mark.parametrize("method", ["to_polars", "to_pandas"])
+def test_units_that_no_signal_has_are_refused(method: str) -> None:
+    run = simulate(valve, P, {"command": COMMAND}, RATE, given=STROKE)
+    with pytest.raises(InputError, match=r"run of \S+ has one .* units is 'display', .*'SI'"):
+        getattr(run, method)(units="display")
 
 
 class Stops(NamedTuple):

@@ -9,7 +9,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from math import ceil, floor
-from typing import TYPE_CHECKING, cast
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -161,11 +161,9 @@ class FullOrderSimulation(Run, Tabular):
         m = self.plant.machine
         return _beyond(self.swash_angle, -m.swash_stop_minus, m.swash_stop_plus)
 
-    def to_polars(self) -> polars.DataFrame:
-        """Table of time, all signals and the limits that hold."""
-        import polars as pl
-
-        return pl.DataFrame({name: getattr(self, name) for name in (*self.names, *HOLDS)})
+    def columns(self) -> dict[str, NDArray[Any]]:
+        """Time, all signals and the limits that hold, by name."""
+        return {name: getattr(self, name) for name in (*self.names, *HOLDS)}
 
 
 SIGNAL_UNITS = {

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from swashplate.equations.marching.use import Run, read_only
 from swashplate.errors import InputError
 from swashplate.models.displacement_control import Pump
-from swashplate.results import GivenAxes, figures, pandas_frame
+from swashplate.results import GivenAxes, figures
 from swashplate.tables import UNIT, Column, Table, share_cell
 from swashplate.units import SHAFT_ANGLE, display_unit
 
@@ -258,16 +258,6 @@ class Simulation(Run):
         if units != "display":
             raise InputError(f"units is {units!r}; it is 'SI' or 'display'.")
         return frame.select(map(_displayed, frame.iter_columns()))
-
-    def to_pandas(self, units: Literal["SI", "display"] = "SI") -> Any:
-        """The table of `to_polars` as a ``pandas.DataFrame``.
-
-        Raises
-        ------
-        InputError
-            If pandas is not installed.
-        """
-        return pandas_frame(self.to_polars(units))
 
     @overload
     def plot(

@@ -13,6 +13,7 @@ from typing import (
     Any,
     ClassVar,
     Generic,
+    Literal,
     NamedTuple,
     Self,
     TypeVar,
@@ -49,7 +50,7 @@ from swashplate.equations.marching.run import (
 from swashplate.equations.marching.stepping import CompiledStep, Machine
 from swashplate.equations.model import Model, parameter_paths
 from swashplate.errors import DomainError, InputError, UnknownNameError
-from swashplate.results import GivenAxes, Tabular, figures
+from swashplate.results import GivenAxes, Tabular, figures, pandas_frame
 
 if TYPE_CHECKING:
     import polars
@@ -199,12 +200,42 @@ class Run(Tabular):
         chosen = chosen or self.shown or tuple(name for name in self.names if name != "time")
         return cast("Figure", figures().plot_signals(self, chosen, ax=ax, label=label))
 
-    def to_polars(self) -> polars.DataFrame:
-        """Table of time, all signals and a true/false column ``limit_NAME`` for each limit, SI."""
+    def to_polars(self, units: Literal["SI", "display"] = "SI") -> polars.DataFrame:
+        """Table of time, all signals and a true/false column ``limit_NAME`` for each limit, SI.
+
+        Parameters
+        ----------
+        units : "SI"
+            No others are known of a model's signals; a `Simulation` of a drive knows them.
+
+        Raises
+        ------
+        InputError
+            For other units.
+        """
+        if units != "SI":
+            raise InputError(
+                f"A run of {self.name} has one set of units, that of its equations: units is "
+                f"{units!r}, leave it out or give 'SI'."
+            )
         import polars as pl
 
+        return pl.DataFrame(self.columns())
+
+    def columns(self) -> dict[str, NDArray[Any]]:
+        """Columns of the table of `to_polars`, by name."""
         limits = {f"limit_{name}": self.active(name) for name in self.limit_names}
-        return pl.DataFrame({name: self[name] for name in self.names} | limits)
+        return {name: self[name] for name in self.names} | limits
+
+    def to_pandas(self, units: Literal["SI", "display"] = "SI") -> Any:
+        """The table of `to_polars` as a ``pandas.DataFrame``.
+
+        Raises
+        ------
+        InputError
+            For units that the table cannot have, or if pandas is not installed.
+        """
+        return pandas_frame(self.to_polars(units))
 
     def __getitem__(self, signal: str) -> Array:
         """A signal by its name, SI: ``run["shaft_speed"]``.
