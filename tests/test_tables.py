@@ -325,3 +325,15 @@ def test_a_link_is_replaced_and_what_it_points_to_stays(tmp_path):
     assert not (tmp_path / "a.csv").is_symlink()
     assert (tmp_path / "elsewhere.csv").read_text() == "old"
     assert stat.S_IMODE((tmp_path / "a.csv").stat().st_mode) == 0o600
+
+
+def test_a_head_of_two_lines_stands_above_its_column_as_text() -> None:
+    table = Table(
+        "", (Column("limit"), Column("error without it\n", ".3f", "rad/s"), Column("share", ".0%"))
+    )
+    table.add("orifice", 0.5, 0.25)
+    first, second, row = str(table).splitlines()
+    assert first.split() == ["error", "without", "it"]
+    assert second.split() == ["limit", "deg/s", "share"]
+    assert len(first) <= len(second) <= len(row)
+    assert first.endswith("error without it")

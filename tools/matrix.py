@@ -32,7 +32,16 @@ PAGE = ROOT / "docs" / "environments.md"
 BEGIN, END = "<!-- table: begin -->", "<!-- table: end -->"
 
 PYTHONS = ("3.11", "3.12", "3.13", "3.14")
-TEST_TOOLS = ("hypothesis", "jupytext", "pytest", "pytest-xdist", "sympy", "wasmtime")
+TEST_TOOLS = (
+    "hypothesis",
+    "ipykernel",
+    "jupytext",
+    "nbclient",
+    "pytest",
+    "pytest-xdist",
+    "sympy",
+    "wasmtime",
+)
 SHOWN = ("numpy", "scipy", "numba", "pint", "rich")
 """Libraries whose versions the table gives."""
 

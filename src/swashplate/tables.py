@@ -162,7 +162,11 @@ class Table:
     def __str__(self) -> str:
         """The table as plain text, numbers to the right."""
         shown = self.of("t")
-        lines = [shown.heads(), *map(shown.texts, shown.rows)]
+        heads = [[line.strip() for line in head.split("\n")] for head in shown.heads()]
+        height = max(map(len, heads), default=1)
+        # a head of fewer lines stands right above its column
+        stacked = [[*[""] * (height - len(head)), *head] for head in heads]
+        lines = [*zip(*stacked, strict=True), *map(shown.texts, shown.rows)]
         sizes = [max(map(len, cells)) for cells in zip(*lines, strict=True)]
         right = [">" if each.spec else "<" for each in shown.columns]
         text = [

@@ -110,8 +110,8 @@ def test_a_speed_that_was_wanted_and_a_load(hoist: Drive) -> None:
     assert limit_shares(leaking, SINE, load_torque=3e4, wanted=run).error == 0.0
     found = limit_shares(leaking, SINE, load_torque=3e4, wanted=np.zeros(SINE.size))
     assert found.error == pytest.approx(rms(run))
-    assert "from the wanted speed" in found.sentences()[0]
-    assert "from the speed of a drive without limits" in limit_shares(hoist, SINE).sentences()[0]
+    assert "against the wanted speed" in found.sentences()[0]
+    assert "against a drive without limits" in limit_shares(hoist, SINE).sentences()[0]
     (delay,) = (each for each in found.shares if each.limit == "delay")
     without = leaking.replace(tau=0.0).simulate(SINE, load_torque=3e4).shaft_speed
     assert delay.error == pytest.approx(rms(without), rel=1e-12)

@@ -172,6 +172,14 @@ def test_the_speed_limit_goes_with_the_pump_alone(hoist, task):
     assert result.sentences[1].startswith("all variants: no creep, the command does not rest")
 
 
+def test_a_maneuver_is_a_command(hoist):
+    step = maneuvers.step(4.0, start=0.1, stop=1.0, length=2.0)
+    sampled = what_if(hoist, {"pump": 1.5}, trial(hoist, step.sample(512.0)))
+    found = what_if(hoist, {"pump": 1.5}, step)
+    assert np.array_equal(found.trial.voltage, step.sample(512.0))
+    assert found.summary() == sampled.summary()
+
+
 @pytest.mark.parametrize(
     ("call", "said"),
     [
@@ -183,6 +191,7 @@ def test_the_speed_limit_goes_with_the_pump_alone(hoist, task):
             "Z15 is inf, which the factor 0 cannot change",
         ),
         (lambda d, t: what_if(d, {}, t), "at least one lever"),
+        (lambda d, t: what_if(d, {"pump": "1.5"}, t), "factor on pump is the text '1.5'"),
         (lambda d, t: find_outcomes(["rise_tim"]), r"'rise_tim' \(did you mean rise_time\?\)"),
         (lambda d, t: trial(d, [3.0, 3.0]), "stays at 3 V"),
         (lambda d, t: trial(d, [0.0, 11.0]), "within ±10 V"),

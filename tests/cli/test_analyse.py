@@ -2,6 +2,7 @@
 
 import re
 import tomllib
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -211,3 +212,27 @@ def test_numbers_are_those_of_the_functions(done, tmp_path):
     done("linearize", "slew", "--at", "2", "--sample-time", "0.01", "--out", "slew.toml")
     written = tomllib.loads((tmp_path / "slew.toml").read_text("utf-8"))
     np.testing.assert_array_equal(written["A"], slew.linearize(2.0).discrete(0.01).A)
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        ("simulate", "short.toml", "step:9"),
+        ("size", "short.toml", "--speed-deg-s", "200"),
+        ("whatif", "short.toml", "--scale", "pump=1.1", "--maneuver", "step:9"),
+        ("export", "short.toml", "--c", "c"),
+    ],
+    ids=lambda words: words[0],
+)
+def test_what_no_test_reached_is_called_extrapolated(done, tmp_path, command):
+    """A swash stop that lies at the end of the tests or beyond decides the speed at 9 V."""
+    parameters = replace(Drive.preset("hoist").parameters, unreached={"Z13_plus": 0.2})
+    Drive(parameters).to_toml(tmp_path / "short.toml")
+    printed = " ".join(done(*command).split())
+    assert "No test of this drive reached Z13_plus" in printed
+    # who gives the number knows it
+    if command[0] != "whatif":
+        given = " ".join(
+            done(*command[:2], "--force", "--set", "Z13_plus=0.27", *command[2:]).split()
+        )
+        assert "No test" not in given

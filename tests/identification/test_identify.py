@@ -221,6 +221,11 @@ REFUSED: Mapping[str, tuple[Callable[[Campaign], object], type[Exception], str]]
         InputError,
         "no axis 'slew'; it has hoist",
     ),
+    "logs instead of a campaign": (
+        lambda tests: swashplate.identify(["up.csv", "down.csv"]),
+        InputError,
+        "draft_campaign",
+    ),
     "several axes": (
         lambda tests: swashplate.identify(two_axes(tests)),
         InputError,

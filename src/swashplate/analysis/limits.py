@@ -123,7 +123,7 @@ class LimitShares(Tabular):
     error: float
     """Rms tracking error of the drive as it is. [rad/s]"""
     shares: tuple[LimitShare, ...]
-    reference: str = "the speed of a drive without limits"
+    reference: str = "a drive without limits"
     """What is compared with, in words."""
     unseen: tuple[str, ...] = ()
     """Columns of limits that act here and that no test of the drive reached."""
@@ -139,8 +139,8 @@ class LimitShares(Tabular):
         if first is not None and first.error is not None:
             share = 1.0 - first.error / self.error
             said = [
-                f"Change first: {first.component}. Without this limit the rms difference from "
-                f"{self.reference} falls by {100.0 * share:.1f} % to "
+                f"Change first: {first.component}. Without this limit the rms error of the "
+                f"speed, against {self.reference}, falls by {100.0 * share:.1f} % to "
                 f"{quantity(first.error, 'rad/s', spec='.3f')}."
             ]
         if self.unseen:

@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from swashplate.analysis.capability import saturation
 from swashplate.drive import Drive
 from swashplate.errors import InputError
+from swashplate.maneuvers import Maneuver, sampled
 from swashplate.parameters.rules import FULL_VOLTAGE
 from swashplate.results import Result
 from swashplate.tables import UNIT, Column, Table
@@ -70,7 +71,11 @@ def first_move(voltage: Array) -> int:
 
 
 def trial(
-    drive: Drive, voltage: ArrayLike, rate: float = 512.0, *, wanted: ArrayLike | None = None
+    drive: Drive,
+    voltage: ArrayLike | Maneuver,
+    rate: float = 512.0,
+    *,
+    wanted: ArrayLike | None = None,
 ) -> Trial:
     """A command to judge drives by.
 
@@ -78,7 +83,7 @@ def trial(
     ----------
     drive : Drive
         The drive as it is.
-    voltage : (n,) array_like
+    voltage : (n,) array_like or Maneuver
         Command. [V]
     rate : float
         Samples a second. [Hz]
@@ -92,7 +97,7 @@ def trial(
         If the command is no row of at least two numbers within ±10 V that changes, or the wanted
         speed is not as long.
     """
-    volts = np.array(voltage, dtype=np.float64)
+    volts = np.array(sampled(voltage, rate), dtype=np.float64)
     if volts.ndim != 1 or volts.size < 2 or not (np.abs(volts) <= FULL_VOLTAGE).all():
         raise InputError("A command needs two samples or more, in one row, within ±10 V.")
     if (volts == volts[0]).all():

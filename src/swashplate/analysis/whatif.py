@@ -18,8 +18,10 @@ from swashplate.analysis.outcomes import (
     meant,
     outcome_matrix,
 )
+from swashplate.analysis.outcomes import trial as trial_of
 from swashplate.drive import Drive
 from swashplate.errors import DomainError, InputError, ParameterError
+from swashplate.maneuvers import Maneuver
 from swashplate.parameters.definitions import CATALOGUE, COLUMNS, REFINEMENTS, columns_of
 from swashplate.parameters.rules import FULL_VOLTAGE
 from swashplate.results import GivenAxes, Result, figures
@@ -142,6 +144,8 @@ def pulled(drive: Drive, factors: Mapping[str, float]) -> Drive:
     numbers, moved = drive.parameters.numbers, dict[str, float]()
     for name, factor in factors.items():
         powers = find_lever(name)
+        if isinstance(factor, str):
+            raise InputError(f"The factor on {name} is the text {factor!r}, but must be a number.")
         if not factor >= 0.0:
             raise InputError(f"The factor on {name} is {factor:g}, but must be 0 or more.")
         for symbol, power in powers.items():
@@ -254,7 +258,7 @@ class WhatIf(Result):
 def what_if(
     drive: Drive,
     factors: Mapping[str, float],
-    trial: Trial,
+    trial: Trial | Maneuver,
     *,
     outcomes: Sequence[str] = tuple(OUTCOMES),
 ) -> WhatIf:
@@ -266,7 +270,7 @@ def what_if(
         As it is.
     factors : mapping of str to float
         By lever, see `LEVERS`, e.g. ``{"orifice": 1.5, "pump": 1.5}``. [1]
-    trial : Trial
+    trial : Trial or Maneuver
         The command, see `outcomes.trial`; both drives begin at rest.
     outcomes : sequence of str
         Names in `outcomes.OUTCOMES`.
@@ -280,6 +284,9 @@ def what_if(
     """
     if not factors:
         raise InputError("Move at least one lever, such as orifice=1.5.")
+    pulled(drive, factors)  # refuses what no drive can have
+    if not isinstance(trial, Trial):
+        trial = trial_of(drive, trial)
     chosen = find_outcomes(outcomes)
     moved: dict[str, Mapping[str, float]] = {AS_IS: {}}
     if len(factors) > 1:

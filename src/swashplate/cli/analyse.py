@@ -85,7 +85,8 @@ def limits(
     save(out, "Shares of each limit, in SI", shares.write)
     draw(plot, "plot_limit_timeline", run, wanted=shares.wanted, title=title)
     error = quantity(shares.error, "rad/s", spec=".3f")
-    drive.note(f"{title}: {error} rms from a drive without limits")
+    # which of the limits that act here no test reached is said below, by the result itself
+    drive.note(f"{title}: {error} rms from a drive without limits", unreached=False)
     acting = shares.table(acting=True)
     if acting.rows:
         show(acting)
@@ -162,7 +163,7 @@ def whatif(
     title = f"{choice.title}, {name}"
     changes = ", ".join(f"{name} x {factor:g}" for name, factor in moved.items())
     draw(plot, "plot_whatif", result, bands=bands, title=f"{title}: {changes}")
-    note(title)
+    choice.note(title)
     before, after = (each.drive.parameters for each in (result.before, result.after))
     for line in words.changes_between(before, after):
         note(line)

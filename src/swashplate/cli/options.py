@@ -19,7 +19,7 @@ import typer
 from typer.models import ParameterInfo
 
 from swashplate.cli.terminal import FORCED, RESOURCES, SAVED, check_output, note, say_saved
-from swashplate.tables import FIGURE, TABLE, Form
+from swashplate.tables import FIGURE, TABLE, Form, listed
 from swashplate.units import show_rod, shown_in
 
 if TYPE_CHECKING:
@@ -123,15 +123,26 @@ class DriveChoice:
         return changes_between(parameters_of(self.drive), self.chosen.parameters)
 
     def warn(self) -> None:
-        """Say it if the fit that found the drive calls it not usable: its title then has it."""
+        """Say it if the drive's fit calls it not usable, as its title does, or left limits open."""
         _, found, why = self.chosen.parameters.title.partition("Not usable")
         if found:
             note(f"! The fit of this drive says: {found}{why}.")
+        self._warn_unreached()
 
-    def note(self, heading: str) -> None:
-        """Print a heading, and below it what is changed."""
+    def _warn_unreached(self) -> None:
+        unreached = self.chosen.parameters.unreached
+        if unreached:
+            note(
+                f"! No test of this drive reached {listed([*unreached])}: beyond what was tested "
+                "it is extrapolated."
+            )
+
+    def note(self, heading: str, *, unreached: bool = True) -> None:
+        """Print a heading, what is changed, and which limits the drive's tests left open."""
         for line in (heading, *self.changes):
             note(line)
+        if unreached:
+            self._warn_unreached()
 
 
 @dataclass(frozen=True)

@@ -130,6 +130,11 @@ def identify(
             "more, 1000 for smooth ones."
         )
     profiles = (profiles,) if isinstance(profiles, str) else profiles
+    if not isinstance(tests, str | Path | Campaign):
+        raise InputError(
+            f"The tests are a {type(tests).__name__}: give the path of a campaign file, which "
+            "swashplate.campaign.draft_campaign makes of logs, or a Campaign."
+        )
     campaign = tests if isinstance(tests, Campaign) else Campaign.from_toml(tests)
     axis = only_axis(campaign, axis)
     runs = runs_to_fit(campaign, axis)
