@@ -125,7 +125,7 @@ def test_a_run_is_a_summary_and_not_all_its_columns(notebook) -> None:
 def test_the_verdict_comes_first(notebook) -> None:
     headline = notebook["headline"][0].text
     assert headline.startswith(("Usable", "Not usable"))
-    for cell in ("judge", "verdict"):
+    for cell in ("result", "verdict"):
         result = notebook[cell][-1].data
         assert result["text/html"].startswith(f"<p><strong>{escape(headline)}</strong></p>")
         assert len(result["text/plain"]) < 400
@@ -136,4 +136,4 @@ def test_a_wait_says_what_it_is_for_in_one_line(notebook) -> None:
     assert re.fullmatch(r"Compiling equations, once on this machine: \d+\.\d s", first)
     (fitting,) = shown(notebook["fit"], "text/plain").splitlines()
     assert re.search(r"Fitting hoist: \d+\.\d s$", fitting)
-    assert "Judging the fit: " in shown(notebook["judge"], "text/plain").splitlines()[0]
+    assert "Judging the fit: " in shown(notebook["result"], "text/plain").splitlines()[0]
