@@ -347,7 +347,12 @@ def test_a_name_that_begins_like_a_sensors_zero_is_the_models() -> None:
 def test_a_fit_comes_back_with_its_model_alone(tmp_path: Path) -> None:
     tests, path = campaign(*RUNS), tmp_path / "fit.json"
     made = fit(servo, tests, RANGES, noise=NOISE)
-    Identification(tests, made).save(tmp_path)
+    result = Identification(tests, made)
+    result.save(tmp_path)
+    # starts of single runs are in the table of columns, and a sentence says so
+    starts = [name for name in result.to_polars()["parameter"] if name.startswith("start.place")]
+    assert len(starts) == len(RUNS)
+    assert f"{len(RUNS)} numbers of single runs, such as {starts[0]}" in result.summary()
     with pytest.raises(InputError, match=r"user-defined.* Python by model=.*--model FILE"):
         Identification.load(path, tests)
     with pytest.raises(InputError, match="another model, or of other bounds"):
