@@ -160,7 +160,13 @@ def test_a_folder_in_the_place_of_machine_code(tmp_path: Path) -> None:
     for path in paths:
         path.unlink()
         path.mkdir()
-    done = python("-c", RUN, str(tmp_path), NUMBA_CACHE_DIR=str(tmp_path / "cache"))
+    done = python(
+        "-c",
+        RUN,
+        str(tmp_path),
+        NUMBA_CACHE_DIR=str(tmp_path / "cache"),
+        PYTHONWARNINGS="default",
+    )
     assert json.loads(done.stdout)["march"] == 46.0
     assert len(paths) == 1
     assert str(paths[0]) in done.stderr
