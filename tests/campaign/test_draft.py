@@ -242,7 +242,7 @@ def test_an_encoder_of_few_pulses_shows_a_jump(pulses: float) -> None:
 
 
 def test_a_run_without_a_count_widens_the_dead_zone() -> None:
-    """Two large steps leave the dead zone open, anywhere below; a command of 0.45 V moved nothing."""
+    """Two large steps leave the dead zone open; a command of 0.45 V moved nothing."""
     steps = [run for run in encoder_runs(60.0) if run.name in ("up", "down")]
     command = 0.45 * np.sin(TIME)
     still = run_of("still", command, {"counts": np.zeros(TIME.size)}, time=TIME, hold="previous")
