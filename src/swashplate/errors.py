@@ -34,7 +34,8 @@ class DomainError(SwashplateError):
     """A simulation that left the range in which the model's equations hold."""
 
 
-class FileError(SwashplateError, OSError):
+# OSError comes first, since its `__new__` alone can make these: what unpickles errors calls it
+class FileError(OSError, SwashplateError):
     """A file that cannot be read or written; also an ``OSError``."""
 
 
