@@ -309,6 +309,7 @@ def test_samples_without_weight_may_be_missing(hoist: Drive) -> None:
 
 
 @pytest.mark.skipif(bool(config.DISABLE_JIT), reason="nothing is compiled")
+@pytest.mark.skipif(config.CPU_NAME == "generic", reason="vectors of two do not pay")
 def test_the_sets_are_marched_as_vectors() -> None:
     lanes = lanes_of(pump_drive, ("current",), (None, PumpOptions()), "shaft_speed")
     march = njit(error_model="numpy")(lanes.march.py_func)  # not from the cache, which has no text
