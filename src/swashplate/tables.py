@@ -206,8 +206,9 @@ def _html_row(tag: str, cells: Sequence[str], sides: Sequence[str], style: str =
 
 def share_cell(share: float | None) -> Cell:
     """A share of time as people read it: ``"12.5 %"``, ``"never"``."""
-    words = "" if share is None else f"{100.0 * share:.1f} %" if share else "never"
-    return Cell(share, words)
+    if share is None:
+        return Cell(share, "")
+    return Cell(share, f"{100.0 * share:.1f} %" if share else "never")
 
 
 def joined(tables: Sequence[Table]) -> Table:
