@@ -39,8 +39,12 @@ def fitted(
     drive: Drive = NOMINAL,
     logs: Logs = lambda columns: None,
     each: tuple[float, ...] = (0.0,) * 5,
+    days: tuple[int, ...] = (),
 ) -> tuple[list[StageFit], Verdict]:
-    """A slew campaign of five tests, each with a machine that much faster, and its judgement."""
+    """A slew campaign of five tests, each with a machine that much faster, and its judgement.
+
+    Recorded on these days of a month, if any are given.
+    """
     runs = {}
     for faster, (name, maneuver) in zip(each, TESTS.items(), strict=True):
         truth, held = drive.scale(Z10=1.0 + faster), [name] * (name == "middle")
@@ -48,7 +52,14 @@ def fitted(
         columns = {key: values.copy() for key, values in made.runs[name].columns.items()}
         logs(columns)
         runs[name] = replace(made.runs[name], columns=columns)
-    campaign = Campaign.from_toml(rig.write(replace(made, runs=runs), folder / "virtual"))
+    path = rig.write(replace(made, runs=runs), folder / "virtual")
+    text = path.read_text("utf-8")
+    for day, name in zip(days, runs, strict=bool(days)):
+        entry = f'file = "slew_{name}.csv"'
+        assert text.count(entry) == 1
+        text = text.replace(entry, f"{entry}\nrecorded = 2026-05-{day:02}")
+    path.write_text(text, "utf-8")
+    campaign = Campaign.from_toml(path)
     result = fit(NOMINAL.parameters, campaign.select(role="fit"), load_setup("slew"))
     predicted = predict(result.parameters, campaign.select(role="validate"))
     return [*result.stages], verdict(result.stages, predicted)
@@ -130,6 +141,15 @@ def test_a_drift_is_named_and_rules_out_the_use(tmp_path: Path) -> None:
     # 8 % over five runs, of which the fourth of five is held out
     assert lack_of_fit(stages).causes[0].name.startswith(DRIFT)
     assert lack_of_fit(stages).causes[0].size == pytest.approx(6.0, abs=2.0)
+
+
+def test_a_drift_is_found_in_the_order_of_time(tmp_path: Path) -> None:
+    """In the order of the file the machine only differs between runs."""
+    drifting = {3: -0.04, 5: -0.02, 8: 0.0, 9: 0.02, 12: 0.04}
+    days = 9, 3, 12, 8, 5
+    stages, found = fitted(tmp_path, each=tuple(drifting[day] for day in days), days=days)
+    assert {MISFIT, DRIFT} <= failed(found)
+    assert lack_of_fit(stages).causes[0].name.startswith(DRIFT)
 
 
 def test_runs_that_differ_in_no_order_are_no_drift(tmp_path: Path) -> None:

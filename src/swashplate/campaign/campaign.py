@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from difflib import get_close_matches
 from pathlib import Path
 from typing import TYPE_CHECKING, cast, get_args
+
+import numpy as np
 
 from swashplate.campaign import schema
 from swashplate.campaign.experiment import Experiment
@@ -34,6 +36,9 @@ LISTED = 12
 @dataclass(frozen=True, eq=False)
 class Campaign(Result):
     """Experiments on one machine, SI. Iterate it, or take one by its name.
+
+    They stand in the order in which they were recorded, or in that of the file if the time of a
+    run is unknown.
 
     Examples
     --------
@@ -87,7 +92,8 @@ class Campaign(Result):
             place = f"{path}: run {number} ({run.file})"
             experiments += read_run(place, name, run, file.axes, log)
         title = file.title or Path(path).resolve().parent.name
-        return cls(Path(path), title, file.virtual, file.axes, tuple(experiments), tuple(ignored))
+        ordered = in_time(experiments)
+        return cls(Path(path), title, file.virtual, file.axes, ordered, tuple(ignored))
 
     def table(self) -> Table:
         """Its experiments: axis, role, maneuver, length and channels."""
@@ -172,6 +178,15 @@ class Campaign(Result):
         if name.lower().endswith(".toml"):
             return Drive.from_toml(self.path.parent / name)
         return Drive.preset(name)
+
+
+def in_time(experiments: Sequence[Experiment]) -> tuple[Experiment, ...]:
+    """Experiments in the order in which they were recorded; unchanged if a time is unknown."""
+    times = [each.recorded for each in experiments]
+    known = [time for time in times if time is not None]
+    if len(known) < len(times):
+        return tuple(experiments)
+    return tuple(experiments[k] for k in np.argsort(known, kind="stable"))
 
 
 def json_schema() -> str:

@@ -9,7 +9,9 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
-from math import floor, pi
+from datetime import UTC, datetime
+from itertools import pairwise
+from math import floor, inf, pi
 from pathlib import Path
 from typing import NamedTuple, get_args
 
@@ -37,6 +39,10 @@ HEADER = """\
 UNUSED = "# Columns that are not used"
 NO_TIME = "# time = { rate = 512 }"
 NO_ENCODER = "# No column looks like an encoder's counts"
+UNORDERED = (
+    "# No clock tells when each run was recorded. A drift over the campaign is found only in the\n"
+    "# order of time: sort the runs, or state recorded = 2026-05-04T13:20:00 in each."
+)
 FIXME = "FIXME"
 """What the lines hold that say what the draft leaves out or open."""
 TIME = (
@@ -63,6 +69,9 @@ TICKS = {"ms": 1e-3, "us": 1e-6, "ns": 1e-9}
 """Units of whole numbers that count the time, and their size. [s]"""
 SLOWEST_LOG = 1.0
 """Rate from which a log of a drive's motion is plausible. [Hz]"""
+OVERLAP = 0.1
+"""Share of a log's length by which it may seem to begin before the one before it ended: file
+systems round the time of writing to as much as 2 s. [1]"""
 MANY = 4
 """Runs from which on one is held back for validation."""
 
@@ -184,6 +193,8 @@ def draft_campaign(
             made.more.insert(0, f"name = {toml_string('/'.join(near))}")
         runs.append(made)
     held_back = _held_back([each for each in runs if each.role == '"fit"'])
+    runs, order = _in_time(runs)
+    lines += order
     for each in runs:
         role = '"validate"' if each is held_back else each.role
         lines += ["[[runs]]", f"file = {each.file}", f"role = {role}", *each.more, ""]
@@ -507,6 +518,12 @@ class _Run(NamedTuple):
     more: list[str]
     stratum: str = ""
     peak: float = 0.0
+    written: float = 0.0
+    """When its file was last written, in seconds since 1970. [s]"""
+    duration: float | None = None
+    """None if it could not be read. [s]"""
+    recorded: float | None = None
+    """When it begins, if its stamps are of a calendar. [s]"""
 
 
 def _run(
@@ -531,7 +548,8 @@ def _run(
             more += [false.format(toml_key(k), toml_string(n)) for k, n in lacking.items()]
     if tested and len(tested) < len(axes):
         more.insert(0, f"only = [{', '.join(map(toml_string, tested))}]")
-    made = _Run(f"{toml_string(file)}    # {rows} samples", '"fit"', more)
+    written = path.stat().st_mtime
+    made = _Run(f"{toml_string(file)}    # {rows} samples", '"fit"', more, written=written)
     if not tested:
         return made._replace(role='"ignore"    # it has no input')
     if f'column = "{FIXME}"' in text:
@@ -562,7 +580,42 @@ def _run(
         kind = each.recognised.kind if each.recognised else ""
         stratum += f"{kind} {'both' if both else 'up' if high > low else 'down'}, "
         peak = max(peak, low, high)
-    return made._replace(file=said, stratum=stratum, peak=peak)
+    duration = float(experiments[-1].input.time[-1] - experiments[0].input.time[0])
+    return made._replace(
+        file=said,
+        stratum=stratum,
+        peak=peak,
+        duration=duration,
+        recorded=experiments[0].recorded,
+    )
+
+
+def _in_time(runs: Sequence[_Run]) -> tuple[list[_Run], list[str]]:
+    """Runs in the order in which they were recorded, if clocks tell it, and lines on that.
+
+    A log is written to its end. If files were written so far apart that none of their runs overlap,
+    these are the times of a logger; those of copies lie closer together.
+    """
+    read = [each for each in runs if each.duration is not None]
+    if len(read) < 2 or all(each.recorded is not None for each in read):
+        return sorted(runs, key=lambda each: each.recorded or inf), []
+    last_first = sorted(read, key=lambda each: each.written)
+    apart = all(
+        later.written - (1.0 - OVERLAP) * (later.duration or 0.0) >= earlier.written
+        for earlier, later in pairwise(last_first)
+    )
+    if not apart:
+        return [*runs], [UNORDERED, ""]
+    dated = [_dated(each) if each.duration is not None else each for each in runs]
+    return sorted(dated, key=lambda each: each.written), []
+
+
+def _dated(run: _Run) -> _Run:
+    """A run with the entry of when it was recorded, by its file."""
+    began = datetime.fromtimestamp(run.written - (run.duration or 0.0), UTC)
+    words = began.isoformat(timespec="seconds").replace("+00:00", "Z")
+    line = f"recorded = {words}    # guessed: when its file was written, less its length"
+    return run._replace(more=[line, *run.more])
 
 
 def _held_back(fitted: Sequence[_Run]) -> _Run | None:

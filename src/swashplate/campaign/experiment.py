@@ -235,6 +235,8 @@ class Experiment(Tabular):
     recognised: Recognised | None = None
     ignored: tuple[tuple[float, float, str], ...] = ()
     """Windows left out of every channel: first and last instant [s], and why."""
+    recorded: float | None = None
+    """When its first sample was taken, in seconds since 1970; None if no clock tells. [s]"""
     notes: tuple[str, ...] = ()
     """What reading did that nobody asked for, one sentence each: a channel left out, a split."""
 

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
+from datetime import UTC, datetime
 from itertools import pairwise
 from typing import Any, TypeVar
 
@@ -157,6 +158,20 @@ class _Columns:
             time = self._stamps[clock, size] = check_duration(self.log, source, time)
         return time
 
+    def zero(self, axis: schema.Axis, recorded: datetime | None) -> float | None:
+        """Calendar time at which an axis's stamps are 0, in seconds since 1970; None if unknown.
+
+        `recorded` is when the log begins, if the campaign file says so.
+        """
+        clock, begin = axis.time, 0.0
+        if clock.column is not None:
+            begin = self._second(clock) * float(self._begins[clock.column][0])
+        of_calendar = begin >= SINCE_1970
+        if recorded is not None:
+            first = clock.offset if of_calendar else begin + clock.offset
+            return _seconds(recorded) - first
+        return begin - clock.offset if of_calendar else None
+
     def _second(self, clock: schema.Clock) -> float:
         """Size of the unit of a column of stamps [s]."""
         column = self.found[clock.column or ""]
@@ -234,6 +249,7 @@ def _experiments(
     parts, _ = columns.samples("the input", axis.input, axis, run)
     drive = InputSignal(**parts, interpolation=axis.input.interpolation)
     notes, signals, cuts = [window] if window else [], dict[str, Channel](), dict[float, str]()
+    zero = columns.zero(axis, run.recorded)
     for channel, entry in axis.channels.items():
         parts, factor = columns.samples(f"channel '{channel}'", entry, axis, run)
         if not parts and entry.missing == "refuse":
@@ -298,8 +314,14 @@ def _experiments(
             run.maneuver,
             recognised,
             tuple((*ends(each), each.why) for each in ignored),
-            tuple(said),
+            recorded=None if zero is None else zero + float(given.time[0]),
+            notes=tuple(said),
         )
+
+
+def _seconds(moment: datetime) -> float:
+    """Seconds since 1970; one without a time zone is taken as UTC, as the order alone matters."""
+    return (moment if moment.tzinfo else moment.replace(tzinfo=UTC)).timestamp()
 
 
 def _within(signal: AnySignal, begin: float, end: float) -> AnySignal:

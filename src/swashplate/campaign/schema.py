@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from datetime import datetime
 from fnmatch import fnmatchcase
 from typing import Any, Literal, NamedTuple, TypeVar, get_args
 
@@ -333,6 +334,11 @@ class Run(Entry):
     start: InitialState | None = Field(None, description="State at the first sample.")
     start_pressure: Finite | None = Field(
         None, description="Stroking pressure at the first sample, with start = 'given' [Pa]."
+    )
+    recorded: datetime | None = Field(
+        None,
+        description="When its log begins, 2026-05-04T13:20:00; by default as its stamps say, if "
+        "they are of a calendar. Runs stand in this order.",
     )
     span: Window | None = Field(None, description="The part of the log to take.")
     only: tuple[str, ...] = Field((), description="The axes that this run tests; all if empty.")
