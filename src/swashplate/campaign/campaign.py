@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from difflib import get_close_matches
 from pathlib import Path
 from typing import TYPE_CHECKING, cast, get_args
@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from swashplate.drive import Drive
+    from swashplate.equations.marching.record import Interpolation
 
 _OPEN = re.compile("=.*FIXME")
 """A line of a draft that a person has to fill in."""
@@ -158,6 +159,14 @@ class Campaign(Result):
             raise InputError(f"There is no role '{role}': runs have {', '.join(roles)}.")
         ours = (each for each in self if axis in (None, each.axis))
         return tuple(each for each in ours if role in (None, each.role))
+
+    def with_interpolation(self, axis: str, between: Interpolation) -> Campaign:
+        """The campaign with the input of an axis joined in one way between its samples."""
+        experiments = [
+            replace(each, input=each.input.joined(between)) if each.axis == axis else each
+            for each in self
+        ]
+        return replace(self, experiments=tuple(experiments))
 
     def drive(self, axis: str) -> Drive:
         """The drive that an axis names.

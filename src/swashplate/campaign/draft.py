@@ -37,6 +37,7 @@ HEADER = """\
 # all logs and says what is wrong with them.
 """
 UNUSED = "# Columns that are not used"
+BETWEEN = '# interpolation = "previous"    # held, or "linear"; without it a fit tries both'
 NO_TIME = "# time = { rate = 512 }"
 NO_ENCODER = "# No column looks like an encoder's counts"
 UNORDERED = (
@@ -430,8 +431,7 @@ def _axis_lines(
     for table, each in signals:
         tables[table] = _signal_lines(each, parts[each.name], counts_per_turn)
         tables[table] += [clocks[each.name]] * (clocks[each.name] not in ("", main))
-    held = 'interpolation = "previous"    # guessed: by the controller; of another logger "linear"'
-    tables["input"] += [held, *(f"# another input? '{each.name}'" for each in axis.inputs[1:])]
+    tables["input"] += [BETWEEN, *(f"# another input? '{each.name}'" for each in axis.inputs[1:])]
     lines = [f"[axes.{toml_key(name)}]", own, main, start, ""]
     for table, entries in tables.items():
         lines += [f"[axes.{toml_key(name)}.{table}]", *entries, ""]

@@ -21,6 +21,8 @@ if TYPE_CHECKING:
     import polars
     from matplotlib.figure import Figure
 
+    from swashplate.equations.marching.record import Interpolation
+
 Array = NDArray[np.float64]
 
 SUDDEN, BESIDE, APART, RISE = 0.1, 0.1, 0.003, 3.0 / 512.0
@@ -81,18 +83,24 @@ class InputSignal(Result):
     """(n,) stamps. [s]"""
     values: Array
     """(n,) samples, in `unit`."""
-    interpolation: Literal["previous", "linear"]
+    interpolation: Interpolation
     """What it is between two stamps."""
     source: Source
     limits: tuple[float, float] | None = None
     """Range of the instrument, in `unit`."""
     dropped: int = 0
     """Samples left out because they were missing."""
+    settled: bool = True
+    """Whether `interpolation` was stated, or found by a fit; if not, a fit finds it."""
 
     @property
     def used(self) -> NDArray[np.bool_]:
         """(n,) whether a sample counts: all, because what is ignored is not read."""
         return np.ones(self.time.size, np.bool_)
+
+    def joined(self, between: Interpolation) -> InputSignal:
+        """The signal joined in one way between its stamps, which is settled with that."""
+        return replace(self, interpolation=between, settled=True)
 
     @cached_property
     def edges(self) -> tuple[Edge, ...]:
@@ -161,7 +169,7 @@ class Channel(Result):
     """Size of the unit in which the campaign file states it, in `unit`."""
     rolls_over_at: float | None = None
     """Reading after which a position begins anew, in `unit`; it is unwrapped."""
-    interpolation: Literal["previous", "linear"] = "linear"
+    interpolation: Interpolation = "linear"
     """What it is between two stamps, where a model takes it as an input."""
 
     @property

@@ -247,7 +247,8 @@ def _experiments(
     `without` is the entry by which the run leaves the axis out.
     """
     parts, _ = columns.samples("the input", axis.input, axis, run)
-    drive = InputSignal(**parts, interpolation=axis.input.interpolation)
+    between = axis.input.interpolation
+    drive = InputSignal(**parts, interpolation=between or "linear", settled=between is not None)
     notes, signals, cuts = [window] if window else [], dict[str, Channel](), dict[float, str]()
     zero = columns.zero(axis, run.recorded)
     for channel, entry in axis.channels.items():

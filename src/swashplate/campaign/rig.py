@@ -260,8 +260,8 @@ def run(
     nominal = Drive.preset(drive) if isinstance(drive, str) else drive
     seed, axis, kinds = whole("seed", seed), axis or nominal.name, tuple(channels)
     simulated = _perturbed(truth or nominal, perturb, seed) if perturb else truth or nominal
-    # a real card's decay does not wait for the next sample of a log (docs/decisions/0008)
-    simulated = Drive(replace(simulated.parameters, card_switch="split"))
+    # a real card's filter and decay know nothing of a log's samples (docs/decisions/0008)
+    simulated = Drive(replace(simulated.at_every_rate().parameters, card_switch="split"))
     listed = source_tests(axis) if maneuvers is None else maneuvers
     tests = dict(listed if isinstance(listed, Mapping) else ((m.name, m) for m in listed))
     held_back = HELD_BACK[axis] if validate is None and maneuvers is None else validate or ()
@@ -545,14 +545,11 @@ def _write_log(columns: Mapping[str, Array], note: str, path: Path) -> None:
 
 
 def _contents(tests: VirtualTests) -> tuple[str, str]:
-    """TOML of the campaign file, and of the truth: instruments, seed and versions.
-
-    The input is joined by straight lines, because that is what was simulated between two samples.
-    """
+    """TOML of the campaign file, and of the truth: instruments, seed and versions."""
     from tomlkit import dumps
 
     tools, drop = tests.instruments, {"missing": "drop"} if tests.instruments.empty_cells else {}
-    given = {"kind": "voltage", "column": "voltage", "unit": "V", "interpolation": "linear", **drop}
+    given = {"kind": "voltage", "column": "voltage", "unit": "V", **drop}
     axis: dict[str, Any] = {"drive": tests.preset or DRIVE_FILE}
     axis |= {"time": {"column": "time", "unit": "s"}, "start": "rest", "input": given}
     channels = axis["channels"] = dict[str, dict[str, object]]()

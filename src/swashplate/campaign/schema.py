@@ -250,8 +250,10 @@ class Input(Signal):
     """The signal that drives the axis."""
 
     kind: InputKind = Field("voltage", description="voltage, current (signed, no card) or other.")
-    interpolation: Literal["previous", "linear"] = Field(
-        "previous", description="Between two samples: hold the earlier one, or a straight line."
+    interpolation: Literal["previous", "linear"] | None = Field(
+        None,
+        description="Between two samples: hold the earlier one, or a straight line. Left out, a "
+        "fit takes what fits better, everything else the straight line.",
     )
     ignore: tuple[Window, ...] = Field(
         (), description="Windows whose samples are left out: the input goes on across them."

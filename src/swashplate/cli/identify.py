@@ -398,7 +398,7 @@ def demo(*, out: Path = Path("demo"), seed: int = 1) -> None:
     setup = load_setup("hoist")
     with long_work("", 5) as begin:
         begin("testing the virtual hoist")
-        truth = drawn(Drive.preset("hoist"), setup, seed)
+        truth = drawn(Drive.preset("hoist").at_every_rate(), setup, seed)
         path = rig.write(rig.run("hoist", truth=truth, seed=seed), out / "virtual", overwrite=True)
         begin("reading its logs")
         campaign = Campaign.from_toml(path)

@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Sequence
-from dataclasses import replace
 from functools import partial
-from itertools import chain
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -45,10 +43,6 @@ FAR_OFF = 3.0
 FROZEN, DEAD = 1.0, 0.2
 """Time for which no position stands still while its drive runs [s]; and the part of a channel's
 largest simulated range that a run must have for a still sensor to be broken."""
-COARSE = 0.01
-"""Interval of an input from which it matters what it is between samples. [s]"""
-BETTER = 0.7
-"""Error of the other interpolation, over that of the stated one, below which it is meant."""
 NAMED = 8
 """Unknowns that a sentence names."""
 
@@ -383,30 +377,4 @@ def beside_the_drives(campaign: Campaign) -> list[str]:
         made_up = all(each.status == "assumed" for each in nominal.values())
         if runs and not made_up and all(each.input.kind != "other" for each in runs):
             found += [each.sentence.rstrip(".") for each in check_runs(runs, nominal)]
-            found += _other_interpolation(name, runs, nominal)
     return found
-
-
-def _other_interpolation(axis: str, runs: Sequence[Experiment], nominal: ParameterSet) -> list[str]:
-    """A sentence if coarsely sampled commands fit much better straight than held, or held.
-
-    A held command acts half a sample later, which a delay takes: the best of three delays counts.
-    """
-    step = float(np.median([np.median(np.diff(each.input.time)) for each in runs]))
-    stated = runs[0].input.interpolation
-    other: Literal["previous", "linear"] = "linear" if stated == "previous" else "previous"
-    left = dict.fromkeys((stated, other), np.inf)
-    for kind in left if step >= COARSE else ():
-        ours = [replace(each, input=replace(each.input, interpolation=kind)) for each in runs]
-        for later in (-0.5 * step, 0.0, 0.5 * step):
-            delayed = nominal.replace({"tau": max(nominal.numbers["tau"] + later, 0.0)})
-            of_channels = chain.from_iterable(motions(ours, delayed).values())
-            unlike = [each.unlike for each in of_channels]
-            left[kind] = min(left[kind], float(np.sqrt(np.mean(unlike or [1.0]))))
-    if not left[other] < BETTER * left[stated] < np.inf:
-        return []
-    return [
-        f"the input of the axis '{axis}' seems to be {other!r} between samples: the drive differs "
-        f"from the runs by {100.0 * left[other]:.2g} % then, now by {100.0 * left[stated]:.2g} %; "
-        f'try interpolation = "{other}" in [axes.{axis}.input]'
-    ]

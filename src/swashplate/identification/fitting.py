@@ -22,6 +22,7 @@ from swashplate.equations import Model as Equations
 from swashplate.errors import InputError, UnknownNameError
 from swashplate.executors import Executor, Serial
 from swashplate.identification import tables
+from swashplate.identification.between_samples import settle
 from swashplate.identification.data_checks import (
     check_model,
     check_rank,
@@ -34,10 +35,10 @@ from swashplate.identification.determination import Identifiability, identifiabi
 from swashplate.identification.drive_model import (
     DriveModel,
     Parameters,
-    at_rate_of,
     configuration,
     stage_problem,
     start_currents_of,
+    with_card_filter,
     with_estimates,
 )
 from swashplate.identification.faults import measurement_error
@@ -294,7 +295,8 @@ def fit(
     ----------
     model : Drive, ParameterSet, Model or ModelSetup
         A drive: where to begin, and what stays fixed. The decay's switch is split, see `smooth`,
-        the card's filter holds at the rate of the runs. Or a model of one's own: of equations,
+        the card's filter is its differential equation unless the configuration's `card_filter`
+        says "recursion". Or a model of one's own: of equations,
         an `OwnModel` of them, any object with `simulate`, or a `ModelSetup`.
     tests : Campaign or sequence of Experiment
         The runs to fit; of a campaign those with the role ``"fit"``.
@@ -349,9 +351,9 @@ def fit(
                 "swashplate.identify takes drive and fit configuration from the campaign."
             )
         free = configuration(free, runs)
+        nominal, changed = with_card_filter(free.card_filter, runs, nominal)
         doubts += refuse_unsound(check_runs(runs, smooth(nominal)))
         doubts += refuse_unsound(unfitted_currents(runs, free))
-        nominal, changed = at_rate_of(runs, nominal)
         doubts += changed
 
     def solved(stage: Stage, problem: Problem) -> Solved:
@@ -376,6 +378,8 @@ def fit(
         return result
 
     with working(f"Fitting {nominal.name}"):
+        runs, between = settle(runs, smooth(nominal), free, loss=loss, threads=threads)
+        doubts += between
         stages = staged(free, nominal, runs, solved, threads=threads)
     return Fit(free, nominal, tuple(runs), stages, doubts)
 

@@ -14,6 +14,7 @@ from swashplate.equations import Model as Equations
 from swashplate.errors import InputError
 from swashplate.executors import Executor, Serial
 from swashplate.identification.assessment import Identification, versions
+from swashplate.identification.between_samples import doubt
 from swashplate.identification.criteria import REQUIRED
 from swashplate.identification.data_checks import refuse_unsound, spike_findings
 from swashplate.identification.drive_model import Parameters, setup_of
@@ -157,11 +158,15 @@ def identify(
         # from where the stages ended: from afar a joint fit is often caught on its way
         result = fit(
             result.parameters,
-            runs,
+            result.runs,
             setup.joint(),
             loss=loss,
             max_evaluations=max_evaluations,
         )
+    if all(run.input.settled for run in runs):
+        doubts = doubt(result.runs, staged.nominal, staged.setup, loss=loss)
+        result = replace(result, doubts=(*result.doubts, *doubts))
+    campaign = campaign.with_interpolation(axis, result.runs[0].input.interpolation)
     notes = {**versions(), "seed": str(seed), "campaign": str(campaign.path)}
     identification = Identification(campaign, result, notes=notes, required=required)
     if result.interrupted:

@@ -219,6 +219,12 @@ class Setup(Entry):
         "be off by, in SI units or as '5 %' of the value; the intervals of all estimates take it "
         "in. Both directions of a symbol are off together.",
     )
+    card_filter: Literal["equation", "recursion"] = Field(
+        "equation",
+        description="The filter of a card whose set states a recursion for one rate, as the "
+        "packaged ones do: the differential equation with the same poles, as real cards have it, "
+        "or the recursion, to which published zeta and omega belong.",
+    )
 
     @model_validator(mode="after")
     def _fixed(self) -> Setup:
