@@ -1,12 +1,16 @@
 """A model of one's own in a fit: exact derivatives, starts and loads, and all that drives have."""
 
+import pickle
+import re
+import sys
 from dataclasses import replace
-from math import exp, nan
+from math import exp, nan, sqrt
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 from tests.identification.given import run_of
 
 from swashplate import (
@@ -19,6 +23,7 @@ from swashplate import (
     ParameterError,
 )
 from swashplate.equations import Model, Tap, equation, simulate
+from swashplate.executors import Processes
 from swashplate.identification import (
     Identification,
     ModelSetup,
@@ -499,3 +504,54 @@ def test_one_run_has_no_drift() -> None:
     (drift,) = (each for each in found.criteria if each.name == "drift of position")
     assert (drift.state, drift.value) == ("met", "not seen")
     assert found.grade != "Usable"
+
+
+# --- the documented model file, against another solver --------------------------------------------
+
+PAGE = Path(__file__).parents[2] / "docs" / "how-to" / "own-model-fit.md"
+MACHINE = {"dead_zone": 0.6, "gain": 0.02, "lag": 0.15}
+
+
+def valve_test(name: str, frequency: float) -> Experiment:
+    """The page's valve and rod by SciPy, from one sample to the next, as the command is held."""
+    time = 0.02 * np.arange(400)
+    command = 4.0 * np.sin(2.0 * np.pi * frequency * time)
+    supply = 100.0 + 15.0 * np.sin(2.0 * np.pi * 0.3 * time)
+    state, rows = np.array([0.0, 0.0]), [0.0]
+    for start, level, pressure in zip(time[:-1], command, supply, strict=False):
+        slope = (np.interp(start + 0.01, time, supply) - pressure) / 0.01
+
+        def rates(t, y, start=start, level=level, pressure=pressure, slope=slope):
+            root = sqrt((pressure + slope * (t - start)) / 100.0)
+            beyond = np.sign(y[0]) * max(abs(y[0]) - MACHINE["dead_zone"], 0.0)
+            return (level - y[0]) / MACHINE["lag"], MACHINE["gain"] * beyond * root
+
+        ends = (start, start + 0.02)
+        state = solve_ivp(rates, ends, state, method="DOP853", rtol=1e-10, atol=1e-12).y[:, -1]
+        rows.append(state[1])
+    channels = {"rod": np.array(rows), "supply": supply}
+    return run_of(name, command, channels, time=time, kind="other", hold="previous")
+
+
+@pytest.fixture
+def documented(tmp_path: Path, monkeypatch) -> Path:
+    """The model file of the page, importable for the length of a test."""
+    monkeypatch.setattr(sys, "path", [*sys.path])
+    path = tmp_path / "documented_valve.py"
+    (text,) = re.findall(r"```python\n(# valve\.py\n.*?)```", PAGE.read_text("utf-8"), re.DOTALL)
+    path.write_text(text, "utf-8")
+    yield path
+    sys.modules.pop(path.stem, None)
+
+
+def test_the_documented_model_file_finds_a_lag_in_several_processes(documented: Path) -> None:
+    """Workers find the model, which has no name of its own, as an attribute of the `OwnModel`."""
+    setup = ModelSetup.from_file(documented)
+    assert isinstance(setup.model, OwnModel)
+    assert pickle.loads(pickle.dumps(setup.model.model)) is setup.model.model
+    runs = [valve_test("slow", 0.2), valve_test("fast", 0.6)]
+    search = Search(2, executor=Processes(2))
+    made = fit(setup.model, runs, setup.free, noise={"rod": 1e-5}, search=search)
+    assert len(made.stages[0].starts) == 3
+    values = made.stages[0].values
+    assert {name: values[name] for name in MACHINE} == pytest.approx(MACHINE, rel=5e-3)
