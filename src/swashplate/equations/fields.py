@@ -144,6 +144,25 @@ def declared_by(parameters: Any) -> Iterator[Definition]:
             yield replace(definition, symbol=name, fields=(name,))
 
 
+def definition_of(hint: Any) -> Definition | None:
+    """The definition in the type of a field or an argument, None if it has none."""
+    extras = getattr(hint, "__metadata__", ())
+    return next((extra for extra in extras if isinstance(extra, Definition)), None)
+
+
+def definitions_of(kind: Any) -> dict[str, Definition]:
+    """Definitions that the fields of a named tuple state, by dotted path."""
+    hints = get_type_hints(kind, include_extras=True)
+    stated = dict[str, Definition]()
+    for name in kind._fields:
+        if is_named_tuple(hints[name]):
+            inner = definitions_of(hints[name])
+            stated |= {f"{name}.{path}": definition for path, definition in inner.items()}
+        elif (definition := definition_of(hints[name])) is not None:
+            stated[name] = definition
+    return stated
+
+
 def ranges_of(kind: Any) -> dict[str, Definition]:
     """Definitions with a range that a named tuple declares, by dotted path."""
     return {

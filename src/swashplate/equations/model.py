@@ -33,7 +33,13 @@ from types import FunctionType, ModuleType
 from typing import Any, Literal, NamedTuple, get_args, get_type_hints
 
 from swashplate.equations.declaration import equation, equation_of_text
-from swashplate.equations.fields import Definition, floats_of, ranges_of
+from swashplate.equations.fields import (
+    Definition,
+    definition_of,
+    definitions_of,
+    floats_of,
+    ranges_of,
+)
 from swashplate.equations.syntax import is_named_tuple, plain
 from swashplate.errors import InputError
 
@@ -275,6 +281,24 @@ class Model:
         """Definitions of the parameters that have a range, by path."""
         found = [(i, ranges_of(part.parameters)) for i, part in enumerate(self.parts)]
         return {f"{self.prefix(i)}{p}": each for i, own in found for p, each in own.items()}
+
+    @cached_property
+    def definitions(self) -> dict[str, Definition]:
+        """Definitions of inputs, states and signals by name, as far as the model declares them.
+
+        An input declares its own on the argument of an equation, or on the field of `inputs`.
+        """
+        declared = dict[str, Definition]()
+        for part in self.parts:
+            sources = (part.inputs,) if part.inputs is not None else map(plain, part.equations)
+            for source in sources:
+                for name, hint in get_type_hints(source, include_extras=True).items():
+                    definition = definition_of(hint)
+                    if name in part.input_types and definition is not None:
+                        declared.setdefault(part.tap(name).signal, definition)
+            for kind in (part.state, part.signals):
+                declared |= definitions_of(kind) if kind is not None else {}
+        return declared
 
     def tap(self, name: str) -> Tap:
         """How an input is looked at."""

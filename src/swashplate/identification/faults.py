@@ -313,7 +313,8 @@ def clipped_channels(experiments: Sequence[Experiment]) -> tuple[str, ...]:
         values = np.concatenate([each[name].values for each in runs])
         low, high = float(values.min()), float(values.max())
         reach = float(np.ptp(np.concatenate([each.input.values for each in runs])))
-        limits = [each[name].limits for each in runs if each[name].limits is not None]
+        stated = (each[name].limits for each in runs)
+        limits = [pair for pair in stated if pair is not None]
         for end in (low, high):
             # limits may be stated a little within the end at which the readings stand
             if any(not lower < end < upper for lower, upper in limits):
