@@ -9,6 +9,7 @@ from typing import Annotated, NamedTuple
 from xml.etree import ElementTree
 
 import numpy as np
+import polars as pl
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -454,5 +455,24 @@ def test_few_signals_of_a_user_defined_model_stand_in_one_column(assert_legible)
     ax = Figure().subplots()
     assert run.plot("pressure", ax=ax, title="here") is ax
     assert (ax.get_ylabel(), ax.get_xlabel()) == ("chamber pressure (bar)", "time (s)")
-    # samples without a maneuver have no name
-    assert simulate(SHAKER, Masses(), {"force": run["force"]}, 100.0).title == "shaker"
+    # a column of a table has a name, too, but is no maneuver
+    column = pl.Series("force", run["force"])
+    again = simulate(SHAKER, Masses(), {"force": column}, 100.0)
+    assert again.title == "shaker"
+    np.testing.assert_array_equal(again["pressure"], run["pressure"])
+
+
+def test_a_model_whose_types_only_a_function_knows_is_shown_by_its_names() -> None:
+    class Gain(NamedTuple):
+        gain: float
+
+    class Level(NamedTuple):
+        level: float
+
+    @equation
+    def filled(state: "Level", inflow: "float", p: "Gain", h: float) -> "Level":
+        return Level(state.level + h * p.gain * inflow)
+
+    tank = Model("tank", Gain, Level, filled)
+    figure = simulate(tank, Gain(2.0), {"inflow": np.ones(9)}, 10.0).plot()
+    assert labels(figure) == ["inflow", "level"]

@@ -40,7 +40,7 @@ from swashplate.equations.fields import (
     floats_of,
     ranges_of,
 )
-from swashplate.equations.syntax import is_named_tuple, plain
+from swashplate.equations.syntax import is_named_tuple, plain, type_of
 from swashplate.errors import InputError
 
 Equation = Callable[..., Any]
@@ -290,14 +290,17 @@ class Model:
         """
         declared = dict[str, Definition]()
         for part in self.parts:
-            sources = (part.inputs,) if part.inputs is not None else map(plain, part.equations)
-            for source in sources:
-                for name, hint in get_type_hints(source, include_extras=True).items():
-                    definition = definition_of(hint)
-                    if name in part.input_types and definition is not None:
+            for name in part.input_types:
+                types = [type_of(plain(equation), name) for equation in part.equations]
+                if part.inputs is not None:
+                    types.append(get_type_hints(part.inputs, include_extras=True)[name])
+                for kind in types:
+                    definition = definition_of(kind)
+                    if definition is not None:
                         declared.setdefault(part.tap(name).signal, definition)
-            for kind in (part.state, part.signals):
-                declared |= definitions_of(kind) if kind is not None else {}
+            declared |= definitions_of(part.state)
+            if part.signals is not None:
+                declared |= definitions_of(part.signals)
         return declared
 
     def tap(self, name: str) -> Tap:
