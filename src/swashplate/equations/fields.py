@@ -47,6 +47,9 @@ class Definition:
     """Option of the model that it belongs to, and that is off where it is zero."""
     least: float | None = None
     """Lowest value that an estimate may take where `lower` itself would switch the term off."""
+    plausible: tuple[float, float] | None = None
+    """Least and largest size, whatever the sign, of a number that somebody can mean; 0 and infinity
+    apart, which stand for "none". None: any size."""
     symmetry: Mapping[str, float] = field(default_factory=dict, hash=False)
     """Power with which it scales along each symmetry of the model, by the symmetry's name."""
     needs: str = ""
@@ -145,12 +148,15 @@ def declared_by(parameters: Any) -> Iterator[Definition]:
 
 
 def ranges_of(kind: Any) -> dict[str, Definition]:
-    """Definitions with a range that a named tuple declares, by dotted path."""
+    """Definitions with a range, of what is possible or plausible, that a named tuple declares.
+
+    By dotted path.
+    """
     return {
         path: each
         for each in declared_by(kind)
         for path in each.fields
-        if each.range != Definition("", "").range
+        if each.range != Definition("", "").range or each.plausible is not None
     }
 
 

@@ -31,6 +31,7 @@ from swashplate.identification.solving import solve
 from swashplate.identification.unknowns import Prior, Unknown, Unknowns
 from swashplate.parameters.definitions import find
 from swashplate.parameters.parameter_set import ParameterSet
+from swashplate.parameters.plausible import check_plausible
 from swashplate.parameters.rules import SIDES
 from swashplate.results import Result, short
 from swashplate.simulation.instance import START
@@ -407,10 +408,15 @@ class ModelSetup(Result):
                     )
         free = {key: _unknown(key, each) for key, each in self.free.items()}
         ranges = equations.ranges if isinstance(equations, Equations) else {}
-        for key, each in free.items():
-            for bound in (each.low, each.high):
-                if key in ranges and not ranges[key].holds(bound):
-                    raise ParameterError(f"{name}, a bound: {ranges[key].broken(key, bound)}.")
+        for key, definition in ranges.items():
+            if key in free:
+                for bound in (free[key].low, free[key].high):
+                    if not definition.holds(bound):
+                        raise ParameterError(f"{name}, a bound: {definition.broken(key, bound)}.")
+                    check_plausible(f"{name}, a bound: {key}", definition, bound)
+                check_plausible(f"{name}: {key}", definition, free[key].start)
+            if key in self.fixed:
+                check_plausible(f"{name}, fixed: {key}", definition, self.fixed[key])
         for key, made in {"model": own, "name": name, "free": free}.items():
             object.__setattr__(self, key, made)
         _ = self.setup  # refuses what is no uncertainty
