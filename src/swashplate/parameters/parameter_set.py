@@ -29,7 +29,7 @@ from swashplate.parameters.definitions import (
 from swashplate.parameters.plausible import check_plausible
 from swashplate.parameters.rules import broken_rules, check_options, refuse
 from swashplate.results import Result
-from swashplate.tables import UNIT, Column, Table
+from swashplate.tables import UNIT, Column, Table, listed
 from swashplate.units import Quantity, in_si
 
 PressureRoot = Literal["published", "symmetric"]
@@ -258,6 +258,15 @@ class ParameterSet(Entries):
         parameters = {symbol: self.parameters[symbol] for symbol in CATALOGUE}
         own = {SWITCHES[symbol] for symbol in CATALOGUE if symbol in SWITCHES}
         return replace(self, parameters=parameters, options=self.options & own, equations=())
+
+    def unreached_sentence(self, drive: str = "this drive") -> str:
+        """What the tests of a drive, as it is called, left open; empty if it is nothing."""
+        if not self.unreached:
+            return ""
+        return (
+            f"No test of {drive} reached {listed([*self.unreached])}: beyond what was tested it is "
+            "extrapolated."
+        )
 
     def tables(self) -> list[Table]:
         """Every parameter with its unit and status, a table for each block that the set has.
