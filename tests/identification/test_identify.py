@@ -251,6 +251,24 @@ REFUSED: Mapping[str, tuple[Callable[[Campaign], object], type[Exception], str]]
         ParameterError,
         r"free, Z8: .*must rise: write \[0.5, 2\]",
     ),
+    "a factor that no machine has": (
+        lambda tests: swashplate.identify(tests, free={"Z8": (0.5, 1e300)}),
+        ParameterError,
+        r"a bound of Z8 .* is 1.6514e\+306 sqrt\(Pa\)/\(m s\), .* 10 to 1e\+11 sqrt",
+    ),
+    "a bound in another unit": (
+        lambda tests: swashplate.identify(tests, free={"Z9": {"bounds": (50.0, 2e7)}}),
+        ParameterError,
+        r"a bound of Z9 .* is 50 Pa, .* 10000 to 1e\+09 Pa: .* bar instead of Pa",
+    ),
+    "a prior in another unit": (
+        lambda tests: swashplate.identify(
+            tests,
+            free={"Z9": {"bounds": (5e6, 2e7), "prior": {"mean": 107.0, "deviation": 10.0}}},
+        ),
+        ParameterError,
+        r"the prior mean of Z9 .* is 107 Pa, .* bar instead of Pa",
+    ),
     "nothing": (
         lambda tests: swashplate.identify(tests, free={}),
         InputError,

@@ -104,6 +104,14 @@ class Definition:
         words = " and ".join(part for part in (low, high) if part) or "any finite number"
         return words + (", or inf for none" if self.can_be_off else "")
 
+    @property
+    def plausible_range(self) -> str:
+        """The plausible sizes as words, e.g. ``at most 100``; empty if there is no such range."""
+        if self.plausible is None:
+            return ""
+        low, high = self.plausible
+        return f"{low:g} to {high:g}" if low > 0.0 else f"at most {high:g}"
+
 
 class Direction(Enum):
     """Marks the other direction of a parameter with two values."""

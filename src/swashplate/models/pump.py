@@ -6,10 +6,9 @@ stand in the same sample and the same step; an option that is off leaves nothing
 """
 
 from math import exp, sqrt
-from typing import Annotated, NamedTuple
+from typing import NamedTuple
 
 from swashplate.equations.declaration import equation
-from swashplate.equations.fields import Definition
 from swashplate.equations.loops import root
 from swashplate.equations.model import Model
 from swashplate.models.displacement_control import (
@@ -54,21 +53,12 @@ from swashplate.models.refinements import (
 
 
 class PumpInputs(NamedTuple):
-    """What drives the pump at a sample; where nothing was measured, the parameter's value.
+    """What drives the pump at a sample; where nothing was measured, the parameter's value."""
 
-    The ranges are those of a sample, beyond any machine: what lies outside is in another unit or no
-    measurement. What is plausible is the largest size in a record.
-    """
-
-    # fmt: off
     current: float  # Signed, that of the positive channel less that of the negative one. [A]
-    pump_speed: Annotated[float, Definition("speed of the prime mover over the one that Z10 "
-        "belongs to, 1 if they are equal", "1", lower=0.0, upper=10.0, plausible=(0.0, 10.0))]
-    load_torque: Annotated[float, Definition("torque of the load at the shaft, positive against "
-        "positive speed", "N m", lower=-1e12, upper=1e12, plausible=(0.0, 1e10))]
-    supply_pressure: Annotated[float, Definition("supply less static pressure, in place of Z9",
-        "Pa", lower=1.0, upper=1e9, plausible=(1e4, 1e9))]
-    # fmt: on
+    pump_speed: float  # Speed of the prime mover, relative to that of Z10. [1]
+    load_torque: float  # C_g of gravity at the shaft, positive against positive speed. [N m]
+    supply_pressure: float  # Supply pressure less static pressure, in place of Z9. [Pa]
 
 
 class PumpState(NamedTuple):

@@ -8,7 +8,7 @@ from math import inf
 
 from swashplate.equations.fields import Definition
 from swashplate.errors import ParameterError
-from swashplate.units import to_si
+from swashplate.units import scaling
 
 WRITTEN_IN: dict[str, tuple[str, ...]] = {
     "1/Pa": ("1/bar", "1/MPa"),
@@ -66,11 +66,10 @@ def check_plausible(column: str, definition: Definition, *values: float) -> None
         if of_wrong_sign or size in (0.0, inf) or not (size < low or size > high):
             continue
         unit = "" if definition.unit == "1" else f" {definition.unit}"
-        span = f"{low:g} to {high:g}{unit}" if low > 0.0 else f"at most {high:g}{unit}"
         either_way = " either way" if definition.lower < 0.0 else ""
         raise ParameterError(
             f"{column} ({definition.name}) is {value:g}{unit}, but on a machine it is "
-            f"{span}{either_way}: {_slip(definition, value)}."
+            f"{definition.plausible_range}{unit}{either_way}: {_slip(definition, value)}."
         )
 
 
@@ -79,7 +78,8 @@ def _slip(definition: Definition, value: float) -> str:
     assert definition.plausible is not None
     low, high = definition.plausible
     for unit in WRITTEN_IN.get(definition.unit, ()):
-        if low <= abs(to_si(value, unit, definition.unit, definition.name)) <= high:
+        factor, _ = scaling(unit, definition.unit, definition.name)
+        if low <= factor * abs(value) <= high:
             return f"perhaps it is in {unit} instead of {definition.unit}"
     if definition.unit == "1" and high <= LARGEST_SHARE and low <= abs(value) / 100.0 <= high:
         return "perhaps it is in per cent"

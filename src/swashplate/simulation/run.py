@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from swashplate.equations.fields import Definition, is_real, ranges_of
+from swashplate.equations.fields import Definition, is_real
 from swashplate.equations.marching.part import Stored
 from swashplate.equations.marching.record import (
     Interpolation,
@@ -22,7 +22,6 @@ from swashplate.equations.marching.run import Instance, Start, Started, marched
 from swashplate.equations.marching.use import Stepper
 from swashplate.errors import DomainError, InputError, ParameterError
 from swashplate.maneuvers import Maneuver, sampled
-from swashplate.models.pump import PumpInputs
 from swashplate.parameters.parameter_set import ParameterSet
 from swashplate.parameters.plausible import check_plausible
 from swashplate.parameters.rules import FULL_VOLTAGE
@@ -32,16 +31,24 @@ from swashplate.simulation.instance import (
     models_of,
     without_ripple,
 )
-from swashplate.simulation.result import UNITS, Simulation
+from swashplate.simulation.result import MEASURED, UNITS, Simulation
 from swashplate.units import in_si
 
 Array = NDArray[np.float64]
+
+
+def _input(name: str, lower: float, upper: float, plausible: tuple[float, float]) -> Definition:
+    unit, meaning = MEASURED[name]
+    return Definition(meaning, unit, lower, upper, plausible=plausible, symbol=name)
+
+
 INPUTS: Mapping[str, Definition] = {
-    name: definition
-    for name, definition in ranges_of(PumpInputs).items()
-    if name in ("load_torque", "supply_pressure", "pump_speed")
+    "load_torque": _input("load_torque", -1e12, 1e12, (0.0, 1e10)),
+    "supply_pressure": _input("supply_pressure", 1.0, 1e9, (1e4, 1e9)),
+    "pump_speed": _input("pump_speed", 0.0, 10.0, (0.0, 10.0)),
 }
-"""What each measured input is, with its ranges."""
+"""What each measured input is. The range is that of a sample, beyond any machine: what lies outside
+is in another unit or no measurement. What is plausible is the largest size in a record."""
 RANGES: Mapping[str, tuple[float, float]] = {
     name: (definition.lower, definition.upper) for name, definition in INPUTS.items()
 }
