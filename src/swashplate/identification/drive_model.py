@@ -39,7 +39,7 @@ from swashplate.identification.setup import (
     setup_names,
 )
 from swashplate.identification.unknowns import Prior, Unknown, Unknowns, bounded
-from swashplate.parameters.definitions import SWITCHES, columns_of, find, is_column
+from swashplate.parameters.definitions import SWITCHES, Definition, columns_of, find, is_column
 from swashplate.parameters.parameter_set import ParameterSet
 from swashplate.parameters.plausible import check_plausible
 from swashplate.parameters.rules import FULL_VOLTAGE
@@ -61,6 +61,8 @@ START_PRESSURE = "start_pressure"
 """Name of δP at the first sample, where it is an unknown of the experiment."""
 START_CURRENTS = ("start_current_plus", "start_current_minus")
 """Names of a channel's current at the first sample, where it is an unknown of the experiment."""
+FORCE = Definition("force of the solenoids", "N", plausible=(0.0, 1e4))
+"""What stands for their coefficients."""
 MOST_EDGES = 60
 """Jumps of commands whose instants are estimated; more are taken halfway between their samples."""
 LARGEST_START_PRESSURE = 4e6
@@ -586,7 +588,9 @@ def _of_the_machine(stage: Stage, parameters: ParameterSet) -> list[Unknown]:
     if stage.forces is not None:
         for name, value in stage.forces.values(parameters).items():
             log = value > 0.0
-            unknowns.append(bounded(name, value, stage.forces.relative, unit="N", log=log))
+            force = bounded(name, value, stage.forces.relative, unit="N", log=log)
+            check_plausible(f"a bound of {name}", FORCE, force.low, force.high)
+            unknowns.append(force)
     return unknowns
 
 

@@ -19,7 +19,7 @@ from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validat
 
 from swashplate.campaign import ChannelKind
 from swashplate.campaign.experiment import Experiment
-from swashplate.campaign.schema import Weight, Window
+from swashplate.campaign.schema import LARGEST_PRESSURE, Weight, Window
 from swashplate.documents import parse_toml, read_text, validated
 from swashplate.entries import Finite, Flag, NotNegative, Positive
 from swashplate.equations import Model as Equations
@@ -181,6 +181,7 @@ class Stage(Entry):
     )
     start_pressure: Positive | None = Field(
         None,
+        le=LARGEST_PRESSURE,
         description="Largest stroking pressure at the first sample, free in each run [Pa]; where "
         "none is given, it is free in runs with start = 'estimated' alone.",
     )
