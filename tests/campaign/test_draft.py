@@ -280,6 +280,9 @@ def test_a_guess_becomes_a_drive_and_a_fit_configuration() -> None:
     setup = Setup(**tomllib.loads(fit_configuration(found, parameters)))
     (stage,) = setup.stages
     assert {"V_dz_plus", "G1_minus", "Z8", "tau", "Z13_plus", "Z16_minus"} <= stage.free.keys()
+    faster = found._replace(gain=(4e9, 6e9), top_speed=(2e10, 2e10))
+    with pytest.raises(ParameterError, match="from campaign.toml .* units and scales .* Z10 "):
+        guessed_set(faster, "campaign.toml")
 
 
 def test_a_way_that_was_not_tried_is_the_other_s_and_fixed() -> None:

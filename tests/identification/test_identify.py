@@ -215,6 +215,13 @@ def two_axes(campaign: Campaign) -> Campaign:
     return replace(campaign, axes={**campaign.axes, "slew": campaign.axes["hoist"]})
 
 
+def pump(**entries: object) -> dict[str, object]:
+    """A fit configuration of the pump alone."""
+    stage = {"name": "pump", "part": "pump", "free": {"Z8": {"relative": (0.5, 2.0)}}}
+    return {"stages": [stage | entries]}
+
+
+FORCES = {"plus": (0.06, 0.16, 0.28, 0.40), "minus": (0.06, 0.16, 0.28, 0.38)}
 REFUSED: Mapping[str, tuple[Callable[[Campaign], object], type[Exception], str]] = {
     "another axis": (
         lambda tests: swashplate.identify(tests, axis="slew"),
@@ -250,6 +257,36 @@ REFUSED: Mapping[str, tuple[Callable[[Campaign], object], type[Exception], str]]
         lambda tests: swashplate.identify(tests, free={"Z8": (2, 0.5)}),
         ParameterError,
         r"free, Z8: .*must rise: write \[0.5, 2\]",
+    ),
+    "a factor that no machine has": (
+        lambda tests: swashplate.identify(tests, free={"Z8": (0.5, 1e300)}),
+        ParameterError,
+        r"a bound of Z8 .* is 1.6514e\+306 sqrt\(Pa\)/\(m s\), .* 10 to 1e\+11 sqrt",
+    ),
+    "a bound in another unit": (
+        lambda tests: swashplate.identify(tests, free={"Z9": {"bounds": (50.0, 2e7)}}),
+        ParameterError,
+        r"a bound of Z9 .* is 50 Pa, .* 10000 to 1e\+09 Pa: .* bar instead of Pa",
+    ),
+    "a force that no solenoid has": (
+        lambda tests: swashplate.identify(
+            tests, free=pump(forces=FORCES | {"relative": (0.5, 1e6)})
+        ),
+        ParameterError,
+        r"a bound of force_plus_1 .* N, .* at most 10000 N",
+    ),
+    "a start pressure that no machine has": (
+        lambda tests: swashplate.identify(tests, free=pump(start_pressure=1e300)),
+        ParameterError,
+        r"start_pressure is 1e\+300, .* 10000000000",
+    ),
+    "a prior in another unit": (
+        lambda tests: swashplate.identify(
+            tests,
+            free={"Z9": {"bounds": (5e6, 2e7), "prior": {"mean": 107.0, "deviation": 10.0}}},
+        ),
+        ParameterError,
+        r"the prior mean of Z9 .* is 107 Pa, .* bar instead of Pa",
     ),
     "nothing": (
         lambda tests: swashplate.identify(tests, free={}),

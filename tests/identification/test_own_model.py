@@ -6,7 +6,7 @@ import sys
 from dataclasses import replace
 from math import exp, nan, sqrt
 from pathlib import Path
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
 import pytest
@@ -22,7 +22,7 @@ from swashplate import (
     InputError,
     ParameterError,
 )
-from swashplate.equations import Model, Tap, equation, simulate
+from swashplate.equations import Definition, Model, Tap, equation, simulate
 from swashplate.executors import Processes
 from swashplate.identification import (
     Identification,
@@ -274,6 +274,22 @@ def servo_step(state: State, command: float, supply: float, p: Servo, h: float) 
 
 
 servo = Model("servo", parameters=Servo, state=State, step=servo_step)
+
+
+class DocumentedServo(NamedTuple):
+    gain: float
+    lag: Annotated[float, Definition("lag", "s", lower=0.0, plausible=(1e-3, 100.0))]
+
+
+@equation
+def documented_step(
+    state: State, command: float, supply: float, p: DocumentedServo, h: float
+) -> State:
+    return State(state.place + h / p.lag * (p.gain * command * supply - state.place))
+
+
+documented = Model("servo", parameters=DocumentedServo, state=State, step=documented_step)
+"""The same, whose author says which lags can be meant; of the gain nothing is said."""
 RANGES = {
     "gain": (0.1, 1.0, 10.0, "mm/V"),
     "lag": (0.05, 0.1, 3.0),
@@ -398,6 +414,15 @@ def lag_alone(**stated: object) -> None:
 
 
 SENSELESS = {
+    r"servo, a bound: lag .* is 500 s, .* 0.001 to 100 s: .* ms instead of s": lambda: ModelSetup(
+        documented, {"lag": (0.1, 1.0, 500.0)}
+    ),
+    r"servo: lag .* is 1e-05 s, .* 0.001 to 100 s": lambda: ModelSetup(
+        documented, {"lag": Unknown("lag", 1e-5, 0.0, 10.0)}
+    ),
+    "servo, fixed: lag .* is 500 s, .* 0.001 to 100 s": lambda: ModelSetup(
+        documented, {"gain": (0.1, 1.0, 10.0)}, fixed={"lag": 500.0}
+    ),
     "A dict is no model": lambda: fit({}, RUNS, RANGES),
     "Nothing of servo is free": lambda: fit(servo, RUNS, {}),
     "lag is free as 3: give lower bound": lambda: fit(servo, RUNS, {"lag": 3}),

@@ -114,7 +114,7 @@ def test_another_campaign_is_refused(path: Path, campaign: Campaign) -> None:
 POISON = {
     "cut": (lambda text: text[:-100], "is not JSON"),
     "another key": (put('"axis"', '"ax"'), "an entry 'axis'"),
-    "other parameters": (put('"Z10"', '"Z9"', 1), "stage pump has other parameters .* fit again"),
+    "other parameters": (put('"Z10"', '"Z3"', 1), "stage pump has other parameters .* fit again"),
     "other version": (put('"swashplate": "[^"]*"', '"swashplate": "9.9"'), "9.9"),
     "text for a vector": (put(r'"vector": \[[^]]+\]', '"vector": "abc"'), "finite numbers"),
     "wrong length": (put(r'"vector": \[[^]]+\]', '"vector": [1.0]', 1), "stage card has other"),

@@ -291,7 +291,7 @@ def _moved(
     errors = dict[str, Array]()  # of each stage, by its name
     try:
         if fixed:
-            parameters = parameters.replace(fixed, parameters.options)
+            parameters = parameters.with_numbers(fixed, parameters.options)
         for stage in stages:
             problem, known = stage.problem, stage.uncertainty
             assert isinstance(problem.model, DriveModel)

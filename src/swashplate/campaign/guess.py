@@ -25,7 +25,7 @@ from swashplate.campaign.schema import ChannelKind
 from swashplate.drive import Drive
 from swashplate.equations.cache import kernel
 from swashplate.equations.declaration import inlined
-from swashplate.errors import InputError
+from swashplate.errors import InputError, ParameterError
 from swashplate.parameters.parameter_set import ParameterSet, set_of
 from swashplate.parameters.rules import SIDES
 from swashplate.results import short
@@ -550,7 +550,14 @@ def guessed_set(guess: Guess, source: str) -> ParameterSet:
         "Z13": (stops[0], stops[1]),
         "Z16": (openings[0], openings[1]),
     }
-    made = base.replace(changed)
+    try:
+        # what is written here is read again as what somebody wrote
+        made = base.replace(changed)
+    except ParameterError as error:
+        raise ParameterError(
+            f"The guess of {guess.axis} from {source} fails; look at units and scales of its "
+            f"signals: {error}"
+        ) from None
     said = {
         symbol: replace(each, source=source, status="approximate")
         if symbol in changed

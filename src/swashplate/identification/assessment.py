@@ -287,6 +287,7 @@ class Identification(Estimated):
             verdict=StoredVerdict(
                 grade=self.verdict.grade,
                 headline=self.verdict.headline,
+                validity=self.verdict.validity,
                 numbers=dict(self.fit.parameters.numbers),
             ),
         )
@@ -390,6 +391,8 @@ class StoredVerdict(Entry):
     headline: str
     numbers: dict[str, float]
     """Of the drive or model that it is about."""
+    validity: str = ""
+    """What it holds for, and what the tests never reached; empty in older files."""
 
 
 class FitFile(Entry):

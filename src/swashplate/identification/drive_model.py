@@ -39,8 +39,9 @@ from swashplate.identification.setup import (
     setup_names,
 )
 from swashplate.identification.unknowns import Prior, Unknown, Unknowns, bounded
-from swashplate.parameters.definitions import SWITCHES, columns_of, find, is_column
+from swashplate.parameters.definitions import SWITCHES, Definition, columns_of, find, is_column
 from swashplate.parameters.parameter_set import ParameterSet
+from swashplate.parameters.plausible import check_plausible
 from swashplate.parameters.rules import FULL_VOLTAGE
 from swashplate.results import Result
 from swashplate.simulation.instance import PRESSURE, START, at_every_rate
@@ -60,6 +61,8 @@ START_PRESSURE = "start_pressure"
 """Name of δP at the first sample, where it is an unknown of the experiment."""
 START_CURRENTS = ("start_current_plus", "start_current_minus")
 """Names of a channel's current at the first sample, where it is an unknown of the experiment."""
+FORCE = Definition("force of the solenoids", "N", plausible=(0.0, 1e4))
+"""What stands for their coefficients."""
 MOST_EDGES = 60
 """Jumps of commands whose instants are estimated; more are taken halfway between their samples."""
 LARGEST_START_PRESSURE = 4e6
@@ -200,7 +203,7 @@ def limits_unreached(
     """
     limits = {column: parameters.numbers[column] for column in LIMIT_COLUMNS}
     eased = {c: EASED * limit for c, limit in limits.items() if isfinite(limit)}
-    without, reached = parameters.replace(eased), dict.fromkeys(LIMIT_COLUMNS, 0.0)
+    without, reached = parameters.with_numbers(eased), dict.fromkeys(LIMIT_COLUMNS, 0.0)
     for each in experiments:
         run = simulated_run(each, without)
         for column, (signal, sign) in LIMIT_COLUMNS.items():
@@ -321,7 +324,7 @@ def _at(model: DriveModel, values: tuple[tuple[str, float], ...]) -> ParameterSe
         changes |= model.forces.coefficients(dict(values), model.parameters)
     try:
         # whatever the values, the equations stay those that the fit began with
-        return model.parameters.replace(changes, model.parameters.options)
+        return model.parameters.with_numbers(changes, model.parameters.options)
     except ParameterError as error:
         raise DomainError(str(error)) from None
 
@@ -491,7 +494,7 @@ def stage_problem(
     free = _of_the_machine(stage, parameters)
     begin = {column: each.start for each in free for column in each.targets if column in SWITCHES}
     on = parameters.options | {SWITCHES[column] for column in begin}
-    begun = parameters.replace(begin, on) if begin else parameters
+    begun = parameters.with_numbers(begin, on) if begin else parameters
     own = [unknown for each in runs for unknown in _of_a_run(stage, each, channels, parameters)]
     simulated = stage.part != "pump" or stage.current != "measured"
     jumps = [unknown for each in runs if simulated for unknown in _edges(each, edges)]
@@ -577,11 +580,17 @@ def _of_the_machine(stage: Stage, parameters: ParameterSet) -> list[Unknown]:
         for group in [columns] if entry.tied else [(each,) for each in columns]:
             nominal = float(np.mean([_nominal(parameters, column) for column in group]))
             own, bounds = name if entry.tied else group[0], (entry.relative, entry.bounds)
-            unknowns.append(bounded(own, nominal, *bounds, least, sets=group, **how))
+            unknown = bounded(own, nominal, *bounds, least, sets=group, **how)
+            check_plausible(f"a bound of {own}", definition, unknown.low, unknown.high)
+            if entry.prior is not None:
+                check_plausible(f"the prior mean of {own}", definition, entry.prior.mean)
+            unknowns.append(unknown)
     if stage.forces is not None:
         for name, value in stage.forces.values(parameters).items():
             log = value > 0.0
-            unknowns.append(bounded(name, value, stage.forces.relative, unit="N", log=log))
+            force = bounded(name, value, stage.forces.relative, unit="N", log=log)
+            check_plausible(f"a bound of {name}", FORCE, force.low, force.high)
+            unknowns.append(force)
     return unknowns
 
 

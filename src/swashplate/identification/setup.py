@@ -19,7 +19,7 @@ from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validat
 
 from swashplate.campaign import ChannelKind
 from swashplate.campaign.experiment import Experiment
-from swashplate.campaign.schema import Weight, Window
+from swashplate.campaign.schema import LARGEST_PRESSURE, Weight, Window
 from swashplate.documents import parse_toml, read_text, validated
 from swashplate.entries import Finite, Flag, NotNegative, Positive
 from swashplate.equations import Model as Equations
@@ -31,6 +31,7 @@ from swashplate.identification.solving import solve
 from swashplate.identification.unknowns import Prior, Unknown, Unknowns
 from swashplate.parameters.definitions import find
 from swashplate.parameters.parameter_set import ParameterSet
+from swashplate.parameters.plausible import check_plausible
 from swashplate.parameters.rules import SIDES
 from swashplate.results import Result, short
 from swashplate.simulation.instance import START
@@ -180,6 +181,7 @@ class Stage(Entry):
     )
     start_pressure: Positive | None = Field(
         None,
+        le=LARGEST_PRESSURE,
         description="Largest stroking pressure at the first sample, free in each run [Pa]; where "
         "none is given, it is free in runs with start = 'estimated' alone.",
     )
@@ -407,10 +409,15 @@ class ModelSetup(Result):
                     )
         free = {key: _unknown(key, each) for key, each in self.free.items()}
         ranges = equations.ranges if isinstance(equations, Equations) else {}
-        for key, each in free.items():
-            for bound in (each.low, each.high):
-                if key in ranges and not ranges[key].holds(bound):
-                    raise ParameterError(f"{name}, a bound: {ranges[key].broken(key, bound)}.")
+        for key, definition in ranges.items():
+            if key in free:
+                for bound in (free[key].low, free[key].high):
+                    if not definition.holds(bound):
+                        raise ParameterError(f"{name}, a bound: {definition.broken(key, bound)}.")
+                    check_plausible(f"{name}, a bound: {key}", definition, bound)
+                check_plausible(f"{name}: {key}", definition, free[key].start)
+            if key in self.fixed:
+                check_plausible(f"{name}, fixed: {key}", definition, self.fixed[key])
         for key, made in {"model": own, "name": name, "free": free}.items():
             object.__setattr__(self, key, made)
         _ = self.setup  # refuses what is no uncertainty

@@ -22,8 +22,9 @@ from swashplate.parameters.parameter_set import (
     ParameterSet,
     PressureRoot,
     Status,
-    value_of,
+    meant_value,
 )
+from swashplate.parameters.plausible import check_plausible
 from swashplate.units import to_si
 
 # --- what stands in a file ------------------------------------------------------------------------
@@ -284,7 +285,8 @@ def parameter_of(definition: Definition, entry: Entry) -> Parameter:
     if len(numbers) == 2 and not definition.directional:
         raise ParameterError(f"{what} has one value, not a plus and a minus one.")
     change = numbers if len(numbers) == 2 else numbers[0]
-    value = value_of(definition.symbol, definition, change)
+    value = meant_value(definition.symbol, definition, change)
+    check_plausible(f"a bound of {definition.symbol}", definition, *bounds)
     return Parameter(definition, value, entry.source, entry.status, bounds or None)  # type: ignore[arg-type]
 
 

@@ -187,6 +187,11 @@ def numbers_table(drive: Drive, stages: Sequence[StageFit]) -> tuple[Table, list
     return made, sentences
 
 
+def _at_limits(drive: Drive, limits: Mapping[str, float]) -> Drive:
+    """A drive whose limits lie where the tests went, by column."""
+    return Drive(drive.parameters.with_numbers(limits))
+
+
 def _range_of(drive: Drive, stages: Sequence[StageFit], values: Array, largest: Commands) -> _Range:
     """Errors of the numbers: of what the tests determine, and of unseen limits by both ends."""
 
@@ -204,12 +209,12 @@ def _range_of(drive: Drive, stages: Sequence[StageFit], values: Array, largest: 
         if mistaken_for_a_lag(column, stages, unseen):
             # the lag is the same both ways, and the delay follows it
             doubt[ACCELERATION, way] = doubt[DELAY : LAG + 1] = f"{column} fixed"
-    nearest, farthest = drive.replace(**unseen), without_limits(drive, unseen)
+    nearest, farthest = _at_limits(drive, unseen), without_limits(drive, unseen)
     near, far = numbers_of(nearest, largest), numbers_of(farthest, largest)
     moved = np.maximum(np.abs(near - values), np.abs(far - values))
     left_open = np.abs(far - near) > OPEN * np.abs(near)
     if left_open.any():
-        errors = standard_errors(stages, lambda one: numbers_of(one.replace(**unseen), largest))
+        errors = standard_errors(stages, lambda one: numbers_of(_at_limits(one, unseen), largest))
         cautious = QUANTILE * errors * np.sign(near)
         near = np.where(np.abs(far) > np.abs(near), near - cautious, near + cautious)
     half = np.where(left_open, np.nan, half + moved)
