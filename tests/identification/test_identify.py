@@ -216,6 +216,11 @@ def stage_of(name: str) -> Mapping[str, Any]:
     return {"name": "pump", "part": "pump", "free": {name: {"relative": [0.5, 2.0]}}}
 
 
+def with_drive(campaign: Campaign, name: str) -> Campaign:
+    axis = campaign.axes["hoist"].model_copy(update={"drive": name})
+    return replace(campaign, axes={"hoist": axis})
+
+
 def two_axes(campaign: Campaign) -> Campaign:
     return replace(campaign, axes={**campaign.axes, "slew": campaign.axes["hoist"]})
 
@@ -337,6 +342,11 @@ REFUSED: Mapping[str, tuple[Callable[[Campaign], object], type[Exception], str]]
         lambda tests: swashplate.export.fmu(Identification(tests, None), "hoist.fmu"),
         TypeError,
         r"give a Drive.*identification.drive",
+    ),
+    "a campaign with an unknown drive": (
+        lambda tests: swashplate.identify(with_drive(tests, "hoost")),
+        ParameterError,
+        r"campaign.toml, \[axes.hoist\]: .*'hoost' .did you mean hoist",
     ),
     "an unknown packaged drive": (
         lambda _: Drive.preset("hoost"),
