@@ -385,6 +385,44 @@ def test_a_fit_comes_back_with_its_model_alone(tmp_path: Path) -> None:
     assert again.stages[0].uncertainty.estimates == (made.stages[0].uncertainty.estimates)
 
 
+class Bend(NamedTuple):
+    bend: float
+
+
+class Speed(NamedTuple):
+    speed: float
+
+
+def bent(state: Speed, voltage: float, p: Bend) -> Speed:
+    """A speed that has a ridge over `bend` at -1, where a search from the left is caught."""
+    return Speed(voltage * (p.bend**3 - 3.0 * p.bend))
+
+
+@pytest.mark.parametrize(
+    ("speed", "tried"),
+    [
+        pytest.param(5.0, range(2, 7), id="until one explains what was measured"),
+        pytest.param(30.0, [7], id="all of them, if none does"),
+    ],
+)
+def test_other_starts_are_tried_where_residuals_are_large(speed, tried, caplog) -> None:
+    model = Model("bent", parameters=Bend, state=Speed, step=bent)
+    measured = np.full(TIME.size, speed)
+    measured[0] = 0.0
+    run = run_of("a", np.ones(TIME.size), {"speed": measured}, time=TIME, kind="other", noise=0.01)
+    free = {"bend": (-2.2, -1.8, 2.9)}
+    with caplog.at_level("INFO", "swashplate"):
+        (stage,) = fit(model, [run], free).stages
+    assert len(stage.starts) in tried
+    assert stage.solution.cost == min(stage.solution.cost, *(each.cost for each in stage.starts))
+    assert any("starts=0" in message for message in caplog.messages)
+    (alone,) = fit(model, [run], free, search=Search(0)).stages
+    assert alone.values["bend"] == pytest.approx(-1.0, abs=0.01)
+    assert not alone.starts
+    if speed == 5.0:
+        assert stage.values["bend"] == pytest.approx(2.2790, abs=1e-3)  # x³ - 3 x = 5
+
+
 def test_starts_of_other_steps_are_not_resumed(tmp_path: Path) -> None:
     search = Search(1, store=tmp_path, resume=True)
     made = fit(OwnModel(servo), RUNS, RANGES, noise=NOISE, search=search)
@@ -426,7 +464,7 @@ SENSELESS = {
     "A dict is no model": lambda: fit({}, RUNS, RANGES),
     "Nothing of servo is free": lambda: fit(servo, RUNS, {}),
     "lag is free as 3: give lower bound": lambda: fit(servo, RUNS, {"lag": 3}),
-    "no parameter 'lagg'; it has gain, lag": lambda: fit(
+    "no parameter 'lagg', which free names .*it has gain, lag": lambda: fit(
         servo, RUNS, {"lagg": (0.1, 0.2, 3.0)}, fixed={"gain": 1.0, "lag": 1.0}
     ),
     "There is no run to fit": lambda: fit(servo, [], RANGES),

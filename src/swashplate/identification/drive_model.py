@@ -23,7 +23,7 @@ from swashplate.documents import validated
 from swashplate.drive import Drive
 from swashplate.equations.marching.observation import Observation, ObservedRecord, Own
 from swashplate.equations.marching.record import SLOWEST, SOURCE_RATE, Record, even_rate, record_of
-from swashplate.errors import DomainError, InputError, ParameterError
+from swashplate.errors import DomainError, InputError, ParameterError, UnknownParameterError
 from swashplate.executors import available_cores
 from swashplate.identification.model import EDGE, OFFSET, Asked, EquationModel
 from swashplate.identification.problem import Problem, noise_scales
@@ -418,9 +418,9 @@ def configuration(free: FreeParameters, experiments: Sequence[Experiment]) -> Se
         If the configuration cannot be read, or an entry is wrong.
     """
     if isinstance(free, Setup):
-        return free
+        return _with_known_names(free, "the fit configuration")
     if isinstance(free, str | Path):
-        return load_setup(free)
+        return _with_known_names(load_setup(free), str(free))
     given: object = free
     if not isinstance(given, Mapping) or not given:
         raise InputError(
@@ -428,7 +428,8 @@ def configuration(free: FreeParameters, experiments: Sequence[Experiment]) -> Se
             "mapping such as {'Z8': (0.5, 2)}."
         )
     if "stages" in free:
-        return validated(dict(free), Setup, "the fit configuration")
+        setup = validated(dict(free), Setup, "the fit configuration")
+        return _with_known_names(setup, "the fit configuration")
     entries = free_entries(free)
     blocks = {"card" if find(name).block == "control_card" else "pump" for name in entries}
     kinds = {channel.kind for run in experiments for channel in run.channels.values()}
@@ -438,6 +439,23 @@ def configuration(free: FreeParameters, experiments: Sequence[Experiment]) -> Se
     elif blocks == {"card"} and not kinds.isdisjoint(CURRENTS):
         part = "card"
     return Setup(stages=(Stage(name=part, part=part, free=entries),))
+
+
+def _with_known_names(setup: Setup, origin: str) -> Setup:
+    """The fit configuration of a drive; a name in it that no parameter has is refused."""
+    names = [
+        (f"stage '{stage.name}', free", name)
+        for stage in setup.stages
+        if stage.part != "model"
+        for name in stage.free
+    ]
+    names += [("standard_uncertainty", name) for name in setup.standard_uncertainty]
+    for table, name in names:
+        try:
+            find(name)
+        except UnknownParameterError as error:
+            raise UnknownParameterError(f"{origin}, {table}: {error}") from None
+    return setup
 
 
 def setup_of(

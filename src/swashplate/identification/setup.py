@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache
 from importlib import import_module
@@ -24,7 +24,16 @@ from swashplate.documents import parse_toml, read_text, validated
 from swashplate.entries import Finite, Flag, NotNegative, Positive
 from swashplate.equations import Model as Equations
 from swashplate.equations.fields import check_mapping, is_real
-from swashplate.errors import FileError, InputError, MissingFileError, ParameterError
+from swashplate.equations.model import parameter_paths
+from swashplate.errors import (
+    FileError,
+    InputError,
+    MissingFileError,
+    ParameterError,
+    SwashplateError,
+    UnknownNameError,
+    meant,
+)
 from swashplate.identification.model import OFFSET, OwnModel, simulated
 from swashplate.identification.problem import Problem, noise_scales
 from swashplate.identification.solving import solve
@@ -292,8 +301,8 @@ def load_setup(name: str | Path) -> Setup:
         text = _SETUPS.joinpath(file).read_text("utf-8")
     else:
         raise ParameterError(
-            f"There is no packaged fit configuration '{name}'; there are "
-            f"{', '.join(setup_names())}, or give a .toml file."
+            f"There is no packaged fit configuration '{name}'{meant(file, setup_names())}; there "
+            f"are {', '.join(setup_names())}, or give a .toml file."
         )
     return validated(parse_toml(text, file), Setup, file)
 
@@ -408,6 +417,10 @@ class ModelSetup(Result):
                         f"{name}: the {what} of '{key}' is {number!r}, but must be {must}."
                     )
         free = {key: _unknown(key, each) for key, each in self.free.items()}
+        if isinstance(own, OwnModel):
+            targets = [name for unknown in free.values() for name in unknown.targets]
+            _check_names(own.model, "free", targets)
+            _check_names(own.model, "fixed", self.fixed)
         ranges = equations.ranges if isinstance(equations, Equations) else {}
         for key, definition in ranges.items():
             if key in free:
@@ -467,7 +480,10 @@ class ModelSetup(Result):
                     "{'lag': (0.005, 0.06, 0.5), ...}, lower bound, nominal value and upper bound."
                 )
         known = ("model", "free", "name", "channels", "noise", "fixed", "standard_uncertainty")
-        return cls(**{key: getattr(module, key) for key in known if hasattr(module, key)})
+        try:
+            return cls(**{key: getattr(module, key) for key in known if hasattr(module, key)})
+        except SwashplateError as error:
+            raise type(error)(f"{path}: {error}") from None
 
     @property
     def setup(self) -> Setup:
@@ -554,6 +570,17 @@ class ModelSetup(Result):
         known = channels, self.scales, self.numbers
         problem = Problem(self.model, (experiment,), Unknowns(own), *known)
         return problem.outputs(solve(problem).vector, 0)
+
+
+def _check_names(model: Equations, table: str, names: Iterable[str]) -> None:
+    """Refuse a name that the model's parameters do not have."""
+    paths = parameter_paths(model)
+    for name in names:
+        if name not in paths and not name.startswith((START, OFFSET)):
+            raise UnknownNameError(
+                f"{model.name} has no parameter '{name}', which {table} names"
+                f"{meant(name, paths)}; it has {', '.join(paths)}."
+            )
 
 
 def _unknown(name: str, entry: Range | Unknown) -> Unknown:

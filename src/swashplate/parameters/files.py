@@ -11,7 +11,7 @@ from pydantic import BaseModel, ConfigDict, Field
 from swashplate.documents import parse_toml, read_text, validated
 from swashplate.entries import Name, NotNegative, Number, Positive, Version
 from swashplate.equations.replacement import Replacement, again, found_at, uses
-from swashplate.errors import InputError, MissingFileError, ParameterError
+from swashplate.errors import InputError, MissingFileError, ParameterError, meant
 from swashplate.parameters.definitions import Block, Definition, declare, find, options_of
 from swashplate.parameters.parameter_set import (
     CardSwitch,
@@ -120,8 +120,10 @@ def preset_names() -> tuple[str, ...]:
 def load_preset(name: str) -> ParameterSet:
     """A packaged parameter set; the `ParameterError` for an unknown name lists the right ones."""
     if name not in preset_names():
+        names = preset_names()
         raise ParameterError(
-            f"There is no packaged parameter set '{name}'; there are {', '.join(preset_names())}."
+            f"There is no packaged parameter set '{name}'{meant(str(name), names)}; there are "
+            f"{', '.join(names)}; a parameter file is read with Drive.from_toml."
         )
     return read_set(SETS.joinpath(f"{name}.toml").read_text("utf-8"), f"{name}.toml")
 
@@ -172,7 +174,8 @@ def set_file(name: str | Path) -> Path | None:
     if path.suffix.lower() == ".toml" or len(path.parts) > 1 or path.is_file():
         return path
     raise MissingFileError(
-        f"There is no packaged set, file or folder '{name}'; packaged are "
+        f"There is no packaged set, file or folder '{name}'{meant(str(name), preset_names())}; "
+        "packaged are "
         f"{', '.join(preset_names())}."
     )
 
