@@ -597,7 +597,7 @@ def valve_test(name: str, frequency: float) -> Experiment:
 
 
 @pytest.fixture
-def documented(tmp_path: Path, monkeypatch) -> Path:
+def documented_valve(tmp_path: Path, monkeypatch) -> Path:
     """The model file of the page, importable for the length of a test."""
     monkeypatch.setattr(sys, "path", [*sys.path])
     path = tmp_path / "documented_valve.py"
@@ -607,9 +607,9 @@ def documented(tmp_path: Path, monkeypatch) -> Path:
     sys.modules.pop(path.stem, None)
 
 
-def test_the_documented_model_file_finds_a_lag_in_several_processes(documented: Path) -> None:
+def test_the_documented_model_file_finds_a_lag_in_several_processes(documented_valve: Path) -> None:
     """Workers find the model, which has no name of its own, as an attribute of the `OwnModel`."""
-    setup = ModelSetup.from_file(documented)
+    setup = ModelSetup.from_file(documented_valve)
     assert isinstance(setup.model, OwnModel)
     assert pickle.loads(pickle.dumps(setup.model.model)) is setup.model.model
     runs = [valve_test("slow", 0.2), valve_test("fast", 0.6)]
