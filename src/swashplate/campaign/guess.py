@@ -67,9 +67,8 @@ STILL = 0.01
 """Command that counts as none, over the largest one, whatever the dead zone. [1]"""
 LAGS_TO_REST = 5.0
 """Lags after which a motion has come to rest: it has 0.7 % of its speed then. [1]"""
-SURE = 4.0
-"""Standard errors of the mean speed at rest beyond which it is a creep: of normal ones one mean in
-16 000 lies farther off."""
+FALSE_ALARM = 1e-3
+"""Probability at which noise that is normal passes for a creep. [1]"""
 CREEPS = 0.002
 """Creep over the greatest speed that is none: zero errors of tachometers are as large. [1]"""
 ANGLE = 0.2
@@ -137,12 +136,13 @@ class Guess(NamedTuple):
 @inlined
 def _speed_at(command: float, numbers: Array, edge: float) -> float:
     """Speed that a drive without lag, delay and limits of acceleration has at a command."""
-    speed = numbers[11]
+    speed: float = numbers[11]
     for way in range(2):
         sign = 1.0 - 2.0 * way
         beyond = max(sign * command - numbers[way], 0.0)
         speed += sign * (numbers[2 + way] * beyond + numbers[8 + way] * min(beyond / edge, 1.0))
-    return min(max(speed, -numbers[5]), numbers[4])
+    limited: float = min(max(speed, -numbers[5]), numbers[4])
+    return limited
 
 
 @kernel
@@ -223,8 +223,8 @@ class _Run(NamedTuple):
     """Instants (j,) of the measured samples. [s]"""
     travelled: Array
     """Measured way (j,) since the first of them, of a speed its integral."""
-    count: float
-    """Resolution of the way, 0 if it is fine."""
+    resolution: float
+    """Of the way, 0 if it is fine."""
 
 
 def _simulated(run: _Run, numbers: Array) -> tuple[Array, Array]:
@@ -257,6 +257,8 @@ def _creep(runs: Sequence[_Run], numbers: Array, scale: float) -> float | None:
     of motions that end more slowly than the numbers say. The counts of an encoder may hide one at
     both ends of a rest, or show one too many.
     """
+    from scipy.special import stdtrit
+
     dead_zones, accelerations, lag, delay = numbers[:2], numbers[6:8], numbers[10], numbers[12]
     largest = max(float(np.abs(run.command).max()) for run in runs)
     # a creep takes from the dead zone of one way what it gives to the other
@@ -269,13 +271,14 @@ def _creep(runs: Sequence[_Run], numbers: Array, scale: float) -> float | None:
             ends = begin + REST * np.arange(int((end - begin) / REST) + 1)
             measured = np.interp(ends, run.sampled, run.travelled)
             speeds.append(np.diff(measured - np.interp(ends, time, position)) / REST)
-            rounding += run.count
+            rounding += run.resolution
     observed = np.concatenate([np.zeros(0), *speeds])
     if observed.size < RESTS:
         return None
     mean = float(observed.mean())
     error = float(observed.std(ddof=1)) / sqrt(observed.size)
-    doubt = max(SURE * error + rounding / (REST * observed.size), CREEPS * scale)
+    quantile = float(stdtrit(observed.size - 1, 1.0 - 0.5 * FALSE_ALARM))
+    doubt = max(quantile * error + rounding / (REST * observed.size), CREEPS * scale)
     return mean if abs(mean) > doubt else 0.0
 
 
@@ -420,7 +423,18 @@ def _run(experiment: Experiment, channel: Channel) -> _Run:
     stamps = np.append(drive.time, grid[-1]) if held else np.union1d(drive.time, grid)
     start = 0.0 if experiment.start == "rest" or not speeds.size else float(speeds[0])
     command = drive.at(stamps)
-    return _Run(grid, stamps, command, held, start, windows, speeds, time, travelled, count=count)
+    return _Run(
+        time=grid,
+        stamps=stamps,
+        command=command,
+        held=held,
+        start=start,
+        windows=windows,
+        speeds=speeds,
+        sampled=time,
+        travelled=travelled,
+        resolution=count,
+    )
 
 
 def _edges(time: Array, angle: Array, count: float) -> tuple[Array, Array]:
