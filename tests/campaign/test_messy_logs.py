@@ -18,7 +18,6 @@ from swashplate.campaign import (
     unsigned_currents,
 )
 from swashplate.identification.data_checks import (
-    beside_the_drives,
     check_runs,
     refuse_unsound,
     spike_findings,
@@ -118,28 +117,6 @@ def test_a_nameplates_turns(drafted: Drafted, header: str, factor: float) -> Non
     assert channel.unit == "rad/s"
     assert channel.values == pytest.approx(factor * (35.0 + BOTH))
     assert ('unit = "rpm"' in text_of(tests)) == (header == "rpm")
-
-
-# --- what the input is between samples ------------------------------------------------------------
-
-
-@pytest.mark.parametrize("true", ["previous", "linear"])
-def test_the_interpolation_that_fits_better_is_named(drafted: Drafted, true: str) -> None:
-    """A driver's command, sampled 20 times a second; the drive is known."""
-    random, fine = np.random.default_rng(3), np.arange(0.0, 30.0, 1.0 / 512.0)
-    time = np.arange(0.0, 29.99, 0.05)
-    levels = np.concatenate([[0.0, 0.0], random.uniform(-7.0, 7.0, 30)])
-    command = np.interp(time, np.arange(32.0), levels)
-    held = np.searchsorted(time, fine, side="right") - 1
-    moved = command[held] if true == "previous" else np.interp(fine, time, command)
-    speed = np.interp(time, fine, Drive.preset("hoist").simulate(moved).shaft_speed)
-    tests = drafted(time=time, voltage=command, speed=speed, draft={"drive": "hoist"})
-    other = "linear" if true == "previous" else "previous"
-    wrong = tests if true == "linear" else edit(tests, 'n = "previous"', 'n = "linear"')
-    (said,) = beside_the_drives(wrong)
-    assert f"the input of the axis 'hoist' seems to be '{true}' between samples" in said
-    assert f'try interpolation = "{true}" in [axes.hoist.input]' in said
-    assert beside_the_drives(edit(wrong, f'n = "{other}"', f'n = "{true}"')) == []
 
 
 # --- spikes, and what is ignored ------------------------------------------------------------------

@@ -9,6 +9,7 @@ import sys
 import time
 import tomllib
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
@@ -84,12 +85,7 @@ def test_from_logs_with_a_current_to_a_drive_named_by_its_axis(
     counts = ("--counts-per-turn", "2526.315789473684")
     done("campaign", "init", *logs, "--drive", "neutral", *counts, "--out", "campaign.toml")
     path = tmp_path / "campaign.toml"
-    text = (
-        path.read_text("utf-8")
-        .replace("[axes.drive", "[axes.winch")
-        .replace('interpolation = "previous"', 'interpolation = "linear"')
-    )
-    path.write_text(text, "utf-8")
+    path.write_text(path.read_text("utf-8").replace("[axes.drive", "[axes.winch"), "utf-8")
     said = done("guess", "campaign.toml")
     assert "rexroth_mdsd_1k_2x_2" in said
     result = run("fit", "campaign.toml", "--from", "start.toml", "--setup", "setup.toml")
@@ -221,11 +217,14 @@ def test_fits_that_are_refused(refused: Words, virtual: Path, tmp_path: Path) ->
 
 def test_one_fit_at_a_time_into_a_folder(refused: Words, virtual: Path, tmp_path: Path) -> None:
     words = ("fit", CAMPAIGN, "--axis", "boom", "--out", "results/fitted")
-    with locked(tmp_path / "results" / "fitted"):
+    lock = locked(tmp_path / "results" / "fitted")
+    with ThreadPoolExecutor(1) as another:
+        another.submit(lock.__enter__).result()
         sentence = refused(*words)
-        assert "results/fitted is in use" in sentence
-        assert f"process {os.getpid()} on" in sentence
-        assert "--out" in sentence
+        another.submit(lock.__exit__, None, None, None).result()
+    assert "results/fitted is in use" in sentence
+    assert f"process {os.getpid()} on" in sentence
+    assert "--out" in sentence
     assert "no axis 'boom'" in refused(*words)  # and leaves no folder behind
 
 

@@ -15,7 +15,7 @@ import numpy as np
 from swashplate.errors import InputError
 from swashplate.identification.determination import GAUGES, without_value
 from swashplate.identification.drive_model import START_PRESSURE, DriveModel, true_value
-from swashplate.identification.intervals import Estimate, Status
+from swashplate.identification.intervals import Estimate, Interval, Status
 from swashplate.identification.model import EDGE
 from swashplate.identification.noise import LEVEL
 from swashplate.identification.setup import ModelSetup
@@ -85,11 +85,12 @@ def estimates_table(
         ),
         si=True,
     )
-    pairs = zip(unknowns, _estimates(stage), strict=True)
+    pairs = zip(unknowns, stage.estimates, strict=True)
     for k, (unknown, estimate) in enumerate(pairs):
         if (unknown.run is None) == own:
             continue
-        name, value, status, error, low, high, _ = estimate
+        name, value = estimate.name, estimate.value
+        low, high = estimate.interval
         factor, true, holds = chosen_unit(unknown.unit).factor, None, ""
         if truth is not None:
             assert isinstance(stage.problem.model, DriveModel)
@@ -114,10 +115,10 @@ def estimates_table(
             Cell(high, shown[2]),
             _half_width(value, low, high),
             *((redrawn[k] if redrawn else None) or (None, None)),
-            error,
-            status,
+            estimate.standard_error,
+            estimate.status,
             unit=unknown.unit,
-            look=status != "estimated",
+            look=estimate.status != "estimated",
         )
     return made
 
@@ -162,19 +163,6 @@ def bootstrap_table(found: Bootstrap) -> Table:
     return made
 
 
-def _estimates(stage: StageFit) -> Sequence[Estimate]:
-    """The estimates, without intervals where too few samples tell the noise."""
-    try:
-        return stage.uncertainty.estimates
-    except InputError:
-        point = stage.problem.unknowns.at(stage.solution.vector)
-        values = zip(point, point.estimates.tolist(), strict=True)
-        return [
-            Estimate(name, value, "undetermined", None, None, None, unknown.unit)
-            for name, (unknown, value) in zip(point.names, values, strict=True)
-        ]
-
-
 def estimates_of(fit: Fit) -> dict[str, Estimate]:
     """What a fit says of every number: what each stage estimated, then what stayed fixed.
 
@@ -182,7 +170,7 @@ def estimates_of(fit: Fit) -> dict[str, Estimate]:
     """
     made: dict[str, Estimate] = {}
     for stage in fit.stages:
-        for unknown, estimate in zip(stage.problem.unknowns, _estimates(stage), strict=True):
+        for unknown, estimate in zip(stage.problem.unknowns, stage.estimates, strict=True):
             made[estimate.name] = estimate
             if unknown.run is None:
                 made.update(dict.fromkeys(unknown.targets, estimate))
@@ -190,7 +178,7 @@ def estimates_of(fit: Fit) -> dict[str, Estimate]:
     for name, value in parameters.numbers.items():
         unit = "" if isinstance(parameters, ModelSetup) else parameters[name].unit
         status: Status = "from the forces" if name in moved else "fixed"
-        made.setdefault(name, Estimate(name, value, status, None, None, None, unit))
+        made.setdefault(name, Estimate(name, value, unit, Interval(status)))
     return made
 
 
