@@ -1,0 +1,211 @@
+"""Campaigns: the runs of a day, logged to CSV files as a user has them, and the truth apart."""
+
+import csv
+import json
+import os
+from dataclasses import dataclass
+from datetime import datetime
+from pathlib import Path
+
+import numpy as np
+
+from . import controller, draws, instruments
+from .draws import LEVELS
+from .equations import march_cylinder, march_drive, motor_speed
+
+NEW_RATE = 512.0
+"""Instants a second at which new maneuvers are commanded and compared."""
+
+
+@dataclass(frozen=True)
+class Machine:
+    """A drive without instruments."""
+
+    numbers: dict[str, float]
+
+    def march(self, command, length, condition=draws.STEADY):
+        """Rows of `march_drive` under a held command."""
+        late = command.delayed(self.numbers["tau"], length)
+        return march_drive(
+            late.edges,
+            late.volts,
+            draws.channel(self.numbers, "plus"),
+            draws.channel(self.numbers, "minus"),
+            draws.pump(self.numbers),
+            condition,
+        )
+
+
+def sample_instants(logger, length, random):
+    """True instants of a run's samples and the stamps that the logger writes. [s]"""
+    own = np.arange(int(length * logger.rate) + 1) / logger.rate
+    own[1:] += logger.jitter * random.standard_normal(own.size - 1)
+    true = own * (1.0 + logger.drift)
+    inside = true <= length
+    stamps = np.round(own + logger.offset, logger.stamp_digits)
+    return true[inside], stamps[inside]
+
+
+def read_command(logger, volts, random):
+    """The command as the logger's converter reads it. [V]"""
+    analogue = logger.gain * volts + logger.zero + logger.noise * random.standard_normal(volts.size)
+    step = 2.0 * controller.LARGEST / 2**logger.bits
+    return np.clip(np.round(analogue / step) * step, -controller.LARGEST, controller.LARGEST)
+
+
+def written(values, digits):
+    """A column as text; no minus before a zero."""
+    return [f"{value:.{digits}f}" for value in np.round(values, digits) + 0.0]
+
+
+def file_name(axis, run):
+    """Name of a run's log: it sorts by maneuver, not by the day."""
+    return f"{axis}_{run}".replace(", ", "_").replace(" ", "_").replace("/", "-") + ".csv"
+
+
+def drive_columns(axis, seed, logger, run, condition, machine):
+    """Header and text of the columns of a drive's run."""
+    name = run.split(",")[0]
+    random = np.random.default_rng([seed, LEVELS["seeds"][axis], 100 + run_index(axis, run)])
+    length, wish = controller.maneuver(name, axis)
+    command = controller.held(wish, length, draws.drawn_controller(axis, seed))
+    rows = machine.march(command, length, condition)
+    true, stamps = sample_instants(logger, length, random)
+    tool = draws.drawn_encoder(axis, seed)
+    zero = random.uniform(0.0, 4.0)
+    counts = instruments.encoder(rows, rows[:, 4], true, tool, zero)
+    columns = {
+        "time [s]": written(stamps, logger.stamp_digits),
+        "voltage [V]": written(read_command(logger, command.at(true), random), 5),
+        "current [A]": written(
+            instruments.ammeter(rows, true, draws.drawn_ammeter(axis, seed), random), 4
+        ),
+        "encoder [counts]": written(counts, 0),
+    }
+    generator = draws.drawn_tacho(axis, seed)
+    if generator is not None:
+        speed = instruments.tacho(rows, true, generator, random)
+        columns["speed [rad/s]"] = written(speed, 6)
+    return columns
+
+
+def cylinder_columns(seed, logger, run, gain, cylinder):
+    """Header and text of the columns of a cylinder's run."""
+    random = np.random.default_rng(
+        [seed, LEVELS["seeds"]["cylinder"], 100 + run_index("cylinder", run)]
+    )
+    length, wish = controller.maneuver(run, "cylinder")
+    command = controller.held(wish, length, draws.drawn_controller("cylinder", seed))
+    rows = march_cylinder(command.edges, command.volts, cylinder, gain)
+    true, stamps = sample_instants(logger, length, random)
+    tool = draws.drawn_encoder("cylinder", seed)
+    zero = random.uniform(0.0, 4.0)
+    rod = instruments.encoder(rows, rows[:, 2], true, tool, zero) * tool.step
+    return {
+        "time [s]": written(stamps, logger.stamp_digits),
+        "valve [V]": written(read_command(logger, command.at(true), random), 5),
+        "rod [m]": written(rod, 6),
+    }
+
+
+def run_index(axis, run):
+    """Place of a run in the list of levels.toml, which its noise is drawn by."""
+    return draws.run_names(axis).index(run)
+
+
+def write_run(path, columns, stamp):
+    """Write a log and set its file's time."""
+    with path.open("w", newline="", encoding="utf-8") as stream:
+        writer = csv.writer(stream, lineterminator="\n")
+        writer.writerow(columns)
+        writer.writerows(zip(*columns.values(), strict=True))
+    os.utime(path, (stamp, stamp))
+
+
+def write_campaign(axis, seed, folder, rate=512.0, stated_spread=0.0):
+    """Write the logs of a campaign and what they were made with.
+
+    Parameters
+    ----------
+    axis : str
+        "hoist", "slew", "luff" or "cylinder".
+    seed : int
+    folder : Path
+        Gets `logs/` and `truth.json`.
+    rate : float
+        Samples a second of the logger.
+    stated_spread : float
+        As of `draws.drawn_parameters`.
+
+    Returns
+    -------
+    dict
+        "parameters" by name, "counts_per_turn" (1 for a cylinder), "held_out" (names of files),
+        "runs" (names of files in the order of the day).
+    """
+    folder = Path(folder)
+    logs = folder / "logs"
+    logs.mkdir(parents=True, exist_ok=True)
+    logger = draws.drawn_logger(axis, seed, rate)
+    names, gaps = draws.day(axis, seed)
+    clock = datetime.fromisoformat(LEVELS["campaign"]["start"]).timestamp()
+    if axis == "cylinder":
+        cylinder = draws.drawn_cylinder(seed)
+        parameters = cylinder._asdict()
+        conditions = draws.drawn_gains(seed)
+    else:
+        parameters = draws.drawn_parameters(axis, seed, stated_spread)
+        machine = Machine(parameters)
+        conditions = draws.drawn_conditions(axis, seed)
+    for run, gap, condition in zip(names, gaps, conditions, strict=True):
+        if axis == "cylinder":
+            columns = cylinder_columns(seed, logger, run, condition, cylinder)
+        else:
+            columns = drive_columns(axis, seed, logger, run, condition, machine)
+        clock += gap
+        write_run(logs / file_name(axis, run), columns, clock)
+    truth = {
+        "axis": axis,
+        "seed": seed,
+        "rate": rate,
+        "parameters": parameters,
+        "counts_per_turn": turn(axis, seed),
+        "held_out": [file_name(axis, run) for run in LEVELS["held_out"][axis]],
+        "runs": [file_name(axis, run) for run in names],
+    }
+    (folder / "truth.json").write_text(json.dumps(truth, indent=1), "utf-8")
+    return truth
+
+
+def turn(axis, seed):
+    """Counts a turn of a campaign's encoder, as its label says; 1 for a cylinder."""
+    if axis == "cylinder":
+        return 1.0
+    return 2.0 * np.pi / draws.drawn_encoder(axis, seed).step
+
+
+def new_run(numbers, axis, name):
+    """A new maneuver of a drive, without instruments, 512 samples a second.
+
+    Returns
+    -------
+    (n, 3) array
+        Time [s], command [V] as held from there on, speed of the drum [rad/s].
+    """
+    length, wish = controller.new_maneuver(name, axis)
+    command = controller.held_exactly(wish, length, NEW_RATE)
+    rows = Machine(numbers).march(command, length)
+    time = command.edges[:-1]
+    pressure = np.interp(time, rows[:, 0], rows[:, 3])
+    pump = draws.pump(numbers)
+    speed = [motor_speed(value, pump, draws.STEADY) for value in pressure]
+    return np.column_stack([time, command.volts, speed])
+
+
+def new_cylinder_run(cylinder, name):
+    """A new maneuver of a cylinder: time [s], command [V] and speed of the rod [m/s], (n, 3)."""
+    length, wish = controller.new_maneuver(name, "cylinder")
+    command = controller.held_exactly(wish, length, NEW_RATE)
+    rows = march_cylinder(command.edges, command.volts, cylinder, 1.0)
+    time = command.edges[:-1]
+    return np.column_stack([time, command.volts, np.interp(time, rows[:, 0], rows[:, 3])])
