@@ -75,7 +75,7 @@ def test_converted_filter_follows_the_recursion(machine: ModuleType) -> None:
 
 @pytest.mark.parametrize("run", range(5))
 def test_march_agrees_with_scipy(machine: ModuleType, run: int) -> None:
-    """Every signal to 1e-4 of its range; measured are 2e-5 at most."""
+    """Every signal to 1e-4 of its range; measured are 6.1e-5 at most."""
     shares = machine.checks.differences(*machine.checks.RUNS[run])
     assert max(shares.values()) < 1e-4, shares
 
@@ -99,7 +99,8 @@ def test_campaign_is_as_a_logger_leaves_it(machine: ModuleType, tmp_path: Path) 
     numbers = machine.draws.drawn_parameters("luff", 1003)
     assert numbers == truth["parameters"]
     length, wish = machine.controller.maneuver("step +9 V", "luff")
-    command = machine.controller.held(wish, length, machine.draws.drawn_controller("luff", 1003))
+    plc = machine.draws.drawn_controller("luff", 1003, "step +9 V")
+    command = machine.controller.held(wish, length, plc)
     order, _ = machine.draws.day("luff", 1003)
     condition = machine.draws.drawn_conditions("luff", 1003)[order.index("step +9 V")]
     turned = machine.logger.Machine(numbers).march(command, length, condition)[-1, 4]

@@ -30,27 +30,51 @@ RUNS = (
 TOLERANCES = {"method": "DOP853", "rtol": 1e-10, "atol": 1e-12}
 
 
+def reference_filter(start, stop, state, target, c, instants):
+    """I* (n,) at instants of a time in which I_ss is constant, and I* and its rate at the end."""
+    level, rate = state
+    values = np.full(instants.size, level)
+    while start < stop:
+        pull = c.omega**2 * (target - level)
+        if rate == 0.0 and abs(pull) <= c.C:
+            values[instants >= start] = level
+            break
+        sign = np.sign(rate) if rate != 0.0 else np.sign(pull)
+
+        def rates(_, y, sign=sign):
+            force = c.omega**2 * (target - y[0]) - 2.0 * c.zeta * c.omega * y[1]
+            return y[1], force - c.C * sign
+
+        def turning(t, y, start=start, sign=sign):
+            return y[1] if t > start else sign  # a rate that begins at zero does not end there
+
+        turning.terminal, turning.direction = True, -sign
+        events = turning if c.C else None
+        solved = solve_ivp(
+            rates, (start, stop), (level, rate), dense_output=True, events=events, **TOLERANCES
+        )
+        inside = (instants >= start) & (instants <= solved.t[-1])
+        if inside.any():
+            values[inside] = solved.sol(instants[inside])[0]
+        start = solved.t[-1]
+        level, rate = solved.y[:, -1]
+        if solved.status == 1:
+            rate = 0.0
+    return values, (level, rate)
+
+
 def reference_channel(edges, volts, c, grid):
     """Output of a channel (n,) on a fine grid. [A]"""
     filtered = np.empty_like(grid)
-    state = [0.0, 0.0]
+    state = (0.0, 0.0)
     for start, stop, volt in zip(edges[:-1], edges[1:], volts, strict=True):
         over = volt - c.V_dz
         target = c.J + c.G1 * over + c.G2 * over**2 + c.G3 * over**3 if over > 0.0 else 0.0
         first, last = np.searchsorted(grid, (start, stop), side="left")
         if stop == edges[-1]:
             last = grid.size
-        if not target and not any(state):
-            filtered[first:last] = 0.0
-            continue
-
-        def rates(_, y, target=target):
-            sign = min(max(y[1] / 0.01, -1.0), 1.0)
-            return y[1], c.omega**2 * (target - y[0]) - 2 * c.zeta * c.omega * y[1] - c.C * sign
-
-        solved = solve_ivp(rates, (start, stop), state, dense_output=True, **TOLERANCES)
-        filtered[first:last] = solved.sol(grid[first:last])[0]
-        state = solved.y[:, -1]
+        part = slice(first, last)
+        filtered[part], state = reference_filter(start, stop, state, target, c, grid[part])
     output, before, decay = np.empty_like(grid), 0.0, np.exp(-c.a * FINE)
     for n, level in enumerate(filtered.tolist()):
         if level >= before:
@@ -136,7 +160,7 @@ def merged(command):
 def differences(axis, seed, run):
     """Largest differences of a run by signal, as shares of the signal's range."""
     length, wish = controller.maneuver(run, axis)
-    command = controller.held(wish, length, draws.drawn_controller(axis, seed))
+    command = controller.held(wish, length, draws.drawn_controller(axis, seed, run))
     if axis == "cylinder":
         cylinder = draws.drawn_cylinder(seed)
         rows = march_cylinder(command.edges, command.volts, cylinder, 1.0)[:-1:16]

@@ -14,6 +14,8 @@ SINE_LENGTHS = {0.05: 40.0, 0.1: 30.0, 0.3: 20.0, 0.5: 20.0}
 """Length of a sine's run by its frequency. [s by Hz]"""
 LARGEST = 10.0
 """[V]"""
+PARTS = 16
+"""Stairs between two rows of a command that goes straight."""
 
 
 class Held(NamedTuple):
@@ -112,3 +114,9 @@ def held_exactly(command, length, rate):
     """A command held `rate` times a second from zero, not rounded."""
     edges = np.arange(round(length * rate) + 1) / rate
     return Held(edges, command(edges[:-1]))
+
+
+def straight(time, volts):
+    """A command that goes straight between its rows, as stairs that are `PARTS` times as fine."""
+    edges = np.interp(np.arange((time.size - 1) * PARTS + 1) / PARTS, np.arange(time.size), time)
+    return Held(edges, np.interp(0.5 * (edges[:-1] + edges[1:]), time, volts))

@@ -207,10 +207,18 @@ class Tacho:
     """Cycles of the ripple a turn of the drum."""
 
 
-def drawn_controller(axis, seed):
-    """The controller of a campaign."""
+def drawn_controller(axis, seed, run):
+    """The controller of a campaign, whose tasks run through: each run begins at another phase.
+
+    Parameters
+    ----------
+    run : str
+        Name of a run, as in `run_names`.
+    """
     random, levels = generator(axis, seed, "controller"), LEVELS["controller"]
-    return Controller(*(drawn(random, levels[name]) for name in ("rate", "phase", "bits")))
+    rate, bits = drawn(random, levels["rate"]), drawn(random, levels["bits"])
+    phases = [drawn(random, levels["phase"]) for _ in run_names(axis)]
+    return Controller(rate, phases[run_names(axis).index(run)], bits)
 
 
 def drawn_logger(axis, seed, rate):

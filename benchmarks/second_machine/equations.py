@@ -16,8 +16,6 @@ from numba import njit
 
 LONGEST_STEP = 1.0 / (16 * 512)
 """Longest step of a march. [s] With the fastest shaft, 40 Hz, 0.03 of its angular period."""
-STICKING = 0.01
-"""Rate below which the card's Coulomb term is proportional to it. [A/s]"""
 
 
 class Channel(NamedTuple):
@@ -128,24 +126,69 @@ def steady_current(v, c):
 
 
 @njit(cache=True)
-def filter_acceleration(level, rate, target, c):
-    """(3.7) with erratum 3: İ* by time. [A/s²]"""
-    coulomb = c.C * min(max(rate / STICKING, -1.0), 1.0)
-    return c.omega**2 * (target - level) - 2.0 * c.zeta * c.omega * rate - coulomb
+def filter_acceleration(level, rate, target, sign, c):
+    """(3.7) with erratum 3: İ* by time. [A/s²] The sign is that of İ*, given by the caller."""
+    return c.omega**2 * (target - level) - 2.0 * c.zeta * c.omega * rate - c.C * sign
+
+
+@njit(cache=True)
+def smooth_step(level, rate, target, sign, h, c):
+    """I* [A] and its rate [A/s] a step later, in which İ* keeps its sign."""
+    a1 = filter_acceleration(level, rate, target, sign, c)
+    r2 = rate + 0.5 * h * a1
+    a2 = filter_acceleration(level + 0.5 * h * rate, r2, target, sign, c)
+    r3 = rate + 0.5 * h * a2
+    a3 = filter_acceleration(level + 0.5 * h * r2, r3, target, sign, c)
+    r4 = rate + h * a3
+    a4 = filter_acceleration(level + h * r3, r4, target, sign, c)
+    after = level + h / 6.0 * (rate + 2.0 * r2 + 2.0 * r3 + r4)
+    return after, rate + h / 6.0 * (a1 + 2.0 * a2 + 2.0 * a3 + a4)
+
+
+@njit(cache=True)
+def direction_of_motion(level, rate, target, c):
+    """Sign of İ* from here on; 0 where the Coulomb term holds I*."""
+    if rate != 0.0:
+        return 1.0 if rate > 0.0 else -1.0
+    pull = c.omega**2 * (target - level)
+    if abs(pull) <= c.C:
+        return 0.0
+    return 1.0 if pull > 0.0 else -1.0
 
 
 @njit(cache=True)
 def filter_step(level, rate, target, h, c):
-    """I* [A] and its rate [A/s] a step later."""
-    a1 = filter_acceleration(level, rate, target, c)
-    r2 = rate + 0.5 * h * a1
-    a2 = filter_acceleration(level + 0.5 * h * rate, r2, target, c)
-    r3 = rate + 0.5 * h * a2
-    a3 = filter_acceleration(level + 0.5 * h * r2, r3, target, c)
-    r4 = rate + h * a3
-    a4 = filter_acceleration(level + h * r3, r4, target, c)
-    after = level + h / 6.0 * (rate + 2.0 * r2 + 2.0 * r3 + r4)
-    return after, rate + h / 6.0 * (a1 + 2.0 * a2 + 2.0 * a3 + a4)
+    """I* [A] and its rate [A/s] a step later.
+
+    The Coulomb term is C sign(İ*), and whatever holds I* still where C is enough for that. So a
+    step in which İ* passes zero is made in two: up to there, found by regula falsi, and on.
+    """
+    left = h
+    for _ in range(4):  # İ* passes zero once in a step, in rounding once more
+        sign = direction_of_motion(level, rate, target, c)
+        if sign == 0.0:
+            return level, 0.0
+        after, moving = smooth_step(level, rate, target, sign, left, c)
+        if c.C == 0.0 or sign * moving >= 0.0:
+            return after, moving
+        low, high = 0.0, left
+        low_rate, high_rate = rate, moving
+        if low_rate == 0.0:
+            return level, 0.0
+        for _ in range(30):
+            part = low - low_rate * (high - low) / (high_rate - low_rate)
+            after, moving = smooth_step(level, rate, target, sign, part, c)
+            if abs(moving) < 1e-12:
+                break
+            if sign * moving > 0.0:
+                low, low_rate = part, moving
+            else:
+                high, high_rate = part, moving
+        level, rate = after, 0.0
+        left -= part
+        if left <= 0.0:
+            return level, rate
+    return level, rate
 
 
 @njit(cache=True)

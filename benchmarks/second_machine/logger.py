@@ -11,10 +11,10 @@ import numpy as np
 
 from . import controller, draws, instruments
 from .draws import LEVELS
-from .equations import march_cylinder, march_drive, motor_speed
+from .equations import march_cylinder, march_drive
 
 NEW_RATE = 512.0
-"""Instants a second at which new maneuvers are commanded and compared."""
+"""Rows a second of new maneuvers."""
 
 
 @dataclass(frozen=True)
@@ -68,7 +68,7 @@ def drive_columns(axis, seed, logger, run, condition, machine):
     name = run.split(",")[0]
     random = np.random.default_rng([seed, LEVELS["seeds"][axis], 100 + run_index(axis, run)])
     length, wish = controller.maneuver(name, axis)
-    command = controller.held(wish, length, draws.drawn_controller(axis, seed))
+    command = controller.held(wish, length, draws.drawn_controller(axis, seed, run))
     rows = machine.march(command, length, condition)
     true, stamps = sample_instants(logger, length, random)
     tool = draws.drawn_encoder(axis, seed)
@@ -95,7 +95,7 @@ def cylinder_columns(seed, logger, run, gain, cylinder):
         [seed, LEVELS["seeds"]["cylinder"], 100 + run_index("cylinder", run)]
     )
     length, wish = controller.maneuver(run, "cylinder")
-    command = controller.held(wish, length, draws.drawn_controller("cylinder", seed))
+    command = controller.held(wish, length, draws.drawn_controller("cylinder", seed, run))
     rows = march_cylinder(command.edges, command.volts, cylinder, gain)
     true, stamps = sample_instants(logger, length, random)
     tool = draws.drawn_encoder("cylinder", seed)
@@ -184,28 +184,29 @@ def turn(axis, seed):
     return 2.0 * np.pi / draws.drawn_encoder(axis, seed).step
 
 
+def new_command(name, axis):
+    """Rows of a new maneuver's command, straight between them: time [s] and command [V]."""
+    length, wish = controller.new_maneuver(name, axis)
+    time = np.arange(round(length * NEW_RATE) + 1) / NEW_RATE
+    return time, wish(time)
+
+
 def new_run(numbers, axis, name):
-    """A new maneuver of a drive, without instruments, 512 samples a second.
+    """A new maneuver of a drive, without instruments, 512 rows a second.
 
     Returns
     -------
     (n, 3) array
-        Time [s], command [V] as held from there on, speed of the drum [rad/s].
+        Time [s], command [V], straight between rows, and speed of the drum [rad/s].
     """
-    length, wish = controller.new_maneuver(name, axis)
-    command = controller.held_exactly(wish, length, NEW_RATE)
-    rows = Machine(numbers).march(command, length)
-    time = command.edges[:-1]
-    pressure = np.interp(time, rows[:, 0], rows[:, 3])
-    pump = draws.pump(numbers)
-    speed = [motor_speed(value, pump, draws.STEADY) for value in pressure]
-    return np.column_stack([time, command.volts, speed])
+    time, volts = new_command(name, axis)
+    rows = Machine(numbers).march(controller.straight(time, volts), time[-1])
+    return np.column_stack([time, volts, np.interp(time, rows[:, 0], rows[:, 5])])
 
 
 def new_cylinder_run(cylinder, name):
     """A new maneuver of a cylinder: time [s], command [V] and speed of the rod [m/s], (n, 3)."""
-    length, wish = controller.new_maneuver(name, "cylinder")
-    command = controller.held_exactly(wish, length, NEW_RATE)
+    time, volts = new_command(name, "cylinder")
+    command = controller.straight(time, volts)
     rows = march_cylinder(command.edges, command.volts, cylinder, 1.0)
-    time = command.edges[:-1]
-    return np.column_stack([time, command.volts, np.interp(time, rows[:, 0], rows[:, 3])])
+    return np.column_stack([time, volts, np.interp(time, rows[:, 0], rows[:, 3])])
