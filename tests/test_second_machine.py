@@ -57,8 +57,10 @@ def test_march_ends_at_the_published_static_levels(
     numbers = machine.draws.published(axis)
     command = machine.controller.held_exactly(lambda t: np.full(t.size, volts), 4.0, 10.0)
     end = machine.logger.Machine(numbers).march(command, 4.0)[-1]
-    assert end[1] + end[2] == pytest.approx(current, abs=6e-5)
-    assert np.rad2deg(end[5]) == pytest.approx(speed, abs=0.05 if axis == "hoist" else 0.006)
+    # the slew card's Coulomb term holds the current within C/omega², 0.5 mA, which is 0.011 deg/s
+    stuck = max(numbers[f"C_{way}"] / numbers[f"omega_{way}"] ** 2 for way in ("plus", "minus"))
+    assert end[1] + end[2] == pytest.approx(current, abs=6e-5 + stuck)
+    assert np.rad2deg(end[5]) == pytest.approx(speed, abs=0.05 if axis == "hoist" else 0.017)
 
 
 def test_converted_filter_follows_the_recursion(machine: ModuleType) -> None:
