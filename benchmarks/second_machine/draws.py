@@ -100,6 +100,20 @@ def drawn_parameters(axis, seed, stated_spread=0.0):
     return numbers
 
 
+def as_read(numbers, gain):
+    """Numbers of a machine in the amperes of an ammeter whose gain is off.
+
+    A gain of the ammeter cannot be told from other numbers: these are the ones that make all
+    measured signals the same with a right ammeter.
+    """
+    powers = dict.fromkeys(("J", "G1", "G2", "G3", "C", "lim1", "lim2", "I_t1", "I_t2", "Z17"), 1)
+    powers |= {"Z19": -1, "Z20": -2, "Z21": -3, "Z22": -4}
+    return {
+        name: value * gain ** powers.get(name.partition("_plus")[0].partition("_minus")[0], 0)
+        for name, value in numbers.items()
+    }
+
+
 def channel(numbers, direction):
     """One half of the card: "plus" or "minus"."""
     return Channel(*(numbers[f"{name}_{direction}"] for name in Channel._fields))

@@ -140,8 +140,8 @@ def write_campaign(axis, seed, folder, rate=512.0, stated_spread=0.0):
     Returns
     -------
     dict
-        "parameters" by name, "counts_per_turn" (1 for a cylinder), "held_out" (names of files),
-        "runs" (names of files in the order of the day).
+        "parameters" by name, "counts_per_turn" (1 for a cylinder), "ammeter_gain", "held_out"
+        (names of files), "runs" (names of files in the order of the day).
     """
     folder = Path(folder)
     logs = folder / "logs"
@@ -170,6 +170,7 @@ def write_campaign(axis, seed, folder, rate=512.0, stated_spread=0.0):
         "rate": rate,
         "parameters": parameters,
         "counts_per_turn": turn(axis, seed),
+        "ammeter_gain": 1.0 if axis == "cylinder" else draws.drawn_ammeter(axis, seed).gain,
         "held_out": [file_name(axis, run) for run in LEVELS["held_out"][axis]],
         "runs": [file_name(axis, run) for run in names],
     }
