@@ -2,6 +2,7 @@
 
     .venv/bin/python benchmarks/calibration.py [--axis hoist slew] [--rate 102] [--campaigns 20]
     .venv/bin/python benchmarks/calibration.py --python OLD/bin/python --label old
+    .venv/bin/python benchmarks/calibration.py --oracle
     .venv/bin/python benchmarks/calibration.py --report FILE.jsonl [--beside OTHER.jsonl]
 
 Each campaign is logged by the machine of `second_machine`, which shares no line with swashplate.
@@ -227,9 +228,13 @@ def claims(headline):
     return tuple(float(text) if text else None for text in said.groups())
 
 
-def campaign(program, axis, rate, seed, folder):
-    """Record of a campaign: what a user gets of it, beside the machine's numbers."""
-    truth = logger.write_campaign(axis, seed, folder, rate)
+def campaign(program, axis, rate, seed, folder, oracle=False):
+    """Record of a campaign: what a user gets of it, beside the machine's numbers.
+
+    With `oracle` the command goes straight between samples, is logged exactly, and the file says
+    so: what a fit would be worth that knew all of the command.
+    """
+    truth = logger.write_campaign(axis, seed, folder, rate, exact_command=oracle)
     record = {"axis": axis, "rate": rate, "seed": seed}
     logs = sorted(Path("logs") / path.name for path in (folder / "logs").iterdir())
     known = ["--drive", axis, "--counts-per-turn", repr(truth["counts_per_turn"])]
@@ -241,6 +246,9 @@ def campaign(program, axis, rate, seed, folder):
         raise CampaignError(output)
     file = folder / "campaign.toml"
     set_roles(file, truth["held_out"])
+    if oracle:
+        text = file.read_text("utf-8")
+        file.write_text(re.sub(r'interpolation = "\w+"', 'interpolation = "linear"', text), "utf-8")
     drafted = re.search(r'interpolation\s*=\s*"(\w+)"', file.read_text("utf-8"))
     record["interpolation"] = drafted[1] if drafted else ""
     model = ["--model", CYLINDER] if axis == "cylinder" else []
@@ -273,7 +281,7 @@ def read(path):
     return [json.loads(line) for line in path.read_text("utf-8").splitlines() if line]
 
 
-def run_missing(program, items, jobs, path, keep):
+def run_missing(program, items, jobs, path, keep, oracle):
     """Run campaigns, (axis, rate, seed), and append a line of each to a file."""
     lock, begun, count = Lock(), time.perf_counter(), 0
 
@@ -285,7 +293,7 @@ def run_missing(program, items, jobs, path, keep):
             if keep is not None:
                 folder = keep / f"{axis}-{rate:g}-{seed}"
             try:
-                record = campaign(program, axis, rate, seed, folder)
+                record = campaign(program, axis, rate, seed, folder, oracle)
             except CampaignError as error:
                 record = {"axis": axis, "rate": rate, "seed": seed, "error": str(error)[-2000:]}
         with lock:
@@ -495,6 +503,7 @@ def main():
     parser.add_argument(
         "--development", action="store_true", help="seeds that nothing is quoted of"
     )
+    parser.add_argument("--oracle", action="store_true", help="exact command, in a file of its own")
     parser.add_argument("--python", default=sys.executable, help="executable with swashplate")
     parser.add_argument("--label", default="tree", help="installation, in the file's name")
     parser.add_argument("--jobs", type=int, default=2)
@@ -507,7 +516,8 @@ def main():
     arguments = parser.parse_args()
     path = arguments.report or arguments.out
     if path is None:
-        path = FOLDER / "build" / f"calibration-{arguments.label}.jsonl"
+        name = f"{arguments.label}-oracle" if arguments.oracle else arguments.label
+        path = FOLDER / "build" / f"calibration-{name}.jsonl"
     if arguments.report is None:
         path.parent.mkdir(parents=True, exist_ok=True)
         levels = draws.LEVELS["seeds"]
@@ -525,7 +535,8 @@ def main():
             if (axis, arguments.rate, seed) not in done
         ]
         keep = None if arguments.keep is None else arguments.keep.absolute()
-        run_missing(Program(arguments.python), items, arguments.jobs, path, keep)
+        program = Program(arguments.python)
+        run_missing(program, items, arguments.jobs, path, keep, arguments.oracle)
     records = read(path)
     print_report(records)
     if arguments.beside is not None:

@@ -6,6 +6,7 @@ import os
 from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
@@ -15,6 +16,8 @@ from .equations import march_cylinder, march_drive
 
 NEW_RATE = 512.0
 """Rows a second of new maneuvers."""
+COMMAND_DIGITS = 6
+"""Decimals of the command's column, in volts."""
 
 
 @dataclass(frozen=True)
@@ -63,47 +66,77 @@ def file_name(axis, run):
     return f"{axis}_{run}".replace(", ", "_").replace(" ", "_").replace("/", "-") + ".csv"
 
 
-def drive_columns(axis, seed, logger, run, condition, machine):
-    """Header and text of the columns of a drive's run."""
-    name = run.split(",")[0]
-    random = np.random.default_rng([seed, LEVELS["seeds"][axis], 100 + run_index(axis, run)])
-    length, wish = controller.maneuver(name, axis)
+class DriveRun(NamedTuple):
+    """A run of a drive as its instruments read it."""
+
+    stamps: np.ndarray
+    """[s]"""
+    volts: np.ndarray
+    """[V]"""
+    current: np.ndarray
+    """[A]"""
+    counts: np.ndarray
+    speed: np.ndarray | None
+    """Of the tacho, if there is one. [rad/s]"""
+
+
+def run_random(axis, seed, run):
+    """Random generator of a run's instruments."""
+    return np.random.default_rng([seed, LEVELS["seeds"][axis], 100 + run_index(axis, run)])
+
+
+def given_command(axis, seed, logger, run, random, exact):
+    """Command of a run, instants and stamps of its samples [s], and what is logged of it [V].
+
+    With `exact` it goes straight between the samples, unrounded, and is logged without an error.
+    """
+    length, wish = controller.maneuver(run.split(",")[0], axis)
+    instants, stamps = sample_instants(logger, length, random)
+    if exact:
+        return controller.straight(instants, wish(instants)), instants, stamps, wish(instants)
     command = controller.held(wish, length, draws.drawn_controller(axis, seed, run))
-    rows = machine.march(command, length, condition)
-    true, stamps = sample_instants(logger, length, random)
-    tool = draws.drawn_encoder(axis, seed)
+    return command, instants, stamps, read_command(logger, command.at(instants), random)
+
+
+def drive_run(axis, seed, logger, run, condition, machine, exact=False):
+    """Run a drive once and read its instruments; `exact` as of `given_command`."""
+    random = run_random(axis, seed, run)
+    command, instants, stamps, volts = given_command(axis, seed, logger, run, random, exact)
+    rows = machine.march(command, command.edges[-1], condition)
     zero = random.uniform(0.0, 4.0)
-    counts = instruments.encoder(rows, rows[:, 4], true, tool, zero)
+    encoder = draws.drawn_encoder(axis, seed)
+    counts = instruments.encoder(rows, rows[:, 4], instants, encoder, zero)
+    current = instruments.ammeter(rows, instants, draws.drawn_ammeter(axis, seed), random)
+    tacho = draws.drawn_tacho(axis, seed)
+    speed = None if tacho is None else instruments.tacho(rows, instants, tacho, random)
+    return DriveRun(stamps, volts, current, counts, speed)
+
+
+def drive_columns(axis, seed, logger, run, condition, machine, exact):
+    """Header and text of the columns of a drive's run."""
+    signals = drive_run(axis, seed, logger, run, condition, machine, exact)
     columns = {
-        "time [s]": written(stamps, logger.stamp_digits),
-        "voltage [V]": written(read_command(logger, command.at(true), random), 5),
-        "current [A]": written(
-            instruments.ammeter(rows, true, draws.drawn_ammeter(axis, seed), random), 4
-        ),
-        "encoder [counts]": written(counts, 0),
+        "time [s]": written(signals.stamps, logger.stamp_digits),
+        "voltage [V]": written(signals.volts, COMMAND_DIGITS),
+        "current [A]": written(signals.current, 4),
+        "encoder [counts]": written(signals.counts, 0),
     }
-    generator = draws.drawn_tacho(axis, seed)
-    if generator is not None:
-        speed = instruments.tacho(rows, true, generator, random)
-        columns["speed [rad/s]"] = written(speed, 6)
+    if signals.speed is not None:
+        columns["speed [rad/s]"] = written(signals.speed, 6)
     return columns
 
 
-def cylinder_columns(seed, logger, run, gain, cylinder):
+def cylinder_columns(seed, logger, run, gain, cylinder, exact):
     """Header and text of the columns of a cylinder's run."""
-    random = np.random.default_rng(
-        [seed, LEVELS["seeds"]["cylinder"], 100 + run_index("cylinder", run)]
-    )
-    length, wish = controller.maneuver(run, "cylinder")
-    command = controller.held(wish, length, draws.drawn_controller("cylinder", seed, run))
+    random = run_random("cylinder", seed, run)
+    command, instants, stamps, volts = given_command("cylinder", seed, logger, run, random, exact)
     rows = march_cylinder(command.edges, command.volts, cylinder, gain)
-    true, stamps = sample_instants(logger, length, random)
     tool = draws.drawn_encoder("cylinder", seed)
     zero = random.uniform(0.0, 4.0)
-    rod = instruments.encoder(rows, rows[:, 2], true, tool, zero) * tool.step
+    rod = instruments.encoder(rows, rows[:, 2], instants, tool, zero) * tool.step
     return {
         "time [s]": written(stamps, logger.stamp_digits),
-        "valve [V]": written(read_command(logger, command.at(true), random), 5),
+        "valve [V]": written(volts, COMMAND_DIGITS),
         "rod [m]": written(rod, 6),
     }
 
@@ -122,7 +155,7 @@ def write_run(path, columns, stamp):
     os.utime(path, (stamp, stamp))
 
 
-def write_campaign(axis, seed, folder, rate=512.0, stated_spread=0.0):
+def write_campaign(axis, seed, folder, rate=512.0, stated_spread=0.0, exact_command=False):
     """Write the logs of a campaign and what they were made with.
 
     Parameters
@@ -136,6 +169,9 @@ def write_campaign(axis, seed, folder, rate=512.0, stated_spread=0.0):
         Samples a second of the logger.
     stated_spread : float
         As of `draws.drawn_parameters`.
+    exact_command : bool
+        Whether the command goes straight between the samples and is logged without an error. It
+        does not in a sound campaign: this is for what a fit gets of knowing it.
 
     Returns
     -------
@@ -159,9 +195,9 @@ def write_campaign(axis, seed, folder, rate=512.0, stated_spread=0.0):
         conditions = draws.drawn_conditions(axis, seed)
     for run, gap, condition in zip(names, gaps, conditions, strict=True):
         if axis == "cylinder":
-            columns = cylinder_columns(seed, logger, run, condition, cylinder)
+            columns = cylinder_columns(seed, logger, run, condition, cylinder, exact_command)
         else:
-            columns = drive_columns(axis, seed, logger, run, condition, machine)
+            columns = drive_columns(axis, seed, logger, run, condition, machine, exact_command)
         clock += gap
         write_run(logs / file_name(axis, run), columns, clock)
     truth = {
