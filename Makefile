@@ -89,7 +89,7 @@ cluster: $(STAMP) ## many starts on a local Dask cluster that loses a worker
 	@$(BIN)/pip install -qq -c constraints.txt -e '.[dask]'
 	@$(BIN)/python benchmarks/cluster.py
 
-calibration: $(STAMP) ## how often intervals hold the truth, over 400 virtual campaigns an axis (hours)
+calibration: $(STAMP) ## how often intervals hold the truth of a machine written apart, 60 campaigns an axis (hours)
 	@$(BIN)/python benchmarks/calibration.py
 
 owner-table: $(STAMP) ## whether the numbers of a report's first page hold, over 40 virtual winches

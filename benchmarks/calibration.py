@@ -1,538 +1,546 @@
-"""How often 95 % intervals hold the truth, over many virtual campaigns, method by method.
+"""How often 95 % intervals hold the truth of a second machine, as a user works.
 
-    .venv/bin/python benchmarks/calibration.py [--campaigns 400] [--cells 40] [--axes hoist slew]
-    .venv/bin/python benchmarks/calibration.py --methods --campaigns 0 --cells 5
+    .venv/bin/python benchmarks/calibration.py [--axis hoist slew] [--rate 102] [--campaigns 20]
+    .venv/bin/python benchmarks/calibration.py --python OLD/bin/python --label old
+    .venv/bin/python benchmarks/calibration.py --oracle
+    .venv/bin/python benchmarks/calibration.py --report FILE.jsonl [--beside OTHER.jsonl]
 
-Each campaign draws a drive about the published one, logs Kruse's tests of it through imperfect
-instruments, is written to files, read, fitted from the published values, and judged, all by the
-same calls as `swashplate rig` and `swashplate fit` make. The axis "own" is a valve and a rod,
-fitted as a model of one's own, under realistic noise alone. `--cells` are campaigns in each of the
-eight noises, with fixed parameters that are off by what is stated of them, and of the wrong models,
-where nothing is promised. With `--methods` the candidates for
-the noise model are compared on the same fits.
+Each campaign is logged by the machine of `second_machine`, which shares no line with swashplate.
+`swashplate campaign init` drafts the file from the folder of logs, the runs that are held out get
+their role, nothing else is corrected, and `swashplate fit` fits it. Counted are the intervals that
+hold the machine's numbers; the fitted drive's speed is compared with the machine's in maneuvers
+that no campaign has. All goes through the command line, so that `--python` can run an older
+installation over the same campaigns.
 
-The rule, written down before the comparison: of the methods whose pooled coverage over the noises
-of the right model is 93 to 97 % on every axis, the one with the smallest median half width; between
-methods within 5 % of it the one with the smaller error on new maneuvers where the model is wrong,
-then the shorter code.
+An ammeter's gain cannot be told from the machine's numbers. So the share of intervals that hold
+them is given twice: as they are, and in the amperes of the campaign's ammeter.
+
+Every campaign is a line of JSON in `--out`, written as soon as it ends: what stands there already
+is not run again.
 """
 
 import argparse
+import csv
+import json
 import math
 import os
+import re
+import subprocess
+import sys
 import tempfile
 import time
-from collections import defaultdict
-from dataclasses import replace
+import tomllib
+from collections import Counter, defaultdict
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from statistics import median
-
-# one core for each campaign: threads of the linear algebra would only wait for each other
-os.environ["OPENBLAS_NUM_THREADS"] = "1"
+from threading import Lock, Timer
 
 import numpy as np
-from campaigns import read, run_missing
-from faults import true_error
+from scipy.stats import binom, binomtest
+from second_machine import draws, logger
 
-NOISES = {
-    "realistic": {},
-    "no ripple": {"dither": 0.0},
-    "ripple x 3": {"dither": 0.045},
-    "ripple of 50 Hz": {"dither_frequency": 50.0},
-    "ammeter noise x 3": {"current_noise": 0.006},
-    "ammeter steps of 5 mA": {"current_resolution": 0.005},
-    "encoder steps of 4": {"encoder_step": 4},
-    "2 % of the rows lost": {"lost_rows": 0.02, "longest_loss": 20},
-}
-"""Instruments of the right model, beside the realistic ones: all of mean zero."""
-WRONG = {
-    "stiction": {"spool_friction": 0.115, "spool_presliding": 5e-5, "dither_time": 0.6},
-    "cam ripple": {"cam_ripple": 0.02},
-}
-"""Refinements of the machine that the fitted model lacks: an overshoot of 4 % at 4 V; a share."""
-OFF = "fixed parameters 3 % off"
-"""What no axis frees is drawn with a standard deviation of 3 %, and that is stated."""
-FIXED = ("Z4", "Z5", "Z6", "Z9", "Z18")
-FIELDS = (
-    "axis",
-    "case",
-    "seed",
-    "method",
-    "stage",
-    "unknown",
-    "truth",
-    "estimate",
-    "lower",
-    "upper",
-    "new",
-    "grade",
-)
+FOLDER = Path(__file__).parent
+CYLINDER = FOLDER / "cylinder.py"
+LONGEST = 600.0
+"""After which a command is ended, and the campaign counted as failed. [s]"""
+SEEDS = {512.0: "at_512", 102.0: "at_102", 50.0: "at_50"}
+"""Ranges of seeds in levels.toml by the logger's rate."""
+CHANCE = 1e-3
+"""Probability of a coverage of one parameter, or a lower one, that is called more than chance."""
 
 
-def campaign(_, item):
-    """Rows of one campaign: an unknown and a method each, with truth, estimate and interval."""
-    axis, case, seed, compared = item
-    return own_campaign(seed) if axis == "own" else drive_campaign(axis, case, seed, compared)
+# --- the installation under test ------------------------------------------------------------------
 
 
-def drive_campaign(axis, case, seed, compared):
-    """Rows of a campaign of a drive."""
-    from swashplate import Campaign, Drive
-    from swashplate.campaign import rig
-    from swashplate.identification.criteria import verdict
-    from swashplate.identification.drive_model import true_value
-    from swashplate.identification.fitting import drawn, fit
-    from swashplate.identification.setup import load_setup
-    from swashplate.identification.validation import predict
+class Program:
+    """The swashplate of a Python executable, by its command line."""
 
-    setup, nominal = load_setup(axis), Drive.preset(axis)
-    # campaigns of two cells share neither machine nor noise
-    draw = seed + 10_000 * [*NOISES, *WRONG, OFF].index(case)
-    machine = drawn(nominal, setup, draw)
-    if case == OFF:
-        random = np.random.default_rng([draw, 7])
-        machine = machine.scale(**{name: 1.0 + 0.03 * random.standard_normal() for name in FIXED})
-        stated = dict.fromkeys(FIXED, "3 %")
-        setup = setup.model_copy(update={"standard_uncertainty": stated})
-    tools = replace(rig.SEVERITIES["realistic"], **NOISES.get(case, {}))
-    truth = machine.replace(**WRONG[case]) if case in WRONG else machine
-    tests = rig.run(axis, truth=truth, seed=draw, instruments=tools)
-    with tempfile.TemporaryDirectory() as folder:
-        read = Campaign.from_toml(rig.write(tests, Path(folder) / "virtual"))
-        runs, held = read.select(role="fit"), read.select(role="validate")
-    stages = fit(nominal.parameters, runs, setup, threads=1).stages
-    planned = [each.name for each in setup.stages]
-    fitted = stages[-1].parameters
-    judged = verdict(stages, predict(fitted, held), planned=planned)
-    found = [("product", fitted, [a.uncertainty for a in stages])]
-    if compared:
-        found += candidates(stages)
-    rows = []
-    own = true_error(found[0][1], truth, axis) if axis != "luff" else ""
-    for method, parameters, uncertainties in found:
-        # most methods differ in their intervals alone
-        new = own if parameters is None or axis == "luff" else true_error(parameters, truth, axis)
-        for each, estimates in zip(stages, uncertainties, strict=True):
-            problem = each.problem
-            values = getattr(estimates, "estimates", estimates)
-            for unknown, estimate in zip(problem.unknowns, values, strict=True):
-                true = true_value(unknown, problem.model, machine.parameters)
-                if true is not None:
-                    numbers = (true, estimate.value, estimate.lower, estimate.upper, new)
-                    words = (axis, case, seed, method, each.stage.name, unknown.name)
-                    rows.append((*words, *numbers, judged.grade))
-    return rows
+    def __init__(self, python):
+        self.python = python
+        self.environment = {
+            **os.environ,
+            "OPENBLAS_NUM_THREADS": "1",
+            "OMP_NUM_THREADS": "1",
+            "COLUMNS": "1000",  # no sentence is broken into lines
+            "NO_COLOR": "1",
+        }
 
-
-VALVE = {"dead_zone": 0.6, "gain": 0.02, "lag": 0.15}
-"""Nominal truth of the valve: dead zone [V], gain [m/(V s)], lag [s]; drawn within about 10 %."""
-
-
-def own_campaign(seed):
-    """Rows of a campaign of a valve and a rod, in plain Python, as in the docs."""
-    from valve import model
-
-    from swashplate import Campaign
-    from swashplate.identification import fit, predict, verdict
-
-    random, h = np.random.default_rng([seed, 0x0BEEF]), 0.02
-    truth = {name: v * np.exp(0.1 * random.standard_normal()) for name, v in VALVE.items()}
-    time, starts = h * np.arange(1500), {}
-    commands = {
-        "slow": 3.0 * np.sin(2.0 * np.pi * 0.1 * time),
-        "fast": 4.0 * np.sin(2.0 * np.pi * 0.4 * time),
-        "steps": 3.0 * np.sign(np.sin(2.0 * np.pi * 0.15 * time)),
-        "mixed": 2.5 * np.sin(2.0 * np.pi * 0.2 * time) + np.sin(2.0 * np.pi * 0.53 * time),
-    }
-    with tempfile.TemporaryDirectory() as folder:
-        text = VALVE_CAMPAIGN
-        for number, (name, command) in enumerate(commands.items()):
-            supply = 100.0 + 15.0 * np.sin(2.0 * np.pi * 0.03 * time + number)
-            opening, rod, slow = 0.0, 0.01 * random.standard_normal(), 0.0
-            starts[name], rows = rod, ["time,valve,supply,rod"]
-            for t, u, p in zip(time, command, supply, strict=True):
-                slow = 0.8 * slow + 0.6 * random.standard_normal()  # correlated over 0.1 s
-                noise = 1e-4 * random.standard_normal() + 1e-4 * slow
-                # the logger keeps a hundredth of a millimetre
-                rows.append(f"{t:.2f},{u:.4f},{p:.4f},{1e3 * (rod + noise):.2f}")
-                beyond = np.sign(opening) * max(abs(opening) - truth["dead_zone"], 0.0)
-                rod += h * truth["gain"] * beyond * np.sqrt(p / 100.0)
-                opening += (1.0 - np.exp(-h / truth["lag"])) * (u - opening)
-            Path(folder, f"{name}.csv").write_text("\n".join(rows), "utf-8")
-            role = "validate" if name == "mixed" else "fit"
-            text += f'[[runs]]\nfile = "{name}.csv"\nrole = "{role}"\n'
-        Path(folder, "campaign.toml").write_text(text, "utf-8")
-        read = Campaign.from_toml(Path(folder, "campaign.toml"))
-        runs, held = read.select(role="fit"), read.select(role="validate")
-    found = fit(model, runs, VALVE_FREE, noise={"rod": np.sqrt(2.0) * 1e-4}, threads=1)
-    (stage,) = found.stages
-    grade = verdict([stage], predict(found.parameters, held)).grade
-    rows = []
-    for unknown, estimate in zip(stage.problem.unknowns, stage.uncertainty.estimates, strict=True):
-        true = starts[unknown.run] if unknown.run else truth[unknown.name]
-        numbers = (true, estimate.value, estimate.lower, estimate.upper, "")
-        rows.append(("own", "realistic", seed, "product", "valve", unknown.name, *numbers, grade))
-    return rows
-
-
-VALVE_CAMPAIGN = """
-title = "Cylinder"
-[axes.cylinder]
-time = { column = "time", unit = "s" }
-input = { kind = "other", column = "valve", unit = "V", interpolation = "previous" }
-channels.rod = { kind = "position", column = "rod", unit = "mm" }
-channels.supply = { kind = "other", column = "supply", unit = "bar" }
-"""
-VALVE_FREE = {
-    "dead_zone": (0.0, 0.3, 2.0, "V"),
-    "gain": (0.001, 0.05, 1.0, "m/(V s)"),
-    "lag": (0.01, 0.05, 1.0, "s"),
-    "start.rod": (-0.1, 0.0, 0.1, "m"),
-}
-
-
-def candidates(stages):
-    """Methods beside the product's: name, drive, and for each stage its estimates."""
-    from swashplate.identification.intervals import estimates, with_handed
-
-    made = []
-    for method in METHODS:
-        covariances, results, parameters = [], [], stages[0].parameters
-        shifts = np.zeros(0)
-        for each in stages:
-            fit, problem = each.linearised, each.problem
-            own, shift = METHODS[method](fit)
-            handed = [
-                old._replace(covariance=covariance)
-                for old, covariance in zip(each.uncertainty.handed, covariances, strict=False)
-            ]
-            covariance = with_handed(own, handed)
-            if handed:
-                shift = shift + handed[0].slopes @ shifts
-            shifts = shift
-            vector = np.clip(each.solution.vector + shift, *problem.bounds)
-            parameters = replace(problem.model, parameters=parameters).parameters_at(
-                problem.unknowns.targets(vector, "")
+    def run(self, *words, folder):
+        """Exit code, output, CPU time [s] and largest memory [MB] of a command."""
+        with tempfile.TemporaryFile("w+", encoding="utf-8") as stream:
+            process = subprocess.Popen(
+                [self.python, "-m", "swashplate", *map(str, words)],
+                cwd=folder,
+                stdout=stream,
+                stderr=subprocess.STDOUT,
+                env=self.environment,
             )
-            moved = replace(covariance, variables=covariance.variables.at(vector))
-            covariances.append(covariance)
-            results.append(estimates(moved))
-        made.append((method, parameters if shifts.any() else None, results))
-    return made
+            watch = Timer(LONGEST, process.kill)
+            watch.start()
+            _, status, usage = os.wait4(process.pid, 0)
+            watch.cancel()
+            process.returncode = os.waitstatus_to_exitcode(status)
+            stream.seek(0)
+            output = stream.read()
+        seconds = usage.ru_utime + usage.ru_stime
+        return process.returncode, output, seconds, usage.ru_maxrss / 1024.0
 
 
-def white(fit):
-    """s²(JᵀJ)⁻¹."""
-    from swashplate.identification.noise import covariance_of
-
-    matrix = fit.squares / fit.spare_samples * (fit.whitening @ fit.whitening.T)
-    free = np.full(len(fit.variables), float(fit.spare_samples))
-    return covariance_of(fit, matrix, free), np.zeros(len(fit.variables))
+class CampaignError(Exception):
+    """A command of a campaign that ended with an error."""
 
 
-def autocovariance(fit):
-    """Sandwich with the residuals' autocovariance, one to a channel (Maine and Iliff 1981)."""
-    from scipy.fft import irfft, next_fast_len, rfft
-
-    from swashplate.identification.noise import covariance_of, grid_of, noise_colours
-
-    spare = fit.samples / fit.spare_samples
-    middle = np.zeros((fit.rank, fit.rank))
-    for colour in noise_colours(fit):
-        for m in colour.members:
-            run, grid = fit.runs[m], grid_of(fit.runs[m].time)
-            weight = 1.0 if run.weight is None else run.weight[:, None]
-            columns = grid.spread((run.jacobian @ fit.whitening) * weight)
-            size = next_fast_len(grid.size + colour.correlation.size, real=True)
-            window = np.zeros(size)
-            lags = colour.correlation.size
-            window[:lags] = colour.correlation
-            window[size - lags + 1 :] = colour.correlation[:0:-1]
-            power = np.maximum(rfft(window).real, 0.0)[:, None]
-            level = spare * np.mean(run.unweighted**2)
-            filtered = irfft(rfft(columns, size, axis=0) * power, size, axis=0)[: grid.size]
-            middle += level * columns.T @ filtered
-    matrix = fit.whitening @ (0.5 * (middle + middle.T)) @ fit.whitening.T
-    free = np.full(len(fit.variables), float(fit.spare_samples))
-    return covariance_of(fit, matrix, free), np.zeros(len(fit.variables))
+# --- one campaign ---------------------------------------------------------------------------------
 
 
-def autocovariance_without_lines(fit):
-    """The same with spectral lines removed from the residuals beforehand."""
-    from swashplate.identification.noise import without_lines
-
-    return autocovariance(without_lines(fit)[0])
-
-
-def leverage_corrected(power):
-    """Band scores with residuals divided by (1 - leverage)^power, frequency by frequency.
-
-    1 is HC3, 1/2 is HC2 of MacKinnon and White (1985).
-    """
-
-    def method(fit):
-        from scipy.fft import rfft, rfftfreq
-
-        from swashplate.identification.noise import covariance_of, grid_of
-
-        middle = np.zeros((fit.rank, fit.rank))
-        total, squares = np.zeros(len(fit.variables)), np.zeros(len(fit.variables))
-        for run in fit.runs:
-            grid = grid_of(run.time)
-            derivatives = rfft(grid.spread(run.jacobian @ fit.whitening), axis=0)
-            leverage = np.sum(np.abs(derivatives) ** 2, axis=1) / grid.size
-            residual = rfft(grid.spread(run.residual)) / (1.0 - np.minimum(leverage, 0.9)) ** power
-            products = derivatives.conj() * residual[:, None] * (2.0 / grid.size)
-            products[0] *= 0.5
-            width = min(10.0, 0.5 / grid.step / 20.0)  # [Hz]
-            band = (rfftfreq(grid.size, grid.step) / width).astype(np.intp)
-            scores = np.add.reduceat(products, np.flatnonzero(np.diff(band, prepend=-1)), axis=0)
-            middle = middle + 0.5 * (scores.conj().T @ scores).real
-            seen = 0.5 * np.abs(scores @ fit.whitening.T) ** 2
-            total += seen.sum(axis=0)
-            squares += np.sum(seen**2, axis=0)
-        free = np.divide(2.0 * total**2, squares, out=np.ones_like(total), where=squares > 0.0)
-        matrix = fit.whitening @ middle @ fit.whitening.T
-        found = covariance_of(fit, matrix, np.maximum(free, 1.0))
-        return found, np.zeros(len(fit.variables))
-
-    return method
-
-
-def prewhitened_scores(fit):
-    """Sandwich of prewhitened scores (Andrews and Monahan 1992): an AR(1) of each score and run."""
-    from swashplate.identification.noise import covariance_of
-
-    middle = np.zeros((fit.rank, fit.rank))
-    for run in fit.runs:
-        scores = (run.jacobian @ fit.whitening) * run.residual[:, None]
-        lag, now = scores[:-1], scores[1:]
-        slope = np.clip(
-            np.sum(lag * now, axis=0) / np.maximum(np.sum(lag * lag, axis=0), 1e-300), -0.97, 0.97
+def set_roles(path, held_out):
+    """Give the runs of a drafted campaign file their roles."""
+    lines, role = [], "fit"
+    for line in path.read_text("utf-8").splitlines():
+        named = re.match(r'\s*file\s*=\s*"([^"]+)"', line)
+        if named:
+            role = "validate" if Path(named[1]).name in held_out else "fit"
+        lines.append(re.sub(r'^(\s*role\s*=\s*)"\w+"', rf'\1"{role}"', line))
+    path.write_text("\n".join(lines) + "\n", "utf-8")
+    roles = [run.get("role", "fit") for run in tomllib.loads(path.read_text("utf-8"))["runs"]]
+    if roles.count("validate") != len(held_out):
+        raise CampaignError(
+            f"{path.name}: {roles.count('validate')} runs are held out, not {held_out}"
         )
-        left = now - slope * lag
-        length = int(4.0 * (run.time.size / 100.0) ** (2.0 / 9.0))  # Newey and West 1994
-        total = left.T @ left
-        for k in range(1, length + 1):
-            part = left[k:].T @ left[:-k]
-            total += (1.0 - k / (length + 1.0)) * (part + part.T)
-        recolour = 1.0 / (1.0 - slope)
-        middle += recolour[:, None] * total * recolour
-    matrix = fit.whitening @ middle @ fit.whitening.T
-    free = np.full(len(fit.variables), float(fit.spare_samples))
-    return covariance_of(fit, matrix, free), np.zeros(len(fit.variables))
 
 
-def autoregression(colour, samples):
-    """Coefficients (p,) of noise of a colour, p by Akaike's criterion, at most 10 log10(samples).
+def with_forces(numbers, setup):
+    """Parameters by name, and the forces at the currents of a fit configuration."""
+    numbers = dict(numbers)
+    for stage in setup.get("stages", ()):
+        for direction, sign in (("plus", 1.0), ("minus", -1.0)):
+            for n, e in enumerate(stage.get("forces", {}).get(direction, ()), 1):
+                coefficients = [numbers[f"Z{k}_{direction}"] for k in (19, 20, 21, 22)]
+                force = sum(c * (sign * e) ** k for k, c in enumerate(coefficients, 1))
+                numbers[f"force_{direction}_{n}"] = sign * force
+    return numbers
 
-    Yule and Walker's equations by Levinson's recursion, on the autocorrelation with the negative
-    parts of its spectrum cut off: it is then that of a process, and the model stable.
+
+def estimates(fitted, truth):
+    """Estimates of what the machine has, and the names of those that it has not.
+
+    "as_read" is the truth in the amperes of the campaign's ammeter.
     """
-    from scipy.fft import irfft, next_fast_len, rfft
-
-    correlation = colour.correlation
-    best, best_score = np.zeros(0), 0.0
-    if not colour.length:
-        return best
-    size = next_fast_len(4 * correlation.size, real=True)
-    mirrored = np.zeros(size)
-    mirrored[: correlation.size] = correlation
-    mirrored[size - correlation.size + 1 :] = correlation[:0:-1]
-    proper = irfft(np.maximum(rfft(mirrored).real, 0.0), size)[: correlation.size]
-    proper = proper / proper[0]
-    most = int(min(10.0 * np.log10(max(samples, 10)), correlation.size - 1, samples // 4))
-    taps, variance = np.zeros(0), 1.0
-    for order in range(1, most + 1):
-        reflection = (proper[order] - taps @ proper[order - 1 : 0 : -1]) / variance
-        if abs(reflection) >= 1.0:
-            break  # only rounding is left to predict
-        taps = np.append(taps - reflection * taps[::-1], reflection)
-        variance *= 1.0 - reflection**2
-        score = samples * float(np.log(variance)) + 2.0 * order
-        if score < best_score:
-            best, best_score = taps, score
-    return best
-
-
-def generalised(fit):
-    """Generalised least squares: one Gauss-Newton step on residuals whitened by an AR model."""
-    from swashplate.identification.noise import covariance_of, grid_of, noise_colours
-    from swashplate.identification.problem import triangular_factor, whitening
-
-    rows, count = [], len(fit.variables)
-    for colour in noise_colours(fit):
-        samples = sum(fit.runs[m].time.size for m in colour.members)
-        coefficients = autoregression(colour, samples)
-        order = coefficients.size
-        taps = np.concatenate([[1.0], -coefficients])
-        parts = []
-        for m in colour.members:
-            run, grid = fit.runs[m], grid_of(fit.runs[m].time)
-            plain = run.jacobian if run.weight is None else run.jacobian / run.weight[:, None]
-            both = np.column_stack([plain, run.unweighted])
-            spread = grid.spread(both)
-            filtered = sum(
-                tap * spread[order - k : spread.shape[0] - k] for k, tap in enumerate(taps)
+    file = fitted / "setup.toml"
+    setup = tomllib.loads(file.read_text("utf-8")) if file.exists() else {}
+    numbers = with_forces(truth["parameters"], setup)
+    as_read = with_forces(draws.as_read(truth["parameters"], truth["ammeter_gain"]), setup)
+    rows, without = [], set()
+    with (fitted / "estimates.csv").open(encoding="utf-8", newline="") as stream:
+        for row in csv.DictReader(stream):
+            name = row["parameter"]
+            if name not in numbers:
+                without.add(name.partition(" (")[0])
+                continue
+            rows.append(
+                {
+                    "name": name,
+                    "truth": numbers[name],
+                    "as_read": as_read[name],
+                    "value": float(row["value"]),
+                    "lower": float(row["lower"]) if row["lower"] else None,
+                    "upper": float(row["upper"]) if row["upper"] else None,
+                }
             )
-            present = np.convolve(grid.spread(np.ones(run.time.size)), np.ones(order + 1), "valid")
-            parts.append(filtered[present > order + 0.5])
-        whole = np.vstack(parts)
-        deviation = np.sqrt(np.mean(whole[:, -1] ** 2))
-        rows.append(triangular_factor(whole / max(deviation, 1e-300)))
-    triangle = triangular_factor(np.vstack(rows))
-    inverse, _ = whitening(triangle[:, :count], fit.variables.free, fit.tolerance)
-    shift = -inverse @ (inverse.T @ (triangle[:, :count].T @ triangle[:, -1]))
-    free = np.full(count, float(fit.spare_samples))
-    return covariance_of(fit, inverse @ inverse.T, free), shift
+    return rows, sorted(without)
 
 
-def smoothed_spectrum(fit):
-    """Sandwich with the smoothed spectrum of the residuals (Hannan 1963), HC2."""
-    from swashplate.identification.noise import spectral_covariance
-
-    return spectral_covariance(fit), np.zeros(len(fit.variables))
-
-
-def larger_of_both(fit):
-    """The larger error of the smoothed spectrum and of band scores."""
-    from swashplate.identification.noise import coloured_noise_covariance
-
-    return coloured_noise_covariance(fit), np.zeros(len(fit.variables))
-
-
-METHODS = {
-    "larger of smoothed spectrum and band scores": larger_of_both,
-    "white noise": white,
-    "smoothed-spectrum sandwich": smoothed_spectrum,
-    "autocovariance sandwich": autocovariance,
-    "autocovariance sandwich, lines removed": autocovariance_without_lines,
-    "band-score sandwich": leverage_corrected(0.0),
-    "band-score sandwich, HC2": leverage_corrected(0.5),
-    "band-score sandwich, HC3": leverage_corrected(1.0),
-    "prewhitened-score sandwich": prewhitened_scores,
-    "generalised least squares": generalised,
-}
+def predicted_drive(program, folder, drive, truth):
+    """Errors of a fitted drive's speed in new maneuvers: RMS, % of the speed's range, by name."""
+    errors = {}
+    for name in new_names():
+        time_, volts, speed = logger.new_run(truth["parameters"], truth["axis"], name).T
+        write_table(folder / "new.csv", {"time": time_, "voltage": volts})
+        code, output, _, _ = program.run(
+            "simulate", drive, "new.csv", "--interpolation", "linear", "--rate", 512,
+            "--out", "simulated.csv", "--force", folder=folder,
+        )  # fmt: skip
+        if code:
+            raise CampaignError(output)
+        with (folder / "simulated.csv").open(encoding="utf-8") as stream:
+            simulated = {
+                float(row["time"]): float(row["shaft_speed"]) for row in csv.DictReader(stream)
+            }
+        ours = np.interp(time_, list(simulated), list(simulated.values()))
+        errors[name] = 100.0 * float(np.sqrt(np.mean((ours - speed) ** 2)) / np.ptp(speed))
+    return errors
 
 
-def ends(row):
-    """Both ends of an interval, infinite where there is none; None for no interval at all."""
-    if not row["lower"] and not row["upper"]:
-        return None
-    return float(row["lower"] or -math.inf), float(row["upper"] or math.inf)
-
-
-def summary(rows):
-    """Unknowns with an interval, how many hold the truth, those without, median half width [%]."""
-    told = [(ends(row), float(row["truth"])) for row in rows if ends(row)]
-    held = sum(low <= truth <= high for (low, high), truth in told)
-    widths = [
-        50.0 * (high - low) / abs(truth)
-        for (low, high), truth in told
-        if math.isfinite(high - low) and truth
+def predicted_cylinder(program, folder, truth):
+    """The same of the fitted cylinder, by `validate` on logs without instruments."""
+    lines = [
+        'title = "new maneuvers"',
+        "[axes.drive]",
+        'time = { column = "time", unit = "s" }',
+        'input = { kind = "voltage", column = "voltage", unit = "V", interpolation = "linear" }',
+        'channels.speed = { kind = "shaft_speed", column = "speed", unit = "m/s" }',
     ]
-    return len(told), held, len(rows) - len(told), median(widths) if widths else math.nan
+    ranges = {}
+    for name in new_names():
+        cylinder = draws.drawn_cylinder(truth["seed"])
+        time_, volts, speed = logger.new_cylinder_run(cylinder, name).T
+        file = f"{name}.csv".replace(" ", "_")
+        write_table(folder / file, {"time": time_, "voltage": volts, "speed": speed})
+        lines += ["[[runs]]", f'file = "{file}"', 'role = "validate"']
+        ranges[file.removesuffix(".csv")] = (name, float(np.ptp(speed)))
+    (folder / "new.toml").write_text("\n".join(lines) + "\n", "utf-8")
+    code, output, _, _ = program.run(
+        "validate", "fitted", "new.toml", "--model", CYLINDER, "--out", "new", folder=folder
+    )
+    if code not in {0, 1}:
+        raise CampaignError(output)
+    errors = {}
+    with (folder / "new" / "measures.csv").open(encoding="utf-8", newline="") as stream:
+        for row in csv.DictReader(stream):
+            if row["channel"] == "speed":
+                name, size = ranges[row["run"]]
+                errors[name] = 100.0 * float(row["rmse"]) / size
+    return errors
 
 
-def line(words, rows):
-    """One row of a table."""
-    count, inside, without, width = summary(rows)
-    seeds = len({(row["axis"], row["case"], row["seed"]) for row in rows})
-    share = f"{100.0 * inside / count:.1f} %" if count else "-"
-    new = [float(row["new"]) for row in rows if row["new"]]
-    error = f"{median(new):.3f}" if new else "-"
-    print(f"| {words} | {seeds} | {count} | {share} | {width:.3g} | {error} | {without} |")
+def new_names():
+    """Names of the new maneuvers."""
+    return [name for name, entry in draws.LEVELS["new"].items() if isinstance(entry, dict)]
 
 
-HEAD = (
-    "| {} | campaigns | intervals | hold the truth | half width, % | error on new, % | without |\n"
-    "|---|--:|--:|--:|--:|--:|--:|"
+def write_table(path, columns):
+    """Write columns of numbers to a CSV file, to the last digit."""
+    with path.open("w", encoding="utf-8", newline="") as stream:
+        writer = csv.writer(stream)
+        writer.writerow(columns)
+        writer.writerows(zip(*(values.tolist() for values in columns.values()), strict=True))
+
+
+def claims(headline):
+    """Errors that a verdict claims of the held-out speed: mean and worst run, % of range."""
+    speed = (
+        r"speed(?: from)?[ \w]*? to ([\d.eE+-]+) % of its range(?: \(worst run ([\d.eE+-]+) %\))?"
+    )
+    said = re.search(speed, headline)
+    if not said:
+        return None, None
+    return tuple(float(text) if text else None for text in said.groups())
+
+
+def campaign(program, axis, rate, seed, folder, oracle=False):
+    """Record of a campaign: what a user gets of it, beside the machine's numbers.
+
+    With `oracle` the command goes straight between samples, is logged exactly, and the file says
+    so: what a fit would be worth that knew all of the command.
+    """
+    truth = logger.write_campaign(axis, seed, folder, rate, exact_command=oracle)
+    record = {"axis": axis, "rate": rate, "seed": seed}
+    logs = sorted(Path("logs") / path.name for path in (folder / "logs").iterdir())
+    known = ["--drive", axis, "--counts-per-turn", repr(truth["counts_per_turn"])]
+    words = known if axis != "cylinder" else []
+    code, output, record["cpu_init"], _ = program.run(
+        "campaign", "init", *logs, *words, "--out", "campaign.toml", folder=folder
+    )
+    if code:
+        raise CampaignError(output)
+    file = folder / "campaign.toml"
+    set_roles(file, truth["held_out"])
+    if oracle:
+        text = file.read_text("utf-8")
+        file.write_text(re.sub(r'interpolation = "\w+"', 'interpolation = "linear"', text), "utf-8")
+    drafted = re.search(r'interpolation\s*=\s*"(\w+)"', file.read_text("utf-8"))
+    record["interpolation"] = drafted[1] if drafted else ""
+    model = ["--model", CYLINDER] if axis == "cylinder" else []
+    code, output, record["cpu_fit"], record["memory"] = program.run(
+        "fit", file.name, "--out", "fitted", "--jobs", 1, *model, folder=folder
+    )
+    record["exit"] = code
+    if code not in {0, 1}:
+        raise CampaignError(output)
+    fitted = folder / "fitted"
+    verdict = json.loads((fitted / "fit.json").read_text("utf-8")).get("verdict") or {}
+    record["grade"] = verdict.get("grade", "")
+    record["headline"] = verdict.get("headline", "")
+    record["claim"], record["claim_worst"] = claims(record["headline"])
+    record["estimates"], record["without_counterpart"] = estimates(fitted, truth)
+    if axis == "cylinder":
+        record["new"] = predicted_cylinder(program, folder, truth)
+    else:
+        record["new"] = predicted_drive(program, folder, fitted / "drive.toml", truth)
+    return record
+
+
+# --- all campaigns --------------------------------------------------------------------------------
+
+
+def read(path):
+    """Records that a file holds; none if there is no file."""
+    if not path.exists():
+        return []
+    return [json.loads(line) for line in path.read_text("utf-8").splitlines() if line]
+
+
+def run_missing(program, items, jobs, path, keep, oracle):
+    """Run campaigns, (axis, rate, seed), and append a line of each to a file."""
+    lock, begun, count = Lock(), time.perf_counter(), 0
+
+    def one(item):
+        nonlocal count
+        axis, rate, seed = item
+        with tempfile.TemporaryDirectory() as temporary:
+            folder = Path(temporary) / "campaign"
+            if keep is not None:
+                folder = keep / f"{axis}-{rate:g}-{seed}"
+            try:
+                record = campaign(program, axis, rate, seed, folder, oracle)
+            except CampaignError as error:
+                record = {"axis": axis, "rate": rate, "seed": seed, "error": str(error)[-2000:]}
+        with lock:
+            with path.open("a", encoding="utf-8") as stream:
+                stream.write(json.dumps(record) + "\n")
+            count += 1
+            left = (time.perf_counter() - begun) / count * (len(items) - count)
+            print(f"\r{count} of {len(items)}, {left:.0f} s left ", end="", file=sys.stderr)
+
+    with ThreadPoolExecutor(jobs) as pool:
+        list(pool.map(one, items))
+    print(file=sys.stderr)
+
+
+# --- tables ---------------------------------------------------------------------------------------
+
+
+def holds(row, what="truth"):
+    """Whether an interval holds the truth; an end that is missing lies at infinity."""
+    low = -math.inf if row["lower"] is None else row["lower"]
+    high = math.inf if row["upper"] is None else row["upper"]
+    return low <= row[what] <= high
+
+
+def half_width(row):
+    """Half width of an interval, % of the truth; None where an end is missing."""
+    if row["lower"] is None or row["upper"] is None or not row["truth"]:
+        return None
+    return 50.0 * (row["upper"] - row["lower"]) / abs(row["truth"])
+
+
+def miss(row):
+    """Distance of the estimate from the truth, in half widths; None where an end is missing."""
+    if row["lower"] is None or row["upper"] is None or row["lower"] == row["upper"]:
+        return None
+    middle, half = 0.5 * (row["upper"] + row["lower"]), 0.5 * (row["upper"] - row["lower"])
+    return abs(row["truth"] - middle) / half
+
+
+def present(values):
+    """The values that are there."""
+    return [value for value in values if value is not None]
+
+
+def number(values, of=median):
+    """A statistic of the values that are there, as text."""
+    values = present(values)
+    return f"{of(values):.3g}" if values else "-"
+
+
+def with_interval(records):
+    """All estimates of records that have an interval, if with one end."""
+    rows = [row for record in records for row in record["estimates"]]
+    return [row for row in rows if row["lower"] is not None or row["upper"] is not None]
+
+
+def coverage_cell(rows, what="truth"):
+    """Share of intervals that hold, with the 95 % interval of as many independent ones."""
+    if not rows:
+        return "-"
+    inside = sum(holds(row, what) for row in rows)
+    ends = binomtest(inside, len(rows)).proportion_ci(0.95, method="wilson")
+    return f"{inside / len(rows):.1%} ({ends.low:.1%} to {ends.high:.1%})"
+
+
+def groups(records):
+    """Records by axis and rate, those that failed left out."""
+    split = defaultdict(list)
+    for record in records:
+        if "error" not in record:
+            split[record["axis"], record["rate"]].append(record)
+    return split
+
+
+def print_table(head, rows):
+    """A table of Markdown."""
+    print(f"\n| {' | '.join(head)} |\n|{'---|' * len(head)}")
+    for row in rows:
+        print(f"| {' | '.join(map(str, row))} |")
+
+
+OVERVIEW = (
+    "axis",
+    "rate, Hz",
+    "campaigns (seeds)",
+    "intervals",
+    "hold the truth",
+    "hold it as the ammeter reads",
+    "by campaign",
+    "half width, median %",
+    "worst miss, half widths",
+    "without interval",
+    "CPU s, init",
+    "CPU s, fit",
+    "memory, MB, largest",
 )
 
 
-def report(rows):
-    """Methods by axis, right and wrong; then noises and unknowns of the product."""
-    methods = list(dict.fromkeys(row["method"] for row in rows))
-    axes = list(dict.fromkeys(row["axis"] for row in rows))
-    print(HEAD.format("axis, model, method"))
-    for axis in axes:
-        for kind in ("right", OFF, *WRONG):
-            for method in methods:
-                some = [
-                    row
-                    for row in rows
-                    if row["axis"] == axis
-                    and row["method"] == method
-                    and (row["case"] in NOISES if kind == "right" else row["case"] == kind)
-                ]
-                if some:
-                    line(f"{axis}, {kind}, {method}", some)
-    product = [row for row in rows if row["method"] == "product" and row["case"] in NOISES]
-    print()
-    print(HEAD.format("noise of the right model, product"))
-    for case in NOISES:
-        some = [row for row in product if row["case"] == case]
-        if some:
-            line(case, some)
-    print()
-    print(HEAD.format("unknown, product"))
-    named = defaultdict(list)
-    for row in product:
-        named[f"{row['axis']}, {row['stage']}, {row['unknown'].split(' in ')[0]}"].append(row)
-    for name, some in named.items():
-        line(name, some)
-    family(named)
-    grades = {(row["axis"], row["case"], row["seed"]): row["grade"] for row in product}
-    for axis in axes:
-        some = [grade for (where, _, _), grade in grades.items() if where == axis]
-        alarms = sum(grade != "Usable" for grade in some)
-        print(f"\n{axis}: {alarms} of {len(some)} sound campaigns are not called usable.")
-
-
-def family(named):
-    """Whether the coverage of each unknown is one that chance allows, at 1e-3 for all together."""
-    from scipy.stats import binomtest
-
-    worst = []
-    for name, rows in named.items():
-        count, inside, _, _ = summary(rows)
-        if count:
-            worst.append((binomtest(inside, count, 0.95).pvalue, name, inside / count))
-    level = 1e-3 / len(worst)
-    outside = [f"{name} ({100.0 * share:.1f} %)" for p, name, share in worst if p < level]
-    print(
-        f"\nOf {len(worst)} unknowns {len(outside)} have a coverage that is not 95 % by a binomial "
-        f"test at {level:.1e} each, 1e-3 for the family: {', '.join(outside) or 'none'}."
+def overview_row(axis, rate, records):
+    """Cells of `OVERVIEW` for the campaigns of an axis at a rate."""
+    intervals = with_interval(records)
+    seeds = [record["seed"] for record in records]
+    shares = []
+    for record in records:
+        rows = with_interval([record])
+        if rows:
+            shares.append(sum(map(holds, rows)) / len(rows))
+    return (
+        axis,
+        f"{rate:g}",
+        f"{len(records)} ({min(seeds)} to {max(seeds)})",
+        len(intervals),
+        coverage_cell(intervals),
+        coverage_cell(intervals, "as_read"),
+        f"{min(shares):.0%} to {max(shares):.0%}" if shares else "-",
+        number(map(half_width, intervals)),
+        number(map(miss, intervals), max),
+        sum(len(record["estimates"]) for record in records) - len(intervals),
+        number([record["cpu_init"] for record in records]),
+        number([record["cpu_fit"] for record in records]),
+        number([record["memory"] for record in records], max),
     )
 
 
+def error_row(axis, rate, records):
+    """What headlines claim of held-out speed, and the errors in new maneuvers: median, largest."""
+    columns = [[record["claim"] for record in records]]
+    columns += [[record["new"].get(name) for record in records] for name in new_names()]
+    return axis, f"{rate:g}", *(f"{number(values)}, {number(values, max)}" for values in columns)
+
+
+def print_report(records):
+    """All tables of a file's records."""
+    split = groups(records)
+    print_table(OVERVIEW, [overview_row(*key, some) for key, some in split.items()])
+    print("\nError of the speed, RMS in % of its range: median, largest of the campaigns.")
+    head = ("axis", "rate, Hz", "headline claims", *new_names())
+    print_table(head, [error_row(*key, some) for key, some in split.items()])
+    for (axis, rate), some in split.items():
+        print_parameters(f"{axis}, {rate:g} Hz", with_interval(some))
+        left_out = sorted({name for record in some for name in record["without_counterpart"]})
+        grades = Counter(f"{record['grade']} (exit code {record['exit']})" for record in some)
+        drafts = Counter(record["interpolation"] for record in some)
+        print(f"\nWithout a counterpart in the machine: {', '.join(left_out) or 'none'}.")
+        print(f"Verdicts: {', '.join(f'{n} {grade}' for grade, n in grades.items())}.")
+        print(f"Drafted interpolation: {', '.join(f'{n} {name}' for name, n in drafts.items())}.")
+    for record in records:
+        if "error" in record:
+            last = " ".join(record["error"].split())[-300:]
+            print(f"\nFailed: {record['axis']}, {record['rate']:g} Hz, {record['seed']}: {last}")
+
+
+def print_parameters(title, intervals):
+    """Coverage and half width of each parameter, and which coverage chance does not allow."""
+    named = defaultdict(list)
+    for row in intervals:
+        named[row["name"]].append(row)
+    rows = []
+    for name, some in named.items():
+        inside = sum(map(holds, some))
+        low = binom.cdf(inside, len(some), 0.95) < CHANCE
+        bias = median(row["value"] / row["truth"] - 1.0 for row in some if row["truth"])
+        rows.append((
+            name, f"{inside} of {len(some)}", "below chance" if low else "",
+            number(map(half_width, some)), f"{100.0 * bias:+.2f}", number(map(miss, some), max),
+        ))  # fmt: skip
+    print(f"\n{title}")
+    head = ("parameter", "hold", f"at {1.0 - CHANCE:.1%}", "half width, median %")
+    print_table((*head, "bias, median %", "worst miss, half widths"), rows)
+
+
+def print_beside(records, others):
+    """Coverage, widths and errors of two files on the campaigns that both have."""
+    split, beside = groups(records), groups(others)
+    rows = []
+    for key, some in split.items():
+        shared = {one["seed"] for one in some} & {one["seed"] for one in beside.get(key, ())}
+        for words, group in (("this", some), ("beside", beside.get(key, ()))):
+            common = [record for record in group if record["seed"] in shared]
+            if not common:
+                continue
+            intervals = with_interval(common)
+            new = [max(record["new"].values()) for record in common]
+            rows.append((
+                f"{key[0]}, {key[1]:g} Hz", words, len(common), len(intervals),
+                coverage_cell(intervals), coverage_cell(intervals, "as_read"),
+                number(map(half_width, intervals)),
+                number(map(miss, intervals), max), number(new), number(new, max),
+                number([record["cpu_fit"] for record in common]),
+            ))  # fmt: skip
+    print_table(
+        ("axis", "file", "campaigns", "intervals", "hold the truth",
+         "hold it as the ammeter reads", "half width, median %",
+         "worst miss, half widths", "largest error on new, median %", "largest %", "CPU s, fit"),
+        rows,
+    )  # fmt: skip
+
+
 def main():
-    """Run what is missing in the file, write it, print the tables."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--axes", nargs="+", default=["hoist", "slew", "luff", "own"])
-    parser.add_argument("--campaigns", type=int, default=400, help="of realistic instruments")
-    parser.add_argument("--cells", type=int, default=40, help="of each other noise and model")
-    parser.add_argument("--methods", action="store_true", help="compare the candidates, too")
+    """Run what is missing in the file, print the tables."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--axis", nargs="+", choices=draws.AXES, default=draws.AXES)
+    parser.add_argument("--rate", type=float, choices=SEEDS, default=512.0, help="of the logger")
+    parser.add_argument("--campaigns", type=int, help="the first so many; by default all")
+    parser.add_argument(
+        "--development", action="store_true", help="seeds that nothing is quoted of"
+    )
+    parser.add_argument("--oracle", action="store_true", help="exact command, in a file of its own")
+    parser.add_argument("--python", default=sys.executable, help="executable with swashplate")
+    parser.add_argument("--label", default="tree", help="installation, in the file's name")
     parser.add_argument("--jobs", type=int, default=2)
-    parser.add_argument("--out", type=Path, default=Path("benchmarks/build/calibration.csv"))
-    wanted = parser.parse_args()
-    wanted.out.parent.mkdir(parents=True, exist_ok=True)
-    kept = read(wanted.out)
-    done = {(row["axis"], row["case"], int(row["seed"])) for row in kept}
-    counts = dict.fromkeys((*NOISES, *WRONG, OFF), wanted.cells)
-    counts["realistic"] = max(wanted.campaigns, wanted.cells)
-    todo = [
-        (axis, case, seed, wanted.methods)
-        for seed in range(max(counts.values()))
-        for axis in wanted.axes
-        for case, number in counts.items()
-        if seed < number and (axis, case, seed) not in done
-        if axis != "own" or case == "realistic"
-    ]
-    begun = time.perf_counter()
-    run_missing(campaign, todo, wanted.jobs, wanted.out, FIELDS)
-    report(read(wanted.out))
-    print(f"\n{len(todo)} campaigns in {time.perf_counter() - begun:.0f} s.")
+    parser.add_argument(
+        "--out", type=Path, help="by default benchmarks/build/calibration-LABEL.jsonl"
+    )
+    parser.add_argument("--keep", type=Path, help="folder in which logs and fits stay")
+    parser.add_argument("--report", type=Path, help="print the tables of this file; run nothing")
+    parser.add_argument("--beside", type=Path, help="compare with this file on shared campaigns")
+    arguments = parser.parse_args()
+    path = arguments.report or arguments.out
+    if path is None:
+        name = f"{arguments.label}-oracle" if arguments.oracle else arguments.label
+        path = FOLDER / "build" / f"calibration-{name}.jsonl"
+    if arguments.report is None:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        levels = draws.LEVELS["seeds"]
+        first, last = levels[SEEDS[arguments.rate]]
+        count = last - first + 1
+        if arguments.campaigns is not None:
+            count = min(count, arguments.campaigns)
+        if arguments.development:
+            first = levels["development_from"]
+        done = {(one["axis"], one["rate"], one["seed"]) for one in read(path)}
+        items = [
+            (axis, arguments.rate, seed)
+            for seed in range(first, first + count)
+            for axis in arguments.axis
+            if (axis, arguments.rate, seed) not in done
+        ]
+        keep = None if arguments.keep is None else arguments.keep.absolute()
+        program = Program(arguments.python)
+        run_missing(program, items, arguments.jobs, path, keep, arguments.oracle)
+    records = read(path)
+    print_report(records)
+    if arguments.beside is not None:
+        print_beside(records, read(arguments.beside))
 
 
 if __name__ == "__main__":

@@ -2,11 +2,10 @@
 
     .venv/bin/python benchmarks/faults.py [--campaigns 20] [--sound 100] [--axes hoist slew]
 
-Each campaign draws a drive about the published one, as `benchmarks/calibration.py` does, puts one
-fault into the machine, its instruments or its logs, is written to files, checked, fitted, judged
-and validated by the calls that `swashplate campaign check`, `fit` and `validate` make. The true
-error is that of the fitted drive on maneuvers that no campaign has, against the machine that was
-simulated.
+Each campaign draws a drive about the published one, puts one fault into the machine, its
+instruments or its logs, is written to files, checked, fitted, judged and validated by the calls
+that `swashplate campaign check`, `fit` and `validate` make. The true error is that of the fitted
+drive on maneuvers that no campaign has, against the machine that was simulated.
 """
 
 import argparse

@@ -1,0 +1,110 @@
+"""The second machine of the benches: apart from swashplate, and right by other means."""
+
+import ast
+import csv
+from pathlib import Path
+from types import ModuleType
+
+import numpy as np
+import pytest
+
+BENCHMARKS = Path(__file__).parents[1] / "benchmarks"
+FOLDER = BENCHMARKS / "second_machine"
+
+
+@pytest.fixture(scope="module")
+def machine() -> ModuleType:
+    """The package with its modules."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.syspath_prepend(str(BENCHMARKS))
+        import second_machine.checks
+        import second_machine.draws
+        import second_machine.equations
+        import second_machine.logger
+
+        return second_machine
+
+
+def test_nothing_of_swashplate_is_imported() -> None:
+    """Truth and model share no line: imports stay within the folder, NumPy, Numba and SciPy."""
+    outside = set()
+    for path in FOLDER.glob("*.py"):
+        for node in ast.walk(ast.parse(path.read_text("utf-8"))):
+            if isinstance(node, ast.Import):
+                outside |= {name.name.partition(".")[0] for name in node.names}
+            elif isinstance(node, ast.ImportFrom) and not node.level:
+                outside.add((node.module or "").partition(".")[0])
+            elif isinstance(node, ast.Call) and isinstance(node.func, ast.Name):
+                assert node.func.id not in {"__import__", "exec", "eval"}, path.name
+    assert {"numpy", "numba"} <= outside
+    assert not outside & {"swashplate", "importlib", "subprocess"}
+
+
+# voltage, current [A] and speed [deg/s], worked out from the published tables without a march
+STATIC = [
+    ("hoist", 1.0, 0.3184, 22.25),
+    ("hoist", -4.0, 0.5093, -85.72),
+    ("hoist", 9.0, 0.7452, 196.0),
+    ("slew", 4.0, 0.3185, 3.23),
+    ("slew", -9.0, 0.4890, -4.29),
+]
+
+
+@pytest.mark.parametrize(("axis", "volts", "current", "speed"), STATIC)
+def test_march_ends_at_the_published_static_levels(
+    machine: ModuleType, axis: str, volts: float, current: float, speed: float
+) -> None:
+    numbers = machine.draws.published(axis)
+    command = machine.controller.held_exactly(lambda t: np.full(t.size, volts), 4.0, 10.0)
+    end = machine.logger.Machine(numbers).march(command, 4.0)[-1]
+    # the slew card's Coulomb term holds the current within C/omega², 0.5 mA, which is 0.011 deg/s
+    stuck = max(numbers[f"C_{way}"] / numbers[f"omega_{way}"] ** 2 for way in ("plus", "minus"))
+    assert end[1] + end[2] == pytest.approx(current, abs=6e-5 + stuck)
+    assert np.rad2deg(end[5]) == pytest.approx(speed, abs=0.05 if axis == "hoist" else 0.017)
+
+
+def test_converted_filter_follows_the_recursion(machine: ModuleType) -> None:
+    """Free samples of Kruse's recursion lie on the converted equation's exponentials."""
+    for zeta, omega in ((0.71887, 56.253), (1.4157, 98.377)):
+        h = 1.0 / 512.0
+        printed = np.roots(
+            [1.0, -2.0 * (1.0 - zeta * omega * h), 1.0 - 2.0 * zeta * omega * h + (omega * h) ** 2]
+        )
+        new_zeta, new_omega = machine.equations.continuous_filter(zeta, omega)
+        rates = np.roots([1.0, 2.0 * new_zeta * new_omega, new_omega**2])
+        assert np.sort_complex(np.exp(rates * h)) == pytest.approx(np.sort_complex(printed))
+
+
+@pytest.mark.parametrize("run", range(5))
+def test_march_agrees_with_scipy(machine: ModuleType, run: int) -> None:
+    """Every signal to 1e-4 of its range; measured are 6.1e-5 at most."""
+    shares = machine.checks.differences(*machine.checks.RUNS[run])
+    assert max(shares.values()) < 1e-4, shares
+
+
+def test_campaign_is_as_a_logger_leaves_it(machine: ModuleType, tmp_path: Path) -> None:
+    truth = machine.logger.write_campaign("luff", 1003, tmp_path, rate=50.0)
+    logs = sorted((tmp_path / "logs").iterdir())
+    by_time = sorted(logs, key=lambda path: path.stat().st_mtime)
+    assert [path.name for path in by_time] == truth["runs"]
+    assert by_time != logs
+    assert set(truth["held_out"]) < {path.name for path in logs}
+    with (tmp_path / "logs" / "luff_step_+9_V.csv").open(encoding="utf-8") as stream:
+        rows = list(csv.DictReader(stream))
+    assert list(rows[0])[:4] == ["time [s]", "voltage [V]", "current [A]", "encoder [counts]"]
+    counts = np.array([float(row["encoder [counts]"]) for row in rows])
+    volts = np.array([float(row["voltage [V]"]) for row in rows])
+    time = np.array([float(row["time [s]"]) for row in rows])
+    assert np.diff(time) == pytest.approx(np.full(time.size - 1, 0.02), abs=5e-4)
+    assert volts[100:250] == pytest.approx(np.full(150, 9.0), abs=0.02)
+    # within a count of the angle that the machine, drawn once more, turned through
+    numbers = machine.draws.drawn_parameters("luff", 1003)
+    assert numbers == truth["parameters"]
+    length, wish = machine.controller.maneuver("step +9 V", "luff")
+    plc = machine.draws.drawn_controller("luff", 1003, "step +9 V")
+    command = machine.controller.held(wish, length, plc)
+    order, _ = machine.draws.day("luff", 1003)
+    condition = machine.draws.drawn_conditions("luff", 1003)[order.index("step +9 V")]
+    turned = machine.logger.Machine(numbers).march(command, length, condition)[-1, 4]
+    turns = (counts[-1] - counts[0]) / truth["counts_per_turn"]
+    assert 2.0 * np.pi * turns == pytest.approx(turned, abs=4.0 * np.pi / truth["counts_per_turn"])
