@@ -63,6 +63,17 @@ def test_march_ends_at_the_published_static_levels(
     assert np.rad2deg(end[5]) == pytest.approx(speed, abs=0.05 if axis == "hoist" else 0.017)
 
 
+def test_gain_of_an_ammeter_is_equal_to_other_numbers(machine: ModuleType) -> None:
+    """The machine in an ammeter's amperes reads as the gain says and turns the same."""
+    numbers = machine.draws.drawn_parameters("slew", 1005)
+    length, wish = machine.controller.maneuver("ramp +1 V/s", "slew")
+    command = machine.controller.held_exactly(wish, length, 100.0)
+    rows = machine.logger.Machine(numbers).march(command, length)
+    other = machine.logger.Machine(machine.draws.as_read(numbers, 1.005)).march(command, length)
+    assert other[:, 1] == pytest.approx(1.005 * rows[:, 1], abs=1e-9)
+    assert other[:, 4] == pytest.approx(rows[:, 4], abs=1e-9)
+
+
 def test_converted_filter_follows_the_recursion(machine: ModuleType) -> None:
     """Free samples of Kruse's recursion lie on the converted equation's exponentials."""
     for zeta, omega in ((0.71887, 56.253), (1.4157, 98.377)):

@@ -29,7 +29,7 @@ class Machine:
     def march(self, command, length, condition=draws.STEADY):
         """Rows of `march_drive` under a held command."""
         late = command.delayed(self.numbers["tau"], length)
-        return march_drive(
+        rows = march_drive(
             late.edges,
             late.volts,
             draws.channel(self.numbers, "plus"),
@@ -37,6 +37,9 @@ class Machine:
             draws.pump(self.numbers),
             condition,
         )
+        if not np.isfinite(rows).all():
+            raise ValueError("The spool leaves the range of the balance: draw Z5, Z4, Z19 closer.")
+        return rows
 
 
 def sample_instants(logger, length, random):
