@@ -246,11 +246,13 @@ def campaign(program, axis, rate, seed, folder, oracle=False):
         raise CampaignError(output)
     file = folder / "campaign.toml"
     set_roles(file, truth["held_out"])
+    text = file.read_text("utf-8")
     if oracle:
-        text = file.read_text("utf-8")
-        file.write_text(re.sub(r'interpolation = "\w+"', 'interpolation = "linear"', text), "utf-8")
-    drafted = re.search(r'interpolation\s*=\s*"(\w+)"', file.read_text("utf-8"))
-    record["interpolation"] = drafted[1] if drafted else ""
+        text = re.sub(r'(# )?interpolation = "\w+".*', 'interpolation = "linear"', text)
+        file.write_text(text, "utf-8")
+    # a comment in drafts that leave it to the fit
+    drafted = re.search(r'^interpolation\s*=\s*"(\w+)"', text, re.MULTILINE)
+    record["interpolation"] = drafted[1] if drafted else "left to the fit"
     model = ["--model", CYLINDER] if axis == "cylinder" else []
     code, output, record["cpu_fit"], record["memory"] = program.run(
         "fit", file.name, "--out", "fitted", "--jobs", 1, *model, folder=folder
