@@ -21,7 +21,7 @@ from swashplate.identification.fitting import Fit, Search, StageFit, fit
 from swashplate.identification.model import Model
 from swashplate.identification.problem import Loss
 from swashplate.identification.profiles import Profile, profiles_of
-from swashplate.identification.resampling import bootstraps_of, cross_validate
+from swashplate.identification.resampling import cross_validate
 from swashplate.identification.setup import FreeParameters, ModelSetup, Setup
 from swashplate.parameters.files import named_set
 from swashplate.parameters.parameter_set import ParameterSet
@@ -29,8 +29,6 @@ from swashplate.parameters.parameter_set import ParameterSet
 if TYPE_CHECKING:
     pass
 
-FEWEST_DRAWS = 40
-"""Of a bootstrap: one beyond each end of a 95 % interval."""
 MOST_EVALUATIONS = 600
 
 
@@ -43,7 +41,6 @@ def identify(
     joint: bool = False,
     starts: int = 0,
     folds: int = 0,
-    bootstrap: int = 0,
     profiles: str | Sequence[str] = (),
     seed: int = 0,
     loss: Loss = "linear",
@@ -79,12 +76,12 @@ def identify(
         After the stages, estimate all parameters at once, through the whole drive.
     starts : int
         More starts, spread over the bounds; the best is refined.
-    folds, bootstrap : int
-        Folds of a cross-validation, and refits to new noise (40 or more); 0 for none.
+    folds : int
+        Folds of a cross-validation; 0 for none.
     profiles : str or sequence of str
         Parameters to profile the cost along, by name, or ``"all"``.
     seed : int
-        Random seed of starts, folds and bootstrap.
+        Random seed of starts and folds.
     loss : {"linear", "soft_l1", "cauchy"}
         Robust loss functions reduce the weight of outliers.
     max_evaluations : int
@@ -92,7 +89,7 @@ def identify(
     required : float
         Largest error of held-out runs, over their range, for the verdict "usable". [1]
     executor : Executor, optional
-        Of `swashplate.executors`, for starts, folds, refits and profiles; one after another by
+        Of `swashplate.executors`, for starts, folds and profiles; one after another by
         default. The result does not depend on it.
     store : path, optional
         Folder that keeps the result of each start as it is ready.
@@ -103,7 +100,7 @@ def identify(
     -------
     Identification
         Estimates by name, drive, verdict; `Identification.report` and `Identification.save` write
-        them. After Ctrl-C it is the best result so far, without folds, bootstrap and profiles.
+        them. After Ctrl-C it is the best result so far, without folds and profiles.
 
     Raises
     ------
@@ -124,11 +121,6 @@ def identify(
     >>> result = identify("harbour/campaign.toml", "hoist", {"Z8": (0.5, 2), "Z16": (0.5, 2)})
     >>> result = identify("valve/campaign.toml", valve, {"lag": (0.005, 0.06, 0.5)})
     """
-    if 0 < bootstrap < FEWEST_DRAWS:
-        raise InputError(
-            f"{bootstrap} draws do not reach the ends of a 95 % interval; take {FEWEST_DRAWS} or "
-            "more, 1000 for smooth ones."
-        )
     profiles = (profiles,) if isinstance(profiles, str) else profiles
     if not isinstance(tests, str | Path | Campaign):
         raise InputError(
@@ -177,14 +169,6 @@ def identify(
             seed=seed,
         )
         identification = replace(identification, folds=cross_validation)
-    if bootstrap:
-        refits = bootstraps_of(
-            result.stages,
-            bootstrap,
-            executor=executor,
-            seed=seed,
-        )
-        identification = replace(identification, bootstraps=refits)
     if profiles:
         curves = [
             curve for stage in result.stages for curve in _profiles(stage, profiles, executor)
