@@ -114,7 +114,7 @@ class Problem(Result):
         found = []
         for each in self.experiments:
             names = [name for name in self.channels if name in each.channels]
-            found.append({n: np.sqrt(each[n].weight) / self.scales[n] for n in names})
+            found.append({n: _factors(each[n].weight, self.scales[n]) for n in names})
         return tuple(found)
 
     @property
@@ -273,6 +273,13 @@ class Problem(Result):
         numbers = range(len(self.experiments))
         alone = min(self.threads, len(numbers)) == 1
         return list(map(work, numbers) if alone else _pool(self.threads).map(work, numbers))
+
+
+def _factors(weight: Array, scale: float) -> Array:
+    """(m,) factors on residuals; where all are alike, an array that takes no memory."""
+    if weight.size and weight.min() == weight.max():
+        return np.broadcast_to(np.sqrt(weight[0]) / scale, weight.shape)
+    return np.sqrt(weight) / scale
 
 
 @lru_cache
