@@ -53,7 +53,7 @@ from swashplate.parameters.parameter_set import ParameterSet
 from swashplate.parameters.rules import SIDES
 from swashplate.progress import LOGGER, working
 from swashplate.results import Result, Tabular
-from swashplate.tables import count
+from swashplate.tables import count, listed
 
 if TYPE_CHECKING:
     import polars
@@ -68,6 +68,15 @@ Solved = tuple[Problem, Solution, tuple[Solution, ...]]
 OTHERS = 6
 """Starts besides the nominal one where that ends far from what was measured: of 856 sound campaigns
 five did; of two of them two and four of these starts reached the best."""
+LEAST_EXPLAINED = 0.5
+"""Share of the variance of what was measured that a search must explain after `solving.LEG`
+evaluations, or it is given up. Of 60 virtual campaigns, from sound ones to such with gross faults,
+that fit at all, the first search explained {MEASURED} then, and it converged."""
+TRIAL = 12
+"""Evaluations of each other start where the first search was given up."""
+WINDOW = 1.0
+"""Time over which the speed of a position is taken, of which the variance counts: where a position
+drifts to after minutes says little of how a drive moves. [s]"""
 UNEXPLAINED = 5.0
 """Residuals over their known measurement error from which another optimum is looked for."""
 SPREAD = 0.05
@@ -310,7 +319,8 @@ def fit(
         Threads over experiments; all cores by default. The result does not depend on it.
     search : Search, optional
         More starts than the nominal one; the best is refined. Without, six more are tried where
-        residuals are five times as large as their known measurement error; `Search(0)` tries none.
+        residuals are five times as large as their known measurement error, and if none of them
+        explains half of what was measured, the fit is refused; `Search(0)` tries none.
         Ctrl-C during them ends the whole fit, with the best start of that stage as its last result.
     watch : callable, optional
         Called with the stage's name and each of its iterations.
@@ -318,8 +328,8 @@ def fit(
     Raises
     ------
     InputError, ParameterError
-        If tests, model and what is free do not fit each other, or no fit of these runs can mean
-        anything.
+        If tests, model and what is free do not fit each other, no fit of these runs can mean
+        anything, or none of the starts comes near what was measured.
     DomainError
         If the model does not hold at the nominal values.
 
@@ -364,7 +374,7 @@ def fit(
         limits: dict[str, Any] = {"tolerance": tolerance, "max_evaluations": max_evaluations}
         with working(f"Stage {stage.name}") as work:
             solve_stage = partial(solve, loss=loss, watch=seen, **limits)
-            result = _solved(stage, problem, solve_stage, search)
+            result = _solved(stage, problem, solve_stage, search, doubts)
         _, solution, _ = result
         LOGGER.info(
             "Stage %s: %s after %d evaluations, cost %.5g",
@@ -431,7 +441,11 @@ def _edges_found(stage: StageFit) -> dict[str, Prior]:
 
 
 def _solved(
-    stage: Stage, problem: Problem, solved: partial[Solution], search: Search | None
+    stage: Stage,
+    problem: Problem,
+    solved: partial[Solution],
+    search: Search | None,
+    doubts: Sequence[str],
 ) -> Solved:
     """See `Solved`."""
     limits = {key: solved.keywords[key] for key in ("tolerance", "max_evaluations")}
@@ -451,25 +465,77 @@ def _solved(
         )
         solution = several[0]
     else:
-        solution, planned = solved(problem), 1 + OTHERS
+        hopeless = None
+        if search is None and isinstance(problem.model, EquationModel):
+            hopeless = partial(_is_hopeless, problem)
+        solution, planned = solved(problem, hopeless=hopeless), 1 + OTHERS
     if search is None and solution.loss == "linear" and _unexplained(problem, solution):
+        starts = [*sobol_starts(problem, OTHERS, 0)]
+        if solution.given_up:
+            limits["max_evaluations"] = TRIAL
         try:
-            others = solve_from(problem, [*sobol_starts(problem, OTHERS, 0)], **limits)
+            others = solve_from(problem, starts, **limits)
         except KeyboardInterrupt:  # before the first of them ended
             others = ()
         several = solution, *(replace(each, number=each.number + 1) for each in others)
     if several:
         best = min(several, key=lambda each: each.cost)
+        if solution.given_up and len(several) == planned:
+            share = explained(problem, best.vector)
+            if share < LEAST_EXPLAINED:
+                raise InputError(_no_fit(stage, problem, planned, share, doubts))
         if len(several) < planned:
             words = f"interrupted after {len(several)} of {planned} starts: the best of them"
             solution = replace(best, converged=False, interrupted=True, message=words)
-        elif search is not None or best.number:
+        elif search is not None or best.number or solution.given_up:
             solution = solved(problem, best.vector)
     if any(each.prior is not None for each in problem.unknowns) and not solution.interrupted:
         # what the residuals are worth is known only now
         problem = weighed(problem, solution.vector)
         solution = solved(problem, solution.vector)
     return problem, solution, several
+
+
+def explained(problem: Problem, vector: Array) -> float:
+    """Share of the variance of what was measured that a point explains, at most 1.
+
+    In units of the residuals, so that the channels that are measured best count most; of a position
+    that of its mean speeds.
+    """
+    total, left = 0.0, 0.0
+    for number, experiment in enumerate(problem.experiments):
+        for name, output in problem.outputs(vector, number).items():
+            channel = experiment[name]
+            used = channel.used
+            measured, errors = channel.values[used], (output - channel.values)[used]
+            if channel.is_position and measured.size > 1:
+                step = float(np.median(np.diff(channel.time[used])))
+                width = min(max(round(WINDOW / step), 1), measured.size - 1)
+                measured, errors = np.diff(measured[::width]), np.diff(errors[::width])
+            if measured.size:
+                unit = problem.scales[name] ** 2
+                total += float(np.sum((measured - measured.mean()) ** 2)) / unit
+                left += float(errors @ errors) / unit
+    return 1.0 - left / total if total > 0.0 else 1.0
+
+
+def _is_hopeless(problem: Problem, vector: Array) -> bool:
+    return explained(problem, vector) < LEAST_EXPLAINED
+
+
+def _no_fit(
+    stage: Stage, problem: Problem, starts: int, share: float, doubts: Sequence[str]
+) -> str:
+    """That no search comes near what was measured, and what to look at."""
+    channels, percentage = listed(problem.channels), 100.0 * max(share, 0.0)
+    sentence = (
+        f"Stage {stage.name} does not fit: the best of {count(starts, 'start')} explains "
+        f"{percentage:.0f} % of the variance of {channels}. Look at the runs with 'swashplate "
+        "campaign plot': is it this command that moved the machine, do jumps or resets cut a "
+        "signal, are kinds, units and signs right? Begin at another drive with --from, or search "
+        "on all the same with --starts 20 (in Python search = Search(20))."
+    )
+    return " ".join([sentence, *(f"Seen in the runs: {doubt}" for doubt in doubts[:1])])
 
 
 def _unexplained(problem: Problem, solution: Solution) -> bool:
