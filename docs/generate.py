@@ -220,7 +220,7 @@ def nomenclature(text: str) -> str:
 
 def parameter_table(block: Block) -> str:
     """All parameters of a block, a row each."""
-    heads = ("symbol", "name", "unit", "per direction", "range", *HEADS[block])
+    heads = ("symbol", "name", "unit", "per direction", "range", "plausible", *HEADS[block])
     members = [d for d in (*CATALOGUE.values(), *REFINEMENTS.values()) if d.block == block]
     lines = [row(heads), "|" + "---|" * len(heads), *(row(cells(each)) for each in members)]
     return "\n".join(lines) + "\n"
@@ -228,7 +228,8 @@ def parameter_table(block: Block) -> str:
 
 def cells(each: Definition) -> tuple[str, ...]:
     """A parameter's row."""
-    first = (each.symbol, each.name, each.unit, "yes" if each.directional else "no", each.range)
+    directional = "yes" if each.directional else "no"
+    first = (each.symbol, each.name, each.unit, directional, each.range, each.plausible_range)
     match each.block:
         case "control_card":
             return (*first, each.source)

@@ -27,7 +27,7 @@ class Document(BaseModel):
 @pytest.mark.parametrize(
     ("entries", "said"),
     [
-        ({"colunm": "u", "unit": "V"}, "needs an entry 'column'; it has 'colunm', which may be"),
+        ({"colunm": "u", "unit": "V"}, "no entry 'colunm': perhaps 'column' is meant"),
         ({"rate": 1, "unit": "V"}, "[signal] needs an entry 'column'."),
         ({"column": "u", "unit": "V", "unti": "V"}, "no entry 'unti': perhaps 'unit' is meant"),
     ],

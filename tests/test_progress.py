@@ -4,6 +4,7 @@ import logging
 import os
 import subprocess
 import sys
+from io import StringIO
 from pathlib import Path
 
 import pytest
@@ -72,7 +73,7 @@ def test_items_are_counted(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def test_a_prompt_gets_one_line_that_is_wiped_out(capsys, monkeypatch) -> None:
     monkeypatch.setenv("COLUMNS", "20")
-    line = progress.PromptLine()
+    line = progress.TerminalLine()
     line.show("Fitting hoist: stage card")
     line.show("Judging")
     line.end(progress.Work("Judging"))
@@ -80,6 +81,26 @@ def test_a_prompt_gets_one_line_that_is_wiped_out(capsys, monkeypatch) -> None:
     assert first == "Fitting hoist: sta…"
     assert second == f"{'Judging':19}"
     assert not last.strip()
+
+
+class Terminal(StringIO):
+    def isatty(self) -> bool:
+        return True
+
+
+def test_a_script_shows_a_line_on_a_terminal_only_and_not_beside_the_log(
+    monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    def written(stream: StringIO) -> str:
+        monkeypatch.setattr(sys, "stderr", stream)
+        with progress.working("Judging"):
+            pass
+        return stream.getvalue()
+
+    assert written(Terminal()) == f"\rJudging\r{'':7}\r"
+    assert written(StringIO()) == ""
+    caplog.set_level(logging.INFO, "swashplate")
+    assert written(Terminal()) == ""
 
 
 def test_a_fit_says_its_stages_evaluations_and_cost(tmp_path: Path, caplog) -> None:

@@ -220,10 +220,13 @@ def test_a_figure_of_chosen_signals() -> None:
     run = Drive.preset("hoist").simulate(TESTS[0])
     assert len(run.plot().axes) > 4
     two = run.plot(["shaft_speed", "stroker_pressure"])
-    assert [each.get_ylabel() for each in two.axes] == [
+    assert [each.get_ylabel().replace("\n", " ") for each in two.axes] == [
         "shaft speed (deg/s)",
         "stroker pressure (bar)",
     ]
+    assert two.axes[-1].get_xlabel() == "time (s)"
+    part = run.plot("shaft_speed", window=(1.0, 2.0), title="start")
+    assert (part.get_suptitle(), part.axes[0].get_xlim()) == ("start", (1.0, 2.0))
     axes = Figure().subplots()
     run.plot("shaft_speed", ax=axes, label="as it is")
     Drive.preset("hoist").scale(Z10=1.2).simulate(TESTS[0]).plot(ax=axes, label="faster")

@@ -20,6 +20,7 @@ from .equations.marching.use import Stepper as Stepper
 from .errors import DomainError as DomainError
 from .errors import FileError as FileError
 from .errors import InputError as InputError
+from .errors import InputTypeError as InputTypeError
 from .errors import MissingFileError as MissingFileError
 from .errors import ParameterError as ParameterError
 from .errors import SwashplateError as SwashplateError

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import re
 import tomllib
+from collections.abc import Sequence
 from difflib import get_close_matches
 from pathlib import Path
 from reprlib import Repr
@@ -178,8 +179,7 @@ def validated(content: Any, model: type[Model], origin: str) -> Model:
     try:
         return model.model_validate(content)
     except ValidationError as error:
-        found = error.errors()
-        raise ParameterError(f"{origin}: {_sentence(found[0], model, found)}.") from None
+        raise ParameterError(f"{origin}: {_sentence(error.errors(), model)}.") from None
 
 
 def read_json(path: str | Path, model: type[Model], *, strict: bool = True) -> Model:
@@ -199,33 +199,28 @@ def read_json(path: str | Path, model: type[Model], *, strict: bool = True) -> M
         if found[0]["type"] == "json_invalid":
             reason = found[0]["msg"].removeprefix("Invalid JSON: ")
             raise FileError(f"{path} is not JSON: {reason}.") from None
-        raise ParameterError(f"{path}: {_sentence(found[0], model, found)}.") from None
+        raise ParameterError(f"{path}: {_sentence(found, model)}.") from None
 
 
 _SHORT = Repr()
 _SHORT.maxstring = _SHORT.maxother = _SHORT.maxlong = 100
 
 
-def _sentence(error: ErrorDetails, model: type[BaseModel], others: list[ErrorDetails]) -> str:
+def _sentence(errors: Sequence[ErrorDetails], model: type[BaseModel]) -> str:
+    """The first error in words; one of a misspelt entry before those that follow from it."""
+    error = next((each for each in errors if _near(each, model)), errors[0])
     parts = map(str, error["loc"])
-    where = [part for part in parts if part not in _BRANCHES and "[" not in part]
+    where = [part for part in parts if _names_entry(part)]
     # of a list the entries count from 1, as in other sentences
     named = [f" {int(part) + 1}" if part.isdecimal() else f".{part}" for part in where]
     path, kind = "".join(named).removeprefix("."), error["type"]
     parent, key = "".join(named[:-1]).removeprefix("."), where[-1] if where else ""
     table = f"[{parent}]" if parent else "the file"
     if kind == "missing":
-        unknown = [
-            str(each["loc"][-1])
-            for each in others
-            if each["type"] == "extra_forbidden" and each["loc"][:-1] == error["loc"][:-1]
-        ]
-        close = get_close_matches(key, unknown, 1)
-        written = f"; it has '{close[0]}', which may be meant" if close else ""
-        return f"{table} needs an entry '{key}'{written}"
+        return f"{table} needs an entry '{key}'"
     if kind == "extra_forbidden":
         known = _known_keys(model, where[:-1])
-        close = get_close_matches(key, known, 1)
+        close = _near(error, model)
         hint = f"perhaps '{close[0]}' is meant" if close else f"it has {', '.join(known)}"
         return f"{table} has no entry '{key}': {hint}" if known else f"{table} has no entry '{key}'"
     message = error["msg"].removeprefix("Value error, ").rstrip(".")
@@ -235,6 +230,18 @@ def _sentence(error: ErrorDetails, model: type[BaseModel], others: list[ErrorDet
         keys = ", ".join(_known_keys(model, where)) if should == "a table" else ""
         message = f"should be {should}" + (f" with entries such as {keys}" if keys else "")
     return f"{path} is {_SHORT.repr(error['input'])}, but {message[0].lower()}{message[1:]}"
+
+
+def _near(error: ErrorDetails, model: type[BaseModel]) -> list[str]:
+    """The entry that is meant by one that there is not, if one is near."""
+    if error["type"] != "extra_forbidden":
+        return []
+    *where, key = [part for part in map(str, error["loc"]) if _names_entry(part)]
+    return get_close_matches(key, _known_keys(model, where), 1)
+
+
+def _names_entry(part: str) -> bool:
+    return part not in _BRANCHES and "[" not in part
 
 
 _SHAPES = {

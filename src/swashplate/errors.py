@@ -2,8 +2,11 @@
 
 All errors that a user can cause and mend are a `SwashplateError`, and with it a ``ValueError``.
 Those that Python has a word for are that as well: a missing file is a ``FileNotFoundError``, a
-missing key a ``KeyError``.
+missing key a ``KeyError``, an argument of another kind a ``TypeError``.
 """
+
+from collections.abc import Iterable
+from difflib import get_close_matches
 
 
 class SwashplateError(ValueError):
@@ -16,6 +19,10 @@ class SwashplateError(ValueError):
 
 class InputError(SwashplateError):
     """A record, maneuver, option or argument that cannot be simulated."""
+
+
+class InputTypeError(InputError, TypeError):
+    """An argument that is not of a kind that a function takes; also a ``TypeError``."""
 
 
 class UnknownNameError(InputError, KeyError):
@@ -45,3 +52,9 @@ class MissingFileError(FileError, FileNotFoundError):
 
 class EquationError(SwashplateError):
     """An equation that uses what equations may not, or that cannot be differentiated."""
+
+
+def meant(name: str, names: Iterable[str]) -> str:
+    """A clause that asks whether the nearest of some names is meant; empty if none is near."""
+    near = get_close_matches(name, list(names), 1)
+    return f" (did you mean {near[0]}?)" if near else ""

@@ -1,4 +1,4 @@
-"""A folder that one process writes into at a time."""
+"""A folder that one process, and one thread of it, writes into at a time."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from datetime import datetime
 from pathlib import Path
+from threading import get_ident
 from warnings import warn
 
 from swashplate.errors import FileError
@@ -16,6 +17,8 @@ from swashplate.tables import made_folder
 
 NAME = ".swashplate.lock"
 """The file in the folder; it names the process that writes, and is gone when that has ended."""
+_owners = dict[Path, int]()
+"""Threads of this process that have locked a folder, by its path."""
 POSITION = 2**30
 """Byte that is locked on Windows, where nobody else could read what stands before. [byte]"""
 
@@ -26,27 +29,34 @@ def locked(folder: Path) -> Iterator[None]:
 
     The operating system holds the lock, so that it ends with the process however that ends: a lock
     file that a killed process has left is taken over. It holds between machines too, where their
-    network file system has locks, as NFS with its lock service does.
+    network file system has locks, as NFS with its lock service does. The thread that has locked a
+    folder may lock it again: a command does so, and what it saves there does as well.
 
     Raises
     ------
     FileError
-        If another process writes into the folder; the sentence names the process, its machine and
-        since when. Also if the folder cannot be made or written to.
+        If another process, or another thread, writes into the folder; the sentence names the
+        process, its machine and since when. Also if the folder cannot be made or written to.
 
     Warns
     -----
     RuntimeWarning
         If the file system has no locks; then nobody is kept out.
     """
+    whole = folder.resolve()
+    if _owners.get(whole) == get_ident():
+        yield
+        return
     created = [place for place in (folder, *folder.parents) if not place.exists()]
     path = made_folder(folder) / NAME
     handle = _open_locked(path, folder)
     try:
+        _owners[whole] = get_ident()
         os.truncate(handle, 0)
         os.write(handle, _description().encode())
         yield
     finally:
+        del _owners[whole]
         if sys.platform == "win32":  # an open file cannot be removed there
             os.close(handle)
         with suppress(OSError):
@@ -71,7 +81,7 @@ def _open_locked(path: Path, folder: Path) -> int:
             os.close(handle)
             raise FileError(
                 f"{folder} is in use: {_user_of(path)} is writing a fit into it. Wait for its end, "
-                "or name another folder with --out."
+                "or name another folder (of a command by --out)."
             ) from None
         except OSError as error:
             warn(

@@ -1,9 +1,11 @@
 """Progress of what takes long: in the log, and as a line to a person who waits.
 
 Work is announced with `working`. The logger ``"swashplate"`` gets its beginning and its end at
-level INFO, details at DEBUG; as a library's logger it prints nothing by itself. A notebook and an
-interactive prompt show the present state as a line, a script shows nothing. The command line shows
-it by its own means, see `shown_by`.
+level INFO, details at DEBUG; as a library's logger it prints nothing by itself. To a person who
+waits, the present state is shown as a line: in a notebook, and at a prompt or in a script whose
+standard error is a terminal, where it is wiped out at the end. A script whose output goes elsewhere
+shows nothing, nor does one that has the log. The command line shows it by its own means, see
+`shown_by`.
 """
 
 from __future__ import annotations
@@ -26,7 +28,7 @@ OFTEN = 0.1
 """Least time between two details that are shown: a search has up to a thousand a second. [s]"""
 
 enabled = True
-"""Whether notebooks and prompts show a line; set it to False where the output is published."""
+"""Whether a line is shown; set it to False where the output is published."""
 
 
 class Display(Protocol):
@@ -169,7 +171,7 @@ def _refresh(least: float = 0.0) -> None:
         _state.display.show(_joined(outer.words, inner[-1].line) if inner else outer.line)
 
 
-# --- a notebook and a prompt ----------------------------------------------------------------------
+# --- a notebook and a terminal --------------------------------------------------------------------
 
 
 def in_notebook() -> bool:
@@ -179,13 +181,15 @@ def in_notebook() -> bool:
 
 
 def _usual_display() -> Display | None:
-    """A line in a notebook or at a prompt, nothing for a script."""
+    """A line in a notebook or on a terminal, unless the log says the same there."""
     if not enabled:
         return None
     if in_notebook():
         return _notebook_line
-    at_prompt = hasattr(sys, "ps1") and sys.stderr is not None and sys.stderr.isatty()
-    return PromptLine() if at_prompt else None
+    if LOGGER.isEnabledFor(logging.INFO):
+        return None
+    on_terminal = sys.stderr is not None and sys.stderr.isatty()
+    return TerminalLine() if on_terminal else None
 
 
 class NotebookLine:
@@ -223,8 +227,8 @@ class NotebookLine:
 _notebook_line = NotebookLine()
 
 
-class PromptLine:
-    """A line at a prompt, on standard error, which is wiped out at the end."""
+class TerminalLine:
+    """A line on standard error, a terminal, which is wiped out at the end."""
 
     def __init__(self) -> None:
         self._length = 0

@@ -9,8 +9,15 @@ import pytest
 from tests.campaign.conftest import Drafted
 from tests.identification.given import run_of
 
-from swashplate import Campaign, Drive, Experiment, InputError, ParameterError
-from swashplate.campaign import Encoder, fit_configuration, guess_drive, guessed_set
+from swashplate import Campaign, Drive, Experiment, InputError, ParameterError, maneuvers
+from swashplate.campaign import (
+    Encoder,
+    fit_configuration,
+    guess_drive,
+    guess_table,
+    guessed_set,
+    rig,
+)
 from swashplate.campaign import draft_campaign as draft
 from swashplate.identification.setup import Setup
 
@@ -280,6 +287,9 @@ def test_a_guess_becomes_a_drive_and_a_fit_configuration() -> None:
     setup = Setup(**tomllib.loads(fit_configuration(found, parameters)))
     (stage,) = setup.stages
     assert {"V_dz_plus", "G1_minus", "Z8", "tau", "Z13_plus", "Z16_minus"} <= stage.free.keys()
+    faster = found._replace(gain=(4e9, 6e9), top_speed=(2e10, 2e10))
+    with pytest.raises(ParameterError, match="from campaign.toml .* units and scales .* Z10 "):
+        guessed_set(faster, "campaign.toml")
 
 
 def test_a_way_that_was_not_tried_is_the_other_s_and_fixed() -> None:
@@ -289,6 +299,71 @@ def test_a_way_that_was_not_tried_is_the_other_s_and_fixed() -> None:
     text = fit_configuration(found, guessed_set(found, "x"))
     assert "G1_plus" in text
     assert "G1_minus" not in text
+
+
+WINCH = Drive.preset("neutral").replace(V_dz=(0.8, 0.45), tau=0.04, Z8=1.4e6)
+"""A lag of 0.15 s; its steady speed is a straight line beyond the dead zone."""
+
+
+def rig_runs(drive: Drive, folder: Path, channel: str, **how: object) -> Campaign:
+    """Steps with a rest of three seconds after them, and a sine, of a drive in the virtual rig."""
+    steps = [maneuvers.step(volts, start=0.5, stop=3.0, length=6.0) for volts in (8.0, -8.0)]
+    tests = [*steps, maneuvers.sine(7.0, 0.2, length=6.0)]
+    logs = rig.run("neutral", tests, truth=drive, channels=[channel], **how)
+    return Campaign.from_toml(rig.write(logs, folder))
+
+
+@pytest.mark.parametrize(
+    ("offset", "seed", "channel", "counts"),
+    [(2e-5, 23, "encoder_counts", 2500.0), (-2e-5, 24, "shaft_speed", None)],
+)
+def test_a_creep_at_rest_is_found(
+    tmp_path: Path, offset: float, seed: int, channel: str, counts: float | None
+) -> None:
+    truth = WINCH.replace(Z18=offset)
+    logs = rig_runs(truth, tmp_path / "logs", channel, seed=seed, counts_per_turn=counts)
+    found = guess_drive(logs)
+    assert found.creep == pytest.approx(float(truth.steady_speed(0.0)), rel=0.1)
+    # nothing else stands for it
+    assert found.dead_zone == pytest.approx((0.8, 0.45), abs=0.05)
+    start = guessed_set(found, "campaign.toml")
+    assert float(Drive(start).steady_speed(0.0)) == pytest.approx(found.creep, rel=1e-6)
+    assert start["Z18"].status == "approximate"
+    (stage,) = Setup(**tomllib.loads(fit_configuration(found, start))).stages
+    low, high = stage.free["Z18"].bounds
+    assert low < start.numbers["Z18"] < high
+    (row,) = (line for line in str(guess_table(found)).splitlines() if line.startswith("creep"))
+    assert "rad/s" in row or "deg/s" in row
+
+
+@pytest.mark.parametrize(
+    ("channel", "counts", "severity"),
+    [
+        ("shaft_speed", None, "harsh"),
+        ("encoder_counts", 2500.0, "harsh"),
+        ("encoder_counts", 40.0, "realistic"),
+    ],
+)
+def test_no_creep_is_made_of_noise_or_counts(
+    tmp_path: Path, channel: str, counts: float | None, severity: str
+) -> None:
+    how = {"seed": 25, "counts_per_turn": counts, "severity": severity}
+    found = guess_drive(rig_runs(WINCH, tmp_path / "logs", channel, **how))
+    assert found.creep == 0.0
+    start = guessed_set(found, "campaign.toml")
+    assert start.numbers["Z18"] == 0.0
+    text = fit_configuration(found, start)
+    assert "no creep" in text
+    assert "Z18" not in tomllib.loads(text)["stages"][0]["free"]
+
+
+def test_without_a_rest_no_creep_is_told() -> None:
+    """Sines cross the dead zone too fast for the motion to end there."""
+    found = guess_drive([each for each in runs() if each.name in ("sine", "small")])
+    assert found.creep is None
+    text = fit_configuration(found, guessed_set(found, "campaign.toml"))
+    assert "rest" in text
+    assert "Z18" not in tomllib.loads(text)["stages"][0]["free"]
 
 
 def test_what_tells_nothing_is_refused() -> None:

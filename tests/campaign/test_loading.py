@@ -126,6 +126,11 @@ def test_missing_samples_are_refused_or_dropped_and_counted(edited: Edit) -> Non
         ('{ column = "time", unit = "ms" }', "{ unit = 'ms' }", "either the column of the time"),
         ('role = "validate"', 'role = "check"', "runs 2.role is 'check'"),
         ('role = "validate"', 'start = "given"', "start_pressure belong together"),
+        (
+            'role = "validate"',
+            'start = "given"\nstart_pressure = 1e300',
+            "start_pressure is 1e+300",
+        ),
         ('role = "validate"', "ignore = [{ from = 2.0, to = 1.0 }]", "from 2.0 s to 1.0 s"),
         ('role = "validate"', 'only = ["boom"]', "names the axis 'boom', but the axes are winch"),
         ('role = "validate"', 'name = "up"', "two runs are called 'up'"),

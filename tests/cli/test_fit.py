@@ -9,6 +9,7 @@ import sys
 import time
 import tomllib
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
@@ -214,11 +215,14 @@ def test_fits_that_are_refused(refused: Words, virtual: Path, tmp_path: Path) ->
 
 def test_one_fit_at_a_time_into_a_folder(refused: Words, virtual: Path, tmp_path: Path) -> None:
     words = ("fit", CAMPAIGN, "--axis", "boom", "--out", "results/fitted")
-    with locked(tmp_path / "results" / "fitted"):
+    lock = locked(tmp_path / "results" / "fitted")
+    with ThreadPoolExecutor(1) as another:
+        another.submit(lock.__enter__).result()
         sentence = refused(*words)
-        assert "results/fitted is in use" in sentence
-        assert f"process {os.getpid()} on" in sentence
-        assert "--out" in sentence
+        another.submit(lock.__exit__, None, None, None).result()
+    assert "results/fitted is in use" in sentence
+    assert f"process {os.getpid()} on" in sentence
+    assert "--out" in sentence
     assert "no axis 'boom'" in refused(*words)  # and leaves no folder behind
 
 

@@ -158,8 +158,8 @@ def test_what_was_measured_beside_the_voltage_counts(done, refused):
     for wrong, said in (
         ("pump_speed=n", "a maneuver has no columns, so give a number in SI"),
         ("speed=1", "write NAME=COLUMN, once for each of load_torque, pump_speed"),
-        ("supply_pressure=-3", "falls to -3, but must be from 1 to 1e+09"),
-        ("pump_speed=1e308", "rises to 1e+308, but must be from 0 to 10"),
+        ("supply_pressure=-3", "falls to -3 Pa, but must be from 1 to 1e+09 Pa"),
+        ("pump_speed=1e308", "is 1e+308, but on a machine it is at most 10"),
     ):
         assert said in refused("simulate", "hoist", "step:9", "--measured", wrong)
 

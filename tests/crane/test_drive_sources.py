@@ -1,10 +1,12 @@
 """Drives that come from fits: what the verdict was is said, and a drive of no use is refused."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import pytest
 from typer.testing import CliRunner
 
+from swashplate import Drive
 from swashplate.cli import app
 from swashplate.crane import Crane, Stick, control, judge
 from swashplate.crane.crane import preset_text
@@ -19,6 +21,12 @@ GRADES = {
     "Not usable": "Not usable: residuals are 2.14 times their known measurement error.",
 }
 SHORT = {"length": 12.0, "start": 5.0}
+VALIDITY = "Holds for steps from -9 to 9 V; never reached: the swash plate's stop Z13."
+UNREACHED = (
+    "No test of the hoist's drive reached Z13_plus and Z13_minus: beyond what was tested it is "
+    "extrapolated."
+)
+"""What the verdict holds for, and what the tests left open: both halves go with every verdict."""
 
 
 @pytest.fixture
@@ -28,10 +36,16 @@ def fit(tmp_path):
     def made(grade, name="fitted", changed=1.0):
         folder = tmp_path / name
         folder.mkdir()
-        drive = Crane.preset("tg3637").hoist
+        parameters = replace(
+            Crane.preset("tg3637").hoist.parameters, unreached={"Z13_plus": 0.2, "Z13_minus": 0.1}
+        )
+        drive = Drive(parameters)
         drive.scale(Z16=changed).to_toml(folder / "drive.toml")
         verdict = grade and StoredVerdict(
-            grade=grade, headline=GRADES[grade], numbers=dict(drive.parameters.numbers)
+            grade=grade,
+            headline=GRADES[grade],
+            validity=VALIDITY,
+            numbers=dict(drive.parameters.numbers),
         )
         file = FitFile(
             swashplate="1",
@@ -95,7 +109,8 @@ def test_the_verdict_is_said(fit, command, grade):
     force = ["--force"] if grade == "Not usable" else []
     shown = said(command, "tg3637", *COMMANDS[command], "--drive", f"hoist={fit(grade)}", *force)
     assert shown.exit_code == 0, shown.output
-    assert GRADES[grade] in " ".join(shown.stdout.split())
+    for words in (f"{GRADES[grade]} {VALIDITY}", UNREACHED):
+        assert words in " ".join(shown.stdout.split())
 
 
 def test_a_drive_without_a_verdict_says_so(fit, tmp_path):
@@ -138,6 +153,7 @@ def test_in_python_the_verdict_is_data_of_the_crane(fit):
         folder,
         "Usable for prediction",
         GRADES["Usable for prediction"],
+        VALIDITY,
     )
     result = SimpleNamespace(
         drive=crane.hoist, verdict=Verdict(GRADES["Not usable"], grade="Not usable")
@@ -150,6 +166,14 @@ def test_in_python_the_verdict_is_data_of_the_crane(fit):
     assert not bad.with_drive(hoist="hoist").sources
     unjudged = crane.with_drive(hoist=SimpleNamespace(drive=crane.hoist)).sources["hoist"]
     assert unjudged.grade is None
+    # a limit that is given a value is no longer open
+    fitted = crane.with_drive(hoist=folder)
+    stopped = fitted.upgraded("hoist", {"Z13": 1.1})
+    assert (fitted.unreached_sentence("hoist"), stopped.unreached_sentence("hoist")) == (
+        UNREACHED,
+        "",
+    )
+    assert UNREACHED in crane.with_drive(hoist=fitted.hoist).provenance()
     assert bad.with_drive(luff=crane.luff).sources == bad.sources
 
 
@@ -162,7 +186,8 @@ def test_judgment_and_page_say_the_verdict(fit, tmp_path, grade):
     page = tmp_path.joinpath("judge.html").read_text("utf-8")
     summary, basis = page.partition('<section id="swing">')[0], page.partition('id="basis"')[2]
     for part in (summary, basis):
-        assert GRADES[grade] in part
+        for words in (f"{GRADES[grade]} {VALIDITY}", UNREACHED):
+            assert words.replace("'", "&#39;") in part
     look = {"Usable": "good", "Not usable": "bad"}.get(grade, "look")
     assert f'<dt class="{look}">Hoist&#39;s drive' in summary
     forced = "It rests on the fit of the hoist, which is not usable." in found.headline
@@ -175,4 +200,6 @@ def test_judgment_and_page_say_the_verdict(fit, tmp_path, grade):
 def test_a_scene_says_the_verdict(fit, tmp_path):
     crane = Crane.preset("tg3637").with_drive(hoist=fit("Not usable"))
     write_scene(crane.simulate(Stick.rest(2.0)), tmp_path / "scene.html")
-    assert GRADES["Not usable"] in tmp_path.joinpath("scene.html").read_text("utf-8")
+    text = tmp_path.joinpath("scene.html").read_text("utf-8")
+    for words in (f"{GRADES['Not usable']} {VALIDITY}", UNREACHED):
+        assert words.replace("'", "&#39;") in text

@@ -563,5 +563,5 @@ def test_of_two_models_in_series_both_say_what_may_have_happened() -> None:
 
 def test_a_model_goes_to_other_processes_by_its_name() -> None:
     assert pickle.loads(pickle.dumps(pump_drive)) is pump_drive
-    with pytest.raises(InputError, match="tank cannot be sent .* stand by a name in a module"):
+    with pytest.raises(InputError, match=r"tank cannot be sent .* a name of a module .*--jobs 1"):
         pickle.dumps(Model("tank", Outlet, Fill, filled))

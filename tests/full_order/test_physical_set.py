@@ -197,7 +197,9 @@ def test_a_set_is_changed_copied_and_refused_in_words() -> None:
     for changes, said in (
         ({"swash_stop": (past, 0.2)}, "turn the feedback arm past 90°"),
         ({"spool_frequency": 200.0}, "chosen only where a set is completed"),
-        ({"air_fraction": 1.5}, "air_fraction .* at least 0 and below 1"),
+        ({"air_fraction": 1.0}, "air_fraction .* at least 0 and below 1"),
+        ({"air_fraction": 1.5}, "air_fraction .* is 1.5, .* at most 1: .* per cent"),
+        ({"bulk_modulus": 1.4}, "bulk_modulus .* is 1.4 Pa, .* to 1e.11 Pa: .* GPa"),
     ):
         with pytest.raises(ParameterError, match=said):
             hoist.replace(**changes)

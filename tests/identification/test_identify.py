@@ -19,6 +19,7 @@ from swashplate import (
     Identification,
     InputError,
     ParameterError,
+    SwashplateError,
     maneuvers,
 )
 from swashplate.equations import Model
@@ -211,10 +212,26 @@ def test_a_tied_parameter_has_its_estimate_by_every_name(campaign: Campaign) -> 
     assert found["J"].free
 
 
+def stage_of(name: str) -> Mapping[str, Any]:
+    return {"name": "pump", "part": "pump", "free": {name: {"relative": [0.5, 2.0]}}}
+
+
+def with_drive(campaign: Campaign, name: str) -> Campaign:
+    axis = campaign.axes["hoist"].model_copy(update={"drive": name})
+    return replace(campaign, axes={"hoist": axis})
+
+
 def two_axes(campaign: Campaign) -> Campaign:
     return replace(campaign, axes={**campaign.axes, "slew": campaign.axes["hoist"]})
 
 
+def pump(**entries: object) -> dict[str, object]:
+    """A fit configuration of the pump alone."""
+    stage = {"name": "pump", "part": "pump", "free": {"Z8": {"relative": (0.5, 2.0)}}}
+    return {"stages": [stage | entries]}
+
+
+FORCES = {"plus": (0.06, 0.16, 0.28, 0.40), "minus": (0.06, 0.16, 0.28, 0.38)}
 REFUSED: Mapping[str, tuple[Callable[[Campaign], object], type[Exception], str]] = {
     "another axis": (
         lambda tests: swashplate.identify(tests, axis="slew"),
@@ -223,7 +240,7 @@ REFUSED: Mapping[str, tuple[Callable[[Campaign], object], type[Exception], str]]
     ),
     "logs instead of a campaign": (
         lambda tests: swashplate.identify(["up.csv", "down.csv"]),
-        InputError,
+        TypeError,
         "draft_campaign",
     ),
     "several axes": (
@@ -251,6 +268,36 @@ REFUSED: Mapping[str, tuple[Callable[[Campaign], object], type[Exception], str]]
         ParameterError,
         r"free, Z8: .*must rise: write \[0.5, 2\]",
     ),
+    "a factor that no machine has": (
+        lambda tests: swashplate.identify(tests, free={"Z8": (0.5, 1e300)}),
+        ParameterError,
+        r"a bound of Z8 .* is 1.6514e\+306 sqrt\(Pa\)/\(m s\), .* 10 to 1e\+11 sqrt",
+    ),
+    "a bound in another unit": (
+        lambda tests: swashplate.identify(tests, free={"Z9": {"bounds": (50.0, 2e7)}}),
+        ParameterError,
+        r"a bound of Z9 .* is 50 Pa, .* 10000 to 1e\+09 Pa: .* bar instead of Pa",
+    ),
+    "a force that no solenoid has": (
+        lambda tests: swashplate.identify(
+            tests, free=pump(forces=FORCES | {"relative": (0.5, 1e6)})
+        ),
+        ParameterError,
+        r"a bound of force_plus_1 .* N, .* at most 10000 N",
+    ),
+    "a start pressure that no machine has": (
+        lambda tests: swashplate.identify(tests, free=pump(start_pressure=1e300)),
+        ParameterError,
+        r"start_pressure is 1e\+300, .* 10000000000",
+    ),
+    "a prior in another unit": (
+        lambda tests: swashplate.identify(
+            tests,
+            free={"Z9": {"bounds": (5e6, 2e7), "prior": {"mean": 107.0, "deviation": 10.0}}},
+        ),
+        ParameterError,
+        r"the prior mean of Z9 .* is 107 Pa, .* bar instead of Pa",
+    ),
     "nothing": (
         lambda tests: swashplate.identify(tests, free={}),
         InputError,
@@ -259,22 +306,84 @@ REFUSED: Mapping[str, tuple[Callable[[Campaign], object], type[Exception], str]]
     "an unknown configuration": (
         lambda tests: swashplate.identify(tests, free="hoost"),
         ParameterError,
-        "no packaged fit configuration 'hoost'",
+        "no packaged fit configuration 'hoost' .did you mean hoist",
     ),
     "an unknown drive": (
         lambda tests: swashplate.identify(tests, "hoost"),
         FileNotFoundError,
-        "no packaged set, file or folder 'hoost'",
+        "no packaged set, file or folder 'hoost' .did you mean hoist",
     ),
     "a model without what is free": (
         lambda tests: swashplate.identify(tests, lag_model()),
         InputError,
         "needs a mapping of what is free",
     ),
+    "neither a drive nor a model": (
+        lambda tests: swashplate.identify(tests, 5),
+        TypeError,
+        "model is 5: give a Drive, the name of a packaged one such as 'hoist'",
+    ),
+    "starts below none": (
+        lambda tests: swashplate.identify(tests, starts=-1),
+        InputError,
+        "starts is -1, but must be a whole number of 0 or more",
+    ),
+    "half an evaluation": (
+        lambda tests: swashplate.identify(tests, max_evaluations=0.5),
+        InputError,
+        "max_evaluations is 0.5, but must be a whole number of 1 or more",
+    ),
+    "another loss": (
+        lambda tests: swashplate.identify(tests, loss="lin"),
+        InputError,
+        "loss is 'lin', but must be one of linear, soft_l1, cauchy",
+    ),
+    "no error at all": (
+        lambda tests: swashplate.identify(tests, required=0.0),
+        InputError,
+        "required is 0.0, but must be an error over the range, above 0",
+    ),
+    "an unknown parameter of a stage": (
+        lambda tests: swashplate.identify(tests, free={"stages": [stage_of("Z88")]}),
+        KeyError,
+        "stage 'pump', free: .*'Z88'.*did you mean Z8",
+    ),
+    "an unknown parameter that is uncertain": (
+        lambda tests: swashplate.identify(
+            tests, free={"stages": [stage_of("Z8")], "standard_uncertainty": {"Z99": 1.0}}
+        ),
+        KeyError,
+        "standard_uncertainty: .*'Z99'.*did you mean Z9",
+    ),
+    "another name in a model's free": (
+        lambda tests: swashplate.identify(tests, lag_model(), {"lagg": (0.01, 0.1, 3.0)}),
+        KeyError,
+        "lag has no parameter 'lagg', which free names .did you mean lag",
+    ),
+    "another name in a model's fixed": (
+        lambda tests: ModelSetup(lag_model(), {"lag": (0.01, 0.1, 3.0)}, fixed={"gian": 1.0}),
+        KeyError,
+        "'gian', which fixed names .did you mean gain",
+    ),
     "a profile of nothing": (
         lambda tests: swashplate.identify(tests, free={"Z8": (0.5, 2)}, profiles=["Z9"]),
         InputError,
         "no parameter 'Z9'; there are Z8",
+    ),
+    "an identification to export": (
+        lambda tests: swashplate.export.fmu(Identification(tests, None), "hoist.fmu"),
+        TypeError,
+        r"give a Drive.*identification.drive",
+    ),
+    "a campaign with an unknown drive": (
+        lambda tests: swashplate.identify(with_drive(tests, "hoost")),
+        ParameterError,
+        r"campaign.toml, \[axes.hoist\]: .*'hoost' .did you mean hoist",
+    ),
+    "an unknown packaged drive": (
+        lambda _: Drive.preset("hoost"),
+        ParameterError,
+        "'hoost' .did you mean hoist",
     ),
     "a fit without what is free": (
         lambda tests: fit(Drive.preset("hoist"), tests),
@@ -286,8 +395,9 @@ REFUSED: Mapping[str, tuple[Callable[[Campaign], object], type[Exception], str]]
 
 @pytest.mark.parametrize(("call", "kind", "sentence"), REFUSED.values(), ids=REFUSED)
 def test_what_does_not_fit_is_refused(campaign: Campaign, call, kind, sentence: str) -> None:
-    with pytest.raises(kind, match=sentence):
+    with pytest.raises(kind, match=sentence) as caught:
         call(campaign)
+    assert isinstance(caught.value, SwashplateError)
 
 
 def test_more_than_a_fit_is_asked_for_by_keywords(

@@ -276,6 +276,9 @@ def test_a_rounded_channel_that_lags_is_not_clipped(rounding: float) -> None:
     cut = replace(cut, input=replace(cut.input, values=3.0 * np.sin(time)))
     (said,) = clipped_channels([cut])
     assert "'y' stands at exactly 1.5 1" in said
+    for upper, count in ((1.5, 0), (1.495, 0), (1.6, 1)):
+        stated = replace(cut["y"], limits=(-3.5, upper))
+        assert len(clipped_channels([replace(cut, channels={"y": stated})])) == count
 
 
 @pytest.mark.parametrize("noise", [0.0, 0.02])

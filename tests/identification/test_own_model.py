@@ -1,12 +1,16 @@
 """A model of one's own in a fit: exact derivatives, starts and loads, and all that drives have."""
 
+import pickle
+import re
+import sys
 from dataclasses import replace
-from math import exp, nan
+from math import exp, nan, sqrt
 from pathlib import Path
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 from tests.identification.given import run_of
 
 from swashplate import (
@@ -18,7 +22,8 @@ from swashplate import (
     InputError,
     ParameterError,
 )
-from swashplate.equations import Model, Tap, equation, simulate
+from swashplate.equations import Definition, Model, Tap, equation, simulate
+from swashplate.executors import Processes
 from swashplate.identification import (
     Identification,
     ModelSetup,
@@ -269,6 +274,22 @@ def servo_step(state: State, command: float, supply: float, p: Servo, h: float) 
 
 
 servo = Model("servo", parameters=Servo, state=State, step=servo_step)
+
+
+class DocumentedServo(NamedTuple):
+    gain: float
+    lag: Annotated[float, Definition("lag", "s", lower=0.0, plausible=(1e-3, 100.0))]
+
+
+@equation
+def documented_step(
+    state: State, command: float, supply: float, p: DocumentedServo, h: float
+) -> State:
+    return State(state.place + h / p.lag * (p.gain * command * supply - state.place))
+
+
+documented = Model("servo", parameters=DocumentedServo, state=State, step=documented_step)
+"""The same, whose author says which lags can be meant; of the gain nothing is said."""
 RANGES = {
     "gain": (0.1, 1.0, 10.0, "mm/V"),
     "lag": (0.05, 0.1, 3.0),
@@ -364,6 +385,44 @@ def test_a_fit_comes_back_with_its_model_alone(tmp_path: Path) -> None:
     assert again.stages[0].uncertainty.estimates == (made.stages[0].uncertainty.estimates)
 
 
+class Bend(NamedTuple):
+    bend: float
+
+
+class Speed(NamedTuple):
+    speed: float
+
+
+def bent(state: Speed, voltage: float, p: Bend) -> Speed:
+    """A speed that has a ridge over `bend` at -1, where a search from the left is caught."""
+    return Speed(voltage * (p.bend**3 - 3.0 * p.bend))
+
+
+@pytest.mark.parametrize(
+    ("speed", "tried"),
+    [
+        pytest.param(5.0, range(2, 7), id="until one explains what was measured"),
+        pytest.param(30.0, [7], id="all of them, if none does"),
+    ],
+)
+def test_other_starts_are_tried_where_residuals_are_large(speed, tried, caplog) -> None:
+    model = Model("bent", parameters=Bend, state=Speed, step=bent)
+    measured = np.full(TIME.size, speed)
+    measured[0] = 0.0
+    run = run_of("a", np.ones(TIME.size), {"speed": measured}, time=TIME, kind="other", noise=0.01)
+    free = {"bend": (-2.2, -1.8, 2.9)}
+    with caplog.at_level("INFO", "swashplate"):
+        (stage,) = fit(model, [run], free).stages
+    assert len(stage.starts) in tried
+    assert stage.solution.cost == min(stage.solution.cost, *(each.cost for each in stage.starts))
+    assert any("starts=0" in message for message in caplog.messages)
+    (alone,) = fit(model, [run], free, search=Search(0)).stages
+    assert alone.values["bend"] == pytest.approx(-1.0, abs=0.01)
+    assert not alone.starts
+    if speed == 5.0:
+        assert stage.values["bend"] == pytest.approx(2.2790, abs=1e-3)  # x³ - 3 x = 5
+
+
 def test_starts_of_other_steps_are_not_resumed(tmp_path: Path) -> None:
     search = Search(1, store=tmp_path, resume=True)
     made = fit(OwnModel(servo), RUNS, RANGES, noise=NOISE, search=search)
@@ -393,10 +452,19 @@ def lag_alone(**stated: object) -> None:
 
 
 SENSELESS = {
+    r"servo, a bound: lag .* is 500 s, .* 0.001 to 100 s: .* ms instead of s": lambda: ModelSetup(
+        documented, {"lag": (0.1, 1.0, 500.0)}
+    ),
+    r"servo: lag .* is 1e-05 s, .* 0.001 to 100 s": lambda: ModelSetup(
+        documented, {"lag": Unknown("lag", 1e-5, 0.0, 10.0)}
+    ),
+    "servo, fixed: lag .* is 500 s, .* 0.001 to 100 s": lambda: ModelSetup(
+        documented, {"gain": (0.1, 1.0, 10.0)}, fixed={"lag": 500.0}
+    ),
     "A dict is no model": lambda: fit({}, RUNS, RANGES),
     "Nothing of servo is free": lambda: fit(servo, RUNS, {}),
     "lag is free as 3: give lower bound": lambda: fit(servo, RUNS, {"lag": 3}),
-    "no parameter 'lagg'; it has gain, lag": lambda: fit(
+    "no parameter 'lagg', which free names .*it has gain, lag": lambda: fit(
         servo, RUNS, {"lagg": (0.1, 0.2, 3.0)}, fixed={"gain": 1.0, "lag": 1.0}
     ),
     "There is no run to fit": lambda: fit(servo, [], RANGES),
@@ -499,3 +567,54 @@ def test_one_run_has_no_drift() -> None:
     (drift,) = (each for each in found.criteria if each.name == "drift of position")
     assert (drift.state, drift.value) == ("met", "not seen")
     assert found.grade != "Usable"
+
+
+# --- the documented model file, against another solver --------------------------------------------
+
+PAGE = Path(__file__).parents[2] / "docs" / "how-to" / "own-model-fit.md"
+MACHINE = {"dead_zone": 0.6, "gain": 0.02, "lag": 0.15}
+
+
+def valve_test(name: str, frequency: float) -> Experiment:
+    """The page's valve and rod by SciPy, from one sample to the next, as the command is held."""
+    time = 0.02 * np.arange(400)
+    command = 4.0 * np.sin(2.0 * np.pi * frequency * time)
+    supply = 100.0 + 15.0 * np.sin(2.0 * np.pi * 0.3 * time)
+    state, rows = np.array([0.0, 0.0]), [0.0]
+    for start, level, pressure in zip(time[:-1], command, supply, strict=False):
+        slope = (np.interp(start + 0.01, time, supply) - pressure) / 0.01
+
+        def rates(t, y, start=start, level=level, pressure=pressure, slope=slope):
+            root = sqrt((pressure + slope * (t - start)) / 100.0)
+            beyond = np.sign(y[0]) * max(abs(y[0]) - MACHINE["dead_zone"], 0.0)
+            return (level - y[0]) / MACHINE["lag"], MACHINE["gain"] * beyond * root
+
+        ends = (start, start + 0.02)
+        state = solve_ivp(rates, ends, state, method="DOP853", rtol=1e-10, atol=1e-12).y[:, -1]
+        rows.append(state[1])
+    channels = {"rod": np.array(rows), "supply": supply}
+    return run_of(name, command, channels, time=time, kind="other", hold="previous")
+
+
+@pytest.fixture
+def documented_valve(tmp_path: Path, monkeypatch) -> Path:
+    """The model file of the page, importable for the length of a test."""
+    monkeypatch.setattr(sys, "path", [*sys.path])
+    path = tmp_path / "documented_valve.py"
+    (text,) = re.findall(r"```python\n(# valve\.py\n.*?)```", PAGE.read_text("utf-8"), re.DOTALL)
+    path.write_text(text, "utf-8")
+    yield path
+    sys.modules.pop(path.stem, None)
+
+
+def test_the_documented_model_file_finds_a_lag_in_several_processes(documented_valve: Path) -> None:
+    """Workers find the model, which has no name of its own, as an attribute of the `OwnModel`."""
+    setup = ModelSetup.from_file(documented_valve)
+    assert isinstance(setup.model, OwnModel)
+    assert pickle.loads(pickle.dumps(setup.model.model)) is setup.model.model
+    runs = [valve_test("slow", 0.2), valve_test("fast", 0.6)]
+    search = Search(2, executor=Processes(2))
+    made = fit(setup.model, runs, setup.free, noise={"rod": 1e-5}, search=search)
+    assert len(made.stages[0].starts) == 3
+    values = made.stages[0].values
+    assert {name: values[name] for name in MACHINE} == pytest.approx(MACHINE, rel=5e-3)

@@ -1,6 +1,7 @@
 """A fit on disk is the fit, and is refused where it no longer belongs to its campaign."""
 
 import json
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
 
@@ -15,6 +16,7 @@ from swashplate.identification.profiles import Point, Profile
 from swashplate.identification.resampling import CrossValidation, Fold
 from swashplate.identification.solving import Solution
 from swashplate.identification.validation import Measures
+from swashplate.locks import locked
 
 STARTS = (
     Solution(np.array([0.3, 0.4]), 3.0, 10, True, False, "done"),
@@ -60,6 +62,78 @@ def test_a_fit_comes_back_as_it_was(path: Path, campaign: Campaign, fitted: Fit)
         assert costs[0] == costs[1]
         for name, value in vars(theirs.solution).items():
             assert np.array_equal(getattr(ours.solution, name), value), name
+
+
+COMPUTED = ("fitting.stage_uncertainty", "assessment.verdict")
+
+
+def test_what_is_stored_is_not_computed_again(path, campaign, fitted, monkeypatch) -> None:
+    before = Identification(campaign, fitted)
+    drive, verdict = before.drive, before.verdict
+
+    def refuse(*_: object, **__: object) -> None:
+        pytest.fail("computed")
+
+    for name in COMPUTED:
+        monkeypatch.setattr(f"swashplate.identification.{name}", refuse)
+    # a value needs no interval, neither of a fit nor of its folder
+    bare = replace(fitted, stages=tuple(replace(stage) for stage in fitted.stages))
+    assert bare["Z10"].value == before["Z10"].value
+    stored = Identification.load(path, campaign)
+    for name in before:
+        assert stored[name] == before[name]
+    assert stored["Z10"].standard_error
+    assert stored.drive == drive
+    assert stored.verdict == verdict
+    stored.save(path.parent / "again")
+    again = (path.parent / "again" / "fit.json").read_text("utf-8")
+    assert again == path.read_text("utf-8")
+
+
+def test_what_is_not_stored_is_computed_when_it_is_asked_for(path, campaign, fitted) -> None:
+    before = Identification(campaign, fitted)
+    content = json.loads(path.read_text("utf-8"))
+    for stage in content["stages"]:
+        del stage["intervals"]
+    content["verdict"] = {key: content["verdict"][key] for key in ("grade", "headline", "numbers")}
+    path.write_text(json.dumps(content), "utf-8")
+    older = Identification.load(path, campaign)
+    assert older["Z10"] == before["Z10"]
+    assert older.verdict == before.verdict
+
+
+def test_a_verdict_is_of_its_requirement_and_its_held_out_runs(short_campaign, tmp_path) -> None:
+    *fitted_to, held_out = short_campaign.experiments
+    held_out = replace(held_out, role="validate")
+    tests = replace(short_campaign, experiments=(*fitted_to, held_out))
+    found = fit(Drive.preset("hoist"), tests, TWO_STAGES)
+    strict = Identification(tests, found, required=1e-6)
+    strict.save(tmp_path)
+    stored = Identification.load(tmp_path, tests)
+    assert stored.required == 1e-6
+    assert stored.verdict == strict.verdict
+    states = [
+        criterion.state
+        for result in (stored, replace(stored, required=0.1))
+        for criterion in result.verdict.criteria
+        if criterion.name.startswith("error / range")
+    ]
+    assert states == ["not met", "met"]
+    alone = Identification.load(tmp_path, replace(tests, experiments=tuple(fitted_to)))
+    assert not alone.predicted
+    names = [criterion.name for criterion in alone.verdict.criteria]
+    assert "RMSE / standard deviation, fitted" in names
+    assert "RMSE / standard deviation, held-out" not in names
+
+
+def test_two_do_not_save_into_one_folder_at_once(campaign, fitted, tmp_path) -> None:
+    result = Identification(campaign, fitted)
+    with locked(tmp_path / "fitted"), ThreadPoolExecutor(1) as threads:
+        other = threads.submit(result.save, tmp_path / "fitted")
+        with pytest.raises(OSError, match="fitted is in use.*name another folder"):
+            other.result()
+        result.save(tmp_path / "fitted")  # who has the lock can
+    assert Identification.load(tmp_path / "fitted", campaign)["Z10"] == result["Z10"]
 
 
 def test_profiles_folds_and_notes_come_back(tmp_path, campaign, fitted) -> None:
@@ -113,11 +187,12 @@ def test_another_campaign_is_refused(path: Path, campaign: Campaign) -> None:
 
 POISON = {
     "cut": (lambda text: text[:-100], "is not JSON"),
-    "another key": (put('"axis"', '"ax"'), "an entry 'axis'"),
-    "other parameters": (put('"Z10"', '"Z9"', 1), "stage pump has other parameters .* fit again"),
+    "another key": (put('"axis"', '"ax"'), "'ax'.*'axis' is meant"),
+    "other parameters": (put('"Z10"', '"Z3"', 1), "stage pump has other parameters .* fit again"),
     "other version": (put('"swashplate": "[^"]*"', '"swashplate": "9.9"'), "9.9"),
     "text for a vector": (put(r'"vector": \[[^]]+\]', '"vector": "abc"'), "finite numbers"),
     "wrong length": (put(r'"vector": \[[^]]+\]', '"vector": [1.0]', 1), "stage card has other"),
+    "too few intervals": (put(r'("intervals": \[)[^]]+\],', r"\1", 1), "stage card has other"),
     "a number for the drive": (put('"nominal": ', '"nominal": 3, "was": '), "nominal"),
 }
 

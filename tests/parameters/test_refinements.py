@@ -88,7 +88,7 @@ def test_values_that_change_take_their_own_option_along(hoist: Drive) -> None:
     both = hoist.replace(cam_ripple=0.02, cam_ripple_per_torque=1e-6, load_torque=1e4)
     assert both.replace(cam_ripple=0.0).parameters.options == {"ripple"}
     assert both.replace(cam_ripple=0.0, cam_ripple_per_torque=0.0).parameters.options == set()
-    fixed = both.parameters.replace({"Z12": 0.1, "cam_ripple": 0.0}, both.parameters.options)
+    fixed = both.parameters.with_numbers({"Z12": 0.1, "cam_ripple": 0.0}, both.parameters.options)
     assert fixed.options == {"ripple"}
 
 

@@ -3,13 +3,17 @@
 import subprocess
 import sys
 import warnings
+from dataclasses import replace
 from pathlib import Path
+from typing import Annotated, NamedTuple
 from xml.etree import ElementTree
 
 import numpy as np
+import polars as pl
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from swashplate import Drive, FileError, FullOrderDrive, InputError, Limit, Simulation, maneuvers
@@ -25,6 +29,7 @@ from swashplate.analysis import (
     trial,
     what_if,
 )
+from swashplate.equations import Definition, Model, Run, discretised, equation, simulate
 from swashplate.full_order import compare
 from swashplate.report import figures
 from swashplate.report.figures import plot_simulation, save_figure
@@ -329,3 +334,145 @@ def test_lines_of_a_sweep_are_the_response(made: dict[str, Figure], hoist: Drive
     by_current = hoist.linearize(current=0.5)
     with pytest.raises(InputError, match="leads from voltage to shaft_speed"):
         figures.plot_bode(swept, linear=by_current)
+
+
+# --- a user-defined model -------------------------------------------------------------------------
+
+
+class Masses(NamedTuple):
+    stiffness: float = 40.0
+
+
+class Motion(NamedTuple):
+    position: Annotated[float, Definition("position of the first mass", "m", lower=-5.0)]
+    speed: Annotated[float, Definition("speed", "m/s", lower=-2.0, upper=2.0)]
+    current: float  # not the current of a drive, whose unit it must not get
+    speed_2: float
+
+
+class Signals(NamedTuple):
+    pressure: Annotated[float, Definition("chamber pressure", "Pa", lower=0.0, upper=21e6)]
+    temperature: Annotated[float, Definition("oil temperature", "K")]
+    spring: float
+
+
+class Acting(NamedTuple):
+    relief: bool
+    cavitation: bool
+
+
+Force = Annotated[float, Definition("force", "N", upper=1e4)]
+
+
+@equation
+def spring(state: Motion, p: Masses) -> float:
+    return p.stiffness * (state.position - state.current)
+
+
+@equation
+def chamber(state: Motion, p: Masses) -> Signals:
+    force = spring(state, p)
+    return Signals(5e6 + 4e6 * force, 320.0 + state.position, force)
+
+
+@equation
+def masses(state: Motion, force: Force, p: Masses) -> Motion:
+    pull = spring(state, p)
+    return Motion(state.speed, force - pull - state.speed, state.speed_2, pull - state.speed_2)
+
+
+@equation
+def acting(signals: Signals) -> Acting:
+    return Acting(signals.pressure > 12e6, signals.pressure < 0.0)
+
+
+SHAKER = Model(
+    "shaker", Masses, Motion, discretised(masses, "midpoint"), sample=chamber, limits=acting
+)
+
+
+def shaken(**changes: object) -> Run:
+    command = maneuvers.sine(5.0, 0.4)
+    return simulate(replace(SHAKER, **changes), Masses(), {"force": command}, 100.0)
+
+
+def levels(ax: Axes) -> list[float]:
+    """Where a panel marks limits."""
+    return [float(line.get_ydata()[0]) for line in ax.lines if line.get_linestyle() == "--"]
+
+
+def test_a_user_defined_model_is_shown_with_what_it_declares(assert_legible) -> None:
+    run = shaken()
+    figure = run.plot()
+    assert_legible(figure)
+    assert figure.get_suptitle() == "shaker: sine 5 V 0.4 Hz"
+    # outputs on the left, states on the right; what declares nothing has its name
+    left, right = figure.axes[::2], figure.axes[1::2]
+    assert left[0].get_position().x1 < right[0].get_position().x0
+    assert labels(figure)[::2] == [
+        "force (N)",
+        "chamber pressure (bar)",
+        "oil temperature (K)",
+        "spring",
+    ]
+    assert labels(figure)[1::2] == [
+        "position of the first mass (mm)",
+        "speed (mm/s)",
+        "current",
+        "speed 2",
+    ]
+    assert [ax.get_xlabel() for ax in left] == ["", "", "", "time (s)"]
+    assert [ax.get_xlabel() for ax in right] == ["", "", "", "time (s)"]
+    np.testing.assert_allclose(lines(figure, 2)[0], 1e-5 * run["pressure"])
+    # limits that signals come near to, and stretches in which one acts
+    assert levels(left[0]) == []
+    assert levels(left[1]) == pytest.approx([0.0, 210.0])
+    assert levels(right[1]) == pytest.approx([-2000.0, 2000.0])
+    shown = {text.get_text() for text in left[0].get_legend().get_texts()}
+    assert (
+        shown
+        == {name for name in run.limit_names if run.active(name).any()}
+        == {
+            "relief",
+            "cavitation",
+        }
+    )
+    # far from zero, an ordinate does not begin there
+    assert left[2].get_ylim()[0] > 300.0
+
+
+def test_few_signals_of_a_user_defined_model_stand_in_one_column(assert_legible) -> None:
+    run = shaken(outputs=("pressure", "position"))
+    figure = run.plot(window=(2.0, 6.0), title="Shaker test")
+    assert_legible(figure)
+    assert figure.get_suptitle() == "Shaker test"
+    assert [label.split(" (")[0] for label in labels(figure)] == [
+        "force",
+        "chamber pressure",
+        "position of the first mass",
+    ]
+    assert figure.axes[-1].get_xlim() == (2.0, 6.0)
+    ax = Figure().subplots()
+    assert run.plot("pressure", ax=ax, title="here") is ax
+    assert (ax.get_ylabel(), ax.get_xlabel()) == ("chamber pressure (bar)", "time (s)")
+    # a column of a table has a name, too, but is no maneuver
+    column = pl.Series("force", run["force"])
+    again = simulate(SHAKER, Masses(), {"force": column}, 100.0)
+    assert again.title == "shaker"
+    np.testing.assert_array_equal(again["pressure"], run["pressure"])
+
+
+def test_a_model_whose_types_only_a_function_knows_is_shown_by_its_names() -> None:
+    class Gain(NamedTuple):
+        gain: float
+
+    class Level(NamedTuple):
+        level: float
+
+    @equation
+    def filled(state: "Level", inflow: "float", p: "Gain", h: float) -> "Level":
+        return Level(state.level + h * p.gain * inflow)
+
+    tank = Model("tank", Gain, Level, filled)
+    figure = simulate(tank, Gain(2.0), {"inflow": np.ones(9)}, 10.0).plot()
+    assert labels(figure) == ["inflow", "level"]

@@ -1,20 +1,21 @@
 """The owner's numbers: intervals where the tests tell, one end or none where they do not."""
 
 import tomllib
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from math import inf
 from pathlib import Path
+from types import MappingProxyType
 
 import numpy as np
 import pytest
 from tests.identification.given import run_of
 
 from swashplate import Drive, Experiment, maneuvers
-from swashplate.analysis import envelope
+from swashplate.analysis import envelope, standard_errors, variances_from_bounds
 from swashplate.campaign import fit_configuration, guess_drive, guess_table, guessed_set
 from swashplate.identification.criteria import verdict
 from swashplate.identification.fitting import Fit, fit
-from swashplate.identification.setup import Setup
+from swashplate.identification.setup import Free, Setup
 from swashplate.identification.validation import predict
 from swashplate.report.fit_report.summary import largest_commands, numbers_of, numbers_table
 from swashplate.tables import Cell
@@ -46,16 +47,22 @@ def measured(drive: Drive) -> list[Experiment]:
     return runs
 
 
-def fitted(runs: Sequence[Experiment], without: Sequence[str] = ()) -> Fit:
-    """The fit of a guess, by its configuration without some parameters."""
+def fitted(
+    runs: Sequence[Experiment],
+    without: Sequence[str] = (),
+    bounds: Mapping[str, tuple[float, float]] = MappingProxyType({}),
+) -> Fit:
+    """The fit of a guess, by its configuration without some parameters or with other bounds."""
     guess = guess_drive(runs)
     start = guessed_set(guess, "campaign.toml")
     setup = Setup(**tomllib.loads(fit_configuration(guess, start)))
     (stage,) = setup.stages
     free = {name: entry for name, entry in stage.free.items() if name not in without}
+    free |= {name: Free(bounds=pair) for name, pair in bounds.items()}
     setup = setup.model_copy(update={"stages": (stage.model_copy(update={"free": free}),)})
     if without:
         start = start.replace(dict.fromkeys(without, inf))
+    start = start.replace({name: sum(pair) / 2.0 for name, pair in bounds.items()})
     return fit(start, runs, setup, threads=1)
 
 
@@ -116,7 +123,33 @@ def test_an_orifice_that_the_fit_does_not_look_for_leaves_no_interval(
     assert "Z16_minus fixed" in shown[ROWS["acceleration"]][1]
     for name in ("delay", "lag"):
         assert not any("±" in text for text in shown[ROWS[name]])
-    assert "±" in shown[ROWS["dead zone"]][1]
+    # the gain bends as far as it may to make up for it, and the dead zone there is 1.0 V, not 0.6
+    assert "bound" in shown[ROWS["dead zone"]][1]
+    assert "±" in shown[ROWS["dead zone"]][0]
+
+
+@pytest.mark.parametrize("bounds", [(0.0, 0.4), (0.75, 2.0)])
+def test_an_estimate_at_its_bound_gives_no_interval(
+    runs: list[Experiment], bounds: tuple[float, float]
+) -> None:
+    """A dead zone of 0.6 V that the search was not allowed, and what it decides."""
+    result = fitted(runs, bounds={"V_dz_minus": bounds})
+    (stage,) = result.stages
+    assert "V_dz_minus" in stage.identifiability.at_bounds
+    shown = cells(result)
+    assert "±" not in shown[ROWS["dead zone"]][1]
+    assert "V_dz_minus" in shown[ROWS["dead zone"]][1]
+    assert "bound" in shown[ROWS["dead zone"]][1]
+    # what it does not decide has its interval
+    assert "±" in shown[ROWS["dead zone"]][0]
+    assert "±" in shown[ROWS["acceleration"]][0]
+    # by how much the others follow it is the covariance's: all of its own variance
+    variances = variances_from_bounds(result.stages, lambda one: numbers_of(one, (8.0, 7.0)))
+    whole = standard_errors(result.stages, lambda one: numbers_of(one, (8.0, 7.0))) ** 2
+    share = variances["V_dz_minus"] / np.where(whole > 0.0, whole, inf)
+    assert share[ROWS["dead zone"], 1] == pytest.approx(1.0, rel=0.02)
+    assert share[ROWS["dead zone"], 0] < 0.1
+    assert (share < 1.02).all()
 
 
 def test_a_way_that_no_run_goes_has_no_interval(runs: list[Experiment]) -> None:

@@ -25,6 +25,7 @@ from .monte_carlo import changes_left_open as changes_left_open
 from .monte_carlo import drives as drives
 from .monte_carlo import standard_errors as standard_errors
 from .monte_carlo import stored_draws as stored_draws
+from .monte_carlo import variances_from_bounds as variances_from_bounds
 from .outcomes import OUTCOMES as OUTCOMES
 from .outcomes import Outcome as Outcome
 from .outcomes import Trial as Trial

@@ -89,7 +89,8 @@ def without_limits(drive: Drive, columns: Iterable[str]) -> Drive:
     """A drive whose limits of these columns lie as far as its model can take."""
     numbers = drive.parameters.numbers
     far = {column: farthest_stop(drive) if column.startswith("Z13") else inf for column in columns}
-    return drive.replace(**{column: max(value, numbers[column]) for column, value in far.items()})
+    limits = {column: max(value, numbers[column]) for column, value in far.items()}
+    return Drive(drive.parameters.with_numbers(limits))
 
 
 # --- acceleration ---------------------------------------------------------------------------------
@@ -326,7 +327,8 @@ def envelope(drive: Drive) -> Envelope:
     unreached = drive.parameters.unreached
     if not unreached:
         return found
-    nearest = drive.replace(**{column: value for column, value in unreached.items() if value})
+    reached = {column: value for column, value in unreached.items() if value}
+    nearest = Drive(drive.parameters.with_numbers(reached))
     farthest = without_limits(drive, unreached)
     return replace(
         found,

@@ -237,7 +237,7 @@ def shares_of(drive: Drive, run: Simulation, wanted: ArrayLike | None = None) ->
         left = {each.signal for each in limits}
         records = {name: each for name, each in run.records.items() if name not in left}
         try:
-            other = drive.replace(**changes).parameters
+            other = drive.parameters.with_numbers(changes)
             return simulate_drive(other, records, run.start).shaft_speed
         except SwashplateError as refusal:
             return str(refusal)
@@ -246,7 +246,7 @@ def shares_of(drive: Drive, run: Simulation, wanted: ArrayLike | None = None) ->
     removed, unlimited = list[Removal](), drive
     for each in present:  # as many at once as the model's domain allows
         try:
-            unlimited = unlimited.replace(**each.changes)
+            unlimited = Drive(unlimited.parameters.with_numbers(each.changes))
         except ParameterError:
             continue
         removed.append(each)

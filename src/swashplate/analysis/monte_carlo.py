@@ -211,6 +211,34 @@ def standard_errors(
     return np.asarray(np.sqrt(variance))
 
 
+def variances_from_bounds(
+    stages: Sequence[StageFit], numbers: Callable[[Drive], Array], but: Collection[str] = ()
+) -> dict[str, Array]:
+    """Variances of numbers that go with each estimate at a bound, by its name.
+
+    Of the machine's unknowns, `but` some. Arguments and errors are those of `standard_errors`,
+    whose variances these are parts of; two estimates that go together share theirs.
+
+    Notes
+    -----
+    To first order: the square of what the numbers change by for one standard error of the estimate,
+    if it were free to move and all others followed it. An estimate at its bound is not where the
+    data would have it: by how much it is off is not known, and that it is off to either side alike
+    is wrong.
+    """
+    base, none = numbers(stages[-1].drive), np.zeros(len(stages[0].problem.uncertain))
+    variances = {}
+    for stage in stages:
+        own, names = stage.uncertainty.own, stage.problem.unknowns.names
+        for name in set(stage.identifiability.at_bounds).difference(but):
+            index = names.index(name)
+            deviation = sqrt(max(float(own.matrix[index, index]), 0.0))
+            if stage.problem.unknowns[index].run is None and deviation > NEGLIGIBLE:
+                errors = {stage.stage.name: own.matrix[index] / deviation}
+                variances[name] = _slope(stages, errors, none, numbers, base) ** 2
+    return variances
+
+
 def changes_left_open(
     stages: Sequence[StageFit], numbers: Callable[[Drive], Array], but: Collection[str] = ()
 ) -> Array:
@@ -293,7 +321,7 @@ def _moved(
     errors = dict[str, Array]()  # of each stage, by its name
     try:
         if fixed:
-            parameters = parameters.replace(fixed, parameters.options)
+            parameters = parameters.with_numbers(fixed, parameters.options)
         for stage in stages:
             problem, known = stage.problem, stage.uncertainty
             assert isinstance(problem.model, DriveModel)

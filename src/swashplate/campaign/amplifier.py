@@ -256,7 +256,8 @@ def _followed(
 ) -> tuple[str, dict[str, Pair], float, float]:
     """Card and dynamics, with the delay [s] of the least error and that error's RMS [A]."""
     # whatever the current, the solenoids do not overpower the feedback spring
-    drive = Drive.preset("neutral").at_every_rate().replace(Z19=1e-3, **static, **dynamics)
+    neutral = Drive.preset("neutral").at_every_rate().parameters
+    drive = Drive(neutral.with_numbers({"Z19": 1e-3, **static, **dynamics}))
     squares, size = np.zeros(DELAYS.size), 0
     try:
         for each in measured:

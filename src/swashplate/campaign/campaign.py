@@ -171,7 +171,10 @@ class Campaign(Result):
             raise InputError(f'{self.path}: [axes.{axis}] names no drive; add drive = "hoist".')
         if name.lower().endswith(".toml"):
             return Drive.from_toml(self.path.parent / name)
-        return Drive.preset(name)
+        try:
+            return Drive.preset(name)
+        except ParameterError as error:
+            raise ParameterError(f"{self.path}, [axes.{axis}]: {error}") from None
 
 
 def json_schema() -> str:

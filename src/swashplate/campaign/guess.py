@@ -1,9 +1,10 @@
 """First guesses of an unknown machine's numbers, read off its logs.
 
 What a drive does between command and speed is, at first sight, a dead zone, a jump at its edge, a
-gain, a top speed and a greatest acceleration each way, one delay and one lag. `guess_drive` finds
-these by least squares on mean speeds and puts them into the drive "neutral"; `fit_configuration`
-frees them, with bounds about them. Both are where a fit begins, not its result.
+gain, a top speed and a greatest acceleration each way, one delay and one lag, and the creep at
+rest. `guess_drive` finds these by least squares on mean speeds, the creep from what moves while the
+command rests; `guessed_set` puts them into the drive "neutral"; `fit_configuration` frees them,
+with bounds about them. All of it is where a fit begins, not its result.
 """
 
 from __future__ import annotations
@@ -11,7 +12,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from itertools import product
-from math import inf, isfinite, log, sqrt
+from math import asin, inf, isfinite, log, sqrt, tan
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -25,7 +26,7 @@ from swashplate.campaign.schema import ChannelKind
 from swashplate.drive import Drive
 from swashplate.equations.cache import kernel
 from swashplate.equations.declaration import inlined
-from swashplate.errors import InputError
+from swashplate.errors import InputError, ParameterError
 from swashplate.parameters.parameter_set import ParameterSet, set_of
 from swashplate.parameters.rules import SIDES
 from swashplate.results import short
@@ -60,6 +61,16 @@ ROUGH = 0.05
 """Error over the greatest speed from which the squares of errors grow as their sizes. [1]"""
 OFFSET = 0.1
 """Largest neutral offset of the spool, over its travel at the greatest speed that was seen. [1]"""
+REST, RESTS = 0.5, 4
+"""Length of the intervals in which a creep is looked for [s], and the fewest of them that tell."""
+STILL = 0.01
+"""Command that counts as none, over the largest one, whatever the dead zone. [1]"""
+LAGS_TO_REST = 5.0
+"""Lags after which a motion has come to rest: it has 0.7 % of its speed then. [1]"""
+FALSE_ALARM = 1e-3
+"""Probability at which noise that is normal passes for a creep. [1]"""
+CREEPS = 0.002
+"""Creep over the greatest speed that is none: zero errors of tachometers are as large. [1]"""
 ANGLE = 0.2
 """Angle of the swash plate at the greatest speed that was seen, at most. [rad]"""
 STOP_FIRST, ORIFICE_FIRST = 0.9, 0.8
@@ -109,6 +120,9 @@ class Guess(NamedTuple):
     """[s]"""
     delay: float
     """[s]"""
+    creep: float | None
+    """Speed at rest, with its sign; 0 where the logs show none, None where their rests are too
+    short or too few to show one. [unit]"""
     command: tuple[float, float]
     """Largest command; 0 for a way that was not tried, whose numbers are the other's. [V]"""
     speed: float
@@ -122,13 +136,13 @@ class Guess(NamedTuple):
 @inlined
 def _speed_at(command: float, numbers: Array, edge: float) -> float:
     """Speed that a drive without lag, delay and limits of acceleration has at a command."""
-    speed = 0.0
+    speed: float = numbers[11]
     for way in range(2):
         sign = 1.0 - 2.0 * way
         beyond = max(sign * command - numbers[way], 0.0)
-        faster = numbers[2 + way] * beyond + numbers[8 + way] * min(beyond / edge, 1.0)
-        speed += sign * min(faster, numbers[4 + way])
-    return speed
+        speed += sign * (numbers[2 + way] * beyond + numbers[8 + way] * min(beyond / edge, 1.0))
+    limited: float = min(max(speed, -numbers[5]), numbers[4])
+    return limited
 
 
 @kernel
@@ -138,9 +152,9 @@ def march_guess(
 ) -> None:  # fmt: skip
     """March the position of a drive without delay, in steps from the command's first stamp.
 
-    `numbers` (11,) are dead zones, gains, top speeds, accelerations and jumps of plus and minus,
-    and the lag [s]. A `held` command's steps may lie between its stamps (k,), a straight line's are
-    among them. `position` (n,) is the output; its first sample gives the speed at first.
+    `numbers` (12,) are dead zones, gains, top speeds, accelerations and jumps of plus and minus,
+    the lag [s] and the creep. A `held` command's steps may lie between its stamps (k,), a straight
+    line's are among them. `position` (n,) is the output; its first sample gives the speed at first.
     """
     share, speed, last = 1.0 - np.exp(-h / max(numbers[10], 1e-4)), position[0], stamps.size - 1
     here, now, k = _speed_at(command[0], numbers, edge), stamps[0], 0
@@ -205,25 +219,83 @@ class _Run(NamedTuple):
     start: float
     windows: _Windows
     speeds: Array
+    sampled: Array
+    """Instants (j,) of the measured samples. [s]"""
+    travelled: Array
+    """Measured way (j,) since the first of them, of a speed its integral."""
+    resolution: float
+    """Of the way, 0 if it is fine."""
+
+
+def _simulated(run: _Run, numbers: Array) -> tuple[Array, Array]:
+    """Instants [s] and positions of a run; numbers (13,) are those of `march_guess`, and the delay.
+
+    What comes out is delayed, so that the march meets its steps alike whatever the delay: else
+    errors had a minimum at every whole step.
+    """
+    edge = EDGE * float(np.abs(run.command).max()) or 1.0
+    position = np.full(run.time.size, run.start)
+    march_guess(run.stamps, run.command, run.held, edge, numbers[:12], STEP, position)
+    time = numbers[12] + np.append(run.time[0] - BEFORE, run.time)
+    return time, np.append(-BEFORE * run.start, position)
 
 
 def _errors(runs: Sequence[_Run], numbers: Array) -> Array:
-    """Simulated less measured mean speeds of all runs, weighted by their windows' lengths.
-
-    Numbers (12,) are those of `march_guess`, and the delay [s].
-    """
+    """Simulated less measured mean speeds of all runs, weighted by their windows' lengths."""
     errors = list[Array]()
     for run in runs:
-        edge = EDGE * float(np.abs(run.command).max()) or 1.0
-        position = np.full(run.time.size, run.start)
-        march_guess(run.stamps, run.command, run.held, edge, numbers[:11], STEP, position)
-        # what comes out is delayed, so that the march meets its steps alike whatever the delay:
-        # else errors had a minimum at every whole step
-        time = numbers[11] + np.append(run.time[0] - BEFORE, run.time)
-        position = np.append(-BEFORE * run.start, position)
-        simulated = run.windows.mean_speeds(time, position)
+        simulated = run.windows.mean_speeds(*_simulated(run, numbers))
         errors.append(run.windows.weights * (simulated - run.speeds))
     return np.concatenate(errors)
+
+
+def _creep(runs: Sequence[_Run], numbers: Array, scale: float) -> float | None:
+    """Mean speed at rest beyond that of `numbers` (13,); 0 if it may be none, None without rests.
+
+    From intervals in which the command has lain in the dead zone for so long that a motion has come
+    to rest. Each is taken as one observation: the scatter of them has the noise, and what is left
+    of motions that end more slowly than the numbers say. The counts of an encoder may hide one at
+    both ends of a rest, or show one too many.
+    """
+    from scipy.special import stdtrit
+
+    dead_zones, accelerations, lag, delay = numbers[:2], numbers[6:8], numbers[10], numbers[12]
+    largest = max(float(np.abs(run.command).max()) for run in runs)
+    # a creep takes from the dead zone of one way what it gives to the other
+    still = max(0.5 * float(dead_zones.min()), STILL * largest)
+    settling = delay + LAGS_TO_REST * lag + scale / accelerations.min()
+    speeds, rounding = list[Array](), 0.0
+    for run in runs:
+        time, position = _simulated(run, numbers)
+        for begin, end in _rests(run, still, settling):
+            ends = begin + REST * np.arange(int((end - begin) / REST) + 1)
+            measured = np.interp(ends, run.sampled, run.travelled)
+            speeds.append(np.diff(measured - np.interp(ends, time, position)) / REST)
+            rounding += run.resolution
+    observed = np.concatenate([np.zeros(0), *speeds])
+    if observed.size < RESTS:
+        return None
+    mean = float(observed.mean())
+    error = float(observed.std(ddof=1)) / sqrt(observed.size)
+    quantile = float(stdtrit(observed.size - 1, 1.0 - 0.5 * FALSE_ALARM))
+    doubt = max(quantile * error + rounding / (REST * observed.size), CREEPS * scale)
+    return mean if abs(mean) > doubt else 0.0
+
+
+def _rests(run: _Run, still: float, settling: float) -> Iterable[tuple[float, float]]:
+    """Begin and end [s] of stretches at rest that were measured without a gap, settled ones."""
+    resting = np.abs(run.command) <= still
+    # a command that is held stays up to the next stamp
+    until = np.append(run.stamps[1:], run.stamps[-1]) if run.held else run.stamps
+    changes = np.flatnonzero(np.diff(np.concatenate([[0], resting.astype(np.int8), [0]])))
+    gaps = np.flatnonzero(np.diff(run.sampled) > 3.0 * float(np.median(np.diff(run.sampled))))
+    pieces = np.split(run.sampled, gaps + 1)
+    for first, last in changes.reshape(-1, 2):
+        for piece in pieces:
+            begin = max(float(run.stamps[first]) + settling, float(piece[0]))
+            end = min(float(until[last - 1]), float(piece[-1]))
+            if end - begin >= REST:
+                yield begin, end
 
 
 def guess_drive(tests: Campaign | Sequence[Experiment]) -> Guess:
@@ -290,7 +362,11 @@ def guess_drive(tests: Campaign | Sequence[Experiment]) -> Guess:
     scale = float(np.quantile(np.abs(speeds), 0.99))
     if not size.max() > 0.0 or scale == 0.0:
         raise InputError("The command or the speed never leaves rest: there is nothing to guess.")
-    found = _searched(runs, weights * speeds, size, scale)
+    found = _searched(runs, weights * speeds, size, scale, 0.0)
+    creep = _creep(runs, found, scale)
+    if creep:
+        # without it one dead zone was too wide, the other too narrow, and the gains made up for it
+        found = _searched(runs, weights * speeds, size, scale, creep)
     mean = np.average(speeds, weights=weights**2)
     unexplained = np.sum(_errors(runs, found) ** 2) / np.sum(weights**2 * (speeds - mean) ** 2)
     # numbers of a way that was not tried are the other's
@@ -301,7 +377,8 @@ def guess_drive(tests: Campaign | Sequence[Experiment]) -> Guess:
     return Guess(
         *(experiments[0].axis, unit, dead_zone, gain, jump, top_speed, acceleration),
         lag=float(found[10]),
-        delay=round(float(found[11]), 6),
+        delay=round(float(found[12]), 6),
+        creep=creep,
         command=command,
         speed=scale,
         fit_percent=100.0 * (1.0 - sqrt(unexplained)),
@@ -317,15 +394,16 @@ def _run(experiment: Experiment, channel: Channel) -> _Run:
     count = channel.resolution or 0.0
     rows = round(width / interval)
     fastest = np.abs(values[rows:] - values[:-rows]).max(initial=0.0)
+    travelled = values - values[0]
+    if not channel.is_position:
+        steps = 0.5 * (values[1:] + values[:-1]) * np.diff(time)
+        travelled = np.concatenate([[0.0], np.cumsum(steps)])
+    course = time, travelled
     if count and fastest < FEW * count:
         # a slow staircase shows a count in a window or none, whatever the speed between
-        time, travelled = _edges(time, values, count)
-        windows = _windows_between(time, width)
+        course = _edges(time, values, count)
+        windows = _windows_between(course[0], width)
     else:
-        travelled = values - values[0]
-        if not channel.is_position:
-            steps = 0.5 * (values[1:] + values[:-1]) * np.diff(time)
-            travelled = np.concatenate([[0.0], np.cumsum(steps)])
         if channel.kind == "position":
             width = max(width, _quiet_width(time, values, interval))
         begins = np.arange(time[0], time[-1] - 2.0 * width, width)
@@ -338,13 +416,25 @@ def _run(experiment: Experiment, channel: Channel) -> _Run:
     for gap in np.flatnonzero(np.diff(stamps) > 3.0 * interval):
         inside &= (span[0] >= stamps[gap + 1]) | (span[1] <= stamps[gap])
     windows = windows.of(inside)
-    speeds = windows.mean_speeds(time, travelled)
+    speeds = windows.mean_speeds(*course)
     grid = drive.time[0] + STEP * np.arange(np.ceil((drive.time[-1] - drive.time[0]) / STEP) + 1.0)
     held = drive.interpolation == "previous"
     # a straight line may cross a dead zone between two stamps
     stamps = np.append(drive.time, grid[-1]) if held else np.union1d(drive.time, grid)
     start = 0.0 if experiment.start == "rest" or not speeds.size else float(speeds[0])
-    return _Run(grid, stamps, drive.at(stamps), held, start, windows, speeds)
+    command = drive.at(stamps)
+    return _Run(
+        time=grid,
+        stamps=stamps,
+        command=command,
+        held=held,
+        start=start,
+        windows=windows,
+        speeds=speeds,
+        sampled=time,
+        travelled=travelled,
+        resolution=count,
+    )
 
 
 def _edges(time: Array, angle: Array, count: float) -> tuple[Array, Array]:
@@ -388,10 +478,13 @@ def _quiet_width(time: Array, position: Array, interval: float) -> float:
     return (noise * sqrt(2.0 * interval) / (QUIET * fastest)) ** (2.0 / 3.0) if fastest else 0.0
 
 
-def _searched(runs: Sequence[_Run], weighted: Array, size: Array, scale: float) -> Array:
-    """Numbers (12,) of least squares: a grid first, on which gains are linear, then all at once.
+def _searched(
+    runs: Sequence[_Run], weighted: Array, size: Array, scale: float, creep: float
+) -> Array:
+    """Numbers (13,) of least squares: a grid first, on which gains are linear, then all at once.
 
-    From the weighted mean speeds (m,), the largest command each way (2,) and the greatest speed.
+    From the weighted mean speeds (m,), the largest command each way (2,), the greatest speed and
+    the creep, which stays.
     What the logs do not show is taken out in the end, and the rest goes to its optimum: with the
     former in, the squares are so flat that a search ends anywhere along a valley.
     """
@@ -403,7 +496,7 @@ def _searched(runs: Sequence[_Run], weighted: Array, size: Array, scale: float) 
         """From what is searched for (12,)."""
         limits = np.exp(vector[6:10]) * scale
         limits[vector[6:10] >= NONE] = inf
-        gain, last = np.exp(vector[2:4]) * steepness, [np.exp(vector[4]), vector[5]]
+        gain, last = np.exp(vector[2:4]) * steepness, [np.exp(vector[4]), creep, vector[5]]
         return np.concatenate([vector[:2] * size, gain, limits, vector[10:12] * scale, last])
 
     def errors_of(vector: Array) -> Array:
@@ -447,12 +540,13 @@ def _searched(runs: Sequence[_Run], weighted: Array, size: Array, scale: float) 
 
     candidates: list[tuple[float, Array, Array]] = []
     for lag, delay, share in product(LAGS, DELAYS, DEAD_ZONES):
-        numbers = np.array([*(share * size), 0.0, 0.0, *[inf] * 4, 0.0, 0.0, lag, delay])
-        at_rest, unit = _errors(runs, numbers), np.eye(12)
+        numbers = np.array([*(share * size), 0.0, 0.0, *[inf] * 4, 0.0, 0.0, lag, creep, delay])
+        at_rest, unit = _errors(runs, numbers), np.eye(13)
         ways = [_errors(runs, numbers + unit[2 + way]) for way in np.flatnonzero(tried)]
         gain, left = np.zeros(2), np.transpose([way - at_rest for way in ways])
-        gain[tried] = np.linalg.lstsq(left, weighted, rcond=None)[0]
-        cost = float(np.sum((left @ gain[tried] - weighted) ** 2))
+        beyond_creep = weighted if creep == 0.0 else -at_rest
+        gain[tried] = np.linalg.lstsq(left, beyond_creep, rcond=None)[0]
+        cost = float(np.sum((left @ gain[tried] - beyond_creep) ** 2))
         steep = np.log(np.maximum(gain, 1e-3 * steepness) / steepness)
         dead = np.where(tried, share, 0.1)
         vector = np.array([*dead, *steep, log(lag), delay, *[NONE] * 4, 0.0, 0.0])
@@ -508,7 +602,8 @@ def guessed_set(guess: Guess, source: str) -> ParameterSet:
     The greatest speed that was seen is given a swash angle of 0.2 rad at most, which sets Z10; no
     measurement of a speed could tell it. With sin φ = Z5 Z19 I/√Z4 and tan α = sin φ/Z3 the gain is
     Z10 Z5 Z19 G1/(√Z4 Z3), and the jump likewise one of J; the lag is 1/(Z1 Z3 Z5 Z8 √(Z9/2)); the
-    acceleration beyond which the orifice opens no further is Z10 Z1 Z8 √(Z9/2) Z16.
+    acceleration beyond which the orifice opens no further is Z10 Z1 Z8 √(Z9/2) Z16. The creep
+    without a force sets Z18: sin atan(Z18/Z5) = Z3 tan α.
 
     A limit that the guess did not see may still be there: a lag that is too short can stand for it.
     It is put a little below what the largest command asks for, where a fit can tell, and the set
@@ -550,13 +645,24 @@ def guessed_set(guess: Guess, source: str) -> ParameterSet:
         "Z13": (stops[0], stops[1]),
         "Z16": (openings[0], openings[1]),
     }
-    made = base.replace(changed)
+    if guess.creep:
+        changed["Z18"] = n["Z5"] * tan(asin(n["Z3"] * tan(guess.creep / per_angle)))
+    try:
+        # what is written here is read again as what somebody wrote
+        made = base.replace(changed)
+    except ParameterError as error:
+        raise ParameterError(
+            f"The guess of {guess.axis} from {source} fails; look at units and scales of its "
+            f"signals: {error}"
+        ) from None
     said = {
         symbol: replace(each, source=source, status="approximate")
         if symbol in changed
         else replace(each, source="assumed: no speed determines it")
         for symbol, each in made.parameters.items()
     }
+    if not guess.creep:
+        said["Z18"] = replace(said["Z18"], source=f"assumed: {_without_creep(guess)}")
     title = f"{guess.axis}: guessed from {source}"
     # of a current that was measured the filter has a meaning of its own, whatever the logs' rate
     rate = made.rate if guess.amplifier is None else None
@@ -602,7 +708,8 @@ def _steady(guess: Guess, way: int) -> float:
     """Speed that settles under the largest command one way, as a magnitude. [unit]"""
     volts = guess.command[way] or max(guess.command)
     beyond = max(volts - guess.dead_zone[way], 0.0)
-    speed = guess.gain[way] * beyond + guess.jump[way]
+    along = (1.0 - 2.0 * way) * (guess.creep or 0.0)
+    speed = guess.gain[way] * beyond + guess.jump[way] + along
     return min(speed, guess.top_speed[way]) or guess.speed
 
 
@@ -637,6 +744,7 @@ channels = ["shaft_speed", "position", "encoder_counts"]
 
 [stages.free]
 """
+NO_CREEP = "# {}: Z18 is 0, fixed"
 NOT_TRIED = "# no run goes {}: its numbers are those of the other way, fixed"
 
 
@@ -651,7 +759,10 @@ def fit_configuration(guess: Guess, start: ParameterSet | Drive) -> str:
     delay = f"tau = {{ bounds = [0.0, {longest:.4g}] }}    # delay"
     if guess.amplifier is None:
         lines = _command_lines(numbers, guess.command, [each > 0.0 for each in guess.jump])
-        lines += [*_limit_lines(guess), _lag_line(guess, 5.0), delay]
+        creep = (
+            _offset_line(guess, numbers) if guess.creep else NO_CREEP.format(_without_creep(guess))
+        )
+        lines += [*_limit_lines(guess), _lag_line(guess, 5.0), delay, creep]
         return text + CHAIN + "\n".join(lines) + "\n"
     of_current = _command_lines(numbers, guess.amplifier.command, (True, True))
     of_current += [*_dynamics_lines(numbers), delay]
@@ -709,8 +820,7 @@ def _solenoid_lines(guess: Guess, numbers: Mapping[str, float]) -> list[str]:
     # below the largest current of either way, or nothing would move
     most = min(2.0 * begins if begins else 0.5 * smallest, 0.95 * smallest)
     lines = [f"Z17 = {{ bounds = [0.0, {max(most, 1.05 * begins):.4g}] }}    # dead zone"]
-    offset = OFFSET * numbers["Z5"] * numbers["Z3"] * guess.speed / numbers["Z10"]
-    lines.append(f"Z18 = {{ bounds = [{-offset:.4g}, {offset:.4g}] }}    # neutral offset")
+    lines.append(_offset_line(guess, numbers))
     for way, side in enumerate(SIDES):
         if not guess.command[way]:
             lines.append(NOT_TRIED.format(side))
@@ -721,6 +831,20 @@ def _solenoid_lines(guess: Guess, numbers: Mapping[str, float]) -> list[str]:
             f"Z20_{side} = {{ bounds = [{-bends:.4g}, {bends:.4g}] }}    # how it bends",
         ]
     return lines
+
+
+def _offset_line(guess: Guess, numbers: Mapping[str, float]) -> str:
+    """Neutral offset of the spool, either way, with room for that of the creep that was seen."""
+    offset = OFFSET * numbers["Z5"] * numbers["Z3"] * guess.speed / numbers["Z10"]
+    offset = max(offset, 2.0 * abs(numbers["Z18"]))
+    return f"Z18 = {{ bounds = [{-offset:.4g}, {offset:.4g}] }}    # neutral offset: creep at rest"
+
+
+def _without_creep(guess: Guess) -> str:
+    """Why no creep is taken in."""
+    if guess.creep is None:
+        return "the logs rest too seldom to show a creep"
+    return "the logs show no creep at rest"
 
 
 def _limit_lines(guess: Guess) -> list[str]:
@@ -776,4 +900,8 @@ def guess_table(found: Guess) -> Table:
         made.add(name, *cells, unit=unit, spec=spec)
     made.add("delay", 1e3 * found.delay, "", unit="ms", spec=".3g")
     made.add("lag", 1e3 * found.lag, "", unit="ms", spec=".3g")
+    creep: Cell | float = found.creep or Cell(None, "not seen")
+    if found.creep is None:
+        creep = Cell(None, "no long rest")
+    made.add("creep at rest", creep, "", unit=found.unit, spec=".3g")
     return made

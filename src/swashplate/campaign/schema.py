@@ -140,6 +140,8 @@ def conversion(kind: str, unit: str | None, what: str) -> tuple[str, float, floa
     return units[0], *scaling(unit, units[0], what)
 
 
+LARGEST_PRESSURE = 1e10
+"""At the stroking piston: the plausible sizes of Z15 end here. [Pa]"""
 Role = Literal["fit", "validate", "ignore"]
 InitialState = Literal["rest", "steady", "given", "estimated"]
 AnyWindow = TypeVar("AnyWindow", bound="Window")
@@ -332,7 +334,10 @@ class Run(Entry):
     )
     start: InitialState | None = Field(None, description="State at the first sample.")
     start_pressure: Finite | None = Field(
-        None, description="Stroking pressure at the first sample, with start = 'given' [Pa]."
+        None,
+        ge=-LARGEST_PRESSURE,
+        le=LARGEST_PRESSURE,
+        description="Stroking pressure at the first sample, with start = 'given' [Pa].",
     )
     span: Window | None = Field(None, description="The part of the log to take.")
     only: tuple[str, ...] = Field((), description="The axes that this run tests; all if empty.")

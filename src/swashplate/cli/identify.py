@@ -86,7 +86,14 @@ def fit(
     model: Path | None = None,
     joint: bool = False,
     begin: str | None = None,
-    starts: int = 0,
+    starts: Annotated[
+        int | None,
+        option(
+            "More starts, spread over the bounds; 0 tries none, even if residuals ask for some.",
+            min=0,
+            metavar="N",
+        ),
+    ] = None,
     evaluations: Annotated[
         int, option("Evaluations of the model that a search may take.", min=1, metavar="N")
     ] = MOST_EVALUATIONS,
@@ -113,7 +120,6 @@ def fit(
     Options:
       out DIR: Folder for the fitted drive and its tables.
       joint: After the stages, estimate all parameters at once, through the whole drive.
-      starts: More starts, spread over the bounds.
       folds: Cross-validate over so many parts of the runs; 0 = off.
       profile NAME: Profile the cost along this parameter, or 'all'; may be repeated.
       jobs: Processes for all of these; 0 = all cores.

@@ -19,7 +19,7 @@ import typer
 from typer.models import ParameterInfo
 
 from swashplate.cli.terminal import FORCED, RESOURCES, SAVED, check_output, note, say_saved
-from swashplate.tables import FIGURE, TABLE, Form, listed
+from swashplate.tables import FIGURE, TABLE, Form
 from swashplate.units import show_rod, shown_in
 
 if TYPE_CHECKING:
@@ -130,12 +130,9 @@ class DriveChoice:
         self._warn_unreached()
 
     def _warn_unreached(self) -> None:
-        unreached = self.chosen.parameters.unreached
-        if unreached:
-            note(
-                f"! No test of this drive reached {listed([*unreached])}: beyond what was tested "
-                "it is extrapolated."
-            )
+        sentence = self.chosen.parameters.unreached_sentence()
+        if sentence:
+            note(f"! {sentence}")
 
     def note(self, heading: str, *, unreached: bool = True) -> None:
         """Print a heading, what is changed, and which limits the drive's tests left open."""

@@ -104,8 +104,25 @@ class Crane:
         return {axis: source.fit for axis, source in self.sources.items() if source.fit is not None}
 
     def provenance(self) -> tuple[str, ...]:
-        """A sentence for each drive in `sources`: its file, and the verdict on its fit."""
-        return tuple(source.sentence(axis) for axis, source in self.sources.items())
+        """Where drives come from, and what their tests left open, in sentences.
+
+        Of each drive in `sources` its file, the verdict on its fit and what that holds for; of any
+        drive the limits that no test of it reached.
+        """
+        sentences = list[str]()
+        for axis in AXES:
+            if axis in self.sources:
+                sentences.append(self.sources[axis].sentence(axis))
+            sentences.append(self.unreached_sentence(axis))
+        return tuple(filter(None, sentences))
+
+    def unreached_sentence(self, axis: str) -> str:
+        """The limits that no test of an axis's drive reached, in a sentence; empty if it has none.
+
+        Limits that were given another value since are none of them.
+        """
+        drive: Drive = getattr(self, axis)
+        return drive.parameters.unreached_sentence(f"the {axis}'s drive")
 
     def with_drive(self, *, told: bool = True, **drives: DriveLike) -> Crane:
         """The crane with other drives by axis.

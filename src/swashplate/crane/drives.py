@@ -45,6 +45,8 @@ class DriveSource(NamedTuple):
     """Grade of that fit's verdict; None if no verdict is known."""
     verdict: str
     """Headline of the verdict, or the clause why none is known."""
+    validity: str = ""
+    """Sentence that says what the verdict holds for; empty if that is not known."""
 
     @property
     def usable(self) -> bool:
@@ -52,10 +54,13 @@ class DriveSource(NamedTuple):
         return self.grade != UNUSABLE
 
     def words(self) -> str:
-        """Where the drive comes from, and what the verdict was, as the end of a sentence."""
+        """Where the drive comes from, what the verdict was and what it holds for.
+
+        It ends a sentence, and may go on with another one.
+        """
         if self.grade is None:
             return f"{self.place}; no verdict on it is known, as {self.verdict}."
-        return f"{self.place}; the verdict on its fit is: {self.verdict}"
+        return f"{self.place}; the verdict on its fit is: {self.verdict} {self.validity}".rstrip()
 
     def sentence(self, axis: str) -> str:
         """The same of the drive of an axis."""
@@ -132,7 +137,7 @@ def _source(given: DriveLike, drive: Drive, path: Path | None) -> DriveSource | 
     verdict = getattr(given, "verdict", None)
     if verdict is None:
         return DriveSource("that of a fit", None, None, "the fit was not judged")
-    return DriveSource("that of a fit", None, verdict.grade, verdict.headline)
+    return DriveSource("that of a fit", None, verdict.grade, verdict.headline, verdict.validity)
 
 
 def _source_of_file(path: Path, drive: Drive) -> DriveSource:
@@ -143,7 +148,7 @@ def _source_of_file(path: Path, drive: Drive) -> DriveSource:
         fit = path.parent
         verdict, why = _stored_verdict(stored, drive)
         if verdict is not None:
-            return DriveSource(str(path), fit, verdict.grade, verdict.headline)
+            return DriveSource(str(path), fit, verdict.grade, verdict.headline, verdict.validity)
     stated = _stated_in_title(drive)
     if stated:
         return DriveSource(str(path), fit, UNUSABLE, stated)

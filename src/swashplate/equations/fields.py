@@ -47,6 +47,9 @@ class Definition:
     """Option of the model that it belongs to, and that is off where it is zero."""
     least: float | None = None
     """Lowest value that an estimate may take where `lower` itself would switch the term off."""
+    plausible: tuple[float, float] | None = None
+    """Least and largest size, whatever the sign, of a number that somebody can mean; 0 and infinity
+    apart, which stand for "none". None: any size."""
     symmetry: Mapping[str, float] = field(default_factory=dict, hash=False)
     """Power with which it scales along each symmetry of the model, by the symmetry's name."""
     needs: str = ""
@@ -101,6 +104,14 @@ class Definition:
         words = " and ".join(part for part in (low, high) if part) or "any finite number"
         return words + (", or inf for none" if self.can_be_off else "")
 
+    @property
+    def plausible_range(self) -> str:
+        """The plausible sizes as words, e.g. ``at most 100``; empty if there is no such range."""
+        if self.plausible is None:
+            return ""
+        low, high = self.plausible
+        return f"{low:g} to {high:g}" if low > 0.0 else f"at most {high:g}"
+
 
 class Direction(Enum):
     """Marks the other direction of a parameter with two values."""
@@ -144,13 +155,35 @@ def declared_by(parameters: Any) -> Iterator[Definition]:
             yield replace(definition, symbol=name, fields=(name,))
 
 
+def definition_of(hint: Any) -> Definition | None:
+    """The definition in the type of a field or an argument, None if it has none."""
+    extras = getattr(hint, "__metadata__", ())
+    return next((extra for extra in extras if isinstance(extra, Definition)), None)
+
+
+def definitions_of(kind: Any) -> dict[str, Definition]:
+    """Definitions that the fields of a named tuple state, by dotted path."""
+    hints = get_type_hints(kind, include_extras=True)
+    stated = dict[str, Definition]()
+    for name in kind._fields:
+        if is_named_tuple(hints[name]):
+            inner = definitions_of(hints[name])
+            stated |= {f"{name}.{path}": definition for path, definition in inner.items()}
+        elif (definition := definition_of(hints[name])) is not None:
+            stated[name] = definition
+    return stated
+
+
 def ranges_of(kind: Any) -> dict[str, Definition]:
-    """Definitions with a range that a named tuple declares, by dotted path."""
+    """Definitions with a range, of what is possible or plausible, that a named tuple declares.
+
+    By dotted path.
+    """
     return {
         path: each
         for each in declared_by(kind)
         for path in each.fields
-        if each.range != Definition("", "").range
+        if each.range != Definition("", "").range or each.plausible is not None
     }
 
 

@@ -28,12 +28,19 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from importlib import import_module
-from types import FunctionType
+from operator import attrgetter
+from types import FunctionType, ModuleType
 from typing import Any, Literal, NamedTuple, get_args, get_type_hints
 
 from swashplate.equations.declaration import equation, equation_of_text
-from swashplate.equations.fields import Definition, floats_of, ranges_of
-from swashplate.equations.syntax import is_named_tuple, plain
+from swashplate.equations.fields import (
+    Definition,
+    definition_of,
+    definitions_of,
+    floats_of,
+    ranges_of,
+)
+from swashplate.equations.syntax import is_named_tuple, plain, type_of
 from swashplate.errors import InputError
 
 Equation = Callable[..., Any]
@@ -185,18 +192,20 @@ class Model:
         return id(self)
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """By its recipe, or its name in a module, from which another process imports it."""
+        """By its recipe, or its name in a module, from which another process imports it.
+
+        The name is the model's own, or that of an object with the model in an attribute, as an
+        `OwnModel` has.
+        """
         if self.recipe:
             return self.recipe
-        # the main module last: that of another process may be another one
-        for name in sorted(sys.modules, key=lambda name: name == "__main__"):
-            for word, thing in list(getattr(sys.modules[name], "__dict__", {}).items()):
-                if thing is self:
-                    return _imported, (name, word)
-        raise InputError(
-            f"The model {self.name} cannot be sent to another process: let it stand by a name in a "
-            "module that can be imported."
-        )
+        address = _address(self)
+        if address is None:
+            raise InputError(
+                f"The model {self.name} cannot be sent to another process: assign it to a name of "
+                "a module that can be imported, or use one process (--jobs 1)."
+            )
+        return _imported, address
 
     @cached_property
     def input_types(self) -> dict[str, type[Any]]:
@@ -272,6 +281,27 @@ class Model:
         """Definitions of the parameters that have a range, by path."""
         found = [(i, ranges_of(part.parameters)) for i, part in enumerate(self.parts)]
         return {f"{self.prefix(i)}{p}": each for i, own in found for p, each in own.items()}
+
+    @cached_property
+    def definitions(self) -> dict[str, Definition]:
+        """Definitions of inputs, states and signals by name, as far as the model declares them.
+
+        An input declares its own on the argument of an equation, or on the field of `inputs`.
+        """
+        declared = dict[str, Definition]()
+        for part in self.parts:
+            for name in part.input_types:
+                types = [type_of(plain(equation), name) for equation in part.equations]
+                if part.inputs is not None:
+                    types.append(get_type_hints(part.inputs, include_extras=True)[name])
+                for kind in types:
+                    definition = definition_of(kind)
+                    if definition is not None:
+                        declared.setdefault(part.tap(name).signal, definition)
+            declared |= definitions_of(part.state)
+            if part.signals is not None:
+                declared |= definitions_of(part.signals)
+        return declared
 
     def tap(self, name: str) -> Tap:
         """How an input is looked at."""
@@ -353,10 +383,39 @@ def _no_floats(type_: type[Any]) -> Iterator[tuple[str, str]]:
             yield f"{type_.__name__}.{name}", getattr(hint, "__name__", str(hint))
 
 
+def _address(model: Model) -> tuple[str, str] | None:
+    """Module in which a model has a name, and this name, dotted for an attribute of an object."""
+    # the main module last: that of another process may be another one
+    modules = sorted(sys.modules, key=lambda name: name == "__main__")
+    things = [
+        (module, name, thing)
+        for module in modules
+        for name, thing in list(getattr(sys.modules[module], "__dict__", {}).items())
+    ]
+    for module, name, thing in things:
+        if thing is model:
+            return module, name
+    for module, name, thing in things:
+        if isinstance(thing, ModuleType | type):
+            continue
+        for attribute, value in _attributes(thing):
+            if value is model:
+                return module, f"{name}.{attribute}"
+    return None
+
+
+def _attributes(thing: Any) -> list[tuple[str, Any]]:
+    """Attributes that an object itself stores; no code of the object is executed."""
+    try:
+        return list(object.__getattribute__(thing, "__dict__").items())
+    except AttributeError:
+        return []
+
+
 def _imported(module: str, name: str) -> Model:
-    """A model by its name in a module."""
-    found: Model = getattr(import_module(module), name)
-    return found
+    """A model by its name in a module, as of `_address`."""
+    model: Model = attrgetter(name)(import_module(module))
+    return model
 
 
 def join(

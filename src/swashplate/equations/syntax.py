@@ -15,7 +15,7 @@ import typing
 from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import lru_cache
-from types import FunctionType
+from types import FunctionType, SimpleNamespace
 from typing import Any, NoReturn
 from weakref import WeakKeyDictionary
 
@@ -218,6 +218,18 @@ def hints_of(function: FunctionType) -> dict[str, Any]:
     cells = zip(function.__code__.co_freevars, function.__closure__ or (), strict=False)
     free = {name: cell.cell_contents for name, cell in cells}
     return typing.get_type_hints(function, None, free or None, include_extras=True)
+
+
+def type_of(function: FunctionType, argument: str) -> Any:
+    """Type of an argument; None if it has none, or one that only an enclosing function knows."""
+    hint = function.__annotations__.get(argument)
+    if not isinstance(hint, str):
+        return hint
+    try:
+        alone = SimpleNamespace(__annotations__={argument: hint})
+        return typing.get_type_hints(alone, function.__globals__, include_extras=True)[argument]
+    except NameError:
+        return None
 
 
 def plain(function: Any) -> Any:

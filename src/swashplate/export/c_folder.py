@@ -22,10 +22,11 @@ from swashplate.equations.marching.record import SOURCE_RATE, check_rate
 from swashplate.equations.marching.run import Instance, called
 from swashplate.equations.marching.run import instance_of as instance_of_model
 from swashplate.equations.model import Model
-from swashplate.errors import FileError, InputError
+from swashplate.errors import FileError, InputError, InputTypeError
 from swashplate.export.variable_list import DRIVE, DRIVE_WORDS, OWN, References, Words, words_of
 from swashplate.models.card import stable_step
 from swashplate.models.displacement_control import steep_stops
+from swashplate.parameters.parameter_set import ParameterSet
 from swashplate.parameters.rules import FULL_VOLTAGE
 from swashplate.simulation.instance import check_filter_stability, instance_of, models_of
 from swashplate.simulation.run import RANGES, Sample
@@ -56,7 +57,7 @@ def exported_drive(drive: Drive | None = None) -> Exported:
         parameters=columns,
         outputs=(*Sample._fields[1:], "motor_torque", "motor_pressure_drop"),
         bounds={"voltage": FULL_VOLTAGE},
-        ranges={name: (least, most) for name, (least, most, _) in RANGES.items()},
+        ranges=RANGES,
         stable={0: stable_step},
         follows={(1, "steep"): steep_stops},
         internal=frozenset({"own"}),
@@ -177,13 +178,27 @@ def content_of(
         name, title, references, words = what.name, what.parameters.title, DRIVE, DRIVE_WORDS
     else:
         if not isinstance(what, Model):
-            raise InputError(f"{what!r} cannot be exported: give a Drive or a Model of equations.")
+            raise InputTypeError(
+                f"{what!r} cannot be exported: give a Drive or a Model of equations"
+                f"{_nearest(what)}."
+            )
         instance = instance_of_model(what, parameters, options=options, given=given)
         exported, name, title = Exported(what, prefix), what.name, f"Model {what.name}"
         references, words = OWN, words_of(exported)
     values = _values(instance, step)
     packaged = isinstance(what, Drive) and not what.parameters.equations
     return Content(exported, instance, values, name, title, packaged, references, words)
+
+
+def _nearest(what: object) -> str:
+    """How a drive is got of something else, to stand behind what must be given."""
+    if isinstance(what, ParameterSet):
+        return ": Drive(parameters)"
+    if isinstance(what, str | Path):
+        return ": Drive.preset(NAME) or Drive.from_toml(PATH)"
+    if hasattr(type(what), "drive"):  # an Identification, which stands above this package
+        return ": its drive, as in export.fmu(identification.drive, PATH)"
+    return ""
 
 
 def source_text(name: str) -> str:

@@ -239,7 +239,7 @@ class FullOrderDrive:
     def reduced(self) -> Drive:
         """The one-state drive with the lumps of the physical set, at the drive's own Z6."""
         Z6 = self.drive.parameters.numbers["Z6"]
-        return self.drive.replace(**self.physical.to_lumped(Z6))
+        return Drive(self.drive.parameters.with_numbers(self.physical.to_lumped(Z6)))
 
     @cached_property
     def plant(self) -> model.Plant:

@@ -32,8 +32,8 @@ from swashplate.parameters.parameter_set import (
     Parameter,
     ParameterSet,
     Value,
+    meant_value,
     set_of,
-    value_of,
 )
 from swashplate.parameters.rules import Broken, Rule, applied, range_rule, refuse
 from swashplate.tables import Column, Table
@@ -160,7 +160,7 @@ class PhysicalSet(Entries):
     def replace(self, **changes: Change) -> PhysicalSet:
         """A set with other values in SI, ``replace(load_torque=2e3)``, marked as the user's."""
         made = {
-            name: Parameter(quantity_of(name), value_of(name, quantity_of(name), change))
+            name: Parameter(quantity_of(name), meant_value(name, quantity_of(name), change))
             for name, change in changes.items()
         }
         return replace(self, parameters={**self.parameters, **made})
@@ -238,7 +238,7 @@ def chosen_over(
     for name, change in chosen.items():
         if not isinstance(change, Parameter):
             quantity = chosen_quantity(name)
-            change = Parameter(quantity, value_of(name, quantity, change))
+            change = Parameter(quantity, meant_value(name, quantity, change))
         entries[name] = change
         if (instead := IN_PLACE_OF.get(name)) is not None and instead not in chosen:
             entries.pop(instead, None)

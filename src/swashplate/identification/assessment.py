@@ -22,7 +22,7 @@ from swashplate.documents import read_json
 from swashplate.drive import Drive
 from swashplate.errors import DomainError, FileError, InputError, MissingFileError
 from swashplate.identification import tables
-from swashplate.identification.criteria import REQUIRED, Grade, Verdict, verdict
+from swashplate.identification.criteria import REQUIRED, Criterion, Grade, Verdict, verdict
 from swashplate.identification.drive_model import Parameters
 from swashplate.identification.fitting import (
     Estimated,
@@ -32,7 +32,7 @@ from swashplate.identification.fitting import (
     fingerprint,
     staged,
 )
-from swashplate.identification.intervals import Estimate, unseen_limits
+from swashplate.identification.intervals import Estimate, Interval, unseen_limits
 from swashplate.identification.problem import Problem
 from swashplate.identification.profiles import Profile
 from swashplate.identification.resampling import CrossValidation
@@ -40,6 +40,7 @@ from swashplate.identification.setup import ModelSetup, Setup, Stage, setup_text
 from swashplate.identification.solving import Solution
 from swashplate.identification.unknowns import Unknown, Unknowns
 from swashplate.identification.validation import RunQuality, predict
+from swashplate.locks import locked
 from swashplate.parameters.definitions import find
 from swashplate.parameters.files import (
     FITTED_DRIVE,
@@ -51,7 +52,7 @@ from swashplate.parameters.files import (
 from swashplate.parameters.parameter_set import Motion, ParameterSet
 from swashplate.progress import working
 from swashplate.results import folded
-from swashplate.tables import Table, made_folder, write_text
+from swashplate.tables import Table, write_text
 
 if TYPE_CHECKING:
     import polars
@@ -65,7 +66,8 @@ estimates, and what the fit keeps of itself."""
 class Identification(Estimated):
     """What `identify` returns: a fitted drive or user-defined model, and what it is worth.
 
-    Estimates are there by name, intervals and verdict are computed when they are first asked for.
+    Estimates are there by name. Intervals and verdict are computed when they are first asked for,
+    or read from the folder that a result was loaded from.
 
     Examples
     --------
@@ -85,6 +87,8 @@ class Identification(Estimated):
     """Versions, seed, campaign."""
     required: float = REQUIRED
     """Largest error of held-out runs over their range."""
+    stored: StoredVerdict | None = field(default=None, repr=False)
+    """The verdict that the fit's folder holds."""
 
     @property
     def estimates(self) -> Mapping[str, Estimate]:
@@ -110,17 +114,24 @@ class Identification(Estimated):
         """
         return Drive(replace(self.fit.drive.parameters, **self._origins()))
 
-    @cached_property
-    def predicted(self) -> tuple[RunQuality, ...]:
-        """Runs of the axis that were held out, predicted."""
+    @property
+    def held_out(self) -> tuple[Experiment, ...]:
+        """Runs of the axis that were held out."""
         runs = self.fit.runs
         names = {each.name for each in runs}
         out = self.campaign.select(axis=runs[0].axis, role="validate")
-        return predict(self.fit.parameters, [each for each in out if each.name not in names])
+        return tuple(each for each in out if each.name not in names)
+
+    @cached_property
+    def predicted(self) -> tuple[RunQuality, ...]:
+        """Runs of the axis that were held out, predicted."""
+        return predict(self.fit.parameters, self.held_out)
 
     @cached_property
     def verdict(self) -> Verdict:
         """What it can be used for."""
+        if self.stored is not None and self.stored.holds_for(self):
+            return self.stored.verdict
         planned = [each.name for each in self.fit.setup.stages]
         with working("Judging the fit"):
             return verdict(self.fit.stages, self.predicted, planned=planned, required=self.required)
@@ -199,9 +210,15 @@ class Identification(Estimated):
         Raises
         ------
         FileError
-            If one cannot be written.
+            If one cannot be written, or another process, or another thread, is writing a fit into
+            the folder.
         """
-        place = made_folder(Path(folder))
+        place = Path(folder)
+        with locked(place):
+            return self._written(place)
+
+    def _written(self, place: Path) -> tuple[Path, ...]:
+        """See `save`."""
         parameters = self.fit.parameters
         if isinstance(parameters, ModelSetup):
             numbers = {name: float(value) for name, value in parameters.numbers.items()}
@@ -275,6 +292,7 @@ class Identification(Estimated):
                     unknowns=each.problem.unknowns.items,
                     solution=each.solution,
                     starts=each.starts,
+                    intervals=each.intervals,
                 )
                 for each in self.fit.stages
             ),
@@ -282,9 +300,10 @@ class Identification(Estimated):
             folds=self.folds,
             notes=dict(self.notes),
             verdict=StoredVerdict(
-                grade=self.verdict.grade,
-                headline=self.verdict.headline,
+                **{key: getattr(self.verdict, key) for key in VERDICT},
                 numbers=dict(self.fit.parameters.numbers),
+                required=self.required,
+                held_out={each.name: fingerprint(each) for each in self.held_out},
             ),
         )
 
@@ -343,7 +362,7 @@ def _interval_words(stages: Sequence[StageFit], found: ParameterSet) -> dict[str
     words: dict[str, list[str]] = {}
     for each in stages:
         unknowns = each.problem.unknowns
-        for estimate, unknown in zip(each.uncertainty.estimates, unknowns, strict=True):
+        for estimate, unknown in zip(each.estimates, unknowns, strict=True):
             if unknown.run is None and unknown.name.startswith("force_"):
                 forces = ("Z19", "Z20", "Z21", "Z22")
                 words |= {symbol: ["from the fitted forces"] for symbol in forces}
@@ -378,15 +397,47 @@ class StoredStage(Entry):
     """With what their priors are worth."""
     solution: Solution
     starts: tuple[Solution, ...]
+    intervals: tuple[Interval, ...] | None = None
+    """Of the unknowns; None in a file of a version that did not store them."""
+
+
+VERDICT = ("grade", "headline", "criteria", "sentences", "validity", "assumed")
+"""What of a verdict is stored: all of it."""
 
 
 class StoredVerdict(Entry):
-    """The verdict on the fit when it was stored."""
+    """The verdict on the fit when it was stored, and what it rests on."""
 
     grade: Grade
     headline: str
+    criteria: tuple[Criterion, ...] = ()
+    sentences: tuple[str, ...] = ()
+    validity: str = ""
+    """What it holds for, and what the tests never reached; empty in older files."""
+    assumed: tuple[str, ...] = ()
     numbers: dict[str, float]
     """Of the drive or model that it is about."""
+    required: float = REQUIRED
+    """See `Identification`."""
+    held_out: dict[str, str] = {}
+    """Name to fingerprint of each run that was held out."""
+
+    @property
+    def verdict(self) -> Verdict:
+        """The verdict as it was."""
+        return Verdict(**{key: getattr(self, key) for key in VERDICT})
+
+    def holds_for(self, result: Identification) -> bool:
+        """Whether it is the verdict on these numbers, requirement and runs held out.
+
+        A file of a version that stored no criteria does not have the whole verdict.
+        """
+        return (
+            bool(self.criteria)
+            and self.required == result.required
+            and self.numbers == dict(result.fit.parameters.numbers)
+            and self.held_out == {run.name: fingerprint(run) for run in result.held_out}
+        )
 
 
 class FitFile(Entry):
@@ -469,12 +520,20 @@ def _loaded(
             (name, [(unknown.name, unknown.run) for unknown in unknowns])
             for name, unknowns in ((stage.name, problem.unknowns), (entry.name, entry.unknowns))
         )
-        if ours != theirs or entry.solution.vector.size != len(entry.unknowns):
+        sizes = {entry.solution.vector.size, len(entry.unknowns)}
+        if entry.intervals is not None:
+            sizes.add(len(entry.intervals))
+        if ours != theirs or len(sizes) > 1:
             raise FileError(
                 f"{path}: stage {entry.name} has other parameters than its fit configuration "
                 "makes: fit again."
             )
-        return replace(problem, unknowns=Unknowns(entry.unknowns)), entry.solution, entry.starts
+        return Solved(
+            replace(problem, unknowns=Unknowns(entry.unknowns)),
+            entry.solution,
+            entry.starts,
+            entry.intervals,
+        )
 
     begun = file.setup.model_copy(update={"stages": file.setup.stages[: len(file.stages)]})
     stages = staged(begun, nominal, experiments, stored, threads=threads)
@@ -486,4 +545,12 @@ def _loaded(
             raise FileError(f"{path}: stage {stage} has no parameter {profile.index + 1}.")
         name, unknown = unknowns.names[profile.index], unknowns.items[profile.index]
         profiles.append(replace(profile, stage=stage, name=name, unknown=unknown))
-    return Identification(campaign, found, profiles, file.folds, file.notes)
+    return Identification(
+        campaign,
+        found,
+        profiles=profiles,
+        folds=file.folds,
+        notes=file.notes,
+        required=REQUIRED if file.verdict is None else file.verdict.required,
+        stored=file.verdict,
+    )

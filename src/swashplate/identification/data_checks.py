@@ -399,7 +399,7 @@ def _other_interpolation(axis: str, runs: Sequence[Experiment], nominal: Paramet
     for kind in left if step >= COARSE else ():
         ours = [replace(each, input=replace(each.input, interpolation=kind)) for each in runs]
         for later in (-0.5 * step, 0.0, 0.5 * step):
-            delayed = nominal.replace({"tau": max(nominal.numbers["tau"] + later, 0.0)})
+            delayed = nominal.with_numbers({"tau": max(nominal.numbers["tau"] + later, 0.0)})
             of_channels = chain.from_iterable(motions(ours, delayed).values())
             unlike = [each.unlike for each in of_channels]
             left[kind] = min(left[kind], float(np.sqrt(np.mean(unlike or [1.0]))))

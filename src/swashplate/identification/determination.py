@@ -366,7 +366,7 @@ def without_value(stage: StageFit) -> list[str]:
 def weak_unknowns(stage: StageFit) -> list[str]:
     """Unknowns of the machine with an interval wider than 10 % of the value, or without one."""
     try:
-        found = {each.name: each.relative_half_width for each in stage.uncertainty.estimates}
+        found = {each.name: each.relative_half_width for each in stage.estimates}
     except InputError:
         found = {}
     machine = [each.name for each in stage.problem.unknowns if each.run is None]

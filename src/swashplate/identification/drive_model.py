@@ -23,7 +23,7 @@ from swashplate.documents import validated
 from swashplate.drive import Drive
 from swashplate.equations.marching.observation import Observation, ObservedRecord, Own
 from swashplate.equations.marching.record import SLOWEST, SOURCE_RATE, Record, even_rate, record_of
-from swashplate.errors import DomainError, InputError, ParameterError
+from swashplate.errors import DomainError, InputError, ParameterError, UnknownParameterError
 from swashplate.executors import available_cores
 from swashplate.identification.model import EDGE, OFFSET, Asked, EquationModel
 from swashplate.identification.problem import Problem, noise_scales
@@ -39,8 +39,9 @@ from swashplate.identification.setup import (
     setup_names,
 )
 from swashplate.identification.unknowns import Prior, Unknown, Unknowns, bounded
-from swashplate.parameters.definitions import SWITCHES, columns_of, find, is_column
+from swashplate.parameters.definitions import SWITCHES, Definition, columns_of, find, is_column
 from swashplate.parameters.parameter_set import ParameterSet
+from swashplate.parameters.plausible import check_plausible
 from swashplate.parameters.rules import FULL_VOLTAGE
 from swashplate.results import Result
 from swashplate.simulation.instance import PRESSURE, START, at_every_rate
@@ -60,6 +61,8 @@ START_PRESSURE = "start_pressure"
 """Name of δP at the first sample, where it is an unknown of the experiment."""
 START_CURRENTS = ("start_current_plus", "start_current_minus")
 """Names of a channel's current at the first sample, where it is an unknown of the experiment."""
+FORCE = Definition("force of the solenoids", "N", plausible=(0.0, 1e4))
+"""What stands for their coefficients."""
 MOST_EDGES = 60
 """Jumps of commands whose instants are estimated; more are taken halfway between their samples."""
 LARGEST_START_PRESSURE = 4e6
@@ -200,7 +203,7 @@ def limits_unreached(
     """
     limits = {column: parameters.numbers[column] for column in LIMIT_COLUMNS}
     eased = {c: EASED * limit for c, limit in limits.items() if isfinite(limit)}
-    without, reached = parameters.replace(eased), dict.fromkeys(LIMIT_COLUMNS, 0.0)
+    without, reached = parameters.with_numbers(eased), dict.fromkeys(LIMIT_COLUMNS, 0.0)
     for each in experiments:
         run = simulated_run(each, without)
         for column, (signal, sign) in LIMIT_COLUMNS.items():
@@ -321,7 +324,7 @@ def _at(model: DriveModel, values: tuple[tuple[str, float], ...]) -> ParameterSe
         changes |= model.forces.coefficients(dict(values), model.parameters)
     try:
         # whatever the values, the equations stay those that the fit began with
-        return model.parameters.replace(changes, model.parameters.options)
+        return model.parameters.with_numbers(changes, model.parameters.options)
     except ParameterError as error:
         raise DomainError(str(error)) from None
 
@@ -415,9 +418,9 @@ def configuration(free: FreeParameters, experiments: Sequence[Experiment]) -> Se
         If the configuration cannot be read, or an entry is wrong.
     """
     if isinstance(free, Setup):
-        return free
+        return _with_known_names(free, "the fit configuration")
     if isinstance(free, str | Path):
-        return load_setup(free)
+        return _with_known_names(load_setup(free), str(free))
     given: object = free
     if not isinstance(given, Mapping) or not given:
         raise InputError(
@@ -425,7 +428,8 @@ def configuration(free: FreeParameters, experiments: Sequence[Experiment]) -> Se
             "mapping such as {'Z8': (0.5, 2)}."
         )
     if "stages" in free:
-        return validated(dict(free), Setup, "the fit configuration")
+        setup = validated(dict(free), Setup, "the fit configuration")
+        return _with_known_names(setup, "the fit configuration")
     entries = free_entries(free)
     blocks = {"card" if find(name).block == "control_card" else "pump" for name in entries}
     kinds = {channel.kind for run in experiments for channel in run.channels.values()}
@@ -435,6 +439,23 @@ def configuration(free: FreeParameters, experiments: Sequence[Experiment]) -> Se
     elif blocks == {"card"} and not kinds.isdisjoint(CURRENTS):
         part = "card"
     return Setup(stages=(Stage(name=part, part=part, free=entries),))
+
+
+def _with_known_names(setup: Setup, origin: str) -> Setup:
+    """The fit configuration of a drive; a name in it that no parameter has is refused."""
+    names = [
+        (f"stage '{stage.name}', free", name)
+        for stage in setup.stages
+        if stage.part != "model"
+        for name in stage.free
+    ]
+    names += [("standard_uncertainty", name) for name in setup.standard_uncertainty]
+    for table, name in names:
+        try:
+            find(name)
+        except UnknownParameterError as error:
+            raise UnknownParameterError(f"{origin}, {table}: {error}") from None
+    return setup
 
 
 def setup_of(
@@ -491,7 +512,7 @@ def stage_problem(
     free = _of_the_machine(stage, parameters)
     begin = {column: each.start for each in free for column in each.targets if column in SWITCHES}
     on = parameters.options | {SWITCHES[column] for column in begin}
-    begun = parameters.replace(begin, on) if begin else parameters
+    begun = parameters.with_numbers(begin, on) if begin else parameters
     own = [unknown for each in runs for unknown in _of_a_run(stage, each, channels, parameters)]
     simulated = stage.part != "pump" or stage.current != "measured"
     jumps = [unknown for each in runs if simulated for unknown in _edges(each, edges)]
@@ -577,11 +598,17 @@ def _of_the_machine(stage: Stage, parameters: ParameterSet) -> list[Unknown]:
         for group in [columns] if entry.tied else [(each,) for each in columns]:
             nominal = float(np.mean([_nominal(parameters, column) for column in group]))
             own, bounds = name if entry.tied else group[0], (entry.relative, entry.bounds)
-            unknowns.append(bounded(own, nominal, *bounds, least, sets=group, **how))
+            unknown = bounded(own, nominal, *bounds, least, sets=group, **how)
+            check_plausible(f"a bound of {own}", definition, unknown.low, unknown.high)
+            if entry.prior is not None:
+                check_plausible(f"the prior mean of {own}", definition, entry.prior.mean)
+            unknowns.append(unknown)
     if stage.forces is not None:
         for name, value in stage.forces.values(parameters).items():
             log = value > 0.0
-            unknowns.append(bounded(name, value, stage.forces.relative, unit="N", log=log))
+            force = bounded(name, value, stage.forces.relative, unit="N", log=log)
+            check_plausible(f"a bound of {name}", FORCE, force.low, force.high)
+            unknowns.append(force)
     return unknowns
 
 

@@ -313,8 +313,11 @@ def clipped_channels(experiments: Sequence[Experiment]) -> tuple[str, ...]:
         values = np.concatenate([each[name].values for each in runs])
         low, high = float(values.min()), float(values.max())
         reach = float(np.ptp(np.concatenate([each.input.values for each in runs])))
+        stated = (each[name].limits for each in runs)
+        limits = [pair for pair in stated if pair is not None]
         for end in (low, high):
-            if any(end in (each[name].limits or ()) for each in runs):
+            # limits may be stated a little within the end at which the readings stand
+            if any(not lower < end < upper for lower, upper in limits):
                 continue
             spans = np.array([span for each in runs for span in _inputs_at(end, each, name)])
             if not spans.size or low == high:

@@ -4,14 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from math import inf
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import get_args
+
+import numpy as np
 
 from swashplate.campaign.campaign import Campaign
 from swashplate.campaign.experiment import Experiment
 from swashplate.drive import Drive
 from swashplate.equations import Model as Equations
-from swashplate.errors import InputError
+from swashplate.equations.fields import is_real
+from swashplate.errors import InputError, InputTypeError
 from swashplate.executors import Executor, Serial
 from swashplate.identification.assessment import Identification, versions
 from swashplate.identification.criteria import REQUIRED
@@ -26,9 +30,6 @@ from swashplate.identification.setup import FreeParameters, ModelSetup, Setup
 from swashplate.parameters.files import named_set
 from swashplate.parameters.parameter_set import ParameterSet
 
-if TYPE_CHECKING:
-    pass
-
 MOST_EVALUATIONS = 600
 
 
@@ -39,7 +40,7 @@ def identify(
     *,
     axis: str | None = None,
     joint: bool = False,
-    starts: int = 0,
+    starts: int | None = None,
     folds: int = 0,
     profiles: str | Sequence[str] = (),
     seed: int = 0,
@@ -74,8 +75,10 @@ def identify(
         The axis; needed if the campaign has several.
     joint : bool
         After the stages, estimate all parameters at once, through the whole drive.
-    starts : int
-        More starts, spread over the bounds; the best is refined.
+    starts : int, optional
+        More starts, spread over the bounds; the best is refined. By default up to six are tried in
+        a stage whose residuals are five times as large as their known measurement error, until
+        they no longer are; 0 tries none.
     folds : int
         Folds of a cross-validation; 0 for none.
     profiles : str or sequence of str
@@ -110,8 +113,8 @@ def identify(
     ParameterError
         If an entry of a file, or of `free`, is wrong.
     InputError
-        If tests, model and what is free do not fit each other, or no fit of these runs can mean
-        anything.
+        If tests, model and what is free do not fit each other, a number is out of its range, or no
+        fit of these runs can mean anything; an argument of another kind is a ``TypeError`` as well.
     DomainError
         If the model does not hold at the nominal values.
 
@@ -121,9 +124,21 @@ def identify(
     >>> result = identify("harbour/campaign.toml", "hoist", {"Z8": (0.5, 2), "Z16": (0.5, 2)})
     >>> result = identify("valve/campaign.toml", valve, {"lag": (0.005, 0.06, 0.5)})
     """
+    _check_numbers(
+        starts=0 if starts is None else starts,
+        folds=folds,
+        seed=seed,
+        max_evaluations=max_evaluations,
+    )
+    if loss not in get_args(Loss):
+        raise InputError(f"The loss is {loss!r}, but must be one of {', '.join(get_args(Loss))}.")
+    if not is_real(required) or not 0.0 < required < inf:
+        raise InputError(
+            f"required is {required!r}, but must be an error over the range, above 0: 0.05 for 5 %."
+        )
     profiles = (profiles,) if isinstance(profiles, str) else profiles
     if not isinstance(tests, str | Path | Campaign):
-        raise InputError(
+        raise InputTypeError(
             f"The tests are a {type(tests).__name__}: give the path of a campaign file, which "
             "swashplate.campaign.draft_campaign makes of logs, or a Campaign."
         )
@@ -133,7 +148,7 @@ def identify(
     nominal, setup = _stated(campaign, axis, model, free, runs)
 
     search = None
-    if starts:
+    if starts is not None:
         folder = None if store is None else Path(store)
         search = Search(starts, seed, executor or Serial(), store=folder, resume=resume)
     staged = result = fit(
@@ -175,6 +190,16 @@ def identify(
         ]
         identification = replace(identification, profiles=curves)
     return identification
+
+
+def _check_numbers(**numbers: object) -> None:
+    """Refuse what is not a whole number of 0 or more, of evaluations of 1 or more."""
+    for name, number in numbers.items():
+        least = 1 if name == "max_evaluations" else 0
+        if not isinstance(number, int | np.integer) or isinstance(number, bool) or number < least:
+            raise InputError(
+                f"{name} is {number!r}, but must be a whole number of {least} or more."
+            )
 
 
 def only_axis(campaign: Campaign, axis: str | None) -> str:
@@ -221,6 +246,11 @@ def _stated(
         drive = model.parameters
     if isinstance(drive, ParameterSet):
         return drive, setup_of(campaign, axis, drive, free)
+    if not isinstance(drive, Equations) and not callable(getattr(drive, "simulate", None)):
+        raise InputTypeError(
+            f"The model is {drive!r}: give a Drive, the name of a packaged one such as 'hoist', a "
+            "parameter file, the folder of a fit, or a user-defined model."
+        )
     if not isinstance(free, Mapping):
         raise InputError(
             "A user-defined model needs a mapping of what is free of it, by name: "

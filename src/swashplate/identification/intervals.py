@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from math import inf, log
 from types import MappingProxyType
@@ -61,8 +61,23 @@ OPEN = 0.01
 depends on that unknown."""
 
 
-class Estimate(NamedTuple):
+class Interval(NamedTuple):
+    """What is known of the error of an estimate."""
+
+    status: Status
+    standard_error: float | None = None
+    """None unless estimated."""
+    lower: float | None = None
+    """None if there is no end."""
+    upper: float | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Estimate(Result):
     """One number of a model with what is known of its error.
+
+    The value is there at once. Status, standard error and interval are computed when one of them is
+    first asked for, unless the estimate is that of a folder which has stored them.
 
     Examples
     --------
@@ -71,20 +86,55 @@ class Estimate(NamedTuple):
 
     name: str
     value: float
-    status: Status
-    standard_error: float | None
-    """In the unknown's unit; of a logarithmic one the value times the logarithm's. None unless
-    estimated."""
-    lower: float | None
-    """End of the interval; asymmetric about the value for a logarithmic unknown. None where there
-    is no end."""
-    upper: float | None
     unit: str = ""
+    source: Interval | Callable[[], Interval] = field(
+        default_factory=lambda: Interval("undetermined"), repr=False
+    )
+    """What is known of its error, or what computes it."""
+
+    @cached_property
+    def _known(self) -> Interval:
+        return self.source if isinstance(self.source, Interval) else self.source()
+
+    @property
+    def status(self) -> Status:
+        """How it came about, or what its interval lacks."""
+        return self._known.status
+
+    @property
+    def standard_error(self) -> float | None:
+        """Standard error, in `unit`; None unless estimated.
+
+        That of a logarithmic unknown is the value times the logarithm's.
+        """
+        return self._known.standard_error
+
+    @property
+    def lower(self) -> float | None:
+        """Lower end of the 95 % interval, in `unit`; None if there is no end.
+
+        The interval of a logarithmic unknown is asymmetric about the value.
+        """
+        return self._known.lower
+
+    @property
+    def upper(self) -> float | None:
+        """Upper end of the 95 % interval, in `unit`; None if there is no end."""
+        return self._known.upper
 
     @property
     def interval(self) -> tuple[float | None, float | None]:
         """Both ends of the 95 % interval; None where there is no end."""
         return self.lower, self.upper
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, Estimate):
+            return NotImplemented
+        same = (self.name, self.value, self.unit) == (other.name, other.value, other.unit)
+        return same and self._known == other._known
+
+    def __hash__(self) -> int:
+        return hash((self.name, self.value, self.unit))
 
     @property
     def free(self) -> bool:
@@ -148,17 +198,14 @@ def estimates(
         elif below or above:
             status = "no lower end" if below else "no upper end"
         told = not side and status != "undetermined"
-        made.append(
-            Estimate(
-                name,
-                float(variables.estimates[k]),
-                status,
-                float(errors[k]) if status == "estimated" else None,
-                float(lower[k]) if told and not below else None,
-                float(upper[k]) if told and not above else None,
-                variables.items[k].unit,
-            )
+        interval = Interval(
+            status,
+            float(errors[k]) if status == "estimated" else None,
+            float(lower[k]) if told and not below else None,
+            float(upper[k]) if told and not above else None,
         )
+        value = float(variables.estimates[k])
+        made.append(Estimate(name, value, variables.items[k].unit, interval))
     return tuple(made)
 
 
@@ -463,7 +510,7 @@ def unseen_limits(stages: Sequence[StageFit]) -> dict[str, float]:
     runs = {run.name: run for stage in stages for run in stage.problem.experiments}
     unseen = limits_unreached(list(runs.values()), stages[-1].drive.parameters)
     for stage in stages:
-        for estimate in stage.uncertainty.estimates:
+        for estimate in stage.estimates:
             one_sided = estimate.upper is None and estimate.lower is not None
             if estimate.name in LIMIT_COLUMNS and one_sided:
                 unseen.setdefault(estimate.name, float(estimate.lower or 0.0))

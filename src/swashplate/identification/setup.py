@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache
 from importlib import import_module
@@ -19,18 +19,28 @@ from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validat
 
 from swashplate.campaign import ChannelKind
 from swashplate.campaign.experiment import Experiment
-from swashplate.campaign.schema import Weight, Window
+from swashplate.campaign.schema import LARGEST_PRESSURE, Weight, Window
 from swashplate.documents import parse_toml, read_text, validated
 from swashplate.entries import Finite, Flag, NotNegative, Positive
 from swashplate.equations import Model as Equations
 from swashplate.equations.fields import check_mapping, is_real
-from swashplate.errors import FileError, InputError, MissingFileError, ParameterError
+from swashplate.equations.model import parameter_paths
+from swashplate.errors import (
+    FileError,
+    InputError,
+    MissingFileError,
+    ParameterError,
+    SwashplateError,
+    UnknownNameError,
+    meant,
+)
 from swashplate.identification.model import OFFSET, OwnModel, simulated
 from swashplate.identification.problem import Problem, noise_scales
 from swashplate.identification.solving import solve
 from swashplate.identification.unknowns import Prior, Unknown, Unknowns
 from swashplate.parameters.definitions import find
 from swashplate.parameters.parameter_set import ParameterSet
+from swashplate.parameters.plausible import check_plausible
 from swashplate.parameters.rules import SIDES
 from swashplate.results import Result, short
 from swashplate.simulation.instance import START
@@ -180,6 +190,7 @@ class Stage(Entry):
     )
     start_pressure: Positive | None = Field(
         None,
+        le=LARGEST_PRESSURE,
         description="Largest stroking pressure at the first sample, free in each run [Pa]; where "
         "none is given, it is free in runs with start = 'estimated' alone.",
     )
@@ -290,8 +301,8 @@ def load_setup(name: str | Path) -> Setup:
         text = _SETUPS.joinpath(file).read_text("utf-8")
     else:
         raise ParameterError(
-            f"There is no packaged fit configuration '{name}'; there are "
-            f"{', '.join(setup_names())}, or give a .toml file."
+            f"There is no packaged fit configuration '{name}'{meant(file, setup_names())}; there "
+            f"are {', '.join(setup_names())}, or give a .toml file."
         )
     return validated(parse_toml(text, file), Setup, file)
 
@@ -406,11 +417,20 @@ class ModelSetup(Result):
                         f"{name}: the {what} of '{key}' is {number!r}, but must be {must}."
                     )
         free = {key: _unknown(key, each) for key, each in self.free.items()}
+        if isinstance(own, OwnModel):
+            targets = [name for unknown in free.values() for name in unknown.targets]
+            _check_names(own.model, "free", targets)
+            _check_names(own.model, "fixed", self.fixed)
         ranges = equations.ranges if isinstance(equations, Equations) else {}
-        for key, each in free.items():
-            for bound in (each.low, each.high):
-                if key in ranges and not ranges[key].holds(bound):
-                    raise ParameterError(f"{name}, a bound: {ranges[key].broken(key, bound)}.")
+        for key, definition in ranges.items():
+            if key in free:
+                for bound in (free[key].low, free[key].high):
+                    if not definition.holds(bound):
+                        raise ParameterError(f"{name}, a bound: {definition.broken(key, bound)}.")
+                    check_plausible(f"{name}, a bound: {key}", definition, bound)
+                check_plausible(f"{name}: {key}", definition, free[key].start)
+            if key in self.fixed:
+                check_plausible(f"{name}, fixed: {key}", definition, self.fixed[key])
         for key, made in {"model": own, "name": name, "free": free}.items():
             object.__setattr__(self, key, made)
         _ = self.setup  # refuses what is no uncertainty
@@ -460,7 +480,10 @@ class ModelSetup(Result):
                     "{'lag': (0.005, 0.06, 0.5), ...}, lower bound, nominal value and upper bound."
                 )
         known = ("model", "free", "name", "channels", "noise", "fixed", "standard_uncertainty")
-        return cls(**{key: getattr(module, key) for key in known if hasattr(module, key)})
+        try:
+            return cls(**{key: getattr(module, key) for key in known if hasattr(module, key)})
+        except SwashplateError as error:
+            raise type(error)(f"{path}: {error}") from None
 
     @property
     def setup(self) -> Setup:
@@ -547,6 +570,17 @@ class ModelSetup(Result):
         known = channels, self.scales, self.numbers
         problem = Problem(self.model, (experiment,), Unknowns(own), *known)
         return problem.outputs(solve(problem).vector, 0)
+
+
+def _check_names(model: Equations, table: str, names: Iterable[str]) -> None:
+    """Refuse a name that the model's parameters do not have."""
+    paths = parameter_paths(model)
+    for name in names:
+        if name not in paths and not name.startswith((START, OFFSET)):
+            raise UnknownNameError(
+                f"{model.name} has no parameter '{name}', which {table} names"
+                f"{meant(name, paths)}; it has {', '.join(paths)}."
+            )
 
 
 def _unknown(name: str, entry: Range | Unknown) -> Unknown:

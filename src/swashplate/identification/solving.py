@@ -304,6 +304,7 @@ def solve_from(
     origin: Mapping[str, str] | None = None,
     resume: bool = False,
     watch: Callable[[Solution, int], None] | None = None,
+    enough: Callable[[Solution], bool] | None = None,
     **settings: float,
 ) -> tuple[Solution, ...]:
     """Solve from each start; results in the order of the starts, whoever computed them.
@@ -324,6 +325,8 @@ def solve_from(
     watch : callable, optional
         Called with each result and how many there are by now. Ctrl-C ends it; what was done
         is returned, fewer results than starts, if there is anything.
+    enough : callable, optional
+        Called with each result; the first for which it is true ends the search.
     **settings :
         `tolerance` and `max_evaluations`, as of `solve`.
 
@@ -348,6 +351,8 @@ def solve_from(
                 write_text(kept.model_dump_json(indent=1) + "\n", store / name)
             if watch is not None:
                 watch(result, len(done))
+            if enough is not None and enough(result):
+                break
     except KeyboardInterrupt:
         if not done:
             raise

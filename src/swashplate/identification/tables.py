@@ -9,10 +9,9 @@ from collections.abc import Collection, Sequence
 from math import inf
 from typing import TYPE_CHECKING, NamedTuple
 
-from swashplate.errors import InputError
 from swashplate.identification.determination import GAUGES, without_value
 from swashplate.identification.drive_model import START_PRESSURE, DriveModel, true_value
-from swashplate.identification.intervals import Estimate, Status
+from swashplate.identification.intervals import Estimate, Interval, Status
 from swashplate.identification.model import EDGE
 from swashplate.identification.noise import LEVEL
 from swashplate.identification.setup import ModelSetup
@@ -78,10 +77,11 @@ def estimates_table(
         ),
         si=True,
     )
-    for unknown, estimate in zip(unknowns, _estimates(stage), strict=True):
+    for unknown, estimate in zip(unknowns, stage.estimates, strict=True):
         if (unknown.run is None) == own:
             continue
-        name, value, status, error, low, high, _ = estimate
+        name, value = estimate.name, estimate.value
+        low, high = estimate.interval
         factor, true, holds = chosen_unit(unknown.unit).factor, None, ""
         if truth is not None:
             assert isinstance(stage.problem.model, DriveModel)
@@ -105,10 +105,10 @@ def estimates_table(
             Cell(low, shown[1]),
             Cell(high, shown[2]),
             _half_width(value, low, high),
-            error,
-            status,
+            estimate.standard_error,
+            estimate.status,
             unit=unknown.unit,
-            look=status != "estimated",
+            look=estimate.status != "estimated",
         )
     return made
 
@@ -136,19 +136,6 @@ def profiles_table(found: Identification) -> Table:
     return made
 
 
-def _estimates(stage: StageFit) -> Sequence[Estimate]:
-    """The estimates, without intervals where too few samples tell the noise."""
-    try:
-        return stage.uncertainty.estimates
-    except InputError:
-        point = stage.problem.unknowns.at(stage.solution.vector)
-        values = zip(point, point.estimates.tolist(), strict=True)
-        return [
-            Estimate(name, value, "undetermined", None, None, None, unknown.unit)
-            for name, (unknown, value) in zip(point.names, values, strict=True)
-        ]
-
-
 def estimates_of(fit: Fit) -> dict[str, Estimate]:
     """What a fit says of every number: what each stage estimated, then what stayed fixed.
 
@@ -156,7 +143,7 @@ def estimates_of(fit: Fit) -> dict[str, Estimate]:
     """
     made: dict[str, Estimate] = {}
     for stage in fit.stages:
-        for unknown, estimate in zip(stage.problem.unknowns, _estimates(stage), strict=True):
+        for unknown, estimate in zip(stage.problem.unknowns, stage.estimates, strict=True):
             made[estimate.name] = estimate
             if unknown.run is None:
                 made.update(dict.fromkeys(unknown.targets, estimate))
@@ -164,7 +151,7 @@ def estimates_of(fit: Fit) -> dict[str, Estimate]:
     for name, value in parameters.numbers.items():
         unit = "" if isinstance(parameters, ModelSetup) else parameters[name].unit
         status: Status = "from the forces" if name in moved else "fixed"
-        made.setdefault(name, Estimate(name, value, status, None, None, None, unit))
+        made.setdefault(name, Estimate(name, value, unit, Interval(status)))
     return made
 
 

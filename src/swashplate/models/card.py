@@ -36,7 +36,7 @@ class Card(NamedTuple):
     plus: Channel
     minus: Channel
     tau: Annotated[float, Definition("delay", "s", lower=0.0, upper=10.0, source="3.4",
-        needs=BEYOND)]
+        needs=BEYOND, plausible=(0.0, 10.0))]
     # fmt: on
 
 

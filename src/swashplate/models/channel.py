@@ -29,32 +29,41 @@ CHANGING = "a current that changes"
 
 
 class Channel(NamedTuple):
-    """Parameters of one channel."""
+    """Parameters of one channel.
+
+    Plausible are currents of up to 100 A, alone or by each term of the gain at 10 V: solenoids take
+    0.1 to 3 A. Times are those of electronics and ramps, from 1 µs to hours.
+    """
 
     # fmt: off
     V_dz: Annotated[float, Definition("dead zone of the card", "V", lower=0.0, upper=10.0,
-        source="3.3", needs=BEYOND)]
+        source="3.3", needs=BEYOND, plausible=(0.0, 10.0))]
     J: Annotated[float, Definition("current jump at the edge of the dead zone", "A", lower=0.0,
-        source="3.3", needs=BEYOND)]
-    G1: Annotated[float, Definition("linear gain", "A/V", source="3.3", needs=BEYOND)]
-    G2: Annotated[float, Definition("quadratic gain", "A/V^2", source="3.3", needs=BEYOND)]
-    G3: Annotated[float, Definition("cubic gain", "A/V^3", source="3.3", needs=BEYOND)]
+        source="3.3", needs=BEYOND, plausible=(0.0, 100.0))]
+    G1: Annotated[float, Definition("linear gain", "A/V", source="3.3", needs=BEYOND,
+        plausible=(0.0, 10.0))]
+    G2: Annotated[float, Definition("quadratic gain", "A/V^2", source="3.3", needs=BEYOND,
+        plausible=(0.0, 1.0))]
+    G3: Annotated[float, Definition("cubic gain", "A/V^3", source="3.3", needs=BEYOND,
+        plausible=(0.0, 0.1))]
     zeta: Annotated[float, Definition("damping ratio of the current filter", "1", above=0.0,
-        source="3.6", needs=CHANGING)]
+        source="3.6", needs=CHANGING, plausible=(1e-3, 1e3))]
     omega: Annotated[float, Definition("natural frequency of the current filter", "rad/s",
-        above=0.0, source="3.6", needs=CHANGING)]
+        above=0.0, source="3.6", needs=CHANGING, plausible=(0.1, 1e6))]
     C: Annotated[float, Definition("Coulomb-like term of the current filter", "A/s^2", lower=0.0,
-        source="3.6", needs=CHANGING)]
+        source="3.6", needs=CHANGING, plausible=(0.0, 1e6))]
     lim1: Annotated[float, Definition("rate limit away from zero", "A/s", above=0.0,
-        can_be_off=True, source="3.8", needs="a current rising at its limit")]
+        can_be_off=True, source="3.8", needs="a current rising at its limit",
+        plausible=(1e-4, 1e5))]
     lim2: Annotated[float, Definition("rate limit towards zero", "A/s", above=0.0, can_be_off=True,
-        source="3.9", needs="a current falling at its limit")]
+        source="3.9", needs="a current falling at its limit", plausible=(1e-4, 1e5))]
     I_t1: Annotated[float, Definition("current above which lim1 acts", "A", lower=0.0,
-        can_be_off=True, source="3.8", needs="a current held back at I_t1")]
+        can_be_off=True, source="3.8", needs="a current held back at I_t1",
+        plausible=(0.0, 100.0))]
     I_t2: Annotated[float, Definition("current below which the decay acts", "A", lower=0.0,
-        source="3.9", needs="a current that decays from I_t2")]
+        source="3.9", needs="a current that decays from I_t2", plausible=(0.0, 100.0))]
     a: Annotated[float, Definition("rate of the final decay", "1/s", lower=0.0, can_be_off=True,
-        source="3.9", needs="a current that decays to its end")]
+        source="3.9", needs="a current that decays to its end", plausible=(0.0, 1e6))]
     # fmt: on
 
 

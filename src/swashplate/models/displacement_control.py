@@ -32,91 +32,110 @@ PRESSURE, ZERO, TRAVEL, FORCE, MOTION = "pressure", "zero", "travel", "force", "
 
 
 class Pump(NamedTuple):
-    """Parameters of pump and motor, then those of the refinements, then the prime mover's."""
+    """Parameters of pump and motor, then those of the refinements, then the prime mover's.
+
+    Plausible is three to four decades about Kruse's machines and the packaged start, and beyond
+    where machines are: each term of a solenoid's force reaches 10 kN at 10 mA, torques are those of
+    the slew ring of the largest cranes, a motor of 10 kW at 3000 rpm that loses a tenth of its
+    speed leaks 1 rad/(s N m), and one of 0.1 cm³ a turn has 6e7 rad/m³.
+    """
 
     # fmt: off
     Z1: Annotated[float, Definition("pressure to swash plate tangent", "1/Pa", above=0.0,
-        source="6.55", stands_for="A_s/(k_r d4)", symmetry={PRESSURE: -1.0})]
-    Z2: Annotated[float, Definition("offset of the swash plate tangent", "1", source="6.55")]
+        source="6.55", stands_for="A_s/(k_r d4)", symmetry={PRESSURE: -1.0},
+        plausible=(1e-11, 1e-3))]
+    Z2: Annotated[float, Definition("offset of the swash plate tangent", "1", source="6.55",
+        plausible=(0.0, 10.0))]
     Z3: Annotated[float, Definition("arm ratio of the feedback", "1", above=0.0, source="6.59",
-        stands_for="d4/d3")]
+        stands_for="d4/d3", plausible=(1e-4, 1e4))]
     Z4: Annotated[float, Definition("squared moment of the feedback spring", "N^2 m^2", above=0.0,
-        source="6.57", stands_for="k_f² d3⁴", symmetry={TRAVEL: 2.0, FORCE: 2.0})]
+        source="6.57", stands_for="k_f² d3⁴", symmetry={TRAVEL: 2.0, FORCE: 2.0},
+        plausible=(1e-8, 1e4))]
     Z5: Annotated[float, Definition("arm of the spool", "m", above=0.0, source="6.57",
-        stands_for="d1", symmetry={TRAVEL: 1.0})]
+        stands_for="d1", symmetry={TRAVEL: 1.0}, plausible=(1e-6, 1.0))]
     Z6: Annotated[float, Definition("piston motion against oil stiffness", "1", lower=0.0,
-        source="6.67", stands_for="A_s² B/(k_r V)")]
+        source="6.67", stands_for="A_s² B/(k_r V)", plausible=(0.0, 1e6))]
     Z7: Annotated[float, Definition("leakage around the stroking piston", "1/s", lower=0.0,
-        source="6.64", stands_for="K_L B/V", switch="leaky")]
+        source="6.64", stands_for="K_L B/V", switch="leaky", plausible=(0.0, 1e6))]
     Z8: Annotated[float, Definition("flow gain of the valve", "sqrt(Pa)/(m s)", above=0.0,
         source="6.67", stands_for="C_o B/V",
-        symmetry={PRESSURE: 0.5, TRAVEL: -1.0, MOTION: 1.0})]
+        symmetry={PRESSURE: 0.5, TRAVEL: -1.0, MOTION: 1.0}, plausible=(10.0, 1e11))]
     Z9: Annotated[float, Definition("supply pressure less static pressure", "Pa", above=0.0,
-        source="6.67", stands_for="ΔP − P0", symmetry={PRESSURE: 1.0, ZERO: 1.0})]
+        source="6.67", stands_for="ΔP − P0", symmetry={PRESSURE: 1.0, ZERO: 1.0},
+        plausible=(1e4, 1e9))]
     Z10: Annotated[float, Definition("swash plate angle to shaft speed", "1/s", above=0.0,
-        source="6.69", stands_for="K_mf C_q")]
+        source="6.69", stands_for="K_mf C_q", plausible=(1e-6, 1e6))]
     Z11: Annotated[float, Definition("speed lost to static load", "rad/s", source="6.69",
-        stands_for="K_mL C_g")]
+        stands_for="K_mL C_g", plausible=(0.0, 1e4))]
     Z12: Annotated[float, Definition("speed lost to accelerating load", "1", source="6.69",
-        stands_for="K_mL K_mf C_i C_q", switch="loaded")]
+        stands_for="K_mL K_mf C_i C_q", switch="loaded", plausible=(0.0, 1e4))]
     Z13_plus: Annotated[float, Definition("stop of the swash plate", "rad", above=0.0, upper=pi / 2,
-        source="8.9", needs="the swash plate at its stop")]
+        source="8.9", needs="the swash plate at its stop", plausible=(1e-3, pi / 2))]
     Z13_minus: Annotated[float, MINUS]
     Z14: Annotated[float, Definition("stroke of the spool", "m", above=0.0, can_be_off=True,
-        source="6.36", symmetry={TRAVEL: 1.0}, needs="the spool at its stop")]
+        source="6.36", symmetry={TRAVEL: 1.0}, needs="the spool at its stop",
+        plausible=(1e-8, 1.0))]
     Z15: Annotated[float, Definition("largest stroking pressure", "Pa", above=0.0, can_be_off=True,
-        source="6.2.5", symmetry={PRESSURE: 1.0}, needs="the relief valve open")]
+        source="6.2.5", symmetry={PRESSURE: 1.0}, needs="the relief valve open",
+        plausible=(1e4, 1e10))]
     Z16_plus: Annotated[float, Definition("opening at which the orifice limits the flow", "m",
         above=0.0, can_be_off=True, source="6.71", symmetry={TRAVEL: 1.0},
-        needs="an orifice limiting the flow")]
+        needs="an orifice limiting the flow", plausible=(1e-8, 0.1))]
     Z16_minus: Annotated[float, MINUS]
     Z17: Annotated[float, Definition("dead zone of the solenoids", "A", lower=0.0, source="6.61",
-        needs=DRIVEN)]
+        needs=DRIVEN, plausible=(0.0, 100.0))]
     Z18: Annotated[float, Definition("neutral offset of the spool", "m", source="6.57",
-        symmetry={TRAVEL: 1.0})]
+        symmetry={TRAVEL: 1.0}, plausible=(0.0, 0.1))]
     Z19_plus: Annotated[float, Definition("solenoid force, linear", "N/A", source="6.61",
-        symmetry={FORCE: 1.0}, needs=DRIVEN)]
+        symmetry={FORCE: 1.0}, needs=DRIVEN, plausible=(0.0, 1e6))]
     Z19_minus: Annotated[float, MINUS]
     Z20_plus: Annotated[float, Definition("solenoid force, quadratic", "N/A^2", source="6.61",
-        symmetry={FORCE: 1.0}, needs=DRIVEN)]
+        symmetry={FORCE: 1.0}, needs=DRIVEN, plausible=(0.0, 1e8))]
     Z20_minus: Annotated[float, MINUS]
     Z21_plus: Annotated[float, Definition("solenoid force, cubic", "N/A^3", source="6.61",
-        symmetry={FORCE: 1.0}, needs=DRIVEN)]
+        symmetry={FORCE: 1.0}, needs=DRIVEN, plausible=(0.0, 1e10))]
     Z21_minus: Annotated[float, MINUS]
     Z22_plus: Annotated[float, Definition("solenoid force, quartic", "N/A^4", source="6.61",
-        symmetry={FORCE: 1.0}, needs=DRIVEN)]
+        symmetry={FORCE: 1.0}, needs=DRIVEN, plausible=(0.0, 1e12))]
     Z22_minus: Annotated[float, MINUS]
     spool_friction: Annotated[float, Definition("friction of spool and solenoid", "N", lower=0.0,
-        stands_for="F_s", default=0.0, switch="friction", least=1e-07)] = 0.0
+        stands_for="F_s", default=0.0, switch="friction", least=1e-07, plausible=(0.0, 1e4))] = 0.0
     spool_presliding: Annotated[float, Definition("travel over which that friction builds up", "m",
-        lower=0.0, stands_for="x_s", default=0.0, least=1e-10)] = 0.0
+        lower=0.0, stands_for="x_s", default=0.0, least=1e-10, plausible=(0.0, 0.1))] = 0.0
     dither_time: Annotated[float, Definition("time constant with which dither frees the spool", "s",
-        above=0.0, can_be_off=True, stands_for="T", default=inf, least=1e-06)] = inf
+        above=0.0, can_be_off=True, stands_for="T", default=inf, least=1e-06,
+        plausible=(1e-6, 1e4))] = inf
     solenoid_hysteresis: Annotated[float, Definition("half-width of the solenoids' hysteresis", "A",
-        lower=0.0, stands_for="r", default=0.0, switch="hysteresis", least=1e-08)] = 0.0
+        lower=0.0, stands_for="r", default=0.0, switch="hysteresis", least=1e-08,
+        plausible=(0.0, 100.0))] = 0.0
     load_torque: Annotated[float, Definition("static torque of the load at the shaft", "N m",
-        stands_for="C_g, positive against positive speed", default=0.0)] = 0.0
+        stands_for="C_g, positive against positive speed", default=0.0,
+        plausible=(0.0, 1e10))] = 0.0
     load_inertia: Annotated[float, Definition("inertia of motor and load at the shaft", "kg m^2",
-        lower=0.0, stands_for="C_i, J", default=0.0, least=1e-06)] = 0.0
+        lower=0.0, stands_for="C_i, J", default=0.0, least=1e-06, plausible=(0.0, 1e12))] = 0.0
     motor_leakage: Annotated[float, Definition("speed lost to leakage for a torque", "rad/(s N m)",
-        lower=0.0, stands_for="K_mL", default=0.0, switch="leakage", least=1e-15)] = 0.0
+        lower=0.0, stands_for="K_mL", default=0.0, switch="leakage", least=1e-15,
+        plausible=(0.0, 1.0))] = 0.0
     cam_ripple: Annotated[float, Definition("variation of the motor's displacement without load",
         "1", lower=0.0, upper=1.0, stands_for="ε0", default=0.0, switch="ripple",
-        least=1e-09)] = 0.0
+        least=1e-09, plausible=(0.0, 1.0))] = 0.0
     cam_ripple_per_torque: Annotated[float, Definition("growth of that variation with the load",
-        "1/(N m)", lower=0.0, stands_for="ε1", default=0.0, switch="ripple", least=1e-15)] = 0.0
+        "1/(N m)", lower=0.0, stands_for="ε1", default=0.0, switch="ripple", least=1e-15,
+        plausible=(0.0, 1.0))] = 0.0
     cam_cycles: Annotated[float, Definition("cycles of the cam ring in a turn", "1", above=0.0,
-        stands_for="n", default=5.5, least=1e-06)] = 5.5
+        stands_for="n", default=5.5, least=1e-06, plausible=(1e-2, 1e4))] = 5.5
     cam_phase: Annotated[float, Definition("phase of the cam ring at the start", "rad",
-        stands_for="ψ", default=0.0)] = 0.0
+        stands_for="ψ", default=0.0, plausible=(0.0, 100.0))] = 0.0
     swash_damping: Annotated[float, Definition("time constant of the swash plate's damping", "s",
-        lower=0.0, stands_for="T", default=0.0, switch="damping", least=1e-09)] = 0.0
+        lower=0.0, stands_for="T", default=0.0, switch="damping", least=1e-09,
+        plausible=(0.0, 100.0))] = 0.0
     line_stiffness: Annotated[float, Definition("stiffness of the line's oil at the shaft",
-        "N m/rad", lower=0.0, stands_for="k", default=0.0, switch="line", least=0.001)] = 0.0
+        "N m/rad", lower=0.0, stands_for="k", default=0.0, switch="line", least=0.001,
+        plausible=(0.0, 1e15))] = 0.0
     motor_constant: Annotated[float, Definition("motor speed for a flow", "rad/m^3", lower=0.0,
-        stands_for="K_mf", default=0.0, least=1e-06)] = 0.0
+        stands_for="K_mf", default=0.0, least=1e-06, plausible=(1e-3, 1e8))] = 0.0
     pump_speed: Annotated[float, Definition("speed of the prime mover, relative to that of Z10",
-        "1", above=0.0, default=1.0)] = 1.0
+        "1", above=0.0, default=1.0, plausible=(0.0, 10.0))] = 1.0
     # fmt: on
 
 

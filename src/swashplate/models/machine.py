@@ -24,73 +24,79 @@ ATMOSPHERE = 101325.0
 
 
 class Machine(NamedTuple):
-    """Physical parameters of a machine, from the spool to the load."""
+    """Physical parameters of a machine, from the spool to the load.
+
+    Plausible is three decades or more about what the packaged sets have or assume; a mass or an
+    inertia may be as small as one likes, towards the model without it.
+    """
 
     # fmt: off
     spool_arm: Annotated[float, Definition("arm from the pivot to the spool", "m", above=0.0,
-        stands_for="d1")]
+        stands_for="d1", plausible=(1e-6, 1.0))]
     spool_mass: Annotated[float, Definition("mass of the spool", "kg", above=0.0,
-        stands_for="m_sp")]
+        stands_for="m_sp", plausible=(0.0, 100.0))]
     feedback_arm_inertia: Annotated[float, Definition("inertia of the spool's feedback arm",
-        "kg m^2", 0.0, stands_for="J_fa")]
+        "kg m^2", 0.0, stands_for="J_fa", plausible=(0.0, 10.0))]
     spool_damping: Annotated[float, Definition("viscous damping of the spool", "N s/m", 0.0,
-        stands_for="b_sp")]
+        stands_for="b_sp", plausible=(0.0, 1e6))]
     feedback_spring_rate: Annotated[float, Definition("stiffness of the feedback spring", "N/m",
-        above=0.0, stands_for="k_f")]
+        above=0.0, stands_for="k_f", plausible=(1.0, 1e9))]
     feedback_spring_arm: Annotated[float, Definition("arm of the feedback spring", "m", above=0.0,
-        stands_for="d3")]
+        stands_for="d3", plausible=(1e-5, 10.0))]
     control_arm: Annotated[float, Definition("arm of the ball on the stroking piston", "m",
-        above=0.0, stands_for="d3'")]
-    plussing: Annotated[float, Definition("spool displacement at rest", "m", stands_for="x0")]
+        above=0.0, stands_for="d3'", plausible=(1e-5, 10.0))]
+    plussing: Annotated[float, Definition("spool displacement at rest", "m", stands_for="x0",
+        plausible=(0.0, 0.1))]
     spool_stroke: Annotated[float, Definition("stroke of the spool, both ways", "m", above=0.0,
-        stands_for="x_max")]
+        stands_for="x_max", plausible=(1e-8, 1.0))]
     orifice_opening_plus: Annotated[float,
         Definition("opening at which the in-line orifice limits the flow", "m", above=0.0,
-        can_be_off=True, stands_for="x_o")]
+        can_be_off=True, stands_for="x_o", plausible=(1e-8, 0.1))]
     orifice_opening_minus: Annotated[float, MINUS]
     valve_flow_gain: Annotated[float, Definition("flow gain of the valve", "m^2/(s sqrt(Pa))",
-        above=0.0, stands_for="C_o")]
+        above=0.0, stands_for="C_o", plausible=(1e-9, 10.0))]
     supply_pressure: Annotated[float, Definition("supply pressure less reservoir pressure", "Pa",
-        above=0.0, stands_for="ΔP")]
+        above=0.0, stands_for="ΔP", plausible=(1e4, 1e9))]
     oil_volume: Annotated[float, Definition("oil under pressure at the stroking piston", "m^3",
-        above=0.0, stands_for="V")]
+        above=0.0, stands_for="V", plausible=(1e-9, 1.0))]
     bulk_modulus: Annotated[float, Definition("bulk modulus of the oil", "Pa", above=0.0,
-        stands_for="B")]
+        stands_for="B", plausible=(1e7, 1e11))]
     piston_leakage: Annotated[float, Definition("leakage around the stroking piston", "m^3/(s Pa)",
-        0.0, stands_for="K_L")]
+        0.0, stands_for="K_L", plausible=(0.0, 1e-6))]
     piston_area: Annotated[float, Definition("area of the stroking piston", "m^2", above=0.0,
-        stands_for="A_s")]
+        stands_for="A_s", plausible=(1e-7, 1.0))]
     relief_pressure: Annotated[float, Definition("pressure of the relief valve", "Pa", above=0.0,
-        can_be_off=True, stands_for="P_r")]
+        can_be_off=True, stands_for="P_r", plausible=(1e4, 1e10))]
     swash_arm: Annotated[float, Definition("arm of the stroking piston on the swash plate", "m",
-        above=0.0, stands_for="d4")]
+        above=0.0, stands_for="d4", plausible=(1e-4, 10.0))]
     swash_inertia: Annotated[float, Definition("inertia of the swash plate", "kg m^2", above=0.0,
-        stands_for="J_sw")]
+        stands_for="J_sw", plausible=(0.0, 1e4))]
     piston_mass: Annotated[float, Definition("mass of the stroking piston", "kg", 0.0,
-        stands_for="m_st")]
+        stands_for="m_st", plausible=(0.0, 1e4))]
     piston_damping: Annotated[float, Definition("viscous damping of the stroking piston", "N s/m",
-        0.0, stands_for="b_st")]
+        0.0, stands_for="b_st", plausible=(0.0, 1e9))]
     return_spring_rate: Annotated[float, Definition("stiffness of the return spring", "N/m",
-        above=0.0, stands_for="k_r")]
+        above=0.0, stands_for="k_r", plausible=(1.0, 1e11))]
     swash_stop_plus: Annotated[float, Definition("stop of the swash plate", "rad", above=0.0,
-        upper=pi / 2, stands_for="α_max")]
+        upper=pi / 2, stands_for="α_max", plausible=(1e-3, pi / 2))]
     swash_stop_minus: Annotated[float, MINUS]
     pumping_area: Annotated[float, Definition("effective area of the pumping pistons", "m^2", 0.0,
-        stands_for="A_p")]
+        stands_for="A_p", plausible=(0.0, 1.0))]
     pumping_arm: Annotated[float, Definition("arm of the pumping pistons' force on the plate", "m",
-        0.0, stands_for="d5")]
+        0.0, stands_for="d5", plausible=(0.0, 1.0))]
     motor_constant: Annotated[float, Definition("motor speed over flow", "rad/m^3", above=0.0,
-        stands_for="K_mf")]
+        stands_for="K_mf", plausible=(1e-3, 1e8))]
     pump_flow_gain: Annotated[float, Definition("pump flow over swash angle", "m^3/s", above=0.0,
-        stands_for="C_q")]
+        stands_for="C_q", plausible=(1e-8, 1e3))]
     motor_leakage: Annotated[float, Definition("motor speed lost over load torque",
-        "rad/(s N m)", 0.0, stands_for="K_mL")]
+        "rad/(s N m)", 0.0, stands_for="K_mL", plausible=(0.0, 1.0))]
     load_inertia: Annotated[float, Definition("inertia of the load at the motor", "kg m^2", 0.0,
-        stands_for="C_i")]
+        stands_for="C_i", plausible=(0.0, 1e12))]
     load_torque: Annotated[float, Definition("static torque of the load, against positive speed",
-        "N m", stands_for="C_g")]
+        "N m", stands_for="C_g", plausible=(0.0, 1e10))]
     air_fraction: Annotated[float, Definition("free air over oil at atmospheric pressure", "1", 0.0,
-        upper=1.0, default=0.0, switch=True, least=1e-9, stands_for="χ")] = 0.0
+        upper=1.0, default=0.0, switch=True, least=1e-9, stands_for="χ",
+        plausible=(0.0, 1.0))] = 0.0
     # fmt: on
 
 

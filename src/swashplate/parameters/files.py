@@ -11,7 +11,7 @@ from pydantic import BaseModel, ConfigDict, Field
 from swashplate.documents import parse_toml, read_text, validated
 from swashplate.entries import Name, NotNegative, Number, Positive, Version
 from swashplate.equations.replacement import Replacement, again, found_at, uses
-from swashplate.errors import InputError, MissingFileError, ParameterError
+from swashplate.errors import InputError, MissingFileError, ParameterError, meant
 from swashplate.parameters.definitions import Block, Definition, declare, find, options_of
 from swashplate.parameters.parameter_set import (
     CardSwitch,
@@ -22,8 +22,9 @@ from swashplate.parameters.parameter_set import (
     ParameterSet,
     PressureRoot,
     Status,
-    value_of,
+    meant_value,
 )
+from swashplate.parameters.plausible import check_plausible
 from swashplate.units import to_si
 
 # --- what stands in a file ------------------------------------------------------------------------
@@ -119,8 +120,10 @@ def preset_names() -> tuple[str, ...]:
 def load_preset(name: str) -> ParameterSet:
     """A packaged parameter set; the `ParameterError` for an unknown name lists the right ones."""
     if name not in preset_names():
+        names = preset_names()
         raise ParameterError(
-            f"There is no packaged parameter set '{name}'; there are {', '.join(preset_names())}."
+            f"There is no packaged parameter set '{name}'{meant(str(name), names)}; there are "
+            f"{', '.join(names)}; a parameter file is read with Drive.from_toml."
         )
     return read_set(SETS.joinpath(f"{name}.toml").read_text("utf-8"), f"{name}.toml")
 
@@ -171,7 +174,8 @@ def set_file(name: str | Path) -> Path | None:
     if path.suffix.lower() == ".toml" or len(path.parts) > 1 or path.is_file():
         return path
     raise MissingFileError(
-        f"There is no packaged set, file or folder '{name}'; packaged are "
+        f"There is no packaged set, file or folder '{name}'{meant(str(name), preset_names())}; "
+        "packaged are "
         f"{', '.join(preset_names())}."
     )
 
@@ -284,7 +288,8 @@ def parameter_of(definition: Definition, entry: Entry) -> Parameter:
     if len(numbers) == 2 and not definition.directional:
         raise ParameterError(f"{what} has one value, not a plus and a minus one.")
     change = numbers if len(numbers) == 2 else numbers[0]
-    value = value_of(definition.symbol, definition, change)
+    value = meant_value(definition.symbol, definition, change)
+    check_plausible(f"a bound of {definition.symbol}", definition, *bounds)
     return Parameter(definition, value, entry.source, entry.status, bounds or None)  # type: ignore[arg-type]
 
 

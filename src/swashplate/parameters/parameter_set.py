@@ -26,9 +26,10 @@ from swashplate.parameters.definitions import (
     options_of,
     unknown_parameter,
 )
+from swashplate.parameters.plausible import check_plausible
 from swashplate.parameters.rules import broken_rules, check_options, refuse
 from swashplate.results import Result
-from swashplate.tables import UNIT, Column, Table
+from swashplate.tables import UNIT, Column, Table, listed
 from swashplate.units import Quantity, in_si
 
 PressureRoot = Literal["published", "symmetric"]
@@ -258,6 +259,15 @@ class ParameterSet(Entries):
         own = {SWITCHES[symbol] for symbol in CATALOGUE if symbol in SWITCHES}
         return replace(self, parameters=parameters, options=self.options & own, equations=())
 
+    def unreached_sentence(self, drive: str = "this drive") -> str:
+        """What the tests of a drive, as it is called, left open; empty if it is nothing."""
+        if not self.unreached:
+            return ""
+        return (
+            f"No test of {drive} reached {listed([*self.unreached])}: beyond what was tested it is "
+            "extrapolated."
+        )
+
     def tables(self) -> list[Table]:
         """Every parameter with its unit and status, a table for each block that the set has.
 
@@ -285,7 +295,7 @@ class ParameterSet(Entries):
             made += [table] if members else []
         return made
 
-    def replace(self, changes: Mapping[str, Change], options: frozenset[str] | None = None) -> Self:
+    def replace(self, changes: Mapping[str, Change]) -> Self:
         """Copy with other values, marked as the user's.
 
         Parameters
@@ -293,6 +303,27 @@ class ParameterSet(Entries):
         changes : mapping
             Symbol (``Z16``, both directions or a pair) or column (``Z16_plus``) to value: a number
             in SI, or a Pint quantity.
+
+        Raises
+        ------
+        ParameterError
+            For an unknown name, a pair for a parameter without directions, a value beyond its
+            plausible range, or a broken rule.
+        """
+        for name, change in changes.items():
+            definition = find(name)
+            meant_value(name, definition, change, self[definition.symbol])
+        return self.with_numbers(changes)
+
+    def with_numbers(
+        self, changes: Mapping[str, Change], options: frozenset[str] | None = None
+    ) -> Self:
+        """As `replace`, for numbers that nobody wrote: of any size that the rules allow.
+
+        Parameters
+        ----------
+        changes : mapping
+            As of `replace`.
         options : frozenset of str, optional
             Terms that count then. By default a refinement whose parameters are changed comes on
             where one of them is not 0, and goes off where all are.
@@ -300,7 +331,7 @@ class ParameterSet(Entries):
         Raises
         ------
         ParameterError
-            For an unknown name, a pair for a parameter without directions, or a broken rule.
+            As `replace`, but for the plausible ranges.
         """
         parameters = dict(self.parameters)
         for name, change in changes.items():
@@ -318,7 +349,7 @@ class ParameterSet(Entries):
         return replace(self, parameters=parameters, options=options, unreached=unreached)
 
     def scale(self, factors: Mapping[str, Change]) -> Self:
-        """Copy with values multiplied by factors; names as in `replace`."""
+        """Copy with values multiplied by factors; names and errors as of `replace`."""
         changes: dict[str, Change] = {}
         for name, factor in factors.items():
             numbers, columns = self[find(name).symbol].numbers, columns_of([name])
@@ -357,6 +388,18 @@ def value_of(
         return Pair(numbers[0], numbers[-1])
     assert old is not None
     return Pair(*(old.numbers | {name: numbers[0]}).values())
+
+
+def meant_value(
+    name: str, definition: Definition, change: Change, old: Parameter | None = None
+) -> Value:
+    """The same as `value_of` of a number that somebody wrote; refuses one that is not plausible."""
+    value = value_of(name, definition, change, old)
+    numbers = tuple(value) if isinstance(value, Pair) else (value,)
+    for column, number in zip(definition.columns, numbers, strict=True):
+        if name in (definition.symbol, column):
+            check_plausible(column, definition, number)
+    return value
 
 
 class HasParameters(Protocol):

@@ -81,17 +81,20 @@ def sheet(
     *,
     legend: Sequence[Artist] = (),
     lines: int = 0,
+    columns: int = 1,
 ) -> tuple[Figure, list[Axes]]:
     """A figure of panels over one abscissa, dressed: labels of ordinates and of what is below.
 
     Heights [inch] are from the top. Above the first panel stand the handles of a legend, and so
-    many lines of words besides.
+    many lines of words besides. Several columns come one after another, each from the top.
     """
     rows = lines + (legend_rows(legend) if legend else 0)
     inside = sum(heights) + GAP * (len(heights) - 1)
     figure = new_figure(WIDTH, HEAD + ROW * rows + inside + FOOT)
     ratios = {"height_ratios": heights}
-    axes = list(figure.subplots(len(heights), sharex=True, squeeze=False, gridspec_kw=ratios)[:, 0])
+    size = len(heights), columns
+    grid = figure.subplots(*size, sharex=True, squeeze=False, gridspec_kw=ratios)
+    axes = list(grid.T.ravel())
     for ax, label in zip(axes, [*labels, *[""] * len(axes)], strict=False):
         dress(ax, label)
     if below:
@@ -156,15 +159,6 @@ def legend_within(ax: Axes, handles: Sequence[Artist], location: Any = "best") -
         edgecolor="none",
         framealpha=0.85,
     )
-
-
-def root_figure(ax: Axes) -> Figure:
-    """The whole figure that a panel is in."""
-    from matplotlib.figure import Figure
-
-    figure = ax.get_figure(root=True)
-    assert isinstance(figure, Figure)
-    return figure
 
 
 def write_title(figure: Figure, title: str) -> None:

@@ -100,7 +100,7 @@ def with_equation(parameters: ParameterSet, made: Replacement) -> ParameterSet:
     if made.parameters is None:
         return found
     defaults = made.parameters._field_defaults
-    return found.replace(defaults, found.options)
+    return found.with_numbers(defaults, found.options)
 
 
 def card_of(parameters: ParameterSet) -> Card:
@@ -230,4 +230,4 @@ def at_every_rate(parameters: ParameterSet) -> ParameterSet:
         changes[f"omega_{side}"] = made
         changes[f"zeta_{side}"] = -float((first + second).real) / (2.0 * made)
         changes[f"C_{side}"] = C * (made / omega) ** 2
-    return replace(parameters.replace(changes, parameters.options), rate=None)
+    return replace(parameters.with_numbers(changes, parameters.options), rate=None)

@@ -272,7 +272,13 @@ class Simulation(Run):
 
     @overload
     def plot(
-        self, signals: str | Sequence[str] = (), *, ax: GivenAxes, label: str = ""
+        self,
+        signals: str | Sequence[str] = (),
+        *,
+        ax: GivenAxes,
+        label: str = "",
+        window: tuple[float, float] | None = None,
+        title: str | None = None,
     ) -> GivenAxes: ...
 
     def plot(
@@ -295,9 +301,9 @@ class Simulation(Run):
         label : str
             Of the curves: each panel gets a legend of all labelled curves in it.
         window : (float, float), optional
-            Of the chain, first and last instant to show. [s]
+            First and last instant to show. [s]
         title : str, optional
-            Of the chain, in the place of the drive's name.
+            In the place of the drive's name; axes that are given have none by default.
 
         Returns
         -------
@@ -306,13 +312,13 @@ class Simulation(Run):
         Raises
         ------
         InputError
-            For a signal that there is not, another number of axes, or a window or title of signals.
+            For a signal that there is not, another number of axes, or a window with fewer than two
+            samples.
         """
         if not signals and ax is None:
             draw = figures().plot_simulation
             return cast("Figure", draw(self, window=window, title=title))
-        if window is not None or title is not None:
-            raise InputError("A window or a title is for the figure of the chain: leave out both.")
         draw = figures().plot_signals
         chosen = (signals,) if isinstance(signals, str) else tuple(signals)
-        return cast("Figure", draw(self, chosen or ("shaft_speed",), ax=ax, label=label))
+        chosen = chosen or ("shaft_speed",)
+        return cast("Figure", draw(self, chosen, ax=ax, label=label, window=window, title=title))

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from swashplate.equations.fields import is_real
+from swashplate.equations.fields import Definition, is_real
 from swashplate.equations.marching.part import Stored
 from swashplate.equations.marching.record import (
     Interpolation,
@@ -20,9 +20,10 @@ from swashplate.equations.marching.record import (
 )
 from swashplate.equations.marching.run import Instance, Start, Started, marched
 from swashplate.equations.marching.use import Stepper
-from swashplate.errors import DomainError, InputError
+from swashplate.errors import DomainError, InputError, ParameterError
 from swashplate.maneuvers import Maneuver, sampled
 from swashplate.parameters.parameter_set import ParameterSet
+from swashplate.parameters.plausible import check_plausible
 from swashplate.parameters.rules import FULL_VOLTAGE
 from swashplate.simulation.instance import (
     check_filter_stability,
@@ -30,21 +31,28 @@ from swashplate.simulation.instance import (
     models_of,
     without_ripple,
 )
-from swashplate.simulation.result import UNITS, Simulation
+from swashplate.simulation.result import MEASURED, UNITS, Simulation
 from swashplate.units import in_si
 
 Array = NDArray[np.float64]
-RANGES: Mapping[str, tuple[float, float, str]] = {
-    "load_torque": (-1e12, 1e12, "it is a torque at the shaft in N m"),
-    "supply_pressure": (1.0, 1e9, "it is the supply less the static pressure in Pa"),
-    "pump_speed": (
-        0.0,
-        10.0,
-        "it is the speed of the prime mover over the one that Z10 belongs to, 1 if they are equal",
-    ),
+
+
+def _input(name: str, lower: float, upper: float, plausible: tuple[float, float]) -> Definition:
+    unit, meaning = MEASURED[name]
+    return Definition(meaning, unit, lower, upper, plausible=plausible, symbol=name)
+
+
+INPUTS: Mapping[str, Definition] = {
+    "load_torque": _input("load_torque", -1e12, 1e12, (0.0, 1e10)),
+    "supply_pressure": _input("supply_pressure", 1.0, 1e9, (1e4, 1e9)),
+    "pump_speed": _input("pump_speed", 0.0, 10.0, (0.0, 10.0)),
 }
-"""Least and largest value of each measured input, and what it is: beyond any machine, so that what
-lies outside is in another unit or no measurement."""
+"""What each measured input is. The range is that of a sample, beyond any machine: what lies outside
+is in another unit or no measurement. What is plausible is the largest size in a record."""
+RANGES: Mapping[str, tuple[float, float]] = {
+    name: (definition.lower, definition.upper) for name, definition in INPUTS.items()
+}
+"""Least and largest sample of each, as a stepper and exported code take it."""
 
 
 def drive_records(
@@ -83,16 +91,26 @@ def drive_records(
     found = on_grid(inputs, rate, time=time, interpolation=between, substeps=steps)
     if driver == "voltage":
         found["voltage"] = check_voltage(found["voltage"], clip)
-    for name, (least, most, meaning) in RANGES.items():
-        if name not in found:
-            continue
-        low, high = float(found[name].values.min()), float(found[name].values.max())
-        if not (low >= least and high <= most):
-            reached = f"falls to {low:g}" if low < least else f"rises to {high:g}"
-            raise InputError(
-                f"The {name} {reached}, but must be from {least:g} to {most:g}: {meaning}."
-            )
+    for name in beside:
+        _check_measured(name, found[name].values)
     return found
+
+
+def _check_measured(name: str, values: Array) -> None:
+    """Refuse a record with a sample that no machine has, or whose size can hardly be meant."""
+    definition, (least, most) = INPUTS[name], RANGES[name]
+    low, high = float(values.min()), float(values.max())
+    try:
+        check_plausible(name, definition, max(low, high, key=abs))
+    except ParameterError as error:
+        raise InputError(str(error)) from None
+    if not (low >= least and high <= most):
+        reached = f"falls to {low:g}" if low < least else f"rises to {high:g}"
+        unit = f" {definition.unit}".removesuffix(" 1")
+        raise InputError(
+            f"The {name} {reached}{unit}, but must be from {least:g} to {most:g}{unit}: it is the "
+            f"{definition.name}."
+        )
 
 
 def check_voltage(record: Record, clip: bool) -> Record:
@@ -183,7 +201,7 @@ def drive_stepper(
         substeps=substeps,
         ranges={
             "voltage": (-FULL_VOLTAGE, FULL_VOLTAGE),
-            **{name: (least, most) for name, (least, most, _) in RANGES.items()},
+            **RANGES,
         },
     )
 

@@ -15,11 +15,13 @@ from typing import (
     Generic,
     Literal,
     NamedTuple,
+    Protocol,
     Self,
     TypeVar,
     Unpack,
     cast,
     overload,
+    runtime_checkable,
 )
 
 import numpy as np
@@ -101,6 +103,8 @@ class Run(Tabular):
     """Signals on the march's grid, as far as they were asked for,"""
     samples: dict[str, Array] = field(default_factory=dict, repr=False)
     """and at the samples."""
+    maneuver: str = ""
+    """Names of the maneuvers among the inputs; empty if there is none."""
 
     shown: ClassVar[tuple[str, ...]] = ()
     """Signals that `plot` shows unless others are named; all of them if none is here."""
@@ -144,6 +148,11 @@ class Run(Tabular):
         return self.instance.name
 
     @property
+    def title(self) -> str:
+        """Names of the model, or of its numbers, and of the maneuver: of a figure."""
+        return f"{self.name}: {self.maneuver}" if self.maneuver else self.name
+
+    @property
     def time(self) -> Array:
         """Time stamps. [s]"""
         return self["time"]
@@ -166,12 +175,24 @@ class Run(Tabular):
 
     @overload
     def plot(
-        self, signals: str | Sequence[str] = (), *, ax: None = None, label: str = ""
+        self,
+        signals: str | Sequence[str] = (),
+        *,
+        ax: None = None,
+        label: str = "",
+        window: tuple[float, float] | None = None,
+        title: str | None = None,
     ) -> Figure: ...
 
     @overload
     def plot(
-        self, signals: str | Sequence[str] = (), *, ax: GivenAxes, label: str = ""
+        self,
+        signals: str | Sequence[str] = (),
+        *,
+        ax: GivenAxes,
+        label: str = "",
+        window: tuple[float, float] | None = None,
+        title: str | None = None,
     ) -> GivenAxes: ...
 
     def plot(
@@ -180,25 +201,48 @@ class Run(Tabular):
         *,
         ax: Axes | Sequence[Axes] | None = None,
         label: str = "",
+        window: tuple[float, float] | None = None,
+        title: str | None = None,
     ) -> Figure | Axes | Sequence[Axes]:
-        """Figure of signals over time, one below the other.
+        """Figure of signals over time, a panel each, with the model's limits.
+
+        Words, units and ranges are those of the `Definition` of each signal, state and input.
 
         Parameters
         ----------
         signals : str or sequence of str
-            Names as of `names`; by default all of them.
+            Names as of `names`; by default the inputs and the model's `outputs`, or all signals if
+            it names no outputs.
         ax : matplotlib axes or sequence of them, optional
             Where to draw the signals, one for each; by default in a new figure.
         label : str
             Of the curves: each panel gets a legend of all labelled curves in it.
+        window : (float, float), optional
+            First and last instant to show. [s]
+        title : str, optional
+            In the place of `title`; axes that are given have none by default.
 
         Returns
         -------
         Figure, or `ax` as it was given
+
+        Raises
+        ------
+        InputError
+            For a signal that there is not, another number of axes, or a window with fewer than two
+            samples.
         """
         chosen = (signals,) if isinstance(signals, str) else tuple(signals)
-        chosen = chosen or self.shown or tuple(name for name in self.names if name != "time")
-        return cast("Figure", figures().plot_signals(self, chosen, ax=ax, label=label))
+        chosen = chosen or self.shown or self._usual
+        draw = figures().plot_signals
+        return cast("Figure", draw(self, chosen, ax=ax, label=label, window=window, title=title))
+
+    @property
+    def _usual(self) -> tuple[str, ...]:
+        """Signals that `plot` shows of a user-defined model."""
+        outputs = self.instance.model.outputs
+        usual = (*self.records, *outputs) if outputs else self.names[1:]
+        return tuple(dict.fromkeys(usual))
 
     def to_polars(self, units: Literal["SI", "display"] = "SI") -> polars.DataFrame:
         """Table of time, all signals and a true/false column ``limit_NAME`` for each limit, SI.
@@ -306,25 +350,54 @@ class Run(Tabular):
         self._march(names, tuple(sorted(parts)))
 
 
+@runtime_checkable
+class Command(Protocol):
+    """An input as a function of time, such as a `swashplate.maneuvers.Maneuver`."""
+
+    # more than is used here, as columns of pandas and polars have a name and draw samples, too
+
+    @property
+    def name(self) -> str:
+        """What a figure calls it."""
+        ...
+
+    @property
+    def length(self) -> float:
+        """Duration. [s]"""
+        ...
+
+    def sample(self, rate: float) -> Array:
+        """Samples at a rate [Hz], from 0 s on."""
+        ...
+
+    def __call__(self, time: Any) -> Array:
+        """Values at some instants. [s]"""
+        ...
+
+
 def inputs_of(
     instance: Instance,
-    inputs: Mapping[str, ArrayLike],
+    inputs: Mapping[str, ArrayLike | Command],
     rate: float,
     **sampling: Unpack[Sampling],
 ) -> dict[str, Record]:
     """External signals of a model on its grid, checked; see `on_grid`."""
     check_mapping("inputs", inputs)
     instance.check_inputs(inputs)
+    samples: dict[str, ArrayLike] = {
+        name: given.sample(rate) if isinstance(given, Command) else given
+        for name, given in inputs.items()
+    }
     if not inputs:
         wanted = ", ".join(instance.model.external) or "an input, but its equations take none"
         raise InputError(f"{instance.name} needs a record of {wanted}.")
-    return on_grid(inputs, rate, **sampling)
+    return on_grid(samples, rate, **sampling)
 
 
 def simulate(
     model: Model,
     p: Any,
-    inputs: Mapping[str, ArrayLike],
+    inputs: Mapping[str, ArrayLike | Command],
     rate: float,
     *,
     time: ArrayLike | None = None,
@@ -343,8 +416,9 @@ def simulate(
         Of one's own, or one of the package's.
     p, options, given : named tuple
         Its numbers, see `instance_of`.
-    inputs : mapping of str to (n,) array_like or float
+    inputs : mapping of str to (n,) array_like, float or Maneuver
         External signals, numbers for constant ones; those with a default parameter may be left out.
+        A maneuver is sampled at `rate`, its volts as the unit of the input.
     rate : float
         Samples a second; with `time`, of the result's grid. [Hz]
     time : (n,) array_like, optional
@@ -371,13 +445,14 @@ def simulate(
     records = inputs_of(
         instance, inputs, rate, time=time, interpolation=interpolation, substeps=substeps
     )
-    return Run(instance, records, start, begin or {}).marched()
+    maneuver = ", ".join(each.name for each in inputs.values() if isinstance(each, Command))
+    return Run(instance, records, start, begin or {}, maneuver=maneuver).marched()
 
 
 def sensitivities(
     model: Model,
     p: Any,
-    inputs: Mapping[str, ArrayLike],
+    inputs: Mapping[str, ArrayLike | Command],
     rate: float,
     *,
     output: str,

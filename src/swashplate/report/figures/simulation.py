@@ -3,22 +3,25 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from math import inf
+from itertools import cycle
+from math import inf, isfinite
 from typing import NamedTuple, overload
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.patches import Patch
 from numpy.typing import NDArray
 
-from swashplate.equations import Run
+from swashplate.equations import Definition, Run
 from swashplate.errors import InputError
-from swashplate.full_order import SIGNAL_UNITS, Comparison
+from swashplate.full_order import SIGNAL_UNITS, Comparison, FullOrderSimulation
 from swashplate.maneuvers import Maneuver
 from swashplate.report.lines import (
     COLUMNS,
     SHADES,
     Array,
+    Shade,
     draw,
     fit_time,
     rows_within,
@@ -32,16 +35,18 @@ from swashplate.report.style import (
     INK,
     LINE,
     NORMAL,
+    POINTS_PER_INCH,
+    ROW,
     THIN,
     VERMILION,
     MarginLabel,
     dress_given,
-    given_axes,
     handle,
+    in_lines,
+    label_below,
     label_margin,
+    legend_rows,
     legend_within,
-    new_figure,
-    root_figure,
     sheet,
     signed,
     strokes,
@@ -59,6 +64,8 @@ WIDE, NARROW = 1.9, 0.9
 """Widths of two lines that lie on one another for long. [pt]"""
 NEAR = 0.3
 """A line that marks a limit is shown if the signal goes at least this share of the way to it."""
+FAR = 0.3
+"""A signal whose range is less than this share of its largest value stays far from zero."""
 
 # --- one simulation -------------------------------------------------------------------------------
 
@@ -85,12 +92,14 @@ class Panel(NamedTuple):
     words: str
     si: str
     traces: tuple[Trace, ...]
-    limits: tuple[tuple[Limit, Array], ...] = ()
-    """Limits with the stretches in which they act."""
+    limits: tuple[tuple[Shade, Array], ...] = ()
+    """Looks of limits with the stretches in which they act."""
     marks: tuple[Mark, ...] = ()
     height: float = 1.3
     least: float = 0.0
     """Range that is shown at least, SI, so that rounding looks like nothing."""
+    from_zero: bool = True
+    """Whether zero is shown however far the signals stay from it."""
 
 
 def plot_simulation(
@@ -115,8 +124,8 @@ def plot_simulation(
     """
     pump, run = simulation.pump, simulation
 
-    def acting(*limits: Limit) -> tuple[tuple[Limit, Array], ...]:
-        return tuple((limit, stretches(run.time, run.active(limit))) for limit in limits)
+    def acting(*limits: Limit) -> tuple[tuple[Shade, Array], ...]:
+        return tuple((SHADES[limit], stretches(run.time, run.active(limit))) for limit in limits)
 
     ends = (pump.Z16_plus, -pump.Z16_minus)
     current = (
@@ -145,15 +154,39 @@ def plot_simulation(
     return _chain(panels, run.time, run.name if title is None else title, rows)
 
 
+# --- signals of any run ---------------------------------------------------------------------------
+
+MANY = 6
+"""Panels that stand one below the other; of more, states have a column of their own."""
+ALONE, PANEL = 2.4, 1.3
+"""Height of the only panel, and of one of several. [inch]"""
+LETTERS = 20
+"""Of a line of an ordinate's label, at most."""
+LOOKS = ("#f9d58b", "#c3e2f6", "#e3a5c5", "#b5e0cb", "#f3b79b", "#ededed")
+"""Colours of the limits of a user-defined model."""
+
+
 @overload
 def plot_signals(
-    run: Run, signals: Sequence[str], *, ax: None = None, label: str = ""
+    run: Run,
+    signals: Sequence[str],
+    *,
+    ax: None = None,
+    label: str = "",
+    window: tuple[float, float] | None = None,
+    title: str | None = None,
 ) -> Figure: ...
 
 
 @overload
 def plot_signals(
-    run: Run, signals: Sequence[str], *, ax: GivenAxes, label: str = ""
+    run: Run,
+    signals: Sequence[str],
+    *,
+    ax: GivenAxes,
+    label: str = "",
+    window: tuple[float, float] | None = None,
+    title: str | None = None,
 ) -> GivenAxes: ...
 
 
@@ -163,20 +196,30 @@ def plot_signals(
     *,
     ax: Axes | Sequence[Axes] | None = None,
     label: str = "",
+    window: tuple[float, float] | None = None,
+    title: str | None = None,
 ) -> Figure | Axes | Sequence[Axes]:
-    """Figure of some signals of a run over time, one below the other, or in given axes.
+    """Figure of some signals of a run over time, a panel each, or in given axes.
+
+    A user-defined model says what they are: their `Definition` has words and unit of the ordinate
+    and the range, whose ends are drawn if the signal comes near to them. Stretches in which a limit
+    of the model acts are shaded in each panel; where several act, the last that the model names is
+    seen. In given axes neither range nor limits are drawn.
 
     Parameters
     ----------
     run : Run
-        What to show: of a drive, a full-order drive or a model of one's own, whose signals have no
-        known unit.
+        What to show: of a drive, a full-order drive or a user-defined model.
     signals : sequence of str
-        Names, as of ``run[name]``.
+        Names, as of ``run[name]``. Of more than six, the model's states stand in a second column.
     ax : matplotlib axes or sequence of them, optional
         One for each signal; by default a new figure's.
     label : str
         Of the curves: each panel gets a legend of all labelled curves in it.
+    window : (float, float), optional
+        First and last instant to show. [s]
+    title : str, optional
+        In the place of the run's name and command; axes that are given have none by default.
 
     Returns
     -------
@@ -185,26 +228,110 @@ def plot_signals(
     Raises
     ------
     InputError
-        For a signal that the run has not, or another number of axes.
+        For a signal that the run has not, another number of axes, or a window with fewer than two
+        samples.
     """
-    values = [run[name] for name in signals]
-    if ax is None:
-        figure = new_figure(7.2, 0.7 + 1.6 * len(signals))
-        axes = list(figure.subplots(len(signals), 1, sharex=True, squeeze=False)[:, 0])
-    else:
-        axes = given_axes(ax, len(signals), "signals")
-    for place, name, value in zip(axes, signals, values, strict=True):
-        words, factor = name.replace("_", " "), 1.0
-        if name in SIGNAL_UNITS:
-            unit = display_unit(SIGNAL_UNITS[name], float(np.abs(value).max()) or inf)
-            words, factor = unit.label(words), unit.factor
-        place.plot(run.time, factor * value, label=label or None)
-        place.set_ylabel(words)
+    rows = rows_within(run.time, window, run.name)
+    if ax is not None:
+        _draw_given(run, signals, ax, label, rows, title)
+        return ax
+    looks = _looks(run)
+    limits = tuple((look, stretches(run.time, run.active(name))) for name, look in looks.items())
+    panels = {name: _panel(run, name, label, rows)._replace(limits=limits) for name in signals}
+    columns = _columns(run, panels)
+    longest = max(map(len, columns.values()))
+    height = PANEL if len(panels) > 1 else ALONE
+    legend = _legend(list(panels.values()), tuple(looks.values()))
+    figure, axes = sheet(
+        [height] * longest,
+        run.title if title is None else title,
+        legend=legend,
+        lines=len(columns) - 1,
+        columns=len(columns),
+    )
+    for number, (heading, column) in enumerate(columns.items()):
+        places = axes[number * longest : (number + 1) * longest]
+        for place, panel in zip(places, column, strict=False):
+            _fill(place, panel._replace(height=height), run.time, rows)
+        above = 4.0 + POINTS_PER_INCH * ROW * (legend_rows(legend) if legend else 0)
+        if heading:
+            write(places[0], heading, (0.0, 1.0), (0.0, above), color=GREY)
+        last = places[len(column) - 1]
+        last.tick_params(labelbottom=True)
+        label_below(last, "time (s)")
+        for unused in places[len(column) :]:
+            unused.remove()
+    fit_time(axes[0], run.time[rows])
+    return figure
+
+
+def _columns(run: Run, panels: Mapping[str, Panel]) -> dict[str, list[Panel]]:
+    """Panels of signals by the heading of their column: one without, or states apart."""
+    states = {path for _, path in run.instance.model.places("state")}
+    columns = {
+        "inputs and outputs": [panel for name, panel in panels.items() if name not in states],
+        "states": [panel for name, panel in panels.items() if name in states],
+    }
+    if len(panels) > MANY and all(columns.values()):
+        return columns
+    return {"": list(panels.values())}
+
+
+def _draw_given(
+    run: Run,
+    signals: Sequence[str],
+    ax: Axes | Sequence[Axes],
+    label: str,
+    rows: slice,
+    title: str | None,
+) -> None:
+    """Draw signals in axes of a caller, which may have curves already."""
+    curves, labels = [], []
+    for name in signals:
+        values, definition = run[name][rows], _definition(run, name)
+        unit = display_unit(definition.unit, float(np.abs(values).max()) or inf)
+        curves.append(unit.factor * values)
+        labels.append(unit.label(definition.name))
+    axes = dress_given(ax, title, labels, "time (s)", what="signals")
+    for panel, values in zip(axes, curves, strict=True):
+        panel.plot(run.time[rows], values, label=label or None)
         # with those of the lines that were there before
         if label:
-            legend_within(place, place.get_legend_handles_labels()[0])
-    axes[-1].set_xlabel("time (s)")
-    return root_figure(axes[0]) if ax is None else ax
+            legend_within(panel, panel.get_legend_handles_labels()[0])
+
+
+def _panel(run: Run, signal: str, label: str, rows: slice) -> Panel:
+    """Panel of one signal, with the ends of its range."""
+    values, definition = run[signal], _definition(run, signal)
+    unit = display_unit(definition.unit, float(np.abs(values[rows]).max()) or inf)
+    marks = tuple(
+        Mark(end, f"limit {unit.factor * end:.4g} {unit.name}".rstrip().replace("-", "−"))
+        for end in (definition.lower, definition.upper)
+        if isfinite(end)
+    )
+    color = INK if signal in run.records else BLUE
+    words = in_lines(definition.name, LETTERS)
+    trace = Trace(values, color, label)
+    return Panel(words, definition.unit, (trace,), marks=marks, from_zero=False)
+
+
+def _definition(run: Run, signal: str) -> Definition:
+    """What a signal is: as a user-defined model declares it, of a drive as `SIGNAL_UNITS` say."""
+    words = signal.replace("_", " ")
+    if isinstance(run, Simulation | FullOrderSimulation):
+        return Definition(words, SIGNAL_UNITS.get(signal, ""))
+    return run.instance.model.definitions.get(signal, Definition(words, ""))
+
+
+def _looks(run: Run) -> dict[str, Shade]:
+    """Looks of the limits of a user-defined model by name; a drive's stand in its chain."""
+    if isinstance(run, Simulation | FullOrderSimulation):
+        return {}
+    colors = cycle(LOOKS)
+    return {name: Shade(next(colors), name.replace("_", " ")) for name in run.limit_names}
+
+
+# --- two models of one drive ----------------------------------------------------------------------
 
 
 def plot_full_order(found: Comparison, *, title: str | None = None) -> Figure:
@@ -218,8 +345,8 @@ def plot_full_order(found: Comparison, *, title: str | None = None) -> Figure:
     full = found.full
     machine = full.plant.machine
 
-    def holding(limit: Limit, held: Flags) -> tuple[tuple[Limit, Array], ...]:
-        return ((limit, stretches(found.time, held != 0)),)
+    def holding(limit: Limit, held: Flags) -> tuple[tuple[Shade, Array], ...]:
+        return ((SHADES[limit], stretches(found.time, held != 0)),)
 
     command = (
         Panel("current", "A", (Trace(full.current, INK),))
@@ -272,37 +399,48 @@ def _swash(angle: Array, stops: Stops) -> Panel:
 
 def _chain(panels: Sequence[Panel], time: Array, title: str, rows: slice = slice(None)) -> Figure:
     """The panels one under another, with a legend of the limits that act anywhere."""
-    acting = {limit for panel in panels for limit, spans in panel.limits if spans.size}
-    legend = [shade_handle(SHADES[limit]) for limit in Limit if limit in acting]
+    legend = _legend(panels, tuple(SHADES.values()))
     figure, axes = sheet([each.height for each in panels], title, below="time (s)", legend=legend)
     for ax, panel in zip(axes, panels, strict=True):
-        for limit, spans in panel.limits:
-            shade(ax, spans, SHADES[limit])
-        _fill(ax, panel, time[rows], rows)
+        _fill(ax, panel, time, rows)
     fit_time(axes[-1], time[rows])
     return figure
 
 
+def _legend(panels: Sequence[Panel], looks: Sequence[Shade]) -> list[Patch]:
+    """Handles of the looks of limits that act in one of the panels, in the order given."""
+    acting = {look for panel in panels for look, spans in panel.limits if spans.size}
+    return [shade_handle(look) for look in looks if look in acting]
+
+
 def _fill(ax: Axes, panel: Panel, time: Array, rows: slice) -> None:
-    """Draw signals over time, from zero on, with the marks that they come near to."""
+    """Draw signals over time, with the limits that act and the marks that they come near to.
+
+    The ordinate begins at zero, unless signals stay far from it and the panel need not show it.
+    """
+    for look, spans in panel.limits:
+        shade(ax, spans, look)
     largest = max(float(np.abs(each.values[rows]).max()) for each in panel.traces)
     unit = display_unit(panel.si, max(largest, panel.least) or inf)
     name, factor = unit
-    ax.set_ylabel(f"{panel.words}\n({name})", fontsize=NORMAL, color=INK)
+    label = f"{panel.words}\n({name})" if name else panel.words
+    ax.set_ylabel(label, fontsize=NORMAL, color=INK)
     zero_line(ax)
     shown = [factor * each.values[rows] for each in panel.traces]
     low, high = min(float(each.min()) for each in shown), max(float(each.max()) for each in shown)
     labels = []
     for level, words in ((factor * each.level, each.words) for each in panel.marks):
-        if level and (high if level > 0.0 else -low) >= NEAR * abs(level):
+        if (high if level > 0.0 else -low) >= NEAR * abs(level):
             ax.axhline(level, color=GREY, linewidth=THIN, dashes=(5.0, 3.0), zorder=1.5)
             labels.append(MarginLabel(level, words, GREY))
-    ends = [0.0, low, high, *(each.height for each in labels)]
+    ends = [low, high, *(each.height for each in labels)]
+    if panel.from_zero or not 0.0 < high - low < FAR * max(abs(low), abs(high)):
+        ends.append(0.0)
     span = max(ends) - min(ends)
     spare = max(0.09 * span, 0.5 * (factor * panel.least - span)) or 1.0
     ax.set_ylim(min(ends) - spare, max(ends) + spare)
     for trace, values in zip(panel.traces, shown, strict=True):
-        draw(ax, time, values, trace.color, width=trace.width)
+        draw(ax, time[rows], values, trace.color, width=trace.width)
         if trace.name:
             labels.append(MarginLabel(float(values[-1]), trace.name, trace.color))
     label_margin(ax, labels, panel.height)

@@ -17,6 +17,7 @@ from swashplate.analysis import (
     dead_zone,
     limit_shares,
     standard_errors,
+    variances_from_bounds,
     without_limits,
 )
 from swashplate.campaign import Campaign
@@ -60,6 +61,9 @@ QUANTILE = 1.96
 OPEN = 0.1
 """Share of a number by which limits that no test reached can move it, from which it has one end
 alone; what moves it by less is taken into its interval. [1]"""
+LEANS = 0.1
+"""Share of a number's variance that goes with an estimate at its bound, from which it has no
+interval: 5 % of its width. [1]"""
 NO_COMMAND = 0.05
 """Share of the largest command up to which one the other way is none. [1]"""
 FOLLOWS = 0.01
@@ -187,6 +191,11 @@ def numbers_table(drive: Drive, stages: Sequence[StageFit]) -> tuple[Table, list
     return made, sentences
 
 
+def _at_limits(drive: Drive, limits: Mapping[str, float]) -> Drive:
+    """A drive whose limits lie where the tests went, by column."""
+    return Drive(drive.parameters.with_numbers(limits))
+
+
 def _range_of(drive: Drive, stages: Sequence[StageFit], values: Array, largest: Commands) -> _Range:
     """Errors of the numbers: of what the tests determine, and of unseen limits by both ends."""
 
@@ -194,8 +203,16 @@ def _range_of(drive: Drive, stages: Sequence[StageFit], values: Array, largest: 
         return numbers_of(one, largest)
 
     unseen, assumed = unseen_limits(stages), assumed_parameters(stages)
-    half = QUANTILE * standard_errors(stages, numbers, assumed)
+    errors = standard_errors(stages, numbers, assumed)
+    half = QUANTILE * errors
+    nearest, farthest = _at_limits(drive, unseen), without_limits(drive, unseen)
+    near, far = numbers_of(nearest, largest), numbers_of(farthest, largest)
+    moved = np.maximum(np.abs(near - values), np.abs(far - values))
+    left_open = np.abs(far - near) > OPEN * np.abs(near)
     doubt = np.full((6, 2), "", dtype=object)
+    for name, variances in variances_from_bounds(stages, numbers, unseen).items():
+        # what has one end alone has no interval to lose
+        doubt[~left_open & (variances > LEANS * errors**2)] = f"{name} {AT_BOUND}"
     doubt[changes_left_open(stages, numbers, unseen) > FOLLOWS * np.abs(values)] = "not determined"
     for way, volts in enumerate(tested_commands(stages)):
         if volts == 0.0:
@@ -204,13 +221,9 @@ def _range_of(drive: Drive, stages: Sequence[StageFit], values: Array, largest: 
         if mistaken_for_a_lag(column, stages, unseen):
             # the lag is the same both ways, and the delay follows it
             doubt[ACCELERATION, way] = doubt[DELAY : LAG + 1] = f"{column} fixed"
-    nearest, farthest = drive.replace(**unseen), without_limits(drive, unseen)
-    near, far = numbers_of(nearest, largest), numbers_of(farthest, largest)
-    moved = np.maximum(np.abs(near - values), np.abs(far - values))
-    left_open = np.abs(far - near) > OPEN * np.abs(near)
     if left_open.any():
-        errors = standard_errors(stages, lambda one: numbers_of(one.replace(**unseen), largest))
-        cautious = QUANTILE * errors * np.sign(near)
+        at_ends = standard_errors(stages, lambda one: numbers_of(_at_limits(one, unseen), largest))
+        cautious = QUANTILE * at_ends * np.sign(near)
         near = np.where(np.abs(far) > np.abs(near), near - cautious, near + cautious)
     half = np.where(left_open, np.nan, half + moved)
     near, far = np.where(left_open, near, values), np.where(left_open, far, values)
@@ -220,10 +233,13 @@ def _range_of(drive: Drive, stages: Sequence[StageFit], values: Array, largest: 
 INTERVALS = (
     "With 95 % intervals of the fit, rounded up, which do not cover what the model leaves out."
 )
+AT_BOUND = "at its bound"
 MEANINGS = {
     "not seen": "Not seen: no test reached the limit that decides it.",
     "not tested": "Not tested: no run goes that way.",
     "not determined": "Not determined: the tests leave open what it follows from.",
+    AT_BOUND: "At its bound: follows from an estimate that ended at a bound of its search; how far "
+    "off it is, and to which side, is not known.",
     "(fixed)": "Fixed: follows from parameters that were not fitted.",
     "Z16_": "Z16 fixed: an orifice that the fit did not look for can be mistaken for a lag.",
 }
@@ -259,7 +275,9 @@ def _cell(factor: float, values: Array, range_: _Range, index: tuple[int, int]) 
     if not np.isfinite(value):
         return Cell(None, NONE)
     if range_.doubt[index]:
-        return Cell(value, f"{value:.4g} ({range_.doubt[index]})")
+        has_half = 0.0 < half < np.inf
+        shown = f"{value:.{_decimals(value, half)}f}" if has_half else f"{value:.4g}"
+        return Cell(value, f"{_unsigned_zero(shown)} ({range_.doubt[index]})")
     if near != far:
         least = abs(far) > abs(near)
         return Cell(near, f"at {'least' if least else 'most'} {_rounded(near, least)}, not seen")
@@ -268,11 +286,21 @@ def _cell(factor: float, values: Array, range_: _Range, index: tuple[int, int]) 
         return Cell(value, f"{value:.4g} (fixed)")
     if not np.isfinite(half):
         return Cell(value, f"{value:.4g}")
-    # as many digits as the interval gives sense to, and no more than an engineer would write down
+    decimals = _decimals(value, half)
+    upwards = ceil(half * 10.0**decimals - 1e-9) / 10.0**decimals
+    shown = _unsigned_zero(f"{value:.{decimals}f}")
+    return Cell(value, f"{shown} ± {upwards:.{decimals}f}")
+
+
+def _decimals(value: float, half: float) -> int:
+    """As many as an interval gives sense to, and no more than an engineer would write down."""
     decimals = 1 - floor(log10(half))
-    decimals = max(min(decimals, 3 - floor(log10(max(abs(value), half)))), 0)
-    shown = ceil(half * 10.0**decimals - 1e-9) / 10.0**decimals
-    return Cell(value, f"{value:.{decimals}f} ± {shown:.{decimals}f}")
+    return max(min(decimals, 3 - floor(log10(max(abs(value), half)))), 0)
+
+
+def _unsigned_zero(shown: str) -> str:
+    """A number as it is printed, a zero without a sign."""
+    return shown if float(shown) else shown.removeprefix("-")
 
 
 def _rounded(value: float, down: bool) -> str:

@@ -189,12 +189,17 @@ def write_judgment(judgment: Judgment, path: str | Path) -> None:
 
 
 def _fit_verdicts(crane: Crane) -> list[Block]:
-    """The verdict on the fit of each drive that comes from one, or that none is known."""
+    """The verdict on the fit of each drive that comes from one, and what its tests left open."""
     looks: dict[str | None, Light] = {"Usable": "good", UNUSABLE: "bad"}
-    terms = [
-        (f"{axis.capitalize()}'s drive", looks.get(source.grade, "look"), [source.words()])
-        for axis, source in crane.sources.items()
-    ]
+    terms: list[tuple[str, Light, list[str]]] = []
+    for axis in AXES:
+        source, unreached = crane.sources.get(axis), crane.unreached_sentence(axis)
+        look: Light = "look" if source is None else looks.get(source.grade, "look")
+        words = [source.words()] if source is not None else []
+        if unreached:
+            words.append(unreached)
+        if words:
+            terms.append((f"{axis.capitalize()}'s drive", look, words))
     return [Block("terms", terms, "verdict")] if terms else []
 
 
