@@ -221,6 +221,19 @@ def candidates(stages):
     return made
 
 
+def dense(fit):
+    """(n, K) derivatives of each run by all unknowns: what the product never holds."""
+    for run, jacobian in fit.jacobians():
+        matrix = np.zeros((len(jacobian), len(fit.variables)))
+        matrix[:, fit.variables.columns(run.name)] = jacobian
+        yield matrix
+
+
+def whitened(fit):
+    """(n, rank) derivatives of each run in directions in which all of them are orthonormal."""
+    return (jacobian @ fit.whitening for jacobian in dense(fit))
+
+
 def white(fit):
     """s²(JᵀJ)⁻¹."""
     from swashplate.identification.noise import covariance_of
@@ -237,12 +250,12 @@ def autocovariance(fit):
     from swashplate.identification.noise import covariance_of, grid_of, noise_colours
 
     spare = fit.samples / fit.spare_samples
-    middle = np.zeros((fit.rank, fit.rank))
+    middle, derivatives = np.zeros((fit.rank, fit.rank)), [*whitened(fit)]
     for colour in noise_colours(fit):
         for m in colour.members:
             run, grid = fit.runs[m], grid_of(fit.runs[m].time)
             weight = 1.0 if run.weight is None else run.weight[:, None]
-            columns = grid.spread((run.jacobian @ fit.whitening) * weight)
+            columns = grid.spread((derivatives[m] * weight).T).T
             size = next_fast_len(grid.size + colour.correlation.size, real=True)
             window = np.zeros(size)
             lags = colour.correlation.size
@@ -255,13 +268,6 @@ def autocovariance(fit):
     matrix = fit.whitening @ (0.5 * (middle + middle.T)) @ fit.whitening.T
     free = np.full(len(fit.variables), float(fit.spare_samples))
     return covariance_of(fit, matrix, free), np.zeros(len(fit.variables))
-
-
-def autocovariance_without_lines(fit):
-    """The same with spectral lines removed from the residuals beforehand."""
-    from swashplate.identification.noise import without_lines
-
-    return autocovariance(without_lines(fit)[0])
 
 
 def leverage_corrected(power):
@@ -277,9 +283,9 @@ def leverage_corrected(power):
 
         middle = np.zeros((fit.rank, fit.rank))
         total, squares = np.zeros(len(fit.variables)), np.zeros(len(fit.variables))
-        for run in fit.runs:
+        for run, moved in zip(fit.runs, whitened(fit), strict=True):
             grid = grid_of(run.time)
-            derivatives = rfft(grid.spread(run.jacobian @ fit.whitening), axis=0)
+            derivatives = rfft(grid.spread(moved.T)).T
             leverage = np.sum(np.abs(derivatives) ** 2, axis=1) / grid.size
             residual = rfft(grid.spread(run.residual)) / (1.0 - np.minimum(leverage, 0.9)) ** power
             products = derivatives.conj() * residual[:, None] * (2.0 / grid.size)
@@ -304,8 +310,8 @@ def prewhitened_scores(fit):
     from swashplate.identification.noise import covariance_of
 
     middle = np.zeros((fit.rank, fit.rank))
-    for run in fit.runs:
-        scores = (run.jacobian @ fit.whitening) * run.residual[:, None]
+    for run, moved in zip(fit.runs, whitened(fit), strict=True):
+        scores = moved * run.residual[:, None]
         lag, now = scores[:-1], scores[1:]
         slope = np.clip(
             np.sum(lag * now, axis=0) / np.maximum(np.sum(lag * lag, axis=0), 1e-300), -0.97, 0.97
@@ -357,10 +363,10 @@ def autoregression(colour, samples):
 
 def generalised(fit):
     """Generalised least squares: one Gauss-Newton step on residuals whitened by an AR model."""
+    from swashplate.identification.arrow import dense_factor, triangular_factor, whitening
     from swashplate.identification.noise import covariance_of, grid_of, noise_colours
-    from swashplate.identification.problem import triangular_factor, whitening
 
-    rows, count = [], len(fit.variables)
+    rows, count, jacobians = [], len(fit.variables), [*dense(fit)]
     for colour in noise_colours(fit):
         samples = sum(fit.runs[m].time.size for m in colour.members)
         coefficients = autoregression(colour, samples)
@@ -369,9 +375,9 @@ def generalised(fit):
         parts = []
         for m in colour.members:
             run, grid = fit.runs[m], grid_of(fit.runs[m].time)
-            plain = run.jacobian if run.weight is None else run.jacobian / run.weight[:, None]
+            plain = jacobians[m] if run.weight is None else jacobians[m] / run.weight[:, None]
             both = np.column_stack([plain, run.unweighted])
-            spread = grid.spread(both)
+            spread = grid.spread(both.T).T
             filtered = sum(
                 tap * spread[order - k : spread.shape[0] - k] for k, tap in enumerate(taps)
             )
@@ -381,7 +387,8 @@ def generalised(fit):
         deviation = np.sqrt(np.mean(whole[:, -1] ** 2))
         rows.append(triangular_factor(whole / max(deviation, 1e-300)))
     triangle = triangular_factor(np.vstack(rows))
-    inverse, _ = whitening(triangle[:, :count], fit.variables.free, fit.tolerance)
+    factor = dense_factor(triangle[:, :count])
+    inverse = whitening(factor, fit.variables.free, fit.tolerance).matrix
     shift = -inverse @ (inverse.T @ (triangle[:, :count].T @ triangle[:, -1]))
     free = np.full(count, float(fit.spare_samples))
     return covariance_of(fit, inverse @ inverse.T, free), shift
@@ -406,7 +413,6 @@ METHODS = {
     "white noise": white,
     "smoothed-spectrum sandwich": smoothed_spectrum,
     "autocovariance sandwich": autocovariance,
-    "autocovariance sandwich, lines removed": autocovariance_without_lines,
     "band-score sandwich": leverage_corrected(0.0),
     "band-score sandwich, HC2": leverage_corrected(0.5),
     "band-score sandwich, HC3": leverage_corrected(1.0),
