@@ -14,6 +14,7 @@ from swashplate.identification.noise import (
     spectral_covariance,
 )
 from swashplate.identification.problem import LinearisedFit, LinearisedRun
+from swashplate.identification.unknowns import Unknown, Unknowns
 
 RUNS, N, RATE = 4, 4096, 512.0
 TIME = np.arange(N) / RATE
@@ -195,3 +196,83 @@ def test_noise_that_differs_along_the_runs(kind: str, width: float) -> None:
     ratio = np.sqrt(np.mean(np.square(errors)) / np.mean(np.square(estimates)))
     # 80 draws tell a standard deviation to 8 %
     assert 0.8 < ratio < 1.25
+
+
+# --- many runs ------------------------------------------------------------------------------------
+
+
+def dense_covariances(
+    residuals: list[np.ndarray], jacobians: list[np.ndarray], weights: list[np.ndarray]
+) -> tuple[np.ndarray, np.ndarray]:
+    """By the smoothed spectrum and by band scores, from derivatives (n, K) of all runs at once."""
+    factor = np.linalg.qr(np.vstack(jacobians), mode="r")
+    inverse = np.linalg.inv(factor)
+    spectra, powers, left, frequencies = [], [], [], []
+    for residual, jacobian, weight in zip(residuals, jacobians, weights, strict=True):
+        directions, size = jacobian @ inverse, np.sqrt(residual.size)
+        derivatives = np.fft.rfft(weight[:, None] * directions, axis=0) / size
+        by_estimate = np.fft.rfft(directions / weight[:, None], axis=0) / size
+        noise, level = residual / weight, np.mean((residual / weight) ** 2)
+        spectrum = np.fft.rfft(noise) / size
+        twice = np.full(spectrum.size, 2.0)
+        twice[[0, -1]] = 1.0
+        spectra.append((derivatives, spectrum, twice, level))
+        powers.append(np.abs(spectrum) ** 2 / level)
+        leverage = np.sum((derivatives.conj() * by_estimate).real, axis=1)
+        left.append(1.0 - np.clip(leverage, 0.0, 1.0))
+        frequencies.append(np.fft.rfftfreq(residual.size, 1.0 / RATE))
+    order = np.argsort(np.concatenate(frequencies), kind="stable")
+
+    def smoothed(parts: list[np.ndarray]) -> np.ndarray:
+        """Sums over 21 neighbours of all runs, in the order of the runs again."""
+        padded = np.pad(np.concatenate(parts)[order], (10, 10), mode="reflect")
+        sums = np.empty(order.size)
+        sums[order] = np.convolve(padded, np.ones(21), mode="valid")
+        return sums
+
+    shapes = np.split(
+        smoothed(powers) / np.maximum(smoothed(left), 2.1),
+        np.cumsum([each.size for each in powers])[:-1],
+    )
+    by_spectrum, by_bands = np.zeros_like(factor), np.zeros_like(factor)
+    for (derivatives, spectrum, twice, level), shape, at in zip(
+        spectra, shapes, frequencies, strict=True
+    ):
+        density = level * shape * twice
+        by_spectrum += ((derivatives.conj().T * density) @ derivatives).real
+        products = derivatives.conj() * (twice * spectrum)[:, None]
+        for band in np.unique(np.floor(at / 10.0)):
+            score = products[np.floor(at / 10.0) == band].sum(axis=0)
+            by_bands += 0.5 * np.outer(score.conj(), score).real
+    return inverse @ by_spectrum @ inverse.T, inverse @ by_bands @ inverse.T
+
+
+def test_covariances_run_by_run_are_those_of_all_derivatives_at_once() -> None:
+    """Three runs of different lengths with a free zero each; in one the weights differ."""
+    rng, sizes = np.random.default_rng(4), (800, 1200, 1000)
+    names = [f"run {k}" for k in range(3)]
+    zeros = [Unknown("zero", 1.0, -9.0, 9.0, run=name) for name in names]
+    machine = [Unknown(name, 1.0, -9.0, 9.0) for name in ("a", "b", "c")]
+    # the order of the unknowns is not that of the runs
+    variables = Unknowns((zeros[2], machine[0], zeros[0], *machine[1:], zeros[1]))
+    runs, derivatives, dense, weights, residuals = [], [], [], [], []
+    for name, size in zip(names, sizes, strict=True):
+        weight = np.where(TIME[:size] < 1.0, 2.0, 0.5) if name == "run 1" else np.full(size, 3.0)
+        rows = weight[:, None] * np.column_stack([np.ones(size), rng.uniform() * DESIGN[:size]])
+        residual = weight * first_order(0.9, rng, (size,))
+        matrix = np.zeros((size, len(variables)))
+        matrix[:, variables.columns(name)] = rows
+        runs.append(linearised(name, residual, weight=weight))
+        derivatives.append(rows)
+        dense.append(matrix)
+        weights.append(weight)
+        residuals.append(residual)
+    fit = linear_fit(runs, derivatives, variables)
+    expected = dense_covariances(residuals, dense, weights)
+    found_ones = spectral_covariance(fit), band_score_covariance(fit)
+    for found, matrix in zip(found_ones, expected, strict=True):
+        np.testing.assert_allclose(found.matrix, matrix, rtol=1e-8, atol=1e-12 * matrix.max())
+        assert found.determined.all()
+        # as many as bands or independent frequencies at most, and of the zeros not many times fewer
+        assert found.degrees_of_freedom.min() > 1.0
+        assert found.degrees_of_freedom.max() < 2.0 * sum(sizes)
