@@ -77,15 +77,15 @@ nothing: in one campaign the nominal start and the first three ended in the same
 ROUGH = 1e-4
 """Tolerance of these starts, of which the best goes on: optima differ by factors. Where the model
 lacks an effect, so that no start can help, six starts take 235 evaluations instead of 929."""
-LEAST_EXPLAINED = 0.5
+LEAST_EXPLAINED = 0.4
 """Share of the variance of what was measured that a search must explain after `solving.LEG`
-evaluations, or it is given up. Of 60 virtual campaigns, from sound ones to such with gross faults,
-that fit at all, the first search explained {MEASURED} then, and it converged."""
+evaluations, or it is given up. Channels clipped at half of their range, late by 0.2 s, behind a lag
+of 0.5 s, doubled, or under noise of 30 % of it left 0.57 or more in 36 campaigns; outputs of other
+runs, and runs tiled with jumps, 0 to 0.32."""
 TRIAL = 12
 """Evaluations of each other start where the first search was given up."""
 WINDOW = 1.0
-"""Time over which the speed of a position is taken, of which the variance counts: where a position
-drifts to after minutes says little of how a drive moves. [s]"""
+"""Time over which the mean speed of a position is taken. [s]"""
 UNEXPLAINED = 5.0
 """Residuals over their known measurement error from which another optimum is looked for."""
 SPREAD = 0.05
@@ -373,8 +373,8 @@ def fit(
     search : Search, optional
         More starts than the nominal one; the best is refined. Without, up to six more are tried if
         residuals are five times as large as their known measurement error, until one of them is
-        not, and if none explains half of what was measured, the fit is refused; `Search(0)` tries
-        none.
+        not, and if none explains two fifths of what was measured, the fit is refused; `Search(0)`
+        tries none.
         Ctrl-C during them ends the whole fit, with the best start of that stage as its last result.
     watch : callable, optional
         Called with the stage's name and each of its iterations.
@@ -578,24 +578,31 @@ def _solved(
 def share_explained(problem: Problem, vector: Array) -> float:
     """Share of the variance of what was measured that a point explains, at most 1.
 
-    In units of the residuals, so that the channels that are measured best count most; of a position
-    that of its mean speeds.
+    In units of the residuals, so that the channels that are measured best count most. Of a position
+    that of its mean speeds: where it drifts to after minutes says little of how a drive moves.
     """
     total, left = 0.0, 0.0
     for number, experiment in enumerate(problem.experiments):
         for name, output in problem.outputs(vector, number).items():
             channel = experiment[name]
             used = channel.used
+            if not used.any():
+                continue
             measured, errors = channel.values[used], (output - channel.values)[used]
             if channel.is_position and measured.size > 1:
                 step = float(np.median(np.diff(channel.time[used])))
-                width = min(max(round(WINDOW / step), 1), measured.size - 1)
-                measured, errors = np.diff(measured[::width]), np.diff(errors[::width])
-            if measured.size:
-                unit = problem.scales[name] ** 2
-                total += float(np.sum((measured - measured.mean()) ** 2)) / unit
-                left += float(errors @ errors) / unit
+                width = max(min(round(WINDOW / step), measured.size // 4), 1)
+                measured, errors = _changes(measured, width), _changes(errors, width)
+            unit = problem.scales[name] ** 2
+            total += float(np.sum((measured - measured.mean()) ** 2)) / unit
+            left += float(errors @ errors) / unit
     return 1.0 - left / total if total > 0.0 else 1.0
+
+
+def _changes(values: Array, width: int) -> Array:
+    """Differences between the means of so many samples each, which noise hardly reaches."""
+    count = values.size // width
+    return np.diff(values[: count * width].reshape(count, width).mean(axis=1))
 
 
 def _is_hopeless(problem: Problem, vector: Array) -> bool:
