@@ -11,23 +11,20 @@ from table import Row, duration
 
 from swashplate import Campaign, maneuvers
 from swashplate.campaign import rig
-from swashplate.executors import Processes
 from swashplate.full_order.drive import FullOrderDrive
 from swashplate.identification.assessment import Identification
 from swashplate.identification.fitting import fit
-from swashplate.identification.resampling import bootstraps_of
 from swashplate.identification.setup import load_setup
 from swashplate.report.fit_report import write_fit_report
 
 ROUNDS = 5
-REFITS = 1000
-FIT, REPORT, REFITTED = 2.0, 3.0, 300.0
+FIT, REPORT = 2.0, 3.0
 MARCHED, STUDIED = 0.1, 5.0
 """Targets. [s]"""
 
 
 def fit_study_rows() -> Iterator[Row]:
-    """The hoist's set-up on a realistic virtual campaign: fit, judging, report, refits."""
+    """The hoist's set-up on a realistic virtual campaign: fit, judging, report."""
     with tempfile.TemporaryDirectory() as folder:
         tests = rig.run("hoist", seed=1, perturb=0.1)
         campaign = Campaign.from_toml(rig.write(tests, Path(folder) / "virtual"))
@@ -53,10 +50,6 @@ def fit_study_rows() -> Iterator[Row]:
         yield _limited("complete staged fit of a virtual hoist", median(fitted[1:]), FIT)
         yield Row("what the fit is worth: intervals, tests", duration(median(judged[1:])))
         yield _limited("its report", median(written[1:]), REPORT)
-        begin = time.perf_counter()
-        bootstraps_of(stages, REFITS, seed=0, executor=Processes())
-        spent = time.perf_counter() - begin
-        yield _limited(f"{REFITS:,} bootstrap refits of both stages, all cores", spent, REFITTED)
 
 
 def full_order_rows() -> Iterator[Row]:

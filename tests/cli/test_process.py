@@ -193,7 +193,7 @@ def test_a_wrong_speed_is_said_and_ends_with_code_1(run, monkeypatch: pytest.Mon
 def test_every_end_of_an_interval_is_whole(monkeypatch, capsys) -> None:
     """A table of more numbers than a line holds goes on below, each block with the names."""
     monkeypatch.setenv("COLUMNS", "80")
-    ends = ("lower 95 %", "upper 95 %", "bootstrap lower 95 %", "bootstrap upper 95 %")
+    ends = ("lower 95 %", "upper 95 %", "profile lower 95 %", "profile upper 95 %")
     numbers = [Column(name, ".8g") for name in ("nominal", "estimate", *ends)]
     made = Table("Stage pump", (Column("unknown"), UNIT, *numbers), si=True)
     values = [1651412.3, 1653987.6, 1621034.5, 1685123.4, 1633245.6, 1669765.4]
@@ -216,9 +216,8 @@ GROUP = typer.main.get_group(app).commands
 COMMANDS = [*GROUP.values(), *GROUP["campaign"].commands.values()]
 COMMANDS = [each for each in COMMANDS if not hasattr(each, "commands")]
 INSTEAD = {
-    "bootstrap 1000": "bootstrap 40 --jobs 1",
     "--starts 50": "--starts 1 --jobs 1",
-    "--folds 5": "--folds 2",
+    "--folds 5": "--folds 2 --jobs 1",
     "--out virtual": "--out new",
     "virtual-hoist/": "virtual/",
     "--run hoistr6": "--run hoist_step_4_V",

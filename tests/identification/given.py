@@ -13,7 +13,8 @@ from swashplate import Campaign, Channel, Experiment
 from swashplate.campaign import rig
 from swashplate.campaign.experiment import InputSignal, Source
 from swashplate.executors import Serial
-from swashplate.identification.problem import TOLERANCE, LinearisedFit, LinearisedRun
+from swashplate.identification.arrow import Block
+from swashplate.identification.problem import TOLERANCE, LinearisedFit, LinearisedRun, factor_of
 from swashplate.identification.setup import Setup
 from swashplate.identification.unknowns import Unknown, Unknowns
 
@@ -104,16 +105,19 @@ def unknowns_of(
 
 def linear_fit(
     runs: Sequence[LinearisedRun],
+    derivatives: Sequence[np.ndarray],
     variables: Unknowns,
     *,
     prior: np.ndarray | None = None,
     prior_noise: np.ndarray | None = None,
     tolerance: float = TOLERANCE,
 ) -> LinearisedFit:
-    """A fit of some runs, without priors by default."""
+    """A fit of some runs, by unknowns of the machine alone; without priors by default."""
     rows = np.zeros((0, len(variables))) if prior is None else prior
     noise = np.ones(len(rows)) if prior_noise is None else prior_noise
-    return LinearisedFit(tuple(runs), variables, rows, tolerance, noise)
+    priors = [Block("", np.arange(0), row[None, :]) for row in rows]
+    factor = factor_of(zip(runs, derivatives, strict=True), variables, priors)
+    return LinearisedFit(tuple(runs), derivatives, variables, factor, rows, tolerance, noise)
 
 
 def first_order(

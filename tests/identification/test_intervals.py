@@ -81,8 +81,8 @@ def test_an_interval_beyond_a_hundredfold_is_none() -> None:
 )
 def test_what_is_not_determined_has_no_number(jacobian: np.ndarray, more: dict) -> None:
     noise = np.random.default_rng(15).normal(size=50)
-    run = LinearisedRun("a", "speed", np.arange(50.0), noise, jacobian)
-    found = uncertainty(linear_fit([run], unknowns_of("ab", np.ones(2), **more)))
+    run = LinearisedRun("a", "speed", np.arange(50.0), noise)
+    found = uncertainty(linear_fit([run], [jacobian], unknowns_of("ab", np.ones(2), **more)))
     assert all(each.standard_error is None for each in found.estimates)
     at_bounds = ["at its upper bound", "at its lower bound"]
     expected = at_bounds if more else ["undetermined"] * 2
@@ -93,8 +93,8 @@ def test_an_undetermined_unknown_does_not_spoil_the_others() -> None:
     rng = np.random.default_rng(1)
     jacobian = rng.normal(size=(40, 3))
     jacobian[:, 1] = -2.0 * jacobian[:, 0]
-    run = LinearisedRun("a", "speed", np.arange(40.0), rng.normal(size=40), jacobian)
-    made = linear_fit([run], unknowns_of("abc", np.ones(3)))
+    run = LinearisedRun("a", "speed", np.arange(40.0), rng.normal(size=40))
+    made = linear_fit([run], [jacobian], unknowns_of("abc", np.ones(3)))
     assert made.determined.tolist() == [False, False, True]
     # the third beside the one combination of the others that is determined
     pair = jacobian[:, [0, 2]]
@@ -103,9 +103,9 @@ def test_an_undetermined_unknown_does_not_spoil_the_others() -> None:
 
 
 def test_one_sample_is_refused() -> None:
-    run = LinearisedRun("a", "speed", np.zeros(1), np.ones(1), np.ones((1, 1)))
+    run = LinearisedRun("a", "speed", np.zeros(1), np.ones(1))
     with pytest.raises(InputError, match="1 sample for 1 parameter leave nothing"):
-        uncertainty(linear_fit([run], unknowns_of(["p"], [1.0])))
+        uncertainty(linear_fit([run], [np.ones((1, 1))], unknowns_of(["p"], [1.0])))
 
 
 def test_an_estimate_at_its_bound_is_released_in_its_partners_intervals() -> None:
@@ -114,9 +114,9 @@ def test_an_estimate_at_its_bound_is_released_in_its_partners_intervals() -> Non
     jacobian = np.column_stack([np.ones(400), 1.0 + 0.01 * np.sin(time)])
 
     def half(rows: np.ndarray, names: str, at_bound: list[int]) -> float:
-        run = LinearisedRun("run", "y", time, noise, rows)
+        run = LinearisedRun("run", "y", time, noise)
         variables = unknowns_of(names, np.ones(len(names)), at_bound=at_bound)
-        *others, found = uncertainty(linear_fit([run], variables)).estimates
+        *others, found = uncertainty(linear_fit([run], [rows], variables)).estimates
         assert any(each.status == "at its upper bound" for each in others) == any(at_bound)
         return found.upper - found.lower
 

@@ -1,4 +1,4 @@
-"""Noise of residuals: correlation over time, spectral lines, and errors of the estimates."""
+"""Noise of residuals: correlation over time, and errors of the estimates."""
 
 import numpy as np
 import pytest
@@ -12,9 +12,9 @@ from swashplate.identification.noise import (
     band_score_covariance,
     noise_colours,
     spectral_covariance,
-    without_lines,
 )
 from swashplate.identification.problem import LinearisedFit, LinearisedRun
+from swashplate.identification.unknowns import Unknown, Unknowns
 
 RUNS, N, RATE = 4, 4096, 512.0
 TIME = np.arange(N) / RATE
@@ -24,11 +24,11 @@ DESIGN = np.column_stack([LEVEL, np.sin(1.7 * TIME), BUMP])
 
 
 def linearised(
-    name: str, residual: np.ndarray, rows: np.ndarray, channel: str = "current", **more: object
+    name: str, residual: np.ndarray, channel: str = "current", **more: object
 ) -> LinearisedRun:
     """A run from 0 s on."""
     how = {"time": TIME[: residual.size], **more}
-    return LinearisedRun(name, channel, residual=residual, jacobian=rows, **how)
+    return LinearisedRun(name, channel, residual=residual, **how)
 
 
 def fitted(
@@ -43,11 +43,12 @@ def fitted(
         len(noise) * rows.T @ rows, sum(rows.T @ (w * each) for each in noise)
     )
     runs = [
-        linearised(f"run {k}", w * (e + design @ estimate), rows, weight=weight)
+        linearised(f"run {k}", w * (e + design @ estimate), weight=weight)
         for k, e in enumerate(noise)
     ]
     names = [f"p{k}" for k in range(design.shape[1])]
-    return linear_fit(runs, unknowns_of(names, np.ones(len(names)))), estimate
+    variables = unknowns_of(names, np.ones(len(names)))
+    return linear_fit(runs, [rows] * len(runs), variables), estimate
 
 
 # --- correlation over time ------------------------------------------------------------------------
@@ -55,12 +56,13 @@ def fitted(
 
 def level(*runs: LinearisedRun) -> LinearisedFit:
     """A fit of a level."""
-    return linear_fit(runs, unknowns_of(["p"], [1.0]))
+    levels = [np.ones((run.time.size, 1)) for run in runs]
+    return linear_fit(runs, levels, unknowns_of(["p"], [1.0]))
 
 
 def colour(residual: np.ndarray, time: np.ndarray | None = None) -> NoiseColour:
     time = np.arange(residual.size) / RATE if time is None else time
-    run = linearised("a", residual, np.ones((residual.size, 1)), time=time)
+    run = linearised("a", residual, time=time)
     return noise_colours(level(run))[0]
 
 
@@ -100,64 +102,17 @@ def test_what_correlation_does_to_intervals_is_said() -> None:
 def test_channels_and_steps_have_their_own_colours() -> None:
     kinds = (("a", "speed", RATE), ("a", "current", RATE), ("b", "speed", 100.0))
     runs = [
-        linearised(name, TIME[:100], np.ones((100, 1)), channel, time=np.arange(100) / rate)
+        linearised(name, TIME[:100], channel, time=np.arange(100) / rate)
         for name, channel, rate in (*kinds, ("c", "speed", RATE))
     ]
     found = [(each.channel, each.members) for each in noise_colours(level(*runs))]
     assert found == [("speed", (0, 3)), ("current", (1,)), ("speed", (2,))]
 
 
-# --- spectral lines -------------------------------------------------------------------------------
-
-
 def ripple(rng: np.random.Generator, level: np.ndarray | float = 1.0) -> np.ndarray:
     """A 100 Hz ripple far above white noise, of another phase in each run."""
     phase = rng.uniform(0.0, 2.0 * np.pi, (RUNS, 1))
     return 8.0 * level * np.sin(2.0 * np.pi * 100.03 * TIME + phase)
-
-
-@pytest.mark.parametrize("weight", [None, np.where(TIME < 2.0, 3.0, 1.0)])
-def test_a_ripple_is_found_and_removed(weight: np.ndarray | None) -> None:
-    rng = np.random.default_rng(1)
-    fit, _ = fitted(rng.normal(size=(RUNS, N)) + ripple(rng), weight)
-    clean, (line, *others) = without_lines(fit)
-    assert line.channel == "current"
-    assert line.frequency == pytest.approx(100.03, abs=0.05)
-    assert not others
-    assert line.share == pytest.approx(32.0 / 33.0, rel=0.01)
-    left = [run.residual if weight is None else run.residual / weight for run in clean.runs]
-    assert np.var(np.concatenate(left)) == pytest.approx(1.0, abs=0.15)
-
-
-def test_shares_never_exceed_what_there_is() -> None:
-    rng = np.random.default_rng(2)
-    slow = 20.0 * np.sin(2.0 * np.pi * 0.2 * TIME)
-    fit, _ = fitted(rng.normal(size=(RUNS, N)) + ripple(rng, LEVEL) + slow)
-    _, lines = without_lines(fit)
-    assert 0.0 < sum(each.share for each in lines) < 1.0
-    assert all(each.share >= 0.0 for each in lines)
-
-
-def test_slow_model_errors_white_noise_and_short_runs_have_no_lines() -> None:
-    rng = np.random.default_rng(4)
-    # the lowest bins are those of the tests: four half bandwidths of 8 s are 2 Hz
-    for frequency in (0.1, 0.3, 1.0, 1.9):
-        slow = 3.0 * np.cos(2.0 * np.pi * frequency * TIME)
-        assert without_lines(fitted(rng.normal(size=(RUNS, N)) + slow)[0])[1] == ()
-    white = [without_lines(fitted(rng.normal(size=(RUNS, N)))[0])[1] for _ in range(20)]
-    # one campaign in a hundred may have one by chance
-    assert sum(len(each) for each in white) <= 1
-    short = linearised("short", np.ones(100), DESIGN[:100])
-    assert without_lines(linear_fit([short], unknowns_of("abc", np.ones(3))))[1] == ()
-
-
-@pytest.mark.parametrize("size", [512, 546])
-def test_a_line_at_half_the_rate(size):
-    # spectra of an even number of frequencies and, at 546 samples, of an odd one
-    turning = (-1.0) ** np.arange(size) + 0.1 * np.random.default_rng(1).normal(size=size)
-    _, lines = without_lines(level(linearised("a", turning, np.ones((size, 1)))))
-    assert lines[0].frequency == pytest.approx(RATE / 2.0, rel=0.005)
-    assert lines[0].share > 0.9
 
 
 def test_errors_are_those_of_the_noise_under_a_ripple() -> None:
@@ -241,3 +196,83 @@ def test_noise_that_differs_along_the_runs(kind: str, width: float) -> None:
     ratio = np.sqrt(np.mean(np.square(errors)) / np.mean(np.square(estimates)))
     # 80 draws tell a standard deviation to 8 %
     assert 0.8 < ratio < 1.25
+
+
+# --- many runs ------------------------------------------------------------------------------------
+
+
+def dense_covariances(
+    residuals: list[np.ndarray], jacobians: list[np.ndarray], weights: list[np.ndarray]
+) -> tuple[np.ndarray, np.ndarray]:
+    """By the smoothed spectrum and by band scores, from derivatives (n, K) of all runs at once."""
+    factor = np.linalg.qr(np.vstack(jacobians), mode="r")
+    inverse = np.linalg.inv(factor)
+    spectra, powers, left, frequencies = [], [], [], []
+    for residual, jacobian, weight in zip(residuals, jacobians, weights, strict=True):
+        directions, size = jacobian @ inverse, np.sqrt(residual.size)
+        derivatives = np.fft.rfft(weight[:, None] * directions, axis=0) / size
+        by_estimate = np.fft.rfft(directions / weight[:, None], axis=0) / size
+        noise, level = residual / weight, np.mean((residual / weight) ** 2)
+        spectrum = np.fft.rfft(noise) / size
+        twice = np.full(spectrum.size, 2.0)
+        twice[[0, -1]] = 1.0
+        spectra.append((derivatives, spectrum, twice, level))
+        powers.append(np.abs(spectrum) ** 2 / level)
+        leverage = np.sum((derivatives.conj() * by_estimate).real, axis=1)
+        left.append(1.0 - np.clip(leverage, 0.0, 1.0))
+        frequencies.append(np.fft.rfftfreq(residual.size, 1.0 / RATE))
+    order = np.argsort(np.concatenate(frequencies), kind="stable")
+
+    def smoothed(parts: list[np.ndarray]) -> np.ndarray:
+        """Sums over 21 neighbours of all runs, in the order of the runs again."""
+        padded = np.pad(np.concatenate(parts)[order], (10, 10), mode="reflect")
+        sums = np.empty(order.size)
+        sums[order] = np.convolve(padded, np.ones(21), mode="valid")
+        return sums
+
+    shapes = np.split(
+        smoothed(powers) / np.maximum(smoothed(left), 2.1),
+        np.cumsum([each.size for each in powers])[:-1],
+    )
+    by_spectrum, by_bands = np.zeros_like(factor), np.zeros_like(factor)
+    for (derivatives, spectrum, twice, level), shape, at in zip(
+        spectra, shapes, frequencies, strict=True
+    ):
+        density = level * shape * twice
+        by_spectrum += ((derivatives.conj().T * density) @ derivatives).real
+        products = derivatives.conj() * (twice * spectrum)[:, None]
+        for band in np.unique(np.floor(at / 10.0)):
+            score = products[np.floor(at / 10.0) == band].sum(axis=0)
+            by_bands += 0.5 * np.outer(score.conj(), score).real
+    return inverse @ by_spectrum @ inverse.T, inverse @ by_bands @ inverse.T
+
+
+def test_covariances_run_by_run_are_those_of_all_derivatives_at_once() -> None:
+    """Three runs of different lengths with a free zero each; in one the weights differ."""
+    rng, sizes = np.random.default_rng(4), (800, 1200, 1000)
+    names = [f"run {k}" for k in range(3)]
+    zeros = [Unknown("zero", 1.0, -9.0, 9.0, run=name) for name in names]
+    machine = [Unknown(name, 1.0, -9.0, 9.0) for name in ("a", "b", "c")]
+    # the order of the unknowns is not that of the runs
+    variables = Unknowns((zeros[2], machine[0], zeros[0], *machine[1:], zeros[1]))
+    runs, derivatives, dense, weights, residuals = [], [], [], [], []
+    for name, size in zip(names, sizes, strict=True):
+        weight = np.where(TIME[:size] < 1.0, 2.0, 0.5) if name == "run 1" else np.full(size, 3.0)
+        rows = weight[:, None] * np.column_stack([np.ones(size), rng.uniform() * DESIGN[:size]])
+        residual = weight * first_order(0.9, rng, (size,))
+        matrix = np.zeros((size, len(variables)))
+        matrix[:, variables.columns(name)] = rows
+        runs.append(linearised(name, residual, weight=weight))
+        derivatives.append(rows)
+        dense.append(matrix)
+        weights.append(weight)
+        residuals.append(residual)
+    fit = linear_fit(runs, derivatives, variables)
+    expected = dense_covariances(residuals, dense, weights)
+    found_ones = spectral_covariance(fit), band_score_covariance(fit)
+    for found, matrix in zip(found_ones, expected, strict=True):
+        np.testing.assert_allclose(found.matrix, matrix, rtol=1e-8, atol=1e-12 * matrix.max())
+        assert found.determined.all()
+        # as many as bands or independent frequencies at most, and of the zeros not many times fewer
+        assert found.degrees_of_freedom.min() > 1.0
+        assert found.degrees_of_freedom.max() < 2.0 * sum(sizes)

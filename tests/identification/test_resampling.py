@@ -1,4 +1,4 @@
-"""Estimates from other noise and from other runs: bootstrap and cross-validation."""
+"""Estimates from other runs: cross-validation; profiles of a linear model."""
 
 from dataclasses import replace
 from math import ceil
@@ -12,23 +12,16 @@ from tests.identification.given import (
     TWO_STAGES,
     Backwards,
     bench_run,
-    first_order,
-    linear_fit,
     model_of,
-    unknowns_of,
 )
 
 from swashplate import Campaign, Drive, Experiment, InputError
 from swashplate.identification.fitting import StageFit, fit
-from swashplate.identification.noise import spectral_covariance
-from swashplate.identification.problem import LinearisedFit, LinearisedRun, Problem
+from swashplate.identification.problem import Problem
 from swashplate.identification.profiles import profiles_of
 from swashplate.identification.resampling import (
-    Bootstrap,
     CrossValidation,
     Fold,
-    NoiseDraws,
-    bootstraps_of,
     cross_validate,
     deal,
 )
@@ -37,42 +30,6 @@ from swashplate.identification.solving import solve
 from swashplate.identification.unknowns import Unknown, Unknowns
 from swashplate.identification.validation import predict
 from swashplate.parameters.files import load_preset
-
-N, RUNS = 2048, 4
-TIME = np.arange(N) / 512.0
-DESIGN = np.column_stack([1.0 - np.exp(-TIME / 0.3), np.sin(2.0 * TIME)])
-
-
-def regression(noise: np.ndarray) -> LinearisedFit:
-    """Two unknowns fitted to noise alone, by linear least squares."""
-    estimate = -np.linalg.solve(RUNS * DESIGN.T @ DESIGN, DESIGN.T @ noise.sum(axis=0))
-    runs = [
-        LinearisedRun(f"run {k}", "speed", TIME, each + DESIGN @ estimate, DESIGN)
-        for k, each in enumerate(noise)
-    ]
-    return linear_fit(runs, unknowns_of("ab", [2.0, 1.0]))
-
-
-def test_estimates_from_draws_scatter_as_the_covariance_says() -> None:
-    made = regression(first_order(0.95, np.random.default_rng(1), (RUNS, N), 400))
-    draws = NoiseDraws(made, seed=1)
-    total = np.array([np.sum(draws.differences(k), axis=0) for k in range(500)])
-    found = np.linalg.solve(RUNS * DESIGN.T @ DESIGN, DESIGN.T @ total.T)
-    # 500 draws tell a deviation to 3 %, and each method knows the noise at the low frequencies of
-    # the derivatives to some 10 %
-    expected = spectral_covariance(made).standard_errors
-    np.testing.assert_allclose(found.std(axis=1), expected, rtol=0.2)
-
-
-def test_quantiles_by_hand() -> None:
-    found = Bootstrap(unknowns_of("a", [1.0]), np.arange(101.0)[:, None], np.ones(1, bool), 0, 0)
-    assert found.intervals()[0] == pytest.approx((2.5, 97.5))
-    unknown = Bootstrap(found.variables, found.vectors, np.zeros(1, bool), 3, 0)
-    assert unknown.intervals() == (None,)
-    assert "3 of 104 refits did not end" in unknown.sentences()[1]
-    few = Bootstrap(found.variables, np.arange(10.0)[:, None], np.ones(1, bool), 0, 0)
-    with pytest.raises(InputError, match="10 draws do not reach the ends"):
-        few.intervals()
 
 
 @pytest.fixture
@@ -88,36 +45,6 @@ def assessed() -> StageFit:
     problem = Problem(line, runs, unknowns, ("y",), {"y": 0.1})
     stage = Stage(name="line", part="chain", free={"J": Free(relative=(0.5, 2.0))})
     return StageFit(stage, problem, solve(problem), load_preset("neutral"))
-
-
-def textbook() -> np.ndarray:
-    """Standard errors of slope and level from 4 times 81 samples with noise 0.1."""
-    design = np.column_stack([LINE_TIME, np.ones(81)])
-    return 0.1 * np.sqrt(np.diag(np.linalg.inv(4.0 * design.T @ design)))
-
-
-def test_refits_scatter_as_the_textbook_says(assessed: StageFit) -> None:
-    found = bootstraps_of([assessed], 200, seed=3)["line"]
-    assert found.failed == 0
-    # 200 draws tell a standard deviation to 5 %, and the noise itself is known to 4 %
-    np.testing.assert_allclose(found.values.std(axis=0), textbook(), rtol=0.2)
-    np.testing.assert_allclose(
-        found.values.mean(axis=0),
-        list(assessed.values.values()),
-        atol=float(4.0 * textbook().max() / np.sqrt(200.0)),
-    )
-    with pytest.raises(InputError, match="1 draws do not make a distribution"):
-        bootstraps_of([assessed], 1)
-
-
-def test_draws_do_not_depend_on_the_order_in_which_they_are_done(assessed: StageFit) -> None:
-    counts: list[int] = []
-    forwards = bootstraps_of([assessed], 40, seed=3)["line"]
-    backwards = bootstraps_of([assessed], 40, seed=3, executor=Backwards(), watch=counts.append)
-    np.testing.assert_array_equal(forwards.vectors, backwards["line"].vectors)
-    assert counts == list(range(1, 41))
-    other = bootstraps_of([assessed], 40, seed=4)["line"]
-    assert not np.array_equal(forwards.vectors, other.vectors)
 
 
 def test_profiles_of_a_linear_model_are_its_intervals(assessed: StageFit) -> None:

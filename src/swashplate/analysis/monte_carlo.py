@@ -193,19 +193,21 @@ def standard_errors(
     variance, uncertain = np.zeros_like(base), len(stages[0].problem.uncertain)
     none = np.zeros(uncertain)
     for stage in stages:
-        sizes, axes = np.linalg.eigh(stage.uncertainty.own.matrix)
-        machine = np.array([unknown.run is None for unknown in stage.problem.unknowns])
+        # what belongs to a run alone is no part of the drive
+        machine = stage.problem.unknowns.shared
+        sizes, axes = np.linalg.eigh(stage.uncertainty.own.matrix[np.ix_(machine, machine)])
         for size, axis in zip(sizes, axes.T, strict=True):
-            error = sqrt(max(size, 0.0)) * axis
-            # what belongs to a run alone is no part of the drive
-            if np.abs(error[machine]).max(initial=0.0) > NEGLIGIBLE:
+            error = np.zeros(len(stage.problem.unknowns))
+            error[machine] = sqrt(max(size, 0.0)) * axis
+            if np.abs(error).max(initial=0.0) > NEGLIGIBLE:
                 slope = _slope(stages, {stage.stage.name: error}, none, numbers, base)
                 variance += slope**2
     for axis in np.eye(uncertain):
         variance += _slope(stages, {}, axis, numbers, base) ** 2
-    for off in assumed:
-        follow = {stage.stage.name: slopes_by(stage, [off])[:, 0] for stage in stages}
-        variance += _slope(stages, follow, none, numbers, base, off) ** 2
+    follow = {stage.stage.name: slopes_by(stage, assumed) for stage in stages if assumed}
+    for k, off in enumerate(assumed):
+        errors = {name: slopes[:, k] for name, slopes in follow.items()}
+        variance += _slope(stages, errors, none, numbers, base, off) ** 2
     return np.asarray(np.sqrt(variance))
 
 

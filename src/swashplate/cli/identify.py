@@ -98,7 +98,6 @@ def fit(
         int, option("Evaluations of the model that a search may take.", min=1, metavar="N")
     ] = MOST_EVALUATIONS,
     folds: int = 0,
-    bootstrap: int = 0,
     profile: list[str] | None = None,
     seed: int = 0,
     jobs: int = 0,
@@ -122,7 +121,6 @@ def fit(
       out DIR: Folder for the fitted drive and its tables.
       joint: After the stages, estimate all parameters at once, through the whole drive.
       folds: Cross-validate over so many parts of the runs; 0 = off.
-      bootstrap: Fit again to so many draws of the noise.
       profile NAME: Profile the cost along this parameter, or 'all'; may be repeated.
       jobs: Processes for all of these; 0 = all cores.
       dask ADDRESS: Run them on the cluster of this scheduler.
@@ -134,7 +132,7 @@ def fit(
       swashplate rig hoist --out virtual --perturb 0.1
       swashplate fit virtual/campaign.toml --out fitted
       swashplate fit harbour/campaign.toml --setup mine.toml --starts 50 --seed 1
-      swashplate fit harbour/campaign.toml --folds 5 --bootstrap 1000 --profile Z16_plus
+      swashplate fit harbour/campaign.toml --folds 5 --profile Z16_plus
       swashplate fit valve/campaign.toml --model valve.py
       swashplate simulate fitted/drive.toml step:9
     """
@@ -164,7 +162,6 @@ def fit(
             joint=joint,
             starts=starts,
             folds=folds,
-            bootstrap=bootstrap,
             profiles=profile or (),
             seed=seed,
             loss=loss,

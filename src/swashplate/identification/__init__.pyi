@@ -23,9 +23,7 @@ from .problem import Problem as Problem
 from .problem import linearised_fit as linearised_fit
 from .profiles import Profile as Profile
 from .profiles import profiles_of as profiles_of
-from .resampling import Bootstrap as Bootstrap
 from .resampling import CrossValidation as CrossValidation
-from .resampling import bootstraps_of as bootstraps_of
 from .resampling import cross_validate as cross_validate
 from .setup import ModelSetup as ModelSetup
 from .setup import Setup as Setup

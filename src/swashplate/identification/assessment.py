@@ -36,7 +36,7 @@ from swashplate.identification.fitting import (
 from swashplate.identification.intervals import Estimate, Interval, unseen_limits
 from swashplate.identification.problem import Problem
 from swashplate.identification.profiles import Profile
-from swashplate.identification.resampling import Bootstrap, CrossValidation
+from swashplate.identification.resampling import CrossValidation
 from swashplate.identification.setup import ModelSetup, Setup, Stage, setup_text
 from swashplate.identification.solving import Solution
 from swashplate.identification.unknowns import Unknown, Unknowns
@@ -82,8 +82,6 @@ class Identification(Estimated):
     campaign: Campaign
     fit: Fit
     """Stage by stage what was estimated, from what it began."""
-    bootstraps: Mapping[str, Bootstrap] = field(default_factory=dict)
-    """By stage."""
     profiles: Sequence[Profile] = ()
     folds: CrossValidation | None = None
     notes: Mapping[str, str] = field(default_factory=dict)
@@ -102,10 +100,9 @@ class Identification(Estimated):
         """What was estimated, one row for each parameter, SI; what ``estimates.csv`` holds.
 
         Columns are stage, parameter, unit, nominal, value, lower and upper (ends of the 95 %
-        interval), with a bootstrap also bootstrap_lower and bootstrap_upper, standard_error and
-        status.
+        interval), standard_error and status.
         """
-        return tables.all_estimates(self.fit, self.bootstraps).to_polars()
+        return tables.all_estimates(self.fit).to_polars()
 
     @cached_property
     def drive(self) -> Drive:

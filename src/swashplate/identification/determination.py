@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 from scipy.linalg import null_space, qr
 
 from swashplate.errors import InputError
-from swashplate.identification.problem import TOLERANCE, triangular_factor, whitening
+from swashplate.identification.arrow import dense_factor, triangular_factor, whitening
+from swashplate.identification.problem import TOLERANCE
 from swashplate.identification.unknowns import Unknowns
 from swashplate.models.displacement_control import FORCE, MOTION, PRESSURE, TRAVEL, ZERO
 from swashplate.parameters.definitions import CATALOGUE
@@ -324,7 +325,7 @@ def identifiability(
     weak, places = [], places[~np.isin(places, [names.index(each.fix) for each in null])]
     if covariance is None:
         every = np.ones(places.size, dtype=np.bool_)
-        inverse, _ = whitening(triangle[:, places], every, TOLERANCE)
+        inverse = whitening(dense_factor(triangle[:, places]), every, TOLERANCE).matrix
         left = inverse @ inverse.T
     else:
         left = covariance[np.ix_(places, places)]

@@ -21,6 +21,7 @@ from swashplate.campaign.experiment import Channel, Experiment, InputSignal, Sou
 from swashplate.campaign.rig import COUNTS_PER_TURN
 from swashplate.drive import Drive
 from swashplate.errors import InputError
+from swashplate.identification.arrow import dense_factor, triangular_factor, whitening
 from swashplate.identification.determination import Identifiability, identifiability
 from swashplate.identification.drive_model import CURRENTS, DriveModel, stage_problem
 from swashplate.identification.intervals import uncertainty
@@ -28,9 +29,8 @@ from swashplate.identification.problem import (
     TOLERANCE,
     LinearisedFit,
     Problem,
+    factor_of,
     linearised_fit,
-    triangular_factor,
-    whitening,
 )
 from swashplate.identification.setup import Setup, Stage
 from swashplate.identification.unknowns import Unknowns
@@ -81,8 +81,8 @@ class Outlook(Result):
         """Part of what is known of an unknown, by name, from each run, its channels together."""
         fit = self.linearised
         squares = {each.name: np.zeros(len(fit.variables)) for each in self.problem.experiments}
-        for run in fit.runs:
-            squares[run.name] = squares[run.name] + np.sum(run.jacobian**2, axis=0)
+        for run, jacobian in fit.jacobians():
+            squares[run.name][fit.variables.columns(run.name)] += np.sum(jacobian**2, axis=0)
         total = np.maximum(sum(squares.values()), 1e-300)
         return {
             name: {run: float(own[k] / total[k]) for run, own in squares.items()}
@@ -262,7 +262,7 @@ def bench(
         apart = float(np.median(np.concatenate([np.diff(each.time) for each in channels])))
         sensor = Sensor(channels[0].kind, problem.scales[name], origin="as in the campaign")
         if fit is not None:
-            sensor = _of_residuals(fit, channels, sensor, apart, machine)
+            sensor = _of_residuals(fit, channels, sensor, apart)
         # an independent sample every so often: the others are worth nothing
         scales[name] = sensor.deviation(apart)
         known[sensor.kind] = sensor
@@ -272,20 +272,19 @@ def bench(
 
 
 def _of_residuals(
-    fit: LinearisedFit,
-    channels: Sequence[Channel],
-    stated: Sensor,
-    step: float,
-    machine: Sequence[int],
+    fit: LinearisedFit, channels: Sequence[Channel], stated: Sensor, step: float
 ) -> Sensor:
     """A channel's sensor with the noise that the residuals of a fitted drive show."""
     name, largest = channels[0].name, max(float(np.ptp(each.values)) for each in channels)
-    left = []
-    for run in (run for run in fit.runs if run.channel == name):
+    left, derivatives = [], []
+    for run, jacobian in fit.jacobians():
+        if run.channel != name:
+            continue
         # with free zeros and other unknowns of single runs fitted
-        own = np.delete(run.jacobian, list(machine), axis=1)
+        own = jacobian[:, : fit.variables.of_run(run.name).size]
         shift = np.linalg.lstsq(own, -run.residual, rcond=None)[0]
         left.append(run._replace(residual=run.residual + own @ shift))
+        derivatives.append(jacobian)
     square = np.concatenate([run.residual for run in left]) ** 2
     noise = stated.noise * float(np.sqrt(np.mean(square)))
     if not NOISELESS * stated.noise < noise or noise > FARTHEST * largest:
@@ -293,7 +292,8 @@ def _of_residuals(
             f"The drive misses '{name}' by {100.0 * noise / largest:.2g} % of its range, so that "
             "its residuals are no noise; give a drive that was fitted to these tests, or none."
         )
-    said = uncertainty(replace(fit, runs=tuple(left)))
+    factor = factor_of(zip(left, derivatives, strict=True), fit.variables)
+    said = uncertainty(replace(fit, runs=tuple(left), derivatives=derivatives, factor=factor))
     # not of all that the residuals hold, but of what meets the unknowns' derivatives
     worth = float(np.median(said.inflation[said.own.determined]))
     return Sensor(stated.kind, noise, worth * step, "residuals of the drive")
@@ -395,11 +395,15 @@ def advise(
             )
     free, made = variables.free, []
     names = tuple(variables.names[k] for k in np.flatnonzero(free))
-    now, known_now = whitening(present, free, TOLERANCE)
-    before = np.where(known_now, np.linalg.norm(now, axis=1), inf)
+    known_now = whitening(dense_factor(present), free, TOLERANCE)
+    now = known_now.matrix
+    before = np.where(known_now.determined, np.linalg.norm(now, axis=1), inf)
     for each in candidates:
-        then, known = whitening(np.vstack([present, each.derivatives]), free, TOLERANCE)
-        after = np.minimum(np.where(known, np.linalg.norm(then, axis=1), inf), before)
+        both = dense_factor(np.vstack([present, each.derivatives]))
+        known = whitening(both, free, TOLERANCE)
+        then = known.matrix
+        after = np.where(known.determined, np.linalg.norm(then, axis=1), inf)
+        after = np.minimum(after, before)
         # errors then along the directions known now, in which they are 1 and independent now
         along = (present @ now).T @ (present @ then)
         shrinking = -np.linalg.slogdet(along @ along.T)[1]

@@ -61,7 +61,7 @@ from swashplate.parameters.parameter_set import ParameterSet
 from swashplate.parameters.rules import SIDES
 from swashplate.progress import LOGGER, working
 from swashplate.results import Result, Tabular
-from swashplate.tables import count
+from swashplate.tables import count, listed
 
 if TYPE_CHECKING:
     import polars
@@ -78,6 +78,15 @@ nothing: in one campaign the nominal start and the first three ended in the same
 ROUGH = 1e-4
 """Tolerance of these starts, of which the best goes on: optima differ by factors. Where the model
 lacks an effect, so that no start can help, six starts take 235 evaluations instead of 929."""
+LEAST_EXPLAINED = 0.4
+"""Share of the variance of what was measured that a search must explain after `solving.LEG`
+evaluations, or it is given up. Channels clipped at half of their range, late by 0.2 s, behind a lag
+of 0.5 s, doubled, or under noise of 30 % of it left 0.57 or more in 36 campaigns; outputs of other
+runs, and runs tiled with jumps, 0 to 0.32."""
+TRIAL = 12
+"""Evaluations of each other start where the first search was given up."""
+WINDOW = 1.0
+"""Time over which the mean speed of a position is taken. [s]"""
 UNEXPLAINED = 5.0
 """Residuals over their known measurement error from which another optimum is looked for."""
 SPREAD = 0.05
@@ -366,7 +375,8 @@ def fit(
     search : Search, optional
         More starts than the nominal one; the best is refined. Without, up to six more are tried if
         residuals are five times as large as their known measurement error, until one of them is
-        not; `Search(0)` tries none.
+        not, and if none explains two fifths of what was measured, the fit is refused; `Search(0)`
+        tries none.
         Ctrl-C during them ends the whole fit, with the best start of that stage as its last result.
     watch : callable, optional
         Called with the stage's name and each of its iterations.
@@ -374,8 +384,8 @@ def fit(
     Raises
     ------
     InputError, ParameterError
-        If tests, model and what is free do not fit each other, or no fit of these runs can mean
-        anything.
+        If tests, model and what is free do not fit each other, no fit of these runs can mean
+        anything, or none of the starts comes near what was measured.
     DomainError
         If the model does not hold at the nominal values.
 
@@ -420,7 +430,7 @@ def fit(
         limits: dict[str, Any] = {"tolerance": tolerance, "max_evaluations": max_evaluations}
         with working(f"Stage {stage.name}") as work:
             solve_stage = partial(solve, loss=loss, watch=seen, **limits)
-            result = _solved(stage, problem, solve_stage, search)
+            result = _solved(stage, problem, solve_stage, search, doubts)
         LOGGER.info(
             "Stage %s: %s after %d evaluations, cost %.5g",
             stage.name,
@@ -501,7 +511,11 @@ def _edges_found(stage: StageFit) -> dict[str, Prior]:
 
 
 def _solved(
-    stage: Stage, problem: Problem, solved: partial[Solution], search: Search | None
+    stage: Stage,
+    problem: Problem,
+    solved: partial[Solution],
+    search: Search | None,
+    doubts: Sequence[str],
 ) -> Solved:
     """See `Solved`."""
     limits = {key: solved.keywords[key] for key in ("tolerance", "max_evaluations")}
@@ -521,7 +535,10 @@ def _solved(
         )
         solution = several[0]
     else:
-        solution, planned = solved(problem), 1 + OTHERS
+        hopeless = None
+        if search is None and isinstance(problem.model, EquationModel):
+            hopeless = partial(_is_hopeless, problem)
+        solution, planned = solved(problem, hopeless=hopeless), 1 + OTHERS
     if search is None and solution.loss == "linear" and _unexplained(problem, solution):
         LOGGER.info(
             "Stage %s: residuals exceed %g times their known measurement error: up to %d more "
@@ -530,13 +547,14 @@ def _solved(
             UNEXPLAINED,
             OTHERS,
         )
+        most = TRIAL if solution.given_up else int(limits["max_evaluations"])
         try:
             others = solve_from(
                 problem,
                 [*sobol_starts(problem, OTHERS, 0)],
                 enough=partial(_explained, problem),
                 tolerance=ROUGH,
-                max_evaluations=int(limits["max_evaluations"]),
+                max_evaluations=most,
             )
         except KeyboardInterrupt:  # before the first of them ended
             others = ()
@@ -545,16 +563,69 @@ def _solved(
             planned = len(several)
     if several:
         best = min(several, key=lambda each: each.cost)
+        if solution.given_up and len(several) == planned:
+            share = share_explained(problem, best.vector)
+            if share < LEAST_EXPLAINED:
+                raise InputError(_no_fit(stage, problem, planned, share, doubts))
         if len(several) < planned:
             words = f"interrupted after {len(several)} of {planned} starts: the best of them"
             solution = replace(best, converged=False, interrupted=True, message=words)
-        elif search is not None or best.number:
+        elif search is not None or best.number or solution.given_up:
             solution = solved(problem, best.vector)
     if any(each.prior is not None for each in problem.unknowns) and not solution.interrupted:
         # what the residuals are worth is known only now
         problem = weighed(problem, solution.vector)
         solution = solved(problem, solution.vector)
     return Solved(problem, solution, several)
+
+
+def share_explained(problem: Problem, vector: Array) -> float:
+    """Share of the variance of what was measured that a point explains, at most 1.
+
+    In units of the residuals, so that the channels that are measured best count most. Of a position
+    that of its mean speeds: where it drifts to after minutes says little of how a drive moves.
+    """
+    total, left = 0.0, 0.0
+    for number, experiment in enumerate(problem.experiments):
+        for name, output in problem.outputs(vector, number).items():
+            channel = experiment[name]
+            used = channel.used
+            if not used.any():
+                continue
+            measured, errors = channel.values[used], (output - channel.values)[used]
+            if channel.is_position and measured.size > 1:
+                step = float(np.median(np.diff(channel.time[used])))
+                width = max(min(round(WINDOW / step), measured.size // 4), 1)
+                measured, errors = _changes(measured, width), _changes(errors, width)
+            unit = problem.scales[name] ** 2
+            total += float(np.sum((measured - measured.mean()) ** 2)) / unit
+            left += float(errors @ errors) / unit
+    return 1.0 - left / total if total > 0.0 else 1.0
+
+
+def _changes(values: Array, width: int) -> Array:
+    """Differences between the means of so many samples each, which noise hardly reaches."""
+    count = values.size // width
+    return np.diff(values[: count * width].reshape(count, width).mean(axis=1))
+
+
+def _is_hopeless(problem: Problem, vector: Array) -> bool:
+    return share_explained(problem, vector) < LEAST_EXPLAINED
+
+
+def _no_fit(
+    stage: Stage, problem: Problem, starts: int, share: float, doubts: Sequence[str]
+) -> str:
+    """That no search comes near what was measured, and what to look at."""
+    channels, percentage = listed(problem.channels), 100.0 * max(share, 0.0)
+    sentence = (
+        f"Stage {stage.name} does not fit: the best of {count(starts, 'start')} explains "
+        f"{percentage:.0f} % of the variance of {channels}. Look at the runs with 'swashplate "
+        "campaign plot': is it this command that moved the machine, do jumps or resets cut a "
+        "signal, are kinds, units and signs right? Begin at another drive with --from, or search "
+        "on all the same with --starts 20 (in Python search = Search(20))."
+    )
+    return " ".join([sentence, *(f"Seen in the runs: {doubt}" for doubt in doubts[:1])])
 
 
 def _unexplained(problem: Problem, solution: Solution) -> bool:

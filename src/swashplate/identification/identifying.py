@@ -26,13 +26,11 @@ from swashplate.identification.fitting import Fit, Search, StageFit, fit
 from swashplate.identification.model import Model
 from swashplate.identification.problem import Loss
 from swashplate.identification.profiles import Profile, profiles_of
-from swashplate.identification.resampling import bootstraps_of, cross_validate
+from swashplate.identification.resampling import cross_validate
 from swashplate.identification.setup import FreeParameters, ModelSetup, Setup
 from swashplate.parameters.files import named_set
 from swashplate.parameters.parameter_set import ParameterSet
 
-FEWEST_DRAWS = 40
-"""Of a bootstrap: one beyond each end of a 95 % interval."""
 MOST_EVALUATIONS = 600
 
 
@@ -45,7 +43,6 @@ def identify(
     joint: bool = False,
     starts: int | None = None,
     folds: int = 0,
-    bootstrap: int = 0,
     profiles: str | Sequence[str] = (),
     seed: int = 0,
     loss: Loss = "linear",
@@ -83,12 +80,12 @@ def identify(
         More starts, spread over the bounds; the best is refined. By default up to six are tried in
         a stage whose residuals are five times as large as their known measurement error, until
         they no longer are; 0 tries none.
-    folds, bootstrap : int
-        Folds of a cross-validation, and refits to new noise (40 or more); 0 for none.
+    folds : int
+        Folds of a cross-validation; 0 for none.
     profiles : str or sequence of str
         Parameters to profile the cost along, by name, or ``"all"``.
     seed : int
-        Random seed of starts, folds and bootstrap.
+        Random seed of starts and folds.
     loss : {"linear", "soft_l1", "cauchy"}
         Robust loss functions reduce the weight of outliers.
     max_evaluations : int
@@ -96,7 +93,7 @@ def identify(
     required : float
         Largest error of held-out runs, over their range, for the verdict "usable". [1]
     executor : Executor, optional
-        Of `swashplate.executors`, for starts, folds, refits and profiles; one after another by
+        Of `swashplate.executors`, for starts, folds and profiles; one after another by
         default. The result does not depend on it.
     store : path, optional
         Folder that keeps the result of each start as it is ready.
@@ -107,7 +104,7 @@ def identify(
     -------
     Identification
         Estimates by name, drive, verdict; `Identification.report` and `Identification.save` write
-        them. After Ctrl-C it is the best result so far, without folds, bootstrap and profiles.
+        them. After Ctrl-C it is the best result so far, without folds and profiles.
 
     Raises
     ------
@@ -131,7 +128,6 @@ def identify(
     _check_numbers(
         starts=0 if starts is None else starts,
         folds=folds,
-        bootstrap=bootstrap,
         seed=seed,
         max_evaluations=max_evaluations,
     )
@@ -140,11 +136,6 @@ def identify(
     if not is_real(required) or not 0.0 < required < inf:
         raise InputError(
             f"required is {required!r}, but must be an error over the range, above 0: 0.05 for 5 %."
-        )
-    if 0 < bootstrap < FEWEST_DRAWS:
-        raise InputError(
-            f"{bootstrap} draws do not reach the ends of a 95 % interval; take {FEWEST_DRAWS} or "
-            "more, 1000 for smooth ones."
         )
     profiles = (profiles,) if isinstance(profiles, str) else profiles
     if not isinstance(tests, str | Path | Campaign):
@@ -198,14 +189,6 @@ def identify(
             seed=seed,
         )
         identification = replace(identification, folds=cross_validation)
-    if bootstrap:
-        refits = bootstraps_of(
-            result.stages,
-            bootstrap,
-            executor=executor,
-            seed=seed,
-        )
-        identification = replace(identification, bootstraps=refits)
     if profiles:
         curves = [
             curve for stage in result.stages for curve in _profiles(stage, profiles, executor)

@@ -23,12 +23,9 @@ from swashplate.identification.model import linearised as linearised_model
 from swashplate.identification.noise import (
     Covariance,
     NoiseColour,
-    SpectralLine,
     coloured_noise_covariance,
-    line_sentences,
     noise_colours,
     spectral_covariance,
-    without_lines,
 )
 from swashplate.identification.problem import LinearisedFit, Problem, linearised_fit
 from swashplate.identification.profiles import CheckedEnd, checked_ends
@@ -251,7 +248,9 @@ def slopes_by_earlier(stage: StageFit, earlier: StageFit) -> Array:
     """
     unknowns, vector = earlier.problem.unknowns, earlier.solution.vector
     names = unknowns.machine_targets
-    return _slopes(stage, names, unknowns.chain(vector, names, ""))
+    slopes = np.zeros((len(stage.linearised.variables), len(unknowns)))
+    slopes[:, unknowns.shared] = _slopes(stage, names, unknowns.chain(vector, names, ""))
+    return slopes
 
 
 def slopes_by_fixed(stage: StageFit) -> Array:
@@ -288,16 +287,17 @@ def _slopes(stage: StageFit, names: Sequence[str], by: Array) -> Array:
     """(K, F) derivatives of a stage's estimates, from those (names, F) of the model's numbers."""
     problem, vector, linearised = stage.problem, stage.solution.vector, stage.linearised
     products, source = np.zeros((linearised.rank, by.shape[1])), source_of(stage)
-    rows = {(run.name, run.channel): run for run in linearised.runs}
+    jacobians = linearised.jacobians()
     for number, experiment in enumerate(problem.experiments):
         values = problem.model_values(vector, number)
         moved = linearised_model(source(experiment), values, experiment, names)
+        directions, whitening = linearised.inverse.of_run(experiment.name)
         for name, weight in problem.weights[number].items():
             used = weight > 0.0
             if used.any():
                 changes = weight[used, None] * (moved[name].by[used] @ by)
-                run = rows[experiment.name, name]
-                products += linearised.whitening.T @ (run.jacobian.T @ changes)
+                _, jacobian = next(jacobians)
+                products[directions] += whitening.T @ (jacobian.T @ changes)
     slopes: Array = -linearised.whitening @ products
     return slopes
 
@@ -347,8 +347,6 @@ class Uncertainty(Result):
     """What earlier stages do not know."""
     fixed: Array
     """(K, F) changes of the solver's vector for a standard uncertainty of each fixed number."""
-    lines: tuple[SpectralLine, ...]
-    """Of the residuals, removed before it was judged how long they stay correlated."""
     ends: tuple[CheckedEnd, ...] = ()
     """Sides on which the cost does not rise as the covariance says."""
     priors: tuple[str, ...] = ()
@@ -378,7 +376,7 @@ class Uncertainty(Result):
         """What the errors rest on."""
         if not self.noisy:
             return ("The residuals are exactly zero: errors of zero do not apply to other tests.",)
-        said = list(line_sentences(self.lines))
+        said = []
         for colour in self.colours:
             said.append(colour.sentence)
             if colour.drifting:
@@ -424,14 +422,13 @@ def uncertainty(
     samples than unknowns.
     """
     bounded, fit = fit.variables, released(fit)
-    clean, lines = without_lines(fit)
     own = replace(coloured_noise_covariance(fit), variables=bounded)
     white = fit.squares / fit.spare_samples * np.sum(fit.whitening**2, axis=1)
     ratio = np.ones_like(white)
     np.divide(np.diag(own.matrix), white, out=ratio, where=own.determined & (white > 0.0))
     fixed = np.zeros((white.size, 0)) if fixed is None else fixed
-    colours, noisy = noise_colours(clean), fit.squares > 0.0
-    return Uncertainty(own, np.maximum(ratio, 1.0), colours, noisy, tuple(handed), fixed, lines)
+    colours, noisy = noise_colours(fit), fit.squares > 0.0
+    return Uncertainty(own, np.maximum(ratio, 1.0), colours, noisy, tuple(handed), fixed)
 
 
 def stage_uncertainty(stage: StageFit) -> Uncertainty:
@@ -543,7 +540,8 @@ def open_unknowns(stage: StageFit, experiments: Iterable[Experiment]) -> Iterato
     chain = DriveModel(stage.drive.parameters, "card" if model.part == "card" else "chain")
     chain = replace(chain, forces=model.forces)
     targets, values = unknowns.machine_targets, unknowns.targets(vector, "")
-    by_name = unknowns.chain(vector, targets, "")
+    by_name = np.zeros((len(targets), len(unknowns)))
+    by_name[:, unknowns.shared] = unknowns.chain(vector, targets, "")
     for experiment in experiments:
         if experiment.input.kind != "voltage" or not chain.signals_of(experiment):
             continue

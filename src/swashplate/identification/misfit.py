@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from swashplate.campaign.experiment import Channel, Experiment
 from swashplate.identification import faults
+from swashplate.identification.arrow import Block, arrow_factor, triangular_factor
 from swashplate.identification.drive_model import DriveModel
 from swashplate.identification.faults import (
     DRIFT,
@@ -23,7 +24,7 @@ from swashplate.identification.faults import (
 )
 from swashplate.identification.intervals import follows_card, source_of
 from swashplate.identification.model import Model, linearised
-from swashplate.identification.problem import TOLERANCE, triangular_factor
+from swashplate.identification.problem import TOLERANCE
 from swashplate.parameters.definitions import CATALOGUE, COLUMNS, columns_of
 
 if TYPE_CHECKING:
@@ -125,44 +126,59 @@ Key = tuple[int, str]
 
 
 class _Block(NamedTuple):
-    """One channel of one run of a stage, in units of its noise."""
+    """One channel of one run of a stage, in units of its noise: products of its columns alone."""
 
     run: str
+    experiment: str
+    """Stage and experiment, whose channels share their own estimates."""
     place: float
     """Of the run among those of the stage, from -1/2 to 1/2."""
     channel: Channel
-    residual: Array
-    """(n,)"""
-    weight: Array
-    """(n,) what a difference is multiplied by to be a residual."""
-    columns: dict[Key, Array]
-    """(n,) derivatives of the residual."""
+    samples: int
+    keys: tuple[Key, ...]
+    """What its columns are by; those that belong to the experiment alone come first."""
+    own: int
+    """How many of these there are."""
+    triangle: Array
+    """(<= P + 2, P + 2) factor of its columns, of the residual, and of the weight by which a
+    difference is multiplied to be a residual."""
+    differences: Array
+    """(<= P + 1, P + 1) factor of its columns and the residual, without that weight."""
     kinds: dict[str, Kind]
     """Of constants and faults, by name."""
 
-    def factor(self, places: Mapping[Key, int]) -> Array:
-        """(<= n, P + 1) triangular factor of its own columns and the residual, among all others."""
-        # a run in one direction tells nothing of the parameters of the other
-        moving = {key: column for key, column in self.columns.items() if column.any()}
-        factor = triangular_factor(np.column_stack([*moving.values(), self.residual]))
-        made = np.zeros((len(factor), len(places) + 1))
-        made[:, [*(places[key] for key in moving), -1]] = factor
-        return made
+    def rows(self, places: Mapping[Key, int], shared: int) -> Block:
+        """Its columns and the residual as rows of the factor of all blocks.
+
+        `places` are numbers of keys; after those that belong to single experiments `shared` others
+        follow, the residual among them.
+        """
+        numbers = [places[key] for key in self.keys]
+        own, others = numbers[: self.own], numbers[self.own :]
+        first = len(places) + 1 - shared
+        rows = np.zeros((len(self.triangle), self.own + shared))
+        rows[:, : self.own] = self.triangle[:, : self.own]
+        rows[:, self.own + np.array(others, np.intp) - first] = self.triangle[:, self.own : -2]
+        rows[:, -1] = self.triangle[:, -2]
+        return Block(self.experiment, np.array(own, np.intp), rows)
 
     def fit(self, places: Mapping[Key, int], shift: Array) -> ChannelFit:
         """What is left of it with the estimates shifted by (K,)."""
-        moved = [shift[places[k]] * each for k, each in self.columns.items() if not k[0]]
-        left, ratio = self.residual - sum(moved, np.zeros(1)), None
+        moves = np.array([0.0 if key[0] else shift[places[key]] for key in self.keys])
+        left, ratio = self.triangle[:, -2] - self.triangle[:, :-2] @ moves, None
         if error := measurement_error(self.channel):
-            ratio = float(np.sqrt(np.mean((left / self.weight) ** 2))) / error
+            differences = self.differences[:, -1] - self.differences[:, :-1] @ moves
+            ratio = float(np.linalg.norm(differences)) / sqrt(self.samples) / error
         scale, late = (self._alone(kind, left) for kind in (faults.SCALE, faults.LATE))
-        return ChannelFit(self.run, self.channel.name, self.place, left.size, ratio, scale, late)
+        name, channel = self.run, self.channel.name
+        return ChannelFit(name, channel, self.place, self.samples, ratio, scale, late)
 
     def _alone(self, kind: Kind, left: Array) -> Alone:
-        column = self.columns[FAULT, kind.words.format(self.channel.name)]
+        name = FAULT, kind.words.format(self.channel.name)
+        column, weight = self.triangle[:, self.keys.index(name)], self.triangle[:, -1]
         if self.channel.is_position:
             # a position has a free zero
-            column = column - self.weight * (self.weight @ column) / (self.weight @ self.weight)
+            column = column - weight * (weight @ column) / (weight @ weight)
         square = float(column @ column)
         if not square > 0.0:
             return Alone(0.0, inf, 0.0)
@@ -191,14 +207,18 @@ def lack_of_fit(stages: Sequence[StageFit]) -> LackOfFit:
     factor of all derivatives.
     """
     blocks = [block for each in stages for block in _blocks(each, stages)]
-    keys = sorted(dict.fromkeys(k for each in blocks for k in each.columns), key=lambda k: k[0])
+    alone = dict.fromkeys(key for block in blocks for key in block.keys[: block.own])
+    others = dict.fromkeys(key for block in blocks for key in block.keys[block.own :])
+    keys = [*alone, *sorted(others, key=lambda key: key[0])]
     places = {key: place for place, key in enumerate(keys)}
     names, kinds = [name for _, name in keys], {k: v for b in blocks for k, v in b.kinds.items()}
     count, known = (sum(group <= last for group, _ in keys) for last in (ESTIMATE, CONSTANT))
     constants, rows = names[count:known], np.eye(len(keys) + 1)
     doubted = [k for k, name in enumerate(names) if name.startswith(UNCERTAIN)]
-    parts = [rows[doubted], *(each.factor(places) for each in blocks)]
-    triangle = triangular_factor(np.vstack(parts))
+    shared = np.arange(len(alone), len(keys) + 1)
+    parts = [Block("", np.arange(0), rows[None, k, len(alone) :]) for k in doubted]
+    parts += [block.rows(places, shared.size) for block in blocks]
+    triangle = arrow_factor(len(keys) + 1, shared, parts).dense()
     opened = triangular_factor(np.vstack([rows[count:known] / FIXED_OFF, triangle]))
 
     (basis, inverse), (wider, instead) = _span(triangle[:, :count]), _span(opened[:, :known])
@@ -211,7 +231,7 @@ def lack_of_fit(stages: Sequence[StageFit]) -> LackOfFit:
     follow = np.abs(inverse @ columns) * lengths[:count, None]
     replaced = np.abs(instead @ opened)[count:] * lengths[count:known, None]
     squares = float(left @ left)
-    deviation = sqrt(squares / max(sum(each.residual.size for each in blocks) - count, 1))
+    deviation = sqrt(squares / max(sum(each.samples for each in blocks) - count, 1))
     shift = inverse @ residual
     runs = tuple(block.fit(places, shift) for block in blocks)
     found = []
@@ -278,7 +298,7 @@ def _blocks(stage: StageFit, stages: Sequence[StageFit]) -> Iterator[_Block]:
         sources = [source(each) for each in problem.experiments]
         parts = {each.part for each in sources if isinstance(each, DriveModel)}
         fixed = _constants(numbers, "chain" if "chain" in parts else parts.pop(), stages)
-    runs = {(run.name, run.channel): run for run in linearised.runs}
+    jacobians, unknowns = linearised.jacobians(), problem.unknowns
     noise, free = _noise_units(stage), linearised.variables.free
     fastest = {name: faults.fastest(name, problem.experiments) for name in problem.channels}
     for number, experiment in enumerate(problem.experiments):
@@ -288,16 +308,17 @@ def _blocks(stage: StageFit, stages: Sequence[StageFit]) -> Iterator[_Block]:
         commanded = faults.of_command(model, values, experiment)
         place = number / max(len(problem.experiments) - 1, 1) - 0.5
         for name, weights in problem.weights[number].items():
-            run = runs.get((experiment.name, name))
-            if run is None:
-                continue
             used, scale = weights > 0.0, noise[name]
+            if not used.any():
+                continue
+            run, jacobian = next(jacobians)
             weight = weights[used] / scale
             columns: dict[Key, Array] = {
-                (ESTIMATE, f"{stage.stage.name}: {name}"): run.jacobian[:, k] / scale
-                for k, name in enumerate(problem.unknowns.names)
-                if problem.unknowns[k].run in (None, experiment.name) and free[k]
+                (ESTIMATE, f"{stage.stage.name}: {unknowns.names[k]}"): jacobian[:, j] / scale
+                for j, k in enumerate(unknowns.columns(experiment.name).tolist())
+                if free[k]
             }
+            own = sum(bool(free[k]) for k in unknowns.of_run(experiment.name).tolist())
             columns |= {key: weight * each[used] for key, each in others.get(name, {}).items()}
             for together in problem.uncertain:
                 known = [each for each in together if (CONSTANT, each) in columns]
@@ -313,13 +334,21 @@ def _blocks(stage: StageFit, stages: Sequence[StageFit]) -> Iterator[_Block]:
             effects |= commanded.get(name, {})
             columns |= {(FAULT, key): weight * each[used] for key, (_, each) in effects.items()}
             kinds = {key: kind for key, (kind, _) in effects.items()}
+            matrix = np.column_stack([*columns.values(), run.residual / scale, weight])
+            triangle = triangular_factor(matrix)
+            differences = triangle[:-1, :-1] / weight[0]
+            if weight.min() < weight.max():
+                differences = triangular_factor(matrix[:, :-1] / weight[:, None])
             yield _Block(
                 experiment.run,
+                f"{stage.stage.name}: {experiment.name}",
                 place,
                 experiment[name],
-                run.residual / scale,
-                weight,
-                columns,
+                run.residual.size,
+                tuple(columns),
+                own,
+                triangle,
+                differences,
                 {key: FIXED for group, key in columns if group == CONSTANT} | kinds,
             )
 
@@ -394,9 +423,9 @@ def _noise_units(stage: StageFit) -> dict[str, float]:
             units[name] = error / problem.scales[name]
             continue
         left = [run.residual for run in stage.linearised.runs if run.channel == name]
-        squares = np.concatenate([np.zeros(0), *left]) ** 2
+        squares, samples = sum(float(r @ r) for r in left), sum(r.size for r in left)
         inflation = max((each.inflation for each in colours if each.channel == name), default=1.0)
-        units[name] = max(sqrt(squares.sum() / max(squares.size, 1) * inflation), 1e-300)
+        units[name] = max(sqrt(squares / max(samples, 1) * inflation), 1e-300)
     return units
 
 

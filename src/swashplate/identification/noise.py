@@ -1,17 +1,18 @@
-"""Noise of residuals: autocorrelation, spectral lines, and the covariance that follows."""
+"""Noise of residuals: autocorrelation, spectrum, and the covariance that follows.
+
+All goes through the runs one by one and keeps of each a few numbers a frequency.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from functools import lru_cache
 from math import sqrt
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.fft import irfft, next_fast_len, rfft, rfftfreq
-from scipy.linalg import eigh_tridiagonal
 
 from swashplate.identification.problem import LinearisedFit, LinearisedRun
 from swashplate.identification.unknowns import Unknowns
@@ -89,11 +90,11 @@ class Grid(NamedTuple):
     """[s]"""
 
     def spread(self, samples: Array) -> Array:
-        """(size, ...) samples (n, ...) on the grid, 0 in the gaps."""
+        """(..., size) samples (..., n) on the grid, 0 in the gaps."""
         if self.size == self.places.size:
             return samples
-        spread = np.zeros((self.size, *samples.shape[1:]))
-        spread[self.places] = samples
+        spread = np.zeros((*samples.shape[:-1], self.size))
+        spread[..., self.places] = samples
         return spread
 
 
@@ -201,11 +202,16 @@ class NoiseColour(Result):
 
 def noise_colours(fit: LinearisedFit) -> tuple[NoiseColour, ...]:
     """Colours of the residuals of each channel, pooled over its runs of one sampling step."""
-    grids, groups = [grid_of(run.time) for run in fit.runs], list[list[int]]()
+    steps, sizes = list[float](), list[int]()
+    for run in fit.runs:
+        grid = grid_of(run.time)
+        steps.append(grid.step)
+        sizes.append(grid.size)
+    groups = list[list[int]]()
     for k, run in enumerate(fit.runs):
         for group in groups:
-            step = grids[group[0]].step
-            alike = abs(grids[k].step - step) <= SAME_STEP * step or run.time.size < 2
+            step = steps[group[0]]
+            alike = abs(steps[k] - step) <= SAME_STEP * step or run.time.size < 2
             if fit.runs[group[0]].channel == run.channel and alike:
                 group.append(k)
                 break
@@ -213,9 +219,12 @@ def noise_colours(fit: LinearisedFit) -> tuple[NoiseColour, ...]:
             groups.append([k])
     colours = []
     for members in groups:
-        longest = int(LONGEST * max(grids[k].size for k in members))
-        pairs = [pair_sums(fit.runs[k].unweighted, grids[k], longest) for k in members]
-        sums, counts = (np.sum(part, axis=0) for part in zip(*pairs, strict=True))
+        longest = int(LONGEST * max(sizes[k] for k in members))
+        sums, counts = np.zeros(longest + 1), np.zeros(longest + 1)
+        for k in members:
+            products, pairs = pair_sums(fit.runs[k].unweighted, grid_of(fit.runs[k].time), longest)
+            sums += products
+            counts += pairs
         autocovariance = sums / np.maximum(counts, 1.0)
         length = correlation_length(autocovariance, counts)
         flat = min(length, longest // 2)  # the taper must have come down at the longest lag
@@ -226,7 +235,7 @@ def noise_colours(fit: LinearisedFit) -> tuple[NoiseColour, ...]:
             # line then leaks less into other frequencies
             taper = 0.5 * (1.0 + np.cos(np.pi * np.clip(lags / flat - 1.0, 0.0, 1.0)))
             correlation = autocovariance[: lags.size] / autocovariance[0] * taper
-        channel, step = fit.runs[members[0]].channel, grids[members[0]].step
+        channel, step = fit.runs[members[0]].channel, steps[members[0]]
         colours.append(NoiseColour(channel, tuple(members), step, correlation, length, longest))
     return tuple(colours)
 
@@ -244,56 +253,110 @@ sampling rate, where that is low."""
 class _Spectrum:
     """One run in the frequency domain, in directions whose derivatives are orthonormal."""
 
-    def __init__(self, run: LinearisedRun, whitening: Array) -> None:
+    def __init__(self, fit: LinearisedFit, run: LinearisedRun, jacobian: Array) -> None:
         grid = grid_of(run.time)
         self.step, scale = grid.step, 1.0 / np.sqrt(grid.size)
-        directions, residual = run.jacobian @ whitening, run.unweighted
-        weight = np.ones((1, 1)) if run.weight is None else run.weight[:, None]
-        self.derivatives = scale * rfft(grid.spread(weight * directions), axis=0)
-        """(F, rank) by which the noise enters the scores: with the weights twice."""
+        self.directions, self.whitening = fit.inverse.of_run(run.name)
+        """(d,) numbers of those that move the run, and (q + M, d) its unknowns along them."""
+        moved, residual = self.whitening.T @ jacobian.T, run.unweighted
+        weight = np.ones(1) if run.weight is None else run.weight
+        self.derivatives = scale * rfft(grid.spread(weight * moved))
+        """(d, F) by which the noise enters the scores: with the weights twice."""
         self.frequencies: Array = rfftfreq(grid.size, grid.step)
         self.residual = scale * rfft(grid.spread(residual))
         """(F,) without the weights."""
         if weight.min() == weight.max():
-            by_estimate = self.derivatives / weight[:1] ** 2
+            by_estimate = self.derivatives / weight[0] ** 2
         else:
-            by_estimate = scale * rfft(grid.spread(directions / weight), axis=0)
-        products = (self.derivatives.conj() * by_estimate).real
-        self.left: Array = 1.0 - np.clip(np.sum(products, axis=1), 0.0, 1.0)
+            by_estimate = scale * rfft(grid.spread(moved / weight))
+        leverage = np.sum((self.derivatives.conj() * by_estimate).real, axis=0)
+        self.left: Array = 1.0 - np.clip(leverage, 0.0, 1.0)
         """(F,) part of the noise that the fit leaves."""
         # a real signal's spectrum stands for its mirror image too, but at the ends
         self.twice: Array = np.full(self.frequencies.size, 2.0)
         self.twice[[0, -1] if grid.size % 2 == 0 else 0] = 1.0
         self.level = float(np.mean(residual**2))
 
+    def variances(self, scores: NDArray[np.complex128]) -> Array:
+        """(q + M, b) squares of what scores (d, b) move the unknowns by."""
+        return np.abs(self.whitening @ scores) ** 2
+
+
+def _spectra(fit: LinearisedFit) -> Iterator[_Spectrum]:
+    """The spectrum of each run, one after another."""
+    for run, jacobian in fit.jacobians():
+        yield _Spectrum(fit, run, jacobian)
+
+
+class _Pooled:
+    """Noise spectrum of a channel: its shape is common to its runs, its level each run's own."""
+
+    def __init__(self, frequencies: list[Array], powers: list[Array], left: list[Array]) -> None:
+        ends = np.cumsum([each.size for each in frequencies])[:-1]
+        order = np.argsort(np.concatenate(frequencies), kind="stable")
+        seen, rest = np.concatenate(powers)[order], np.concatenate(left)[order]
+        shape = np.empty(order.size)
+        shape[order] = _smoothed(seen) / np.maximum(_smoothed(rest), LEAST_LEFT * NEIGHBOURS)
+        self.shapes = np.split(shape, ends)
+        """(F,) of each run, in units of its level."""
+        count = max(order.size // NEIGHBOURS, 1)
+        first = np.arange(count) * NEIGHBOURS
+        number = np.empty(order.size, np.int32)
+        number[order] = np.minimum(np.arange(order.size) // NEIGHBOURS, count - 1)
+        self.bins = np.split(number, ends)
+        """(F,) of each run, the number of the bin of neighbours that each frequency lies in."""
+        sizes = np.diff(np.append(first, order.size))
+        rest = np.maximum(np.add.reduceat(rest, first), LEAST_LEFT * sizes)
+        self.means = np.add.reduceat(seen, first) / rest
+        """(B,) of each bin."""
+        self.squares = np.add.reduceat(seen**2, first) / rest**2
+        """(B,) of each bin, sums of the squares of what its mean is the sum of."""
+
 
 class _Sandwich:
-    """(JᵀJ)⁻¹ M (JᵀJ)⁻¹ in the making: M, the unknowns' variances, the squares of their parts."""
+    """(JᵀJ)⁻¹ M (JᵀJ)⁻¹ in the making: M, and what the unknowns' degrees of freedom follow from.
+
+    A variance is a sum of parts that are independent of each other. Of an unknown of one run those
+    from this run are added up; what others add, by way of the machine, has the degrees of freedom
+    of the machine's unknowns that it follows.
+    """
 
     def __init__(self, fit: LinearisedFit) -> None:
         self.fit, self.spare = fit, fit.spare_samples  # refused where there are none
         prior = fit.prior @ fit.whitening
         self.middle: Array = (prior.T * fit.prior_noise) @ prior
-        self.total: Array = np.einsum("ki,ij,kj->k", fit.whitening, self.middle, fit.whitening)
+        self.total: Array = np.sum((fit.whitening @ self.middle) * fit.whitening, axis=1)
+        """(K,) sums of the parts."""
         self.squares: Array = np.zeros(len(fit.variables))
+        """(K,) sums of their squares."""
 
-    def add(self, middle: Array, parts: Array) -> None:
-        """Add to the middle (rank, rank), and parts (n, K) of the variances, all independent."""
-        self.middle = self.middle + middle
-        self.total += parts.sum(axis=0)
-        self.squares += np.sum(parts**2, axis=0)
+    def add(self, directions: NDArray[np.intp], middle: Array) -> None:
+        """Add the part (d, d) of a run in some directions to the middle."""
+        self.middle[np.ix_(directions, directions)] += middle
 
     def covariance(self, each: float, without: float) -> Covariance:
         """The covariance, a part having `each` degrees of freedom; `without` any part."""
+        whitening, inverse = self.fit.whitening, self.fit.inverse
+        matrix = whitening @ self.middle @ whitening.T
         freedom = np.full_like(self.total, without)
-        np.divide(each * self.total**2, self.squares, out=freedom, where=self.squares > 0.0)
-        matrix = self.fit.whitening @ self.middle @ self.fit.whitening.T
+        shared = self.fit.variables.shared
+        some = self.squares > 0.0
+        np.divide(each * self.total**2, self.squares, out=freedom, where=some)
+        by_direction = np.linalg.pinv(inverse.machine)
+        variances, unsure = np.diag(matrix), 1.0 / np.maximum(freedom[shared], 1.0)
+        for run, (_, _, follow) in inverse.runs.items():
+            own = inverse.factor.runs[run].own
+            others = np.maximum(variances[own] - self.total[own], 0.0)
+            # by each of the machine's unknowns, as if they were independent of each other
+            shares = (follow @ by_direction) ** 2 * variances[shared]
+            shares /= np.maximum(shares.sum(axis=1, keepdims=True), 1e-300)
+            squares = self.squares[own] + each * others**2 * (shares**2 @ unsure)
+            total, known = self.total[own] + others, squares > 0.0
+            freedom[own[known]] = each * total[known] ** 2 / squares[known]
         return covariance_of(self.fit, matrix, np.maximum(freedom, 1.0))
 
 
-def spectral_covariance(
-    fit: LinearisedFit, spectra: Sequence[_Spectrum] | None = None
-) -> Covariance:
+def spectral_covariance(fit: LinearisedFit) -> Covariance:
     """Covariance of the least-squares estimate under coloured noise, from its smoothed spectrum.
 
     Runs, and channels of a run, are taken as independent of each other. An `InputError` says that
@@ -307,43 +370,13 @@ def spectral_covariance(
     common to them, its level each run's own. The fit has taken a part h(f) of the noise,
     the leverage of its derivatives there, and of E|r(f)|² = (1 - h) S only the rest is seen: sums
     of squares are divided by sums of 1 - h, as in HC2 of MacKinnon and White (1985). Degrees of
-    freedom follow from the frequencies that an unknown's variance is an average over.
+    freedom follow from the frequencies that an unknown's variance is an average over, in bins of
+    neighbours that do not overlap.
     """
-    sums, spectra = _Sandwich(fit), spectra or [_Spectrum(r, fit.whitening) for r in fit.runs]
-    for channel in dict.fromkeys(run.channel for run in fit.runs):
-        parts = [s for s, run in zip(spectra, fit.runs, strict=True) if run.channel == channel]
-        order = np.argsort(np.concatenate([part.frequencies for part in parts]), kind="stable")
-        power = [np.abs(part.residual) ** 2 / (part.level or 1.0) for part in parts]
-        seen = np.concatenate(power)[order]
-        left = np.concatenate([part.left for part in parts])[order]
-        rest = np.maximum(_smoothed(left), LEAST_LEFT * NEIGHBOURS)
-        shape = np.empty(order.size)
-        shape[order] = _smoothed(seen) / rest
-        weights, middle = [], np.zeros((fit.rank, fit.rank))
-        ends = np.cumsum([part.frequencies.size for part in parts])[:-1]
-        for part, spectrum in zip(parts, np.split(shape, ends), strict=True):
-            density = part.level * spectrum * part.twice
-            middle += ((part.derivatives.conj().T * density) @ part.derivatives).real
-            across = np.abs(part.derivatives @ fit.whitening.T) ** 2
-            weights.append(across * (part.level * part.twice)[:, None])
-        # what each frequency's square adds to the variances: the smoothing the other way round
-        share = np.concatenate(weights)[order] / rest[:, None]
-        sums.add(middle, _smoothed(share) * seen[:, None])
-    return sums.covariance(4.0, np.inf)
+    return _covariances(fit)[0]
 
 
-def _smoothed(values: Array) -> Array:
-    """Sums over each value and its neighbours (n, ...), mirrored at both ends."""
-    near = min((NEIGHBOURS - 1) // 2, values.shape[0] - 1)
-    others = [(0, 0)] * (values.ndim - 1)
-    sums = np.cumsum(np.pad(values, [(near, near), *others], mode="reflect"), axis=0)
-    sums = np.pad(sums, [(1, 0), *others])
-    return np.asarray(sums[2 * near + 1 :] - sums[: values.shape[0]])
-
-
-def band_score_covariance(
-    fit: LinearisedFit, spectra: Sequence[_Spectrum] | None = None
-) -> Covariance:
+def band_score_covariance(fit: LinearisedFit) -> Covariance:
     """Covariance under noise that may differ along the runs; otherwise as `spectral_covariance`.
 
     Notes
@@ -354,15 +387,60 @@ def band_score_covariance(
     at the same phase, counts in full. Degrees of freedom are those of a sum of squares, two for
     each band and run.
     """
-    sums = _Sandwich(fit)
-    for part in spectra or [_Spectrum(run, fit.whitening) for run in fit.runs]:
-        products = part.derivatives.conj() * (part.twice * part.residual)[:, None]
-        width = min(BAND, 0.5 / part.step / FEWEST_BANDS)
-        band = (part.frequencies / width).astype(np.intp)
-        scores = np.add.reduceat(products, np.flatnonzero(np.diff(band, prepend=-1)), axis=0)
-        middle = 0.5 * (scores.conj().T @ scores).real
-        sums.add(middle, 0.5 * np.abs(scores @ fit.whitening.T) ** 2)
-    return sums.covariance(2.0, 1.0)
+    return _covariances(fit)[1]
+
+
+def _covariances(fit: LinearisedFit) -> tuple[Covariance, Covariance]:
+    """By the smoothed spectrum, and by scores of bands: both in two passes over the runs."""
+    smoothed, banded = _Sandwich(fit), _Sandwich(fit)
+    pooled = _pooled(fit)
+    runs = {channel: iter(zip(p.shapes, p.bins, strict=True)) for channel, p in pooled.items()}
+    shared = {c: np.zeros((fit.variables.shared.size, p.means.size)) for c, p in pooled.items()}
+    for run, spectrum in zip(fit.runs, _spectra(fit), strict=True):
+        noise, (shape, bins) = pooled[run.channel], next(runs[run.channel])
+        derivatives, directions = spectrum.derivatives, spectrum.directions
+        density = spectrum.level * shape * spectrum.twice
+        smoothed.add(directions, ((derivatives.conj() * density) @ derivatives.T).real)
+        # what a unit of the noise's shape in each bin adds to the variances
+        weights = spectrum.variances(derivatives) * (spectrum.level * spectrum.twice)
+        first = np.flatnonzero(np.diff(bins, prepend=-1))
+        weights, bins = np.add.reduceat(weights, first, axis=1), bins[first]
+        own = fit.variables.of_run(run.name)
+        shared[run.channel][:, bins] += weights[own.size :]
+        smoothed.total[own] += weights[: own.size] @ noise.means[bins]
+        smoothed.squares[own] += weights[: own.size] ** 2 @ noise.squares[bins]
+
+        products = derivatives.conj() * (spectrum.twice * spectrum.residual)
+        width = min(BAND, 0.5 / spectrum.step / FEWEST_BANDS)
+        band = (spectrum.frequencies / width).astype(np.intp)
+        scores = np.add.reduceat(products, np.flatnonzero(np.diff(band, prepend=-1)), axis=1)
+        banded.add(directions, 0.5 * (scores.conj() @ scores.T).real)
+        parts, columns = 0.5 * spectrum.variances(scores), fit.variables.columns(run.name)
+        banded.total[columns] += parts.sum(axis=1)
+        banded.squares[columns] += np.sum(parts**2, axis=1)
+    for channel, noise in pooled.items():
+        smoothed.total[fit.variables.shared] += shared[channel] @ noise.means
+        smoothed.squares[fit.variables.shared] += shared[channel] ** 2 @ noise.squares
+    return smoothed.covariance(4.0, np.inf), banded.covariance(2.0, 1.0)
+
+
+def _pooled(fit: LinearisedFit) -> dict[str, _Pooled]:
+    """The noise of each channel."""
+    parts: dict[str, tuple[list[Array], list[Array], list[Array]]] = {}
+    for run, spectrum in zip(fit.runs, _spectra(fit), strict=True):
+        frequencies, powers, left = parts.setdefault(run.channel, ([], [], []))
+        frequencies.append(spectrum.frequencies)
+        powers.append(np.abs(spectrum.residual) ** 2 / (spectrum.level or 1.0))
+        left.append(spectrum.left)
+    return {channel: _Pooled(*each) for channel, each in parts.items()}
+
+
+def _smoothed(values: Array) -> Array:
+    """(n,) sums over each value and its neighbours, mirrored at both ends."""
+    near = min((NEIGHBOURS - 1) // 2, values.size - 1)
+    sums = np.cumsum(np.pad(values, (near, near), mode="reflect"))
+    sums = np.pad(sums, (1, 0))
+    return np.asarray(sums[2 * near + 1 :] - sums[: values.size])
 
 
 def coloured_noise_covariance(fit: LinearisedFit) -> Covariance:
@@ -372,8 +450,7 @@ def coloured_noise_covariance(fit: LinearisedFit) -> Covariance:
     take in noise that is not, but are few. On the bench neither alone covers 93 to 97 % on every
     axis, both together do (docs/calibration.md).
     """
-    spectra = [_Spectrum(run, fit.whitening) for run in fit.runs]
-    first, second = spectral_covariance(fit, spectra), band_score_covariance(fit, spectra)
+    first, second = _covariances(fit)
     known = first.determined & (first.standard_errors > 0.0)
     ratio = np.ones(known.size)
     np.divide(second.standard_errors, first.standard_errors, out=ratio, where=known)
@@ -381,145 +458,3 @@ def coloured_noise_covariance(fit: LinearisedFit) -> Covariance:
     freedom = np.where(ratio > 1.0, second.degrees_of_freedom, first.degrees_of_freedom)
     matrix = first.matrix * np.outer(stretch, stretch)
     return replace(first, matrix=matrix, degrees_of_freedom=freedom)
-
-
-# --- spectral lines -------------------------------------------------------------------------------
-
-HALF_BANDWIDTH = 4.0
-"""Time-bandwidth product NW of the tapers, of which 2 NW - 1 are used (Thomson 1982)."""
-LOWEST = 4.0
-"""Half bandwidths of the shortest run below which no line is told from slow noise or drift."""
-FALSE_ALARM = 0.01
-"""Probability that white noise has a line, over all frequencies of a channel together."""
-MOST, FEWEST = 40, 256
-"""Lines of a channel that are removed, the strongest first; samples of a run from which they are
-sought."""
-PADDING = 4
-"""Zeros beside a run, in its lengths, before its spectrum is taken; a parabola through the largest
-three values then tells a line's frequency to a hundredth of a bin."""
-
-
-class SpectralLine(NamedTuple):
-    """A sinusoid in the residuals of a channel, of one frequency in all its runs."""
-
-    channel: str
-    frequency: float
-    """[Hz]"""
-    share: float
-    """Part of the channel's residual variance that removing it takes away, 0 to 1. [1]"""
-
-
-def without_lines(fit: LinearisedFit) -> tuple[LinearisedFit, tuple[SpectralLine, ...]]:
-    """A fit with the spectral lines of its residuals removed, and those lines.
-
-    Notes
-    -----
-    Lines are found by Thomson's (1982) harmonic F-test on discrete prolate spheroidal tapers,
-    numerators and denominators summed over the runs of a channel. At each a sine and a cosine are
-    fitted to every run by least squares and subtracted; what that takes from the sum of squares is
-    the line's share. None is sought below four half bandwidths of the shortest run, 16 of its
-    bins, where a model error or a drift is no line.
-    """
-    runs, found = list(fit.runs), list[SpectralLine]()
-    for channel in dict.fromkeys(run.channel for run in fit.runs):
-        alike = [k for k, run in enumerate(fit.runs) if run.channel == channel]
-        whole = sum(float(np.sum(runs[k].unweighted ** 2)) for k in alike)
-        members = [k for k in alike if runs[k].time.size >= FEWEST]
-        left = {k: runs[k].unweighted for k in members}
-        grids = [grid_of(runs[k].time) for k in members]
-        for frequency in _frequencies([*left.values()], grids):
-            taken = 0.0
-            for k in members:
-                turn = 2.0 * np.pi * frequency * runs[k].time
-                waves = np.stack([np.cos(turn), np.sin(turn)])
-                products = waves @ left[k]
-                amplitudes = np.linalg.solve(waves @ waves.T, products)
-                left[k] = left[k] - amplitudes @ waves
-                taken += float(products @ amplitudes)
-            found.append(SpectralLine(channel, frequency, taken / whole))
-        for k in members:
-            weight = runs[k].weight
-            runs[k] = runs[k]._replace(residual=left[k] if weight is None else weight * left[k])
-    return (replace(fit, runs=tuple(runs)) if found else fit), tuple(found)
-
-
-def _percent(share: float) -> str:
-    """A share in per cent, two digits of it, never as a power of ten."""
-    percent = 100.0 * share
-    return f"{percent:.0f} %" if percent >= 10.0 else f"{percent:.2g} %"
-
-
-def line_sentences(lines: Sequence[SpectralLine]) -> tuple[str, ...]:
-    """What lines there are, one sentence a channel."""
-    said = []
-    for channel in dict.fromkeys(line.channel for line in lines):
-        alike = sorted((e for e in lines if e.channel == channel), key=lambda e: e.frequency)
-        low, high = alike[0].frequency, alike[-1].frequency
-        most = max(alike, key=lambda each: each.share)
-        what, largest = f"A spectral line at {low:.3g} Hz makes", ""
-        if len(alike) > 1:
-            what = f"{len(alike)} spectral lines between {low:.3g} and {high:.3g} Hz make"
-            largest = f", the largest {_percent(most.share)} at {most.frequency:.3g} Hz"
-        share = _percent(sum(each.share for each in alike))
-        said.append(f"{what} {share} of the residuals' variance of {channel}{largest}.")
-    return tuple(said)
-
-
-def _frequencies(runs: Sequence[Array], grids: Sequence[Grid]) -> list[float]:
-    """Frequencies of significant lines, the strongest first, no two within a bandwidth. [Hz]"""
-    from scipy.special import fdtri
-
-    if not runs:
-        return []
-    step = float(np.median([grid.step for grid in grids]))
-    size = next_fast_len(PADDING * max(grid.size for grid in grids), real=True)
-    count = round(2.0 * HALF_BANDWIDTH) - 1
-    explained, unexplained = np.zeros(size // 2 + 1), np.zeros(size // 2 + 1)
-    for samples, grid in zip(runs, grids, strict=True):
-        tapers = _tapers(grid.size, count)
-        spectra = rfft(tapers * grid.spread(samples), size, axis=1)
-        sums = tapers.sum(axis=1)
-        energy = float(sums @ sums)
-        amplitude = sums @ spectra / energy
-        explained += energy * np.abs(amplitude) ** 2
-        unexplained += np.sum(np.abs(spectra - sums[:, None] * amplitude) ** 2, axis=0)
-    frequencies = rfftfreq(size, step)
-    shortest = min(grid.size for grid in grids) * step
-    bandwidth = HALF_BANDWIDTH / shortest
-    looks = 0.5 * shortest / step  # independent frequencies
-    ratio = (count - 1.0) * explained / np.maximum(unexplained, 1e-300)
-    freedom = 2.0 * len(runs), 2.0 * len(runs) * (count - 1.0)
-    # the upper quantile of F is one over the lower one with its freedoms exchanged
-    limit = 1.0 / float(fdtri(*freedom[::-1], FALSE_ALARM / looks))
-    # at half the rate itself a sine is zero; the last frequency of an odd size lies below it
-    highest = (1.0 - 1e-9) * 0.5 / step
-    told = (ratio > limit) & (frequencies > LOWEST * bandwidth) & (frequencies < highest)
-    chosen: list[float] = []
-    for place in np.argsort(-np.where(told, explained, 0.0)):
-        if not told[place] or len(chosen) == MOST:
-            break
-        near = abs(np.array(chosen) - frequencies[place]) < bandwidth
-        if not near.any():
-            # the parabola through the maximum and its neighbours; the last frequency has one, and
-            # zero is never told
-            low, middle, *after = explained[place - 1 : place + 2]
-            high = after[0] if after else low
-            bend = low - 2.0 * middle + high
-            aside = np.clip(0.5 * (low - high) / bend, -0.5, 0.5) if bend < 0.0 else 0.0
-            chosen.append(float(frequencies[place] + aside * frequencies[1]))
-    return chosen
-
-
-@lru_cache(maxsize=32)
-def _tapers(size: int, count: int) -> Array:
-    """(count, size) Slepian sequences of unit energy, each of either sign.
-
-    Eigenvectors of Slepian's (1978) tridiagonal matrix, as in SciPy's ``dpss``, which comes with
-    all of `scipy.signal` and half a second to load it.
-    """
-    n = np.arange(size)
-    middle = (0.5 * (size - 1) - n) ** 2 * np.cos(2.0 * np.pi * HALF_BANDWIDTH / size)
-    beside = 0.5 * n[1:] * (size - n[1:])
-    wanted = (size - count, size - 1)
-    tapers: Array = eigh_tridiagonal(middle, beside, select="i", select_range=wanted)[1].T[::-1]
-    return tapers

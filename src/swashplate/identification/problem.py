@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property, lru_cache, partial
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple, TypeVar, cast
@@ -14,6 +14,13 @@ from swashplate.campaign.experiment import Channel, Experiment
 from swashplate.equations import Model as OfEquations
 from swashplate.equations.marching.observation import ObservedRecord
 from swashplate.errors import InputError
+from swashplate.identification.arrow import (
+    ArrowFactor,
+    Block,
+    Whitening,
+    arrow_factor,
+    whitening,
+)
 from swashplate.identification.model import (
     EDGE,
     OFFSET,
@@ -107,7 +114,7 @@ class Problem(Result):
         found = []
         for each in self.experiments:
             names = [name for name in self.channels if name in each.channels]
-            found.append({n: np.sqrt(each[n].weight) / self.scales[n] for n in names})
+            found.append({n: _factors(each[n].weight, self.scales[n]) for n in names})
         return tuple(found)
 
     @property
@@ -116,21 +123,40 @@ class Problem(Result):
         return sum(int(np.count_nonzero(w)) for run in self.weights for w in run.values())
 
     def evaluate(self, vector: Array, *, compressed: bool = True) -> Evaluation:
-        """Residuals and Jacobian by the vector; compressed, as a triangular factor of a few rows.
+        """Residuals and Jacobian by the vector; compressed, as a triangular factor, K + 1 rows.
 
         The last ones are kept. A `DomainError` says that the model does not hold there.
         """
         key = vector.tobytes(), compressed
         if key not in self._last:
-            ways = [self._reduced if each else self._factored for each in self._marched]
-            if not compressed:
-                ways = [self._full] * len(self.experiments)
-            parts = self._each(lambda number: ways[number](vector, number))
-            priors = Evaluation(*self.unknowns.prior_rows(vector))
-            residuals, jacobians = zip(*parts, priors, strict=True)
+            evaluation = self._compressed(vector) if compressed else self._whole(vector)
             self._last.clear()
-            self._last[key] = Evaluation(np.concatenate(residuals), np.vstack(jacobians))
+            self._last[key] = evaluation
         return self._last[key]
+
+    def _compressed(self, vector: Array) -> Evaluation:
+        """The triangular factor of [J r], made run by run."""
+        ways = [self._reduced if each else self._factored for each in self._marched]
+        blocks = self._each(lambda number: ways[number](vector, number))
+        residuals, _ = self.unknowns.prior_rows(vector)
+        priors = prior_blocks(self.unknowns, vector)
+        for block, residual in zip(priors, residuals, strict=True):
+            blocks.append(block._replace(rows=np.append(block.rows, [[residual]], axis=1)))
+        size = len(self.unknowns)
+        factor = arrow_factor(size + 1, np.append(self.unknowns.shared, size), blocks).dense()
+        return Evaluation(factor[:, -1], factor[:, :-1])
+
+    def _whole(self, vector: Array) -> Evaluation:
+        """Residuals and derivatives of all samples, as a robust loss needs them."""
+        parts = self._each(lambda number: self._full(vector, number))
+        residuals, rows = self.unknowns.prior_rows(vector)
+        jacobians = []
+        for experiment, part in zip(self.experiments, parts, strict=True):
+            jacobian = np.zeros((part.residuals.size, len(self.unknowns)))
+            jacobian[:, self.unknowns.columns(experiment.name)] = part.jacobian
+            jacobians.append(jacobian)
+        values = [part.residuals for part in parts]
+        return Evaluation(np.concatenate([*values, residuals]), np.vstack([*jacobians, rows]))
 
     def cost(self, vector: Array) -> float:
         """Half the sum of squares alone, which is quicker."""
@@ -159,7 +185,10 @@ class Problem(Result):
         return {name: part_of(outputs, experiment, name) + zero for name, zero in zeros.items()}
 
     def linearised(self, vector: Array, number: int) -> Mapping[str, Linearised]:
-        """Weighted residuals of each channel of one experiment and derivatives by the vector."""
+        """Weighted residuals of each channel of one experiment and their derivatives.
+
+        These are by the unknowns that can move the experiment, `Unknowns.columns`.
+        """
         experiment, run = self.experiments[number], self.experiments[number].name
         values, own = self._values(vector, number), self.model_values(vector, number)
         names = [name for name in self.unknowns.targets(vector, run) if name in own]
@@ -169,7 +198,8 @@ class Problem(Result):
             channel, zero = experiment[name], f"{OFFSET}{name}"
             output = part_of(outputs, experiment, name)
             residual = output.values + values.get(zero, 0.0) - channel.values
-            by = output.by @ chain + self.unknowns.chain(vector, [zero], run)
+            by = output.by @ chain
+            by += self.unknowns.chain(vector, [zero], run)
             parts = self._compared(channel, residual), self._compared(channel, by)
             made[name] = Linearised(weight * parts[0], weight[:, None] * parts[1])
         return made
@@ -186,23 +216,27 @@ class Problem(Result):
         return rows if self.compare is None else self.compare(channel, rows)
 
     def _full(self, vector: Array, number: int) -> Evaluation:
+        """All samples of one experiment, by the unknowns that can move it."""
         values, by = zip(*self.linearised(vector, number).values(), strict=True)
         return Evaluation(np.concatenate(values), np.vstack(by))
 
-    def _factored(self, vector: Array, number: int) -> Evaluation:
-        """The triangular factor of [J r] where the march cannot make it."""
+    def _factored(self, vector: Array, number: int) -> Block:
+        """[J r] of one experiment where the march cannot make its triangular factor."""
         residuals, jacobian = self._full(vector, number)
-        factor = triangular_factor(np.column_stack([jacobian, residuals]))
-        return Evaluation(factor[:, -1], factor[:, :-1])
+        return self._block(number, np.column_stack([jacobian, residuals]))
 
-    def _reduced(self, vector: Array, number: int) -> Evaluation:
-        """A triangular factor of [J r] of one experiment, without ever holding J."""
+    def _reduced(self, vector: Array, number: int) -> Block:
+        """The triangular factor of [J r] of one experiment, without ever holding J."""
         ready, observed = self._ready(vector, number)
         experiment, (_, names, zeros, asked, by) = self.experiments[number], self._own[number]
         factor, chain = ready.triangle(observed).factor, partial(self.unknowns.chain, vector)
         jacobian = factor[:, : len(asked)] @ by @ chain(names, experiment.name)
         jacobian += factor[:, len(asked) : -1] @ chain(zeros, experiment.name)
-        return Evaluation(factor[:, -1], jacobian)
+        return self._block(number, np.column_stack([jacobian, factor[:, -1]]))
+
+    def _block(self, number: int, rows: Array) -> Block:
+        run = self.experiments[number].name
+        return Block(run, self.unknowns.of_run(run), rows)
 
     @cached_property
     def _marched(self) -> tuple[bool, ...]:
@@ -239,6 +273,13 @@ class Problem(Result):
         numbers = range(len(self.experiments))
         alone = min(self.threads, len(numbers)) == 1
         return list(map(work, numbers) if alone else _pool(self.threads).map(work, numbers))
+
+
+def _factors(weight: Array, scale: float) -> Array:
+    """(m,) factors on residuals; where all are alike, an array that takes no memory."""
+    if weight.size and weight.min() == weight.max():
+        return np.broadcast_to(np.sqrt(weight[0]) / scale, weight.shape)
+    return np.sqrt(weight) / scale
 
 
 @lru_cache
@@ -300,8 +341,6 @@ class LinearisedRun(NamedTuple):
     """(n,) stamps, increasing; ignored samples are simply absent. [s]"""
     residual: Array
     """(n,) weighted: w times (simulated less measured)."""
-    jacobian: Array
-    """(n, K) derivatives of `residual` by the solver's vector."""
     weight: Array | None = None
     """(n,) the factors w; None where all are alike. Samples of factor 0 are dropped."""
 
@@ -313,16 +352,31 @@ class LinearisedRun(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class LinearisedFit(Result):
-    """All runs of a fit at its optimum that have a sample which counts; see `linearised_fit`."""
+    """All runs of a fit at its optimum that have a sample which counts; see `linearised_fit`.
+
+    An unknown belongs to the machine or to one run. So the derivatives of a run are those by the
+    unknowns that can move it, `Unknowns.columns`, and those of all runs are never held together:
+    `jacobians` goes through them, and `factor` is all that is needed of them at once.
+    """
 
     runs: tuple[LinearisedRun, ...]
+    derivatives: Iterable[Array] = field(repr=False)
+    """(n, q + M) for each run the derivatives of `residual` by the unknowns that can move it; it
+    can be gone through again and again."""
     variables: Unknowns
+    factor: ArrowFactor = field(repr=False)
+    """Of all derivatives and priors. Never of the normal equations: a null direction of JᵀJ drowns
+    in rounding at 1e-8."""
     prior: Array
     """(p, K) rows of the Gaussian priors: derivatives of (number less mean)/deviation, times the
     root of `prior_noise`."""
     tolerance: float = TOLERANCE
     prior_noise: Array = field(default_factory=lambda: np.ones(0))
     """(p,) variance of each prior's residual, which counts as that many of the data's."""
+
+    def jacobians(self) -> Iterator[tuple[LinearisedRun, Array]]:
+        """Each run with its derivatives (n, q + M), one after another."""
+        return zip(self.runs, self.derivatives, strict=True)
 
     @property
     def samples(self) -> int:
@@ -336,18 +390,13 @@ class LinearisedFit(Result):
 
     @cached_property
     def triangle(self) -> Array:
-        """(<= K, K) factor R of all derivatives and priors, RᵀR = JᵀJ, by blocks of runs.
-
-        Never from the normal equations: a null direction of JᵀJ drowns in rounding at 1e-8.
-        """
-        triangle = self.prior
-        for run in self.runs:
-            triangle = triangular_factor(np.vstack([triangle, run.jacobian]))
-        return triangle
+        """(<= K, K) factor R of all derivatives and priors, RᵀR = JᵀJ."""
+        return self.factor.dense()
 
     @cached_property
-    def _inverse(self) -> tuple[Array, NDArray[np.bool_]]:
-        return whitening(self.triangle, self.variables.free, self.tolerance)
+    def inverse(self) -> Whitening:
+        """Inverse of the derivatives; unknowns at a bound are fixed there."""
+        return whitening(self.factor, self.variables.free, self.tolerance)
 
     @property
     def whitening(self) -> Array:
@@ -355,17 +404,17 @@ class LinearisedFit(Result):
 
         The columns of J W are orthonormal. Rows of unknowns at a bound are 0: they are fixed there.
         """
-        return self._inverse[0]
+        return self.inverse.matrix
 
     @property
     def determined(self) -> NDArray[np.bool_]:
         """(K,) unknowns that are free and have no part in any null direction."""
-        return self._inverse[1]
+        return self.inverse.determined
 
     @property
     def rank(self) -> int:
         """How many combinations of the unknowns the runs determine."""
-        return int(self.whitening.shape[1])
+        return self.inverse.rank
 
     @property
     def spare_samples(self) -> int:
@@ -380,33 +429,28 @@ class LinearisedFit(Result):
         return spare
 
 
-def triangular_factor(matrix: Array) -> Array:
-    """(min(m, K), K) factor R of a matrix (m, K), RᵀR = matrixᵀ matrix."""
-    return np.asarray(np.linalg.qr(matrix, mode="r"))
+def prior_blocks(unknowns: Unknowns, vector: Array) -> list[Block]:
+    """The derivatives of each prior's residual, as rows of the run that its unknown belongs to."""
+    _, rows = unknowns.prior_rows(vector)
+    having = [each for each in unknowns if each.prior is not None]
+    runs = [each.run or "" for each in having]
+    return [
+        Block(run, unknowns.of_run(run), row[None, unknowns.columns(run)])
+        for run, row in zip(runs, rows, strict=True)
+    ]
 
 
-def whitening(
-    triangle: Array, free: NDArray[np.bool_], tolerance: float
-) -> tuple[Array, NDArray[np.bool_]]:
-    """Inverse of (m, K) derivatives, or of their triangular factor, on what they determine.
+def factor_of(
+    runs: Iterable[tuple[LinearisedRun, Array]], unknowns: Unknowns, priors: Iterable[Block] = ()
+) -> ArrowFactor:
+    """Factor of the derivatives of some runs, each (n, q + M), and of rows of priors."""
 
-    W (K, rank) with W Wᵀ = (JᵀJ)⁻¹ on the unknowns that are `free`, and (K,) which are determined:
-    singular values of the column-scaled factor below `tolerance` of the largest count as zero.
-    """
-    if triangle.shape[0] > triangle.shape[1]:
-        triangle = triangular_factor(triangle)
-    length = np.linalg.norm(triangle, axis=0)
-    moving = np.flatnonzero(free & (length > 0.0))
-    determined = np.zeros(free.size, dtype=np.bool_)
-    if not moving.size:
-        return np.zeros((free.size, 0)), determined
-    _, sizes, rows = np.linalg.svd(triangle[:, moving] / length[moving], full_matrices=True)
-    rank = int(np.count_nonzero(sizes > tolerance * sizes[0]))
-    inverse = np.zeros((free.size, rank))
-    inverse[moving] = (rows[:rank].T / sizes[:rank]) / length[moving, None]
-    # an unknown whose unit vector lies in the row space is determined in spite of null directions
-    determined[moving] = np.sum(rows[rank:] ** 2, axis=0) < 1e-8
-    return inverse, determined
+    def blocks() -> Iterator[Block]:
+        yield from priors
+        for run, jacobian in runs:
+            yield Block(run.name, unknowns.of_run(run.name), jacobian)
+
+    return arrow_factor(len(unknowns), unknowns.shared, blocks())
 
 
 def influence(residuals: Array, loss: Loss) -> tuple[Array, Array]:
@@ -422,6 +466,45 @@ def influence(residuals: Array, loss: Loss) -> tuple[Array, Array]:
     return residuals, np.ones_like(residuals)
 
 
+KEPT = 32e6
+"""Derivatives of a fit that are kept instead of marched again: those of a dozen runs. [bytes]"""
+
+
+class _Derivatives:
+    """Derivatives of each run of a fit at a point, marched again whenever they are gone through.
+
+    The first ones are kept, as far as `KEPT` goes.
+    """
+
+    def __init__(self, problem: Problem, vector: Array) -> None:
+        self.problem, self.vector = problem, vector
+        self._kept = dict[int, list[Array]]()
+        self._left = KEPT
+
+    def linearised(self, number: int) -> dict[str, Linearised]:
+        """Residuals and derivatives of an experiment at the samples that count, by channel."""
+        parts = dict[str, Linearised]()
+        for name, part in self.problem.linearised(self.vector, number).items():
+            used = self.problem.weights[number][name] > 0.0
+            if used.all():
+                parts[name] = part
+            elif used.any():
+                parts[name] = Linearised(part.values[used], part.by[used])
+        arrays = [part.by for part in parts.values()]
+        size = sum(each.nbytes for each in arrays)
+        if number not in self._kept and size <= self._left:
+            self._kept[number] = arrays
+            self._left -= size
+        return parts
+
+    def __iter__(self) -> Iterator[Array]:
+        for number in range(len(self.problem.experiments)):
+            if number in self._kept:
+                yield from self._kept[number]
+            else:
+                yield from (part.by for part in self.linearised(number).values())
+
+
 def linearised_fit(problem: Problem, vector: Array, loss: Loss = "linear") -> LinearisedFit:
     """Residuals and derivatives of every run at a point (K,), ignored samples left out.
 
@@ -430,13 +513,20 @@ def linearised_fit(problem: Problem, vector: Array, loss: Loss = "linear") -> Li
     equation 6.5), whatever their spectrum. An `InputError` says that so many residuals lie in the
     tails of the loss that it has no optimum there.
     """
-    runs = []
-    for number, experiment in enumerate(problem.experiments):
-        for name, part in problem.linearised(vector, number).items():
-            weight = problem.weights[number][name]
-            used, columns = weight > 0.0, (experiment[name].time, part.values, part.by, weight)
-            if used.any():
-                runs.append(LinearisedRun(experiment.name, name, *(each[used] for each in columns)))
+    derivatives, runs = _Derivatives(problem, vector), list[LinearisedRun]()
+
+    def marched() -> Iterator[tuple[LinearisedRun, Array]]:
+        for number, experiment in enumerate(problem.experiments):
+            for name, part in derivatives.linearised(number).items():
+                time, weight = experiment[name].time, problem.weights[number][name]
+                if part.values.size < weight.size:
+                    used = weight > 0.0
+                    time, weight = time[used], weight[used]
+                runs.append(LinearisedRun(experiment.name, name, time, part.values, weight))
+                yield runs[-1], part.by
+
+    unknowns = problem.unknowns
+    factor = factor_of(marched(), unknowns, prior_blocks(unknowns, vector))
     for name in problem.channels if loss != "linear" else ():
         mine = [k for k, run in enumerate(runs) if run.channel == name]
         parts = [influence(runs[k].residual, loss) for k in mine]
@@ -448,8 +538,14 @@ def linearised_fit(problem: Problem, vector: Array, loss: Loss = "linear") -> Li
             )
         for k, (bounded, _) in zip(mine, parts, strict=True):
             runs[k] = runs[k]._replace(residual=bounded / slope)
-    unknowns = problem.unknowns
     worths = np.array([each.worth for each in unknowns if each.prior is not None])
     tolerance = TOLERANCE if hasattr(problem.model, "linearise") else BY_DIFFERENCES
-    prior = unknowns.prior_rows(vector)[1]
-    return LinearisedFit(tuple(runs), unknowns.at(vector), prior, tolerance, worths)
+    return LinearisedFit(
+        tuple(runs),
+        derivatives,
+        unknowns.at(vector),
+        factor,
+        unknowns.prior_rows(vector)[1],
+        tolerance,
+        worths,
+    )

@@ -1,35 +1,24 @@
-"""Resampling: cross-validation over the runs, and the bootstrap of the noise."""
+"""Resampling: cross-validation over the runs."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from copy import copy
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from itertools import chain
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.fft import irfft, next_fast_len, rfft
 
 from swashplate.campaign.experiment import Experiment
 from swashplate.errors import DomainError, InputError
 from swashplate.executors import Executor, Serial
 from swashplate.identification import tables
-from swashplate.identification.drive_model import (
-    DriveModel,
-    Parameters,
-    Starts,
-    simulated_current,
-    start_currents_of,
-)
-from swashplate.identification.fitting import Search, StageFit, fit
-from swashplate.identification.noise import grid_of, noise_colours, without_lines
-from swashplate.identification.problem import LinearisedFit, Loss, Problem
+from swashplate.identification.drive_model import Parameters
+from swashplate.identification.fitting import Search, fit
+from swashplate.identification.problem import Loss
 from swashplate.identification.setup import Setup
-from swashplate.identification.solving import NO_EFFECT, solve
-from swashplate.identification.unknowns import Unknowns
+from swashplate.identification.solving import NO_EFFECT
 from swashplate.identification.validation import Measures, measures, predict, with_speeds
-from swashplate.parameters.parameter_set import ParameterSet
 from swashplate.progress import counted
 from swashplate.results import Result
 from swashplate.tables import Table
@@ -212,196 +201,3 @@ def _fold(
         lost += [each.name for each, effect in each_one if each.run is None and effect <= least]
     converged = all(each.solution.converged for each in result.stages)
     return Fold(number, names, tuple(lost), _measured(held), converged), held
-
-
-# --- bootstrap ------------------------------------------------------------------------------------
-
-
-class NoiseDraws:
-    """Noise like a fit's, run by run; draw k of a seed is the same on any cores and in any order.
-
-    An `InputError` says that there are no more samples than unknowns.
-
-    Notes
-    -----
-    Gaussian noise with the autocorrelation of the channel's residuals (a parametric bootstrap,
-    Efron and Tibshirani 1993, section 6.5), drawn by circulant embedding (Dietrich and Newsam
-    1997), in each run of the size of its own residuals, enlarged by the root of the samples over
-    those that the fit leaves.
-    """
-
-    def __init__(self, fit: LinearisedFit, *, seed: int = 0) -> None:
-        spare = fit.samples / fit.spare_samples
-        self.fit, self.seed = fit, seed
-        self._amplitudes: dict[int, tuple[Array, int]] = {}
-        for colour in noise_colours(fit):
-            lags = colour.correlation.size
-            for m in colour.members:
-                size = next_fast_len(grid_of(fit.runs[m].time).size + lags, real=True)
-                circle = np.zeros(size)
-                circle[:lags] = colour.correlation
-                circle[size - lags + 1 :] = colour.correlation[:0:-1]
-                # negative parts of the spectrum are errors of the estimate
-                power = np.maximum(rfft(circle).real, 0.0)
-                variance = spare * np.mean(fit.runs[m].unweighted ** 2)
-                amplitude = np.sqrt(variance * power / irfft(power, size)[0])
-                self._amplitudes[m] = amplitude, size
-
-    def differences(self, draw: int) -> tuple[Array, ...]:
-        """For each run (n,) differences simulated less measured that might have been as well.
-
-        To refit, take as measured what the optimum simulates less these.
-        """
-        made = []
-        for m, run in enumerate(self.fit.runs):
-            amplitude, size = self._amplitudes[m]
-            random = np.random.default_rng(np.random.SeedSequence(self.seed, spawn_key=(draw, m)))
-            noise = irfft(amplitude * rfft(random.standard_normal(size)), size)
-            made.append(noise[grid_of(run.time).places])
-        return tuple(made)
-
-
-FEWEST_DRAWS = 40
-"""Draws that reach the ends of a 95 % interval."""
-
-
-@dataclass(frozen=True, eq=False)
-class Bootstrap(Result):
-    """Estimates from other noise."""
-
-    variables: Unknowns
-    vectors: Array
-    """(draws, K) solver's vectors; those at a bound stay."""
-    determined: NDArray[np.bool_]
-    """(K,)"""
-    failed: int
-    """Refits that did not end."""
-    seed: int
-
-    @property
-    def values(self) -> Array:
-        """(draws, K) in their own units."""
-        return self.variables.to_values(self.vectors)
-
-    def intervals(self) -> tuple[tuple[float, float] | None, ...]:
-        """Percentile intervals of 95 % in own units; None for what is fixed or undetermined."""
-        draws = self.vectors.shape[0]
-        if draws < FEWEST_DRAWS:
-            raise InputError(
-                f"{draws} draws do not reach the ends of a 95 % interval; take {FEWEST_DRAWS} or "
-                "more."
-            )
-        ends = np.quantile(self.values, [0.025, 0.975], axis=0)
-        return tuple(
-            (float(low), float(high)) if known else None
-            for low, high, known in zip(*ends, self.determined, strict=True)
-        )
-
-    def table(self) -> Table:
-        """Median and spread of the draws of each unknown of the machine, and its interval."""
-        return tables.bootstrap_table(self)
-
-    def sentences(self) -> tuple[str, ...]:
-        """How it was done, and what failed."""
-        draws = self.vectors.shape[0]
-        said = [f"{draws} draws of noise of the residuals' autocorrelation, seed {self.seed}."]
-        if self.failed:
-            said.append(
-                f"{self.failed} of {draws + self.failed} refits did not end and are left out: the "
-                "intervals are too narrow if those would have gone far."
-            )
-        return tuple(said)
-
-
-def bootstraps_of(
-    stages: Sequence[StageFit],
-    draws: int = 1000,
-    *,
-    seed: int = 0,
-    executor: Executor | None = None,
-    watch: Callable[[int], None] | None = None,
-) -> dict[str, Bootstrap]:
-    """Fit all stages again and again to what they simulate with other noise of the same colour.
-
-    Results by stage. In each draw a pump is driven by the current of the card of that draw; draw k
-    of a seed is the same on any executor. `watch` is told how many are done.
-
-    Raises
-    ------
-    InputError
-        If there are fewer than two draws, or fewer than two of the fits ended.
-    """
-    if draws < 2:
-        raise InputError(f"{draws} draws do not make a distribution; take 1000.")
-    fits = [without_lines(each.linearised)[0] for each in stages]
-    shared = tuple(
-        (
-            replace(each, problem=replace(each.problem, threads=1), earlier=()),
-            NoiseDraws(fit, seed=seed),
-        )
-        for each, fit in zip(stages, fits, strict=True)
-    )
-    found: dict[int, tuple[Array, ...] | None] = {}
-    refits = (executor or Serial()).run(_refitted, shared, range(draws))
-    for number, vectors in counted(refits, draws, "fits to new noise", "Bootstrapping"):
-        found[number] = vectors
-        if watch is not None:
-            watch(len(found))
-    ended = [each for _, each in sorted(found.items()) if each is not None]
-    if len(ended) < 2:
-        raise InputError(f"{len(ended)} of {draws} refits ended; there is nothing to compare.")
-    vectors, failed = map(np.array, zip(*ended, strict=True)), draws - len(ended)
-    return {
-        stage.stage.name: Bootstrap(fit.variables, of_stage, fit.determined, failed, seed)
-        for stage, fit, of_stage in zip(stages, fits, vectors, strict=True)
-    }
-
-
-def _refitted(
-    shared: Sequence[tuple[StageFit, NoiseDraws]], number: int
-) -> tuple[Array, ...] | None:
-    """The vectors of all stages fitted to one draw; None if a fit did not end."""
-    vectors: list[Array] = []
-    card: tuple[ParameterSet, Starts] | None = None
-    for stage, noise in shared:
-        problem = _redrawn(stage, noise, number)
-        model = problem.model
-        if card is not None and isinstance(model, DriveModel):
-            # another card, whose current drives the pump where it did before
-            currents = dict(model.currents)
-            for each in problem.experiments if stage.stage.current == "simulated" else ():
-                if each.name in currents and each.input.kind == "voltage":
-                    start = card[1].get(each.name, {})
-                    currents[each.name] = simulated_current(each, card[0], start)
-            model = DriveModel(card[0], model.part, currents, model.forces, card[1])
-            problem = replace(problem, model=model)
-        try:
-            solution = solve(problem, stage.solution.vector, tolerance=1e-7, max_evaluations=100)
-        except DomainError:
-            return None
-        if not solution.converged:
-            return None
-        vectors.append(solution.vector)
-        if isinstance(model, DriveModel) and model.part == "card":
-            found = model.parameters_at(problem.unknowns.targets(solution.vector, ""))
-            card = found, start_currents_of(problem, solution.vector)
-    return tuple(vectors)
-
-
-def _redrawn(stage: StageFit, noise: NoiseDraws, number: int) -> Problem:
-    """A stage's problem with other noise about what its optimum simulates."""
-    problem, vector = stage.problem, stage.solution.vector
-    drawn = zip(noise.fit.runs, noise.differences(number), strict=True)
-    differences = {(run.name, run.channel): each for run, each in drawn}
-    experiments = []
-    for place, experiment in enumerate(problem.experiments):
-        channels = dict(experiment.channels)
-        for name, simulated in problem.outputs(vector, place).items():
-            used = problem.weights[place][name] > 0.0
-            if used.any():
-                values = experiment[name].values.copy()
-                values[used] = simulated[used] - differences[experiment.name, name]
-                channels[name] = replace(experiment[name], values=values)
-        experiments.append(replace(experiment, channels=channels))
-    # a copy of the model, which would keep every draw's records otherwise
-    return replace(problem, model=copy(problem.model), experiments=tuple(experiments))

@@ -41,8 +41,9 @@ SOME_EFFECT = 0.05
 """Share of its nominal effect at which an unknown counts as having one again."""
 VALUES = 25
 """Within its bounds that are tried for one."""
-UNCHANGED, INTERRUPTED = 2, -1
+UNCHANGED, INTERRUPTED, GIVEN_UP = 2, -1, -2
 _ENDINGS = {
+    GIVEN_UP: "given up: it explains too little of what was measured",
     INTERRUPTED: "interrupted: the best so far",
     0: "stopped at the largest number of evaluations; allow more with --evaluations",
     1: "the gradient vanished",
@@ -79,6 +80,11 @@ class Solution(Result):
     """What of each residual was summed."""
     number: int = 0
     """Of the start, where there were several: 0 is the nominal one, others are Sobol points."""
+
+    @property
+    def given_up(self) -> bool:
+        """Whether it was hopeless to go on."""
+        return self.message == _ENDINGS[GIVEN_UP]
 
 
 class _Memory:
@@ -133,6 +139,7 @@ def solve(
     tolerance: float = 1e-10,
     max_evaluations: int = 300,
     watch: Callable[[Progress], None] | None = None,
+    hopeless: Callable[[Array], bool] | None = None,
 ) -> Solution:
     """The optimum next to a start: half the sum of squares minimised within the bounds.
 
@@ -152,6 +159,8 @@ def solve(
         Of the residuals.
     watch : callable, optional
         Called at each iteration. Ctrl-C ends the search with the best point so far.
+    hopeless : callable, optional
+        Asked of the best point after each `LEG` evaluations; the search is given up if it says so.
     """
     from scipy.optimize import least_squares
 
@@ -191,6 +200,9 @@ def solve(
                 best, lowest = found.x, float(found.cost)
             # steps that round to nothing are counted by SciPy alone
             spent = max(spent + int(found.nfev), memory.evaluations)
+            if hopeless is not None and ending == 0 and hopeless(memory.whole(best)):
+                ending = GIVEN_UP
+                break
             if spent >= max_evaluations:
                 break
             released, point = still.any(), None

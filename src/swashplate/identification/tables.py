@@ -5,14 +5,10 @@ Each is made once; the terminal, the report's page and the files render it.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Sequence
 from math import inf
-from types import MappingProxyType
 from typing import TYPE_CHECKING, NamedTuple
 
-import numpy as np
-
-from swashplate.errors import InputError
 from swashplate.identification.determination import GAUGES, without_value
 from swashplate.identification.drive_model import START_PRESSURE, DriveModel, true_value
 from swashplate.identification.intervals import Estimate, Interval, Status
@@ -40,7 +36,7 @@ if TYPE_CHECKING:
     from swashplate.campaign.experiment import Channel, Experiment
     from swashplate.identification.assessment import Identification
     from swashplate.identification.fitting import Fit, StageFit
-    from swashplate.identification.resampling import Bootstrap, CrossValidation
+    from swashplate.identification.resampling import CrossValidation
     from swashplate.identification.validation import Measures, RunQuality
     from swashplate.parameters.parameter_set import ParameterSet
 
@@ -51,17 +47,15 @@ def estimates_table(
     stage: StageFit,
     *,
     truth: ParameterSet | None = None,
-    bootstrap: Bootstrap | None = None,
     own: bool = False,
 ) -> Table:
-    """Estimates of a stage with their intervals, those of a bootstrap beside them.
+    """Estimates of a stage with their intervals.
 
     `truth` is what virtual tests were simulated with; with `own` the unknowns of single runs are
     meant, instead of those of the machine.
     """
     unknowns = stage.problem.unknowns
-    redrawn = None if bootstrap is None else bootstrap.intervals()
-    known, drawn = "" if truth is None else "tpf", "tpf" if redrawn else ""
+    known = "" if truth is None else "tpf"
     ends = f"{100.0 * LEVEL:g} %"
     made = Table(
         f"Stage {stage.stage.name}",
@@ -78,15 +72,12 @@ def estimates_table(
             Column(f"lower {ends}", ".5g", none=NONE, key="lower"),
             Column(f"upper {ends}", ".5g", none=NONE, key="upper"),
             Column("half width", "s", of="p"),
-            Column(f"bootstrap lower {ends}", ".5g", none="-", of=drawn, key="bootstrap_lower"),
-            Column(f"bootstrap upper {ends}", ".5g", none="-", of=drawn, key="bootstrap_upper"),
             Column("standard error", ".5g", of="f", key="standard_error"),
             Column("status", of="pf"),
         ),
         si=True,
     )
-    pairs = zip(unknowns, stage.estimates, strict=True)
-    for k, (unknown, estimate) in enumerate(pairs):
+    for unknown, estimate in zip(unknowns, stage.estimates, strict=True):
         if (unknown.run is None) == own:
             continue
         name, value = estimate.name, estimate.value
@@ -114,7 +105,6 @@ def estimates_table(
             Cell(low, shown[1]),
             Cell(high, shown[2]),
             _half_width(value, low, high),
-            *((redrawn[k] if redrawn else None) or (None, None)),
             estimate.standard_error,
             estimate.status,
             unit=unknown.unit,
@@ -146,23 +136,6 @@ def profiles_table(found: Identification) -> Table:
     return made
 
 
-def bootstrap_table(found: Bootstrap) -> Table:
-    """Median and 95 % interval of the draws of each unknown of the machine."""
-    ends = f"{100.0 * LEVEL:g} %"
-    lower, upper = (Column(f"{side} {ends}", ".5g", none=NONE) for side in ("lower", "upper"))
-    made = Table("Bootstrap", (Column("parameter"), UNIT, Column("median", ".5g"), lower, upper))
-    made.si = True
-    medians = np.median(found.values, axis=0)
-    try:
-        intervals = found.intervals()
-    except InputError:  # too few draws
-        intervals = (None,) * medians.size
-    for unknown, median, interval in zip(found.variables, medians, intervals, strict=True):
-        if unknown.run is None:
-            made.add(unknown.name, float(median), *(interval or (None, None)), unit=unknown.unit)
-    return made
-
-
 def estimates_of(fit: Fit) -> dict[str, Estimate]:
     """What a fit says of every number: what each stage estimated, then what stayed fixed.
 
@@ -182,14 +155,10 @@ def estimates_of(fit: Fit) -> dict[str, Estimate]:
     return made
 
 
-def all_estimates(fit: Fit, bootstraps: Mapping[str, Bootstrap] = MappingProxyType({})) -> Table:
+def all_estimates(fit: Fit) -> Table:
     """One table of what all stages estimated: of the machine, then of single runs."""
     return joined(
-        [
-            estimates_table(stage, bootstrap=bootstraps.get(stage.stage.name), own=own)
-            for stage in fit.stages
-            for own in (False, True)
-        ]
+        [estimates_table(stage, own=own) for stage in fit.stages for own in (False, True)]
     )
 
 
@@ -442,17 +411,16 @@ class Part(NamedTuple):
         return "\n\n".join(block for block in blocks if block)
 
 
-def stage_part(stage: StageFit, bootstrap: Bootstrap | None = None) -> Part:
+def stage_part(stage: StageFit) -> Part:
     """Estimates of a stage, how it ended, and what its estimates lack."""
     name, solution = stage.stage.name, stage.solution
     return Part(
         f"How stage {name} ended, and what its intervals are worth",
-        [estimates_table(stage, bootstrap=bootstrap)],
+        [estimates_table(stage)],
         [f"{name}: {solution.message} after {solution.evaluations} evaluations."],
         [
             *stage.identifiability.sentences(),
             *stage.uncertainty.sentences(),
-            *(() if bootstrap is None else bootstrap.sentences()),
             *stage.bounds_reached(),
         ],
         opened=True,
@@ -470,7 +438,7 @@ def parts_of(found: Identification) -> list[Part]:
     notes = [f"{run.name}: {sentence}." for run in fit.runs for sentence in run.notes]
     doubts = [f"! {sentence}" for sentence in fit.doubts]
     made = [Part("Runs", (), (), notes), Part("Doubts", (), doubts)]
-    made += [stage_part(each, found.bootstraps.get(each.stage.name)) for each in fit.stages]
+    made += map(stage_part, fit.stages)
     if found.profiles:
         said = [sentence for profile in found.profiles for sentence in profile.sentences()]
         made.append(Part("Profile likelihoods", [profiles_table(found)], (), said))

@@ -258,23 +258,44 @@ class Unknowns(Result):
         """Names in the model that unknowns of no single run set."""
         return [name for each in self.items if each.run is None for name in each.targets]
 
-    def _places(self, run: str) -> dict[str, int]:
-        """Names in the model that the unknowns of one experiment set, and whose number it is."""
-        items = enumerate(self.items)
-        return {name: k for k, each in items if each.run in (None, run) for name in each.targets}
+    @cached_property
+    def shared(self) -> NDArray[np.intp]:
+        """(M,) numbers of the unknowns of the machine, which all runs share."""
+        return np.array([k for k, each in enumerate(self.items) if each.run is None], np.intp)
+
+    @cached_property
+    def _of_runs(self) -> Mapping[str, NDArray[np.intp]]:
+        """By run the numbers of the unknowns that belong to it alone."""
+        numbers: dict[str, list[int]] = {}
+        for k, each in enumerate(self.items):
+            if each.run is not None:
+                numbers.setdefault(each.run, []).append(k)
+        return {run: np.array(own, np.intp) for run, own in numbers.items()}
+
+    def of_run(self, run: str) -> NDArray[np.intp]:
+        """(q,) numbers of the unknowns that belong to one experiment alone."""
+        return self._of_runs.get(run, np.zeros(0, np.intp))
+
+    def columns(self, run: str) -> NDArray[np.intp]:
+        """(q + M,) numbers of the unknowns that can move one experiment: its own come first."""
+        return np.concatenate([self.of_run(run), self.shared])
 
     def targets(self, vector: Array, run: str) -> dict[str, float]:
         """Values by the model's names, as one experiment sees them."""
-        values = self._within(vector)
-        return {name: values[k] for name, k in self._places(run).items()}
+        numbers = sorted(self.columns(run).tolist())
+        values = ((self.items[k], self.items[k].to_value(float(vector[k]))) for k in numbers)
+        return {name: value for unknown, value in values for name in unknown.targets}
 
     def chain(self, vector: Array, targets: Sequence[str], run: str) -> Array:
-        """(len(targets), K) derivatives of the model's numbers by the vector."""
-        matrix, places = np.zeros((len(targets), len(self.items))), self._places(run)
-        slopes = self.at(vector).slopes
+        """(len(targets), q + M) derivatives of the model's numbers by `columns` of the vector."""
+        columns = self.columns(run)
+        matrix, items = np.zeros((len(targets), columns.size)), [self.items[k] for k in columns]
+        places = {name: j for j, unknown in enumerate(items) for name in unknown.targets}
         for row, place in enumerate(map(places.get, targets)):
             if place is not None:
-                matrix[row, place] = slopes[place]
+                number = float(vector[columns[place]])
+                unknown = items[place]
+                matrix[row, place] = exp(number) if unknown.log else unknown.scale
         return matrix
 
     def with_worths(self, worths: Sequence[float] | None) -> Unknowns:

@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
 from types import MappingProxyType
-from typing import NamedTuple
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -49,7 +49,7 @@ class Observation:
         if values.size != time.size:
             raise InputError(f"{what} has {time.size} stamps for {values.size} values.")
         try:
-            weight = np.array(np.broadcast_to(np.asarray(self.weight, np.float64), time.shape))
+            weight = np.broadcast_to(np.asarray(self.weight, np.float64), time.shape)
         except ValueError:
             raise InputError(
                 f"{what}: the weight must be one number or {time.size} of them, not of shape "
@@ -68,6 +68,8 @@ class Observation:
                 f"{what}: value or weight is not finite, or the weight negative, at sample "
                 f"{int(np.argmax(bad))}; give weight 0 to samples that are not to count."
             )
+        alike = weight.size > 0 and weight.min() == weight.max()
+        weight = _alike(float(weight[0]), weight.size) if alike else np.array(weight)
         for name, value in (("time", time), ("values", values), ("weight", weight)):
             object.__setattr__(self, name, value)
 
@@ -163,20 +165,50 @@ class ObservedRecord:
         """The plan without offsets."""
         places = [_cells(self.record, np.asarray(each.time)) for each in self.observations]
         weights = [np.asarray(each.weight) for each in self.observations]
-        measured = np.concatenate([np.asarray(each.values) for each in self.observations])
-        weight = np.concatenate(weights)
+        measured = _joined([np.asarray(each.values) for each in self.observations])
+        weight = _joined(weights)
+        if not weight.all():
+            measured = np.where(weight > 0.0, measured, 0.0)
+        regular = [bool((at == 0.0).all() and (np.diff(cell) == 1).all()) for cell, at in places]
+        cells = [
+            _in_a_row(int(cell[0]), cell.size) if even else cell
+            for (cell, _), even in zip(places, regular, strict=True)
+        ]
+        fractions = [
+            _alike(0.0, at.size) if even else at
+            for (_, at), even in zip(places, regular, strict=True)
+        ]
         return Plan(
             first=self._first,
-            cell=np.concatenate([cell for cell, _ in places]),
-            fraction=np.concatenate([fraction for _, fraction in places]),
-            measured=np.where(weight > 0.0, measured, 0.0),
+            cell=_joined(cells),
+            fraction=_joined(fractions),
+            measured=measured,
             weight=weight,
             even=np.array([bool((each == 1.0).all()) for each in weights]),
-            regular=np.array(
-                [bool((at == 0.0).all() and (np.diff(cell) == 1).all()) for cell, at in places]
-            ),
+            regular=np.array(regular),
             offset_column=np.zeros(0, dtype=np.int64),
         )
+
+
+Rows = TypeVar("Rows", Array, Indices)
+
+
+def _joined(parts: Sequence[Rows]) -> Rows:
+    """All parts one after another; a single one as it is, so that it takes no memory twice."""
+    return parts[0] if len(parts) == 1 else np.concatenate(parts)
+
+
+# arrays that the plans of runs of one length share; nobody writes to them
+
+
+@lru_cache(maxsize=256)
+def _alike(value: float, size: int) -> Array:
+    return np.full(size, value)
+
+
+@lru_cache(maxsize=256)
+def _in_a_row(first: int, size: int) -> Indices:
+    return np.arange(first, first + size, dtype=np.int64)
 
 
 def every_sample(
