@@ -32,7 +32,7 @@ def test_clean_logs_are_the_model_to_the_last_bit() -> None:
     tests = rig.run("hoist", severity="clean")
     assert list(tests.runs) == list(maneuvers.source_tests("hoist"))
     assert sum(run.columns["time"].size for run in tests.runs.values()) == 110_605
-    drive = split(Drive.preset("hoist"))
+    drive = split(Drive.preset("hoist").at_every_rate())
     for name, maneuver in maneuvers.source_tests("hoist").items():
         columns = tests.runs[name].columns
         model = drive.simulate(maneuver.sample())
@@ -96,7 +96,7 @@ SIGNALS = {
 
 def test_other_channels_are_the_simulated_signals() -> None:
     run = rig.run("luff", [SINE], severity="clean", channels=tuple(SIGNALS)).runs[SINE.name]
-    model = split(Drive.preset("luff")).simulate(SINE.sample())
+    model = split(Drive.preset("luff").at_every_rate()).simulate(SINE.sample())
     assert list(run.columns) == ["time", "voltage", *SIGNALS]
     for column, signal in SIGNALS.items():
         np.testing.assert_array_equal(run.columns[column], model[signal])
@@ -119,7 +119,7 @@ def test_backlash_is_between_shaft_and_encoder() -> None:
 
 def test_perturbed_values_stay_within_the_spread() -> None:
     hoist = Drive.preset("hoist")
-    numbers = hoist.parameters.numbers
+    numbers = hoist.at_every_rate().parameters.numbers
     logarithms = []
     for seed in range(10):
         tests = rig.run("hoist", [STEP], perturb=0.1, seed=seed, channels=["shaft_speed"])

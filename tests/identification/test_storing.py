@@ -48,7 +48,10 @@ def test_a_fit_comes_back_as_it_was(path: Path, campaign: Campaign, fitted: Fit)
     # others read it, too: it is JSON without numbers of its own
     content = json.loads(path.read_text("utf-8"), parse_constant=lambda word: pytest.fail(word))
     assert content["stages"][0]["starts"][1]["cost"] == "Infinity"
-    assert stored.fit.runs == campaign.experiments
+    assert stored.fit.runs == stored.campaign.experiments
+    assert [run.input.interpolation for run in stored.fit.runs] == [
+        run.input.interpolation for run in fitted.runs
+    ]
     assert stored.fit.setup == fitted.setup
     assert stored.fit.nominal == fitted.nominal
     assert stored.fit.parameters == fitted.parameters

@@ -259,9 +259,11 @@ def run(
     preset = drive if isinstance(drive, str) else None
     nominal = Drive.preset(drive) if isinstance(drive, str) else drive
     seed, axis, kinds = whole("seed", seed), axis or nominal.name, tuple(channels)
-    simulated = _perturbed(truth or nominal, perturb, seed) if perturb else truth or nominal
     # a real card's filter and decay know nothing of a log's samples (docs/decisions/0008)
-    simulated = Drive(replace(simulated.at_every_rate().parameters, card_switch="split"))
+    simulated = (truth or nominal).at_every_rate()
+    if perturb:
+        simulated = _perturbed(simulated, perturb, seed)
+    simulated = Drive(replace(simulated.parameters, card_switch="split"))
     listed = source_tests(axis) if maneuvers is None else maneuvers
     tests = dict(listed if isinstance(listed, Mapping) else ((m.name, m) for m in listed))
     held_back = HELD_BACK[axis] if validate is None and maneuvers is None else validate or ()

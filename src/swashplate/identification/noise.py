@@ -5,7 +5,7 @@ All goes through the runs one by one and keeps of each a few numbers a frequency
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from math import sqrt
 from typing import NamedTuple
@@ -250,6 +250,12 @@ BAND, FEWEST_BANDS = 10.0, 20.0
 sampling rate, where that is low."""
 
 
+ALONE, FEWEST_FREEDOM, FEWEST_RATIOS = 1e-5, 4.0, 3
+"""Share of a direction that other runs must determine for a run's score to tell of it; degrees of
+freedom of intervals from scores of runs, at least, as intervals of fewer are not to be trusted
+(Pustejovsky and Tipton 2018); and unknowns from which their ratios have a spread."""
+
+
 class _Spectrum:
     """One run in the frequency domain, in directions whose derivatives are orthonormal."""
 
@@ -258,9 +264,10 @@ class _Spectrum:
         self.step, scale = grid.step, 1.0 / np.sqrt(grid.size)
         self.directions, self.whitening = fit.inverse.of_run(run.name)
         """(d,) numbers of those that move the run, and (q + M, d) its unknowns along them."""
-        moved, residual = self.whitening.T @ jacobian.T, run.unweighted
+        self.moved, residual = self.whitening.T @ jacobian.T, run.unweighted
+        """(d, n) derivatives along these directions."""
         weight = np.ones(1) if run.weight is None else run.weight
-        self.derivatives = scale * rfft(grid.spread(weight * moved))
+        self.derivatives = scale * rfft(grid.spread(weight * self.moved))
         """(d, F) by which the noise enters the scores: with the weights twice."""
         self.frequencies: Array = rfftfreq(grid.size, grid.step)
         self.residual = scale * rfft(grid.spread(residual))
@@ -268,7 +275,7 @@ class _Spectrum:
         if weight.min() == weight.max():
             by_estimate = self.derivatives / weight[0] ** 2
         else:
-            by_estimate = scale * rfft(grid.spread(moved / weight))
+            by_estimate = scale * rfft(grid.spread(self.moved / weight))
         leverage = np.sum((self.derivatives.conj() * by_estimate).real, axis=0)
         self.left: Array = 1.0 - np.clip(leverage, 0.0, 1.0)
         """(F,) part of the noise that the fit leaves."""
@@ -390,9 +397,61 @@ def band_score_covariance(fit: LinearisedFit) -> Covariance:
     return _covariances(fit)[1]
 
 
-def _covariances(fit: LinearisedFit) -> tuple[Covariance, Covariance]:
-    """By the smoothed spectrum, and by scores of bands: both in two passes over the runs."""
+def run_score_covariance(fit: LinearisedFit) -> Covariance:
+    """Covariance if the machine differs from run to run, as it does between a cold and a warm oil.
+
+    Notes
+    -----
+    The sandwich with a cluster for each run, (JᵀJ)⁻¹ Σ_runs g gᵀ (JᵀJ)⁻¹ with the score
+    g = Jᵀ (I - H)^(-½) r of a run: CR2 of Bell and McCaffrey (2002), in which H is the leverage of
+    the run. Degrees of freedom are Satterthwaite's of a sum of squares, one for each run. It knows
+    nothing of a parameter that a single run determines.
+    """
+    return _covariances(fit)[2]
+
+
+class _RunScore:
+    """Score of one run, all its channels together, in the directions that move it."""
+
+    def __init__(self, directions: NDArray[np.intp], whitening: Array) -> None:
+        count = directions.size
+        self.directions, self.whitening = directions, whitening
+        self.leverage, self.score = np.zeros((count, count)), np.zeros(count)
+
+    def add(self, moved: Array, residual: Array) -> None:
+        """Add a channel: derivatives (d, n) along the directions, and residuals (n,)."""
+        self.leverage += moved @ moved.T
+        self.score += moved @ residual
+
+    def adjusted(self) -> Array:
+        """(d,) the score as if the fit had not seen the run, to half of the leverage's effect.
+
+        What a run alone determines has no score, and stays without.
+        """
+        shares, axes = np.linalg.eigh(self.leverage)
+        factors = np.zeros(shares.size)
+        others = 1.0 - shares > ALONE
+        factors[others] = 1.0 / np.sqrt(1.0 - shares[others])
+        adjusted: Array = axes @ (factors * (axes.T @ self.score))
+        return adjusted
+
+
+def _by_runs(fit: LinearisedFit, scores: Mapping[str, _RunScore]) -> Covariance:
+    """See `run_score_covariance`."""
+    clustered = _Sandwich(fit)
+    for name, run in scores.items():
+        adjusted = run.adjusted()
+        clustered.add(run.directions, np.outer(adjusted, adjusted))
+        parts, columns = (run.whitening @ adjusted) ** 2, fit.variables.columns(name)
+        clustered.total[columns] += parts
+        clustered.squares[columns] += parts**2
+    return clustered.covariance(1.0, 1.0)
+
+
+def _covariances(fit: LinearisedFit) -> tuple[Covariance, Covariance, Covariance]:
+    """By the smoothed spectrum, by scores of bands and of runs: in two passes over the runs."""
     smoothed, banded = _Sandwich(fit), _Sandwich(fit)
+    by_run = dict[str, _RunScore]()
     pooled = _pooled(fit)
     runs = {channel: iter(zip(p.shapes, p.bins, strict=True)) for channel, p in pooled.items()}
     shared = {c: np.zeros((fit.variables.shared.size, p.means.size)) for c, p in pooled.items()}
@@ -416,12 +475,14 @@ def _covariances(fit: LinearisedFit) -> tuple[Covariance, Covariance]:
         scores = np.add.reduceat(products, np.flatnonzero(np.diff(band, prepend=-1)), axis=1)
         banded.add(directions, 0.5 * (scores.conj() @ scores.T).real)
         parts, columns = 0.5 * spectrum.variances(scores), fit.variables.columns(run.name)
+        of_run = by_run.setdefault(run.name, _RunScore(directions, spectrum.whitening))
+        of_run.add(spectrum.moved, run.residual)
         banded.total[columns] += parts.sum(axis=1)
         banded.squares[columns] += np.sum(parts**2, axis=1)
     for channel, noise in pooled.items():
         smoothed.total[fit.variables.shared] += shared[channel] @ noise.means
         smoothed.squares[fit.variables.shared] += shared[channel] ** 2 @ noise.squares
-    return smoothed.covariance(4.0, np.inf), banded.covariance(2.0, 1.0)
+    return smoothed.covariance(4.0, np.inf), banded.covariance(2.0, 1.0), _by_runs(fit, by_run)
 
 
 def _pooled(fit: LinearisedFit) -> dict[str, _Pooled]:
@@ -444,17 +505,74 @@ def _smoothed(values: Array) -> Array:
 
 
 def coloured_noise_covariance(fit: LinearisedFit) -> Covariance:
-    """Covariance to quote: the larger of both errors, unknown by unknown.
+    """Covariance to quote.
 
-    A smoothed spectrum knows the noise well but takes it as alike all along a run; scores by bands
-    take in noise that is not, but are few. On the bench neither alone covers 93 to 97 % on every
-    axis, both together do (docs/calibration.md).
+    The larger of two errors, unknown by unknown: a smoothed spectrum knows the noise well but takes
+    it as alike all along a run; scores by bands take in noise that is not, but are few. Both take
+    the machine for the same in all runs. What scores by runs say beyond them widens it, moderated
+    over the unknowns since runs are few (docs/calibration.md).
     """
-    first, second = _covariances(fit)
-    known = first.determined & (first.standard_errors > 0.0)
-    ratio = np.ones(known.size)
-    np.divide(second.standard_errors, first.standard_errors, out=ratio, where=known)
-    stretch = np.maximum(ratio, 1.0)
-    freedom = np.where(ratio > 1.0, second.degrees_of_freedom, first.degrees_of_freedom)
-    matrix = first.matrix * np.outer(stretch, stretch)
-    return replace(first, matrix=matrix, degrees_of_freedom=freedom)
+    smoothed, banded, by_runs = _covariances(fit)
+    within = _widened(smoothed, _ratio(banded, smoothed), banded.degrees_of_freedom)
+    ratio, freedom = _moderated(_ratio(by_runs, within), by_runs.degrees_of_freedom)
+    # Satterthwaite's, of what lies within the runs and what comes between them
+    between = np.maximum(ratio - 1.0, 0.0)
+    unsure = 1.0 / within.degrees_of_freedom + between**2 / np.maximum(freedom, FEWEST_FREEDOM)
+    together = (1.0 + between) ** 2 / np.maximum(unsure, 1e-300)
+    return _widened(within, ratio, together)
+
+
+def _ratio(one: Covariance, other: Covariance) -> Array:
+    """(K,) variances over those of another covariance; 0 if either is not known."""
+    ratio = np.zeros(one.determined.size)
+    known = one.determined & (one.standard_errors > 0.0) & (other.standard_errors > 0.0)
+    np.divide(np.diag(one.matrix), np.diag(other.matrix), out=ratio, where=known)
+    return ratio
+
+
+def _widened(covariance: Covariance, ratio: Array, freedom: Array) -> Covariance:
+    """A covariance with variances larger by ratios (K,), if above 1, of some degrees of freedom."""
+    stretch = np.sqrt(np.maximum(ratio, 1.0))
+    return replace(
+        covariance,
+        matrix=covariance.matrix * np.outer(stretch, stretch),
+        degrees_of_freedom=np.where(ratio > 1.0, freedom, covariance.degrees_of_freedom),
+    )
+
+
+def _moderated(ratios: Array, freedom: Array) -> tuple[Array, Array]:
+    """Ratios of variances of few degrees of freedom, drawn towards what they have in common.
+
+    Notes
+    -----
+    Moderated variances of Smyth (2004): the true ratios are taken as drawn from a scaled inverse χ²
+    distribution, whose degrees of freedom d₀ and scale follow from mean and variance of the logarithms.
+    If ratios differ by no more than chance, d₀ is infinite and all have the common one, which the
+    same few runs tell: it has no more degrees of freedom than the best known of them.
+    """
+    from scipy.special import digamma, polygamma
+
+    known = ratios > 0.0
+    if np.count_nonzero(known) < FEWEST_RATIOS:
+        return np.zeros_like(ratios), freedom
+    half = 0.5 * freedom[known]
+    logarithms = np.log(ratios[known]) - digamma(half) + np.log(half)
+    beyond_chance = float(np.var(logarithms, ddof=1) - np.mean(polygamma(1, half)))
+    common, prior = float(np.exp(np.mean(logarithms))), np.inf
+    if beyond_chance > 0.0:
+        prior = 2.0 * _trigamma_inverse(beyond_chance)
+        common *= float(np.exp(digamma(0.5 * prior) - np.log(0.5 * prior)))
+    moderated, together = np.zeros_like(ratios), np.full_like(freedom, freedom[known].max())
+    moderated[known] = common
+    if np.isfinite(prior):
+        together = prior + freedom
+        moderated[known] = (prior * common + freedom[known] * ratios[known]) / together[known]
+    return moderated, together
+
+
+def _trigamma_inverse(value: float) -> float:
+    """The number whose trigamma function is a value."""
+    from scipy.optimize import brentq
+    from scipy.special import polygamma
+
+    return float(brentq(lambda x: float(polygamma(1, x)) - value, 1e-3, 0.5 + 2.0 / value))
