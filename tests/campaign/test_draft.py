@@ -396,8 +396,14 @@ def test_an_electro_hydrostatic_actuator_blind(tmp_path: Path, rounding: float) 
         f"""
 [axes.rod]
 time = {{ column = "EXP_Time", unit = "s" }}
-input = {{ kind = "voltage", column = "EXP_Velocity", unit = "V", scale = 0.005, interpolation = "previous" }}
 channels.position = {{ kind = "position", column = "EXP_PosFb", unit = "mm" }}
+
+[axes.rod.input]
+kind = "voltage"
+column = "EXP_Velocity"
+unit = "V"
+scale = 0.005
+interpolation = "previous"
 
 [[runs]]
 file = "{(DATA / "exp_data_1_3.csv").as_posix()}"

@@ -249,20 +249,20 @@ def dense_covariances(
 
 
 def test_a_machine_that_differs_from_run_to_run_widens_its_intervals() -> None:
-    """Its level differs by 1 %, far more than white noise lets a mean of samples err by."""
-    rng, runs, holds = np.random.default_rng(5), 8, dict.fromkeys(("quoted", "spectral"), 0)
-    for _ in range(200):
-        level = rng.normal(0.0, 0.01, (runs, 1))
-        noise = level * DESIGN[:512, 0] + rng.normal(0.0, 0.01, (runs, 512))
-        fit, estimate = fitted(noise, design=DESIGN[:, :1])
+    """By 5 %, far more than white noise lets a mean of samples err by."""
+    rng, runs, repeats, count = np.random.default_rng(5), 8, 100, 2048
+    holds = {"quoted": np.zeros(3), "spectral": np.zeros(3)}
+    for _ in range(repeats):
+        changes = rng.normal(0.0, 0.05, (runs, 3))
+        noise = changes @ DESIGN[:count].T + rng.normal(0.0, 0.01, (runs, count))
+        fit, estimate = fitted(noise)
         for name, covariance in (
             ("quoted", uncertainty(fit).own),
             ("spectral", spectral_covariance(fit)),
         ):
-            half = float(covariance.quantiles[0] * covariance.standard_errors[0])
-            holds[name] += abs(estimate[0]) <= half
-    assert holds["spectral"] < 0.75 * 200
-    assert 0.93 * 200 <= holds["quoted"] <= 0.99 * 200
+            holds[name] += np.abs(estimate) <= covariance.quantiles * covariance.standard_errors
+    assert holds["spectral"][0] < 0.85 * repeats
+    assert holds["quoted"].min() >= 0.9 * repeats
 
 
 def test_scores_of_runs_follow_the_textbook() -> None:
@@ -287,7 +287,7 @@ def test_scores_of_runs_follow_the_textbook() -> None:
     fit = linear_fit(runs, designs, unknowns_of(["a", "b", "c"], np.ones(3)))
     found = run_score_covariance(fit)
     assert found.matrix == pytest.approx(inverse @ middle @ inverse, rel=1e-9)
-    assert np.all((found.degrees_of_freedom >= 4.0) & (found.degrees_of_freedom <= 5.0))
+    assert np.all((found.degrees_of_freedom >= 1.0) & (found.degrees_of_freedom <= 5.0))
 
 
 def test_covariances_run_by_run_are_those_of_all_derivatives_at_once() -> None:

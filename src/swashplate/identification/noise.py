@@ -546,7 +546,8 @@ def _moderated(ratios: Array, freedom: Array) -> tuple[Array, Array]:
     Notes
     -----
     Moderated variances of Smyth (2004): the true ratios are taken as drawn from a scaled inverse χ²
-    distribution, whose degrees of freedom d₀ and scale follow from mean and variance of the logarithms.
+    distribution, whose degrees of freedom d₀ and scale follow from mean and variance of the
+    logarithms.
     If ratios differ by no more than chance, d₀ is infinite and all have the common one, which the
     same few runs tell: it has no more degrees of freedom than the best known of them.
     """
