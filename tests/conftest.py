@@ -1,6 +1,7 @@
 """What many tests need: derivatives by differences, the drives, Kruse's numbers."""
 
 import os
+import signal
 import tomllib
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -21,6 +22,8 @@ settings.load_profile("swashplate")
 
 # Warnings are errors in the processes that tests start, too: filterwarnings sees this one alone.
 os.environ.setdefault("PYTHONWARNINGS", "error")
+# A shell that starts tests in the background makes them, and what they start, deaf to Ctrl-C.
+signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 SLOW = {"docs", "examples", "reproduction"}
