@@ -245,6 +245,8 @@ def noise_colours(fit: LinearisedFit) -> tuple[NoiseColour, ...]:
 NEIGHBOURS, LEAST_LEFT = 21, 0.1
 """Frequencies, of all runs of a channel together, over which a periodogram is averaged; and the
 part of them that the fit must have left for the noise to be known there."""
+TOGETHER = 8
+"""Directions whose spectra are taken together."""
 BAND, FEWEST_BANDS = 10.0, 20.0
 """Width of the bands within which noise may swell and fade in any way [Hz]; bands up to half the
 sampling rate, where that is low."""
@@ -258,18 +260,26 @@ class _Spectrum:
         self.step, scale = grid.step, 1.0 / np.sqrt(grid.size)
         self.directions, self.whitening = fit.inverse.of_run(run.name)
         """(d,) numbers of those that move the run, and (q + M, d) its unknowns along them."""
-        moved, residual = self.whitening.T @ jacobian.T, run.unweighted
+        residual = run.unweighted
         weight = np.ones(1) if run.weight is None else run.weight
-        self.derivatives = scale * rfft(grid.spread(weight * moved))
-        """(d, F) by which the noise enters the scores: with the weights twice."""
+        alike = weight.min() == weight.max()
         self.frequencies: Array = rfftfreq(grid.size, grid.step)
         self.residual = scale * rfft(grid.spread(residual))
         """(F,) without the weights."""
-        if weight.min() == weight.max():
-            by_estimate = self.derivatives / weight[0] ** 2
-        else:
-            by_estimate = scale * rfft(grid.spread(moved / weight))
-        leverage = np.sum((self.derivatives.conj() * by_estimate).real, axis=0)
+        shape = self.directions.size, self.frequencies.size
+        self.derivatives = np.empty(shape, np.complex128)
+        """(d, F) by which the noise enters the scores: with the weights twice."""
+        leverage = np.zeros(self.frequencies.size)
+        # a few directions at a time, as all of a long run together would not stay in the cache
+        for first in range(0, shape[0], TOGETHER):
+            few = slice(first, first + TOGETHER)
+            moved = self.whitening[:, few].T @ jacobian.T
+            along = self.derivatives[few]
+            along[:] = scale * rfft(grid.spread(weight * moved))
+            by_estimate = along / weight[0] ** 2
+            if not alike:
+                by_estimate = scale * rfft(grid.spread(moved / weight))
+            leverage += np.sum((along.conj() * by_estimate).real, axis=0)
         self.left: Array = 1.0 - np.clip(leverage, 0.0, 1.0)
         """(F,) part of the noise that the fit leaves."""
         # a real signal's spectrum stands for its mirror image too, but at the ends
