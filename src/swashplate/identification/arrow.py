@@ -39,8 +39,8 @@ def triangular_factor_of(columns: Sequence[Array] | Array) -> Array:
     factor = np.zeros((0, len(columns)))
     for first in range(0, size, ROWS):
         rows = [column[first : first + ROWS] for column in columns]
-        factor = np.linalg.qr(np.vstack([factor, np.transpose(rows)]), mode="r")
-    return np.asarray(factor)
+        factor = np.asarray(np.linalg.qr(np.vstack([factor, np.transpose(rows)]), mode="r"))
+    return factor
 
 
 class Block(NamedTuple):
@@ -126,6 +126,16 @@ def arrow_factor(size: int, shared: Numbers, blocks: Iterable[Block]) -> ArrowFa
         if sum(map(len, gathered)) > GATHERED:
             gathered = [triangular_factor(np.vstack(gathered))]
     return ArrowFactor(size, shared, runs, triangular_factor(np.vstack(gathered)))
+
+
+def stacked(size: int, shared: Numbers, blocks: Sequence[Block]) -> Array:
+    """(n, K) rows of all blocks by all unknowns; arguments as of `arrow_factor`."""
+    matrix, first = np.zeros((sum(len(block.rows) for block in blocks), size)), 0
+    for block in blocks:
+        last = first + len(block.rows)
+        matrix[first:last, np.concatenate([block.own, shared])] = block.rows
+        first = last
+    return matrix
 
 
 def dense_factor(matrix: Array) -> ArrowFactor:
