@@ -151,8 +151,9 @@ def test_wide_intervals_ask_for_attention() -> None:
     assert not any("not determined" in each for each in verdict([fitted], []).sentences)
     known = fitted.uncertainty
     own = replace(known.own, matrix=1e6 * known.own.matrix)
-    vars(fitted)["uncertainty"] = replace(known, own=own)
-    wide = verdict([fitted], []).sentences
+    unsure = stage()
+    vars(unsure)["uncertainty"] = replace(known, own=own)
+    wide = verdict([unsure], []).sentences
     assert "rise: not determined to within ±10 %: gain and lag." in wide
 
 

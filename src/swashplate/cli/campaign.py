@@ -317,7 +317,7 @@ def rig(
 
 
 def guess(path: Path = CAMPAIGN, *, axis: AxisName = None, out: Path | None = None) -> None:
-    """Read dead zones, gains, limits, delay, lag and creep of a machine off its logs.
+    """Read dead zones, gains, limits, delays and creep of a machine off its logs.
 
     For a machine of unknown numbers: needs the command and a speed or a position.
     If a current is measured, the amplifier is read off it and fitted first.
