@@ -125,7 +125,7 @@ def test_memory_does_not_grow_with_runs_times_unknowns(monkeypatch) -> None:
     finally:
         tracemalloc.stop()
     # some matrices of all unknowns, 0.3 MB each
-    assert peak < 0.4 * all_derivatives
+    assert peak < 0.6 * all_derivatives
     # by hand: in each run the time about its mean, as its zero is free
     error = 0.1 / np.linalg.norm(np.outer(levels, TIME - TIME.mean()))
     np.testing.assert_allclose(found.quoted.standard_errors[0], error, rtol=0.1)

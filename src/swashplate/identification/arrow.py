@@ -7,7 +7,7 @@ linearly.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
@@ -20,13 +20,27 @@ Numbers = NDArray[np.intp]
 
 UNDETERMINED = 1e-8
 """Square of an unknown's part in the null space, its column scaled, from which it is in it."""
+ROWS = 32_768
+"""Of a matrix that are reduced together: a long run takes no more memory than a short one."""
 GATHERED = 512
 """Rows of the machine's block that are gathered before they are reduced."""
 
 
 def triangular_factor(matrix: Array) -> Array:
     """(min(m, K), K) factor R of a matrix (m, K), RᵀR = matrixᵀ matrix."""
+    if len(matrix) > ROWS:
+        return triangular_factor_of(matrix.T)
     return np.asarray(np.linalg.qr(matrix, mode="r"))
+
+
+def triangular_factor_of(columns: Sequence[Array] | Array) -> Array:
+    """The factor of a matrix that is given by its columns (m,), which are never stacked whole."""
+    size = len(columns[0])
+    factor = np.zeros((0, len(columns)))
+    for first in range(0, size, ROWS):
+        rows = [column[first : first + ROWS] for column in columns]
+        factor = np.asarray(np.linalg.qr(np.vstack([factor, np.transpose(rows)]), mode="r"))
+    return factor
 
 
 class Block(NamedTuple):
@@ -112,6 +126,16 @@ def arrow_factor(size: int, shared: Numbers, blocks: Iterable[Block]) -> ArrowFa
         if sum(map(len, gathered)) > GATHERED:
             gathered = [triangular_factor(np.vstack(gathered))]
     return ArrowFactor(size, shared, runs, triangular_factor(np.vstack(gathered)))
+
+
+def stacked(size: int, shared: Numbers, blocks: Sequence[Block]) -> Array:
+    """(n, K) rows of all blocks by all unknowns; arguments as of `arrow_factor`."""
+    matrix, first = np.zeros((sum(len(block.rows) for block in blocks), size)), 0
+    for block in blocks:
+        last = first + len(block.rows)
+        matrix[first:last, np.concatenate([block.own, shared])] = block.rows
+        first = last
+    return matrix
 
 
 def dense_factor(matrix: Array) -> ArrowFactor:

@@ -12,7 +12,12 @@ from numpy.typing import NDArray
 
 from swashplate.campaign.experiment import Channel, Experiment
 from swashplate.identification import faults
-from swashplate.identification.arrow import Block, arrow_factor, triangular_factor
+from swashplate.identification.arrow import (
+    Block,
+    arrow_factor,
+    triangular_factor,
+    triangular_factor_of,
+)
 from swashplate.identification.drive_model import DriveModel
 from swashplate.identification.faults import (
     DRIFT,
@@ -334,11 +339,12 @@ def _blocks(stage: StageFit, stages: Sequence[StageFit]) -> Iterator[_Block]:
             effects |= commanded.get(name, {})
             columns |= {(FAULT, key): weight * each[used] for key, (_, each) in effects.items()}
             kinds = {key: kind for key, (kind, _) in effects.items()}
-            matrix = np.column_stack([*columns.values(), run.residual / scale, weight])
-            triangle = triangular_factor(matrix)
+            residual = run.residual / scale
+            triangle = triangular_factor_of([*columns.values(), residual, weight])
             differences = triangle[:-1, :-1] / weight[0]
             if weight.min() < weight.max():
-                differences = triangular_factor(matrix[:, :-1] / weight[:, None])
+                measured = [each / weight for each in (*columns.values(), residual)]
+                differences = triangular_factor_of(measured)
             yield _Block(
                 experiment.run,
                 f"{stage.stage.name}: {experiment.name}",

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.fft import irfft, next_fast_len, rfft, rfftfreq
 
+from swashplate.identification.arrow import triangular_factor
 from swashplate.identification.problem import LinearisedFit, LinearisedRun
 from swashplate.identification.unknowns import Unknowns
 from swashplate.results import Result
@@ -245,15 +246,17 @@ def noise_colours(fit: LinearisedFit) -> tuple[NoiseColour, ...]:
 NEIGHBOURS, LEAST_LEFT = 21, 0.1
 """Frequencies, of all runs of a channel together, over which a periodogram is averaged; and the
 part of them that the fit must have left for the noise to be known there."""
+TOGETHER = 8
+"""Directions whose spectra are taken together."""
 BAND, FEWEST_BANDS = 10.0, 20.0
 """Width of the bands within which noise may swell and fade in any way [Hz]; bands up to half the
 sampling rate, where that is low."""
 
 
-ALONE, FEWEST_FREEDOM, FEWEST_RATIOS = 1e-5, 4.0, 3
-"""Share of a direction that other runs must determine for a run's score to tell of it; degrees of
-freedom of intervals from scores of runs, at least, as intervals of fewer are not to be trusted
-(Pustejovsky and Tipton 2018); and unknowns from which their ratios have a spread."""
+ALONE, FEWEST_RUNS = 1e-5, 5
+"""Share of a direction that other runs must determine for a run's score to tell of it; and runs
+from which scores tell how runs differ: below four degrees of freedom they are not to be trusted
+(Pustejovsky and Tipton 2018)."""
 
 
 class _Spectrum:
@@ -264,19 +267,31 @@ class _Spectrum:
         self.step, scale = grid.step, 1.0 / np.sqrt(grid.size)
         self.directions, self.whitening = fit.inverse.of_run(run.name)
         """(d,) numbers of those that move the run, and (q + M, d) its unknowns along them."""
-        self.moved, residual = self.whitening.T @ jacobian.T, run.unweighted
-        """(d, n) derivatives along these directions."""
+        along = triangular_factor(jacobian) @ self.whitening
+        self.leverage: Array = along.T @ along
+        """(d, d) of the run as a whole."""
+        self.score: Array = self.whitening.T @ (jacobian.T @ run.residual)
+        """(d,) of the run as a whole."""
+        residual = run.unweighted
         weight = np.ones(1) if run.weight is None else run.weight
-        self.derivatives = scale * rfft(grid.spread(weight * self.moved))
-        """(d, F) by which the noise enters the scores: with the weights twice."""
+        alike = weight.min() == weight.max()
         self.frequencies: Array = rfftfreq(grid.size, grid.step)
         self.residual = scale * rfft(grid.spread(residual))
         """(F,) without the weights."""
-        if weight.min() == weight.max():
-            by_estimate = self.derivatives / weight[0] ** 2
-        else:
-            by_estimate = scale * rfft(grid.spread(self.moved / weight))
-        leverage = np.sum((self.derivatives.conj() * by_estimate).real, axis=0)
+        shape = self.directions.size, self.frequencies.size
+        self.derivatives = np.empty(shape, np.complex128)
+        """(d, F) by which the noise enters the scores: with the weights twice."""
+        leverage = np.zeros(self.frequencies.size)
+        # a few directions at a time, as all of a long run together would not stay in the cache
+        for first in range(0, shape[0], TOGETHER):
+            few = slice(first, first + TOGETHER)
+            moved = self.whitening[:, few].T @ jacobian.T
+            along = self.derivatives[few]
+            along[:] = scale * rfft(grid.spread(weight * moved))
+            by_estimate = along / weight[0] ** 2
+            if not alike:
+                by_estimate = scale * rfft(grid.spread(moved / weight))
+            leverage += np.sum((along.conj() * by_estimate).real, axis=0)
         self.left: Array = 1.0 - np.clip(leverage, 0.0, 1.0)
         """(F,) part of the noise that the fit leaves."""
         # a real signal's spectrum stands for its mirror image too, but at the ends
@@ -418,10 +433,10 @@ class _RunScore:
         self.directions, self.whitening = directions, whitening
         self.leverage, self.score = np.zeros((count, count)), np.zeros(count)
 
-    def add(self, moved: Array, residual: Array) -> None:
-        """Add a channel: derivatives (d, n) along the directions, and residuals (n,)."""
-        self.leverage += moved @ moved.T
-        self.score += moved @ residual
+    def add(self, channel: _Spectrum) -> None:
+        """Add a channel."""
+        self.leverage += channel.leverage
+        self.score += channel.score
 
     def adjusted(self) -> Array:
         """(d,) the score as if the fit had not seen the run, to half of the leverage's effect.
@@ -476,7 +491,7 @@ def _covariances(fit: LinearisedFit) -> tuple[Covariance, Covariance, Covariance
         banded.add(directions, 0.5 * (scores.conj() @ scores.T).real)
         parts, columns = 0.5 * spectrum.variances(scores), fit.variables.columns(run.name)
         of_run = by_run.setdefault(run.name, _RunScore(directions, spectrum.whitening))
-        of_run.add(spectrum.moved, run.residual)
+        of_run.add(spectrum)
         banded.total[columns] += parts.sum(axis=1)
         banded.squares[columns] += np.sum(parts**2, axis=1)
     for channel, noise in pooled.items():
@@ -509,17 +524,20 @@ def coloured_noise_covariance(fit: LinearisedFit) -> Covariance:
 
     The larger of two errors, unknown by unknown: a smoothed spectrum knows the noise well but takes
     it as alike all along a run; scores by bands take in noise that is not, but are few. Both take
-    the machine for the same in all runs. What scores by runs say beyond them widens it, moderated
-    over the unknowns since runs are few (docs/calibration.md).
+    the machine for the same in all runs. By what scores of whole runs say beyond them all variances
+    are larger: runs are few, so that only what they say of all unknowns together is known, and a
+    common factor leaves alone how errors cancel in a prediction (docs/calibration.md).
     """
     smoothed, banded, by_runs = _covariances(fit)
     within = _widened(smoothed, _ratio(banded, smoothed), banded.degrees_of_freedom)
-    ratio, freedom = _moderated(_ratio(by_runs, within), by_runs.degrees_of_freedom)
+    if len({run.name for run in fit.runs}) < FEWEST_RUNS:
+        return within
+    ratio, freedom = _common(_ratio(by_runs, within), by_runs.degrees_of_freedom)
     # Satterthwaite's, of what lies within the runs and what comes between them
-    between = np.maximum(ratio - 1.0, 0.0)
-    unsure = 1.0 / within.degrees_of_freedom + between**2 / np.maximum(freedom, FEWEST_FREEDOM)
+    between = max(ratio - 1.0, 0.0)
+    unsure = 1.0 / within.degrees_of_freedom + between**2 / freedom
     together = (1.0 + between) ** 2 / np.maximum(unsure, 1e-300)
-    return _widened(within, ratio, together)
+    return _widened(within, np.full(together.size, ratio), together)
 
 
 def _ratio(one: Covariance, other: Covariance) -> Array:
@@ -540,40 +558,20 @@ def _widened(covariance: Covariance, ratio: Array, freedom: Array) -> Covariance
     )
 
 
-def _moderated(ratios: Array, freedom: Array) -> tuple[Array, Array]:
-    """Ratios of variances of few degrees of freedom, drawn towards what they have in common.
+def _common(ratios: Array, freedom: Array) -> tuple[float, float]:
+    """What ratios (K,) of variances have in common, and the degrees of freedom of the best known.
 
     Notes
     -----
-    Moderated variances of Smyth (2004): the true ratios are taken as drawn from a scaled inverse χ²
-    distribution, whose degrees of freedom d₀ and scale follow from mean and variance of the
-    logarithms.
-    If ratios differ by no more than chance, d₀ is infinite and all have the common one, which the
-    same few runs tell: it has no more degrees of freedom than the best known of them.
+    Of a variance with d degrees of freedom the logarithm's mean lies at that of the truth plus
+    ψ(d/2) - log(d/2) (Bartlett and Kendall 1946): the mean of the logarithms freed of it. All rest
+    on the same few runs, so that many unknowns do not make it better known.
     """
-    from scipy.special import digamma, polygamma
+    from scipy.special import digamma
 
     known = ratios > 0.0
-    if np.count_nonzero(known) < FEWEST_RATIOS:
-        return np.zeros_like(ratios), freedom
+    if not known.any():
+        return 0.0, np.inf
     half = 0.5 * freedom[known]
     logarithms = np.log(ratios[known]) - digamma(half) + np.log(half)
-    beyond_chance = float(np.var(logarithms, ddof=1) - np.mean(polygamma(1, half)))
-    common, prior = float(np.exp(np.mean(logarithms))), np.inf
-    if beyond_chance > 0.0:
-        prior = 2.0 * _trigamma_inverse(beyond_chance)
-        common *= float(np.exp(digamma(0.5 * prior) - np.log(0.5 * prior)))
-    moderated, together = np.zeros_like(ratios), np.full_like(freedom, freedom[known].max())
-    moderated[known] = common
-    if np.isfinite(prior):
-        together = prior + freedom
-        moderated[known] = (prior * common + freedom[known] * ratios[known]) / together[known]
-    return moderated, together
-
-
-def _trigamma_inverse(value: float) -> float:
-    """The number whose trigamma function is a value."""
-    from scipy.optimize import brentq
-    from scipy.special import polygamma
-
-    return float(brentq(lambda x: float(polygamma(1, x)) - value, 1e-3, 0.5 + 2.0 / value))
+    return float(np.exp(np.mean(logarithms))), float(freedom[known].max())

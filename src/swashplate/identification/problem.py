@@ -19,6 +19,8 @@ from swashplate.identification.arrow import (
     Block,
     Whitening,
     arrow_factor,
+    stacked,
+    triangular_factor,
     whitening,
 )
 from swashplate.identification.model import (
@@ -45,6 +47,10 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 Part = TypeVar("Part")
 Loss = Literal["linear", "soft_l1", "cauchy"]
+
+
+STACKED = 1000
+"""Rows of all runs together up to which it does not pay to reduce them further."""
 
 
 class Evaluation(NamedTuple):
@@ -123,8 +129,9 @@ class Problem(Result):
         return sum(int(np.count_nonzero(w)) for run in self.weights for w in run.values())
 
     def evaluate(self, vector: Array, *, compressed: bool = True) -> Evaluation:
-        """Residuals and Jacobian by the vector; compressed, as a triangular factor, K + 1 rows.
+        """Residuals and Jacobian by the vector; compressed, as triangular factors of the runs.
 
+        Of many runs these are reduced to one of all, of K + 1 rows.
         The last ones are kept. A `DomainError` says that the model does not hold there.
         """
         key = vector.tobytes(), compressed
@@ -135,7 +142,7 @@ class Problem(Result):
         return self._last[key]
 
     def _compressed(self, vector: Array) -> Evaluation:
-        """The triangular factor of [J r], made run by run."""
+        """[J r] as the triangular factors of the runs, or as that of all."""
         ways = [self._reduced if each else self._factored for each in self._marched]
         blocks = self._each(lambda number: ways[number](vector, number))
         residuals, _ = self.unknowns.prior_rows(vector)
@@ -143,8 +150,13 @@ class Problem(Result):
         for block, residual in zip(priors, residuals, strict=True):
             blocks.append(block._replace(rows=np.append(block.rows, [[residual]], axis=1)))
         size = len(self.unknowns)
-        factor = arrow_factor(size + 1, np.append(self.unknowns.shared, size), blocks).dense()
-        return Evaluation(factor[:, -1], factor[:, :-1])
+        shared = np.append(self.unknowns.shared, size)
+        if sum(len(block.rows) for block in blocks) > STACKED:
+            factor = arrow_factor(size + 1, shared, blocks).dense()
+        else:
+            factor = stacked(size + 1, shared, blocks)
+        residuals, jacobian = factor[:, -1], factor[:, :-1]
+        return Evaluation(np.ascontiguousarray(residuals), np.ascontiguousarray(jacobian))
 
     def _whole(self, vector: Array) -> Evaluation:
         """Residuals and derivatives of all samples, as a robust loss needs them."""
@@ -223,7 +235,8 @@ class Problem(Result):
     def _factored(self, vector: Array, number: int) -> Block:
         """[J r] of one experiment where the march cannot make its triangular factor."""
         residuals, jacobian = self._full(vector, number)
-        return self._block(number, np.column_stack([jacobian, residuals]))
+        factor = triangular_factor(np.column_stack([jacobian, residuals]))
+        return self._block(number, factor)
 
     def _reduced(self, vector: Array, number: int) -> Block:
         """The triangular factor of [J r] of one experiment, without ever holding J."""

@@ -289,13 +289,14 @@ class Unknowns(Result):
     def chain(self, vector: Array, targets: Sequence[str], run: str) -> Array:
         """(len(targets), q + M) derivatives of the model's numbers by `columns` of the vector."""
         columns = self.columns(run)
-        matrix, items = np.zeros((len(targets), columns.size)), [self.items[k] for k in columns]
-        places = {name: j for j, unknown in enumerate(items) for name in unknown.targets}
+        slopes = np.where(self.logarithmic, self.to_values(vector), self.scales)[columns]
+        places = dict[str, int]()
+        for place in np.argsort(columns).tolist():
+            places |= dict.fromkeys(self.items[columns[place]].targets, place)
+        matrix = np.zeros((len(targets), columns.size))
         for row, place in enumerate(map(places.get, targets)):
             if place is not None:
-                number = float(vector[columns[place]])
-                unknown = items[place]
-                matrix[row, place] = exp(number) if unknown.log else unknown.scale
+                matrix[row, place] = slopes[place]
         return matrix
 
     def with_worths(self, worths: Sequence[float] | None) -> Unknowns:

@@ -1,0 +1,141 @@
+"""Fits of many runs and of long logs, as whole processes: processor time and memory.
+
+    .venv/bin/python benchmarks/many_runs.py [--sets 1 3 10 30] [--minutes 10 60 360]
+
+A set is Kruse's 13 tests of the hoist, 110,605 samples, of one virtual machine and other noise; ten
+of them are fitted. A log of some minutes is one file of the same tests in any order, with rest
+between them. Each fit writes its folder and report, then `report` writes the report again. One
+process at a time; run it twice and take the second, as the first one compiles.
+"""
+
+import argparse
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import polars as pl
+
+from swashplate import Drive
+from swashplate.campaign import rig
+from swashplate.identification.fitting import drawn
+from swashplate.identification.setup import load_setup
+from swashplate.maneuvers import source_tests
+
+COUNTS_PER_TURN = 2526.315789473684
+RATE = 512.0
+AMMETER = 0.003
+"""Standard deviation of its noise. [A]"""
+CAMPAIGN = f"""
+title = "One log"
+virtual = true
+
+[axes.hoist]
+drive = "hoist"
+start = "rest"
+time = {{ column = "time", unit = "s" }}
+input = {{ kind = "voltage", column = "voltage", unit = "V", interpolation = "linear" }}
+channels.current = {{ kind = "rectified_current", column = "current", unit = "A" }}
+
+[axes.hoist.channels.counts]
+kind = "encoder_counts"
+column = "counts"
+counts_per_turn = {COUNTS_PER_TURN}
+
+[[runs]]
+file = "log.csv"
+role = "fit"
+"""
+
+
+def machine() -> Drive:
+    """The virtual hoist, a few per cent off the published one."""
+    truth = drawn(Drive.preset("hoist"), load_setup("hoist"), 1)
+    return Drive(replace(truth.parameters, card_switch="split"))
+
+
+def write_sets(count: int, folder: Path) -> Path:
+    """A campaign of so many sets of Kruse's tests."""
+    truth, head, runs = machine(), "", list[str]()
+    for number in range(count):
+        part = folder / "part"
+        tests = rig.run("hoist", seed=1 + number, truth=truth)
+        text = rig.write(tests, part).read_text("utf-8")
+        head = text.partition("[[runs]]")[0]
+        for run in tests.runs.values():
+            name = f"{run.stem}_{number:03d}.csv"
+            (part / f"{run.stem}.csv").rename(folder / name)
+            runs.append(f'[[runs]]\nfile = "{name}"\nrole = "{run.role}"\n')
+        shutil.rmtree(part)
+    (folder / "campaign.toml").write_text(head + "\n".join(runs), "utf-8")
+    return folder / "campaign.toml"
+
+
+def write_log(minutes: float, folder: Path) -> Path:
+    """A campaign of one log."""
+    rng, size = np.random.default_rng(0), round(60.0 * minutes * RATE)
+    tests = [test.sample(RATE) for test in source_tests("hoist").values()]
+    parts, rows = list[np.ndarray](), 0
+    while rows < size:
+        test = tests[rng.integers(len(tests))] * rng.choice([0.5, 0.8, 1.0, 1.0])
+        rest = np.zeros(int(RATE * rng.uniform(2.0, 6.0)))
+        parts += [test, rest]
+        rows += test.size + rest.size
+    voltage = np.round(np.concatenate(parts)[:size] * 4096.0 / 20.0) / 4096.0 * 20.0
+    run = machine().simulate(voltage)
+    current = run.current_positive + run.current_negative
+    turned = np.floor(run.shaft_position * COUNTS_PER_TURN / (2.0 * np.pi)).astype(int)
+    pl.DataFrame(
+        {
+            "time": np.round(np.arange(size) / RATE, 6),
+            "voltage": np.round(voltage, 5),
+            "current": np.round(current + AMMETER * rng.normal(size=size), 5),
+            "counts": turned,
+        }
+    ).write_csv(folder / "log.csv")
+    (folder / "campaign.toml").write_text(CAMPAIGN, "utf-8")
+    return folder / "campaign.toml"
+
+
+def command(*words: str) -> tuple[float, float]:
+    """Processor time [s] and largest memory [MB] of a command, which may say "not usable"."""
+    # without byte code every command compiles the package's modules from their source
+    surroundings = {k: v for k, v in os.environ.items() if k != "PYTHONDONTWRITEBYTECODE"}
+    process = subprocess.Popen(
+        [sys.executable, "-m", "swashplate", *words],
+        env=surroundings,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+    )
+    _, status, used = os.wait4(process.pid, 0)
+    process.returncode = os.waitstatus_to_exitcode(status)
+    if process.returncode not in (0, 1):
+        raise SystemExit(f"swashplate {' '.join(words)} ended with {process.returncode}.")
+    return used.ru_utime + used.ru_stime, used.ru_maxrss / 1024.0
+
+
+def main() -> None:
+    """Measure and print."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--sets", type=int, nargs="*", default=[1, 3, 10, 30])
+    parser.add_argument("--minutes", type=float, nargs="*", default=[10.0, 60.0, 360.0])
+    arguments = parser.parse_args()
+    cases = [(f"{13 * count} runs", write_sets, count) for count in arguments.sets]
+    cases += [(f"one log of {each:g} min", write_log, each) for each in arguments.minutes]
+    print("| campaign | `fit`, CPU | memory | `report`, CPU | memory |")
+    print("|---|--:|--:|--:|--:|")
+    for words, write, size in cases:
+        with tempfile.TemporaryDirectory() as folder:
+            path, out = write(size, Path(folder)), str(Path(folder) / "fitted")
+            fitted, of_fit = command("fit", str(path), "--out", out)
+            reported, of_report = command("report", out)
+        row = f"{fitted:.1f} s | {of_fit:.0f} MB | {reported:.1f} s | {of_report:.0f} MB"
+        print(f"| {words} | {row} |", flush=True)
+
+
+if __name__ == "__main__":
+    main()
