@@ -35,7 +35,7 @@ options = parser.parse_args([] if "ipykernel" in sys.modules else None)
 
 # %%
 setup = load_setup("hoist")  # what is free, within which bounds, and in which order it is fitted
-truth = drawn(Drive.preset("hoist"), setup, seed=1)
+truth = drawn(Drive.preset("hoist").at_every_rate(), setup, seed=1)
 tests = rig.run("hoist", truth=truth, seed=1)
 path = rig.write(tests, options.out / "virtual", overwrite=True)
 
@@ -70,7 +70,8 @@ for stage in setup.stages:
 # %%
 result = identify(campaign)
 for each in result.fit.stages:
-    print(f"{each.stage.name}: {each.solution.message}")
+    ended = "converged" if each.solution.converged else each.solution.message
+    print(f"{each.stage.name}: {ended}")
 
 # %% [markdown]
 # ## The estimates, and the truth

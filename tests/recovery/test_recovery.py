@@ -60,7 +60,7 @@ def test_the_truth_is_recovered(axis: str, seed: int, joint: bool, tmp_path: Pat
     # with seed 4 the slew drive does not reach its stop downwards, and the fit says so
     assert len(told) >= len(found(result)) - (1 if (axis, seed) == ("slew", 4) else 0)
     # the small card sticks in its Coulomb band, where a search that follows derivatives ends early
-    near = 1e-6 if axis == "hoist" else 1e-4
+    near = 1e-6 if axis == "hoist" else 5e-4
     for name in told:
         assert found(result)[name] == pytest.approx(expected[name], rel=near), name
     assert all(each.solution.converged for each in result.stages)

@@ -24,7 +24,7 @@ from swashplate.errors import InputError
 from swashplate.identification.arrow import dense_factor, triangular_factor, whitening
 from swashplate.identification.determination import Identifiability, identifiability
 from swashplate.identification.drive_model import CURRENTS, DriveModel, stage_problem
-from swashplate.identification.intervals import uncertainty
+from swashplate.identification.noise import spectral_covariance
 from swashplate.identification.problem import (
     TOLERANCE,
     LinearisedFit,
@@ -293,9 +293,13 @@ def _of_residuals(
             "its residuals are no noise; give a drive that was fitted to these tests, or none."
         )
     factor = factor_of(zip(left, derivatives, strict=True), fit.variables)
-    said = uncertainty(replace(fit, runs=tuple(left), derivatives=derivatives, factor=factor))
-    # not of all that the residuals hold, but of what meets the unknowns' derivatives
-    worth = float(np.median(said.inflation[said.own.determined]))
+    noisy = replace(fit, runs=tuple(left), derivatives=derivatives, factor=factor)
+    # not of all that the residuals hold, but of what meets the unknowns' derivatives; of the noise
+    # alone, since each run has been fitted by itself
+    coloured = spectral_covariance(noisy)
+    white = noisy.squares / noisy.spare_samples * np.sum(noisy.whitening**2, axis=1)
+    told = coloured.determined & (white > 0.0)
+    worth = max(float(np.median(np.diag(coloured.matrix)[told] / white[told])), 1.0)
     return Sensor(stated.kind, noise, worth * step, "residuals of the drive")
 
 
