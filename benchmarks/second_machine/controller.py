@@ -93,12 +93,15 @@ def new_maneuver(name, axis):
         length = float(edges[-1]) + entry["dwell"]
         return length, lambda t: levels[np.searchsorted(edges, t, side="right") - 1]
     amplitude, length = factor * entry["amplitude"], entry["length"]
-    if "frequency" in entry:
-        phase = lambda t: entry["frequency"] * t  # noqa: E731
-    else:
-        sweep = (entry["to"] - entry["from"]) / (length - START)
-        phase = lambda t: entry["from"] * t + 0.5 * sweep * t**2  # noqa: E731
-    return length, lambda t: amplitude * np.sin(2.0 * np.pi * phase(np.maximum(t - START, 0.0)))
+    # a sine is a chirp that stays where it begins
+    first = entry.get("frequency", entry.get("from"))
+    sweep = (entry.get("to", first) - first) / (length - START)
+
+    def command(t):
+        since = np.maximum(t - START, 0.0)
+        return amplitude * np.sin(2.0 * np.pi * (first * since + 0.5 * sweep * since**2))
+
+    return length, command
 
 
 def held(command, length, controller):
