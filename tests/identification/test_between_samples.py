@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from tests.identification.given import run_of
+from tests.identification.given import model_of, run_of
 
 from swashplate import Drive
 from swashplate.campaign import Experiment
@@ -43,6 +43,16 @@ def test_a_fit_takes_the_way_that_was_simulated(way: str) -> None:
     # taken the other way, omega is 15 % too large; a march of 512 Hz spreads a jump over a step
     for name in ("omega_plus", "zeta_plus"):
         assert found[name].value == pytest.approx(TRUE.parameters.numbers[name], rel=0.03)
+
+
+def test_a_model_of_its_own_code_is_not_tried_and_that_is_said() -> None:
+    time = np.arange(40.0)
+    run = run_of("run", time, {"y": 2.0 * time}, time=time, kind="other")
+    run = replace(run, input=replace(run.input, settled=False))
+    model = model_of(lambda values, time, _: values["gain"] * time)
+    found = fit(model, [run], {"gain": (0.1, 1.0, 9.0)}, noise={"y": 0.1})
+    assert {each.input.interpolation for each in found.runs} == {"linear"}
+    assert any("[axes.hoist.input]" in said for said in found.doubts)
 
 
 @pytest.mark.parametrize("way", ["linear", "previous"])

@@ -49,11 +49,18 @@ def settle(
 
     The first stage is fitted both ways, and the one that leaves the smaller residuals is taken. A
     model that its own code simulates is not tried, as each evaluation may take minutes: its input
-    is a straight line unless stated. What the campaign states is not tried either, see `doubt`.
+    is a straight line unless stated, and the sentence says so. What the campaign states is not
+    tried either, see `doubt`.
     """
     if all(run.input.settled for run in runs):
         return tuple(runs), ()
-    better, smaller = _compared(runs, nominal, setup, loss, threads)
+    compared = _compared(runs, nominal, setup, loss, threads)
+    if compared is None:
+        return joined(runs, "linear"), (
+            "The command is taken as a straight line between samples, which was not tried: state "
+            f"interpolation in [axes.{runs[0].axis}.input] if it is held.",
+        )
+    better, smaller = compared
     if smaller < ALIKE:
         return joined(runs, "linear"), ()
     step = float(np.median([np.median(np.diff(run.input.time)) for run in runs]))
@@ -72,7 +79,7 @@ def doubt(
     threads: int | None = None,
 ) -> tuple[str, ...]:
     """A sentence if the input is stated in one way, but the other fits clearly better."""
-    better, smaller = _compared(runs, nominal, setup, loss, threads)
+    better, smaller = _compared(runs, nominal, setup, loss, threads) or ("linear", 0.0)
     stated = runs[0].input.interpolation
     if better == stated or smaller < CLEARLY:
         return ()
@@ -89,17 +96,17 @@ def _compared(
     setup: Setup,
     loss: Loss,
     threads: int | None,
-) -> tuple[Interpolation, float]:
-    """The way that fits better, and by what part its residuals are smaller; 0 if not tried."""
+) -> tuple[Interpolation, float] | None:
+    """The way that fits better, and by what part its residuals are smaller; None if not tried."""
     costs = dict[Interpolation, float]()
     for between in OTHER:
         problem = stage_problem(setup.stages[0], nominal, joined(runs, between), threads=threads)
         if not isinstance(problem.model, EquationModel):
-            return "linear", 0.0
+            return None
         try:
             costs[between] = solve(problem, loss=loss, max_evaluations=ENOUGH).cost
         except DomainError:
-            return "linear", 0.0  # the fit itself says where the model does not hold
+            return None  # the fit itself says where the model does not hold
     better = min(costs, key=lambda between: costs[between])
     larger = costs[OTHER[better]]
     return better, 1.0 - (costs[better] / larger) ** 0.5 if larger > 0.0 else 0.0
