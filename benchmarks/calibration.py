@@ -122,6 +122,16 @@ def with_forces(numbers, setup):
     return numbers
 
 
+OLDER = {"value": "estimate", "lower": "lower 95 %", "upper": "upper 95 %"}
+"""What older installations called the columns of estimates.csv."""
+
+
+def number_in(row, column):
+    """Number in a row of estimates.csv; None if the field is empty."""
+    text = row[column] if column in row else row[OLDER[column]]
+    return float(text) if text else None
+
+
 def estimates(fitted, truth):
     """Estimates of what the machine has, and the names of those that it has not.
 
@@ -143,9 +153,9 @@ def estimates(fitted, truth):
                     "name": name,
                     "truth": numbers[name],
                     "as_read": as_read[name],
-                    "value": float(row["value"]),
-                    "lower": float(row["lower"]) if row["lower"] else None,
-                    "upper": float(row["upper"]) if row["upper"] else None,
+                    "value": number_in(row, "value"),
+                    "lower": number_in(row, "lower"),
+                    "upper": number_in(row, "upper"),
                 }
             )
     return rows, sorted(without)
@@ -264,7 +274,8 @@ def campaign(program, axis, rate, seed, folder, oracle=False):
     verdict = json.loads((fitted / "fit.json").read_text("utf-8")).get("verdict") or {}
     record["grade"] = verdict.get("grade", "")
     record["headline"] = verdict.get("headline", "")
-    record["claim"], record["claim_worst"] = claims(record["headline"])
+    # an older installation stores no verdict, but prints it
+    record["claim"], record["claim_worst"] = claims(record["headline"] or output)
     record["estimates"], record["without_counterpart"] = estimates(fitted, truth)
     if axis == "cylinder":
         record["new"] = predicted_cylinder(program, folder, truth)
