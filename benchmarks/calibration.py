@@ -242,7 +242,8 @@ def campaign(program, axis, rate, seed, folder, oracle=False):
     """Record of a campaign: what a user gets of it, beside the machine's numbers.
 
     With `oracle` the command goes straight between samples, is logged exactly, and the file says
-    so: what a fit would be worth that knew all of the command.
+    so: what a fit would be worth that knew all of the command. Of the other instruments it assumes
+    what every fit assumes.
     """
     truth = logger.write_campaign(axis, seed, folder, rate, exact_command=oracle)
     record = {"axis": axis, "rate": rate, "seed": seed}
@@ -258,7 +259,8 @@ def campaign(program, axis, rate, seed, folder, oracle=False):
     set_roles(file, truth["held_out"])
     text = file.read_text("utf-8")
     if oracle:
-        text = re.sub(r'(# )?interpolation = "\w+".*', 'interpolation = "linear"', text)
+        exact = 'interpolation = "linear"\naccuracy = { gain = 0, zero = 0, time = 0 }'
+        text = re.sub(r'(# )?interpolation = "\w+".*', exact, text)
         file.write_text(text, "utf-8")
     # a comment in drafts that leave it to the fit
     drafted = re.search(r'^interpolation\s*=\s*"(\w+)"', text, re.MULTILINE)

@@ -17,8 +17,8 @@ from swashplate.drive import Drive
 from swashplate.errors import DomainError, InputError, ParameterError
 from swashplate.identification.assessment import Identification
 from swashplate.identification.drive_model import LIMIT_COLUMNS, DriveModel
+from swashplate.identification.effects import effect_of_fixed, slopes_by
 from swashplate.identification.fitting import StageFit
-from swashplate.identification.intervals import slopes_by
 from swashplate.identification.setup import Forces
 from swashplate.parameters.parameter_set import ParameterSet
 from swashplate.parameters.rules import FULL_VOLTAGE
@@ -190,8 +190,7 @@ def standard_errors(
     known; its neighbours, and what depends on them alone, are known all the same.
     """
     base = numbers(stages[-1].drive)
-    variance, uncertain = np.zeros_like(base), len(stages[0].problem.uncertain)
-    none = np.zeros(uncertain)
+    variance = np.zeros_like(base)
     for stage in stages:
         # what belongs to a run alone is no part of the drive
         machine = stage.problem.unknowns.shared
@@ -200,14 +199,14 @@ def standard_errors(
             error = np.zeros(len(stage.problem.unknowns))
             error[machine] = sqrt(max(size, 0.0)) * axis
             if np.abs(error).max(initial=0.0) > NEGLIGIBLE:
-                slope = _slope(stages, {stage.stage.name: error}, none, numbers, base)
+                slope = _slope(stages, {stage.stage.name: error}, {}, numbers, base)
                 variance += slope**2
-    for axis in np.eye(uncertain):
-        variance += _slope(stages, {}, axis, numbers, base) ** 2
+    for effect in _effects(stages):
+        variance += _slope(stages, {}, {effect: 1.0}, numbers, base) ** 2
     follow = {stage.stage.name: slopes_by(stage, assumed) for stage in stages if assumed}
     for k, off in enumerate(assumed):
         errors = {name: slopes[:, k] for name, slopes in follow.items()}
-        variance += _slope(stages, errors, none, numbers, base, off) ** 2
+        variance += _slope(stages, errors, {}, numbers, base, off) ** 2
     return np.asarray(np.sqrt(variance))
 
 
@@ -226,7 +225,7 @@ def variances_from_bounds(
     data would have it: by how much it is off is not known, and that it is off to either side alike
     is wrong.
     """
-    base, none = numbers(stages[-1].drive), np.zeros(len(stages[0].problem.uncertain))
+    base = numbers(stages[-1].drive)
     variances = {}
     for stage in stages:
         own, names = stage.uncertainty.own, stage.problem.unknowns.names
@@ -235,7 +234,7 @@ def variances_from_bounds(
             deviation = sqrt(max(float(own.matrix[index, index]), 0.0))
             if stage.problem.unknowns[index].run is None and deviation > NEGLIGIBLE:
                 errors = {stage.stage.name: own.matrix[index] / deviation}
-                variances[name] = _slope(stages, errors, none, numbers, base) ** 2
+                variances[name] = _slope(stages, errors, {}, numbers, base) ** 2
     return variances
 
 
@@ -248,7 +247,7 @@ def changes_left_open(
     no test exercises, `but` some. Arguments and errors are those of `standard_errors`.
     """
     base = numbers(stages[-1].drive)
-    largest, none = np.zeros_like(base), np.zeros(len(stages[0].problem.uncertain))
+    largest = np.zeros_like(base)
     for stage in stages:
         seen, names = stage.identifiability, stage.problem.unknowns.names
         directions = [direction.changes for direction in seen.null]
@@ -257,7 +256,7 @@ def changes_left_open(
             error = np.zeros(len(names))
             for name, by in changes.items():
                 error[names.index(name)] = by
-            slope = _slope(stages, {stage.stage.name: error}, none, numbers, base)
+            slope = _slope(stages, {stage.stage.name: error}, {}, numbers, base)
             largest = np.maximum(largest, LARGEST_STEP * np.abs(slope))
     return largest
 
@@ -265,18 +264,26 @@ def changes_left_open(
 def _slope(
     stages: Sequence[StageFit],
     errors: Mapping[str, Array],
-    off: Array,
+    effects: Mapping[str, float],
     numbers: Callable[[Drive], Array],
     base: Array,
     assumed: Mapping[str, float] = MappingProxyType({}),
 ) -> Array:
-    """Change of numbers for errors of the stages' vectors, by a small step along them."""
+    """Change of numbers for errors of the stages' vectors and effects, by a small step along them.
+
+    Systematic effects are by name, in standard uncertainties.
+    """
     largest = max((float(np.abs(error).max()) for error in errors.values()), default=0.0)
+    for stage in stages:
+        for effect, size in effects.items():
+            change = size * stage.uncertainty.systematic.get(effect, np.zeros(1))
+            largest = max(largest, float(np.abs(change).max()))
     first = min(STEP, LARGEST_STEP / largest) if largest else STEP
     for step in (first, -first, 0.1 * first, -0.1 * first):
         moved = {name: step * error for name, error in errors.items()}
         other = {column: step * size for column, size in assumed.items()}
-        parameters = _moved(stages, moved, step * off, other)
+        small = {effect: step * size for effect, size in effects.items()}
+        parameters = _moved(stages, moved, small, other)
         if parameters is not None:
             return np.asarray((numbers(Drive(parameters)) - base) / step)
     raise InputError(
@@ -287,34 +294,47 @@ def _slope(
 
 def _drawn(stages: Sequence[StageFit], random: np.random.Generator) -> ParameterSet | None:
     """A set with each stage's vector off by a drawn error, None outside bounds or domain."""
-    # of the fixed numbers, in standard uncertainties
-    off = random.normal(size=len(stages[0].problem.uncertain))
+    names = _effects(stages)
+    effects = dict(zip(names, random.normal(size=len(names)).tolist(), strict=True))
     errors = {}
     for stage in stages:
         own = stage.uncertainty.own.matrix
         errors[stage.stage.name] = random.multivariate_normal(
             np.zeros(len(own)), own, check_valid="ignore", method="eigh"
         )
-    return _moved(stages, errors, off)
+    return _moved(stages, errors, effects)
+
+
+def _effects(stages: Sequence[StageFit]) -> list[str]:
+    """Names of the systematic effects that move an estimate of the machine in some stage."""
+    moving = dict[str, None]()
+    for stage in stages:
+        machine = stage.problem.unknowns.shared
+        for effect, change in stage.uncertainty.systematic.items():
+            if np.abs(change[machine]).max(initial=0.0) > NEGLIGIBLE:
+                moving[effect] = None
+    # a fixed number may move no estimate, and what is computed of the drive all the same
+    moving |= dict.fromkeys(effect_of_fixed(each) for each in stages[0].problem.uncertain)
+    return list(moving)
 
 
 def _moved(
     stages: Sequence[StageFit],
     own: Mapping[str, Array],
-    off: Array,
+    effects: Mapping[str, float],
     assumed: Mapping[str, float] = MappingProxyType({}),
 ) -> ParameterSet | None:
     """A set with each stage's vector off by an error of its own, 0 if none is given.
 
-    `off` are errors of fixed numbers, in standard uncertainties, `assumed` those of others. None
-    outside bounds or domain.
+    `effects` are systematic effects, fixed numbers among them, in standard uncertainties; `assumed`
+    are errors of other fixed numbers. None outside bounds or domain.
     """
-    model, uncertain = stages[0].problem.model, stages[0].problem.uncertain
+    model = stages[0].problem.model
     assert isinstance(model, DriveModel)
     parameters = model.parameters
     fixed = {
-        name: parameters.numbers[name] + size * number
-        for together, number in zip(uncertain, off.tolist(), strict=True)
+        name: parameters.numbers[name] + size * effects.get(effect_of_fixed(together), 0.0)
+        for together in stages[0].problem.uncertain
         for name, size in together.items()
     }
     fixed |= {column: parameters.numbers[column] + size for column, size in assumed.items()}
@@ -329,7 +349,10 @@ def _moved(
             for handed in known.handed:
                 error = error + handed.slopes @ errors[handed.stage]
             errors[stage.stage.name] = error
-            vector = stage.solution.vector + error + known.fixed @ off
+            vector = stage.solution.vector + error
+            for effect, size in effects.items():
+                if effect in known.systematic:
+                    vector = vector + size * known.systematic[effect]
             low, high = problem.unknowns.bounds
             if ((vector < low) | (vector > high))[known.own.determined].any():
                 return None

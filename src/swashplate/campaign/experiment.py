@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Literal, NamedTuple, cast
 
 import numpy as np
@@ -29,6 +30,8 @@ SUDDEN, BESIDE, APART, RISE = 0.1, 0.1, 0.003, 3.0 / 512.0
 """Part of a command's range by which it jumps between two samples, and part of the jump that it
 moves by at most beside it; the samples' least distance [s], below which the jump is taken as it is
 logged; and the time that a jump takes, three steps of the march. [s]"""
+ROUNDED = 1e-6
+"""Share of the largest input below which two levels are one. [1]"""
 VARIED = 8
 """Changes of an encoder's steps from which their common divisor is the decoder's."""
 
@@ -52,6 +55,39 @@ class Edge(NamedTuple):
     """Between both samples. [s]"""
     apart: float
     """Time between them. [s]"""
+
+
+class Accuracy(NamedTuple):
+    """Limits of an instrument's error, as a data sheet gives them."""
+
+    gain: float = 0.0
+    """Share of the reading. [1]"""
+    zero: float = 0.0
+    """In the signal's unit."""
+    time: float | None = 0.0
+    """Of its stamps beside those of the other signals [s]; None: half the time between samples."""
+
+
+ASSUMED: Mapping[str, Accuracy] = MappingProxyType(
+    {
+        "voltage": Accuracy(0.0005, 0.001, None),
+        "current": Accuracy(0.005, 0.0005, None),
+        "other": Accuracy(time=None),
+        "signed_current": Accuracy(0.005, 0.0005),
+        "rectified_current": Accuracy(0.005, 0.0005),
+        "current_plus": Accuracy(0.005, 0.0005),
+        "current_minus": Accuracy(0.005, 0.0005),
+        "shaft_speed": Accuracy(0.005),
+        "position": Accuracy(0.001),
+        "swash_angle": Accuracy(0.005),
+        "stroker_pressure": Accuracy(0.005),
+    }
+)
+"""What instruments may err by if a campaign file does not say so, by kind, SI: a logger of 14 to 16
+bits over ±10 V after its calibration; shunts and closed-loop Hall transducers of class 0.5, zeroed
+before the tests; tachogenerators; draw-wire sensors; transducers of class 0.5. Counts of an encoder
+have no error of scale, and nothing is assumed of other kinds. A jump of an input lies somewhere
+between two samples."""
 
 
 class Encoder(NamedTuple):
@@ -92,6 +128,13 @@ class InputSignal(Result):
     """Samples left out because they were missing."""
     settled: bool = True
     """Whether `interpolation` was stated, or found by a fit; if not, a fit finds it."""
+    accuracy: Accuracy | None = None
+    """As the campaign file states it."""
+
+    @property
+    def instrument(self) -> Accuracy:
+        """Limits of the instrument's error: stated, or assumed of its kind."""
+        return _instrument(self)
 
     @property
     def used(self) -> NDArray[np.bool_]:
@@ -141,6 +184,36 @@ class InputSignal(Result):
         return _between(self, time)
 
 
+def _instrument(signal: InputSignal | Channel) -> Accuracy:
+    """Limits of an instrument's error: stated, or assumed of its kind."""
+    if signal.accuracy is not None:
+        return signal.accuracy
+    return assumed_accuracy(signal.kind, is_input=isinstance(signal, InputSignal))
+
+
+def assumed_accuracy(kind: str, *, is_input: bool) -> Accuracy:
+    """What is assumed of an instrument of a kind that nothing is stated of."""
+    assumed = ASSUMED.get(kind, Accuracy())
+    return assumed if is_input else assumed._replace(time=0.0)
+
+
+LEVELS = 32
+"""Levels of inputs from which the smallest distance between two of them is a converter's step."""
+
+
+def resolution_of_inputs(inputs: Sequence[InputSignal]) -> float:
+    """Step of the converter that inputs of one instrument were logged by, in their unit.
+
+    The smallest distance between levels that they take; 0 if they take so few that nothing is known
+    of levels between them.
+    """
+    levels = np.unique(np.concatenate([each.values for each in inputs]))
+    # rounding of a decimal number, or of a scale, sets equal levels apart
+    apart = np.diff(levels)
+    apart = apart[apart > ROUNDED * float(np.abs(levels).max(initial=0.0))]
+    return float(apart.min()) if apart.size + 1 >= LEVELS else 0.0
+
+
 @dataclass(frozen=True, eq=False)
 class Channel(Result):
     """One measured signal on its own time stamps."""
@@ -171,6 +244,13 @@ class Channel(Result):
     """Reading after which a position begins anew, in `unit`; it is unwrapped."""
     interpolation: Interpolation = "linear"
     """What it is between two stamps, where a model takes it as an input."""
+    accuracy: Accuracy | None = None
+    """As the campaign file states it."""
+
+    @property
+    def instrument(self) -> Accuracy:
+        """Limits of the instrument's error: stated, or assumed of its kind."""
+        return _instrument(self)
 
     @property
     def used(self) -> NDArray[np.bool_]:

@@ -15,7 +15,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swashplate.campaign import schema
-from swashplate.campaign.experiment import Channel, Encoder, Experiment, InputSignal, Source
+from swashplate.campaign.experiment import (
+    Accuracy,
+    Channel,
+    Encoder,
+    Experiment,
+    InputSignal,
+    Source,
+    assumed_accuracy,
+)
 from swashplate.campaign.recognition import recognise
 from swashplate.campaign.samples import ambiguous_gaps, unwrap_counts, unwrap_position
 from swashplate.campaign.schema import applying, conversion, ends, inside
@@ -222,8 +230,20 @@ class _Columns:
             "values": values,
             "source": Source(log.path, column.name),
             "limits": signal.limits and tuple(factor * end + zero for end in signal.limits),
+            "accuracy": _accuracy(signal, factor),
             "dropped": rows.size,
         }, factor
+
+
+def _accuracy(signal: schema.Input | schema.Channel, factor: float) -> Accuracy | None:
+    """What a campaign file states of an instrument, SI; the rest as assumed of its kind."""
+    stated = signal.accuracy
+    if stated is None:
+        return None
+    assumed = assumed_accuracy(signal.kind, is_input=isinstance(signal, schema.Input))
+    gain = assumed.gain if stated.gain is None else stated.gain
+    zero = assumed.zero if stated.zero is None else factor * stated.zero
+    return Accuracy(gain, zero, assumed.time if stated.time is None else stated.time)
 
 
 # --- experiments ----------------------------------------------------------------------------------

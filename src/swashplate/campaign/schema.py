@@ -221,6 +221,20 @@ class Clock(Entry):
         return self
 
 
+class Accuracy(Entry):
+    """Limits of an instrument's error, as its data sheet gives them."""
+
+    gain: NotNegative | None = Field(
+        None, lt=1.0, description="Share of the reading, 0.005 for 0.5 %; left out, as assumed."
+    )
+    zero: NotNegative | None = Field(None, description="In `unit`; left out, as assumed.")
+    time: NotNegative | None = Field(
+        None,
+        description="Of its stamps beside those of other signals [s]; left out, half the time "
+        "between two samples of an input, 0 of a channel.",
+    )
+
+
 class Signal(Entry):
     """Where a signal is and how its numbers become physical: sign * (scale * number + offset)."""
 
@@ -237,6 +251,11 @@ class Signal(Entry):
     )
     limits: tuple[Finite, Finite] | None = Field(
         None, description="Range of the instrument in `unit`, to tell clipping."
+    )
+    accuracy: Accuracy | None = Field(
+        None,
+        description="Limits of the instrument's error, which intervals take in; those assumed of "
+        "its kind are in the documentation of campaign files.",
     )
 
     @model_validator(mode="after")

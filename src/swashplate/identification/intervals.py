@@ -18,8 +18,15 @@ from swashplate.identification.drive_model import (
     DriveModel,
     limits_unreached,
 )
-from swashplate.identification.model import Model
-from swashplate.identification.model import linearised as linearised_model
+from swashplate.identification.effects import (
+    IN_RUN,
+    RunToRun,
+    effect_of_fixed,
+    effects_of,
+    follows_card,
+    slopes_by,
+    slopes_by_earlier,
+)
 from swashplate.identification.noise import (
     Covariance,
     NoiseColour,
@@ -38,6 +45,8 @@ if TYPE_CHECKING:
     from swashplate.identification.fitting import StageFit
 
 Array = NDArray[np.float64]
+Systematic = Mapping[str, Array]
+"""(K,) changes of the solver's vector for a standard uncertainty of each systematic effect."""
 Status = Literal[
     "estimated",
     "at its lower bound",
@@ -226,94 +235,19 @@ class Handed(NamedTuple):
     """Name of the earlier stage."""
 
 
-def follows_card(stage: StageFit, earlier: StageFit) -> bool:
-    """Whether a stage takes the current from the card that an earlier one estimated.
-
-    Not where its current is measured, or where it frees the card itself.
-    """
-    model, voltage = stage.problem.model, [e.input.kind for e in stage.problem.experiments]
-    driven = stage.stage.current == "simulated" and "voltage" in voltage
-    pump = isinstance(model, DriveModel) and model.part == "pump"
-    return pump and driven and earlier.stage.part == "card"
-
-
-def slopes_by_earlier(stage: StageFit, earlier: StageFit) -> Array:
-    """(K, K_earlier) derivatives of a pump's estimates by those of the card that drives it.
-
-    Notes
-    -----
-    The later estimate makes J₂ᵀ r₂ = 0, so to first order dθ₂/dθ₁ = -(J₂ᵀJ₂)⁻¹ J₂ᵀ ∂r₂/∂θ₁: the
-    second step of a two-step estimate (Murphy and Topel 1985). Gauss-Newton's approximation, as
-    everywhere here: second derivatives times residuals are left out.
-    """
-    unknowns, vector = earlier.problem.unknowns, earlier.solution.vector
-    names = unknowns.machine_targets
-    slopes = np.zeros((len(stage.linearised.variables), len(unknowns)))
-    slopes[:, unknowns.shared] = _slopes(stage, names, unknowns.chain(vector, names, ""))
-    return slopes
-
-
-def slopes_by_fixed(stage: StageFit) -> Array:
-    """(K, F) changes of a stage's estimates for a standard uncertainty of each fixed number."""
-    return slopes_by(stage, stage.problem.uncertain)
-
-
-def slopes_by(stage: StageFit, uncertain: Sequence[Mapping[str, float]]) -> Array:
-    """(K, F) changes of a stage's estimates if fixed numbers, by column, change together by these.
-
-    Without what follows from earlier stages.
-    """
-    names = [name for together in uncertain for name in together]
-    if not names:
-        return np.zeros((len(stage.linearised.variables), 0))
-    deviations = np.array([[each.get(name, 0.0) for each in uncertain] for name in names])
-    return _slopes(stage, names, deviations)
-
-
-def source_of(stage: StageFit) -> Callable[[Experiment], Model]:
-    """The model of a run of a stage: the whole chain where the fitted card drives the pump."""
-    model = stage.problem.model
-    if not isinstance(model, DriveModel):
-        return lambda experiment: model
-    own, chain = (
-        replace(model, parameters=stage.drive.parameters, part=part)
-        for part in (model.part, "chain")
-    )
-    by_card = model.part == "pump" and stage.stage.current == "simulated"
-    return lambda run: chain if by_card and run.input.kind == "voltage" else own
-
-
-def _slopes(stage: StageFit, names: Sequence[str], by: Array) -> Array:
-    """(K, F) derivatives of a stage's estimates, from those (names, F) of the model's numbers."""
-    problem, vector, linearised = stage.problem, stage.solution.vector, stage.linearised
-    products, source = np.zeros((linearised.rank, by.shape[1])), source_of(stage)
-    jacobians = linearised.jacobians()
-    for number, experiment in enumerate(problem.experiments):
-        values = problem.model_values(vector, number)
-        moved = linearised_model(source(experiment), values, experiment, names)
-        directions, whitening = linearised.inverse.of_run(experiment.name)
-        for name, weight in problem.weights[number].items():
-            used = weight > 0.0
-            if used.any():
-                changes = weight[used, None] * (moved[name].by[used] @ by)
-                _, jacobian = next(jacobians)
-                products[directions] += whitening.T @ (jacobian.T @ changes)
-    slopes: Array = -linearised.whitening @ products
-    return slopes
-
-
 def with_handed(
-    own: Covariance, handed: Sequence[Handed], fixed: Array | None = None
+    own: Covariance, handed: Sequence[Handed], systematic: Systematic = MappingProxyType({})
 ) -> Covariance:
-    """A stage's covariance with what earlier stages do not know, and what fixed numbers may be off.
+    """A stage's covariance with what earlier stages do not know, and systematic effects.
 
     The degrees of freedom are Satterthwaite's, of the sum of the variances; a standard uncertainty
     that was stated has infinitely many (JCGM 100:2008, G.4).
     """
-    if not handed and (fixed is None or not fixed.size):
+    if not handed and not systematic:
         return own
     known = np.outer(own.determined, own.determined)
-    total = own.matrix + (0.0 if fixed is None else np.where(known, fixed @ fixed.T, 0.0))
+    columns = np.array(list(systematic.values())).reshape(-1, len(own.variables))
+    total = own.matrix + np.where(known, columns.T @ columns, 0.0)
     spread = np.diag(own.matrix) ** 2 / own.degrees_of_freedom
     for each in handed:
         added = np.where(known, each.slopes @ each.covariance.matrix @ each.slopes.T, 0.0)
@@ -328,6 +262,20 @@ def with_handed(
     return replace(own, matrix=total, degrees_of_freedom=freedom)
 
 
+def with_runs(noise: Covariance, runs: RunToRun | None) -> Covariance:
+    """A covariance of the noise with what runs differ by."""
+    if runs is None:
+        return noise
+    known = np.outer(noise.determined, noise.determined)
+    between = np.where(known, runs.slopes @ runs.slopes.T, 0.0)
+    spread = np.diag(noise.matrix) ** 2 / noise.degrees_of_freedom
+    spread += np.diag(between) ** 2 / runs.degrees_of_freedom
+    total = noise.matrix + between
+    variance = np.diag(total)
+    freedom = np.divide(variance**2, spread, out=np.full_like(variance, np.inf), where=spread > 0.0)
+    return replace(noise, matrix=total, degrees_of_freedom=freedom)
+
+
 # --- all together ---------------------------------------------------------------------------------
 
 
@@ -336,7 +284,7 @@ class Uncertainty(Result):
     """Errors of a fit's estimates: those to quote, and what they rest on."""
 
     own: Covariance
-    """That of the stage's own noise."""
+    """That of the stage's own noise and of the runs' differences."""
     inflation: Array
     """(K,) samples that stand for one independent one, at least 1, unknown by unknown: the own
     variance over that of white residuals."""
@@ -345,8 +293,9 @@ class Uncertainty(Result):
     """Whether there are any residuals at all."""
     handed: tuple[Handed, ...]
     """What earlier stages do not know."""
-    fixed: Array
-    """(K, F) changes of the solver's vector for a standard uncertainty of each fixed number."""
+    systematic: Systematic
+    runs: RunToRun | None = None
+    """How runs differ, if that is known."""
     ends: tuple[CheckedEnd, ...] = ()
     """Sides on which the cost does not rise as the covariance says."""
     priors: tuple[str, ...] = ()
@@ -355,11 +304,11 @@ class Uncertainty(Result):
     @cached_property
     def quoted(self) -> Covariance:
         """That of the stage's own noise with what is taken for granted."""
-        return with_handed(self.own, self.handed, self.fixed)
+        return with_handed(self.own, self.handed, self.systematic)
 
     @cached_property
     def sampled(self) -> Covariance:
-        """That of all stages' noise: the quoted one without what fixed numbers may be off."""
+        """That of all stages' noise: the quoted one without systematic effects."""
         return with_handed(self.own, self.handed)
 
     @cached_property
@@ -382,7 +331,7 @@ class Uncertainty(Result):
             if colour.drifting:
                 said.append(
                     f"That is a large part of a run: residuals of {colour.channel} are model error "
-                    "or a spectral line rather than noise, and intervals cover noise only."
+                    "or a spectral line rather than noise, of which intervals know little."
                 )
         said += self.priors
         for end in self.ends:
@@ -397,56 +346,101 @@ class Uncertainty(Result):
             elif np.isfinite(end.distance):
                 words = f"The {side} end of {name} is that of its profile, which is asymmetric."
             said.append(words)
-        known = self.own.determined & (np.diag(self.own.matrix) > 0.0)
-        if known.any() and (self.handed or self.fixed.any()):
-            what = ["the uncertainty of earlier stages"] * bool(self.handed)
-            what += ["the standard uncertainty of fixed parameters"] * bool(self.fixed.any())
-            wider = np.ones(known.size)
-            wider[known] = self.quoted.standard_errors[known] / self.own.standard_errors[known]
-            most = int(np.argmax(wider))
+        if self.runs is not None:
             said.append(
-                f"Intervals include {' and '.join(what)}, which widens them by a factor of "
-                f"{float(np.median(wider[known])):.2f} in the median and of {wider[most]:.2f} for "
-                f"{self.own.variables.names[most]}."
+                f"From run to run the motion's scale differs by {100.0 * self.runs.deviation:.2g} "
+                "% (standard deviation), which the intervals include."
             )
+        said += self._widened()
         return tuple(said)
+
+    def _widened(self) -> Iterator[str]:
+        """What earlier stages and systematic effects add to the intervals."""
+        known = self.own.determined & (np.diag(self.own.matrix) > 0.0)
+        if not known.any() or not (self.handed or self.systematic):
+            return
+        what = ["the uncertainty of earlier stages"] if self.handed else []
+        if self.systematic:
+            what.append("what instruments, fixed parameters and the model may be off by")
+        wider = np.ones(known.size)
+        wider[known] = self.quoted.standard_errors[known] / self.own.standard_errors[known]
+        most = int(np.argmax(wider))
+        name = self.own.variables.names[most]
+        text = (
+            f"Intervals include {' and '.join(what)}, which widens them by a factor of "
+            f"{float(np.median(wider[known])):.2f} in the median and of {wider[most]:.2f} for "
+            f"{name}"
+        )
+        if shares := self.budget(most):
+            effect, share = next(iter(shares.items()))
+            text += f", {percent(share, 1.0)} of whose variance is the {effect}"
+        yield f"{text}."
+
+    def budget(self, number: int) -> dict[str, float]:
+        """Share of each systematic effect in the variance of an unknown, the largest first.
+
+        Effects of one kind in several runs, such as the command's zero, are added up.
+        """
+        variance = float(self.quoted.matrix[number, number])
+        if not variance > 0.0:
+            return {}
+        shares = dict[str, float]()
+        for effect, change in self.systematic.items():
+            kind = effect.partition(IN_RUN)[0]
+            shares[kind] = shares.get(kind, 0.0) + float(change[number]) ** 2 / variance
+        return dict(sorted(shares.items(), key=lambda item: -item[1]))
 
 
 def uncertainty(
-    fit: LinearisedFit, *, handed: Sequence[Handed] = (), fixed: Array | None = None
+    fit: LinearisedFit,
+    *,
+    handed: Sequence[Handed] = (),
+    systematic: Systematic = MappingProxyType({}),
+    runs: RunToRun | None = None,
 ) -> Uncertainty:
     """Errors of a fit's estimates for coloured residuals.
 
-    `handed` is what earlier stages do not know, `fixed` (K, F) are changes of the solver's vector
-    for a standard uncertainty of each fixed number. An `InputError` says that there are no more
-    samples than unknowns.
+    `handed` is what earlier stages do not know, `systematic` what each systematic effect changes,
+    `runs` how runs differ. An `InputError` says that there are no more samples than unknowns.
     """
     bounded, fit = fit.variables, released(fit)
-    own = replace(coloured_noise_covariance(fit), variables=bounded)
+    own = replace(with_runs(coloured_noise_covariance(fit), runs), variables=bounded)
     white = fit.squares / fit.spare_samples * np.sum(fit.whitening**2, axis=1)
     ratio = np.ones_like(white)
     np.divide(np.diag(own.matrix), white, out=ratio, where=own.determined & (white > 0.0))
-    fixed = np.zeros((white.size, 0)) if fixed is None else fixed
-    colours, noisy = noise_colours(fit), fit.squares > 0.0
-    return Uncertainty(own, np.maximum(ratio, 1.0), colours, noisy, tuple(handed), fixed)
+    return Uncertainty(
+        own,
+        np.maximum(ratio, 1.0),
+        noise_colours(fit),
+        fit.squares > 0.0,
+        tuple(handed),
+        systematic,
+        runs,
+    )
 
 
 def stage_uncertainty(stage: StageFit) -> Uncertainty:
     """Errors of a stage's estimates, what it takes for granted and checked ends taken in."""
     problem, vector, handed = stage.problem, stage.solution.vector, []
-    fixed = slopes_by_fixed(stage)
-    for each in stage.earlier:
-        if follows_card(stage, each):
-            slopes = slopes_by_earlier(stage, each)
-            handed.append(Handed(each.uncertainty.sampled, slopes, each.stage.name))
-            # a fixed number acts on this stage by itself, and through what it does to others
-            fixed = fixed + slopes @ each.uncertainty.fixed
-    found = uncertainty(stage.linearised, handed=handed, fixed=fixed)
+    effects = effects_of(stage)
+    systematic = dict(effects.systematic)
+    for together, change in zip(
+        problem.uncertain, slopes_by(stage, problem.uncertain).T, strict=True
+    ):
+        systematic[effect_of_fixed(together)] = change
+    for earlier in stage.earlier:
+        if follows_card(stage, earlier):
+            slopes = slopes_by_earlier(stage, earlier)
+            handed.append(Handed(earlier.uncertainty.sampled, slopes, earlier.stage.name))
+            # an effect acts on this stage by itself, and through what it does to others
+            for effect, change in earlier.uncertainty.systematic.items():
+                systematic[effect] = systematic.get(effect, 0.0) + slopes @ change
+    found = uncertainty(stage.linearised, handed=handed, systematic=systematic, runs=effects.runs)
     found = replace(found, priors=prior_sentences(problem.unknowns, vector, found.quoted))
     if not found.noisy:
         return found
     half, fit = reach(found.own), released(stage.linearised)
-    first = [each.targets[0].startswith(tuple(LIMITS)) for each in problem.unknowns]
+    first = [unknown.targets[0].startswith(tuple(LIMITS)) for unknown in problem.unknowns]
     ends = checked_ends(problem, vector, fit, half, np.flatnonzero(first).tolist())
     return replace(found, ends=tuple(ends))
 

@@ -19,6 +19,7 @@ from swashplate.identification.arrow import (
     triangular_factor_of,
 )
 from swashplate.identification.drive_model import DriveModel
+from swashplate.identification.effects import follows_card, source_of
 from swashplate.identification.faults import (
     DRIFT,
     FIXED,
@@ -27,7 +28,6 @@ from swashplate.identification.faults import (
     Kind,
     measurement_error,
 )
-from swashplate.identification.intervals import follows_card, source_of
 from swashplate.identification.model import Model, linearised
 from swashplate.identification.problem import TOLERANCE
 from swashplate.parameters.definitions import CATALOGUE, COLUMNS, columns_of

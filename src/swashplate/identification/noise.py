@@ -5,7 +5,7 @@ All goes through the runs one by one and keeps of each a few numbers a frequency
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from math import sqrt
 from typing import NamedTuple
@@ -14,7 +14,6 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.fft import irfft, next_fast_len, rfft, rfftfreq
 
-from swashplate.identification.arrow import triangular_factor
 from swashplate.identification.problem import LinearisedFit, LinearisedRun
 from swashplate.identification.unknowns import Unknowns
 from swashplate.results import Result
@@ -253,12 +252,6 @@ BAND, FEWEST_BANDS = 10.0, 20.0
 sampling rate, where that is low."""
 
 
-ALONE, FEWEST_RUNS = 1e-5, 5
-"""Share of a direction that other runs must determine for a run's score to tell of it; and runs
-from which scores tell how runs differ: below four degrees of freedom they are not to be trusted
-(Pustejovsky and Tipton 2018)."""
-
-
 class _Spectrum:
     """One run in the frequency domain, in directions whose derivatives are orthonormal."""
 
@@ -267,11 +260,6 @@ class _Spectrum:
         self.step, scale = grid.step, 1.0 / np.sqrt(grid.size)
         self.directions, self.whitening = fit.inverse.of_run(run.name)
         """(d,) numbers of those that move the run, and (q + M, d) its unknowns along them."""
-        along = triangular_factor(jacobian) @ self.whitening
-        self.leverage: Array = along.T @ along
-        """(d, d) of the run as a whole."""
-        self.score: Array = self.whitening.T @ (jacobian.T @ run.residual)
-        """(d,) of the run as a whole."""
         residual = run.unweighted
         weight = np.ones(1) if run.weight is None else run.weight
         alike = weight.min() == weight.max()
@@ -412,61 +400,9 @@ def band_score_covariance(fit: LinearisedFit) -> Covariance:
     return _covariances(fit)[1]
 
 
-def run_score_covariance(fit: LinearisedFit) -> Covariance:
-    """Covariance if the machine differs from run to run, as it does between a cold and a warm oil.
-
-    Notes
-    -----
-    The sandwich with a cluster for each run, (JᵀJ)⁻¹ Σ_runs g gᵀ (JᵀJ)⁻¹ with the score
-    g = Jᵀ (I - H)^(-½) r of a run: CR2 of Bell and McCaffrey (2002), in which H is the leverage of
-    the run. Degrees of freedom are Satterthwaite's of a sum of squares, one for each run. It knows
-    nothing of a parameter that a single run determines.
-    """
-    return _covariances(fit)[2]
-
-
-class _RunScore:
-    """Score of one run, all its channels together, in the directions that move it."""
-
-    def __init__(self, directions: NDArray[np.intp], whitening: Array) -> None:
-        count = directions.size
-        self.directions, self.whitening = directions, whitening
-        self.leverage, self.score = np.zeros((count, count)), np.zeros(count)
-
-    def add(self, channel: _Spectrum) -> None:
-        """Add a channel."""
-        self.leverage += channel.leverage
-        self.score += channel.score
-
-    def adjusted(self) -> Array:
-        """(d,) the score as if the fit had not seen the run, to half of the leverage's effect.
-
-        What a run alone determines has no score, and stays without.
-        """
-        shares, axes = np.linalg.eigh(self.leverage)
-        factors = np.zeros(shares.size)
-        others = 1.0 - shares > ALONE
-        factors[others] = 1.0 / np.sqrt(1.0 - shares[others])
-        adjusted: Array = axes @ (factors * (axes.T @ self.score))
-        return adjusted
-
-
-def _by_runs(fit: LinearisedFit, scores: Mapping[str, _RunScore]) -> Covariance:
-    """See `run_score_covariance`."""
-    clustered = _Sandwich(fit)
-    for name, run in scores.items():
-        adjusted = run.adjusted()
-        clustered.add(run.directions, np.outer(adjusted, adjusted))
-        parts, columns = (run.whitening @ adjusted) ** 2, fit.variables.columns(name)
-        clustered.total[columns] += parts
-        clustered.squares[columns] += parts**2
-    return clustered.covariance(1.0, 1.0)
-
-
-def _covariances(fit: LinearisedFit) -> tuple[Covariance, Covariance, Covariance]:
-    """By the smoothed spectrum, by scores of bands and of runs: in two passes over the runs."""
+def _covariances(fit: LinearisedFit) -> tuple[Covariance, Covariance]:
+    """By the smoothed spectrum and by scores of bands: in two passes over the runs."""
     smoothed, banded = _Sandwich(fit), _Sandwich(fit)
-    by_run = dict[str, _RunScore]()
     pooled = _pooled(fit)
     runs = {channel: iter(zip(p.shapes, p.bins, strict=True)) for channel, p in pooled.items()}
     shared = {c: np.zeros((fit.variables.shared.size, p.means.size)) for c, p in pooled.items()}
@@ -490,14 +426,12 @@ def _covariances(fit: LinearisedFit) -> tuple[Covariance, Covariance, Covariance
         scores = np.add.reduceat(products, np.flatnonzero(np.diff(band, prepend=-1)), axis=1)
         banded.add(directions, 0.5 * (scores.conj() @ scores.T).real)
         parts, columns = 0.5 * spectrum.variances(scores), fit.variables.columns(run.name)
-        of_run = by_run.setdefault(run.name, _RunScore(directions, spectrum.whitening))
-        of_run.add(spectrum)
         banded.total[columns] += parts.sum(axis=1)
         banded.squares[columns] += np.sum(parts**2, axis=1)
     for channel, noise in pooled.items():
         smoothed.total[fit.variables.shared] += shared[channel] @ noise.means
         smoothed.squares[fit.variables.shared] += shared[channel] ** 2 @ noise.squares
-    return smoothed.covariance(4.0, np.inf), banded.covariance(2.0, 1.0), _by_runs(fit, by_run)
+    return smoothed.covariance(4.0, np.inf), banded.covariance(2.0, 1.0)
 
 
 def _pooled(fit: LinearisedFit) -> dict[str, _Pooled]:
@@ -524,20 +458,10 @@ def coloured_noise_covariance(fit: LinearisedFit) -> Covariance:
 
     The larger of two errors, unknown by unknown: a smoothed spectrum knows the noise well but takes
     it as alike all along a run; scores by bands take in noise that is not, but are few. Both take
-    the machine for the same in all runs. By what scores of whole runs say beyond them all variances
-    are larger: runs are few, so that only what they say of all unknowns together is known, and a
-    common factor leaves alone how errors cancel in a prediction (docs/calibration.md).
+    the machine for the same in all runs (see `effects.RunToRun`).
     """
-    smoothed, banded, by_runs = _covariances(fit)
-    within = _widened(smoothed, _ratio(banded, smoothed), banded.degrees_of_freedom)
-    if len({run.name for run in fit.runs}) < FEWEST_RUNS:
-        return within
-    ratio, freedom = _common(_ratio(by_runs, within), by_runs.degrees_of_freedom)
-    # Satterthwaite's, of what lies within the runs and what comes between them
-    between = max(ratio - 1.0, 0.0)
-    unsure = 1.0 / within.degrees_of_freedom + between**2 / freedom
-    together = (1.0 + between) ** 2 / np.maximum(unsure, 1e-300)
-    return _widened(within, np.full(together.size, ratio), together)
+    smoothed, banded = _covariances(fit)
+    return _widened(smoothed, _ratio(banded, smoothed), banded.degrees_of_freedom)
 
 
 def _ratio(one: Covariance, other: Covariance) -> Array:
@@ -556,22 +480,3 @@ def _widened(covariance: Covariance, ratio: Array, freedom: Array) -> Covariance
         matrix=covariance.matrix * np.outer(stretch, stretch),
         degrees_of_freedom=np.where(ratio > 1.0, freedom, covariance.degrees_of_freedom),
     )
-
-
-def _common(ratios: Array, freedom: Array) -> tuple[float, float]:
-    """What ratios (K,) of variances have in common, and the degrees of freedom of the best known.
-
-    Notes
-    -----
-    Of a variance with d degrees of freedom the logarithm's mean lies at that of the truth plus
-    ψ(d/2) - log(d/2) (Bartlett and Kendall 1946): the mean of the logarithms freed of it. All rest
-    on the same few runs, so that many unknowns do not make it better known.
-    """
-    from scipy.special import digamma
-
-    known = ratios > 0.0
-    if not known.any():
-        return 0.0, np.inf
-    half = 0.5 * freedom[known]
-    logarithms = np.log(ratios[known]) - digamma(half) + np.log(half)
-    return float(np.exp(np.mean(logarithms))), float(freedom[known].max())

@@ -179,6 +179,11 @@ class Stage(Entry):
         "both leads with the command's sign.",
     )
     current_scale: Positive = Field(1.0, description="Factor on the measured current.")
+    current_hysteresis: NotNegative = Field(
+        0.0005,
+        description="Hysteresis that the dither leaves of solenoids and spool, as a full width of "
+        "the current, a standard uncertainty [A]: no model has it, and intervals take it in.",
+    )
     channels: tuple[ChannelKind, ...] = Field((), description="Kinds to fit; all if empty.")
     free: dict[str, Free] = Field(min_length=1)
     forces: Forces | None = None
