@@ -402,9 +402,9 @@ def campaign(tmp_path_factory: pytest.TempPathFactory) -> Campaign:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("number", "name", "deviation"), [(0, "Z9", 0.03), (1, "tau", 1e-3)])
+@pytest.mark.parametrize(("name", "deviation"), [("Z9", 0.03), ("tau", 1e-3)])
 def test_estimates_follow_a_fixed_number_as_in_a_fit_with_another(
-    campaign: Campaign, number: int, name: str, deviation: float
+    campaign: Campaign, name: str, deviation: float
 ) -> None:
     """Of both stages: tau acts on the pump's by itself and through the card's estimates."""
     published = Drive.preset("hoist")
@@ -419,7 +419,7 @@ def test_estimates_follow_a_fixed_number_as_in_a_fit_with_another(
     for k, each in enumerate(found):
         told = each.uncertainty.own.determined
         expected = ((ends[0][k] - ends[1][k]) * (deviation / (2.0 * step)))[told]
-        changes = each.uncertainty.fixed[told, number]
+        changes = each.uncertainty.systematic[f"uncertainty of {name}"][told]
         # Gauss and Newton leave out the residuals' curvature, and where the filter sticks in its
         # Coulomb band, which moves weak unknowns by about their own standard error
         errors = each.uncertainty.own.standard_errors[told]
@@ -445,7 +445,7 @@ def test_what_is_added_to_a_model_of_ones_own_is_that_of_other_fits() -> None:
     assert wide.value == plain.value
     assert wide.standard_error**2 == pytest.approx(plain.standard_error**2 + added**2, rel=0.05)
     assert wide.standard_error > 2.0 * plain.standard_error
-    (sentence,) = (s for s in doubted.uncertainty.sentences() if "standard uncertainty" in s)
+    (sentence,) = (s for s in doubted.uncertainty.sentences() if "uncertainty of gain" in s)
     assert "widens them by a factor of" in sentence
 
 

@@ -11,7 +11,6 @@ from swashplate.identification.noise import (
     NoiseColour,
     band_score_covariance,
     noise_colours,
-    run_score_covariance,
     spectral_covariance,
 )
 from swashplate.identification.problem import LinearisedFit, LinearisedRun
@@ -246,48 +245,6 @@ def dense_covariances(
             score = products[np.floor(at / 10.0) == band].sum(axis=0)
             by_bands += 0.5 * np.outer(score.conj(), score).real
     return inverse @ by_spectrum @ inverse.T, inverse @ by_bands @ inverse.T
-
-
-def test_a_machine_that_differs_from_run_to_run_widens_its_intervals() -> None:
-    """By 5 %, far more than white noise lets a mean of samples err by."""
-    rng, runs, repeats, count = np.random.default_rng(5), 8, 100, 2048
-    holds = {"quoted": np.zeros(3), "spectral": np.zeros(3)}
-    for _ in range(repeats):
-        changes = rng.normal(0.0, 0.05, (runs, 3))
-        noise = changes @ DESIGN[:count].T + rng.normal(0.0, 0.01, (runs, count))
-        fit, estimate = fitted(noise)
-        for name, covariance in (
-            ("quoted", uncertainty(fit).own),
-            ("spectral", spectral_covariance(fit)),
-        ):
-            holds[name] += np.abs(estimate) <= covariance.quantiles * covariance.standard_errors
-    assert holds["spectral"][0] < 0.85 * repeats
-    assert holds["quoted"].min() >= 0.9 * repeats
-
-
-def test_scores_of_runs_follow_the_textbook() -> None:
-    """CR2 with all rows at once (Bell and McCaffrey 2002), for designs that differ by run."""
-    rng = np.random.default_rng(11)
-    designs = [rng.normal(size=(n, 3)) * rng.uniform(0.2, 2.0, 3) for n in (40, 60, 50, 30, 45)]
-    measured = [rng.normal(size=len(each)) + rng.normal() for each in designs]
-    whole, rows = np.concatenate(measured), np.vstack(designs)
-    residuals = np.split(
-        whole - rows @ np.linalg.lstsq(rows, whole, rcond=None)[0],
-        np.cumsum([len(each) for each in designs])[:-1],
-    )
-    runs = [
-        linearised(f"run {k}", each, time=np.arange(each.size) / RATE)
-        for k, each in enumerate(residuals)
-    ]
-    inverse, middle = np.linalg.inv(rows.T @ rows), np.zeros((3, 3))
-    for design, residual in zip(designs, residuals, strict=True):
-        shares, axes = np.linalg.eigh(np.eye(len(design)) - design @ inverse @ design.T)
-        score = design.T @ (axes @ ((axes.T @ residual) / np.sqrt(shares)))
-        middle += np.outer(score, score)
-    fit = linear_fit(runs, designs, unknowns_of(["a", "b", "c"], np.ones(3)))
-    found = run_score_covariance(fit)
-    assert found.matrix == pytest.approx(inverse @ middle @ inverse, rel=1e-9)
-    assert np.all((found.degrees_of_freedom >= 1.0) & (found.degrees_of_freedom <= 5.0))
 
 
 def test_covariances_run_by_run_are_those_of_all_derivatives_at_once() -> None:

@@ -1,0 +1,233 @@
+"""What estimates follow beside the noise: instruments, hysteresis of the current, runs."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from math import sqrt
+
+import numpy as np
+import pytest
+from tests.identification.given import run_of, virtual
+from tests.identification.test_own_model import FREE, OWN, TRUTH, trial, valve
+
+from swashplate import Campaign, Drive, Experiment, ParameterError
+from swashplate.campaign.experiment import Accuracy, resolution_of_inputs
+from swashplate.equations import simulate
+from swashplate.identification import ModelSetup, fit
+from swashplate.identification.effects import after_play, changes_of
+from swashplate.identification.fitting import StageFit
+from swashplate.maneuvers import source_tests
+
+RATE = 512.0
+TIME = np.arange(2048) / RATE
+SETUP = ModelSetup(OWN, {unknown.name: unknown for unknown in FREE}, noise={"position": 0.01})
+
+
+def logged(values: np.ndarray, **stated: float | None) -> Experiment:
+    """A run of a command, whose instrument is stated."""
+    run = run_of("run", values, {"shaft_speed": np.zeros(values.size)}, time=TIME[: values.size])
+    return replace(run, input=replace(run.input, accuracy=Accuracy(**stated)))
+
+
+# --- what is read and assumed ---------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("bits", [8, 12, 14])
+def test_the_step_of_a_converter_is_seen_in_a_command_that_moves(bits: int) -> None:
+    step = 20.0 / 2**bits
+    volts = np.round(9.0 * np.sin(2.0 * np.pi * TIME) / step) * step
+    assert resolution_of_inputs([logged(volts).input]) == pytest.approx(step)
+
+
+def test_levels_of_steps_alone_say_nothing_of_a_converter() -> None:
+    volts = np.where(TIME < 1.0, 0.0, 4.0)
+    assert resolution_of_inputs([logged(volts).input, logged(-volts).input]) == 0.0
+
+
+def test_nothing_is_changed_of_instruments_that_are_said_to_be_right() -> None:
+    run = logged(np.linspace(0.0, 5.0, TIME.size), gain=0.0, zero=0.0, time=0.0)
+    speed = replace(run["shaft_speed"], accuracy=Accuracy())
+    assert not list(changes_of(replace(run, channels={"shaft_speed": speed}), 0.0))
+
+
+def test_a_change_is_a_rectangular_limit_over_the_root_of_three() -> None:
+    run = logged(np.linspace(0.0, 5.0, TIME.size), gain=0.03, zero=0.6, time=0.003)
+    changes = {change.effect: change for change in changes_of(run, 0.0)}
+    late = changes["instant of the command in run"].experiment.input.time - TIME
+    assert late == pytest.approx(0.003 / sqrt(3.0))
+    weaker = changes["gain of the command"].experiment.input.values
+    assert weaker[-1] == pytest.approx(5.0 * (1.0 - 0.03 / sqrt(3.0)))
+    zero = changes["zero of the command in run"]
+    assert zero.experiment.input.values[0] / zero.part == pytest.approx(0.6 / sqrt(3.0))
+
+
+def test_half_a_sample_is_assumed_of_a_fast_log_and_nothing_of_one_whose_jumps_are_estimated() -> (
+    None
+):
+    fast = run_of("fast", np.linspace(0.0, 5.0, 100), {}, time=TIME[:100])
+    slow = replace(fast, input=replace(fast.input, time=np.arange(100) / 50.0))
+    late = [change for change in changes_of(fast, 0.0) if change.effect.startswith("instant")]
+    assert late[0].experiment.input.time[0] == pytest.approx(0.5 / RATE / sqrt(3.0))
+    assert not any(change.effect.startswith("instant") for change in changes_of(slow, 0.0))
+
+
+def test_a_command_at_full_voltage_stays_within_it() -> None:
+    run = run_of("run", np.clip(20.0 * TIME - 20.0, -10.0, 10.0), {}, time=TIME)
+    for change in changes_of(run, 0.005):
+        assert np.abs(change.experiment.input.values).max() <= 10.0
+
+
+def campaign_text(accuracy: str) -> str:
+    return (
+        'title = "t"\n[axes.a]\ntime = { column = "t" }\n'
+        'input = { column = "u [V]", accuracy = { zero = 0.002 } }\n'
+        f'channels.i = {{ kind = "signed_current", column = "i [mA]", accuracy = {accuracy} }}\n'
+        'channels.n = { kind = "shaft_speed", column = "n [rad/s]" }\n'
+        '[[runs]]\nfile = "log.csv"\n'
+    )
+
+
+def test_a_campaign_file_states_it_in_its_own_unit_and_leaves_the_rest_as_assumed(tmp_path) -> None:
+    rows = "".join(f"{k / 512.0},{k % 7},{k % 5},{k % 3}\n" for k in range(100))
+    (tmp_path / "log.csv").write_text(f"t,u [V],i [mA],n [rad/s]\n{rows}", "utf-8")
+    path = tmp_path / "campaign.toml"
+    path.write_text(campaign_text("{ gain = 0.01, zero = 2.0 }"), "utf-8")
+    (run,) = Campaign.from_toml(path).select()
+    assert run["i"].instrument == pytest.approx((0.01, 0.002, 0.0))
+    assert run.input.instrument == (0.0005, 0.002, None)
+    assert run["n"].instrument == (0.005, 0.0, 0.0)
+    path.write_text(campaign_text("{ gain = 1.5 }"), "utf-8")
+    with pytest.raises(ParameterError, match=r"channels\.i.*accuracy.*gain"):
+        Campaign.from_toml(path)
+
+
+# --- how estimates follow -------------------------------------------------------------------------
+
+
+def stated(run: Experiment) -> Experiment:
+    """A run of the valve whose instruments err by much, in all ways."""
+    position = replace(run["position"], accuracy=Accuracy(0.02))
+    command = replace(run.input, accuracy=Accuracy(0.02, 0.05, 0.002))
+    return replace(run, input=command, channels={"position": position})
+
+
+def test_estimates_follow_each_effect_as_a_fit_of_changed_runs_does() -> None:
+    runs = [stated(trial("a")), stated(trial("b"))]
+    stage = fit(SETUP, runs).stages[0]
+    systematic, middle = stage.uncertainty.systematic, stage.solution.vector
+    changed: dict[str, list[Experiment]] = {}
+    for number, run in enumerate(runs):
+        for effect, experiment, part in changes_of(run, 0.0):
+            changed.setdefault(effect, list(runs))[number] = experiment
+            assert part in (1.0, 0.02)
+    assert changed.keys() == systematic.keys()
+    assert len(changed) == 6
+    for effect, experiments in changed.items():
+        # the command's zero is moved by a part of its uncertainty
+        part = 0.02 if effect.startswith("zero") else 1.0
+        moved = fit(SETUP, experiments).stages[0].solution.vector
+        expected = (moved - middle) / part
+        size = max(np.abs(expected).max(), 1e-6)
+        assert systematic[effect] == pytest.approx(expected, abs=0.1 * size)
+
+
+def test_variances_of_effects_add_up_and_the_largest_is_named() -> None:
+    runs = [stated(trial("a")), stated(trial("b"))]
+    known = fit(SETUP, runs).stages[0].uncertainty
+    added = sum(change**2 for change in known.systematic.values())
+    assert np.diag(known.quoted.matrix) == pytest.approx(np.diag(known.own.matrix) + added)
+    gain = known.own.variables.names.index("gain")
+    shares = known.budget(gain)
+    assert list(shares) == sorted(shares, key=shares.get, reverse=True)
+    assert sum(shares.values()) <= 1.0
+    # command and position err by 2 % alike: each has its part in the gain's error
+    assert shares["gain of position"] == pytest.approx(shares["gain of the command"], rel=0.1)
+    assert any("instruments" in sentence for sentence in known.sentences())
+
+
+def test_a_play_follows_from_its_middle() -> None:
+    assert after_play(np.array([0.0, 1.0, 3.0, 2.5, 0.5, 0.5]), 2.0).tolist() == [
+        0.0,
+        0.0,
+        2.0,
+        2.0,
+        1.5,
+        1.5,
+    ]
+
+
+@pytest.mark.slow
+def test_a_hysteresis_of_the_current_goes_into_the_pump_alone(tmp_path) -> None:
+    """Twice the hysteresis changes twice as much; none changes nothing, and no card."""
+    tests = source_tests("slew")
+    names = ("ramp +1 V/s", "step +2 V", "sine 4 V 0.1 Hz", "sine 6 V 0.05 Hz")
+    campaign = virtual(tmp_path, "slew", {name: tests[name] for name in names}, seed=3)
+    drive, effect = Drive.preset("slew"), "hysteresis of the current"
+
+    def of_pump(width: float) -> StageFit:
+        from swashplate.identification.setup import load_setup
+
+        setup = load_setup("slew")
+        stages = [stage.model_copy(update={"current_hysteresis": width}) for stage in setup.stages]
+        card, pump = fit(drive, campaign, setup.model_copy(update={"stages": tuple(stages)})).stages
+        assert effect not in card.uncertainty.systematic
+        return pump
+
+    none, one, two = (of_pump(width) for width in (0.0, 1e-4, 2e-4))
+    assert effect not in none.uncertainty.systematic
+    single, double = (pump.uncertainty.systematic[effect] for pump in (one, two))
+    z8 = one.problem.unknowns.names.index("Z8")
+    assert double[z8] == pytest.approx(2.0 * single[z8], rel=0.1)
+    # a current that comes late makes a slow plate seem slower
+    assert single[z8] > 0.0
+
+
+# --- runs that differ -----------------------------------------------------------------------------
+
+
+def scaled_runs(random: np.random.Generator, count: int, deviation: float) -> list[Experiment]:
+    """Runs of the valve, each with a gain of its own."""
+    runs = []
+    for number in range(count):
+        whole = trial(f"run {number}")
+        gain = TRUTH.gain * (1.0 + deviation * random.standard_normal())
+        inputs = {"command": whole.input.values}
+        position = simulate(valve, TRUTH._replace(gain=gain), inputs, 20.0, given=OWN.given)
+        values = position["position"] + random.normal(0.0, 0.002, whole.input.values.size)
+        channel = replace(whole["position"], values=values, accuracy=Accuracy())
+        runs.append(replace(whole, channels={"position": channel}))
+    return runs
+
+
+def estimated(
+    count: int, deviation: float, repeats: int, seed: int, told: Callable[[StageFit], float]
+) -> list[float]:
+    random = np.random.default_rng(seed)
+    return [
+        told(fit(SETUP, scaled_runs(random, count, deviation)).stages[0]) for _ in range(repeats)
+    ]
+
+
+def test_the_scale_of_runs_is_found_and_intervals_hold() -> None:
+    """Gains that differ by 2 % from run to run: the mean of eight is known to 0.7 %."""
+
+    def deviation(stage: StageFit) -> float:
+        runs = stage.uncertainty.runs
+        return 0.0 if runs is None else runs.deviation
+
+    assert np.median(estimated(8, 0.02, 20, 1, deviation)) == pytest.approx(0.02, rel=0.25)
+
+    def holds(stage: StageFit) -> float:
+        gain = next(each for each in stage.estimates if each.name == "gain")
+        return float(gain.lower <= TRUTH.gain <= gain.upper)
+
+    assert np.mean(estimated(8, 0.02, 60, 2, holds)) >= 0.88
+    # of four runs nothing is said
+    assert estimated(4, 0.02, 1, 3, deviation) == [0.0]
+
+
+def test_runs_that_do_not_differ_are_not_said_to() -> None:
+    def deviation(stage: StageFit) -> float:
+        runs = stage.uncertainty.runs
+        return 0.0 if runs is None else runs.deviation
+
+    assert max(estimated(8, 0.0, 10, 4, deviation)) < 0.002
