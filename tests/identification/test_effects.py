@@ -60,14 +60,11 @@ def test_a_change_is_a_rectangular_limit_over_the_root_of_three() -> None:
     assert zero.experiment.input.values[0] / zero.part == pytest.approx(0.6 / sqrt(3.0))
 
 
-def test_half_a_sample_is_assumed_of_a_fast_log_and_nothing_of_one_whose_jumps_are_estimated() -> (
-    None
-):
-    fast = run_of("fast", np.linspace(0.0, 5.0, 100), {}, time=TIME[:100])
-    slow = replace(fast, input=replace(fast.input, time=np.arange(100) / 50.0))
-    late = [change for change in changes_of(fast, 0.0) if change.effect.startswith("instant")]
-    assert late[0].experiment.input.time[0] == pytest.approx(0.5 / RATE / sqrt(3.0))
-    assert not any(change.effect.startswith("instant") for change in changes_of(slow, 0.0))
+@pytest.mark.parametrize("rate", [512.0, 50.0])
+def test_half_a_sample_is_assumed_of_what_a_command_does_between_two(rate: float) -> None:
+    run = run_of("run", np.linspace(0.0, 5.0, 100), {}, time=np.arange(100) / rate)
+    (late,) = (change for change in changes_of(run, 0.0) if change.effect.startswith("instant"))
+    assert late.experiment.input.time[0] == pytest.approx(0.5 / rate / sqrt(3.0))
 
 
 def test_a_command_at_full_voltage_stays_within_it() -> None:

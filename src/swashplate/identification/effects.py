@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from swashplate.campaign.experiment import APART, Channel, Experiment, resolution_of_inputs
+from swashplate.campaign.experiment import Channel, Experiment, resolution_of_inputs
 from swashplate.identification.drive_model import (
     CURRENTS,
     DriveModel,
@@ -149,14 +149,15 @@ def changes_of(experiment: Experiment, resolution: float) -> Iterator[Change]:
     -----
     Limits of an instrument's error are taken for ends of a rectangular distribution, whose standard
     deviation is 1/√3 of them (JCGM 100:2008, 4.3.7). The zero of a command is another one in each
-    run, because the converter rounds each level of it anew. A jump comes at some instant between
-    two samples; of a slow log it is estimated (`InputSignal.edges`), of a fast one it is not.
+    run, because the converter rounds each level of it anew. What a command
+    does between two samples is known to half of the time between them: the instant of a jump, or
+    when a staircase that looks like a ramp passes a threshold.
     """
     command, run = experiment.input, experiment.name
     accuracy = command.instrument
     apart = float(np.median(np.diff(command.time)))
     late = 0.5 * apart if accuracy.time is None else accuracy.time
-    if late > 0.0 and (accuracy.time is not None or apart <= APART):
+    if late > 0.0:
         later = replace(command, time=command.time + late / sqrt(3.0))
         yield Change(f"instant of the command{IN_RUN}{run}", replace(experiment, input=later))
     zero = hypot(accuracy.zero / sqrt(3.0), resolution / sqrt(12.0))
