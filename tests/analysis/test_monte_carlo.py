@@ -40,7 +40,7 @@ def test_draws_outside_the_bounds_are_drawn_again(hoist):
         own = SimpleNamespace(matrix=np.diag([variance, 0.0]), determined=np.array([True, False]))
         problem = SimpleNamespace(unknowns=unknowns, model=model, uncertain=())
         solution, name = SimpleNamespace(vector=unknowns.start), SimpleNamespace(name="pump")
-        known = SimpleNamespace(own=own, handed=(), fixed=np.zeros((2, 0)))
+        known = SimpleNamespace(own=own, handed=(), systematic={})
         one = SimpleNamespace(stage=name, problem=problem, solution=solution, uncertainty=known)
         return drives([one], count, seed=1)
 
@@ -74,7 +74,7 @@ def test_standard_errors_where_no_draw_stays_within_the_bounds(hoist):
             unknowns=unknowns, model=DriveModel(hoist.parameters), uncertain=()
         ),
         solution=SimpleNamespace(vector=unknowns.start),
-        uncertainty=SimpleNamespace(own=own, handed=(), fixed=np.zeros((1, 0))),
+        uncertainty=SimpleNamespace(own=own, handed=(), systematic={}),
         drive=hoist,
     )
 
