@@ -106,6 +106,10 @@ def test_a_campaign_file_states_it_in_its_own_unit_and_leaves_the_rest_as_assume
     assert run["i"].instrument == Accuracy(0.01, 0.002, 0.0, rounded=False)
     assert run.input.instrument == Accuracy(0.0005, 0.002, None, rounded=False)
     assert run["n"].instrument == Accuracy(0.005, 0.0, 0.0)
+    held = campaign_text("{}").replace("{ zero = 0.002 }", '{}, interpolation = "previous"')
+    path.write_text(held, "utf-8")
+    (run,) = Campaign.from_toml(path).select()
+    assert run.input.instrument == Accuracy(0.0005, 0.001, 0.0)
     path.write_text(campaign_text("{ gain = 1.5 }"), "utf-8")
     with pytest.raises(ParameterError, match=r"channels\.i.*accuracy.*gain"):
         Campaign.from_toml(path)
@@ -174,7 +178,7 @@ def test_a_hysteresis_of_the_current_goes_into_the_pump_alone(tmp_path) -> None:
     campaign = virtual(tmp_path, "slew", {name: tests[name] for name in names}, seed=3)
     drive, effect = Drive.preset("slew"), "hysteresis of the current"
 
-    def of_pump(width: float) -> StageFit:
+    def of_pump(width: float, drive: Drive = drive) -> StageFit:
         from swashplate.identification.setup import load_setup
 
         setup = load_setup("slew")
@@ -185,6 +189,9 @@ def test_a_hysteresis_of_the_current_goes_into_the_pump_alone(tmp_path) -> None:
 
     none, one, two = (of_pump(width) for width in (0.0, 1e-4, 2e-4))
     assert effect not in none.uncertainty.systematic
+    # one that the drive has is no error of the model
+    rough = of_pump(1e-4, drive.replace(solenoid_hysteresis=1e-4))
+    assert effect not in rough.uncertainty.systematic
     single, double = (pump.uncertainty.systematic[effect] for pump in (one, two))
     z8 = one.problem.unknowns.names.index("Z8")
     assert double[z8] == pytest.approx(2.0 * single[z8], rel=0.1)

@@ -169,8 +169,8 @@ def test_what_is_known_is_what_a_fit_of_the_same_tests_knows(hoist_tests: Campai
     now = np.sqrt(np.diag(np.linalg.inv(known.present.T @ known.present)))
     errors = {}
     for stage in found.stages:
-        quoted = stage.uncertainty.quoted
-        errors |= dict(zip(quoted.variables.names, quoted.standard_errors, strict=True))
+        noise = stage.uncertainty.sampled
+        errors |= dict(zip(noise.variables.names, noise.standard_errors, strict=True))
     ratio = np.array([now[k] / errors[name] for k, name in enumerate(known.variables.names)])
     assert 0.5 < np.median(ratio) < 2.0
     assert (np.abs(np.log(ratio)) < np.log(4.0)).all(), ratio

@@ -236,14 +236,20 @@ class _Columns:
 
 
 def _accuracy(signal: schema.Input | schema.Channel, factor: float) -> Accuracy | None:
-    """What a campaign file states of an instrument, SI; the rest as assumed of its kind."""
-    stated = signal.accuracy
-    if stated is None:
+    """What a campaign file states of an instrument, SI; the rest as assumed of its kind.
+
+    A command that is said to be held is logged by what gives it: it changes at its samples.
+    """
+    held = isinstance(signal, schema.Input) and signal.interpolation == "previous"
+    if signal.accuracy is None and not held:
         return None
+    stated = signal.accuracy or schema.Accuracy()
     assumed = assumed_accuracy(signal.kind, is_input=isinstance(signal, schema.Input))
     gain = assumed.gain if stated.gain is None else stated.gain
     zero = assumed.zero if stated.zero is None else factor * stated.zero
-    time = assumed.time if stated.time is None else stated.time
+    time = stated.time
+    if time is None:
+        time = 0.0 if held else assumed.time
     return Accuracy(gain, zero, time, rounded=stated.zero is None)
 
 

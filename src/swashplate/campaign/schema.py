@@ -234,7 +234,7 @@ class Accuracy(Entry):
     time: NotNegative | None = Field(
         None,
         description="Of its stamps beside those of other signals [s]; left out, half the time "
-        "between two samples of an input, 0 of a channel.",
+        "between two samples of an input, 0 of one that is said to be held, and of a channel.",
     )
 
 

@@ -39,6 +39,8 @@ SMALL = 0.02
 whole one may lie beyond a switch of the card, where the derivative is another one."""
 IN_RUN = " in "
 """What stands between an effect and the run that it belongs to alone."""
+HYSTERESIS = ("solenoid_hysteresis", "spool_friction")
+"""Parameters by which a drive has a hysteresis of its own."""
 FEWEST_RUNS = 5
 """Runs from which it is estimated by how much they differ."""
 
@@ -249,12 +251,15 @@ class _Simulation:
     def behind_hysteresis(self, experiment: Experiment) -> dict[str, Array]:
         """By how much these change if the current that drives the pump has a hysteresis.
 
-        Of a drive alone; empty if the stage has no pump, or the hysteresis is 0.
+        Of a drive alone; empty if the stage has no pump, the hysteresis is 0, or the drive has one
+        of its own.
         """
         model, width = self.stage.problem.model, self.stage.stage.current_hysteresis
         if not isinstance(model, DriveModel) or model.part == "card" or width == 0.0:
             return {}
         parameters = self.stage.drive.parameters
+        if any(parameters.numbers.get(name) for name in HYSTERESIS):
+            return {}
         if self.stage.stage.current == "measured" or experiment.input.kind == "current":
             current = measured_current(experiment, self.stage.stage.current_scale)
         else:

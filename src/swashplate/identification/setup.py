@@ -182,7 +182,8 @@ class Stage(Entry):
     current_hysteresis: NotNegative = Field(
         0.0005,
         description="Hysteresis that the dither leaves of solenoids and spool, as a full width of "
-        "the current, a standard uncertainty [A]: no model has it, and intervals take it in.",
+        "the current, a standard uncertainty [A], which intervals take in; not if the drive has "
+        "friction or hysteresis of its own.",
     )
     channels: tuple[ChannelKind, ...] = Field((), description="Kinds to fit; all if empty.")
     free: dict[str, Free] = Field(min_length=1)

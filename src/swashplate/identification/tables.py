@@ -125,7 +125,7 @@ def profiles_table(found: Identification) -> Table:
     ends = f"{100.0 * LEVEL:g} %"
     lower, upper = (Column(f"{side} {ends}", ".5g", none=NONE) for side in ("lower", "upper"))
     columns = (Column("stage"), Column("parameter"), UNIT, Column("estimate", ".5g"), lower, upper)
-    made = Table("Profile likelihoods", columns, si=True)
+    made = Table("Profile likelihoods, of the noise alone", columns, si=True)
     for one in found.profiles:
         stage = found.fit.stage(one.stage)
         unknown = stage.problem.unknowns.items[one.index]
