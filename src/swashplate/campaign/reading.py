@@ -442,6 +442,9 @@ def _finished(
         weight[inside(each, read.time)] *= each.factor
     for window in (*ignored, *applying(entry.ignore, maneuver)):
         weight[inside(window, read.time)] = 0.0
+    if weight.min() == weight.max():
+        # most weights are all alike: then they take no memory
+        weight = np.broadcast_to(weight[0], weight.shape)
     return replace(read, counts=counts, values=values, weight=weight)
 
 
