@@ -1,6 +1,7 @@
 """A fit on disk is the fit, and is refused where it no longer belongs to its campaign."""
 
 import json
+import shutil
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
@@ -88,9 +89,9 @@ def test_what_is_stored_is_not_computed_again(path, campaign, fitted, monkeypatc
     assert stored["Z10"].standard_error
     assert stored.drive == drive
     assert stored.verdict == verdict
-    stored.save(path.parent / "again")
-    again = (path.parent / "again" / "fit.json").read_text("utf-8")
-    assert again == path.read_text("utf-8")
+    first = path.read_text("utf-8")
+    stored.save(path.parent)
+    assert path.read_text("utf-8") == first
 
 
 def test_what_is_not_stored_is_computed_when_it_is_asked_for(path, campaign, fitted) -> None:
@@ -172,6 +173,17 @@ def test_profiles_folds_and_notes_come_back(tmp_path, campaign, fitted) -> None:
     path.write_text(json.dumps(content), "utf-8")
     with pytest.raises(FileError, match="stage card has no parameter 100"):
         Identification.load(path, campaign)
+
+
+def test_fit_and_campaign_may_be_moved_together(
+    short_campaign: Campaign, campaign: Campaign, fitted: Fit, tmp_path: Path
+) -> None:
+    tests, moved = tmp_path / "tests", tmp_path / "moved"
+    shutil.copytree(short_campaign.path.parent, tests)
+    there = replace(campaign, path=tests / "campaign.toml")
+    Identification(there, fitted).save(tests / "fitted")
+    tests.rename(moved)
+    assert Identification.load(moved / "fitted").campaign.path == moved / "campaign.toml"
 
 
 def test_another_campaign_is_refused(path: Path, campaign: Campaign) -> None:

@@ -18,6 +18,7 @@ from typing import NamedTuple, get_args
 import numpy as np
 from numpy.typing import NDArray
 
+from swashplate.campaign.experiment import ASSUMED, Accuracy
 from swashplate.campaign.quality import ESTIMATED, has_sign, moves_at_first
 from swashplate.campaign.reading import read_run
 from swashplate.campaign.samples import rolls_over_at, turns_over
@@ -488,7 +489,23 @@ def _signal_lines(each: _Guess, parts: Sequence[Array], counts_per_turn: float |
     if neutral and each.kind == "other":
         why = "guessed: the first sample is neutral"
         lines.append(f"offset = {-scale * neutral:.9g}    # {why}")
-    return lines
+    return lines + _accuracy_lines(kind, "V" if command else each.unit)
+
+
+def _accuracy_lines(kind: str, unit: str | None) -> list[str]:
+    """What is assumed of an instrument, as a comment that is easily made an entry."""
+    assumed = ASSUMED.get(kind, Accuracy())
+    limits = {"gain": assumed.gain, "zero": assumed.zero}
+    if not any(limits.values()):
+        return []
+    try:
+        _, factor, _ = conversion(kind, unit, kind)
+    except InputError:
+        return []  # the line of the unit says FIXME
+    limits["zero"] /= factor
+    stated = ", ".join(f"{name} = {limit:.3g}" for name, limit in limits.items())
+    why = f"share of the reading, and {unit or KINDS[kind].units[0]}; assumed, see its data sheet"
+    return [f"# accuracy = {{ {stated} }}    # {why}"]
 
 
 def _unit_lines(signal: _Guess) -> list[str]:

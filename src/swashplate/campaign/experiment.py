@@ -66,6 +66,8 @@ class Accuracy(NamedTuple):
     """In the signal's unit."""
     time: float | None = 0.0
     """Of its stamps beside those of the other signals [s]; None: half the time between samples."""
+    rounded: bool = True
+    """Whether the steps of its converter are an error beside the zero; not if a zero is stated."""
 
 
 ASSUMED: Mapping[str, Accuracy] = MappingProxyType(

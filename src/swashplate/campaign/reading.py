@@ -301,7 +301,8 @@ def _accuracy(signal: schema.Input | schema.Channel, factor: float) -> Accuracy 
     assumed = assumed_accuracy(signal.kind, is_input=isinstance(signal, schema.Input))
     gain = assumed.gain if stated.gain is None else stated.gain
     zero = assumed.zero if stated.zero is None else factor * stated.zero
-    return Accuracy(gain, zero, assumed.time if stated.time is None else stated.time)
+    time = assumed.time if stated.time is None else stated.time
+    return Accuracy(gain, zero, time, rounded=stated.zero is None)
 
 
 # --- experiments ----------------------------------------------------------------------------------

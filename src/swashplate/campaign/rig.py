@@ -23,7 +23,7 @@ from math import isfinite, pi
 from pathlib import Path
 from platform import python_version
 from types import MappingProxyType
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,6 +36,9 @@ from swashplate.errors import FileError, InputError, ParameterError
 from swashplate.maneuvers import Maneuver, positive, source_tests, whole
 from swashplate.simulation.result import Simulation
 from swashplate.tables import write_text, write_whole
+
+if TYPE_CHECKING:
+    from tomlkit.items import InlineTable
 
 Array = NDArray[np.float64]
 Generator = np.random.Generator
@@ -551,7 +554,8 @@ def _contents(tests: VirtualTests) -> tuple[str, str]:
     from tomlkit import dumps
 
     tools, drop = tests.instruments, {"missing": "drop"} if tests.instruments.empty_cells else {}
-    given = {"kind": "voltage", "column": "voltage", "unit": "V", **drop}
+    given: dict[str, Any] = {"kind": "voltage", "column": "voltage", "unit": "V", **drop}
+    given["accuracy"] = _accuracy("voltage", tools)
     axis: dict[str, Any] = {"drive": tests.preset or DRIVE_FILE}
     axis |= {"time": {"column": "time", "unit": "s"}, "start": "rest", "input": given}
     channels = axis["channels"] = dict[str, dict[str, object]]()
@@ -560,6 +564,7 @@ def _contents(tests: VirtualTests) -> tuple[str, str]:
         entry = channels[column] = {"kind": kind, "column": column, **drop}
         if kind != "encoder_counts":
             entry["unit"] = KINDS[kind].units[0]
+            entry["accuracy"] = _accuracy(kind, tools)
             continue
         entry["counts_per_turn"] = tests.counts_per_turn
         if tools.counter_bits:
@@ -572,3 +577,17 @@ def _contents(tests: VirtualTests) -> tuple[str, str]:
     versions = {each: version(each) for each in ("numpy", "numba")}
     truth["versions"] = {"swashplate": __version__, "python": python_version(), **versions}
     return dumps(content | {"axes": {tests.axis: axis}, "runs": runs}), dumps(truth)
+
+
+def _accuracy(kind: ChannelKind | Literal["voltage"], tools: Instruments) -> InlineTable:
+    """What a campaign file states of an instrument's error, for the rig knows it."""
+    from tomlkit import inline_table
+
+    limits = {"gain": 0.0, "zero": 0.0, "time": 0.0}
+    if kind == "voltage":
+        limits["zero"] = abs(tools.voltage_offset)
+    elif kind == "rectified_current":
+        limits["gain"], limits["zero"] = abs(tools.current_gain_error), abs(tools.current_zero)
+    table = inline_table()
+    table.update(limits)
+    return table

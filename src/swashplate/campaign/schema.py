@@ -227,7 +227,10 @@ class Accuracy(Entry):
     gain: NotNegative | None = Field(
         None, lt=1.0, description="Share of the reading, 0.005 for 0.5 %; left out, as assumed."
     )
-    zero: NotNegative | None = Field(None, description="In `unit`; left out, as assumed.")
+    zero: NotNegative | None = Field(
+        None,
+        description="In `unit`; left out, as assumed, and for an input the steps of its converter.",
+    )
     time: NotNegative | None = Field(
         None,
         description="Of its stamps beside those of other signals [s]; left out, half the time "

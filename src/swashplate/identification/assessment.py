@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import platform
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -232,7 +233,8 @@ class Identification(Estimated):
         for name, text in files.items():
             write_text(text, place / name)
         self.write(place / ESTIMATES)
-        write_text(self._stored().model_dump_json(indent=1, by_alias=True) + "\n", place / STORED)
+        stored = self._stored(place).model_dump_json(indent=1, by_alias=True)
+        write_text(stored + "\n", place / STORED)
         return tuple(place / name for name in (*files, ESTIMATES, STORED))
 
     @classmethod
@@ -277,13 +279,13 @@ class Identification(Estimated):
             model = ModelSetup.from_file(model)
         return _loaded(file, campaign, model, threads)
 
-    def _stored(self) -> FitFile:
-        """What ``fit.json`` holds."""
+    def _stored(self, folder: Path) -> FitFile:
+        """What ``fit.json`` holds in a folder."""
         start = self.fit.nominal
         return FitFile(
             swashplate=__version__,
             axis=self.fit.runs[0].axis,
-            campaign=str(self.campaign.path),
+            campaign=_seen_from(folder, self.campaign.path),
             runs={each.name: fingerprint(each) for each in self.fit.runs},
             interpolation=self.fit.runs[0].input.interpolation,
             nominal=dict(start.numbers) if isinstance(start, ModelSetup) else dump_set(start),
@@ -377,6 +379,14 @@ def _interval_words(stages: Sequence[StageFit], found: ParameterSet) -> dict[str
     return words
 
 
+def _seen_from(folder: Path, path: Path) -> str:
+    """A path as it is found from a folder, so that both may be moved together."""
+    try:
+        return Path(os.path.relpath(path, folder)).as_posix()
+    except ValueError:  # another drive of Windows
+        return str(path.resolve())
+
+
 def versions() -> dict[str, str]:
     """Of this package and of Python."""
     return {"swashplate": __version__, "Python": platform.python_version()}
@@ -448,6 +458,7 @@ class FitFile(Entry):
     swashplate: str
     axis: str
     campaign: str
+    """Path of the campaign file, from the folder of this one."""
     runs: dict[str, str]
     """Name to fingerprint of each run that was fitted, in their order."""
     interpolation: Interpolation = "linear"
@@ -484,11 +495,12 @@ def _loaded(
         raise FileError(
             f"{path} was written by swashplate {file.swashplate}, this is {__version__}: fit again."
         )
-    if tests is None and not Path(file.campaign).is_file():
+    fitted_to = Path(os.path.normpath(path.parent / file.campaign))
+    if tests is None and not fitted_to.is_file():
         raise MissingFileError(
-            f"{path} was fitted to {file.campaign}, which is not there: name the campaign."
+            f"{path} was fitted to {fitted_to}, which is not there: name the campaign."
         )
-    tests = file.campaign if tests is None else tests
+    tests = fitted_to if tests is None else tests
     campaign = tests if isinstance(tests, Campaign) else Campaign.from_toml(tests)
     if not all(each.input.settled for each in campaign if each.axis == file.axis):
         campaign = campaign.with_interpolation(file.axis, file.interpolation)

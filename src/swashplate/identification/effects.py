@@ -149,9 +149,9 @@ def changes_of(experiment: Experiment, resolution: float) -> Iterator[Change]:
     -----
     Limits of an instrument's error are taken for ends of a rectangular distribution, whose standard
     deviation is 1/√3 of them (JCGM 100:2008, 4.3.7). The zero of a command is another one in each
-    run, because the converter rounds each level of it anew. What a command
-    does between two samples is known to half of the time between them: the instant of a jump, or
-    when a staircase that looks like a ramp passes a threshold.
+    run, because the converter rounds each level of it anew. What a command does between two samples
+    is known to half of the time between them: the instant of a jump, or when a staircase that looks
+    like a ramp passes a threshold.
     """
     command, run = experiment.input, experiment.name
     accuracy = command.instrument
@@ -160,7 +160,8 @@ def changes_of(experiment: Experiment, resolution: float) -> Iterator[Change]:
     if late > 0.0:
         later = replace(command, time=command.time + late / sqrt(3.0))
         yield Change(f"instant of the command{IN_RUN}{run}", replace(experiment, input=later))
-    zero = hypot(accuracy.zero / sqrt(3.0), resolution / sqrt(12.0))
+    steps = resolution / sqrt(12.0) if accuracy.rounded else 0.0
+    zero = hypot(accuracy.zero / sqrt(3.0), steps)
     if zero > 0.0:
         # a card takes no more than its full voltage, which a command may have reached
         largest = float(np.abs(command.values).max())
