@@ -132,7 +132,8 @@ def in_si(value: Any, si: str, what: str) -> Any:
     InputError
         If the quantity measures something else.
     """
-    if not isinstance(value, Quantity):
+    # a plain number is most often what comes, and is told far sooner than what has these attributes
+    if isinstance(value, float | int) or not isinstance(value, Quantity):
         return value
     factor, zero = scaling(f"{value.units:~C}" or "1", si, what)
     return value.magnitude * factor + zero

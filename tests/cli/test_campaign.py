@@ -49,6 +49,36 @@ def test_from_logs_to_a_check(run: Callable[..., Result], done: Words, logs: lis
     assert run("campaign", "check", "--strict").exit_code == 1
 
 
+def test_check_plot_and_report_show_the_whole_of_a_long_log(
+    run: Callable[..., Result], done: Words, tmp_path: Path
+) -> None:
+    """300,000 rows at 100 Hz, in which the winch moves for 20 s after 700 s."""
+    rows = range(300_000)
+    moves = [70_000 <= row < 72_000 for row in rows]
+    pl.DataFrame(
+        {
+            "time": [row / 100.0 for row in rows],
+            "u": [5.0 * each for each in moves],
+            "n": [3.0 * each for each in moves],
+        }
+    ).write_csv(tmp_path / "log.csv")
+    (tmp_path / "campaign.toml").write_text(TACHO, "utf-8")
+    said = " ".join(done("campaign", "check").split())
+    assert "log, the whole log: 3000 s, 300,000 rows" in said
+    assert said.count("300,000 rows") == 2
+    assert "one window with motion, which is used" in said
+    lasts = float(re.search(r"to fit, ([\d.]+) s", said)[1])
+    assert 27.0 <= lasts <= 27.0 + 2 * 2.56  # rest before and after, in blocks of 256 rows
+    said = done("campaign", "plot", "--out", "overview.png")
+    assert [each.stem for each in sorted(tmp_path.glob("overview*.png"))] == [
+        "overview-1",
+        "overview-2",
+    ]
+    run("validate", "hoist", "campaign.toml", "--role", "all", "--out", "judged")
+    page = (tmp_path / "judged" / "report.html").read_text("utf-8")
+    assert "one window with motion, which is used" in page
+
+
 TACHO = """
 [axes.hoist]
 drive = "hoist"

@@ -423,6 +423,22 @@ def test_other_starts_are_tried_where_residuals_are_large(speed, tried, caplog) 
         assert stage.values["bend"] == pytest.approx(2.2790, abs=1e-3)  # x³ - 3 x = 5
 
 
+def narrow(state: Speed, voltage: float, p: Bend) -> Speed:
+    """A speed that is a real number only if `bend` is from 4.99 to 5.01."""
+    return Speed(voltage * (1.0 + sqrt(1e-4 - (p.bend - 5.0) ** 2)))
+
+
+def test_a_fit_whose_other_starts_lie_out_of_the_domain() -> None:
+    """A speed of 30 is far from all that the model can do, but only the nominal start holds."""
+    model = Model("narrow", parameters=Bend, state=Speed, step=narrow)
+    measured = np.full(TIME.size, 30.0)
+    measured[0] = 0.0
+    run = run_of("a", np.ones(TIME.size), {"speed": measured}, time=TIME, kind="other", noise=0.01)
+    (stage,) = fit(model, [run], {"bend": (-1000.0, 5.002, 1000.0)}).stages
+    assert stage.values["bend"] == pytest.approx(5.0, abs=0.01)
+    assert len(stage.starts) < 7
+
+
 def test_starts_of_other_steps_are_not_resumed(tmp_path: Path) -> None:
     search = Search(1, store=tmp_path, resume=True)
     made = fit(OwnModel(servo), RUNS, RANGES, noise=NOISE, search=search)

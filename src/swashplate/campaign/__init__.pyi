@@ -15,6 +15,9 @@ from .guess import fit_configuration as fit_configuration
 from .guess import guess_drive as guess_drive
 from .guess import guess_table as guess_table
 from .guess import guessed_set as guessed_set
+from .overview import Envelope as Envelope
+from .overview import LogWindow as LogWindow
+from .overview import Overview as Overview
 from .quality import Quality as Quality
 from .quality import beyond_the_card as beyond_the_card
 from .quality import campaign_findings as campaign_findings

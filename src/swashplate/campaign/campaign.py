@@ -14,6 +14,7 @@ import numpy as np
 
 from swashplate.campaign import schema
 from swashplate.campaign.experiment import Experiment
+from swashplate.campaign.overview import Overview
 from swashplate.campaign.reading import read_run
 from swashplate.documents import parse_toml, read_text, validated
 from swashplate.errors import InputError, ParameterError, UnknownNameError
@@ -56,6 +57,8 @@ class Campaign(Result):
     experiments: tuple[Experiment, ...]
     ignored: tuple[str, ...] = ()
     """Runs with the role ``"ignore"``, whose logs were not opened."""
+    overviews: tuple[Overview, ...] = ()
+    """Logs of more rows than one run has, as a whole; their windows with motion are experiments."""
 
     @classmethod
     def from_toml(cls, path: str | Path, *, logs: str | Path | None = None) -> Campaign:
@@ -78,7 +81,8 @@ class Campaign(Result):
             If a column is missing, a unit wrong or a name taken twice.
         """
         file, folder = read_campaign_file(path), Path(path).parent if logs is None else Path(logs)
-        experiments, ignored, names = list[Experiment](), list[str](), set[str]()
+        experiments, overviews = list[Experiment](), list[Overview]()
+        ignored, names = list[str](), set[str]()
         for number, run in enumerate(file.runs, 1):
             name = run.name or Path(run.file).stem
             if name in names:
@@ -91,10 +95,20 @@ class Campaign(Result):
                 continue
             log = open_log(folder / run.file, options=file.format)
             place = f"{path}: run {number} ({run.file})"
-            experiments += read_run(place, name, run, file.axes, log)
+            of_run, overview = read_run(place, name, run, file.axes, log)
+            experiments += of_run
+            if overview is not None:
+                overviews.append(overview)
         title = file.title or Path(path).resolve().parent.name
-        ordered = in_time(experiments)
-        return cls(Path(path), title, file.virtual, file.axes, ordered, tuple(ignored))
+        return cls(
+            Path(path),
+            title,
+            file.virtual,
+            file.axes,
+            in_time(experiments),
+            tuple(ignored),
+            tuple(overviews),
+        )
 
     def table(self) -> Table:
         """Its experiments: axis, role, maneuver, length and channels."""
@@ -106,9 +120,13 @@ class Campaign(Result):
         return made
 
     def plot(self, *, title: str | None = None) -> list[Figure]:
-        """Figures of all runs, as of `swashplate.report.figures.plot_campaign`."""
+        """Figures of all long logs and of all runs.
+
+        As of `swashplate.report.figures.plot_overview` and `plot_campaign`.
+        """
         words = self.title if title is None else title
-        return cast("list[Figure]", figures().plot_campaign(self, title=words))
+        whole = [each.plot(title=f"{words}: {each.run}, the whole log") for each in self.overviews]
+        return whole + cast("list[Figure]", figures().plot_campaign(self, title=words))
 
     def __iter__(self) -> Iterator[Experiment]:
         return iter(self.experiments)

@@ -576,16 +576,21 @@ def _run(
     whole = "\n".join([whole, "[[runs]]", f"file = {made.file}", *more])
     try:
         content = validated(parse_toml(whole, "the draft"), CampaignFile, "the draft")
-        experiments = list(read_run("the draft", "run", content.runs[0], content.axes, log))
+        experiments, overview = read_run("the draft", "run", content.runs[0], content.axes, log)
     except (FileError, InputError) as error:
         return made._replace(role=f'"ignore"    # {FIXME}: {error}')
     said, stratum, peak, seen = made.file, "", 0.0, set[str]()
     parts = [each for each in experiments if each.axis == experiments[0].axis]
+    duration = float(experiments[-1].input.time[-1] - experiments[0].input.time[0])
+    if overview is not None:
+        duration = overview.end - overview.begin
     if NO_TIME not in text:
         rate = 1.0 / float(np.median(np.diff(parts[0].input.time)))
-        lasts = float(parts[-1].input.time[-1] - parts[0].input.time[0])
-        said += f", {lasts:.4g} s at {rate:.4g} Hz"
-        said += f" in {len(parts)} parts" if len(parts) > 1 else ""
+        said += f", {duration:.4g} s at {rate:.4g} Hz"
+        if overview is not None:
+            said += f", {len(parts)} of {len(overview.windows)} windows with motion used"
+        elif len(parts) > 1:
+            said += f" in {len(parts)} parts"
     for each in (each for each in experiments if each.axis not in seen):
         seen.add(each.axis)
         said += f", {each.maneuver}" if each.input.kind == "voltage" else ""
@@ -597,7 +602,6 @@ def _run(
         kind = each.recognised.kind if each.recognised else ""
         stratum += f"{kind} {'both' if both else 'up' if high > low else 'down'}, "
         peak = max(peak, low, high)
-    duration = float(experiments[-1].input.time[-1] - experiments[0].input.time[0])
     return made._replace(
         file=said,
         stratum=stratum,

@@ -6,7 +6,7 @@ that no run takes and currents that have no sign. What is ignored counts for not
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from math import ceil, inf, isfinite, isnan, nan, pi
 from pathlib import Path
@@ -24,7 +24,7 @@ from swashplate.campaign.samples import (
     stamp_statistics,
     turns_over,
 )
-from swashplate.campaign.schema import applying, inside, shown_unit
+from swashplate.campaign.schema import applying, ends, inside, shown_unit
 from swashplate.parameters.rules import FULL_VOLTAGE
 from swashplate.results import Result
 from swashplate.tables import Column, Table, count
@@ -446,18 +446,19 @@ def campaign_findings(campaign: Campaign) -> tuple[str, ...]:
         If the file, which is read once more, has changed meanwhile and cannot be read.
     """
     found, file = list[str](), read_campaign_file(campaign.path)
+    long = {each.run: (each.begin, each.end) for each in campaign.overviews}
     for name, axis in file.axes.items():
         runs, where = campaign.select(axis=name), f"axes.{name}"
-        found += _unused(f"{where}.ignore", axis.ignore, runs)
+        found += _unused(f"{where}.ignore", axis.ignore, runs, long)
         for key, channel in axis.channels.items():
             of = f"{where}.channels.{key}"
-            found += _unused(f"{of}.ignore", channel.ignore, runs, key)
-            found += _unused(f"{of}.weights", channel.weights, runs, key)
+            found += _unused(f"{of}.ignore", channel.ignore, runs, long, key)
+            found += _unused(f"{of}.weights", channel.weights, runs, long, key)
         found += [*_one_sided(name, runs), *_of_other_scale(runs)]
     for number, run in enumerate(file.runs, 1):
         ours = [each for each in campaign if each.run == (run.name or Path(run.file).stem)]
         for key in ("ignore", "weights") if run.role != "ignore" else ():
-            found += _unused(f"run {number} ({run.file}): {key}", getattr(run, key), ours)
+            found += _unused(f"run {number} ({run.file}): {key}", getattr(run, key), ours, long)
     moving = {e.axis for e in campaign if e.of_kind("shaft_speed", "position", "encoder_counts")}
     found += [
         f"axis '{axis}': no channel measures its motion; a fit of the pump needs one of the kind "
@@ -556,12 +557,20 @@ def _unused(
     where: str,
     windows: Iterable[schema.Window],
     runs: Sequence[Experiment],
+    long: Mapping[str, tuple[float, float]],
     channel: str | None = None,
 ) -> Iterator[str]:
-    """Windows that leave out or weigh no sample of any run: a misspelt maneuver, another clock."""
+    """Windows that leave out or weigh no sample of any run: a misspelt maneuver, another clock.
+
+    `long` holds the first and the last instant of long logs by their run [s]: a window of such a
+    log may lie where no experiment is.
+    """
     for window in windows:
         met = [each for each in runs if applying((window,), each.maneuver)]
         times = [c.time for each in met for n, c in each.channels.items() if channel in (None, n)]
+        start, stop = ends(window)
+        logs = [long[run] for run in {each.run for each in met} & long.keys()]
+        within_log = any(start <= last and stop >= first for first, last in logs)
         if not met:
             names = list(dict.fromkeys(f"'{each.maneuver}'" for each in runs))
             more = [f"{len(names) - NAMED} others"] if len(names) > NAMED else []
@@ -569,7 +578,7 @@ def _unused(
                 f"{where}: no run has the maneuver '{window.maneuver}', so that its window does "
                 f"nothing; there are {', '.join([*names[:NAMED], *more])}"
             )
-        elif not any(inside(window, time).any() for time in times):
+        elif not within_log and not any(inside(window, time).any() for time in times):
             first, last = (
                 "its end" if each is None else f"{each:g} s" for each in (window.start, window.stop)
             )

@@ -24,12 +24,13 @@ from swashplate.campaign.experiment import (
     Source,
     assumed_accuracy,
 )
+from swashplate.campaign.overview import Envelope, LogWindow, Overview
 from swashplate.campaign.recognition import recognise
 from swashplate.campaign.samples import ambiguous_gaps, unwrap_counts, unwrap_position
 from swashplate.campaign.schema import applying, conversion, ends, inside
 from swashplate.documents import toml_string, validated
 from swashplate.errors import FileError, InputError
-from swashplate.logs import LONG, Column, Log, check_duration, check_stamps, in_parts, unit_of
+from swashplate.logs import Column, Log, check_duration, check_stamps, in_parts, unit_of
 from swashplate.units import to_si
 
 Array = NDArray[np.float64]
@@ -42,7 +43,9 @@ LARGEST = 1e30
 """No signal of a machine has so much of any SI unit."""
 
 
-def read_run(place: str, name: str, run: schema.Run, axes: Axes, log: Log) -> Iterator[Experiment]:
+def read_run(
+    place: str, name: str, run: schema.Run, axes: Axes, log: Log
+) -> tuple[list[Experiment], Overview | None]:
     """Experiments of a run: one for each axis that it tests, window of a long log, and split.
 
     Parameters
@@ -52,21 +55,48 @@ def read_run(place: str, name: str, run: schema.Run, axes: Axes, log: Log) -> It
     name : str
         Its own.
 
+    Returns
+    -------
+    list of Experiment, and Overview or None
+        The overview is that of a long log, None of a log that is one experiment for each axis.
+
     Raises
     ------
     FileError, InputError, ParameterError
         For the first thing that is wrong; the sentence names file, column and row.
     """
     tested = _axes_of(place, run, axes)
-    for part, cut, resumes in _windows(tested, log, run.span):
+    names = list(_found(log, tested))
+    log = in_parts(log, names)
+    rows = log.rows_of(names)
+    overview = None
+    parts = [(log, False)]
+    if rows is not None and rows > LONG:
+        overview = _overview(name, tested, log, rows, run.span)
+        parts = [
+            (replace(log, first=window.first, last=window.last), window.resumes)
+            for window in overview.windows
+            if window.used
+        ]
+    experiments = list[Experiment]()
+    for part, resumes in parts:
         columns = _Columns(part, tested)
         for key, axis in tested.items():
             full = f"{name} {key}" if len(axes) > 1 else name
             others = ", ".join(toml_string(each) for each in tested if each != key)
             without = f"only = [{others}]" if others else 'role = "ignore"'
-            yield from _experiments(
-                full, name, key, run, axis, columns, cut, resumes=resumes, without=without
+            experiments += _experiments(
+                full,
+                name,
+                key,
+                run,
+                axis,
+                columns,
+                windowed=overview is not None,
+                resumes=resumes,
+                without=without,
             )
+    return experiments, overview
 
 
 def _axes_of(place: str, run: schema.Run, axes: Axes) -> dict[str, schema.Axis]:
@@ -186,12 +216,42 @@ class _Columns:
         unit = clock.unit or unit_of(column, clock.column or "", "s")
         return to_si(1.0, unit, "s", f"{self.log.path}: column '{column.name}' (the time)")
 
+    def _called(self, what: str, signal: schema.Signal) -> str:
+        """A signal, for the sentence of an error."""
+        return f"{self.log.path}: column '{self.found[signal.column].name}' ({what})"
+
+    def _conversion(
+        self, what: str, signal: schema.Input | schema.Channel
+    ) -> tuple[str, float, float]:
+        """The SI unit of a signal, with factor and zero, as of `schema.conversion`."""
+        usual = (*schema.KINDS[signal.kind].units, "1")[0]
+        unit = signal.unit or unit_of(self.found[signal.column], signal.column, usual)
+        return conversion(signal.kind, unit, self._called(what, signal))
+
+    def as_recorded(
+        self, what: str, signal: schema.Input | schema.Channel
+    ) -> tuple[str, NDArray[np.float64]]:
+        """The SI unit of a signal, and all its samples (n,) in it; NaN if one is not finite.
+
+        Nothing is left out, and a counter that begins anew does so.
+        """
+        si, factor, zero = self._conversion(what, signal)
+        numbers = signal.scale * self.values[signal.column] + signal.offset
+        if isinstance(signal, schema.Channel) and signal.counts_per_turn is not None:
+            encoder = Encoder(signal.counts_per_turn, signal.gear_ratio, signal.sign, None)
+            factor *= encoder.angle_per_count
+        else:
+            factor *= signal.sign
+        values = factor * numbers + zero
+        values[~np.isfinite(values)] = np.nan
+        return si, values
+
     def samples(
         self, what: str, signal: schema.Input | schema.Channel, axis: schema.Axis, run: schema.Run
     ) -> tuple[dict[str, Any], float]:
         """What a signal is made of, in SI, and the size of its unit; empty where all is missing."""
         log, column, numbers = self.log, self.found[signal.column], self.values[signal.column]
-        said = f"{log.path}: column '{column.name}' ({what})"
+        said = self._called(what, signal)
         time, is_input = self.stamps(signal, axis), isinstance(signal, schema.Input)
         if time.size != numbers.size:
             raise FileError(f"{said} has {numbers.size} samples, but its time {time.size}.")
@@ -211,9 +271,7 @@ class _Columns:
         kept &= ~missing
         if (left := np.count_nonzero(kept)) < 2:
             raise FileError(f"{said} has {left} samples that can be used, but needs two at least.")
-        usual = (*schema.KINDS[signal.kind].units, "1")[0]
-        unit = signal.unit or unit_of(column, signal.column, usual)
-        si, factor, zero = conversion(signal.kind, unit, said)
+        si, factor, zero = self._conversion(what, signal)
         # an encoder's sign belongs to the scale of its counts, see `Encoder`
         sign = 1 if signal.kind == "encoder_counts" else signal.sign
         with np.errstate(over="ignore"):
@@ -263,20 +321,21 @@ def _experiments(
     run: schema.Run,
     axis: schema.Axis,
     columns: _Columns,
-    window: str,
     *,
+    windowed: bool,
     resumes: bool,
     without: str,
 ) -> Iterator[Experiment]:
     """One experiment, or several where a counter's position across a gap is not known.
 
-    Of a window of a long log, with a note on it; one that resumes begins in the midst of a motion.
+    A window of a long log is named by its first instant; one that resumes begins in the midst of a
+    motion.
     `without` is the entry by which the run leaves the axis out.
     """
     parts, _ = columns.samples("the input", axis.input, axis, run)
     between = axis.input.interpolation
     drive = InputSignal(**parts, interpolation=between or "linear", settled=between is not None)
-    notes, signals, cuts = [window] if window else [], dict[str, Channel](), dict[float, str]()
+    notes, signals, cuts = list[str](), dict[str, Channel](), dict[float, str]()
     zero = columns.zero(axis, run.recorded)
     for channel, entry in axis.channels.items():
         parts, factor = columns.samples(f"channel '{channel}'", entry, axis, run)
@@ -321,14 +380,14 @@ def _experiments(
         kept = {each: read for each, read in kept.items() if read.time.size > 1}
         if given.time.size < 2 or not kept:
             continue
-        said = list(notes) if part == 0 else [window] * bool(window)
+        said = list(notes) if part == 0 else []
         if np.isfinite(end):
             said.append(f"split at {end:.4g} s, from where it is a run of its own: {cuts[end]}")
         recognised = recognise(given.time, given.values, unit=unit)
         maneuver = run.maneuver or recognised.name
         ignored = applying((*axis.ignore, *run.ignore), maneuver)
         yield Experiment(
-            f"{name} from {given.time[0]:.6g} s" if part or window else name,
+            f"{name} from {given.time[0]:.6g} s" if part or windowed else name,
             key,
             run_name,
             run.role,
@@ -390,15 +449,22 @@ def _finished(
         weight[inside(each, read.time)] *= each.factor
     for window in (*ignored, *applying(entry.ignore, maneuver)):
         weight[inside(window, read.time)] = 0.0
+    if weight.min() == weight.max():
+        # most weights are all alike: then they take no memory
+        weight = np.broadcast_to(weight[0], weight.shape)
     return replace(read, counts=counts, values=values, weight=weight)
 
 
 # --- long logs ------------------------------------------------------------------------------------
 
+LONG = 250_000
+"""Rows beyond which a log is not one run but its windows with motion. A fit holds the derivatives
+of its longest run, 2 kB a row: with this many 0.5 GB, and with the 1.8 million of an hour at 512 Hz
+3.2 GB, which take more than five minutes."""
 BLOCK = 250_000
 """Rows that are looked at together."""
 GRAIN = 256
-"""Rows of which the largest and the smallest input are kept."""
+"""Rows of which the lowest and the highest sample are kept."""
 MOVES = 0.02
 """Share of its largest excursion from rest beyond which an input moves."""
 BEFORE, AFTER = 2.0, 5.0
@@ -407,69 +473,147 @@ HELD = 120_000
 """Rows of one log that a campaign takes at most, more than the 110,605 of Kruse's thirteen tests of
 the hoist. A fit of two channels takes about 0.2 kB of memory for each, and 2 kB for each row of the
 longest run."""
+MOST_WINDOWS = 100
+"""Windows of one log that a campaign takes at most. Each is a run, which takes a fit 0.12 s: a slow
+logger's windows are many and short."""
 PIECE = 60_000
 """A longer motion is cut into pieces of so many rows, of which the later ones begin in motion."""
 
 
-def _windows(axes: Axes, log: Log, span: schema.Window | None) -> Iterator[tuple[Log, str, bool]]:
-    """The log itself or, of one of more rows than `LONG`, its windows in which an input moves.
+class _Trace:
+    """A signal of a long log, of which the extremes in each grain are kept."""
 
-    Within the span of the run, if it has one. The log is looked through once, block after block,
-    its stamps checked. A window takes in 2 s of rest before and 5 s after the motion; if all
-    together have more rows than `HELD`, one in several is taken, evenly over the log. Beside each,
-    which one it is, empty for a whole log, and whether it begins in the midst of a motion.
+    def __init__(
+        self,
+        key: str,
+        axis: schema.Axis,
+        what: str,
+        name: str,
+        signal: schema.Input | schema.Channel,
+        grains: int,
+    ) -> None:
+        self.key, self.axis, self.what, self.name, self.signal = key, axis, what, name, signal
+        self.time = np.empty(grains)
+        self.low = np.empty(grains)
+        self.high = np.empty(grains)
+        self.unit = ""
+        self.end = -np.inf
+        self.missing = 0
+        self.period = np.inf
+        self.longest = 0.0
+
+    def take(self, columns: _Columns, first: int) -> None:
+        """Take in a block of rows; of a later one than the first with the row before it."""
+        time = columns.stamps(self.signal, self.axis)
+        self.unit, values = columns.as_recorded(self.what, self.signal)
+        intervals = np.diff(time)
+        if intervals.size:
+            self.period = min(self.period, float(np.median(intervals)))
+            self.longest = max(self.longest, float(intervals.max()))
+        known_before = int(first > 0)
+        time, values = time[known_before:], values[known_before:]
+        self.end = float(time[-1])
+        self.missing += int(np.count_nonzero(np.isnan(values)))
+        edges = np.arange(0, values.size, GRAIN)
+        here = slice(first // GRAIN, first // GRAIN + edges.size)
+        self.time[here] = time[edges]
+        self.low[here] = np.fmin.reduceat(values, edges)
+        self.high[here] = np.fmax.reduceat(values, edges)
+
+    def envelope(self) -> Envelope:
+        """What was kept of it."""
+        return Envelope(
+            name=self.name,
+            axis=self.key,
+            kind=self.signal.kind,
+            unit=self.unit,
+            time=self.time,
+            end=self.end,
+            low=self.low,
+            high=self.high,
+            missing=self.missing,
+            period=self.period,
+            longest=self.longest,
+        )
+
+
+def _overview(name: str, axes: Axes, log: Log, rows: int, span: schema.Window | None) -> Overview:
+    """A log of more rows than `LONG` as a whole, and its windows in which an input moves.
+
+    The windows are within the span of the run, if it has one. The log is looked through once, block
+    after block, its stamps checked. A window takes in 2 s of rest before and 5 s after the motion;
+    if all together have more rows than `HELD`, or are more than `MOST_WINDOWS`, one in several is
+    used, evenly over the log.
     """
-    names = list(_found(log, axes))
-    log = in_parts(log, names)
-    rows = log.rows_of(names)
-    if rows is None or rows <= LONG:
-        yield log, "", False
-        return
-    moving, period = np.zeros(-(-rows // GRAIN), dtype=np.bool_), np.inf
-    for key, axis in axes.items():
-        extremes, step = np.empty((moving.size, 2)), BLOCK // GRAIN * GRAIN
-        alone = {key: axis.model_copy(update={"channels": {}})}
-        for begin in range(0, rows, step):
-            # with the row before, so that stamps are compared across blocks
-            part = replace(log, first=max(begin - 1, 0), last=min(begin + step, rows))
-            block = _Columns(part, alone)
-            time, values = block.stamps(axis.input, axis), block.values[axis.input.column]
-            period = min(period, float(np.median(np.diff(time[:BLOCK]))))
-            time, values = (each[int(begin > 0) :] for each in (time, values))
-            edges = np.arange(0, values.size, GRAIN)
-            here = slice(begin // GRAIN, begin // GRAIN + edges.size)
-            extremes[here, 0] = np.fmin.reduceat(values, edges)
-            extremes[here, 1] = np.fmax.reduceat(values, edges)
-            if span is not None:
-                extremes[here][~inside(span, time[edges])] = np.nan
+    grains = -(-rows // GRAIN)
+    traces = [
+        _Trace(key, axis, what, channel, signal, grains)
+        for key, axis in axes.items()
+        for (what, signal), channel in zip(
+            _signals(axis).items(), ["input", *axis.channels], strict=True
+        )
+    ]
+    step = BLOCK // GRAIN * GRAIN
+    for first in range(0, rows, step):
+        # with the row before, so that stamps are compared across blocks
+        part = replace(log, first=max(first - 1, 0), last=min(first + step, rows))
+        columns = _Columns(part, axes)
+        for trace in traces:
+            trace.take(columns, first)
+    inputs = [trace for trace in traces if isinstance(trace.signal, schema.Input)]
+    moving = np.zeros(grains, dtype=np.bool_)
+    for trace in inputs:
+        extremes = np.stack((trace.low, trace.high), axis=1)
+        if span is not None:
+            extremes[~inside(span, trace.time)] = np.nan
         moving |= _moves(extremes)
     if not moving.any():
         raise InputError(
             f"{log.path} has {rows} rows, in none of which the input moves: leave the run out with "
             'role = "ignore".'
         )
+    return Overview(
+        run=name,
+        rows=rows,
+        signals=tuple(trace.envelope() for trace in traces),
+        windows=_windows(moving, rows, min(trace.period for trace in inputs), inputs[0].time),
+        read_from=log.table,
+    )
+
+
+def _windows(
+    moving: NDArray[np.bool_], rows: int, period: float, time: Array
+) -> tuple[LogWindow, ...]:
+    """Windows of a log of so many rows, by the grains in which an input moves.
+
+    `period` is the usual interval of its stamps [s], `time` the first stamp of each grain [s].
+    """
     changes = np.flatnonzero(np.diff(np.concatenate([[False], moving, [False]])))
     first = np.maximum(changes[::2] * GRAIN - round(BEFORE / period), 0)
     last = np.minimum(changes[1::2] * GRAIN + round(AFTER / period), rows)
     apart = np.flatnonzero(first[1:] > last[:-1])
     pieces = [
-        (place, min(place + PIECE, end), place > begin)
+        (row, min(row + PIECE, end), row > begin)
         for begin, end in zip(
             first[[0, *(apart + 1)]].tolist(), last[[*apart, last.size - 1]].tolist(), strict=True
         )
-        for place in range(begin, end, PIECE)
+        for row in range(begin, end, PIECE)
     ]
-    every = 1
+    every = -(-len(pieces) // MOST_WINDOWS)
     while sum(end - begin for begin, end, _ in pieces[::every]) > HELD and every < len(pieces):
         every += 1
-    said = f"; the log has {len(pieces)} windows with motion"
-    said += f", of which 1 in {every} is taken" * (every > 1)
-    if log.table is not None:
-        said += f"; its {rows} rows are read from {log.table.name}, written beside it"
-    taken = pieces[::every]
-    for number, (begin, end, within) in enumerate(taken, 1):
-        cut = f"window {number} of {len(taken)}: rows {begin + 1} to {end} of {rows}"
-        yield replace(log, first=begin, last=end), cut + said * (number == 1), within
+    stamps = np.arange(time.size) * GRAIN
+    return tuple(
+        LogWindow(
+            first=begin,
+            last=end,
+            begin=float(np.interp(begin, stamps, time)),
+            end=float(np.interp(end, stamps, time)),
+            resumes=resumes,
+            used=number % every == 0,
+        )
+        for number, (begin, end, resumes) in enumerate(pieces)
+    )
 
 
 def _moves(extremes: Array) -> NDArray[np.bool_]:

@@ -157,6 +157,9 @@ def check(path: Path = CAMPAIGN, *, strict: bool = False) -> None:
     counted = ", ".join(f"{roles.count(role)} to {role}" for role in dict.fromkeys(roles))
     virtual = " (virtual)" * campaign.virtual
     note(f"{campaign.title}{virtual}: {len(campaign)} experiments ({counted})")
+    for overview in campaign.overviews:
+        show(overview.table())
+        bullets([overview.sentence])
     for experiment in campaign:
         found = qualities[experiment.name]
         show(tests.quality_table(experiment, found))
@@ -190,7 +193,8 @@ def plot(
     """Draw all runs and channels of a campaign, or one channel closely.
 
     The overview is one figure for each axis and eight runs, numbered if there
-    are several.
+    are several. A log of more than 250,000 rows has a figure of its own: all of
+    it, with the windows that are used.
 
     Options:
       out FILE: The figure: .png, .svg or .pdf.
@@ -207,7 +211,6 @@ def plot(
     from swashplate.campaign import Campaign
     from swashplate.identification import predict
     from swashplate.identification.drive_model import SIGNALS
-    from swashplate.report.figures import plot_campaign
 
     with working(f"Reading {path}"):
         campaign = Campaign.from_toml(path)
@@ -227,8 +230,7 @@ def plot(
         how = {"window": window, "title": f"{run}, {channel}"}
         draw(out, "plot_channel", shown, simulated, **how)
     else:
-        title = campaign.title + " (virtual)" * campaign.virtual
-        figures = plot_campaign(campaign.experiments, title=title)
+        figures = campaign.plot(title=campaign.title + " (virtual)" * campaign.virtual)
         several = [out.with_stem(f"{out.stem}-{k}") for k in range(1, len(figures) + 1)]
         check_free(*several)
         for path, figure in zip([out] if len(figures) == 1 else several, figures, strict=True):

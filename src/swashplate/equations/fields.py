@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from enum import Enum
-from functools import cache
+from functools import cache, cached_property
 from math import inf, isfinite
 from typing import Any, Final, TypeGuard, get_type_hints
 
@@ -69,12 +69,12 @@ class Definition:
         if self.above is not None:
             object.__setattr__(self, "lower", self.above)
 
-    @property
+    @cached_property
     def directional(self) -> bool:
         """Whether it has a value for each direction."""
         return len(self.fields) == 2
 
-    @property
+    @cached_property
     def columns(self) -> tuple[str, ...]:
         """Names of its values by themselves: ``Z1``, or ``Z16_plus`` and ``Z16_minus``."""
         if self.directional:

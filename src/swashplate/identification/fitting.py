@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from difflib import get_close_matches
 from functools import cached_property, partial
@@ -548,10 +549,16 @@ def _solved(
             OTHERS,
         )
         most = TRIAL if solution.given_up else int(limits["max_evaluations"])
+        starts = list[Array]()
+        # nobody asked for these starts: if few can be used, they are enough
+        with suppress(InputError):
+            for start in sobol_starts(problem, OTHERS, 0):
+                starts.append(start)
+        planned = 1 + len(starts)
         try:
             others = solve_from(
                 problem,
-                [*sobol_starts(problem, OTHERS, 0)],
+                starts,
                 enough=partial(_explained, problem),
                 tolerance=ROUGH,
                 max_evaluations=most,
@@ -618,8 +625,9 @@ def _no_fit(
 ) -> str:
     """That no search comes near what was measured, and what to look at."""
     channels, percentage = listed(problem.channels), 100.0 * max(share, 0.0)
+    best = f"the best of {starts} starts" if starts > 1 else "the search"
     sentence = (
-        f"Stage {stage.name} does not fit: the best of {count(starts, 'start')} explains "
+        f"Stage {stage.name} does not fit: {best} explains "
         f"{percentage:.0f} % of the variance of {channels}. Look at the runs with 'swashplate "
         "campaign plot': is it this command that moved the machine, do jumps or resets cut a "
         "signal, are kinds, units and signs right? Begin at another drive with --from, or search "

@@ -435,7 +435,8 @@ def fixed_part(fit: Fit) -> Part:
 def parts_of(found: Identification) -> list[Part]:
     """What a fit says besides its verdict, in the order in which the command prints it."""
     fit = found.fit
-    notes = [f"{run.name}: {sentence}." for run in fit.runs for sentence in run.notes]
+    notes = [overview.sentence for overview in found.campaign.overviews]
+    notes += [f"{run.name}: {sentence}." for run in fit.runs for sentence in run.notes]
     doubts = [f"! {sentence}" for sentence in fit.doubts]
     made = [Part("Runs", (), (), notes), Part("Doubts", (), doubts)]
     made += map(stage_part, fit.stages)

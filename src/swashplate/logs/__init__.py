@@ -4,7 +4,6 @@
 SI. A file that is damaged or hostile ends in one sentence, and nothing half-read is returned.
 """
 
-from swashplate.logs.apart import LONG as LONG
 from swashplate.logs.apart import in_parts as in_parts
 from swashplate.logs.dialect import TextOptions as TextOptions
 from swashplate.logs.log import SUFFIXES as SUFFIXES

@@ -159,23 +159,26 @@ def _ended(process: subprocess.Popen[bytes], scratch: tempfile.TemporaryDirector
 
 # --- long logs ------------------------------------------------------------------------------------
 
-LONG = 2_000_000
-"""Rows beyond which a log is not held whole."""
+MOST_HELD = 4_000_000
+"""Rows of a text log beyond which its columns are not held whole while parts of it are read: 32 MB
+for each column, two hours at 512 Hz."""
 _GROUP = 1 << 18  # rows that are stored together, and found without those before them
 _KEY = "swashplate"
 
 
 def in_parts(log: Log, names: Sequence[str]) -> Log:
-    """A log whose rows can be read in parts if it is long; a short one as it is.
+    """A log whose rows can be read in parts, each without reading the others again.
 
-    A long text log is converted to Parquet once, piece after piece: ``log.csv.parquet`` beside it
-    holds the columns of these names (as in `Log.find`), and serves until the log changes. Other
-    formats are as they are.
+    Of a text log, the columns of these names (as in `Log.find`). They are held in memory; of one
+    of more rows than `MOST_HELD` they are converted to Parquet once, piece after piece:
+    ``log.csv.parquet`` beside it serves until the log changes. Other formats are as they are.
     """
     import polars as pl
 
-    if log.stream is None or max(log.lengths, default=0) <= LONG:
+    if log.stream is None:
         return log
+    if max(log.lengths, default=0) <= MOST_HELD:
+        return _held(log, names)
     table = log.path.with_name(f"{log.path.name}.parquet")
     columns = {log.columns.index(log.find(name)) for name in names}
     stat = log.path.stat()
@@ -191,6 +194,25 @@ def in_parts(log: Log, names: Sequence[str]) -> Log:
         _convert(log, stored, table, json.dumps([*stamp, stored]))
     kept = tuple(log.columns[position] for position in stored)
     return replace(open_apart("Parquet", table), path=log.path, columns=kept, table=table)
+
+
+def _held(log: Log, names: Sequence[str]) -> Log:
+    """A log of the columns of some names alone, which are in memory."""
+    columns = tuple(dict.fromkeys(log.find(name) for name in names))
+    arrays = [*log.read([column.name for column in columns]).values()]
+
+    def load(positions: Sequence[int], first: int = 0, last: int | None = None) -> list[Array]:
+        parts = [arrays[position][first:last] for position in positions]
+        # a part must not keep all the rest in memory
+        return [part if part.size == arrays[0].size else part.copy() for part in parts]
+
+    return replace(
+        log,
+        columns=columns,
+        load=load,
+        lengths=tuple(array.size for array in arrays),
+        stream=None,
+    )
 
 
 def _convert(log: Log, columns: Sequence[int], table: Path, stamp: str) -> None:

@@ -349,10 +349,14 @@ def read_heading(
         if first == len(plain):
             raise FileError(f"{path} has no rows below line {number}.")
     else:
-        rows = [layout.cells(line) for _, line in plain]
-        first = next((place for place, row in enumerate(rows) if layout.fits(row)), len(rows))
-        if first == len(rows):
+        rows = list[list[str]]()
+        for _, line in plain:
+            rows.append(layout.cells(line))
+            if layout.fits(rows[-1]):
+                break
+        else:
             raise FileError(f"{path} has no rows of numbers in its first {len(plain)} lines.")
+        first = len(rows) - 1
         # a damaged row is a row all the same: it must be refused, not taken for the names
         while first > 1 and any(layout.numbers_in(rows[first - 1])):
             above = layout.names(plain[first - 2][1])

@@ -50,7 +50,7 @@ def open_text(path: Path, options: TextOptions | None = None) -> Log:
     head = next(_pieces(path, encoding, skipped), "").split("\n")[:-1]
     size = sum(map(len, head)) + len(head)
     marks = options.marks
-    filled = [line for line in head if line.strip() and not line.lstrip().startswith(marks)]
+    filled = [line for line in head if (text := line.lstrip()) and not text.startswith(marks)]
     if not filled:
         raise FileError(f"{path} has no rows of numbers, only comments and empty lines.")
     some = max(4, min(_SAMPLE, _SAMPLED * len(head) // size))

@@ -205,9 +205,11 @@ class ParameterSet(Entries):
         known = (*CATALOGUE, *REFINEMENTS, *OWN)
         self._keep({name: self.parameters[name] for name in known if name in self.parameters})
         for each in self.values():
+            if each.own_bounds is None:
+                continue
+            low, high = each.own_bounds
             for column, value in each.numbers.items():
-                if each.own_bounds and not each.own_bounds[0] <= value <= each.own_bounds[1]:
-                    low, high = each.own_bounds
+                if not low <= value <= high:
                     raise ParameterError(
                         f"{self.name}: {column} ({each.name}) is {value:g} {each.unit}, outside "
                         f"its bounds {low:g} to {high:g}."

@@ -7,6 +7,7 @@ from .analysis import plot_tornado as plot_tornado
 from .analysis import plot_whatif as plot_whatif
 from .campaign import plot_campaign as plot_campaign
 from .campaign import plot_channel as plot_channel
+from .campaign import plot_overview as plot_overview
 from .campaign import plot_prediction as plot_prediction
 from .crane import plot_crane as plot_crane
 from .crane import plot_follow as plot_follow

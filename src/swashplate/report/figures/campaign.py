@@ -1,4 +1,4 @@
-"""Figures of measured tests: a campaign, one channel closely, one channel against a model."""
+"""Figures of measured tests: a campaign, a long log, a channel closely, one against a model."""
 
 from __future__ import annotations
 
@@ -19,6 +19,7 @@ from swashplate.report.lines import (
     GAP_MARK,
     IGNORED,
     Array,
+    Shade,
     draw,
     gap_rows,
     mark_gaps,
@@ -42,6 +43,7 @@ from swashplate.report.style import (
     WIDTH,
     dress,
     handle,
+    in_lines,
     label_below,
     new_figure,
     right_axis,
@@ -53,7 +55,7 @@ from swashplate.report.style import (
 from swashplate.units import DisplayUnit, display_unit
 
 if TYPE_CHECKING:
-    from swashplate.campaign import Channel, Experiment, InputSignal
+    from swashplate.campaign import Channel, Envelope, Experiment, InputSignal, Overview
     from swashplate.identification.validation import RunQuality
 
 # --- pages of a campaign --------------------------------------------------------------------------
@@ -280,6 +282,87 @@ def _stamps_in_words(experiment: Experiment) -> list[str]:
             f"a gap of {longest}" if gaps.size == 1 else f"{gaps.size} gaps, longest {longest}"
         )
     return words
+
+
+# --- a long log as a whole ------------------------------------------------------------------------
+
+STRETCHES = 4000
+"""Stretches of a log of which the extremes are drawn: more than a sheet has dots."""
+LABELLED = 16
+"""Letters in a line of a panel's label."""
+USED = Shade("#b5e0cb", "window that is used")
+LEFT_OUT = Shade("#f3f3f3", "window with motion that is left out", "#dadada", "////")
+
+
+def plot_overview(overview: Overview, *, title: str | None = None) -> Figure:
+    """Figure of a whole long log, with its windows: a panel for the input and each channel.
+
+    A signal is drawn from its lowest to its highest sample in each short stretch of time, as
+    recorded: a counter that begins anew does so here.
+
+    Parameters
+    ----------
+    overview : Overview
+        Of the log, as of ``Campaign.overviews``.
+    title : str, optional
+        By default the run's name.
+    """
+    several = len({each.axis for each in overview.signals}) > 1
+    largest = [_largest(each) for each in overview.signals]
+    units = [
+        display_unit(each.shown_unit, size)
+        for each, size in zip(overview.signals, largest, strict=True)
+    ]
+    labels = [
+        in_lines(unit.label(f"{each.axis} {each.name}" if several else each.name), LABELLED)
+        for each, unit in zip(overview.signals, units, strict=True)
+    ]
+    used = np.array([(w.begin, w.end) for w in overview.windows if w.used]).reshape(-1, 2)
+    left_out = np.array([(w.begin, w.end) for w in overview.windows if not w.used]).reshape(-1, 2)
+    shades = [(used, USED), (left_out, LEFT_OUT)]
+    legend = [shade_handle(look) for spans, look in shades if spans.size]
+    heights = [1.3] * len(overview.signals)
+    words = f"{overview.run}, the whole log" if title is None else title
+    figure, axes = sheet(heights, words, labels, "time (s)", legend=legend)
+    for ax, envelope, unit in zip(axes, overview.signals, units, strict=True):
+        zero_line(ax)
+        for spans, look in shades:
+            shade(ax, spans, look)
+        color = INK if envelope.name == "input" else BLUE
+        _draw_envelope(ax, envelope, unit.factor, color)
+        mark_gaps(ax, envelope.time)
+    axes[-1].set_xlim(overview.begin, overview.end)
+    return figure
+
+
+def _largest(envelope: Envelope) -> float:
+    """Largest size of a signal, 0 if it has no number. [unit]"""
+    known = np.isfinite(envelope.low)
+    ends = np.concatenate((envelope.low[known], envelope.high[known]))
+    return float(np.abs(ends).max(initial=0.0))
+
+
+def _draw_envelope(ax: Axes, envelope: Envelope, factor: float, color: str) -> None:
+    """Draw a signal between its extremes, open where it has none and over gaps of the stamps."""
+    first = np.arange(0, envelope.time.size, -(-envelope.time.size // STRETCHES))
+    time = envelope.time[first]
+    low = np.fmin.reduceat(envelope.low, first)
+    high = np.fmax.reduceat(envelope.high, first)
+    breaks = gap_rows(time)
+    time, low, high = (
+        np.insert(each, breaks + 1, filling)
+        for each, filling in ((time, time[breaks]), (low, np.nan), (high, np.nan))
+    )
+    # its edge shows a signal that stays as it is, whose area is nothing
+    ax.fill_between(
+        time,
+        factor * low,
+        factor * high,
+        facecolor=color,
+        edgecolor=color,
+        linewidth=0.6 * THIN,
+        zorder=2.0,
+    )
 
 
 # --- one channel closely --------------------------------------------------------------------------

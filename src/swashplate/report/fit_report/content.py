@@ -10,7 +10,7 @@ from pathlib import Path
 
 from markupsafe import Markup
 
-from swashplate.campaign import Campaign, examine, quality_table
+from swashplate.campaign import Campaign, Overview, examine, quality_table
 from swashplate.campaign.schema import Weight
 from swashplate.drive import Drive
 from swashplate.errors import InputError
@@ -179,7 +179,7 @@ def _page(
         *own,
         _residual_section(runs),
         _verdict_section(judged, len(said)),
-        _data_section([sentence for _, sentence in said], quality),
+        _data_section([sentence for _, sentence in said], quality, campaign.overviews),
         setup,
     ]
     return page(
@@ -289,15 +289,18 @@ def _residual_section(runs: Sequence[ShownRun]) -> Section:
     return Section("residuals", "Residuals", [text(words), Block("table", made, "residuals")])
 
 
-def _data_section(findings: Sequence[str], quality: Table) -> Section:
-    """What the check of the logs finds, and the quality of every signal."""
+def _data_section(
+    findings: Sequence[str], quality: Table, overviews: Sequence[Overview]
+) -> Section:
+    """What is used of long logs, what the check of the logs finds, and the quality of signals."""
     said = f"{count(len(findings), 'finding')}:" if findings else NO_FINDINGS
     numbered = [
         Markup('<span id="finding-{}">{}</span>').format(number, sentence)
         for number, sentence in enumerate(findings, start=1)
     ]
     shown = Block("details", [Block("table", quality, "data")], count(len(quality.rows), "signal"))
-    return Section("data", "Data quality", [text(said), *listed_block(numbered), shown])
+    used = listed_block([overview.sentence for overview in overviews])
+    return Section("data", "Data quality", [*used, text(said), *listed_block(numbered), shown])
 
 
 def _setup_section(

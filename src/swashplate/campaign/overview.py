@@ -1,0 +1,145 @@
+"""A long log as a whole: what its signals do in it, and which of its windows are experiments."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, NamedTuple, cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from swashplate.campaign.schema import shown_unit
+from swashplate.results import Result, figures
+from swashplate.tables import Column, Table
+from swashplate.units import display_unit
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from matplotlib.figure import Figure
+
+Array = NDArray[np.float64]
+
+
+class LogWindow(NamedTuple):
+    """Rows of a long log in which an input moves, with the rest around them."""
+
+    first: int
+    last: int
+    """From the first row, counted from 0, to before the last one."""
+    begin: float
+    end: float
+    """About when. [s]"""
+    resumes: bool
+    """Whether it begins in the midst of a motion."""
+    used: bool
+    """Whether it is an experiment."""
+
+
+@dataclass(frozen=True, eq=False)
+class Envelope(Result):
+    """Lowest and highest samples of a signal in each of the blocks of a long log."""
+
+    name: str
+    """``"input"`` or the channel's name."""
+    axis: str
+    kind: str
+    unit: str
+    """Of `low` and `high`, SI."""
+    time: Array
+    """(n,) the first stamp of each block. [s]"""
+    end: float
+    """The last stamp. [s]"""
+    low: Array
+    high: Array
+    """(n,) as recorded: a counter that begins anew does so here; NaN in a block without a number.
+    [unit]"""
+    missing: int
+    """Samples that are no finite number."""
+    period: float
+    """Usual interval of its stamps. [s]"""
+    longest: float
+    """Longest interval of its stamps. [s]"""
+
+    @property
+    def shown_unit(self) -> str:
+        """Its unit as of `swashplate.units.display_unit`, which knows a shaft's angle."""
+        return shown_unit(self.kind, self.unit)
+
+
+@dataclass(frozen=True, eq=False)
+class Overview(Result):
+    """A log of more rows than one run has: its signals, and its windows with motion."""
+
+    run: str
+    rows: int
+    signals: tuple[Envelope, ...]
+    """The input and the channels of each axis."""
+    windows: tuple[LogWindow, ...]
+    """Those with motion, in the order of time."""
+    read_from: Path | None = None
+    """The table that stands for the log, if one was written beside it."""
+
+    @property
+    def begin(self) -> float:
+        """Its first stamp. [s]"""
+        return min(float(each.time[0]) for each in self.signals)
+
+    @property
+    def end(self) -> float:
+        """Its last stamp. [s]"""
+        return max(each.end for each in self.signals)
+
+    @property
+    def sentence(self) -> str:
+        """How many of its windows, and how many rows, are experiments."""
+        used = [each for each in self.windows if each.used]
+        rows = sum(each.last - each.first for each in used)
+        moving = sum(each.last - each.first for each in self.windows)
+        total = len(self.windows)
+        said = f"{self.run}: the log has {self.rows:,} rows, {moving:,} of them in "
+        said += "one window with motion" if total == 1 else f"{total} windows with motion"
+        if len(used) == total:
+            said += ", which is used" if total == 1 else ", which are all used"
+        else:
+            said += f"; {len(used)} of them, {rows:,} rows, spread over the log, "
+            said += "is used" if len(used) == 1 else "are used"
+        if self.read_from is not None:
+            said += f"; its rows are read from {self.read_from.name}, written beside it"
+        return f"{said}."
+
+    def table(self) -> Table:
+        """What each signal does in the whole log: range, longest interval, missing samples."""
+        made = Table(
+            f"{self.run}, the whole log: {self.end - self.begin:.4g} s, {self.rows:,} rows",
+            (
+                Column("axis", of="pf"),
+                Column("signal", wrap=True),
+                Column("kind"),
+                Column("Hz", ".4g"),
+                Column("gap", "s"),
+                Column("range"),
+                Column("missing", ",d"),
+            ),
+        )
+        for each in self.signals:
+            known = np.isfinite(each.low)
+            words = "no number"
+            if known.any():
+                low, high = float(each.low[known].min()), float(each.high[known].max())
+                shown = display_unit(each.shown_unit, max(abs(low), abs(high)))
+                words = f"{shown.factor * low:z.4g} to {shown.factor * high:z.4g} {shown.name}"
+            made.add(
+                each.axis,
+                each.name,
+                each.kind.replace("_", " "),
+                1.0 / each.period,
+                f"{1e3 * each.longest:.3g}" if each.longest > 1.5 * each.period else "-",
+                words.rstrip(),
+                each.missing,
+            )
+        return made
+
+    def plot(self, *, title: str | None = None) -> Figure:
+        """Figure of the whole log, as of `swashplate.report.figures.plot_overview`."""
+        return cast("Figure", figures().plot_overview(self, title=title))
