@@ -130,8 +130,8 @@ def pump(numbers):
     """Pump and motor."""
     longer = {"p": "plus", "m": "minus"}
     values = []
-    for field in Pump._fields:
-        symbol, _, direction = field.partition("_")
+    for name in Pump._fields:
+        symbol, _, direction = name.partition("_")
         values.append(numbers[f"{symbol}_{longer[direction]}" if direction else symbol])
     return Pump(*values)
 

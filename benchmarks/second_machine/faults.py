@@ -128,7 +128,7 @@ def coarse_command(equipment):
 
 
 def other_axis(equipment):
-    """One log is of the other axis, read by this campaign's ammeter and tacho and its own encoder."""
+    """One log is of the other axis, with its encoder and this campaign's other instruments."""
     axis = "slew" if equipment.axis == "hoist" else "hoist"
     other = draws.drawn_equipment(axis, equipment.seed, equipment.logger.rate)
     other = replace(
