@@ -142,7 +142,8 @@ def estimates(fitted, truth):
 def predicted(program, folder, truth, *words, condition=draws.STEADY):
     """Errors of a fit's speed in new maneuvers: RMS, % of the speed's range, by name.
 
-    By `validate` on logs without instruments.
+    By `validate` on logs without instruments. The range is that of the steady machine: one under
+    load may stand still.
 
     Parameters
     ----------
@@ -170,14 +171,15 @@ def predicted(program, folder, truth, *words, condition=draws.STEADY):
     ranges = {}
     for name in new_names():
         if cylinder:
-            run = logger.new_cylinder_run(draws.drawn_cylinder(truth["seed"]), name)
+            run = steady = logger.new_cylinder_run(draws.drawn_cylinder(truth["seed"]), name)
         else:
             run = logger.new_run(truth["parameters"], truth["axis"], name, condition)
+            steady = logger.new_run(truth["parameters"], truth["axis"], name)
         time, volts, speed = run.T
         file = f"{name}.csv".replace(" ", "_")
         write_table(folder / file, {"time": time, "voltage": volts, "speed": speed})
         lines += ["[[runs]]", f'file = "{file}"', 'role = "validate"']
-        ranges[file.removesuffix(".csv")] = (name, float(np.ptp(speed)))
+        ranges[file.removesuffix(".csv")] = (name, float(np.ptp(steady[:, 2])))
     (folder / "new.toml").write_text("\n".join(lines) + "\n", "utf-8")
     code, output, _, _ = program.run(
         "validate", "fitted", "new.toml", "--out", "new", *words, folder=folder

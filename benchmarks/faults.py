@@ -84,6 +84,14 @@ def findings(program, folder):
     return [line[2:] for line in output.splitlines() if line.startswith("! ")]
 
 
+def guess(program, folder):
+    """Read a start off the logs, which a fit without a current asks for; options of `fit`."""
+    code, output, _, _ = program.run("guess", "campaign.toml", folder=folder)
+    if code:
+        raise CampaignError(output)
+    return "--from", "start.toml", "--setup", "setup.toml"
+
+
 def campaign(program, fault, axis, rate, seed, folder):
     """Record of a campaign with a fault or fewer instruments: what a user gets of it."""
     change = FAULTS.get(fault) or FEWER[fault]
@@ -93,7 +101,9 @@ def campaign(program, fault, axis, rate, seed, folder):
     record = {"unseen": unseen(change, sound), "cpu_init": draft(program, truth, folder)}
     record["check"] = findings(program, folder)
     try:
-        record |= fit(program, truth, folder)
+        record["guessed"] = equipment.ammeter is None
+        words = guess(program, folder) if record["guessed"] else ()
+        record |= fit(program, truth, folder, *words)
     except CampaignError as error:
         return record | {"grade": "refused", "exit": 2, "headline": " ".join(str(error).split())}
     record["causes"] = causes(record["headline"])
@@ -290,7 +300,8 @@ def print_fewer(records):
     table = []
     for (axis, rate, fewer), some in groups.items():
         done = [record for record in some if "new" in record]
-        intervals = with_interval(done)
+        # values beside a guessed amplifier are in its units
+        intervals = with_interval([record for record in done if not record["guessed"]])
         errors = [max(record["new"].values()) for record in done]
         missed = Counter(row["name"] for row in intervals if not holds(row))
         often = [name for name, count in missed.items() if 2 * count > len(done)]
