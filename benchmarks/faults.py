@@ -46,7 +46,7 @@ RATE = 512.0
 FEWER_RATES = {512.0: "at_512", 50.0: "at_50"}
 """Rates of the campaigns with fewer instruments, and their seeds in levels.toml. [Hz]"""
 NAMES = {
-    "run of another axis": r"in sign or scale|scale of hoist_ramp|scale of slew_ramp",
+    "run of another axis": r"differ in scale|moves [\d.]+ times as",
     "spool friction": r"friction or hysteresis",
     "leakage under load, 10 % of the top speed": r"load or leakage",
     "leakage under load, 2 % of the top speed": r"load or leakage",
@@ -61,7 +61,7 @@ NAMES = {
     "supply pressure 20 % low": r"\bZ9\b",
     "play of 0.2 degrees before the encoder": r"friction or hysteresis",
 }
-"""Words by which a verdict names a fault; of others it has none."""
+"""Words by which a verdict or `campaign check` names a fault; of others they have none."""
 
 
 # --- one campaign ---------------------------------------------------------------------------------
@@ -191,15 +191,16 @@ def class_of(row):
 
 
 def named(record):
-    """Where a fault is named: "cause", "assumed" or ""."""
+    """Where a fault is named: in the "verdict", by "check", among what is "assumed", or ""."""
     words = NAMES.get(record["fault"])
     if words is None:
         return ""
-    if re.search(words, record["headline"]):
-        return "cause"
-    if re.search(words, " ".join(record.get("assumed", ()))):
-        return "assumed"
-    return ""
+    texts = {
+        "verdict": record["headline"],
+        "check": " ".join(record["check"]),
+        "assumed": " ".join(record.get("assumed", ())),
+    }
+    return next((place for place, text in texts.items() if re.search(words, text)), "")
 
 
 # --- tables ---------------------------------------------------------------------------------------
@@ -263,17 +264,29 @@ def print_faults(records):
         if key in groups
     ]
     print_table(HEAD, table)
-    bad = [row for row in rows if row["class"] == "B"]
-    usable = [row for row in bad if row["grade"] == "Usable"]
-    predicted = [row for row in bad if row["grade"] == "Usable for prediction"]
-    wrong = [row for row in predicted if row["beyond"][0] > 3.0]
-    print(
-        f"\nOf {len(bad)} campaigns of class B {len(usable)} are called usable, and "
-        f"{len(predicted)} usable for prediction; of these {len(wrong)} err by more than the limit "
-        "in new maneuvers."
+    print_verdicts(rows)
+
+
+GRADES = ("Usable", "Usable for prediction", "Not usable", "refused")
+
+
+def print_verdicts(rows):
+    """How many campaigns of each class have each verdict, and predict worse than it lets expect."""
+    limit = draws.LEVELS["faults"]["matters"]["prediction"]
+    table = []
+    for name in ("sound", "A", "B", "C", "-"):
+        some = [
+            row
+            for row in rows
+            if (name == "sound") == (row["fault"] == "none") and name in {"sound", row["class"]}
+        ]
+        if some:
+            counts = Counter(row["grade"] for row in some)
+            far = [row for row in some if row["exit"] == 0 and max(row["new"].values()) > limit]
+            table.append((name, len(some), *(counts[grade] for grade in GRADES), len(far)))
+    print_table(
+        ("class", "campaigns", *GRADES, f"exit code 0, but error on new above {limit:g} %"), table
     )
-    sound = [row for row in rows if row["fault"] == "none"]
-    print(f"Verdicts of {len(sound)} sound campaigns: {shares(row['grade'] for row in sound)}.")
 
 
 FEWER_HEAD = (

@@ -62,7 +62,8 @@ def record(fault: str, new: float, value: float, **more: Any) -> dict[str, Any]:
     row = {"name": "Z8", "truth": 10.0, "value": value, "lower": value - 1.0, "upper": value + 1.0}
     errors = {"step +1 V": new, "step -1 V": 0.0, "stair": 0.0, "sine 0.5 Hz": 0.0, "chirp": 0.0}
     entries = {"axis": "hoist", "rate": 512.0, "seed": 0, "unseen": False, "grade": "Usable"}
-    return entries | {"fault": fault, "new": errors, "estimates": [row], "headline": ""} | more
+    verdict = {"headline": "", "check": [], "new": errors, "estimates": [row]}
+    return entries | verdict | {"fault": fault} | more
 
 
 def test_classes_are_beyond_the_sound_campaign(bench: ModuleType) -> None:
@@ -91,9 +92,11 @@ def test_causes_of_a_headline_and_whether_they_name_the_fault(bench: ModuleType)
         "drift of encoder_counts over the campaign by -0.265 %",
     ]
     assert bench.causes("Usable.") == []
-    assert bench.named(record("spool friction", 0.0, 10.0, headline=headline)) == "cause"
+    assert bench.named(record("spool friction", 0.0, 10.0, headline=headline)) == "verdict"
     hidden = record("supply pressure 20 % low", 0.0, 10.0, assumed=["in units of the fixed Z9."])
     assert bench.named(hidden) == "assumed"
+    seen = record("run of another axis", 0.0, 10.0, check=["'counts' moves 6.1 times as far."])
+    assert bench.named(seen) == "check"
     assert bench.named(record("ammeter clipped", 0.0, 10.0, headline=headline)) == ""
 
 
