@@ -27,7 +27,6 @@ from pathlib import Path
 
 from command_line import CampaignError, Program, draft, fit, new_names, predicted
 from records import (
-    coverage_cell,
     half_width,
     holds,
     miss,
@@ -45,18 +44,20 @@ FOLDER = Path(__file__).parent
 RATE = 512.0
 FEWER_RATES = {512.0: "at_512", 50.0: "at_50"}
 """Rates of the campaigns with fewer instruments, and their seeds in levels.toml. [Hz]"""
+LATE = r"time stamps of (encoder_counts|the command)|\btau\b"
+"""Which of them is late, logs hardly tell."""
 NAMES = {
     "run of another axis": r"differ in scale|moves [\d.]+ times as",
     "spool friction": r"friction or hysteresis",
     "leakage under load, 10 % of the top speed": r"load or leakage",
     "leakage under load, 2 % of the top speed": r"load or leakage",
     "drift of 8 % over the campaign": r"drift of",
-    "encoder 20 ms late": r"time stamps of encoder_counts",
+    "encoder 20 ms late": LATE,
     "ammeter clipped": r"clipped",
-    "delay 20 ms longer than stated": r"\btau\b",
+    "delay 20 ms longer than stated": LATE,
     "encoder reads 3 % too much": r"scale of encoder_counts",
     "ammeter reads 3 % too much": r"scale of rectified_current",
-    "command's stamps 20 ms late": r"time stamps of the command|\btau\b",
+    "command's stamps 20 ms late": LATE,
     "encoder loses counts above 70 % of the top speed": r"loses counts|largest speeds",
     "supply pressure 20 % low": r"\bZ9\b",
     "play of 0.2 degrees before the encoder": r"friction or hysteresis",
@@ -297,7 +298,7 @@ FEWER_HEAD = (
     "verdict of fit",
     "error on new, median, largest, %",
     "intervals",
-    "hold the truth",
+    "that hold the truth",
     "half width, median %",
     "not held in most campaigns",
 )
@@ -320,8 +321,8 @@ def print_fewer(records):
         often = [name for name, count in missed.items() if 2 * count > len(done)]
         table.append((
             axis, f"{rate:g}", fewer, len(some), shares(record["grade"] for record in some),
-            f"{number(errors)}, {number(errors, max)}", len(intervals), coverage_cell(intervals),
-            number(map(half_width, intervals)), ", ".join(often) or "-",
+            f"{number(errors)}, {number(errors, max)}", len(intervals),
+            f"{sum(map(holds, intervals))}", number(map(half_width, intervals)), ", ".join(often) or "-",
         ))  # fmt: skip
     if table:
         print_table(FEWER_HEAD, table)
