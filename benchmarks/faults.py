@@ -322,7 +322,8 @@ def print_fewer(records):
         table.append((
             axis, f"{rate:g}", fewer, len(some), shares(record["grade"] for record in some),
             f"{number(errors)}, {number(errors, max)}", len(intervals),
-            f"{sum(map(holds, intervals))}", number(map(half_width, intervals)), ", ".join(often) or "-",
+            sum(map(holds, intervals)), number(map(half_width, intervals)),
+            ", ".join(often) or "-",
         ))  # fmt: skip
     if table:
         print_table(FEWER_HEAD, table)
