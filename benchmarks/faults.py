@@ -312,7 +312,9 @@ def print_fewer(records):
             key = record["axis"], record["rate"], record["fault"]
             groups.setdefault(key, []).append(record)
     table = []
-    for (axis, rate, fewer), some in groups.items():
+    order = list(FEWER)
+    for axis, rate, fewer in sorted(groups, key=lambda key: (key[0], -key[1], order.index(key[2]))):
+        some = groups[axis, rate, fewer]
         done = [record for record in some if "new" in record]
         # values beside a guessed amplifier are in its units
         intervals = with_interval([record for record in done if not record["guessed"]])
