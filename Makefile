@@ -15,7 +15,7 @@ export PIP_DISABLE_PIP_VERSION_CHECK := 1
 unexport PYTHONDONTWRITEBYTECODE
 
 .DEFAULT_GOAL := help
-.PHONY: help .venv demo test test-slow test-kernels lint docs figures reproduce bench cluster fuzz tools browser packages calibration owner-table \
+.PHONY: help .venv demo test test-slow test-kernels lint docs figures reproduce bench cluster fuzz tools browser packages calibration faults owner-table \
   coverage dist matrix binaries format clean
 
 help: ## list the targets
@@ -91,6 +91,10 @@ cluster: $(STAMP) ## many starts on a local Dask cluster that loses a worker
 
 calibration: $(STAMP) ## how often intervals hold the truth of a machine written apart, 60 campaigns an axis (hours)
 	@$(BIN)/python benchmarks/calibration.py
+
+faults: $(STAMP) ## what the verdict says of campaigns with a fault or few instruments (hours)
+	@$(BIN)/python benchmarks/faults.py
+	@$(BIN)/python benchmarks/faults.py --fewer
 
 owner-table: $(STAMP) ## whether the numbers of a report's first page hold, over 40 virtual winches
 	@$(BIN)/python benchmarks/owner_table.py

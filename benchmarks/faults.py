@@ -1,342 +1,384 @@
-"""What the judgement says of campaigns with a fault: a row for each fault, on hoist and slew.
+"""What the verdict says of campaigns with a fault, and of fewer instruments, as a user works.
 
-    .venv/bin/python benchmarks/faults.py [--campaigns 20] [--sound 100] [--axes hoist slew]
+    .venv/bin/python benchmarks/faults.py [--campaigns 2] [--sound 10] [--axis hoist slew]
+    .venv/bin/python benchmarks/faults.py --fewer [--campaigns 2]
+    .venv/bin/python benchmarks/faults.py --report FILE.jsonl [--judged JUDGED.jsonl]
 
-Each campaign draws a drive about the published one, puts one fault into the machine, its
-instruments or its logs, is written to files, checked, fitted, judged and validated by the calls
-that `swashplate campaign check`, `fit` and `validate` make. The true error is that of the fitted
-drive on maneuvers that no campaign has, against the machine that was simulated.
+Each campaign is logged by the machine of `second_machine`, which shares no line with swashplate,
+with one fault in the machine, its instruments or its logs. `swashplate campaign init` drafts the
+file, the runs that are held out get their role, nothing else is corrected; `campaign check` and
+`fit` say what they say. The fitted drive's speed is compared with the faulty machine's in maneuvers
+that no campaign has, and its values with the machine's.
+
+Class A: no fit can see the fault, a sound machine with other numbers gives the same signals. Class
+B: it matters, by new maneuvers or by a value, beyond the sound campaign of the same seed. Class C:
+it does not. The limits are in levels.toml.
+
+Every campaign is a line of JSON in `--out`, written as soon as it ends: what stands there already
+is not run again.
 """
 
 import argparse
-import os
-import tempfile
-from collections.abc import Callable
-from dataclasses import dataclass, replace
+import json
+import re
+import sys
+from collections import Counter
 from pathlib import Path
-from statistics import median
 
-# one core for each campaign: threads of the linear algebra would only wait for each other
-os.environ["OPENBLAS_NUM_THREADS"] = "1"
+from command_line import CampaignError, Program, draft, fit, new_names, predicted
+from records import (
+    half_width,
+    holds,
+    miss,
+    missing,
+    number,
+    print_table,
+    read,
+    run_missing,
+    with_interval,
+)
+from second_machine import draws, logger
+from second_machine.faults import FAULTS, FEWER, unseen
 
-import numpy as np
-from campaigns import read, run_missing
-
+FOLDER = Path(__file__).parent
 RATE = 512.0
-NEW = {
-    "hoist": ("stairs:-8:-5:-2:2:5:8", "multisine:6,0.05:0.6:5", "sine:5,0.5"),
-    "slew": ("stairs:-5:-3:3:5", "multisine:5,0.03:0.4:5", "sine:5,0.5"),
+FEWER_RATES = {512.0: "at_512", 50.0: "at_50"}
+"""Rates of the campaigns with fewer instruments, and their seeds in levels.toml. [Hz]"""
+LATE = r"time stamps of (encoder_counts|the command)|\btau\b"
+"""Which of them is late, logs hardly tell."""
+NAMES = {
+    "run of another axis": r"differ in scale|moves [\d.]+ times as",
+    "spool friction": r"friction or hysteresis",
+    "leakage under load, 10 % of the top speed": r"load or leakage",
+    "leakage under load, 2 % of the top speed": r"load or leakage",
+    "drift of 8 % over the campaign": r"drift of",
+    "encoder 20 ms late": LATE,
+    "ammeter clipped": r"clipped",
+    "delay 20 ms longer than stated": LATE,
+    "encoder reads 3 % too much": r"scale of encoder_counts",
+    "ammeter reads 3 % too much": r"scale of rectified_current",
+    "command's stamps 20 ms late": LATE,
+    "encoder loses counts above 70 % of the top speed": r"loses counts|largest speeds",
+    "supply pressure 20 % low": r"\bZ9\b",
+    "play of 0.2 degrees before the encoder": r"friction or hysteresis",
 }
-"""Maneuvers that no campaign has; the true error is the largest of theirs."""
-HELD_OUT = {
-    "hoist": ("step +6.5 V", "step -6.5 V", "sine 6.5 V 0.1 Hz"),
-    "slew": ("sine 4 V 0.1 Hz",),
-}
-COUNTS_PER_TURN = {"hoist": 400.0 * 120.0 / 19.0, "slew": 81_000.0 * 7.0}
-LATE = 10
-"""Samples by which stamps are shifted: 19.5 ms."""
+"""Words by which a verdict or `campaign check` names a fault; of others they have none."""
 
 
-@dataclass(frozen=True)
-class Fault:
-    """One thing that is wrong with a campaign."""
-
-    machine: dict | None = None
-    """Refinements of the machine that was simulated."""
-    scaled: dict | None = None
-    """Factors on parameters of it."""
-    instruments: dict | None = None
-    """Errors of the instruments, beside the realistic ones."""
-    drift: float = 0.0
-    """Share by which the machine's speed changes over the campaign's runs."""
-    logs: Callable | None = None
-    """Changes the columns of a run, a dictionary, in place; given the run's name too."""
-    missing: tuple[str, ...] = ()
-    """Words that the names of runs contain which are not there."""
-    edges: float = 1.0
-    """Counts in a turn over those that the campaign file states."""
-    foreign: str = ""
-    """A run that is of another axis."""
+# --- one campaign ---------------------------------------------------------------------------------
 
 
-def shifted(values, samples):
-    """Values that come later by a number of samples; earlier, for a negative one."""
-    place = np.clip(np.arange(values.size) - samples, 0, values.size - 1)
-    return values[place]
+def causes(headline):
+    """Causes that a headline calls likely, with their sizes."""
+    likely = re.search(r"\(likely: (.*)\)", headline)
+    if not likely:
+        return []
+    text = re.sub(r"^one of these, [^:]*: ", "", likely[1])
+    return [cause.strip(" ;") for cause in re.findall(r"(.+?) explains \d+ %", text)]
 
 
-def encoder_late(columns, name):
-    columns["counts"] = shifted(columns["counts"], LATE)
+def findings(program, folder):
+    """Sentences that `campaign check` marks."""
+    code, output, _, _ = program.run("campaign", "check", "campaign.toml", folder=folder)
+    if code:
+        raise CampaignError(output)
+    return [line[2:] for line in output.splitlines() if line.startswith("! ")]
 
 
-def command_late(columns, name):
-    columns["voltage"] = shifted(columns["voltage"], LATE)
+def guess(program, folder):
+    """Read a start off the logs, which a fit without a current asks for; options of `fit`."""
+    code, output, _, _ = program.run("guess", "campaign.toml", folder=folder)
+    if code:
+        raise CampaignError(output)
+    return "--from", "start.toml", "--setup", "setup.toml"
 
 
-def clipped_ammeter(columns, name):
-    columns["current"] = np.minimum(columns["current"], 0.45)
+def campaign(program, fault, axis, rate, seed, folder):
+    """Record of a campaign with a fault or fewer instruments: what a user gets of it."""
+    change = FAULTS.get(fault) or FEWER[fault]
+    sound = draws.drawn_equipment(axis, seed, rate)
+    equipment = change(sound)
+    truth = logger.write_campaign(equipment, folder)
+    record = {"unseen": unseen(change, sound), "cpu_init": draft(program, truth, folder)}
+    record["check"] = findings(program, folder)
+    try:
+        record["guessed"] = equipment.ammeter is None
+        words = guess(program, folder) if record["guessed"] else ()
+        record |= fit(program, truth, folder, *words)
+    except CampaignError as error:
+        return record | {"grade": "refused", "exit": 2, "headline": " ".join(str(error).split())}
+    record["causes"] = causes(record["headline"])
+    record["new"] = predicted(program, folder, truth, condition=equipment.steady)
+    return record
 
 
-def clipped_ammeter_of_slew(columns, name):
-    columns["current"] = np.minimum(columns["current"], 0.2)
+def fault_items(faults, axes, campaigns, sound, first):
+    """Campaigns of faults from a first seed on; the first seeds of all faults first."""
+    return [
+        {"fault": fault, "axis": axis, "rate": RATE, "seed": first + n}
+        for n in range(max(campaigns, sound))
+        for fault in faults
+        for axis in axes
+        if n < (sound if fault == "none" else campaigns)
+    ]
 
 
-def slow_counter(share):
-    """An encoder that loses edges above a part of the run's largest speed over all runs."""
-
-    def change(columns, name):
-        counts = columns["counts"]
-        steps = np.diff(counts)
-        apart = np.diff(columns["time"])
-        # a mean over 32 samples: an encoder of few edges moves by 0 or 1 a sample
-        speed = np.convolve(steps / apart, np.ones(32) / 32.0, "same")
-        most = share * LARGEST[round(columns["time"].size > 0)]
-        kept = np.clip(speed, -most, most)
-        columns["counts"] = np.floor(counts[0] + np.concatenate([[0.0], np.cumsum(kept * apart)]))
-
-    return change
-
-
-LARGEST = {1: 0.0}
-"""Largest speed of the encoder in the campaign at hand. [count/s]"""
-
-FAULTS = {
-    "none": Fault(),
-    "run of another axis": Fault(foreign="ramp"),
-    "spool friction": Fault(
-        machine={"spool_friction": 0.115, "spool_presliding": 5e-5, "dither_time": 0.6}
-    ),
-    "leakage under load, 10 % of the speed": Fault(machine={"leakage": 0.10}),
-    "load, 2 % of the speed": Fault(machine={"leakage": 0.02}),
-    "drift of 8 % over the campaign": Fault(drift=0.08),
-    "encoder 20 ms late": Fault(logs=encoder_late),
-    "ammeter clipped": Fault(logs=clipped_ammeter),
-    "delay 20 ms longer than held": Fault(machine={"tau": 0.020}),
-    "runs missing": Fault(missing=("-",)),
-    "encoder reads 3 % too much": Fault(edges=1.03),
-    "ammeter reads 3 % too much": Fault(instruments={"current_gain_error": 0.03}),
-    "command's stamps 20 ms late": Fault(logs=command_late),
-    "encoder loses counts above 70 % of the top speed": Fault(logs=slow_counter(0.7)),
-    "supply pressure 20 % low": Fault(scaled={"Z9": 0.8}),
-    "command read back with 8 bits": Fault(instruments={"voltage_bits": 8}),
-    "play of 0.2 degrees before the encoder": Fault(instruments={"backlash": 0.0035}),
-}
+def fewer_items(axes, campaigns):
+    """Campaigns with fewer instruments: of those that have a tacho, at two rates."""
+    items = []
+    for rate, key in FEWER_RATES.items():
+        first, last = draws.LEVELS["seeds"][key]
+        for axis in axes:
+            seeds = [seed for seed in range(first, last + 1) if draws.drawn_tacho(axis, seed)]
+            items += [
+                {"fault": fewer, "axis": axis, "rate": rate, "seed": seed}
+                for seed in seeds[:campaigns]
+                for fewer in FEWER
+            ]
+    return items
 
 
-def simulated_campaign(fault, axis, seed):
-    """Logs of a campaign with a fault, and the machine that was simulated."""
-    from swashplate import Drive
-    from swashplate.campaign import rig
-    from swashplate.identification.fitting import drawn
-    from swashplate.identification.setup import load_setup
-    from swashplate.maneuvers import source_tests
-
-    nominal = Drive.preset(axis)
-    machine = drawn(nominal, load_setup(axis), seed)
-    if fault.scaled:
-        machine = machine.scale(**fault.scaled)
-    if fault.machine:
-        change = dict(fault.machine)
-        if "leakage" in change:
-            lost = change.pop("leakage") * abs(machine.steady_speed(9.0))
-            change |= {"load_torque": 30e3, "motor_leakage": lost / 30e3}
-        if "tau" in change:
-            change["tau"] += machine.parameters.numbers["tau"]
-        machine = machine.replace(**change)
-    tools = replace(rig.SEVERITIES["realistic"], **(fault.instruments or {}))
-    tests = source_tests(axis)
-    held = HELD_OUT[axis]
-    kept = {n: m for n, m in tests.items() if not any(word in n for word in fault.missing)}
-    held = [name for name in held if name in kept]
-
-    def run(drive, some, turn=None):
-        return rig.run(
-            nominal, some, truth=drive, seed=seed, instruments=tools, axis=axis,
-            validate=[name for name in held if name in some], counts_per_turn=turn,
-        )  # fmt: skip
-
-    stated = COUNTS_PER_TURN[axis]
-    made = replace(run(machine, kept, stated * fault.edges), counts_per_turn=stated)
-    runs = dict(made.runs)
-    if fault.drift:
-        for place, (name, maneuver) in enumerate(kept.items()):
-            factor = 1.0 + fault.drift * (place / (len(kept) - 1) - 0.5)
-            runs[name] = run(machine.scale(Z10=factor), {name: maneuver}).runs[name]
-    if fault.foreign:
-        other = Drive.preset("slew" if axis == "hoist" else "hoist")
-        name = next(n for n in runs if n.startswith(fault.foreign) and n not in held)
-        turn = COUNTS_PER_TURN[other.name]
-        runs[name] = replace(run(other, {name: kept[name]}, turn).runs[name], role="fit")
-    if fault.logs is not None:
-        LARGEST[1] = max(
-            float(np.abs(np.diff(each.columns["counts"][::32])).max()) * RATE / 32.0
-            for each in runs.values()
-        )
-        for name, each in runs.items():
-            columns = {key: values.copy() for key, values in each.columns.items()}
-            change = fault.logs
-            if change is clipped_ammeter and axis == "slew":
-                change = clipped_ammeter_of_slew
-            change(columns, name)
-            runs[name] = replace(each, columns=columns)
-    return replace(made, runs=runs), machine
+# --- classes --------------------------------------------------------------------------------------
 
 
-def true_error(found, machine, axis):
-    """Largest error of the shaft's speed on new maneuvers, in per cent of its range."""
-    from swashplate import Drive
-    from swashplate.maneuvers import parse
+def beyond(record, sound):
+    """Error in new maneuvers [% of range] and of a value [half widths] beyond a sound campaign's.
 
-    worst = 0.0
-    for words in NEW[axis]:
-        command = parse(words).sample(RATE)
-        true = machine.simulate(command, RATE).shaft_speed
-        error = Drive(found).simulate(command, RATE).shaft_speed - true
-        worst = max(worst, float(np.sqrt(np.mean(error**2)) / np.ptp(true)))
-    return 100.0 * worst
+    Of each maneuver and each value the difference is taken, and the largest counts.
+    """
+    prediction = max(record["new"][name] - sound["new"][name] for name in new_names())
+    misses = {row["name"]: miss(row) for row in sound["estimates"]}
+    values = [
+        value - misses[row["name"]]
+        for row in record["estimates"]
+        if (value := miss(row)) is not None and misses.get(row["name"]) is not None
+    ]
+    return prediction, max(values, default=None)
 
 
-HIDDEN = {
-    "encoder reads 3 % too much": "scale of counts",
-    "ammeter reads 3 % too much": "scale of current",
-    "command's stamps 20 ms late": "time stamps of the command",
-}
-"""Faults of instruments, and how `lack_of_fit` calls them."""
-FIELDS = (
+def judged(records):
+    """Records with "class" and what it rests on, "beyond"; those without a sound one left out."""
+    key = ("axis", "rate", "seed")
+    sound = {
+        tuple(record[name] for name in key): record
+        for record in records
+        if record["fault"] == "none" and "new" in record
+    }
+    rows = []
+    for record in records:
+        other = sound.get(tuple(record[name] for name in key))
+        if record["fault"] not in FAULTS or other is None or "error" in record:
+            continue
+        row = dict(record)
+        row["named"] = named(record)
+        if "new" not in record:
+            row["beyond"], row["class"] = (None, None), "-"
+        else:
+            row["beyond"] = beyond(record, other)
+            row["class"] = class_of(row)
+        rows.append(row)
+    return rows
+
+
+def class_of(row):
+    """Class of a fault in a campaign."""
+    if row["unseen"]:
+        return "A"
+    limits = draws.LEVELS["faults"]["matters"]
+    prediction, value = row["beyond"]
+    if prediction > limits["prediction"] or (value is not None and value > limits["value"]):
+        return "B"
+    return "C"
+
+
+def named(record):
+    """Where a fault is named: in the "verdict", by "check", among what is "assumed", or ""."""
+    words = NAMES.get(record["fault"])
+    if words is None:
+        return ""
+    texts = {
+        "verdict": record["headline"],
+        "check": " ".join(record["check"]),
+        "assumed": " ".join(record.get("assumed", ())),
+    }
+    return next((place for place, text in texts.items() if re.search(words, text)), "")
+
+
+# --- tables ---------------------------------------------------------------------------------------
+
+HEAD = (
     "fault",
     "axis",
-    "seed",
-    "check",
-    "grade",
-    "code",
-    "ratio",
-    "cause",
-    "error",
-    "worst",
     "class",
-    "validate",
+    "check, findings",
+    "verdict of fit",
+    "exit code",
+    "headline claims, %",
+    "error on new, %",
+    "worst value, half widths",
+    "named",
+    "likely cause",
 )
 
 
-def campaign(_, item):
-    """One row: what check, fit and validate say of a campaign, and how wrong the fit is."""
-    name, axis, seed = item
-    from swashplate import Campaign, Drive
-    from swashplate.campaign import rig
-    from swashplate.errors import SwashplateError
-    from swashplate.identification.criteria import verdict
-    from swashplate.identification.data_checks import check_runs
-    from swashplate.identification.drive_model import true_value
-    from swashplate.identification.fitting import fit, smooth
-    from swashplate.identification.misfit import lack_of_fit
-    from swashplate.identification.setup import load_setup
-    from swashplate.identification.validation import predict
-
-    fault, nominal = FAULTS[name], Drive.preset(axis)
-    tests, machine = simulated_campaign(fault, axis, seed)
-    with tempfile.TemporaryDirectory() as folder:
-        read = Campaign.from_toml(rig.write(tests, Path(folder) / "virtual"))
-        runs, held = read.select(role="fit"), read.select(role="validate")
-    try:
-        found = len(check_runs(runs, smooth(nominal.parameters)))
-        result = fit(nominal.parameters, runs, load_setup(axis), threads=1)
-    except SwashplateError as error:
-        return [(name, axis, seed, "refused", "Not usable", 2, "", str(error), "", "", "B", "")]
-    stages, drive = result.stages, result.parameters
-    predicted = predict(drive, held)
-    judged = verdict(stages, predicted, planned=[s.name for s in result.setup.stages])
-    misfit = lack_of_fit(stages)
-    worst = 0.0
-    for each in stages:
-        problem = each.problem
-        for unknown, estimate in zip(problem.unknowns, each.uncertainty.estimates, strict=True):
-            true = true_value(unknown, problem.model, machine.parameters)
-            if true is not None and estimate.lower is not None and estimate.upper is not None:
-                half = 0.5 * (estimate.upper - estimate.lower)
-                worst = max(worst, abs(true - estimate.value) / half)
-    error = true_error(drive, machine, axis)
-    known = misfit.fault(HIDDEN.get(name, ""))
-    fixed = any(symbol in misfit.units for symbol in fault.scaled or ())
-    if fixed or (known is not None and known.hidden and known.outside < 0.01):
-        kind = "A"
-    else:
-        kind = "B" if error > 3.0 or worst > 3.0 else "C"
-    ratio = max(misfit.ratios.values(), default="")
-    cause = misfit.causes[0].name if misfit.causes and ratio > 1.2 else ""
-    code = 0 if judged.usable else 1
-    alone = verdict((), predicted)
-    validated = "predicts" if alone.usable else alone.grade
-    row = (
-        name, axis, seed, f"{found} findings" if found else "-", judged.grade, code, ratio, cause,
-        error, worst, kind, validated,
-    )  # fmt: skip
-    return [row]
+def shares(values):
+    """Values with how often each is there, if they differ."""
+    counts = Counter(value or "-" for value in values)
+    if len(counts) == 1:
+        return next(iter(counts))
+    return ", ".join(f"{value} ({count})" for value, count in counts.most_common())
 
 
-def most(rows, field):
-    """The commonest entry of a column, and its share where it is not alone."""
-    values = [row[field] for row in rows]
-    common = max(set(values), key=values.count)
-    share = values.count(common) / len(values)
-    return f"{common or '-'}{'' if share == 1.0 else f' ({share:.0%})'}"
+def fault_row(fault, axis, rows):
+    """Cells of `HEAD` for the campaigns of a fault and an axis; numbers are medians."""
+    done = [row for row in rows if "new" in row]
+    first = [re.sub(r" by [+-].*", "", row["causes"][0]) for row in done if row["causes"]]
+    return (
+        fault,
+        axis,
+        shares(row["class"] for row in rows),
+        number([len(row["check"]) for row in rows]),
+        shares(row["grade"] for row in rows),
+        shares(str(row["exit"]) for row in rows),
+        number([row["claim"] for row in done]),
+        number([max(row["new"].values()) for row in done]),
+        number([max(map(miss_or_zero, row["estimates"]), default=0.0) for row in done]),
+        shares(row["named"] for row in rows),
+        shares(first) if first else "-",
+    )
 
 
-def report(rows):
-    """A row for each fault and axis."""
-    heads = (
-        "fault", "axis", "campaigns", "class", "check", "verdict of fit", "exit code",
-        "residual / known error", "likely cause named", "validate", "error on new, %",
-        "worst value, half widths",
-    )  # fmt: skip
-    print(f"| {' | '.join(heads)} |")
-    print("|---|---|--:|---|---|---|---|--:|---|---|--:|--:|")
-    for name in FAULTS:
-        for axis in NEW:
-            some = [row for row in rows if row["fault"] == name and row["axis"] == axis]
-            if not some:
-                continue
-            numbers = []
-            for field in ("ratio", "error", "worst"):
-                known = [float(row[field]) for row in some if row[field]]
-                numbers.append(f"{median(known):.3g}" if known else "-")
-            cells = (
-                name, axis, f"{len(some)}", most(some, "class"), most(some, "check"),
-                most(some, "grade"), most(some, "code"), numbers[0], most(some, "cause"),
-                most(some, "validate"), numbers[1], numbers[2],
-            )  # fmt: skip
-            print(f"| {' | '.join(cells)} |")
-    sound = [row for row in rows if row["fault"] == "none"]
-    if sound:
-        false = [row for row in sound if row["grade"] != "Usable"]
-        wrong = [row for row in false if float(row["error"]) > 0.05]
-        print(
-            f"\nFalse alarms: {len(false)} of {len(sound)} sound campaigns, in {len(wrong)} of "
-            "them the search ended in another optimum (error on new maneuvers above 0.05 %)."
-        )
+def miss_or_zero(row):
+    """Miss of an estimate; 0 where an end of its interval is missing."""
+    return miss(row) or 0.0
+
+
+def print_faults(records):
+    """The table of the faults, and what it says as a whole."""
+    rows = judged(records)
+    groups = {}
+    for row in rows:
+        groups.setdefault((row["fault"], row["axis"]), []).append(row)
+    table = [
+        fault_row(*key, groups[key])
+        for key in ((fault, axis) for fault in FAULTS for axis in draws.AXES)
+        if key in groups
+    ]
+    print_table(HEAD, table)
+    print_verdicts(rows)
+
+
+GRADES = ("Usable", "Usable for prediction", "Not usable", "refused")
+
+
+def print_verdicts(rows):
+    """How many campaigns of each class have each verdict, and predict worse than it lets expect."""
+    limit = draws.LEVELS["faults"]["matters"]["prediction"]
+    table = []
+    for name in ("sound", "A", "B", "C", "-"):
+        some = [
+            row
+            for row in rows
+            if (name == "sound") == (row["fault"] == "none") and name in {"sound", row["class"]}
+        ]
+        if some:
+            counts = Counter(row["grade"] for row in some)
+            far = [row for row in some if row["exit"] == 0 and max(row["new"].values()) > limit]
+            table.append((name, len(some), *(counts[grade] for grade in GRADES), len(far)))
+    print_table(
+        ("class", "campaigns", *GRADES, f"exit code 0, but error on new above {limit:g} %"), table
+    )
+
+
+FEWER_HEAD = (
+    "axis",
+    "rate, Hz",
+    "instruments",
+    "campaigns",
+    "verdict of fit",
+    "error on new, median, largest, %",
+    "intervals",
+    "that hold the truth",
+    "half width, median %",
+    "not held in most campaigns",
+)
+
+
+def print_fewer(records):
+    """The table of campaigns with fewer instruments."""
+    groups = {}
+    for record in records:
+        if record["fault"] in FEWER and "error" not in record:
+            key = record["axis"], record["rate"], record["fault"]
+            groups.setdefault(key, []).append(record)
+    table = []
+    order = list(FEWER)
+    for axis, rate, fewer in sorted(groups, key=lambda key: (key[0], -key[1], order.index(key[2]))):
+        some = groups[axis, rate, fewer]
+        done = [record for record in some if "new" in record]
+        # values beside a guessed amplifier are in its units
+        intervals = with_interval([record for record in done if not record["guessed"]])
+        errors = [max(record["new"].values()) for record in done]
+        missed = Counter(row["name"] for row in intervals if not holds(row))
+        often = [name for name, count in missed.items() if 2 * count > len(done)]
+        table.append((
+            axis, f"{rate:g}", fewer, len(some), shares(record["grade"] for record in some),
+            f"{number(errors)}, {number(errors, max)}", len(intervals),
+            sum(map(holds, intervals)), number(map(half_width, intervals)),
+            ", ".join(often) or "-",
+        ))  # fmt: skip
+    if table:
+        print_table(FEWER_HEAD, table)
 
 
 def main():
-    """Run what is missing in the file, write it, print the table."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--axes", nargs="+", default=["hoist", "slew"])
-    parser.add_argument("--campaigns", type=int, default=50, help="of each fault")
-    parser.add_argument("--sound", type=int, default=1000, help="without a fault, on each axis")
+    """Run what is missing in the file, print the tables."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    axes = ("hoist", "slew")
+    parser.add_argument("--axis", nargs="+", choices=axes, default=axes)
+    parser.add_argument("--fault", nargs="+", choices=FAULTS, default=list(FAULTS))
+    parser.add_argument("--campaigns", type=int, default=2, help="of each fault")
+    parser.add_argument("--sound", type=int, default=10, help="without a fault")
+    parser.add_argument("--fewer", action="store_true", help="fewer instruments instead of faults")
+    parser.add_argument(
+        "--development", action="store_true", help="seeds that nothing is quoted of"
+    )
+    parser.add_argument("--python", default=sys.executable, help="executable with swashplate")
     parser.add_argument("--jobs", type=int, default=2)
-    parser.add_argument("--out", type=Path, default=Path("benchmarks/build/faults.csv"))
-    wanted = parser.parse_args()
-    wanted.out.parent.mkdir(parents=True, exist_ok=True)
-    kept = read(wanted.out)
-    done = {(row["fault"], row["axis"], int(row["seed"])) for row in kept}
-    todo = [
-        (name, axis, seed)
-        for seed in range(max(wanted.campaigns, wanted.sound))
-        for axis in wanted.axes
-        for name in FAULTS
-        if seed < (wanted.sound if name == "none" else wanted.campaigns)
-        and (name, axis, seed) not in done
-    ]
-    run_missing(campaign, todo, wanted.jobs, wanted.out, FIELDS)
-    report(read(wanted.out))
+    parser.add_argument("--out", type=Path, default=FOLDER / "build" / "faults.jsonl")
+    parser.add_argument("--keep", type=Path, help="folder in which logs and fits stay")
+    parser.add_argument("--report", type=Path, help="print the tables of this file; run nothing")
+    parser.add_argument("--judged", type=Path, help="write the records with their classes here")
+    arguments = parser.parse_args()
+    path = arguments.report or arguments.out
+    if arguments.report is None:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        if arguments.fewer:
+            items = fewer_items(arguments.axis, arguments.campaigns)
+        else:
+            seeds = draws.LEVELS["seeds"]
+            first = seeds["development_from"] if arguments.development else seeds["at_512"][0]
+            items = fault_items(
+                arguments.fault, arguments.axis, arguments.campaigns, arguments.sound, first
+            )
+        program = Program(arguments.python)
+
+        def work(item, folder):
+            return campaign(program, **item, folder=folder)
+
+        run_missing(work, missing(items, read(path)), arguments.jobs, path, arguments.keep)
+    records = read(path)
+    print_faults(records)
+    print_fewer(records)
+    if arguments.judged is not None:
+        lines = [json.dumps(row) + "\n" for row in judged(records)]
+        arguments.judged.write_text("".join(lines), "utf-8")
+    for record in records:
+        if "error" in record:
+            last = " ".join(record["error"].split())[-300:]
+            print(f"\nFailed: {record['fault']}, {record['axis']}, {record['seed']}: {last}")
 
 
 if __name__ == "__main__":

@@ -2,6 +2,7 @@
 
 import ast
 import csv
+from dataclasses import replace
 from pathlib import Path
 from types import ModuleType
 
@@ -20,6 +21,7 @@ def machine() -> ModuleType:
         import second_machine.checks
         import second_machine.draws
         import second_machine.equations
+        import second_machine.faults
         import second_machine.logger
 
         return second_machine
@@ -94,7 +96,8 @@ def test_march_agrees_with_scipy(machine: ModuleType, run: int) -> None:
 
 
 def test_campaign_is_as_a_logger_leaves_it(machine: ModuleType, tmp_path: Path) -> None:
-    truth = machine.logger.write_campaign("luff", 1003, tmp_path, rate=50.0)
+    equipment = machine.draws.drawn_equipment("luff", 1003, rate=50.0)
+    truth = machine.logger.write_campaign(equipment, tmp_path)
     logs = sorted((tmp_path / "logs").iterdir())
     by_time = sorted(logs, key=lambda path: path.stat().st_mtime)
     assert [path.name for path in by_time] == truth["runs"]
@@ -119,3 +122,112 @@ def test_campaign_is_as_a_logger_leaves_it(machine: ModuleType, tmp_path: Path) 
     turned = machine.logger.Machine(numbers).march(command, length, condition)[-1, 4]
     turns = (counts[-1] - counts[0]) / truth["counts_per_turn"]
     assert 2.0 * np.pi * turns == pytest.approx(turned, abs=4.0 * np.pi / truth["counts_per_turn"])
+
+
+SIGNALS = {
+    "none": "",
+    "run of another axis": "",
+    "spool friction": "counts",
+    "leakage under load, 10 % of the top speed": "counts",
+    "leakage under load, 2 % of the top speed": "counts",
+    "drift of 8 % over the campaign": "counts",
+    "encoder 20 ms late": "counts",
+    "ammeter clipped": "current",
+    "delay 20 ms longer than stated": "counts current",
+    "runs missing": "",
+    "encoder reads 3 % too much": "counts",
+    "ammeter reads 3 % too much": "current",
+    "command's stamps 20 ms late": "voltage",
+    "encoder loses counts above 70 % of the top speed": "counts",
+    "supply pressure 20 % low": "counts",
+    "command read with 8 bits": "voltage",
+    "play of 0.2 degrees before the encoder": "counts",
+}
+"""What a fault changes in the log of a step of 9 V."""
+
+
+@pytest.mark.parametrize("fault", SIGNALS)
+def test_fault_changes_what_it_says_and_nothing_else(machine: ModuleType, fault: str) -> None:
+    run = "step +9 V"
+    sound = machine.draws.drawn_equipment("hoist", 1000)
+    faulty = machine.faults.FAULTS[fault](sound)
+    before = machine.logger.drive_columns(sound, run)
+    after = machine.logger.drive_columns(faulty, run)
+    assert list(before) == list(after)
+    changed = {name.split()[0] for name in before if before[name] != after[name]}
+    assert changed == {{"counts": "encoder"}.get(word, word) for word in SIGNALS[fault].split()}
+    lost = {name for name in sound.conditions if "-" in name} if fault == "runs missing" else set()
+    assert sound.conditions.keys() - faulty.conditions.keys() == lost
+    assert set(sound.held_out) - set(faulty.held_out) == lost & set(sound.held_out)
+    assert set(faulty.elsewhere) == ({"ramp +1 V/s"} if fault == "run of another axis" else set())
+
+
+def test_every_fault_is_tested(machine: ModuleType) -> None:
+    assert set(SIGNALS) == set(machine.faults.FAULTS)
+
+
+def logged(machine: ModuleType, fault: str) -> dict[str, np.ndarray]:
+    """A step of hoist by the first word of its columns' names."""
+    equipment = machine.faults.FAULTS[fault](machine.draws.drawn_equipment("hoist", 1000))
+    texts = machine.logger.drive_columns(equipment, "step +9 V")
+    return {name.split()[0]: np.array(column, dtype=float) for name, column in texts.items()}
+
+
+def test_sizes_of_faults_of_instruments(machine: ModuleType) -> None:
+    before = logged(machine, "none")
+    late = np.interp(before["time"] - 0.02, before["time"], before["encoder"])
+    assert logged(machine, "encoder 20 ms late")["encoder"] == pytest.approx(late, abs=2.0)
+    turned, more = (
+        logged(machine, fault)["encoder"][-1] for fault in ("none", "encoder reads 3 % too much")
+    )
+    assert more == pytest.approx(1.03 * turned, abs=5.0)  # counters begin at 0 to 4
+    clipped = logged(machine, "ammeter clipped")["current"]
+    assert clipped == pytest.approx(np.minimum(before["current"], 0.45))
+    current = logged(machine, "ammeter reads 3 % too much")["current"]
+    assert current == pytest.approx(1.03 * before["current"], abs=1.1e-3)
+    # 8 bits over 20 V
+    coarse = np.unique(logged(machine, "command read with 8 bits")["voltage"])
+    assert coarse / (20.0 / 256.0) == pytest.approx(np.round(coarse / (20.0 / 256.0)), abs=1e-4)
+    moved = [
+        values["time"][np.argmax(values["voltage"] > 4.5)]
+        for values in (before, logged(machine, "command's stamps 20 ms late"))
+    ]
+    assert moved[1] - moved[0] == pytest.approx(0.02, abs=0.003)
+
+
+def test_sizes_of_faults_of_the_machine(machine: ModuleType) -> None:
+    sound = machine.draws.drawn_equipment("hoist", 1000)
+    top = machine.faults.top_speed(sound)
+    numbers = machine.draws.published("hoist")
+    # the speed of STATIC at 9 V is that of the plate's stop
+    published = machine.faults.top_speed(replace(sound, parameters=numbers))
+    assert np.rad2deg(published) == pytest.approx(196.0, abs=0.05)
+
+    def settled(fault: str, volts: float) -> float:
+        equipment = machine.faults.FAULTS[fault](sound)
+        command = machine.controller.held_exactly(lambda t: np.full(t.size, volts), 4.0, 10.0)
+        steady = machine.logger.Machine(equipment.parameters)
+        return float(steady.march(command, 4.0, equipment.steady)[-1, 5])
+
+    for volts in (9.0, -9.0):
+        loss = settled("none", volts) - settled("leakage under load, 10 % of the top speed", volts)
+        assert loss == pytest.approx(np.sign(volts) * 0.1 * top, rel=1e-3)
+    assert settled("leakage under load, 10 % of the top speed", 0.0) == 0.0
+    # on average over the fitted runs nothing drifts
+    speeds = [
+        machine.faults.FAULTS["drift of 8 % over the campaign"](sound).conditions[run].speed
+        / condition.speed
+        for run, condition in sound.conditions.items()
+    ]
+    fitted = [run not in sound.held_out for run in sound.conditions]
+    assert np.ptp(speeds) == pytest.approx(0.08)
+    assert np.mean(np.array(speeds)[fitted]) == pytest.approx(1.0)
+
+
+def test_what_no_fit_can_see(machine: ModuleType) -> None:
+    """Gains that other numbers of hoist take up; a late encoder has no such numbers."""
+    sound = machine.draws.drawn_equipment("hoist", 1000)
+    faults = machine.faults
+    for fault in (faults.encoder_gain, faults.ammeter_gain, faults.low_supply):
+        assert faults.unseen(fault, sound)
+    assert not faults.unseen(faults.encoder_late, sound)

@@ -1,8 +1,9 @@
 """A machine, its controller and its instruments, drawn for an axis and a seed from levels.toml."""
 
 import tomllib
-from dataclasses import dataclass
-from math import pi
+from dataclasses import dataclass, field
+from datetime import datetime
+from math import inf, pi
 from pathlib import Path
 
 import numpy as np
@@ -85,19 +86,25 @@ def drawn_parameters(axis, seed, stated_spread=0.0):
         sound campaign has none.
     """
     numbers = published(axis)
-    levels = LEVELS["parameters"]
     random = generator(axis, seed, "parameters")
-    determined = set()
-    for symbol in levels[axis]:
-        for name in (symbol, f"{symbol}_plus", f"{symbol}_minus"):
-            if name in numbers:
-                numbers[name] *= drawn(random, levels["factor"])
-                determined.add(name)
+    free = determined(axis, numbers)
+    for name in free:
+        numbers[name] *= drawn(random, LEVELS["parameters"]["factor"])
     if stated_spread:
         random = generator(axis, seed, "stated")
-        for name in numbers.keys() - determined:
+        for name in numbers.keys() - set(free):
             numbers[name] *= 1.0 + stated_spread * float(random.standard_normal())
     return numbers
+
+
+def determined(axis, numbers):
+    """Names of the numbers that the tests of an axis determine."""
+    return [
+        name
+        for symbol in LEVELS["parameters"][axis]
+        for name in (symbol, f"{symbol}_plus", f"{symbol}_minus")
+        if name in numbers
+    ]
 
 
 def as_read(numbers, gain):
@@ -123,8 +130,8 @@ def pump(numbers):
     """Pump and motor."""
     longer = {"p": "plus", "m": "minus"}
     values = []
-    for field in Pump._fields:
-        symbol, _, direction = field.partition("_")
+    for name in Pump._fields:
+        symbol, _, direction = name.partition("_")
         values.append(numbers[f"{symbol}_{longer[direction]}" if direction else symbol])
     return Pump(*values)
 
@@ -173,6 +180,8 @@ class Logger:
     """Gain of the command's converter. [1]"""
     zero: float
     """Zero of it. [V]"""
+    command_delay: float = 0.0
+    """By which the command's stamps are late. [s]"""
 
 
 @dataclass(frozen=True)
@@ -192,6 +201,8 @@ class Ammeter:
     """Amplitude of the driver's ripple, share of the current."""
     ripple_frequency: float
     """[Hz]"""
+    limit: float = inf
+    """Largest reading. [A]"""
 
 
 @dataclass(frozen=True)
@@ -204,6 +215,10 @@ class Encoder:
     """Errors of the four edges of a line. [count]"""
     play: float
     """Full width. [rad or m]"""
+    delay: float = 0.0
+    """By which its readings are late. [s]"""
+    fastest: float = inf
+    """Counts a second beyond which the counter loses them."""
 
 
 @dataclass(frozen=True)
@@ -338,6 +353,7 @@ def drawn_conditions(axis, seed):
             level=spread * float(random.standard_normal()),
             ripple_phase=float(random.uniform(0.0, 2.0 * pi)),
             hunting_phase=float(random.uniform(0.0, 2.0 * pi)),
+            leakage=0.0,
             **fixed,
         )
         for share in warm
@@ -366,5 +382,73 @@ STEADY = Condition(
     hysteresis=0.0,
     shaft_frequency=0.0,
     shaft_damping=0.0,
+    leakage=0.0,
 )
 """A run in which nothing but the drive's own equations acts."""
+
+
+# --- a campaign -----------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Equipment:
+    """All that a campaign is made with, as one value: the machine, its instruments, its runs."""
+
+    axis: str
+    seed: int
+    parameters: dict[str, float]
+    """Numbers of the machine by name."""
+    conditions: dict[str, Condition | float]
+    """Condition by run, in the order of the day; of a cylinder the factor on its speed."""
+    stamps: dict[str, float]
+    """Time of the log's file by run. [s since 1970]"""
+    held_out: tuple[str, ...]
+    """Runs that no fit gets."""
+    logger: Logger
+    encoder: Encoder
+    counts_per_turn: float
+    """As the encoder's label says; 1 for a cylinder."""
+    ammeter: Ammeter | None = None
+    tacho: Tacho | None = None
+    steady: Condition = STEADY
+    """In which new maneuvers are run."""
+    elsewhere: dict[str, "Equipment"] = field(default_factory=dict)
+    """What logs of runs are filed under this campaign's names by mistake."""
+
+
+def drawn_equipment(axis, seed, rate=512.0, stated_spread=0.0):
+    """The equipment of a sound campaign.
+
+    Parameters
+    ----------
+    axis : str
+        "hoist", "slew", "luff" or "cylinder".
+    seed : int
+    rate : float
+        Samples a second of the logger.
+    stated_spread : float
+        As of `drawn_parameters`.
+    """
+    names, gaps = day(axis, seed)
+    start = datetime.fromisoformat(LEVELS["campaign"]["start"]).timestamp()
+    encoder = drawn_encoder(axis, seed)
+    if axis == "cylinder":
+        parameters = drawn_cylinder(seed)._asdict()
+        conditions, turn, ammeter = drawn_gains(seed), 1.0, None
+    else:
+        parameters = drawn_parameters(axis, seed, stated_spread)
+        conditions, turn = drawn_conditions(axis, seed), 2.0 * pi / encoder.step
+        ammeter = drawn_ammeter(axis, seed)
+    return Equipment(
+        axis=axis,
+        seed=seed,
+        parameters=parameters,
+        conditions=dict(zip(names, conditions, strict=True)),
+        stamps=dict(zip(names, start + np.cumsum(gaps), strict=True)),
+        held_out=tuple(LEVELS["held_out"][axis]),
+        logger=drawn_logger(axis, seed, rate),
+        encoder=encoder,
+        counts_per_turn=turn,
+        ammeter=ammeter,
+        tacho=drawn_tacho(axis, seed),
+    )

@@ -84,6 +84,7 @@ class Condition(NamedTuple):
     hysteresis: float  # full width, of the current [A]
     shaft_frequency: float  # [Hz]; 0 for a rigid shaft
     shaft_damping: float  # [1]
+    leakage: float  # speed that the motor loses to leakage under a load that resists it [rad/s]
 
 
 class Cylinder(NamedTuple):
@@ -270,8 +271,15 @@ def pressure_rate(t, pressure, i, p, run):
 
 @njit(cache=True)
 def motor_speed(pressure, p, run):
-    """(6.69): speed of the motor, at the drum. [rad/s]"""
-    return p.Z10 * run.speed * swash_angle(pressure, p) - p.Z11
+    """(6.69): speed of the motor, at the drum, less what leaks under its load. [rad/s]
+
+    A load that resists motion in both directions holds the motor until the pump gives more than
+    leaks.
+    """
+    speed = p.Z10 * run.speed * swash_angle(pressure, p) - p.Z11
+    if speed > 0.0:
+        return max(speed - run.leakage, 0.0)
+    return min(speed + run.leakage, 0.0)
 
 
 @njit(cache=True)

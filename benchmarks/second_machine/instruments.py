@@ -52,10 +52,24 @@ def counted(position, edges):
     return output
 
 
+@njit(cache=True)
+def slow_counter(time, position, fastest):
+    """A position as a counter follows it that loses what is beyond a speed [position a second]."""
+    output = np.empty_like(position)
+    output[0] = position[0]
+    for n in range(1, position.size):
+        most = fastest * (time[n] - time[n - 1])
+        step = min(max(position[n] - position[n - 1], -most), most)
+        output[n] = output[n - 1] + step
+    return output
+
+
 def encoder(rows, position, time, tool, zero):
     """Counts at instants; `zero` is the counter's reading at the start, in counts."""
     moved = after_play(position, tool.play)
-    counts = at(time, rows, moved) / tool.step + zero
+    if np.isfinite(tool.fastest):
+        moved = slow_counter(rows[:, 0], moved, tool.fastest * tool.step)
+    counts = at(time - tool.delay, rows, moved) / tool.step + zero
     return counted(counts, np.array(tool.edges))
 
 
@@ -66,7 +80,7 @@ def ammeter(rows, time, tool, random):
     wave = np.sin(2.0 * pi * tool.ripple_frequency * clock + phase)
     reading = at(time, rows, lagged(clock, current * (1.0 + tool.ripple * wave), tool.bandwidth))
     reading = tool.gain * reading + tool.zero + tool.noise * random.standard_normal(time.size)
-    return np.round(reading / tool.resolution) * tool.resolution
+    return np.round(np.minimum(reading, tool.limit) / tool.resolution) * tool.resolution
 
 
 def tacho(rows, time, tool, random):

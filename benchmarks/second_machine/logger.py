@@ -4,7 +4,6 @@ import csv
 import json
 import os
 from dataclasses import dataclass
-from datetime import datetime
 from pathlib import Path
 from typing import NamedTuple
 
@@ -12,7 +11,7 @@ import numpy as np
 
 from . import controller, draws, instruments
 from .draws import LEVELS
-from .equations import march_cylinder, march_drive
+from .equations import Cylinder, march_cylinder, march_drive
 
 NEW_RATE = 512.0
 """Rows a second of new maneuvers."""
@@ -76,8 +75,8 @@ class DriveRun(NamedTuple):
     """[s]"""
     volts: np.ndarray
     """[V]"""
-    current: np.ndarray
-    """[A]"""
+    current: np.ndarray | None
+    """Of the ammeter, if there is one. [A]"""
     counts: np.ndarray
     speed: np.ndarray | None
     """Of the tacho, if there is one. [rad/s]"""
@@ -88,59 +87,65 @@ def run_random(axis, seed, run):
     return np.random.default_rng([seed, LEVELS["seeds"][axis], 100 + run_index(axis, run)])
 
 
-def given_command(axis, seed, logger, run, random, exact):
+def given_command(equipment, run, random, exact):
     """Command of a run, instants and stamps of its samples [s], and what is logged of it [V].
 
     With `exact` it goes straight between the samples, unrounded, and is logged without an error.
     """
+    axis, seed, logger = equipment.axis, equipment.seed, equipment.logger
     length, wish = controller.maneuver(run.split(",")[0], axis)
     instants, stamps = sample_instants(logger, length, random)
     if exact:
         return controller.straight(instants, wish(instants)), instants, stamps, wish(instants)
     command = controller.held(wish, length, draws.drawn_controller(axis, seed, run))
-    return command, instants, stamps, read_command(logger, command.at(instants), random)
+    volts = command.at(instants - logger.command_delay)
+    return command, instants, stamps, read_command(logger, volts, random)
 
 
-def drive_run(axis, seed, logger, run, condition, machine, exact=False):
+def drive_run(equipment, run, exact=False):
     """Run a drive once and read its instruments; `exact` as of `given_command`."""
-    random = run_random(axis, seed, run)
-    command, instants, stamps, volts = given_command(axis, seed, logger, run, random, exact)
-    rows = machine.march(command, command.edges[-1], condition)
+    random = run_random(equipment.axis, equipment.seed, run)
+    command, instants, stamps, volts = given_command(equipment, run, random, exact)
+    machine = Machine(equipment.parameters)
+    rows = machine.march(command, command.edges[-1], equipment.conditions[run])
     zero = random.uniform(0.0, 4.0)
-    encoder = draws.drawn_encoder(axis, seed)
-    counts = instruments.encoder(rows, rows[:, 4], instants, encoder, zero)
-    current = instruments.ammeter(rows, instants, draws.drawn_ammeter(axis, seed), random)
-    tacho = draws.drawn_tacho(axis, seed)
-    speed = None if tacho is None else instruments.tacho(rows, instants, tacho, random)
+    counts = instruments.encoder(rows, rows[:, 4], instants, equipment.encoder, zero)
+    current, speed = None, None
+    if equipment.ammeter is not None:
+        current = instruments.ammeter(rows, instants, equipment.ammeter, random)
+    if equipment.tacho is not None:
+        speed = instruments.tacho(rows, instants, equipment.tacho, random)
     return DriveRun(stamps, volts, current, counts, speed)
 
 
-def drive_columns(axis, seed, logger, run, condition, machine, exact):
+def drive_columns(equipment, run, exact=False):
     """Header and text of the columns of a drive's run."""
-    signals = drive_run(axis, seed, logger, run, condition, machine, exact)
+    equipment = equipment.elsewhere.get(run, equipment)
+    signals = drive_run(equipment, run, exact)
     columns = {
-        "time [s]": written(signals.stamps, logger.stamp_digits),
+        "time [s]": written(signals.stamps, equipment.logger.stamp_digits),
         "voltage [V]": written(signals.volts, COMMAND_DIGITS),
-        "current [A]": written(signals.current, 4),
-        "encoder [counts]": written(signals.counts, 0),
     }
+    if signals.current is not None:
+        columns["current [A]"] = written(signals.current, 4)
+    columns["encoder [counts]"] = written(signals.counts, 0)
     if signals.speed is not None:
         columns["speed [rad/s]"] = written(signals.speed, 6)
     return columns
 
 
-def cylinder_columns(seed, logger, run, gain, cylinder, exact):
+def cylinder_columns(equipment, run, exact=False):
     """Header and text of the columns of a cylinder's run."""
-    random = run_random("cylinder", seed, run)
-    command, instants, stamps, volts = given_command("cylinder", seed, logger, run, random, exact)
-    rows = march_cylinder(command.edges, command.volts, cylinder, gain)
-    tool = draws.drawn_encoder("cylinder", seed)
+    random = run_random("cylinder", equipment.seed, run)
+    command, instants, stamps, volts = given_command(equipment, run, random, exact)
+    cylinder = Cylinder(**equipment.parameters)
+    rows = march_cylinder(command.edges, command.volts, cylinder, equipment.conditions[run])
     zero = random.uniform(0.0, 4.0)
-    rod = instruments.encoder(rows, rows[:, 2], instants, tool, zero) * tool.step
+    counts = instruments.encoder(rows, rows[:, 2], instants, equipment.encoder, zero)
     return {
-        "time [s]": written(stamps, logger.stamp_digits),
+        "time [s]": written(stamps, equipment.logger.stamp_digits),
         "valve [V]": written(volts, COMMAND_DIGITS),
-        "rod [m]": written(rod, 6),
+        "rod [m]": written(counts * equipment.encoder.step, 6),
     }
 
 
@@ -158,20 +163,15 @@ def write_run(path, columns, stamp):
     os.utime(path, (stamp, stamp))
 
 
-def write_campaign(axis, seed, folder, rate=512.0, stated_spread=0.0, exact_command=False):
+def write_campaign(equipment, folder, exact_command=False):
     """Write the logs of a campaign and what they were made with.
 
     Parameters
     ----------
-    axis : str
-        "hoist", "slew", "luff" or "cylinder".
-    seed : int
+    equipment : draws.Equipment
+        As drawn, or changed by a fault.
     folder : Path
         Gets `logs/` and `truth.json`.
-    rate : float
-        Samples a second of the logger.
-    stated_spread : float
-        As of `draws.drawn_parameters`.
     exact_command : bool
         Whether the command goes straight between the samples and is logged without an error. It
         does not in a sound campaign: this is for what a fit gets of knowing it.
@@ -179,49 +179,32 @@ def write_campaign(axis, seed, folder, rate=512.0, stated_spread=0.0, exact_comm
     Returns
     -------
     dict
-        "parameters" by name, "counts_per_turn" (1 for a cylinder), "ammeter_gain", "held_out"
-        (names of files), "runs" (names of files in the order of the day).
+        "parameters" by name, "counts_per_turn" (1 for a cylinder), "ammeter_gain" (1 without an
+        ammeter), "held_out" (names of files), "runs" (names of files in the order of the day).
     """
     folder = Path(folder)
     logs = folder / "logs"
     logs.mkdir(parents=True, exist_ok=True)
-    logger = draws.drawn_logger(axis, seed, rate)
-    names, gaps = draws.day(axis, seed)
-    clock = datetime.fromisoformat(LEVELS["campaign"]["start"]).timestamp()
-    if axis == "cylinder":
-        cylinder = draws.drawn_cylinder(seed)
-        parameters = cylinder._asdict()
-        conditions = draws.drawn_gains(seed)
-    else:
-        parameters = draws.drawn_parameters(axis, seed, stated_spread)
-        machine = Machine(parameters)
-        conditions = draws.drawn_conditions(axis, seed)
-    for run, gap, condition in zip(names, gaps, conditions, strict=True):
-        if axis == "cylinder":
-            columns = cylinder_columns(seed, logger, run, condition, cylinder, exact_command)
-        else:
-            columns = drive_columns(axis, seed, logger, run, condition, machine, exact_command)
-        clock += gap
-        write_run(logs / file_name(axis, run), columns, clock)
+    axis = equipment.axis
+    columns = cylinder_columns if axis == "cylinder" else drive_columns
+    for run in equipment.conditions:
+        write_run(
+            logs / file_name(axis, run),
+            columns(equipment, run, exact_command),
+            equipment.stamps[run],
+        )
     truth = {
         "axis": axis,
-        "seed": seed,
-        "rate": rate,
-        "parameters": parameters,
-        "counts_per_turn": turn(axis, seed),
-        "ammeter_gain": 1.0 if axis == "cylinder" else draws.drawn_ammeter(axis, seed).gain,
-        "held_out": [file_name(axis, run) for run in LEVELS["held_out"][axis]],
-        "runs": [file_name(axis, run) for run in names],
+        "seed": equipment.seed,
+        "rate": equipment.logger.rate,
+        "parameters": equipment.parameters,
+        "counts_per_turn": equipment.counts_per_turn,
+        "ammeter_gain": 1.0 if equipment.ammeter is None else equipment.ammeter.gain,
+        "held_out": [file_name(axis, run) for run in equipment.held_out],
+        "runs": [file_name(axis, run) for run in equipment.conditions],
     }
     (folder / "truth.json").write_text(json.dumps(truth, indent=1), "utf-8")
     return truth
-
-
-def turn(axis, seed):
-    """Counts a turn of a campaign's encoder, as its label says; 1 for a cylinder."""
-    if axis == "cylinder":
-        return 1.0
-    return 2.0 * np.pi / draws.drawn_encoder(axis, seed).step
 
 
 def new_command(name, axis):
@@ -231,7 +214,7 @@ def new_command(name, axis):
     return time, wish(time)
 
 
-def new_run(numbers, axis, name):
+def new_run(numbers, axis, name, condition=draws.STEADY):
     """A new maneuver of a drive, without instruments, 512 rows a second.
 
     Returns
@@ -240,7 +223,7 @@ def new_run(numbers, axis, name):
         Time [s], command [V], straight between rows, and speed of the drum [rad/s].
     """
     time, volts = new_command(name, axis)
-    rows = Machine(numbers).march(controller.straight(time, volts), time[-1])
+    rows = Machine(numbers).march(controller.straight(time, volts), time[-1], condition)
     return np.column_stack([time, volts, np.interp(time, rows[:, 0], rows[:, 5])])
 
 

@@ -1,0 +1,254 @@
+"""A campaign of the second machine by the command line of an installation, as a user works."""
+
+import csv
+import json
+import os
+import re
+import subprocess
+import tempfile
+import tomllib
+from pathlib import Path
+from threading import Timer
+
+import numpy as np
+from second_machine import draws, logger
+
+LONGEST = 600.0
+"""After which a command is ended, and the campaign counted as failed. [s]"""
+
+
+class Program:
+    """The swashplate of a Python executable, by its command line."""
+
+    def __init__(self, python):
+        self.python = python
+        self.environment = {
+            **os.environ,
+            "OPENBLAS_NUM_THREADS": "1",
+            "OMP_NUM_THREADS": "1",
+            "COLUMNS": "1000",  # no sentence is broken into lines
+            "NO_COLOR": "1",
+        }
+
+    def run(self, *words, folder):
+        """Exit code, output, CPU time [s] and largest memory [MB] of a command."""
+        with tempfile.TemporaryFile("w+", encoding="utf-8") as stream:
+            process = subprocess.Popen(
+                [self.python, "-m", "swashplate", *map(str, words)],
+                cwd=folder,
+                stdout=stream,
+                stderr=subprocess.STDOUT,
+                env=self.environment,
+            )
+            watch = Timer(LONGEST, process.kill)
+            watch.start()
+            _, status, usage = os.wait4(process.pid, 0)
+            watch.cancel()
+            process.returncode = os.waitstatus_to_exitcode(status)
+            stream.seek(0)
+            output = stream.read()
+        seconds = usage.ru_utime + usage.ru_stime
+        return process.returncode, output, seconds, usage.ru_maxrss / 1024.0
+
+
+class CampaignError(Exception):
+    """A command of a campaign that ended with an error."""
+
+
+def set_roles(path, held_out):
+    """Give the runs of a drafted campaign file their roles."""
+    lines, role = [], "fit"
+    for line in path.read_text("utf-8").splitlines():
+        named = re.match(r'\s*file\s*=\s*"([^"]+)"', line)
+        if named:
+            role = "validate" if Path(named[1]).name in held_out else "fit"
+        lines.append(re.sub(r'^(\s*role\s*=\s*)"\w+"', rf'\1"{role}"', line))
+    path.write_text("\n".join(lines) + "\n", "utf-8")
+    roles = [run.get("role", "fit") for run in tomllib.loads(path.read_text("utf-8"))["runs"]]
+    if roles.count("validate") != len(held_out):
+        raise CampaignError(
+            f"{path.name}: {roles.count('validate')} runs are held out, not {held_out}"
+        )
+
+
+def draft(program, truth, folder):
+    """Draft `campaign.toml` from the logs of a folder, give the held-out runs their role.
+
+    Nothing else is corrected. Returns the CPU time. [s]
+    """
+    logs = sorted(Path("logs") / path.name for path in (folder / "logs").iterdir())
+    known = ["--drive", truth["axis"], "--counts-per-turn", repr(truth["counts_per_turn"])]
+    words = known if truth["axis"] != "cylinder" else []
+    code, output, seconds, _ = program.run(
+        "campaign", "init", *logs, *words, "--out", "campaign.toml", folder=folder
+    )
+    if code:
+        raise CampaignError(output)
+    set_roles(folder / "campaign.toml", truth["held_out"])
+    return seconds
+
+
+def with_forces(numbers, setup):
+    """Parameters by name, and the forces at the currents of a fit configuration."""
+    numbers = dict(numbers)
+    for stage in setup.get("stages", ()):
+        for direction, sign in (("plus", 1.0), ("minus", -1.0)):
+            for n, e in enumerate(stage.get("forces", {}).get(direction, ()), 1):
+                coefficients = [numbers[f"Z{k}_{direction}"] for k in (19, 20, 21, 22)]
+                force = sum(c * (sign * e) ** k for k, c in enumerate(coefficients, 1))
+                numbers[f"force_{direction}_{n}"] = sign * force
+    return numbers
+
+
+OLDER = {"value": "estimate", "lower": "lower 95 %", "upper": "upper 95 %"}
+"""What older installations called the columns of estimates.csv."""
+
+
+def number_in(row, column):
+    """Number in a row of estimates.csv; None if the field is empty."""
+    text = row[column] if column in row else row[OLDER[column]]
+    return float(text) if text else None
+
+
+def estimates(fitted, truth):
+    """Estimates of what the machine has, and the names of those that it has not.
+
+    "as_read" is the truth in the amperes of the campaign's ammeter.
+    """
+    file = fitted / "setup.toml"
+    setup = tomllib.loads(file.read_text("utf-8")) if file.exists() else {}
+    numbers = with_forces(truth["parameters"], setup)
+    as_read = with_forces(draws.as_read(truth["parameters"], truth["ammeter_gain"]), setup)
+    rows, without = [], set()
+    with (fitted / "estimates.csv").open(encoding="utf-8", newline="") as stream:
+        for row in csv.DictReader(stream):
+            name = row["parameter"]
+            if name not in numbers:
+                without.add(name.partition(" (")[0])
+                continue
+            rows.append(
+                {
+                    "name": name,
+                    "truth": numbers[name],
+                    "as_read": as_read[name],
+                    "value": number_in(row, "value"),
+                    "lower": number_in(row, "lower"),
+                    "upper": number_in(row, "upper"),
+                }
+            )
+    return rows, sorted(without)
+
+
+def predicted(program, folder, truth, *words, condition=draws.STEADY):
+    """Errors of a fit's speed in new maneuvers: RMS, % of the speed's range, by name.
+
+    By `validate` on logs without instruments. The range is that of the steady machine: one under
+    load may stand still.
+
+    Parameters
+    ----------
+    program : Program
+    folder : Path
+        Holds the fit in `fitted`.
+    truth : dict
+        As of `logger.write_campaign`.
+    words : str or Path
+        More options of `validate`.
+    condition : Condition
+        Of a drive's machine in these maneuvers.
+    """
+    cylinder = truth["axis"] == "cylinder"
+    unit = "m/s" if cylinder else "rad/s"
+    lines = [
+        'title = "new maneuvers"',
+        "[axes.machine]",
+        'time = { column = "time", unit = "s" }',
+        'input = { kind = "voltage", column = "voltage", unit = "V", interpolation = "linear" }',
+        f'channels.speed = {{ kind = "shaft_speed", column = "speed", unit = "{unit}" }}',
+    ]
+    if not cylinder:
+        lines.insert(2, f'drive = "{truth["axis"]}"')
+    ranges = {}
+    for name in new_names():
+        if cylinder:
+            run = steady = logger.new_cylinder_run(draws.drawn_cylinder(truth["seed"]), name)
+        else:
+            run = logger.new_run(truth["parameters"], truth["axis"], name, condition)
+            steady = logger.new_run(truth["parameters"], truth["axis"], name)
+        time, volts, speed = run.T
+        file = f"{name}.csv".replace(" ", "_")
+        write_table(folder / file, {"time": time, "voltage": volts, "speed": speed})
+        lines += ["[[runs]]", f'file = "{file}"', 'role = "validate"']
+        ranges[file.removesuffix(".csv")] = (name, float(np.ptp(steady[:, 2])))
+    (folder / "new.toml").write_text("\n".join(lines) + "\n", "utf-8")
+    code, output, _, _ = program.run(
+        "validate", "fitted", "new.toml", "--out", "new", *words, folder=folder
+    )
+    if code not in {0, 1}:
+        raise CampaignError(output)
+    errors = {}
+    with (folder / "new" / "measures.csv").open(encoding="utf-8", newline="") as stream:
+        for row in csv.DictReader(stream):
+            if row["channel"] == "speed":
+                name, size = ranges[row["run"]]
+                errors[name] = 100.0 * float(row["rmse"]) / size
+    return errors
+
+
+def new_names():
+    """Names of the new maneuvers."""
+    return [name for name, entry in draws.LEVELS["new"].items() if isinstance(entry, dict)]
+
+
+def write_table(path, columns):
+    """Write columns of numbers to a CSV file, to the last digit."""
+    with path.open("w", encoding="utf-8", newline="") as stream:
+        writer = csv.writer(stream)
+        writer.writerow(columns)
+        writer.writerows(zip(*(values.tolist() for values in columns.values()), strict=True))
+
+
+def claims(headline):
+    """Errors that a verdict claims of the held-out speed: mean and worst run, % of range."""
+    speed = (
+        r"speed(?: from)?[ \w]*? to ([\d.eE+-]+) % of its range(?: \(worst run ([\d.eE+-]+) %\))?"
+    )
+    said = re.search(speed, headline)
+    if not said:
+        return None, None
+    return tuple(float(text) if text else None for text in said.groups())
+
+
+def fit(program, truth, folder, *words):
+    """Fit `campaign.toml` into `fitted`.
+
+    Returns
+    -------
+    dict
+        "cpu_fit" [s], "memory" [MB], "exit", of the verdict "grade", "headline", "assumed" and
+        "unmet" (criteria), "claim" and "claim_worst" as of `claims`, "estimates" and
+        "without_counterpart" as of `estimates`.
+    """
+    code, output, seconds, memory = program.run(
+        "fit", "campaign.toml", "--out", "fitted", "--jobs", 1, *words, folder=folder
+    )
+    if code not in {0, 1}:
+        raise CampaignError(output)
+    verdict = json.loads((folder / "fitted" / "fit.json").read_text("utf-8")).get("verdict") or {}
+    headline = verdict.get("headline", "")
+    # an older installation stores no verdict, but prints it
+    claim, worst = claims(headline or output)
+    rows, without = estimates(folder / "fitted", truth)
+    return {
+        "cpu_fit": seconds,
+        "memory": memory,
+        "exit": code,
+        "grade": verdict.get("grade", ""),
+        "headline": headline,
+        "assumed": verdict.get("assumed", []),
+        "unmet": [name for name, _, _, _, failure, *_ in verdict.get("criteria", []) if failure],
+        "claim": claim,
+        "claim_worst": worst,
+        "estimates": rows,
+        "without_counterpart": without,
+    }
