@@ -266,7 +266,7 @@ def _followed(
                 given.values,
                 RATE,
                 time=given.time,
-                interpolation=given.interpolation,
+                interpolation="previous" if given.is_held else "linear",
                 start=each.experiment.begins,
             )
             parts = (run.current_positive, run.current_negative)

@@ -27,7 +27,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from swashplate.drive import Drive
-    from swashplate.equations.marching.record import Interpolation
 
 _OPEN = re.compile("=.*FIXME")
 """A line of a draft that a person has to fill in."""
@@ -178,7 +177,7 @@ class Campaign(Result):
         ours = (each for each in self if axis in (None, each.axis))
         return tuple(each for each in ours if role in (None, each.role))
 
-    def with_interpolation(self, axis: str, between: Interpolation) -> Campaign:
+    def with_interpolation(self, axis: str, between: schema.Between) -> Campaign:
         """The campaign with the input of an axis joined in one way between its samples."""
         experiments = [
             replace(each, input=each.input.joined(between)) if each.axis == axis else each

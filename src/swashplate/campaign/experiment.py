@@ -13,7 +13,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swashplate.campaign.recognition import UNNAMED, Recognised
-from swashplate.campaign.schema import ChannelKind, InitialState, InputKind, Role, shown_unit
+from swashplate.campaign.schema import (
+    Between,
+    ChannelKind,
+    InitialState,
+    InputKind,
+    Role,
+    shown_unit,
+)
 from swashplate.errors import UnknownNameError
 from swashplate.results import Result, Tabular, figures
 from swashplate.tables import UNIT, Column, Table
@@ -121,8 +128,9 @@ class InputSignal(Result):
     """(n,) stamps. [s]"""
     values: Array
     """(n,) samples, in `unit`."""
-    interpolation: Interpolation
-    """What it is between two stamps."""
+    interpolation: Between
+    """What it is between two stamps: ``"jumps"`` is straight but for sudden changes, which come at
+    once in the middle of both."""
     source: Source
     limits: tuple[float, float] | None = None
     """Range of the instrument, in `unit`."""
@@ -143,22 +151,47 @@ class InputSignal(Result):
         """(n,) whether a sample counts: all, because what is ignored is not read."""
         return np.ones(self.time.size, np.bool_)
 
-    def joined(self, between: Interpolation) -> InputSignal:
+    def joined(self, between: Between) -> InputSignal:
         """The signal joined in one way between its stamps, which is settled with that."""
         return replace(self, interpolation=between, settled=True)
+
+    @property
+    def is_held(self) -> bool:
+        """Whether it stays at a sample until the next one."""
+        return self.interpolation == "previous"
+
+    @cached_property
+    def jumps(self) -> NDArray[np.intp]:
+        """(j,) places of the last samples before sudden changes, beside which it hardly moves."""
+        changes = np.abs(np.diff(self.values))
+        beside = np.pad(changes, 1)
+        alone = np.maximum(beside[:-2], beside[2:]) < BESIDE * changes
+        return np.flatnonzero((changes > SUDDEN * np.ptp(self.values)) & alone)
+
+    def with_jumps(self) -> InputSignal:
+        """The signal with its jumps at once, in the middle of the samples beside them.
+
+        A straight line from sample to sample would pass a dead zone at its beginning, and the
+        current's jump there come up to half a sample too early.
+        """
+        places = self.jumps
+        middle = 0.5 * (self.time[places] + self.time[places + 1])
+        beside = np.stack([np.nextafter(middle, -np.inf), middle], axis=1)
+        levels = np.stack([self.values[places], self.values[places + 1]], axis=1)
+        between = np.repeat(places + 1, 2)
+        time = np.insert(self.time, between, beside.ravel())
+        return replace(self, time=time, values=np.insert(self.values, between, levels.ravel()))
 
     @cached_property
     def edges(self) -> tuple[Edge, ...]:
         """Its jumps at instants that are not known: of a command that is held there are none."""
-        if self.interpolation == "previous":
+        if self.is_held:
             return ()
-        changes, apart = np.abs(np.diff(self.values)), np.diff(self.time)
-        beside = np.pad(changes, 1)
-        alone = np.maximum(beside[:-2], beside[2:]) < BESIDE * changes
-        sudden = (changes > SUDDEN * np.ptp(self.values)) & (apart > APART) & alone
+        apart = np.diff(self.time)
         return tuple(
             Edge(int(k), float(self.time[k] + 0.5 * apart[k]), float(apart[k]))
-            for k in np.flatnonzero(sudden)
+            for k in self.jumps
+            if apart[k] > APART
         )
 
     def with_edges(self, late: Mapping[int, float]) -> InputSignal:
@@ -300,7 +333,7 @@ class Channel(Result):
 
 
 def _between(signal: InputSignal | Channel, time: Array) -> Array:
-    if signal.interpolation == "linear":
+    if signal.interpolation != "previous":
         return np.interp(time, signal.time, signal.values)
     held = np.searchsorted(signal.time, time, side="right") - 1
     return signal.values[np.maximum(held, 0)]

@@ -143,6 +143,8 @@ def conversion(kind: str, unit: str | None, what: str) -> tuple[str, float, floa
 
 LARGEST_PRESSURE = 1e10
 """At the stroking piston: the plausible sizes of Z15 end here. [Pa]"""
+Between = Literal["previous", "linear", "jumps"]
+"""What an input is between two samples: the earlier one, a straight line, or a line that jumps."""
 Role = Literal["fit", "validate", "ignore"]
 InitialState = Literal["rest", "steady", "given", "estimated"]
 AnyWindow = TypeVar("AnyWindow", bound="Window")
@@ -274,10 +276,11 @@ class Input(Signal):
     """The signal that drives the axis."""
 
     kind: InputKind = Field("voltage", description="voltage, current (signed, no card) or other.")
-    interpolation: Literal["previous", "linear"] | None = Field(
+    interpolation: Between | None = Field(
         None,
-        description="Between two samples: hold the earlier one, or a straight line. Left out, a "
-        "fit takes what fits better, everything else the straight line.",
+        description="Between two samples: hold the earlier one, a straight line, or such a line "
+        "with sudden changes in the middle of both. Left out, a fit takes what fits best, "
+        "everything else the straight line.",
     )
     ignore: tuple[Window, ...] = Field(
         (), description="Windows whose samples are left out: the input goes on across them."

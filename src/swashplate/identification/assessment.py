@@ -19,9 +19,9 @@ from tomlkit import dumps
 from swashplate.__about__ import __version__
 from swashplate.campaign.campaign import Campaign
 from swashplate.campaign.experiment import Experiment
+from swashplate.campaign.schema import Between
 from swashplate.documents import read_json
 from swashplate.drive import Drive
-from swashplate.equations.marching.record import Interpolation
 from swashplate.errors import DomainError, FileError, InputError, MissingFileError
 from swashplate.identification import tables
 from swashplate.identification.criteria import REQUIRED, Criterion, Grade, Verdict, verdict
@@ -461,7 +461,7 @@ class FitFile(Entry):
     """Path of the campaign file, from the folder of this one."""
     runs: dict[str, str]
     """Name to fingerprint of each run that was fitted, in their order."""
-    interpolation: Interpolation = "linear"
+    interpolation: Between = "linear"
     """What the input is between samples, as the fit took it."""
     nominal: str | dict[str, float]
     """What the fit began from: a drive's parameter file, or the numbers of a model of one's own."""

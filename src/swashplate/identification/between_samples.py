@@ -1,18 +1,19 @@
 """What a command does between its samples, as the runs themselves show it.
 
-Held until the next sample, a command acts half a sample later than joined by straight lines. A
-drive's lag makes up for the difference, so that the wrong one biases ω by several per cent.
+Held until the next sample, a command acts half a sample later than joined by straight lines. And a
+straight line passes the dead zone at the beginning of a sudden change, half a sample too early. A
+drive's lag makes up for the difference, so that the wrong way biases ω by several per cent.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from swashplate.campaign.experiment import Experiment
-from swashplate.equations.marching.record import Interpolation
+from swashplate.campaign.schema import Between
 from swashplate.errors import DomainError
 from swashplate.identification.drive_model import Parameters, stage_problem
 from swashplate.identification.model import EquationModel
@@ -20,10 +21,12 @@ from swashplate.identification.problem import Loss
 from swashplate.identification.setup import Setup
 from swashplate.identification.solving import solve
 
-OTHER: dict[Interpolation, Interpolation] = {"linear": "previous", "previous": "linear"}
-WORDS = {"linear": "a straight line between samples", "previous": "held until the next sample"}
-LATER = {"linear": "later", "previous": "earlier"}
-"""How the other way acts."""
+WORDS: Mapping[Between, str] = {
+    "linear": "a straight line between samples",
+    "previous": "held until the next sample",
+    "jumps": "a straight line between samples that jumps in the middle of two",
+}
+"""The ways, of which the first one is taken if none is better."""
 ENOUGH = 30
 """Evaluations after which a search for the better of two is near enough to its end."""
 ALIKE = 1e-6
@@ -32,7 +35,7 @@ CLEARLY = 0.01
 """Part by which residuals must be smaller the other way before what was stated is doubted."""
 
 
-def joined(runs: Sequence[Experiment], between: Interpolation) -> tuple[Experiment, ...]:
+def joined(runs: Sequence[Experiment], between: Between) -> tuple[Experiment, ...]:
     """Runs with their input joined in one way."""
     return tuple(replace(run, input=run.input.joined(between)) for run in runs)
 
@@ -47,26 +50,28 @@ def settle(
 ) -> tuple[tuple[Experiment, ...], tuple[str, ...]]:
     """Runs with what their input is between samples settled, and a sentence on what was taken.
 
-    The first stage is fitted both ways, and the one that leaves the smaller residuals is taken. A
+    The first stage is fitted each way, and the one that leaves the smallest residuals is taken. A
     model that its own code simulates is not tried, as each evaluation may take minutes: its input
     is a straight line unless stated, and the sentence says so. What the campaign states is not
     tried either, see `doubt`.
     """
     if all(run.input.settled for run in runs):
         return tuple(runs), ()
-    compared = _compared(runs, nominal, setup, loss, threads)
-    if compared is None:
+    costs = _costs(runs, nominal, setup, loss, threads)
+    if costs is None:
         return joined(runs, "linear"), (
             "The command is taken as a straight line between samples, which was not tried: state "
             f"interpolation in [axes.{runs[0].axis}.input] if it is held.",
         )
-    better, smaller = compared
-    if smaller < ALIKE:
+    better = min(costs, key=lambda between: costs[between])
+    if _smaller(costs[better], max(costs.values())) < ALIKE:
         return joined(runs, "linear"), ()
     step = float(np.median([np.median(np.diff(run.input.time)) for run in runs]))
+    other: Between = "linear" if better == "previous" else "previous"
+    later = "earlier" if better == "previous" else "later"
     return joined(runs, better), (
-        f"The command is taken as {WORDS[better]}: as {WORDS[OTHER[better]]}, half a sample "
-        f"({500.0 * step:.2g} ms) {LATER[better]}, it fits worse.",
+        f"The command is taken as {WORDS[better]}: as {WORDS[other]}, half a sample "
+        f"({500.0 * step:.2g} ms) {later}, it fits worse.",
     )
 
 
@@ -79,9 +84,11 @@ def doubt(
     threads: int | None = None,
 ) -> tuple[str, ...]:
     """A sentence if the input is stated in one way, but the other fits clearly better."""
-    better, smaller = _compared(runs, nominal, setup, loss, threads) or ("linear", 0.0)
     stated = runs[0].input.interpolation
-    if better == stated or smaller < CLEARLY:
+    costs = _costs(runs, nominal, setup, loss, threads) or {stated: 0.0}
+    better = min(costs, key=lambda between: costs[between])
+    smaller = _smaller(costs[better], costs[stated])
+    if smaller < CLEARLY:
         return ()
     return (
         f'The campaign states interpolation = "{stated}" for the input of {runs[0].axis}, but '
@@ -90,16 +97,17 @@ def doubt(
     )
 
 
-def _compared(
+def _costs(
     runs: Sequence[Experiment],
     nominal: Parameters,
     setup: Setup,
     loss: Loss,
     threads: int | None,
-) -> tuple[Interpolation, float] | None:
-    """The way that fits better, and by what part its residuals are smaller; None if not tried."""
-    costs = dict[Interpolation, float]()
-    for between in OTHER:
+) -> dict[Between, float] | None:
+    """Cost of the first stage each way, straight lines first; None if a model is not tried."""
+    costs = dict[Between, float]()
+    sudden = any(run.input.jumps.size for run in runs)
+    for between in WORDS if sudden else ("linear", "previous"):
         problem = stage_problem(setup.stages[0], nominal, joined(runs, between), threads=threads)
         if not isinstance(problem.model, EquationModel):
             return None
@@ -107,6 +115,9 @@ def _compared(
             costs[between] = solve(problem, loss=loss, max_evaluations=ENOUGH).cost
         except DomainError:
             return None  # the fit itself says where the model does not hold
-    better = min(costs, key=lambda between: costs[between])
-    larger = costs[OTHER[better]]
-    return better, 1.0 - (costs[better] / larger) ** 0.5 if larger > 0.0 else 0.0
+    return costs
+
+
+def _smaller(cost: float, other: float) -> float:
+    """Part by which residuals of one cost are smaller than those of another."""
+    return 1.0 - (cost / other) ** 0.5 if other > 0.0 else 0.0

@@ -326,7 +326,7 @@ class OwnModel(Result, EquationModel):
             {left[0]: command.values},
             rate,
             time=None if rate == even else command.time,
-            interpolation=command.interpolation,
+            interpolation="previous" if command.is_held else "linear",
             substeps=self.substeps,
         )[left[0]]
         record = replace(record, start=float(command.time[0]))
