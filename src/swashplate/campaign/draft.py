@@ -501,7 +501,8 @@ def _accuracy_lines(kind: str, unit: str | None) -> list[str]:
     try:
         _, factor, _ = conversion(kind, unit, kind)
     except InputError:
-        return []  # the line of the unit says FIXME
+        # `_unit_lines` has left the unit open, so a zero in it means nothing yet
+        return []
     limits["zero"] /= factor
     stated = ", ".join(f"{name} = {limit:.3g}" for name, limit in limits.items())
     why = f"share of the reading, and {unit or KINDS[kind].units[0]}; assumed, see its data sheet"

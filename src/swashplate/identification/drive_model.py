@@ -113,9 +113,9 @@ def _record(signal: InputSignal) -> Record:
 
     The grid of one with sudden changes is finer, so that these come at once.
     """
-    what, own = str(signal.kind), even_rate(signal.time)
-    even = own is not None and own >= SLOWEST
-    rate = own if own is not None and even else SOURCE_RATE
+    what, stamped = str(signal.kind), even_rate(signal.time)
+    even = stamped is not None and stamped >= SLOWEST
+    rate = stamped if stamped is not None and even else SOURCE_RATE
     if _jumps_at_once(signal, even=even):
         sharp = signal.with_jumps()
         record = record_of(
