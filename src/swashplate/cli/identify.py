@@ -30,8 +30,8 @@ from swashplate.tables import PRINTED, TABLE, check_folder, joined, made_folder
 
 if TYPE_CHECKING:
     from swashplate.identification.assessment import Identification
-    from swashplate.identification.criteria import Verdict
     from swashplate.identification.drive_model import Parameters
+    from swashplate.identification.verdict import Verdict
     from swashplate.parameters.parameter_set import ParameterSet
 
 INTERRUPTED = 130
@@ -47,7 +47,7 @@ FILES = {
 """What `Identification.save` writes, of a drive or of a user-defined model."""
 MEASURES = (
     "NRMSE is the RMSE over the standard deviation of what was measured, fit % is 100 (1 - NRMSE); "
-    "'of its range' below means RMSE over the largest less the smallest value measured."
+    "'of range' below means over the largest less the smallest value of the signal."
 )
 
 Loss = Literal["linear", "soft_l1", "cauchy"]
@@ -222,15 +222,17 @@ def _reported(found: Identification, out: Path, truth: ParameterSet | None = Non
 
 
 def _say_verdict(verdict: Verdict) -> None:
-    """Print criteria, range of validity, what is assumed, and the headline.
+    """Print the stated errors, what the verdict rests on, its answers, and the headline.
 
     Ends with code 1 if what was judged is not usable.
     """
     show(verdict.table())
-    bullets(verdict.not_judged)
+    bullets(verdict.remarks)
     if verdict.assumed:
-        say("Assumed, cannot be checked from these logs:")
+        say("Assumed, as these logs cannot show it:")
     bullets(verdict.assumed)
+    for name, answer in verdict.answers().items():
+        say(f"{name}: {answer}")
     if not verdict.usable:
         side.print(verdict.headline)
         raise typer.Exit(1)
@@ -265,9 +267,9 @@ def validate(
     """
     from swashplate.identification import tables
     from swashplate.identification.assessment import versions
-    from swashplate.identification.criteria import verdict
     from swashplate.identification.data_checks import refuse_unsound, spike_findings
     from swashplate.identification.validation import predict, with_speeds
+    from swashplate.identification.verdict import verdict
 
     if out is not None:
         check_folder(out)
@@ -307,7 +309,6 @@ def validate(
     note(f"{campaign.title}{virtual}, {chosen}: {parameters.name} from {drive}")
     show(*measures)
     say(MEASURES)
-    bullets(judged.sentences)
     for line in lines:
         note(line)
     _say_verdict(judged)

@@ -13,13 +13,12 @@ from swashplate.errors import ParameterError, SwashplateError
 from swashplate.parameters.files import preset_names
 
 if TYPE_CHECKING:
-    from swashplate.identification.assessment import StoredVerdict
-    from swashplate.identification.criteria import Grade
+    from swashplate.identification.verdict import Verdict
 
 DRIVE_FILE, FIT_FILE = "drive.toml", "fit.json"
 """What a fit writes into its folder: the drive, and the fit itself with its verdict."""
 UNUSABLE: Final = "Not usable"
-"""Grade of a fit that nothing should rest on; the title of such a drive says it, too."""
+"""How the verdict begins on a fit that nothing should rest on; the title of such a drive has it."""
 
 
 class Fitted(Protocol):
@@ -41,8 +40,8 @@ class DriveSource(NamedTuple):
     """Its file, or how it was given."""
     fit: Path | None
     """Folder of the fit that found it; None if there is none, or it was changed since."""
-    grade: Grade | None
-    """Grade of that fit's verdict; None if no verdict is known."""
+    judged_usable: bool | None
+    """Whether that fit's verdict calls it usable; None if no verdict is known."""
     verdict: str
     """Headline of the verdict, or the clause why none is known."""
     validity: str = ""
@@ -51,14 +50,14 @@ class DriveSource(NamedTuple):
     @property
     def usable(self) -> bool:
         """Whether no verdict says that it is not."""
-        return self.grade != UNUSABLE
+        return self.judged_usable is not False
 
     def words(self) -> str:
         """Where the drive comes from, what the verdict was and what it holds for.
 
         It ends a sentence, and may go on with another one.
         """
-        if self.grade is None:
+        if self.judged_usable is None:
             return f"{self.place}; no verdict on it is known, as {self.verdict}."
         return f"{self.place}; the verdict on its fit is: {self.verdict} {self.validity}".rstrip()
 
@@ -133,11 +132,11 @@ def _source(given: DriveLike, drive: Drive, path: Path | None) -> DriveSource | 
         return None
     stated = _stated_in_title(drive)
     if isinstance(given, Drive):
-        return DriveSource(f"'{drive.name}'", None, UNUSABLE, stated) if stated else None
+        return DriveSource(f"'{drive.name}'", None, False, stated) if stated else None
     verdict = getattr(given, "verdict", None)
     if verdict is None:
         return DriveSource("that of a fit", None, None, "the fit was not judged")
-    return DriveSource("that of a fit", None, verdict.grade, verdict.headline, verdict.validity)
+    return DriveSource("that of a fit", None, verdict.usable, verdict.headline, verdict.validity)
 
 
 def _source_of_file(path: Path, drive: Drive) -> DriveSource:
@@ -148,27 +147,27 @@ def _source_of_file(path: Path, drive: Drive) -> DriveSource:
         fit = path.parent
         verdict, why = _stored_verdict(stored, drive)
         if verdict is not None:
-            return DriveSource(str(path), fit, verdict.grade, verdict.headline, verdict.validity)
+            return DriveSource(str(path), fit, verdict.usable, verdict.headline, verdict.validity)
     stated = _stated_in_title(drive)
     if stated:
-        return DriveSource(str(path), fit, UNUSABLE, stated)
+        return DriveSource(str(path), fit, False, stated)
     return DriveSource(str(path), fit, None, why)
 
 
-def _stored_verdict(path: Path, drive: Drive) -> tuple[StoredVerdict | None, str]:
+def _stored_verdict(path: Path, drive: Drive) -> tuple[Verdict | None, str]:
     """The verdict of a stored fit on a drive; None and the clause why if it is not known."""
     # only what comes from a fit needs the identification
     from swashplate.identification.assessment import read_verdict
 
     try:
-        verdict = read_verdict(path)
+        stored = read_verdict(path)
     except SwashplateError as error:
         return None, f"the fit beside it cannot be read ({str(error).rstrip('.')})"
-    if verdict is None:
+    if stored is None:
         return None, f"{path} has none: fit again"
-    if verdict.numbers != dict(drive.parameters.numbers):
+    if stored.numbers != dict(drive.parameters.numbers):
         return None, f"it is not the drive that {path} was written with"
-    return verdict, ""
+    return stored.verdict, ""
 
 
 def _stated_in_title(drive: Drive) -> str:

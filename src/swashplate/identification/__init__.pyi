@@ -1,6 +1,6 @@
 from .assessment import Identification as Identification
-from .criteria import Verdict as Verdict
-from .criteria import verdict as verdict
+from .verdict import Verdict as Verdict
+from .verdict import verdict as verdict
 from .determination import Identifiability as Identifiability
 from .drive_model import DriveModel as DriveModel
 from .drive_model import configuration as configuration

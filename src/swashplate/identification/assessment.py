@@ -24,7 +24,6 @@ from swashplate.documents import read_json
 from swashplate.drive import Drive
 from swashplate.errors import DomainError, FileError, InputError, MissingFileError
 from swashplate.identification import tables
-from swashplate.identification.criteria import REQUIRED, Criterion, Grade, Verdict, verdict
 from swashplate.identification.drive_model import Parameters
 from swashplate.identification.fitting import (
     Estimated,
@@ -42,6 +41,7 @@ from swashplate.identification.setup import ModelSetup, Setup, Stage, setup_text
 from swashplate.identification.solving import Solution
 from swashplate.identification.unknowns import Unknown, Unknowns
 from swashplate.identification.validation import RunQuality, predict
+from swashplate.identification.verdict import REQUIRED, Verdict, verdict
 from swashplate.locks import locked
 from swashplate.parameters.definitions import find
 from swashplate.parameters.files import (
@@ -88,7 +88,7 @@ class Identification(Estimated):
     notes: Mapping[str, str] = field(default_factory=dict)
     """Versions, seed, campaign."""
     required: float = REQUIRED
-    """Largest error of held-out runs over their range."""
+    """Largest error of a prediction over the range of its signal. [1]"""
     stored: StoredVerdict | None = field(default=None, repr=False)
     """The verdict that the fit's folder holds."""
 
@@ -139,7 +139,7 @@ class Identification(Estimated):
             return verdict(self.fit.stages, self.predicted, planned=planned, required=self.required)
 
     def tables(self) -> list[Table]:
-        """Criteria of the verdict, then estimates, profiles, errors of runs, cross-validation."""
+        """Stated errors, then estimates, profiles, errors of runs, cross-validation."""
         shown = [table for part in tables.parts_of(self) for table in part.tables]
         return [self.verdict.table(), *shown]
 
@@ -167,8 +167,8 @@ class Identification(Estimated):
 
     @property
     def sentences(self) -> tuple[str, ...]:
-        """What the verdict says below its table."""
-        return tuple(self.verdict.remarks())
+        """What the verdict says besides its answers."""
+        return self.verdict.sentences
 
     def report(self, path: str | Path, *, truth: Drive | ParameterSet | None = None) -> Path:
         """Write the report: one HTML file, whole or not at all, that needs no network.
@@ -304,7 +304,7 @@ class Identification(Estimated):
             folds=self.folds,
             notes=dict(self.notes),
             verdict=StoredVerdict(
-                **{key: getattr(self.verdict, key) for key in VERDICT},
+                verdict=self.verdict,
                 numbers=dict(self.fit.parameters.numbers),
                 required=self.required,
                 held_out={each.name: fingerprint(each) for each in self.held_out},
@@ -413,20 +413,10 @@ class StoredStage(Entry):
     """Of the unknowns; None in a file of a version that did not store them."""
 
 
-VERDICT = ("grade", "headline", "criteria", "sentences", "validity", "assumed")
-"""What of a verdict is stored: all of it."""
-
-
 class StoredVerdict(Entry):
     """The verdict on the fit when it was stored, and what it rests on."""
 
-    grade: Grade
-    headline: str
-    criteria: tuple[Criterion, ...] = ()
-    sentences: tuple[str, ...] = ()
-    validity: str = ""
-    """What it holds for, and what the tests never reached; empty in older files."""
-    assumed: tuple[str, ...] = ()
+    verdict: Verdict
     numbers: dict[str, float]
     """Of the drive or model that it is about."""
     required: float = REQUIRED
@@ -434,19 +424,10 @@ class StoredVerdict(Entry):
     held_out: dict[str, str] = {}
     """Name to fingerprint of each run that was held out."""
 
-    @property
-    def verdict(self) -> Verdict:
-        """The verdict as it was."""
-        return Verdict(**{key: getattr(self, key) for key in VERDICT})
-
     def holds_for(self, result: Identification) -> bool:
-        """Whether it is the verdict on these numbers, requirement and runs held out.
-
-        A file of a version that stored no criteria does not have the whole verdict.
-        """
+        """Whether it is the verdict on these numbers, requirement and runs held out."""
         return (
-            bool(self.criteria)
-            and self.required == result.required
+            self.required == result.required
             and self.numbers == dict(result.fit.parameters.numbers)
             and self.held_out == {run.name: fingerprint(run) for run in result.held_out}
         )

@@ -45,6 +45,10 @@ FROZEN, DEAD = 1.0, 0.2
 largest simulated range that a run must have for a still sensor to be broken."""
 NAMED = 8
 """Unknowns that a sentence names."""
+TO_AND_FRO = 0.05
+"""Share of a channel's changes that turn back by more than one step if it is noisy. [1]"""
+DWELLS = 0.1
+"""Time for which a noisy channel stands at its very largest value only if it is clipped. [s]"""
 
 
 class Finding(NamedTuple):
@@ -342,6 +346,81 @@ def contradictions(name: str, ours: Sequence[Motion]) -> Iterator[Finding]:
             said = f"In {each.run} '{name}' moves {gain:.3g} times as far as in the nominal drive, "
             said += f"in the other runs {middle:.3g} times: {hint}"
             yield warning(each.run, name, said)
+
+
+# --- ends of instruments --------------------------------------------------------------------------
+
+
+def clipped_channels(experiments: Sequence[Experiment]) -> Iterator[Finding]:
+    """Channels that stand at an end of their instrument, with the limits to state.
+
+    A channel is clipped where it reads its very largest or smallest value for 0.1 s and longer
+    while the input moves by more than a tenth of its range: no noisy signal does that. Nor does one
+    stand there so long at inputs that far apart, a machine at its stop included; but one without
+    noise does, and one that reads it at a run's first sample is at rest. Positions are passed over,
+    as they stand still by themselves.
+    """
+    for name in dict.fromkeys(name for each in experiments for name in each.channels):
+        runs = [each for each in experiments if name in each.channels]
+        if runs[0][name].is_position:
+            continue
+        values = np.concatenate([each[name].values for each in runs])
+        low, high = float(values.min()), float(values.max())
+        reach = float(np.ptp(np.concatenate([each.input.values for each in runs])))
+        stated = (each[name].limits for each in runs)
+        limits = [pair for pair in stated if pair is not None]
+        for end in (low, high):
+            # limits may be stated a little within the end at which the readings stand
+            if any(not lower < end < upper for lower, upper in limits):
+                continue
+            spans = np.array([span for each in runs for span in _inputs_at(end, each, name)])
+            if not spans.size or low == high:
+                continue
+            rests = any(each[name].values[0] == end for each in runs)
+            moved, apart = float(np.ptp(spans, axis=1).max()), float(np.ptp(spans))
+            # a rounded reading stands still by itself for as long as a step of it lasts
+            coarse = float(np.diff(np.unique(np.round(values / (high - low), 9))).min())
+            step = max(coarse, 3e-4) * (high - low)
+            if apart > moved and not rests and _is_noisy(values, step):
+                moved = apart
+            if moved > (0.1 + 2.0 * coarse) * reach:
+                yield refusal(
+                    None,
+                    name,
+                    f"'{name}' stands at exactly {end:.6g} {runs[0][name].unit} at inputs that "
+                    f"differ by {moved:.3g} {runs[0].input.unit}: it is clipped there. "
+                    f"Set limits = [{low:.6g}, {high:.6g}] in its channel, and such samples are "
+                    "ignored.",
+                )
+
+
+def _inputs_at(end: float, experiment: Experiment, name: str) -> list[tuple[float, float]]:
+    """Smallest and largest input of each stretch in which a channel stands at an end.
+
+    In its first three quarters: a rounded reading that lags stays where it is when the input has
+    left already.
+    """
+    channel, spans = experiment[name], list[tuple[float, float]]()
+    edges = np.flatnonzero(np.diff(channel.values == end, prepend=False, append=False))
+    for first, after in edges.reshape(-1, 2):
+        if channel.time[after - 1] - channel.time[first] >= DWELLS:
+            inputs = experiment.input.at(channel.time[first : after - (after - first) // 4])
+            spans.append((float(inputs.min()), float(inputs.max())))
+    return spans
+
+
+def _is_noisy(values: Array, step: float) -> bool:
+    """Whether samples (n,) go to and fro by two of their steps or more, both ends left out.
+
+    No motion does that from sample to sample, nor rounding. Of the pairs of changes that noise of
+    one step makes, a tenth are such.
+    """
+    inner = (values > values.min()) & (values < values.max())
+    first, after = np.diff(values)[:-1], np.diff(values)[1:]
+    within = inner[:-2] & inner[1:-1] & inner[2:]
+    least = np.minimum(np.abs(first), np.abs(after))
+    turns = within & (first * after < 0.0) & (least > 1.5 * step)
+    return bool(turns.sum() > TO_AND_FRO * max(within.sum(), 1))
 
 
 # --- what the runs determine ----------------------------------------------------------------------

@@ -205,7 +205,7 @@ def responses(stage: StageFit, number: int, resolution: float) -> Iterator[tuple
     effect. `resolution` as of `changes_of`.
     """
     experiment = stage.problem.experiments[number]
-    simulation = _Simulation(stage, number)
+    simulation = SimulatedRun(stage, number)
     middle = simulation.of(experiment)
     for effect, changed, part in changes_of(experiment, resolution):
         moved = simulation.of(changed) if _acts(stage, experiment, changed) else middle
@@ -233,7 +233,7 @@ def _acts(stage: StageFit, experiment: Experiment, changed: Experiment) -> bool:
     )
 
 
-class _Simulation:
+class SimulatedRun:
     """One run of a stage with the numbers that were found, changed or not."""
 
     def __init__(self, stage: StageFit, number: int) -> None:
@@ -304,7 +304,7 @@ def effects_of(stage: StageFit) -> Effects:
     resolution = resolution_of_inputs([run.input for run in problem.experiments])
     jacobians = linearised.jacobians()
     for number in range(len(problem.experiments)):
-        run = _Run(stage, number, jacobians)
+        run = RunParts(stage, number, jacobians)
         for effect, changes in responses(stage, number, resolution):
             products[effect] = products.get(effect, 0.0) + run.along(changes)
         if motion := motion_of(stage, number):
@@ -324,7 +324,7 @@ class _Motion(NamedTuple):
     """(rank,) Wᵀ Jᵀ z"""
 
 
-class _Run:
+class RunParts:
     """The channels of one run at the optimum that have a sample which counts."""
 
     def __init__(
@@ -366,7 +366,7 @@ class _Run:
 def motion_of(stage: StageFit, number: int) -> Changes:
     """What a run moves by, by channel: positions from their first sample on; no currents. [unit]"""
     experiment = stage.problem.experiments[number]
-    samples = _Simulation(stage, number).of(experiment)
+    samples = SimulatedRun(stage, number).of(experiment)
     motion = dict[str, Array]()
     for name, values in samples.items():
         channel = experiment[name]

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field, replace
 from difflib import get_close_matches
 from functools import cached_property, partial
 from hashlib import blake2b
-from math import isfinite
+from math import isfinite, sqrt
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from swashplate.__about__ import __version__
 from swashplate.campaign.campaign import Campaign
-from swashplate.campaign.experiment import Experiment
+from swashplate.campaign.experiment import Channel, Experiment
 from swashplate.drive import Drive
 from swashplate.equations import Model as Equations
 from swashplate.errors import InputError, UnknownNameError
@@ -43,7 +43,6 @@ from swashplate.identification.drive_model import (
     with_card_filter,
     with_estimates,
 )
-from swashplate.identification.faults import measurement_error
 from swashplate.identification.intervals import (
     Estimate,
     Interval,
@@ -644,10 +643,17 @@ def _unexplained(problem: Problem, solution: Solution) -> bool:
     for number, experiment in enumerate(problem.experiments):
         for name, output in problem.outputs(solution.vector, number).items():
             channel = experiment[name]
-            if (error := measurement_error(channel)) is not None:
+            if (error := _known_error(channel)) is not None:
                 left.setdefault(name, []).append((output - channel.values)[channel.used] / error)
     joined = map(np.concatenate, left.values())
     return any(float(r @ r) > UNEXPLAINED**2 * r.size for r in joined)
+
+
+def _known_error(channel: Channel) -> float | None:
+    """Standard deviation of what a channel is stated to err by, or of rounding to its steps."""
+    if channel.noise is not None:
+        return channel.noise
+    return channel.resolution and channel.resolution / sqrt(12.0)
 
 
 def _explained(problem: Problem, solution: Solution) -> bool:

@@ -19,7 +19,6 @@ from swashplate.errors import InputError, InputTypeError
 from swashplate.executors import Executor, Serial
 from swashplate.identification.assessment import Identification, versions
 from swashplate.identification.between_samples import doubt
-from swashplate.identification.criteria import REQUIRED
 from swashplate.identification.data_checks import refuse_unsound, spike_findings
 from swashplate.identification.drive_model import Parameters, setup_of
 from swashplate.identification.fitting import Fit, Search, StageFit, fit
@@ -28,6 +27,7 @@ from swashplate.identification.problem import Loss
 from swashplate.identification.profiles import Profile, profiles_of
 from swashplate.identification.resampling import cross_validate
 from swashplate.identification.setup import FreeParameters, ModelSetup, Setup
+from swashplate.identification.verdict import REQUIRED
 from swashplate.parameters.files import named_set
 from swashplate.parameters.parameter_set import ParameterSet
 
@@ -91,7 +91,7 @@ def identify(
     max_evaluations : int
         Evaluations of the model that a search may take.
     required : float
-        Largest error of held-out runs, over their range, for the verdict "usable". [1]
+        Largest stated error of a new maneuver, over the range of the signal, of a usable fit. [1]
     executor : Executor, optional
         Of `swashplate.executors`, for starts, folds and profiles; one after another by
         default. The result does not depend on it.

@@ -65,9 +65,6 @@ width in its scales."""
 LEAST = 1e-6
 """Smallest worth of a prior: residuals that are all but zero leave it its say on what they leave
 open."""
-OPEN = 0.01
-"""Part of a channel's range that a prediction moves by, for 10 % of an unknown, from which it
-depends on that unknown."""
 
 
 class Interval(NamedTuple):
@@ -509,44 +506,3 @@ def unseen_limits(stages: Sequence[StageFit]) -> dict[str, float]:
             if estimate.name in LIMIT_COLUMNS and one_sided:
                 unseen.setdefault(estimate.name, float(estimate.lower or 0.0))
     return {column: value for column, value in unseen.items() if value > 0.0}
-
-
-def open_unknowns(stage: StageFit, experiments: Iterable[Experiment]) -> Iterator[str]:
-    """Unknowns without an interval on which the prediction of some runs depends.
-
-    Only a prediction that leaves the directions which the fitted runs determine is open: of two
-    unknowns of which the fit tells the product, it depends on the product alone.
-    """
-    found, fit = stage.uncertainty, stage.linearised
-    model, unknowns, vector = stage.problem.model, stage.problem.unknowns, stage.solution.vector
-    assert isinstance(model, DriveModel)
-    pairs = zip(found.estimates, unknowns, strict=True)
-    undetermined = np.array([e.status == "undetermined" and u.run is None for e, u in pairs])
-    # a better optimum that was met says nothing of how far an unknown can go
-    one_ended = np.zeros(len(unknowns), dtype=np.bool_)
-    one_ended[[e.number for e in found.ends if np.isinf(e.distance) and e.better is None]] = True
-    if not (undetermined | one_ended).any():
-        return
-    lengths = np.linalg.norm(fit.triangle, axis=0)
-    lengths[lengths == 0.0] = 1.0
-    # directions that the fitted runs determine, in units of their effect there
-    told = np.linalg.qr(lengths[:, None] * fit.whitening)[0]
-    chain = DriveModel(stage.drive.parameters, "card" if model.part == "card" else "chain")
-    chain = replace(chain, forces=model.forces)
-    targets, values = unknowns.machine_targets, unknowns.targets(vector, "")
-    by_name = np.zeros((len(targets), len(unknowns)))
-    by_name[:, unknowns.shared] = unknowns.chain(vector, targets, "")
-    for experiment in experiments:
-        if experiment.input.kind != "voltage" or not chain.signals_of(experiment):
-            continue
-        for name, moved in chain.linearise(values, experiment, targets).items():
-            channel = experiment[name]
-            rows = moved.by[channel.used] @ by_name
-            if channel.is_position:
-                rows = rows - rows.mean(axis=0)
-            beyond = rows / lengths
-            beyond = (beyond - (beyond @ told) @ told.T) * lengths
-            depends = undetermined * np.abs(beyond).max(axis=0)
-            depends = depends + one_ended * np.abs(rows).max(axis=0)
-            least = OPEN * float(np.ptp(channel.values[channel.used]))
-            yield from (unknowns.names[k] for k in np.flatnonzero(0.1 * depends > least))

@@ -16,7 +16,6 @@ from swashplate.drive import Drive
 from swashplate.errors import InputError
 from swashplate.identification import tables
 from swashplate.identification.assessment import Identification, motion_of
-from swashplate.identification.criteria import Verdict, starts_of, verdict
 from swashplate.identification.determination import Identifiability
 from swashplate.identification.drive_model import Parameters
 from swashplate.identification.fitting import Fit, StageFit
@@ -25,6 +24,7 @@ from swashplate.identification.resampling import CrossValidation
 from swashplate.identification.setup import ModelSetup
 from swashplate.identification.solving import Solution
 from swashplate.identification.validation import RunQuality, at_instants, percent
+from swashplate.identification.verdict import Verdict, starts_of, verdict
 from swashplate.parameters.parameter_set import ParameterSet
 from swashplate.report.fit_report import charts
 from swashplate.report.fit_report.html_page import Block, Section, listed_block, page, text, titled
@@ -174,7 +174,7 @@ def _page(
     known = Drive(drive) if isinstance(drive, ParameterSet) else None
     sections = [
         summary_section(judged, campaign, known, stages, runs, len(said)),
-        _agreement_section(runs, findings),
+        _agreement_section(runs, findings, judged),
         _curves_section(runs, campaign.virtual),
         *own,
         _residual_section(runs),
@@ -200,11 +200,14 @@ def _qualities(runs: Sequence[ShownRun], role: str = "") -> list[RunQuality]:
     return [each.quality for run in runs if role in ("", run.role) for each in run.channels]
 
 
-def _agreement_section(runs: Sequence[ShownRun], findings: dict[str, list[int]]) -> Section:
+def _agreement_section(
+    runs: Sequence[ShownRun], findings: dict[str, list[int]], judged: Verdict
+) -> Section:
     error = Column("error / range", "s", none=NONE)
     columns = (Column(""), Column("run"), Column("role"), Column("maneuver"), Column("judged by"))
     overview = Table("", (*columns, error, Column("why"), Column("findings")))
-    for number, (run, (look, why)) in enumerate(zip(runs, run_lights(runs, findings), strict=True)):
+    lights = run_lights(runs, findings, judged)
+    for number, (run, (look, why)) in enumerate(zip(runs, lights, strict=True)):
         part = run_error(run, runs)
         to_curves = Markup('<a href="#run-{}">{}</a>').format(number, run.name)
         links = Markup(" ").join(
@@ -226,8 +229,7 @@ def _agreement_section(runs: Sequence[ShownRun], findings: dict[str, list[int]])
     words = (
         "RMSE is the root of the mean squared difference of the samples that count; NRMSE is RMSE "
         "over the standard deviation of what was measured; fit % is 100 (1 − NRMSE). Error / range "
-        "is RMSE over the largest less the smallest value measured in all runs of that role, as in "
-        "the verdict."
+        "is RMSE over the largest less the smallest value measured in all runs of that role."
     )
     measures = Block("table", joined(made), "agreement")
     blocks = [
@@ -358,17 +360,18 @@ def _window(weight: Weight) -> str:
 
 
 def _verdict_section(judged: Verdict, findings: int) -> Section:
-    """The judgements, what each rests on, and the criteria."""
+    """The three answers, what they rest on, and the stated errors."""
     words = f"{count(findings, 'finding')} on the campaign's data: see the section on them."
+    answers = [(name, "look", [text]) for name, text in judged.answers().items()]
     said = [
-        ("Remarks", "look", judged.sentences),
-        ("Not judged", "look", judged.not_judged),
+        *answers,
         ("Range of validity", "plain", [judged.validity] if judged.validity else []),
-        ("Assumed, cannot be checked", "plain", judged.assumed),
-        ("Data", "look", [words] if findings else []),
+        ("Remarks", "look", judged.remarks),
+        ("Assumed, as these logs cannot show it", "plain", judged.assumed),
+        ("Logs", "look", [words] if findings else []),
     ]
-    criteria = titled(judged.table(), "criteria") if judged.criteria else []
-    return Section("verdict", "Verdict in detail", [Block("terms", said, "verdict"), *criteria])
+    errors = titled(judged.table(), "errors") if judged.predictions else []
+    return Section("verdict", "Verdict in detail", [Block("terms", said, "verdict"), *errors])
 
 
 # --- what the data tell ---------------------------------------------------------------------------

@@ -23,12 +23,6 @@ from swashplate.analysis import (
 from swashplate.campaign import Campaign
 from swashplate.drive import Drive
 from swashplate.errors import SwashplateError
-from swashplate.identification.criteria import (
-    CARRIES_OVER,
-    POOR,
-    Grade,
-    Verdict,
-)
 from swashplate.identification.determination import weak_unknowns
 from swashplate.identification.fitting import StageFit
 from swashplate.identification.intervals import unseen_limits
@@ -38,6 +32,7 @@ from swashplate.identification.validation import (
     pooled,
     range_of,
 )
+from swashplate.identification.verdict import Verdict
 from swashplate.parameters.rules import FULL_VOLTAGE
 from swashplate.report.fit_report.html_page import Block, Section, listed_block, text
 from swashplate.report.fit_report.runs import ShownRun
@@ -47,11 +42,6 @@ from swashplate.units import display_unit
 Array = NDArray[np.float64]
 Light = Literal["good", "look", "bad"]
 
-LIGHTS: dict[Grade, Light] = {
-    "Usable": "good",
-    "Usable for prediction": "look",
-    "Not usable": "bad",
-}
 RATE, SECONDS = 512.0, 8.0
 """Of the full step that the numbers are read from. [Hz, s]"""
 MOVES, MOST_OF_IT = 0.02, 0.63
@@ -334,32 +324,26 @@ def run_error(run: ShownRun, runs: Sequence[ShownRun]) -> float:
     return pooled([own], without_noise=True)[own.channel].rmse / reach if reach > 0.0 else np.inf
 
 
-def run_lights(runs: Sequence[ShownRun], findings: dict[str, list[int]]) -> list[tuple[Light, str]]:
-    """For each run its light and why, from its errors beside those of all runs that are fitted.
+def run_lights(
+    runs: Sequence[ShownRun], findings: dict[str, list[int]], judged: Verdict
+) -> list[tuple[Light, str]]:
+    """For each run its light and why: unsound, or with findings on its data, or neither.
 
     Findings on the data are by the name of their run.
     """
-    fitted = [each.quality for run in runs if run.role == "fit" for each in run.channels]
-    fitted = fitted or [each.quality for run in runs for each in run.channels]
-    whole = pooled(fitted, without_noise=True)
+    unsound = {each.run for each in judged.unsound}
     made = list[tuple[Light, str]]()
     for run in runs:
-        bad, look = [], []
-        for each in (shown.quality for shown in run.channels):
-            found = pooled([each], without_noise=True)[each.channel]
-            own, pool = found.nrmse or 0.0, whole.get(each.channel)
-            if own >= POOR and (pool is None or found.spread > 0.05 * pool.spread):
-                bad.append(f"{each.channel} misses {percent(min(own, 9.99))} of the movement")
-            elif pool and found.rmse > 2.0 * CARRIES_OVER * pool.rmse:
-                ratio = found.rmse / pool.rmse
-                look.append(f"{each.channel}: {ratio:.1f} times the usual RMSE")
-            elif following([each], each.channel)[1]:
-                look.append(f"residuals of {each.channel} follow the input")
-        own_findings = findings.get(run.experiment.name, [])
-        if own_findings:
-            look.append(count(len(own_findings), "finding"))
-        if bad:
-            made.append(("bad", "; ".join(bad)))
+        name = run.experiment.name
+        look = [
+            f"residuals of {each.quality.channel} follow the input"
+            for each in run.channels
+            if following([each.quality], each.quality.channel)[1]
+        ]
+        if own := findings.get(name, []):
+            look.append(count(len(own), "finding"))
+        if name in unsound:
+            made.append(("bad", "not sound"))
         else:
             made.append(("look", "; ".join(look)) if look else ("good", "as the others"))
     return made
@@ -377,9 +361,9 @@ def summary_section(
     findings: int,
 ) -> Section:
     """The first screen: `drive` is None for a model of one's own, which has no such numbers."""
-    look = LIGHTS[judged.grade]
+    look: Light = "good" if judged.usable else "bad"
     headline = judged.headline.replace(" %", "\N{NO-BREAK SPACE}%")
-    shown = [Block("verdict", (light(look, judged.grade), headline), look)]
+    shown = [Block("verdict", (light(look, "Usable" if judged.usable else "Not usable"), headline), look)]
     shown.append(Block("pair", list(_curves(runs, campaign.virtual))))
     numbers, limits = [], []
     if drive is not None:
@@ -445,8 +429,10 @@ def _next(
     runs: Sequence[ShownRun],
     findings: int,
 ) -> list[str | Markup]:
-    failed = [each.failure for each in judged.criteria if each.failure]
-    said: list[str | Markup] = [f"Settle first: {words}." for words in failed[:3]]
+    said: list[str | Markup] = [f"Settle first: {each}." for each in judged.unfinished]
+    said += [f"Settle first: {each.sentence}" for each in judged.unsound[:3]]
+    if judged.cause:
+        said.append(f"What would explain the error: {judged.cause}")
     if findings:
         link = Markup('Look into the <a href="#data">{}</a> on the logs.')
         said.append(link.format(count(findings, "finding")))
@@ -464,7 +450,7 @@ def _next(
     if stages and not any(run.role == "validate" for run in runs):
         said.append('Hold a run out of the fit (role = "validate"): nothing was predicted yet.')
     if judged.usable:
-        what = f"Use the {thing}{' for prediction only' * (judged.grade != 'Usable')}"
+        what = f"Use the {thing}"
         said.append(f"{what}. {judged.validity}" if judged.validity else f"{what}.")
         if stages and thing == "drive":
             said.append(Markup("Try it: <code>swashplate simulate drive.toml step:9</code>."))

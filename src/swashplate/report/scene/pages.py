@@ -190,11 +190,11 @@ def write_judgment(judgment: Judgment, path: str | Path) -> None:
 
 def _fit_verdicts(crane: Crane) -> list[Block]:
     """The verdict on the fit of each drive that comes from one, and what its tests left open."""
-    looks: dict[str | None, Light] = {"Usable": "good", UNUSABLE: "bad"}
+    looks: dict[bool | None, Light] = {True: "good", False: "bad"}
     terms: list[tuple[str, Light, list[str]]] = []
     for axis in AXES:
         source, unreached = crane.sources.get(axis), crane.unreached_sentence(axis)
-        look: Light = "look" if source is None else looks.get(source.grade, "look")
+        look: Light = "look" if source is None else looks.get(source.judged_usable, "look")
         words = [source.words()] if source is not None else []
         if unreached:
             words.append(unreached)

@@ -1,0 +1,479 @@
+"""What explains an error that is not noise: one thing that is freed, and then a refit with it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from math import isfinite
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import solve_banded
+
+from swashplate.campaign.experiment import Experiment
+from swashplate.errors import DomainError, InputError, ParameterError
+from swashplate.identification.discrepancy import white_noise
+from swashplate.identification.drive_model import (
+    CURRENTS,
+    DriveModel,
+    measured_current,
+    simulated_current,
+)
+from swashplate.identification.effects import HYSTERESIS, Changes, RunParts, SimulatedRun, source_of
+from swashplate.identification.model import linearised
+from swashplate.identification.problem import Problem
+from swashplate.identification.solving import Solution, solve
+from swashplate.identification.unknowns import Unknown, Unknowns
+from swashplate.parameters.definitions import CATALOGUE, COLUMNS, SWITCHES
+from swashplate.results import Result
+
+if TYPE_CHECKING:
+    from swashplate.identification.fitting import StageFit
+
+Array = NDArray[np.float64]
+
+EXPLAINED = 0.5
+"""Part of the squared residuals that a cause must remove, and that must not be noise for anything
+to be explained."""
+MOST = 3
+"""Causes that are tried by a refit, those first that explain most to first order."""
+TOLERANCE, FEWEST_EVALUATIONS, MOST_EVALUATIONS = 1e-6, 6, 30
+"""Of a refit, which begins at the optimum without the cause."""
+WORK = 20_000_000
+"""Samples that one refit may march, again and again: about 6 s."""
+SAME_DIRECTION = 1e-4
+"""Part of a cause's effect outside the estimates' below which both are the same: its square is a
+difference, which has 16 digits less those of this one."""
+LATEST = 0.5
+"""Delay or lag that is plausible. [s]"""
+SMALL_GAIN, SMALL_LAG = 1e-3, 0.01
+"""Relative change of a command, and time constant, by which their effects are found. [1], [s]"""
+
+
+class Cause(NamedTuple):
+    """What would explain an error that is not noise."""
+
+    name: str
+    size: float
+    """Found by a refit. [unit]"""
+    unit: str
+    share: float
+    """Part of the squared residuals that the refit with it removes. [1]"""
+
+    @property
+    def words(self) -> str:
+        """It in words, with its size and share."""
+        return (
+            f"{self.name} by {self.size:+.3g} {self.unit}, with which a refit removes "
+            f"{100.0 * self.share:.0f} % of the squared residuals"
+        )
+
+
+@dataclass(frozen=True)
+class Candidate(Result):
+    """One thing that may be wrong, or that the model may leave out."""
+
+    name: str
+    least: float
+    most: float
+    """Sizes that are plausible. [SI, or 1]"""
+    freed: Callable[[float], Problem]
+    """The problem of the stage with it, for its size to first order."""
+    factor: float = 1.0
+    unit: str = ""
+    """What it is printed in, and the factor from SI to that."""
+    free: str = ""
+    """Unknown that the refit estimates it by; without one it stays at its size."""
+
+
+def causes_of(stages: Sequence[StageFit]) -> tuple[Cause, ...] | None:
+    """What explains the residuals of the first stage for which anything does.
+
+    Parameters
+    ----------
+    stages : sequence of StageFit
+        All stages of the fit.
+
+    Returns
+    -------
+    tuple of Cause, or None
+        At most `MOST`, the largest share first: each removes at least half of the squared
+        residuals in a refit, and is of a plausible size. Empty if none does; None if more than half
+        of the squares are noise in each stage.
+
+    Notes
+    -----
+    Which are tried first says Rao's score test (Rao 1948): the derivative of the residuals by each
+    cause, freed of what the estimates can make up for, is projected on the residuals.
+    """
+    found: tuple[Cause, ...] | None = None
+    for stage in stages:
+        # a robust loss has taken what stands out already
+        if stage.solution.loss != "linear" or noise_share(stage) >= EXPLAINED:
+            continue
+        found = _causes_of_stage(stage)
+        if found:
+            # what an earlier stage lacks, the later ones inherit
+            break
+    return found
+
+
+def noise_share(stage: StageFit) -> float:
+    """Part of the squared residuals that is noise, independent from sample to sample. [1]"""
+    noise, squares = 0.0, 0.0
+    experiments = {run.name: run for run in stage.problem.experiments}
+    for run in stage.linearised.runs:
+        channel = experiments[run.name][run.channel]
+        weight = np.ones(run.residual.size) if run.weight is None else run.weight
+        white = white_noise(run.residual / weight, channel.values[channel.used])
+        noise += float(np.sum((white * weight) ** 2))
+        squares += float(run.residual @ run.residual)
+    return noise / squares if squares > 0.0 else 1.0
+
+
+def _causes_of_stage(stage: StageFit) -> tuple[Cause, ...]:
+    scored = [each for each in _scores(stage) if each.candidate.least < each.size]
+    scored = [each for each in scored if each.size < each.candidate.most]
+    scored.sort(key=lambda each: -each.share)
+    found = list[Cause]()
+    for each in scored[:MOST]:
+        if (cause := _refitted(stage, each)) is not None:
+            found.append(cause)
+    return tuple(sorted(found, key=lambda each: -each.share))
+
+
+# --- to first order -------------------------------------------------------------------------------
+
+
+class _Score(NamedTuple):
+    candidate: Candidate
+    size: float
+    """After one Gauss-Newton step. [SI, or 1]"""
+    share: float
+    """Part of the squares that it removes to first order. [1]"""
+
+
+def _scores(stage: StageFit) -> Iterator[_Score]:
+    """Each candidate of a stage, to first order."""
+    fit = stage.linearised
+    candidates = {each.name: each for each in _candidates(stage)}
+    squares, products = dict[str, float](), dict[str, float]()
+    along = dict[str, Array]()
+    jacobians = fit.jacobians()
+    for number in range(len(stage.problem.experiments)):
+        parts = RunParts(stage, number, jacobians)
+        for name, changes in _effects(stage, number):
+            if name not in candidates:
+                continue
+            for run, _, change in parts.weighted(changes):
+                squares[name] = squares.get(name, 0.0) + float(change @ change)
+                products[name] = products.get(name, 0.0) + float(change @ run.residual)
+            along[name] = along.get(name, 0.0) + parts.along(changes)
+    for name, square in squares.items():
+        apart = square - float(along[name] @ along[name])
+        if square > 0.0 and apart > SAME_DIRECTION**2 * square:
+            size = -products[name] / apart
+            yield _Score(candidates[name], size, products[name] ** 2 / (apart * fit.squares))
+
+
+def _effects(stage: StageFit, number: int) -> Iterator[tuple[str, Changes]]:
+    """By what the residuals of one run change with one unit of each candidate."""
+    problem, experiment = stage.problem, stage.problem.experiments[number]
+    simulation = SimulatedRun(stage, number)
+    middle = simulation.of(experiment)
+    place = number / max(len(problem.experiments) - 1, 1) - 0.5
+    for name in problem.channels:
+        if name in middle and name in experiment.channels:
+            for effect, change in _of_channel(experiment, name, middle[name], place).items():
+                yield effect, {name: change}
+    if _drives(stage, experiment):
+        command = experiment.input
+        lagged = replace(command, values=behind_lag(command.time, command.values))
+        weaker = replace(command, values=(1.0 - SMALL_GAIN) * command.values)
+        for effect, signal, part in (
+            (COMMAND_GAIN, weaker, -SMALL_GAIN),
+            (COMMAND_LAG, lagged, SMALL_LAG),
+        ):
+            moved = simulation.of(replace(experiment, input=signal))
+            yield effect, {name: (moved[name] - middle[name]) / part for name in middle}
+    width = stage.stage.current_hysteresis
+    if width > 0.0:
+        late = simulation.behind_hysteresis(experiment)
+        # half of the width is the parameter
+        yield "solenoid_hysteresis", {name: 2.0 * late[name] / width for name in late}
+    names = fixed_numbers(stage)
+    if names:
+        values = problem.model_values(stage.solution.vector, number)
+        by = linearised(source_of(stage)(experiment), values, experiment, names)
+        for k, name in enumerate(names):
+            yield name, {channel: part.by[:, k] for channel, part in by.items()}
+
+
+COMMAND_GAIN, COMMAND_LAG = "scale of the command", "lag of the command"
+
+
+def _of_channel(
+    experiment: Experiment, name: str, output: Array, place: float
+) -> dict[str, Array]:
+    """Changes (m,) of simulated less measured if an instrument's fault, or a motion that the model
+    leaves out, of one unit is simulated."""
+    channel, time = experiment[name], experiment[name].time
+    slope = np.gradient(output, time) if time.size > 2 else np.zeros_like(output)
+    moved = output - output[0] if channel.is_position else output
+    effects = {
+        f"scale of {name}": moved,
+        f"time stamps of {name}": -slope,
+        f"lag of {name}": (behind_lag(time, output) - output) / SMALL_LAG,
+    }
+    if channel.kind not in CURRENTS:
+        effects[f"drift of {name} over the campaign"] = moved * place
+        effects[f"loss of speed under load, {name}"] = -lost(experiment, name, output)
+    return effects
+
+
+def lost(experiment: Experiment, name: str, output: Array) -> Array:
+    """(m,) what a channel lacks if its motion is slower by one unit while it moves."""
+    channel, time = experiment[name], experiment[name].time
+    speed = np.gradient(output, time) if channel.is_position else output
+    moves = np.abs(speed) > 0.01 * float(np.abs(speed).max(initial=0.0))
+    way = np.sign(speed) * moves
+    if not channel.is_position:
+        return way
+    return np.cumsum(way * np.diff(time, prepend=time[:1]))
+
+
+def behind_lag(time: Array, values: Array) -> Array:
+    """(m,) values behind a first-order lag of `SMALL_LAG`, at rest before."""
+    kept = np.exp(-np.diff(time) / SMALL_LAG)
+    bands = np.vstack([np.ones(time.size), np.append(-kept, 0.0)])
+    made = solve_banded((1, 0), bands, np.append(values[:1], (1.0 - kept) * values[1:]))
+    # a full command stays one, whatever the last digit
+    return np.asarray(np.clip(made, values.min(), values.max()))
+
+
+# --- what is looked for ---------------------------------------------------------------------------
+
+
+def _candidates(stage: StageFit) -> Iterator[Candidate]:
+    """Everything that may be freed in a stage."""
+    problem, model = stage.problem, stage.problem.model
+    for name in problem.channels:
+        kinds = {run[name].kind for run in problem.experiments if name in run.channels}
+        read = partial(_with_reading, stage, name)
+        yield Candidate(f"scale of {name}", -0.3, 0.3, partial(read, _scaled), 100.0, "%")
+        yield Candidate(f"time stamps of {name}", -LATEST, LATEST, partial(read, _late), 1e3, "ms")
+        yield Candidate(f"lag of {name}", 0.0, LATEST, partial(read, _undone_lag), 1e3, "ms")
+        if kinds.isdisjoint(CURRENTS):
+            drift = f"drift of {name} over the campaign"
+            yield Candidate(drift, -0.5, 0.5, partial(read, _undone_drift), 100.0, "%")
+            unit = next(iter(problem.experiments))[name].unit if problem.experiments else ""
+            unit = unit if unit.endswith("/s") else f"{unit}/s"
+            loss = f"loss of speed under load, {name}"
+            yield Candidate(loss, 0.0, np.inf, partial(read, _undone_loss), 1.0, unit)
+    if not isinstance(model, DriveModel):
+        return
+    yield Candidate(COMMAND_GAIN, -0.3, 0.3, partial(_with_command, stage, _gained), 100.0, "%")
+    yield Candidate(COMMAND_LAG, 0.0, LATEST, partial(_with_command, stage, _lagging), 1e3, "ms")
+    most = 0.1 * max(float(np.abs(_driving(stage, run)).max()) for run in problem.experiments)
+    freed = partial(_with_number, stage, "solenoid_hysteresis")
+    name = "solenoid_hysteresis"
+    yield Candidate(name, 0.0, most, freed, 1e3, "mA", name)
+    numbers = stage.parameters.numbers
+    for name in fixed_numbers(stage):
+        value, unit = numbers[name], CATALOGUE[COLUMNS[name]].unit
+        low, high = sorted((-0.5 * value, value))
+        if unit == "s":
+            low, high = -value, LATEST
+        yield Candidate(name, low, high, partial(_with_number, stage, name), 1.0, unit, name)
+
+
+def fixed_numbers(stage: StageFit) -> list[str]:
+    """Columns of the drive that the stage's part has, that it does not estimate, and that act."""
+    model = stage.problem.model
+    if not isinstance(model, DriveModel):
+        return []
+    taken = {
+        target
+        for each in (*stage.earlier, stage)
+        for unknown in each.problem.unknowns
+        for target in unknown.targets
+    }
+    if model.forces is not None:
+        taken |= {name for name in COLUMNS if COLUMNS[name] in ("Z19", "Z20", "Z21", "Z22")}
+    block = {"card": ("control_card",), "pump": ("pump_motor",)}.get(
+        model.part, ("control_card", "pump_motor")
+    )
+    numbers = stage.parameters.numbers
+    return [
+        name
+        for name, symbol in COLUMNS.items()
+        if CATALOGUE[symbol].block in block and name not in taken
+        if numbers.get(name, 0.0) != 0.0 and isfinite(numbers[name])
+    ]
+
+
+def _drives(stage: StageFit, experiment: Experiment) -> bool:
+    """Whether the command of a run acts on what is simulated of it."""
+    model = stage.problem.model
+    if not isinstance(model, DriveModel) or experiment.input.kind != "voltage":
+        return False
+    return model.part != "pump" or stage.stage.current == "simulated"
+
+
+def _driving(stage: StageFit, experiment: Experiment) -> Array:
+    """(m,) the current of a run, or its input. [A]"""
+    model = stage.problem.model
+    assert isinstance(model, DriveModel)
+    record = model.currents.get(experiment.name)
+    return experiment.input.values if record is None else record.values
+
+
+# --- a refit with it ------------------------------------------------------------------------------
+
+
+def _refitted(stage: StageFit, score: _Score) -> Cause | None:
+    """A candidate after a refit; None if it does not remove half of the squares."""
+    candidate = score.candidate
+    best = _solved(stage, candidate, score.size)
+    if best is None:
+        return None
+    size, share = best
+    if not candidate.free:
+        # along the size the squares are a parabola: its slope at 0 is known
+        curvature = share - 2.0 * score.share
+        if curvature < 0.0 and abs(score.share / curvature + 1.0) > 0.1:
+            better = _solved(stage, candidate, -score.share / curvature * score.size)
+            if better is not None and better[1] > share:
+                size, share = better
+    if share < EXPLAINED or not candidate.least < size < candidate.most:
+        return None
+    return Cause(candidate.name, candidate.factor * size, candidate.unit, share)
+
+
+def _solved(stage: StageFit, candidate: Candidate, size: float) -> tuple[float, float] | None:
+    """Size of a candidate and the share of the squares that a refit removes; None if it fails."""
+    problem, before = stage.problem, stage.solution
+    try:
+        freed = candidate.freed(size)
+        start = freed.start.copy()
+        places = {name: k for k, name in enumerate(problem.unknowns.names)}
+        for k, name in enumerate(freed.unknowns.names):
+            if name in places:
+                start[k] = before.vector[places[name]]
+        most = min(max(WORK // problem.samples, FEWEST_EVALUATIONS), MOST_EVALUATIONS)
+        found: Solution = solve(freed, start, tolerance=TOLERANCE, max_evaluations=most)
+    except (DomainError, InputError, ParameterError):
+        return None
+    share = 1.0 - found.cost / before.cost if before.cost > 0.0 else 0.0
+    if candidate.free:
+        value = freed.unknowns.values(found.vector)[candidate.free]
+        size = value - stage.parameters.numbers.get(candidate.free, 0.0)
+    return size, share
+
+
+def _with_number(stage: StageFit, name: str, size: float) -> Problem:
+    """The problem with a fixed number of the drive free, from what one step says on."""
+    problem, model = stage.problem, stage.problem.model
+    assert isinstance(model, DriveModel)
+    value = stage.parameters.numbers.get(name, 0.0)
+    start = value + size
+    if name in HYSTERESIS:
+        extra = Unknown(name, start, 0.01 * start, 20.0 * start, log=True)
+        options = model.parameters.options | {SWITCHES[name]}
+        model = replace(model, parameters=model.parameters.with_numbers({name: start}, options))
+    else:
+        low, high = sorted((0.4 * value, 2.1 * value))
+        if CATALOGUE[COLUMNS[name]].unit == "s":
+            low, high = 0.0, value + LATEST
+        extra = Unknown(name, start, low, high)
+    unknowns = Unknowns((*problem.unknowns.items, extra))
+    return replace(problem, model=model, unknowns=unknowns)
+
+
+def _with_reading(
+    stage: StageFit, name: str, undo: Callable[..., Experiment], size: float
+) -> Problem:
+    """The problem with one channel as it would read without a fault of a size."""
+    problem, runs = stage.problem, list[Experiment]()
+    count = len(problem.experiments)
+    for number, run in enumerate(problem.experiments):
+        if name in run.channels:
+            output = problem.outputs(stage.solution.vector, number)[name]
+            place = number / max(count - 1, 1) - 0.5
+            run = undo(run, name, output, place, size)  # noqa: PLW2901
+        runs.append(run)
+    return replace(problem, experiments=tuple(runs))
+
+
+def _with_values(run: Experiment, name: str, values: Array) -> Experiment:
+    channels = {**run.channels, name: replace(run[name], values=values, counts=None)}
+    return replace(run, channels=channels)
+
+
+def _moved(run: Experiment, name: str) -> tuple[Array, Array]:
+    """What a channel measured from its zero on, and the zero."""
+    values = run[name].values
+    zero = values[:1] if run[name].is_position else np.zeros(1)
+    return values - zero, zero
+
+
+def _scaled(run: Experiment, name: str, _: Array, __: float, size: float) -> Experiment:
+    moved, zero = _moved(run, name)
+    return _with_values(run, name, zero + moved / (1.0 + size))
+
+
+def _undone_drift(run: Experiment, name: str, _: Array, place: float, size: float) -> Experiment:
+    moved, zero = _moved(run, name)
+    return _with_values(run, name, zero + moved / (1.0 + size * place))
+
+
+def _late(run: Experiment, name: str, _: Array, __: float, size: float) -> Experiment:
+    channel = replace(run[name], time=run[name].time - size)
+    return replace(run, channels={**run.channels, name: channel})
+
+
+def _undone_lag(run: Experiment, name: str, output: Array, _: float, size: float) -> Experiment:
+    """As read by an instrument without a lag: what it lacks is added as it is simulated."""
+    time = run[name].time
+    kept = np.exp(-np.diff(time) / size)
+    bands = np.vstack([np.ones(time.size), np.append(-kept, 0.0)])
+    lagged = solve_banded((1, 0), bands, np.append(output[:1], (1.0 - kept) * output[1:]))
+    return _with_values(run, name, run[name].values + output - lagged)
+
+
+def _undone_loss(run: Experiment, name: str, output: Array, _: float, size: float) -> Experiment:
+    return _with_values(run, name, run[name].values + size * lost(run, name, output))
+
+
+def _with_command(
+    stage: StageFit, change: Callable[[Array, Array, float], Array], size: float
+) -> Problem:
+    """The problem with another command, and the currents that follow from it."""
+    problem, model = stage.problem, stage.problem.model
+    assert isinstance(model, DriveModel)
+    runs, currents = list[Experiment](), dict(model.currents)
+    for run in problem.experiments:
+        signal = run.input
+        largest = float(np.abs(signal.values).max())
+        values = np.clip(change(signal.time, signal.values, size), -largest, largest)
+        moved = replace(run, input=replace(signal, values=values))
+        runs.append(moved)
+        if run.name in currents:
+            if _drives(stage, run):
+                start = model.starts.get(run.name, {})
+                currents[run.name] = simulated_current(moved, model.parameters, start)
+            else:
+                currents[run.name] = measured_current(moved, stage.stage.current_scale)
+    return replace(problem, experiments=tuple(runs), model=replace(model, currents=currents))
+
+
+def _gained(_: Array, values: Array, size: float) -> Array:
+    return (1.0 + size) * values
+
+
+def _lagging(time: Array, values: Array, size: float) -> Array:
+    kept = np.exp(-np.diff(time) / size)
+    bands = np.vstack([np.ones(time.size), np.append(-kept, 0.0)])
+    return np.asarray(solve_banded((1, 0), bands, np.append(values[:1], (1 - kept) * values[1:])))

@@ -1,0 +1,411 @@
+"""How far a prediction may be off in a maneuver that no test has, by class of motion.
+
+A model is judged by runs that it was not fitted to: those that were held out, and each fitted run
+as if all runs of its maneuver had been left out. How large their errors are over short windows
+depends on the signal and on how fast it changes; how much a maneuver differs from this is the error
+of a new one. Nothing is asked of the instruments: what is noise shows in the errors themselves.
+"""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Literal, NamedTuple, get_args
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import maximum_filter1d
+from scipy.optimize import nnls
+from scipy.signal import fftconvolve
+from scipy.special import stdtrit
+
+from swashplate.identification.problem import LinearisedFit, LinearisedRun
+from swashplate.results import Result
+
+if TYPE_CHECKING:
+    from swashplate.identification.fitting import StageFit
+    from swashplate.identification.validation import RunQuality
+
+Array = NDArray[np.float64]
+Motion = Literal["large", "small", "fast"]
+
+WINDOWS: Mapping[Motion, float] = {"large": 0.5, "small": 0.5, "fast": 0.12}
+"""Time over which an error is taken in each class. [s]"""
+TIME = 0.1
+"""Time in which a change of the signal counts as large as the signal. [s]"""
+FAST = 0.04
+"""Part of its range by which a signal changes within `TIME` where it is fast. [1]"""
+SMALL = 0.06
+"""Part of its range below which a signal is small. [1]"""
+NEAR = 0.25
+"""Time before and after a fast change that belongs to it. [s]"""
+COMMANDED = 0.01
+"""Part of the largest command from which there is one. [1]"""
+OWN = 0.01
+"""Of 1 less leverage: directions that one maneuver alone determines stay fitted, as one step says
+little of where they would be without it."""
+LEVEL = 0.9
+"""Probability with which the error of a new maneuver lies below the stated one."""
+USUAL_SPREAD, WORTH = 1.2, 20.0
+"""Standard deviation of the logarithm of a maneuver's squared error over the variance function, and
+how many maneuvers that knowledge is worth (Smyth 2004): measured on machines with 13 maneuvers, as
+five that a campaign repeats do not tell it (docs/calibration.md)."""
+
+
+# --- maneuvers as if they had been left out -------------------------------------------------------
+
+
+def left_out(
+    fit: LinearisedFit, maneuvers: Mapping[str, str]
+) -> Iterator[tuple[LinearisedRun, Array]]:
+    """Each channel of each run, with the differences (n,) if its maneuver had been left out.
+
+    Parameters
+    ----------
+    fit : LinearisedFit
+    maneuvers : mapping of str to str
+        Maneuver of each run: a second run of one says nothing of a new maneuver.
+
+    Notes
+    -----
+    To first order, without a fit. With W whitening JᵀJ and D = J W of the runs of one maneuver,
+    their residuals are (I - D Dᵀ)⁻¹ r (Cook and Weisberg 1982, section 3.2; for a group of rows).
+    """
+    groups = defaultdict[str, list[tuple[LinearisedRun, NDArray[np.intp], Array]]](list)
+    for run, jacobian in fit.jacobians():
+        directions, whitening = fit.inverse.of_run(run.name)
+        groups[maneuvers[run.name]].append((run, directions, jacobian @ whitening))
+    for parts in groups.values():
+        moved = np.unique(np.concatenate([directions for _, directions, _ in parts]))
+        places = [np.searchsorted(moved, directions) for _, directions, _ in parts]
+        products, along = np.zeros((moved.size, moved.size)), np.zeros(moved.size)
+        for (run, _, by), place in zip(parts, places, strict=True):
+            products[np.ix_(place, place)] += by.T @ by
+            along[place] += by.T @ run.residual
+        leverages, axes = np.linalg.eigh(products)
+        spare = 1.0 - np.minimum(leverages, 1.0)
+        shared = spare > OWN
+        gain = np.where(shared, 1.0 / np.where(shared, spare, 1.0), 0.0)
+        shift = axes @ (gain * (axes.T @ along))
+        for (run, _, by), place in zip(parts, places, strict=True):
+            weight = 1.0 if run.weight is None else run.weight
+            yield run, (run.residual + by @ shift[place]) / weight
+
+
+# --- errors over windows --------------------------------------------------------------------------
+
+
+class Record(NamedTuple):
+    """One channel of one run, on an even grid, with the error of its simulation."""
+
+    run: str
+    maneuver: str
+    held_out: bool
+    step: float
+    """[s]"""
+    error: Array
+    """(n,) simulated less measured. [unit]"""
+    noise: float
+    """Standard deviation of what in it is independent from sample to sample. [unit]"""
+    signal: Array
+    """(n,) what is simulated; of a position its speed. [unit, or unit/s]"""
+    rate: Array
+    """(n,) its change within `TIME`. [unit, or unit/s]"""
+    command: Array
+    """(n,)"""
+    is_position: bool
+
+
+def record_of(
+    quality: RunQuality, error: Array | None = None, *, held_out: bool = False
+) -> Record | None:
+    """One channel of one run; None if fewer than four samples count.
+
+    Parameters
+    ----------
+    quality : RunQuality
+    error : (m,) array, optional
+        Simulated less measured of the samples that count; by default that of the quality.
+    held_out : bool
+        Whether the run was held out of the fit.
+    """
+    experiment, channel = quality.experiment, quality.experiment[quality.channel]
+    time = channel.time[channel.used]
+    error = quality.residual[channel.used] if error is None else error
+    if time.size < 4:
+        return None
+    step = float(np.median(np.diff(time)))
+    grid = np.arange(time[0], time[-1] + 0.5 * step, step)
+    signal = np.interp(grid, channel.time, quality.simulated)
+    if channel.is_position:
+        signal = np.gradient(signal, step)
+    return Record(
+        experiment.name,
+        experiment.maneuver,
+        held_out,
+        step,
+        np.interp(grid, time, error),
+        white_noise(error, channel.values[channel.used]),
+        signal,
+        TIME * np.gradient(signal, step),
+        experiment.input.at(grid),
+        channel.is_position,
+    )
+
+
+def white_noise(error: Array, values: Array) -> float:
+    """Standard deviation of what in an error is independent from sample to sample.
+
+    From third differences, which leave nothing of what is smooth, in their median, in which spikes
+    count little; at least the rounding of the smallest step between two readings.
+    """
+    if error.size < 4:
+        return 0.0
+    # 20 = 1 + 9 + 9 + 1, and the median of a normal magnitude is 0.6745 standard deviations
+    white = float(np.median(np.abs(np.diff(error, 3)))) / (0.6745 * np.sqrt(20.0))
+    steps = np.abs(np.diff(values))
+    steps = steps[steps > 0.0]
+    rounding = float(steps.min()) / np.sqrt(12.0) if steps.size else 0.0
+    return float(max(white, rounding))
+
+
+def over_window(record: Record, window: float) -> tuple[Array, float]:
+    """Errors (n,) over a window about each sample, NaN at both ends, and their noise's variance.
+
+    Of a position the slope of the straight line through it, of anything else the mean.
+    """
+    half = int(0.5 * window / record.step)
+    size = 2 * half + 1
+    errors = np.full(record.error.size, np.nan)
+    if record.is_position:
+        half = max(half, 1)
+        size = 2 * half + 1
+        places = np.arange(-half, half + 1.0)
+        weights = places[::-1] / (np.sum(places**2) * record.step)
+    else:
+        weights = np.full(size, 1.0 / size)
+    if record.error.size > size:
+        # a position's first error is its free zero
+        about = record.error - record.error[0] * record.is_position
+        errors[half : about.size - half] = fftconvolve(about, weights, "valid")
+    return errors, record.noise**2 * float(weights @ weights)
+
+
+def classes_of(record: Record, reach: float, largest: float) -> dict[Motion, NDArray[np.bool_]]:
+    """Samples of each class, by what the model itself does: known before a run is made.
+
+    Parameters
+    ----------
+    record : Record
+    reach : float
+        Range of the signal over all runs. [unit]
+    largest : float
+        Largest command of all runs.
+    """
+    near = 2 * int(NEAR / record.step) + 1
+    fast = maximum_filter1d(np.abs(record.rate) > FAST * reach, near)
+    commanded = maximum_filter1d(np.abs(record.command) > COMMANDED * largest, near)
+    slow = np.abs(record.signal) < SMALL * reach
+    return {"large": ~fast & ~slow, "small": ~fast & slow & commanded, "fast": fast}
+
+
+class Cell(NamedTuple):
+    """Windows of one class in one run, one beside another, over the range of the signal."""
+
+    record: Record
+    motion: Motion
+    squares: Array
+    """(m,) squared errors less their noise. [1]"""
+    noise: float
+    """Variance of the noise in each. [1]"""
+    terms: Array
+    """(m, 3) of the variance function: 1, the signal's square, that of its rate. [1]"""
+
+
+def cells_of(records: Sequence[Record]) -> tuple[list[Cell], float]:
+    """All windows, by run and class, and the range of the signal. [unit]"""
+    if not records:
+        return [], 0.0
+    reach = max(r.signal.max() for r in records) - min(r.signal.min() for r in records)
+    largest = max(np.abs(r.command).max() for r in records)
+    cells = list[Cell]()
+    for record in records if reach > 0.0 else ():
+        for motion, inside in classes_of(record, reach, largest).items():
+            errors, noise = over_window(record, WINDOWS[motion])
+            rows = np.flatnonzero(inside & np.isfinite(errors))
+            rows = rows[:: max(int(WINDOWS[motion] / record.step), 1)]
+            if rows.size < 2:
+                continue
+            squares = (errors[rows] ** 2 - noise) / reach**2
+            terms = variance_terms(record.signal[rows] / reach, record.rate[rows] / reach)
+            cells.append(Cell(record, motion, squares, noise / reach**2, terms))
+    return cells, float(reach)
+
+
+def variance_terms(signal: Array, rate: Array) -> Array:
+    """(m, 3) terms of the variance function, of a signal and its change over the range. [1]"""
+    return np.column_stack([np.ones(signal.size), signal**2, rate**2])
+
+
+# --- the stated error -----------------------------------------------------------------------------
+
+
+class ClassError(NamedTuple):
+    """The stated error of one class of motion."""
+
+    motion: Motion
+    error: float
+    """Root mean square that nine of ten new maneuvers do not exceed, over the range. [1]"""
+    fitted: int
+    """Fitted runs with such a motion."""
+    held_out: int
+    """Runs with such a motion that were held out."""
+
+
+@dataclass(frozen=True)
+class PredictionError(Result):
+    """How far a prediction of one channel may be off in a new maneuver."""
+
+    channel: str
+    unit: str
+    """Of the signal: of a position that of its speed."""
+    reach: float
+    """Range of the signal, of a position that of its speed, over all runs. [unit]"""
+    coefficients: tuple[float, float, float]
+    """Of the variance of the error over the squared range: 1, (signal/range)², (its change within
+    0.1 s / range)²."""
+    classes: tuple[ClassError, ...]
+    """Those that some run has."""
+
+    of_position: bool = False
+    """Whether the channel is a position, of which the speed is judged."""
+
+    @property
+    def worst(self) -> ClassError:
+        """The class with the largest error."""
+        return max(self.classes, key=lambda each: each.error)
+
+    @property
+    def signal(self) -> str:
+        """What is predicted, in words."""
+        return f"speed from {self.channel}" if self.of_position else self.channel
+
+    def error(self, signal: Array, rate: Array) -> float:
+        """Stated error of a new maneuver, root mean square over the range.
+
+        Parameters
+        ----------
+        signal, rate : (n,) arrays
+            What is predicted, of a position its speed, and its change within 0.1 s. [unit]
+        """
+        terms = variance_terms(signal / self.reach, rate / self.reach)
+        return float(np.sqrt(np.mean(terms @ self.coefficients)))
+
+
+def prediction_errors(
+    stages: Sequence[StageFit], predicted: Sequence[RunQuality]
+) -> tuple[PredictionError, ...]:
+    """How far predictions of each channel may be off; channels that never move are left out.
+
+    Parameters
+    ----------
+    stages : sequence of StageFit
+        Of the fit; none for a drive that is only compared with runs.
+    predicted : sequence of RunQuality
+        Of runs that were held out, as `validation.predict` gives them.
+
+    Notes
+    -----
+    E e² = a₀ + a₁ s² + a₂ (0.1 s · ds/dt)², a ≥ 0, by quasi-likelihood (Davidian and Carroll 1987):
+    non-negative least squares, weighted by the inverse of the squared mean. The logarithms of
+    observed over fitted squares of the maneuvers have a mean m and a deviation d; a new one stays
+    below exp(m + t d √(1 + 1/k)), the bound of a prediction. What the instrument's gain may be off
+    is an error of the motion that no run of it shows.
+    """
+    channels = dict.fromkeys(name for each in stages for name in each.problem.channels)
+    if not stages:
+        channels = dict.fromkeys(each.channel for each in predicted)
+    records = list(records_of(stages, predicted))
+    qualities = [*(each for stage in stages for each in stage.runs), *predicted]
+    found = list[PredictionError]()
+    for name in channels:
+        measured = next(q.experiment[name] for q in qualities if q.channel == name)
+        cells, reach = cells_of([each for channel, each in records if channel == name])
+        if not cells:
+            continue
+        coefficients = bound_of_variance(cells)
+        coefficients[1] += measured.instrument.gain**2 / 3.0
+        classes = tuple(
+            ClassError(
+                motion,
+                float(np.sqrt(np.mean(np.vstack([c.terms for c in alike]) @ coefficients))),
+                sum(not cell.record.held_out for cell in alike),
+                sum(cell.record.held_out for cell in alike),
+            )
+            for motion in get_args(Motion)
+            if (alike := [cell for cell in cells if cell.motion == motion])
+        )
+        unit = f"{measured.unit}/s" if measured.is_position else measured.unit
+        first, second, third = coefficients.tolist()
+        position = measured.is_position
+        found.append(PredictionError(name, unit, reach, (first, second, third), classes, position))
+    return tuple(found)
+
+
+def records_of(
+    stages: Sequence[StageFit], predicted: Sequence[RunQuality]
+) -> Iterator[tuple[str, Record]]:
+    """Each channel of each run, as if its maneuver had been left out, or held out."""
+    for stage in stages:
+        maneuvers = {run.name: run.maneuver for run in stage.problem.experiments}
+        errors = {(run.name, run.channel): e for run, e in left_out(stage.linearised, maneuvers)}
+        for quality in stage.runs:
+            error = errors[quality.experiment.name, quality.channel]
+            if (record := record_of(quality, error)) is not None:
+                yield quality.channel, record
+    for quality in predicted:
+        if (record := record_of(quality, held_out=True)) is not None:
+            yield quality.channel, record
+
+
+def variance_function(cells: Sequence[Cell]) -> Array:
+    """(3,) coefficients of the mean squared error, over the squared range."""
+    terms = np.vstack([cell.terms for cell in cells])
+    squares = np.concatenate([cell.squares for cell in cells])
+    noise = np.concatenate([np.full(cell.squares.size, cell.noise) for cell in cells])
+    coefficients = np.array([max(float(squares.mean()), 1e-12), 0.0, 0.0])
+    for _ in range(12):
+        spread = np.maximum(terms @ coefficients, 1e-3 * coefficients.sum()) + noise + 1e-14
+        coefficients = nnls(terms / spread[:, None], squares / spread)[0]
+    # what the noise's own scatter leaves open is no less than two standard errors of its mean
+    coefficients[0] += 2.0 * float(np.sqrt(2.0 * np.mean(noise**2) / noise.size))
+    return np.asarray(coefficients)
+
+
+def bound_of_variance(cells: Sequence[Cell]) -> Array:
+    """(3,) the same for the squared error that nine of ten new maneuvers do not exceed."""
+    coefficients = variance_function(cells)
+    maneuvers = defaultdict[str, list[Cell]](list)
+    for cell in cells:
+        maneuvers[cell.record.maneuver].append(cell)
+    ratios = np.array([log_ratio(each, coefficients) for each in maneuvers.values()])
+    deviation, freedom = spread_of(ratios)
+    bound = float(stdtrit(freedom, LEVEL)) * deviation * np.sqrt(1.0 + 1.0 / ratios.size)
+    return coefficients * float(np.exp(ratios.mean() + bound))
+
+
+def log_ratio(cells: Sequence[Cell], coefficients: Array) -> float:
+    """Logarithm of the mean of observed over fitted squares of some windows."""
+    fitted = np.concatenate([cell.terms @ coefficients for cell in cells])
+    squares = np.concatenate([cell.squares for cell in cells])
+    noise = sum(cell.noise * cell.squares.size for cell in cells)
+    least = noise * np.sqrt(2.0 / squares.size) / float(fitted.sum())
+    return float(np.log(max(float(np.mean(squares / fitted)), least, 1e-300)))
+
+
+def spread_of(ratios: Array) -> tuple[float, float]:
+    """Standard deviation of logarithms of some maneuvers, and its degrees of freedom."""
+    own = ratios.size - 1.0
+    squares = float(np.sum((ratios - ratios.mean()) ** 2)) + WORTH * USUAL_SPREAD**2
+    return float(np.sqrt(squares / (own + WORTH))), own + WORTH

@@ -1,0 +1,198 @@
+"""Whether the data are sound: runs beside the model that was fitted to all of them."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import uniform_filter1d
+from scipy.special import stdtrit
+
+from swashplate.identification.data_checks import (
+    Finding,
+    clipped_channels,
+    contradicting_runs,
+    refusal,
+)
+from swashplate.identification.discrepancy import (
+    USUAL_SPREAD,
+    WORTH,
+    Cell,
+    Record,
+    cells_of,
+    log_ratio,
+    over_window,
+    record_of,
+    variance_function,
+)
+from swashplate.identification.drive_model import DriveModel
+
+if TYPE_CHECKING:
+    from swashplate.campaign.experiment import Experiment
+    from swashplate.identification.fitting import StageFit
+    from swashplate.identification.validation import RunQuality
+
+Array = NDArray[np.float64]
+
+FALSE_ALARM = 0.01
+"""Probability with which one run of a sound campaign is taken for unsound."""
+FEWEST_RUNS = 3
+"""Of which one can stand out."""
+WINDOW = 0.12
+"""Time over which a run's error is explained. [s]"""
+EXPLAINED = 0.25
+"""Part of a run's squared error that may be left of it by what explains it."""
+LATEST = 2.0
+"""Delay that is looked for. [s]"""
+STANDS_STILL = 0.5
+"""Time for which a reading stands still at once if it is not that of a machine. [s]"""
+
+
+def unsound_data(stages: Sequence[StageFit], predicted: Sequence[RunQuality]) -> list[Finding]:
+    """What in the data of a fit cannot be right, with the line to write in the campaign file.
+
+    Parameters
+    ----------
+    stages : sequence of StageFit
+        All stages of the fit.
+    predicted : sequence of RunQuality
+        Of runs that were held out.
+    """
+    fitted = {run.name: run for stage in stages for run in stage.problem.experiments}
+    held_out = {each.experiment.name: each.experiment for each in predicted}
+    runs = list((fitted | held_out).values())
+    found = list[Finding]()
+    last = stages[-1]
+    if isinstance(last.problem.model, DriveModel):
+        found += contradicting_runs(runs, last.drive.parameters)
+    found += clipped_channels(runs)
+    seen = {each.run for each in found}
+    return [*found, *(each for each in outlying_runs(stages, predicted) if each.run not in seen)]
+
+
+def outlying_runs(
+    stages: Sequence[StageFit], predicted: Sequence[RunQuality]
+) -> Iterator[Finding]:
+    """Runs whose errors are far larger than those of the others, each once, and why.
+
+    Notes
+    -----
+    Logarithms of the squared errors, each over what the variance function lets expect, are
+    compared with their median. Their robust deviation is joined with what is usual, as in
+    `discrepancy`; the limit is a quantile of Student's distribution, shared among the runs.
+    """
+    qualities = [*(each for stage in stages for each in stage.runs), *predicted]
+    seen = set[str]()
+    for channel in dict.fromkeys(each.channel for each in qualities):
+        records = [
+            record
+            for each in qualities
+            if each.channel == channel and (record := record_of(each)) is not None
+        ]
+        runs = defaultdict[str, list[Cell]](list)
+        cells, _ = cells_of(records)
+        for cell in cells:
+            runs[cell.record.run].append(cell)
+        if len(runs) < FEWEST_RUNS:
+            continue
+        coefficients = variance_function(cells)
+        ratios = np.array([log_ratio(each, coefficients) for each in runs.values()])
+        for outlier in _outliers(ratios):
+            own = list(runs.values())[outlier][0].record
+            if own.run not in seen:
+                seen.add(own.run)
+                times = float(np.exp(0.5 * (ratios[outlier] - np.median(ratios))))
+                yield refusal(own.run, channel, _sentence(own, channel, records, times))
+
+
+def _outliers(ratios: Array) -> list[int]:
+    """Numbers of those that are far above the others, the farthest first."""
+    count = ratios.size
+    apart = ratios - np.median(ratios)
+    own = (float(np.median(np.abs(apart))) / 0.6745) ** 2
+    freedom = count - 1.0 + WORTH
+    variance = ((count - 1.0) * own + WORTH * USUAL_SPREAD**2) / freedom
+    limit = float(stdtrit(freedom, 1.0 - FALSE_ALARM / count)) * np.sqrt(variance * (1 + 1 / count))
+    return [int(k) for k in np.argsort(-apart) if apart[k] > limit]
+
+
+# --- why ------------------------------------------------------------------------------------------
+
+
+def _sentence(own: Record, channel: str, records: Sequence[Record], times: float) -> str:
+    """What is wrong with a run, where that can be told, and the line to write."""
+    said = f"{own.run}: '{channel}' is {times:.2g} times as far from what is simulated as in the "
+    said += "other runs"
+    measured, simulated = _motion(own)
+    left = float(np.mean((simulated - measured) ** 2))
+    ignored = 'leave it out with role = "ignore"'
+    if (span := _still(own, measured, simulated)) is not None:
+        first, last = span
+        return (
+            f"{said}: it stands still from {first:.4g} to {last:.4g} s. Look at the sensor; ignore "
+            f"this window, or {ignored}."
+        )
+    delay, after = _delayed(own, measured, simulated)
+    if after < EXPLAINED * left:
+        way = "late" if delay > 0.0 else "early"
+        return (
+            f"{said}: it comes {1e3 * abs(delay):.3g} ms {way} beside its command. Look at the "
+            f"logger's clock in this run, shift the log, or {ignored}."
+        )
+    gain = float(measured @ simulated) / float(simulated @ simulated or 1.0)
+    if np.mean((gain * simulated - measured) ** 2) < EXPLAINED * left:
+        return (
+            f"{said}: it moves {gain:.3g} times as far. Check its unit, scale and counts_per_turn, "
+            f"or {ignored}."
+        )
+    for other in records:
+        if other.run == own.run or abs(other.step - own.step) > 1e-9:
+            continue
+        theirs = _motion(other)[1]
+        size = min(theirs.size, measured.size)
+        if size < 0.5 * max(theirs.size, measured.size):
+            continue
+        if np.mean((theirs[:size] - measured[:size]) ** 2) < EXPLAINED * left:
+            return (
+                f"{said}, but follows the command of {other.run}: are their logs swapped? Give "
+                f"each run its own file, or {ignored}."
+            )
+    return f"{said}. Is it a log of this axis and this command? If not, {ignored}."
+
+
+def _motion(record: Record) -> tuple[Array, Array]:
+    """(n,) what was measured and what is simulated over short windows; of a position speeds."""
+    errors, _ = over_window(record, WINDOW)
+    size = 2 * max(int(0.5 * WINDOW / record.step), 1) + 1
+    simulated = uniform_filter1d(record.signal, size, mode="nearest")
+    return simulated - np.nan_to_num(errors), simulated
+
+
+def _delayed(record: Record, measured: Array, simulated: Array) -> tuple[float, float]:
+    """Delay of what was measured at which it is nearest [s], and the mean square left then."""
+    most = min(int(LATEST / record.step), measured.size // 4)
+    shifts = np.arange(-most, most + 1)
+    left = np.full(shifts.size, np.inf)
+    for k, shift in enumerate(shifts.tolist()):
+        later = measured[shift:] if shift >= 0 else measured[:shift]
+        own = simulated[: simulated.size - shift] if shift >= 0 else simulated[-shift:]
+        left[k] = np.mean((later - own) ** 2)
+    best = int(np.argmin(left))
+    return float(shifts[best] * record.step), float(left[best])
+
+
+def _still(record: Record, measured: Array, simulated: Array) -> tuple[float, float] | None:
+    """First and last instant at which the reading stands still though the model moves. [s]"""
+    if not record.is_position:
+        return None
+    largest = float(np.abs(simulated).max())
+    # a slope of exactly the simulated one is that of a reading that does not change
+    still = (np.abs(measured) < 1e-6 * largest) & (np.abs(simulated) > 0.2 * largest)
+    edges = np.flatnonzero(np.diff(still, prepend=False, append=False)).reshape(-1, 2)
+    for first, after in edges:
+        if (after - first) * record.step > STANDS_STILL - WINDOW:
+            return float(first * record.step), float(after * record.step)
+    return None

@@ -1,0 +1,436 @@
+"""The verdict on a fit: are the data sound, may one predict with it, which values may be quoted."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from html import escape
+from math import isinf, nan
+from typing import TYPE_CHECKING, get_args
+
+from swashplate.campaign.experiment import Channel, Experiment
+from swashplate.errors import DomainError, InputError
+from swashplate.identification.causes import Cause, causes_of, fixed_numbers
+from swashplate.identification.data_checks import Finding
+from swashplate.identification.determination import WIDE, weak_unknowns, without_value
+from swashplate.identification.discrepancy import (
+    ClassError,
+    Motion,
+    PredictionError,
+    prediction_errors,
+)
+from swashplate.identification.drive_model import (
+    LIMIT_COLUMNS,
+    LIMITS,
+    SIGNALS,
+    DriveModel,
+    limits_reached,
+)
+from swashplate.identification.solving import Solution
+from swashplate.identification.soundness import unsound_data
+from swashplate.identification.validation import percent
+from swashplate.parameters.definitions import COLUMNS
+from swashplate.results import Result, listing
+from swashplate.tables import UNIT, Column, Table, count, listed
+
+if TYPE_CHECKING:
+    from swashplate.identification.fitting import StageFit
+    from swashplate.identification.validation import RunQuality
+
+REQUIRED = 0.10
+"""Largest error of a prediction over the range, if the user requires nothing else."""
+SHAFT = ("shaft_speed", "shaft_position")
+"""Signals of a drive that are one motion."""
+SAME = 1e-6
+"""Costs that differ by less than this part are the same optimum."""
+MOTIONS: Mapping[Motion, str] = {
+    "large": "large motion",
+    "small": "small motion, near the dead zone",
+    "fast": "fast motion",
+}
+
+
+@dataclass(frozen=True)
+class Verdict(Result):
+    """The judgment on a fit, or on a drive over some runs: three answers."""
+
+    required: float
+    """Largest error of a prediction over the range that is of use. [1]"""
+    predictions: tuple[PredictionError, ...]
+    """How far predictions of each channel may be off in a new maneuver."""
+    decisive: tuple[str, ...]
+    """Channels whose error must be within what is required: of several that measure the shaft's
+    motion the one that knows it best."""
+    fitted: bool = True
+    """Whether it is on a fit; False for a drive that is compared with runs."""
+    unfinished: tuple[str, ...] = ()
+    """Clauses on stages that did not come to their end."""
+    unsound: tuple[Finding, ...] = ()
+    """Data that cannot be right, each with the line to write."""
+    quotable: int = 0
+    """Values of the machine whose interval is not wide."""
+    undetermined: tuple[str, ...] = ()
+    """Values of the machine with a wide interval, or none."""
+    causes: tuple[Cause, ...] | None = None
+    """What would explain the error, by a refit, the largest share first; empty if nothing does,
+    None if the error is mostly noise or was not looked at."""
+    validity: str = ""
+    """Sentence that names the maneuvers and the range that it holds for, and what they never
+    reach; empty for a drive that was not fitted."""
+    assumed: tuple[str, ...] = ()
+    """What these logs cannot show, and what is assumed of it."""
+    remarks: tuple[str, ...] = ()
+    """What else asks for attention."""
+
+    @property
+    def sound(self) -> bool:
+        """Whether nothing in the data stands out."""
+        return not self.unsound
+
+    @property
+    def error(self) -> PredictionError | None:
+        """The decisive channel with the largest stated error; None if nothing moves."""
+        channels = [each for each in self.predictions if each.channel in self.decisive]
+        return max(channels, key=lambda each: each.worst.error, default=None)
+
+    @property
+    def predicts(self) -> bool:
+        """Whether each class of motion is predicted as well as required."""
+        return self.error is not None and self.error.worst.error <= self.required
+
+    @property
+    def usable(self) -> bool:
+        """Whether the data are sound, the fit came to its end, and it predicts well enough."""
+        return self.sound and not self.unfinished and self.predicts
+
+    @property
+    def headline(self) -> str:
+        """One sentence."""
+        if self.unfinished:
+            return f"Not usable: {'; '.join(self.unfinished)}."
+        if self.unsound:
+            more = f" ({len(self.unsound) - 1} more below.)" if len(self.unsound) > 1 else ""
+            return f"Not usable, as the data are not sound: {self.unsound[0].sentence}{more}"
+        error = self.error
+        if error is None:
+            return "Not usable: no channel moves, so that no prediction can be judged."
+        within = f"{error.signal} within {percent(error.worst.error)} of its range"
+        if not self.predicts:
+            return (
+                f"Not usable: predicts {within} in {MOTIONS[error.worst.motion]}; "
+                f"{percent(self.required)} is required."
+            )
+        classes = ", ".join(f"{each.motion} {percent(each.error)}" for each in error.classes)
+        return f"Usable: predicts {within} in a new maneuver ({classes})."
+
+    @property
+    def data(self) -> str:
+        """Whether the data are sound, in a sentence."""
+        if self.unsound:
+            return f"Not sound: {' '.join(each.sentence for each in self.unsound)}"
+        if not self.fitted:
+            return "Not judged: a drive that was not fitted to these runs says little of them."
+        return "Sound: no run stands out from the others, none is clipped."
+
+    @property
+    def prediction(self) -> str:
+        """What may be predicted, and how well, in a sentence."""
+        if not self.predictions:
+            return "Unknown: no channel moves."
+        said = "; ".join(_stated(each) for each in self.predictions)
+        return (
+            f"Nine of ten new maneuvers are predicted {said}. Required: {percent(self.required)}."
+        )
+
+    @property
+    def values(self) -> str:
+        """Which values may be quoted, in a sentence; empty for a drive that was not fitted."""
+        if not self.fitted:
+            return ""
+        total = self.quotable + len(self.undetermined)
+        if not self.undetermined:
+            return f"All {total} may be quoted with their intervals."
+        return (
+            f"{self.quotable} of {total} may be quoted with their intervals; undetermined, to "
+            f"{percent(WIDE)} of the value: {listed(self.undetermined)}."
+        )
+
+    @property
+    def cause(self) -> str:
+        """What would explain the error, in a sentence; empty if there is nothing to explain."""
+        if self.causes is None:
+            return ""
+        if not self.causes:
+            return "None found: no single thing that was tried explains half of the error."
+        return f"{'; or '.join(each.words for each in self.causes)}."
+
+    def answers(self) -> dict[str, str]:
+        """The three answers, and what would explain the error, by their names."""
+        said = {
+            "Data": self.data,
+            "Prediction": self.prediction,
+            "Values": self.values,
+            "Likely cause": self.cause,
+        }
+        return {name: text for name, text in said.items() if text}
+
+    def table(self) -> Table:
+        """The stated error of each channel by class of motion."""
+        made = Table(
+            "Stated error in a new maneuver",
+            (
+                Column("signal"),
+                Column("motion"),
+                Column("error", ".3g", none="unknown"),
+                UNIT,
+                Column("of range", ".2%"),
+                Column("runs", ".0f", "1"),
+                Column("held out", ".0f", "1"),
+                Column("required"),
+            ),
+        )
+        for each in self.predictions:
+            tested = {found.motion: found for found in each.classes}
+            for motion in get_args(Motion):
+                found = tested.get(motion, ClassError(motion, nan, 0, 0))
+                late = each.channel in self.decisive and found.error > self.required
+                made.add(
+                    each.signal,
+                    motion,
+                    found.error * each.reach,
+                    found.error,
+                    float(found.fitted + found.held_out),
+                    float(found.held_out),
+                    "NOT MET" if late else "met" if each.channel in self.decisive else "-",
+                    unit=each.unit,
+                    look=late,
+                )
+        return made
+
+    def html(self, between: str = "") -> str:
+        """HTML: headline, answers and sentences, other HTML, the stated errors."""
+        answers = "".join(
+            f"<dt>{escape(name)}</dt><dd>{escape(text)}</dd>"
+            for name, text in self.answers().items()
+        )
+        headline = f"<p><strong>{escape(self.headline)}</strong></p>"
+        return (
+            f"{headline}<dl>{answers}</dl>{listing(self.sentences)}{between}"
+            f"{self.table()._repr_html_()}"
+        )
+
+    def _repr_html_(self) -> str:
+        return self.html()
+
+    @property
+    def sentences(self) -> tuple[str, ...]:
+        """What it holds for, what asks for attention, and what is assumed."""
+        validity = (self.validity,) if self.validity else ()
+        return (*validity, *self.remarks, *(f"Assumed: {each}." for each in self.assumed))
+
+    def summary(self) -> str:
+        """Text: headline, answers, sentences, the stated errors."""
+        answers = "\n".join(f"{name}: {text}" for name, text in self.answers().items())
+        lines = "\n".join(f"- {sentence}" for sentence in self.sentences)
+        parts = [self.headline, answers, lines, str(self.table())]
+        return "\n\n".join(part for part in parts if part)
+
+
+def verdict(
+    stages: Sequence[StageFit],
+    predicted: Sequence[RunQuality],
+    *,
+    planned: Sequence[str] = (),
+    required: float = REQUIRED,
+) -> Verdict:
+    """Judge a fit, or a drive by what it predicts.
+
+    Parameters
+    ----------
+    stages : sequence of StageFit
+        Each stage of the fit; none for a drive that is only compared with runs.
+    predicted : sequence of RunQuality
+        Of runs that were held out of the fit, as `validation.predict` gives them.
+    planned : sequence of str
+        Names of all stages of the fit configuration, to tell those that were never begun.
+    required : float
+        Largest error of a prediction in a new maneuver, over the range of the signal. [1]
+    """
+    predictions = prediction_errors(stages, predicted)
+    decisive = _decisive(predictions, stages, predicted)
+    if not stages:
+        return Verdict(required, predictions, decisive, fitted=False)
+    unfinished = tuple(_unfinished(stages, planned))
+    unsound = tuple(unsound_data(stages, predicted))
+    lost = {each for stage in stages for each in (*without_value(stage), *weak_unknowns(stage))}
+    machine = [
+        unknown.name
+        for stage in stages
+        for unknown in stage.problem.unknowns
+        if unknown.run is None
+    ]
+    causes = None if unfinished or unsound else causes_of(stages)
+    tested = {each.name: each for each in _fitted_runs(stages)}
+    tested |= {each.experiment.name: each.experiment for each in predicted}
+    return Verdict(
+        required,
+        predictions,
+        decisive,
+        unfinished=unfinished,
+        unsound=unsound,
+        quotable=sum(name not in lost for name in machine),
+        undetermined=tuple(name for name in machine if name in lost),
+        causes=causes,
+        validity=_validity(stages, tested),
+        assumed=tuple(_assumed(stages)),
+        remarks=tuple(_starts(stages)),
+    )
+
+
+def starts_of(stages: Sequence[StageFit]) -> dict[str, Sequence[Solution]]:
+    """Starts by stage, of the stages that had several."""
+    return {each.stage.name: each.starts for each in stages if len(each.starts) > 1}
+
+
+def _fitted_runs(stages: Sequence[StageFit]) -> list[Experiment]:
+    """The fitted runs of all stages, each once."""
+    return list({e.name: e for a in stages for e in a.problem.experiments}.values())
+
+
+# --- what decides ---------------------------------------------------------------------------------
+
+
+def _decisive(
+    predictions: Sequence[PredictionError],
+    stages: Sequence[StageFit],
+    predicted: Sequence[RunQuality],
+) -> tuple[str, ...]:
+    """Channels that decide: of those that measure a drive's shaft the best, and all others."""
+    runs = [*_fitted_runs(stages), *(each.experiment for each in predicted)]
+    kinds = {name: channel.kind for run in runs for name, channel in run.channels.items()}
+    drive = all(isinstance(each.problem.model, DriveModel) for each in stages)
+    shaft = [
+        each
+        for each in predictions
+        if drive and SIGNALS.get(kinds[each.channel]) in SHAFT
+    ]
+    best = min(shaft, key=lambda each: each.worst.error, default=None)
+    return tuple(
+        each.channel for each in predictions if each not in shaft or each is best
+    )
+
+
+def _unfinished(stages: Sequence[StageFit], planned: Sequence[str]) -> Iterator[str]:
+    """Clauses on stages that did not come to their end."""
+    for each in stages:
+        name, solution = each.stage.name, each.solution
+        if solution.interrupted:
+            yield f"stage {name} was interrupted, and its best so far is not an optimum"
+        elif not solution.converged:
+            yield f"stage {name} did not converge ({solution.message})"
+    done = {each.stage.name for each in stages}
+    missing = [name for name in planned if name not in done]
+    if missing:
+        yield f"{listed(missing)} {'were' if len(missing) > 1 else 'was'} never fitted"
+
+
+# --- words ----------------------------------------------------------------------------------------
+
+
+def _stated(prediction: PredictionError) -> str:
+    """``speed from counts to 0.1 % of its range in large motion (13 runs), ...``."""
+    tested = {each.motion: each for each in prediction.classes}
+    said = list[str]()
+    for motion, words in MOTIONS.items():
+        if motion in tested:
+            each = tested[motion]
+            runs = count(each.fitted + each.held_out, "run")
+            said.append(f"{percent(each.error)} in {words} ({runs})")
+        else:
+            said.append(f"unknown in {words}, as no run has it")
+    return f"{prediction.signal} to {listed(said)}"
+
+
+def _starts(stages: Sequence[StageFit]) -> Iterator[str]:
+    """How many starts reached the best optimum."""
+    for stage, results in starts_of(stages).items():
+        costs = [each.cost for each in results]
+        best = min(costs)
+        if isinf(best):
+            yield f"{stage}: no start ended with a finite cost."
+            continue
+        alike = sum(each <= best * (1.0 + SAME) for each in costs)
+        yield f"{stage}: {alike} of {len(costs)} starts reached the best cost, {best:.6g}."
+
+
+def _assumed(stages: Sequence[StageFit]) -> Iterator[str]:
+    """What the instruments and the fixed numbers are taken for, as no residual shows it."""
+    channels = dict[str, Channel]()
+    for stage in stages:
+        for run in stage.problem.experiments:
+            channels |= {n: run[n] for n in stage.problem.channels if n in run.channels}
+    for name, channel in channels.items():
+        if channel.encoder is not None:
+            yield f"the scale of {name}, {channel.encoder.counts_per_turn:.6g} counts per turn"
+        elif channel.instrument.gain > 0.0:
+            yield f"the scale of {name} within {percent(channel.instrument.gain)}"
+        else:
+            yield f"the scale of {name}"
+    fixed = [name for stage in stages for name in fixed_numbers(stage)]
+    symbols = list(dict.fromkeys(COLUMNS[name] for name in fixed))
+    if symbols:
+        known = {name for stage in stages for each in stage.problem.uncertain for name in each}
+        stated = list(dict.fromkeys(COLUMNS[name] for name in fixed if name in known))
+        also = f", {listed(stated)} within a standard uncertainty" if stated else ""
+        yield f"the fixed {listed(symbols)} as stated{also}"
+
+
+def maneuvers_tested(tested: Mapping[str, Experiment]) -> str:
+    """``ramps, steps and sines of up to 0.3 Hz from -9 to 9 V``."""
+    runs, fastest = list(tested.values()), 0.0
+    several = {each: f"{each}s" for each in ("ramp", "step", "sine", "chirp")}
+    several["unnamed"] = "unnamed motions"
+    kinds = dict[str, None]()
+    for each in runs:
+        word = each.maneuver.split(" ")[0]
+        kinds[several.get(word, word)] = None
+        if each.recognised is not None:
+            fastest = max(fastest, each.recognised.frequency or 0.0)
+    low = min(float(each.input.values.min()) for each in runs)
+    high = max(float(each.input.values.max()) for each in runs)
+    words = [f"sines of up to {fastest:.3g} Hz" if k == "sines" and fastest else k for k in kinds]
+    return f"{listed(words)} from {low:.3g} to {high:.3g} {runs[0].input.unit}"
+
+
+def _validity(stages: Sequence[StageFit], tested: Mapping[str, Experiment]) -> str:
+    """What the fit holds for, which limits its runs never reach, and which the model has not."""
+    said, stage = f"Holds for {maneuvers_tested(tested)}", stages[-1]
+    if not isinstance(stage.problem.model, DriveModel):
+        return f"{said}."
+    try:
+        runs, parameters = _fitted_runs(stages), stage.drive.parameters
+        reached = {limit for each in runs for limit in limits_reached(each, parameters)}
+    except (DomainError, InputError):
+        return f"{said}."
+    never, lacking = list[str](), list[str]()
+    for name, words in LIMITS.items():
+        columns = [column for column in LIMIT_COLUMNS if column.startswith(name)]
+        unreached = [column for column in columns if column not in reached]
+        absent = [column for column in unreached if isinf(parameters.numbers[column])]
+        lacking += _limits_named(words, absent, columns)
+        never += _limits_named(words, [c for c in unreached if c not in absent], columns)
+    if never:
+        said += f"; never reached: {listed(never)}"
+    if lacking:
+        said += f"; not in the model: {listed(lacking)}"
+    return f"{said}."
+
+
+def _limits_named(words: str, some: Sequence[str], columns: Sequence[str]) -> list[str]:
+    """A limit in words, by its direction if only some of its columns are meant."""
+    if not some:
+        return []
+    if len(some) == len(columns):
+        return [words]
+    ways = {"plus": "positive", "minus": "negative"}
+    return [f"{words} in {ways[column.rpartition('_')[2]]} direction" for column in some]
