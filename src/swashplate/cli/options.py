@@ -55,7 +55,9 @@ SetFile = Annotated[
     option("Write the changed drive as a parameter file.", metavar="SET.toml"),
     Form("a parameter file", (".toml",)),
 ]
-Required = Annotated[float, option("Largest error of a prediction, in % of the signal's range.", min=0.0)]
+Required = Annotated[
+    float, option("Largest error of a prediction, in % of the signal's range.", min=0.0)
+]
 
 SHARED = """
   begin --from AXIS|SET.toml: Begin at this drive instead of the campaign's.

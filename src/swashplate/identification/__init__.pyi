@@ -1,6 +1,4 @@
 from .assessment import Identification as Identification
-from .verdict import Verdict as Verdict
-from .verdict import verdict as verdict
 from .determination import Identifiability as Identifiability
 from .drive_model import DriveModel as DriveModel
 from .drive_model import configuration as configuration
@@ -37,3 +35,5 @@ from .unknowns import Prior as Prior
 from .unknowns import Unknown as Unknown
 from .unknowns import Unknowns as Unknowns
 from .validation import predict as predict
+from .verdict import Verdict as Verdict
+from .verdict import verdict as verdict

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from math import isfinite
@@ -61,13 +61,16 @@ class Cause(NamedTuple):
     unit: str
     share: float
     """Part of the squared residuals that the refit with it removes. [1]"""
+    advice: str
+    """What to do, as an imperative clause."""
 
     @property
     def words(self) -> str:
-        """It in words, with its size and share."""
+        """It in words, with its size and share, and what to do."""
+        share = f"{100.0 * self.share:.0f} % of the squared residuals"
         return (
-            f"{self.name} by {self.size:+.3g} {self.unit}, with which a refit removes "
-            f"{100.0 * self.share:.0f} % of the squared residuals"
+            f"{self.name} by {self.size:+.3g} {self.unit}, which removes {share} in a refit "
+            f"({self.advice})"
         )
 
 
@@ -81,6 +84,7 @@ class Candidate(Result):
     """Sizes that are plausible. [SI, or 1]"""
     freed: Callable[[float], Problem]
     """The problem of the stage with it, for its size to first order."""
+    advice: str
     factor: float = 1.0
     unit: str = ""
     """What it is printed in, and the factor from SI to that."""
@@ -214,11 +218,11 @@ def _effects(stage: StageFit, number: int) -> Iterator[tuple[str, Changes]]:
 COMMAND_GAIN, COMMAND_LAG = "scale of the command", "lag of the command"
 
 
-def _of_channel(
-    experiment: Experiment, name: str, output: Array, place: float
-) -> dict[str, Array]:
-    """Changes (m,) of simulated less measured if an instrument's fault, or a motion that the model
-    leaves out, of one unit is simulated."""
+def _of_channel(experiment: Experiment, name: str, output: Array, place: float) -> dict[str, Array]:
+    """Changes (m,) of simulated less measured if one unit of each is simulated.
+
+    Of an instrument's faults, and of a motion that the model leaves out.
+    """
     channel, time = experiment[name], experiment[name].time
     slope = np.gradient(output, time) if time.size > 2 else np.zeros_like(output)
     moved = output - output[0] if channel.is_position else output
@@ -258,35 +262,62 @@ def behind_lag(time: Array, values: Array) -> Array:
 
 def _candidates(stage: StageFit) -> Iterator[Candidate]:
     """Everything that may be freed in a stage."""
-    problem, model = stage.problem, stage.problem.model
-    for name in problem.channels:
-        kinds = {run[name].kind for run in problem.experiments if name in run.channels}
-        read = partial(_with_reading, stage, name)
-        yield Candidate(f"scale of {name}", -0.3, 0.3, partial(read, _scaled), 100.0, "%")
-        yield Candidate(f"time stamps of {name}", -LATEST, LATEST, partial(read, _late), 1e3, "ms")
-        yield Candidate(f"lag of {name}", 0.0, LATEST, partial(read, _undone_lag), 1e3, "ms")
-        if kinds.isdisjoint(CURRENTS):
-            drift = f"drift of {name} over the campaign"
-            yield Candidate(drift, -0.5, 0.5, partial(read, _undone_drift), 100.0, "%")
-            unit = next(iter(problem.experiments))[name].unit if problem.experiments else ""
-            unit = unit if unit.endswith("/s") else f"{unit}/s"
-            loss = f"loss of speed under load, {name}"
-            yield Candidate(loss, 0.0, np.inf, partial(read, _undone_loss), 1.0, unit)
-    if not isinstance(model, DriveModel):
+    for name in stage.problem.channels:
+        yield from _of_readings(stage, name)
+    if isinstance(stage.problem.model, DriveModel):
+        yield from _of_commands(stage)
+        yield from _of_numbers(stage)
+
+
+def _of_readings(stage: StageFit, name: str) -> Iterator[Candidate]:
+    """What may be wrong with an instrument, or with the motion that it reads."""
+    channels = [run[name] for run in stage.problem.experiments if name in run.channels]
+    read = partial(_with_reading, stage, name)
+    check = f"check the instrument of {name}"
+    yield Candidate(f"scale of {name}", -0.3, 0.3, partial(read, _scaled), check, 100.0, "%")
+    late = f"{check} and its clock, or a delay of the machine"
+    stamps = f"time stamps of {name}"
+    yield Candidate(stamps, -LATEST, LATEST, partial(read, _late), late, 1e3, "ms")
+    slow = f"{check} and its filter"
+    yield Candidate(f"lag of {name}", 0.0, LATEST, partial(read, _undone_lag), slow, 1e3, "ms")
+    if channels[0].kind in CURRENTS:
         return
-    yield Candidate(COMMAND_GAIN, -0.3, 0.3, partial(_with_command, stage, _gained), 100.0, "%")
-    yield Candidate(COMMAND_LAG, 0.0, LATEST, partial(_with_command, stage, _lagging), 1e3, "ms")
-    most = 0.1 * max(float(np.abs(_driving(stage, run)).max()) for run in problem.experiments)
-    freed = partial(_with_number, stage, "solenoid_hysteresis")
+    drift = f"drift of {name} over the campaign"
+    warm = "keep the machine as it is in use, its oil warm, and test again"
+    yield Candidate(drift, -0.5, 0.5, partial(read, _undone_drift), warm, 100.0, "%")
+    unit = channels[0].unit
+    unit = unit if unit.endswith("/s") else f"{unit}/s"
+    loss = f"loss of speed under load, {name}"
+    load = "look for a load, friction or a leaking motor, which the model leaves out"
+    yield Candidate(loss, 0.0, np.inf, partial(read, _undone_loss), load, 1.0, unit)
+
+
+def _of_commands(stage: StageFit) -> Iterator[Candidate]:
+    """What may be wrong with the command, or with what takes it."""
+    gain = partial(_with_command, stage, _gained)
+    check = "check the converter of the command"
+    yield Candidate(COMMAND_GAIN, -0.3, 0.3, gain, check, 100.0, "%")
+    lag = partial(_with_command, stage, _lagging)
+    filter_ = "look for a filter or delay between command and amplifier"
+    yield Candidate(COMMAND_LAG, 0.0, LATEST, lag, filter_, 1e3, "ms")
+
+
+def _of_numbers(stage: StageFit) -> Iterator[Candidate]:
+    """What of the drive is fixed, and the hysteresis that it is taken not to have."""
+    runs = stage.problem.experiments
+    most = 0.1 * max(float(np.abs(_driving(stage, run)).max()) for run in runs)
     name = "solenoid_hysteresis"
-    yield Candidate(name, 0.0, most, freed, 1e3, "mA", name)
+    free = f"friction or hysteresis of spool and solenoids: free {name} in the fit configuration"
+    freed = partial(_with_number, stage, name)
+    yield Candidate(name, 0.0, most, freed, free, 1e3, "mA", name)
     numbers = stage.parameters.numbers
     for name in fixed_numbers(stage):
         value, unit = numbers[name], CATALOGUE[COLUMNS[name]].unit
         low, high = sorted((-0.5 * value, value))
         if unit == "s":
             low, high = -value, LATEST
-        yield Candidate(name, low, high, partial(_with_number, stage, name), 1.0, unit, name)
+        free = f"measure {COLUMNS[name]}, or free it in the fit configuration"
+        yield Candidate(name, low, high, partial(_with_number, stage, name), free, 1.0, unit, name)
 
 
 def fixed_numbers(stage: StageFit) -> list[str]:
@@ -349,7 +380,8 @@ def _refitted(stage: StageFit, score: _Score) -> Cause | None:
                 size, share = better
     if share < EXPLAINED or not candidate.least < size < candidate.most:
         return None
-    return Cause(candidate.name, candidate.factor * size, candidate.unit, share)
+    shown = candidate.factor * size
+    return Cause(candidate.name, shown, candidate.unit, share, candidate.advice)
 
 
 def _solved(stage: StageFit, candidate: Candidate, size: float) -> tuple[float, float] | None:
@@ -402,7 +434,7 @@ def _with_reading(
         if name in run.channels:
             output = problem.outputs(stage.solution.vector, number)[name]
             place = number / max(count - 1, 1) - 0.5
-            run = undo(run, name, output, place, size)  # noqa: PLW2901
+            run = undo(run, name, output, place, size)
         runs.append(run)
     return replace(problem, experiments=tuple(runs))
 

@@ -365,10 +365,6 @@ def without_value(stage: StageFit) -> list[str]:
 
 def weak_unknowns(stage: StageFit) -> list[str]:
     """Unknowns of the machine with an interval wider than 10 % of the value, or without one."""
-    try:
-        found = {each.name: each.relative_half_width for each in stage.estimates}
-    except InputError:
-        found = {}
-    machine = [each.name for each in stage.problem.unknowns if each.run is None]
-    bounds = stage.identifiability.at_bounds
-    return [name for name in machine if found.get(name, inf) > WIDE and name not in bounds]
+    pairs = zip(stage.estimates, stage.problem.unknowns, strict=True)
+    machine = [estimate for estimate, unknown in pairs if unknown.run is None]
+    return [each.name for each in machine if each.relative_half_width > WIDE]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from math import inf, log
@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 from swashplate.identification.drive_model import (
     LIMIT_COLUMNS,
     LIMITS,
-    DriveModel,
     limits_unreached,
 )
 from swashplate.identification.effects import (
@@ -41,7 +40,6 @@ from swashplate.results import Result, short
 from swashplate.tables import percent
 
 if TYPE_CHECKING:
-    from swashplate.campaign.experiment import Experiment
     from swashplate.identification.fitting import StageFit
 
 Array = NDArray[np.float64]

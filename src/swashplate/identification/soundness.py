@@ -31,7 +31,6 @@ from swashplate.identification.discrepancy import (
 from swashplate.identification.drive_model import DriveModel
 
 if TYPE_CHECKING:
-    from swashplate.campaign.experiment import Experiment
     from swashplate.identification.fitting import StageFit
     from swashplate.identification.validation import RunQuality
 
@@ -73,9 +72,7 @@ def unsound_data(stages: Sequence[StageFit], predicted: Sequence[RunQuality]) ->
     return [*found, *(each for each in outlying_runs(stages, predicted) if each.run not in seen)]
 
 
-def outlying_runs(
-    stages: Sequence[StageFit], predicted: Sequence[RunQuality]
-) -> Iterator[Finding]:
+def outlying_runs(stages: Sequence[StageFit], predicted: Sequence[RunQuality]) -> Iterator[Finding]:
     """Runs whose errors are far larger than those of the others, each once, and why.
 
     Notes

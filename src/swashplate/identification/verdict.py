@@ -5,14 +5,14 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from html import escape
-from math import isinf, nan
+from math import isinf, isnan, nan
 from typing import TYPE_CHECKING, get_args
 
 from swashplate.campaign.experiment import Channel, Experiment
 from swashplate.errors import DomainError, InputError
 from swashplate.identification.causes import Cause, causes_of, fixed_numbers
 from swashplate.identification.data_checks import Finding
-from swashplate.identification.determination import WIDE, weak_unknowns, without_value
+from swashplate.identification.determination import WIDE, weak_unknowns
 from swashplate.identification.discrepancy import (
     ClassError,
     Motion,
@@ -31,7 +31,7 @@ from swashplate.identification.soundness import unsound_data
 from swashplate.identification.validation import percent
 from swashplate.parameters.definitions import COLUMNS
 from swashplate.results import Result, listing
-from swashplate.tables import UNIT, Column, Table, count, listed
+from swashplate.tables import UNIT, Column, Table, listed
 
 if TYPE_CHECKING:
     from swashplate.identification.fitting import StageFit
@@ -137,10 +137,18 @@ class Verdict(Result):
         """What may be predicted, and how well, in a sentence."""
         if not self.predictions:
             return "Unknown: no channel moves."
-        said = "; ".join(_stated(each) for each in self.predictions)
-        return (
-            f"Nine of ten new maneuvers are predicted {said}. Required: {percent(self.required)}."
+        decisive = [each for each in self.predictions if each.channel in self.decisive]
+        stated = [f"{each.signal} within {percent(each.worst.error)}" for each in decisive]
+        said = (
+            f"In nine of ten new maneuvers {listed(stated)} of range; {percent(self.required)} is "
+            "required."
         )
+        for each in decisive:
+            tested = {found.motion for found in each.classes}
+            unknown = [words for motion, words in MOTIONS.items() if motion not in tested]
+            if unknown:
+                said += f" {each.signal}: unknown in {listed(unknown)}, as no run has it."
+        return said
 
     @property
     def values(self) -> str:
@@ -193,7 +201,6 @@ class Verdict(Result):
             tested = {found.motion: found for found in each.classes}
             for motion in get_args(Motion):
                 found = tested.get(motion, ClassError(motion, nan, 0, 0))
-                late = each.channel in self.decisive and found.error > self.required
                 made.add(
                     each.signal,
                     motion,
@@ -201,9 +208,9 @@ class Verdict(Result):
                     found.error,
                     float(found.fitted + found.held_out),
                     float(found.held_out),
-                    "NOT MET" if late else "met" if each.channel in self.decisive else "-",
+                    _state(found, self.required) if each.channel in self.decisive else "-",
                     unit=each.unit,
-                    look=late,
+                    look=each.channel in self.decisive and found.error > self.required,
                 )
         return made
 
@@ -262,7 +269,7 @@ def verdict(
         return Verdict(required, predictions, decisive, fitted=False)
     unfinished = tuple(_unfinished(stages, planned))
     unsound = tuple(unsound_data(stages, predicted))
-    lost = {each for stage in stages for each in (*without_value(stage), *weak_unknowns(stage))}
+    lost = {name for stage in stages for name in weak_unknowns(stage)}
     machine = [
         unknown.name
         for stage in stages
@@ -309,15 +316,9 @@ def _decisive(
     runs = [*_fitted_runs(stages), *(each.experiment for each in predicted)]
     kinds = {name: channel.kind for run in runs for name, channel in run.channels.items()}
     drive = all(isinstance(each.problem.model, DriveModel) for each in stages)
-    shaft = [
-        each
-        for each in predictions
-        if drive and SIGNALS.get(kinds[each.channel]) in SHAFT
-    ]
+    shaft = [each for each in predictions if drive and SIGNALS.get(kinds[each.channel]) in SHAFT]
     best = min(shaft, key=lambda each: each.worst.error, default=None)
-    return tuple(
-        each.channel for each in predictions if each not in shaft or each is best
-    )
+    return tuple(each.channel for each in predictions if each not in shaft or each is best)
 
 
 def _unfinished(stages: Sequence[StageFit], planned: Sequence[str]) -> Iterator[str]:
@@ -337,18 +338,11 @@ def _unfinished(stages: Sequence[StageFit], planned: Sequence[str]) -> Iterator[
 # --- words ----------------------------------------------------------------------------------------
 
 
-def _stated(prediction: PredictionError) -> str:
-    """``speed from counts to 0.1 % of its range in large motion (13 runs), ...``."""
-    tested = {each.motion: each for each in prediction.classes}
-    said = list[str]()
-    for motion, words in MOTIONS.items():
-        if motion in tested:
-            each = tested[motion]
-            runs = count(each.fitted + each.held_out, "run")
-            said.append(f"{percent(each.error)} in {words} ({runs})")
-        else:
-            said.append(f"unknown in {words}, as no run has it")
-    return f"{prediction.signal} to {listed(said)}"
+def _state(found: ClassError, required: float) -> str:
+    """Whether the stated error of a class is within what is required."""
+    if isnan(found.error):
+        return "-"
+    return "met" if found.error <= required else "NOT MET"
 
 
 def _starts(stages: Sequence[StageFit]) -> Iterator[str]:

@@ -363,7 +363,9 @@ def summary_section(
     """The first screen: `drive` is None for a model of one's own, which has no such numbers."""
     look: Light = "good" if judged.usable else "bad"
     headline = judged.headline.replace(" %", "\N{NO-BREAK SPACE}%")
-    shown = [Block("verdict", (light(look, "Usable" if judged.usable else "Not usable"), headline), look)]
+    shown = [
+        Block("verdict", (light(look, "Usable" if judged.usable else "Not usable"), headline), look)
+    ]
     shown.append(Block("pair", list(_curves(runs, campaign.virtual))))
     numbers, limits = [], []
     if drive is not None:
