@@ -89,9 +89,17 @@ class Verdict(Result):
 
     @property
     def error(self) -> PredictionError | None:
-        """The decisive channel with the largest stated error; None if nothing moves."""
-        channels = [each for each in self.predictions if each.channel in self.decisive]
-        return max(channels, key=lambda each: each.worst.error, default=None)
+        """The decisive channel that is spoken of; None if nothing moves.
+
+        The first one, which is that of the shaft if there is one, unless another one errs by more
+        than required.
+        """
+        channels = {each.channel: each for each in self.predictions}
+        decisive = [channels[name] for name in self.decisive]
+        late = [each for each in decisive if each.worst.error > self.required]
+        if late:
+            return max(late, key=lambda each: each.worst.error)
+        return decisive[0] if decisive else None
 
     @property
     def predicts(self) -> bool:
@@ -137,7 +145,8 @@ class Verdict(Result):
         """What may be predicted, and how well, in a sentence."""
         if not self.predictions:
             return "Unknown: no channel moves."
-        decisive = [each for each in self.predictions if each.channel in self.decisive]
+        channels = {each.channel: each for each in self.predictions}
+        decisive = [channels[name] for name in self.decisive]
         stated = [f"{each.signal} within {percent(each.worst.error)}" for each in decisive]
         said = (
             f"In nine of ten new maneuvers {listed(stated)} of range; {percent(self.required)} is "
@@ -169,7 +178,7 @@ class Verdict(Result):
         if self.causes is None:
             return ""
         if not self.causes:
-            return "None found: no single thing that was tried explains half of the error."
+            return "None of what was tried explains half of the error that is not noise."
         return f"{'; or '.join(each.words for each in self.causes)}."
 
     def answers(self) -> dict[str, str]:
@@ -312,13 +321,14 @@ def _decisive(
     stages: Sequence[StageFit],
     predicted: Sequence[RunQuality],
 ) -> tuple[str, ...]:
-    """Channels that decide: of those that measure a drive's shaft the best, and all others."""
+    """Channels that decide: of those that measure a drive's shaft the best, then all others."""
     runs = [*_fitted_runs(stages), *(each.experiment for each in predicted)]
     kinds = {name: channel.kind for run in runs for name, channel in run.channels.items()}
     drive = all(isinstance(each.problem.model, DriveModel) for each in stages)
     shaft = [each for each in predictions if drive and SIGNALS.get(kinds[each.channel]) in SHAFT]
     best = min(shaft, key=lambda each: each.worst.error, default=None)
-    return tuple(each.channel for each in predictions if each not in shaft or each is best)
+    others = [each.channel for each in predictions if each not in shaft]
+    return (*((best.channel,) if best is not None else ()), *others)
 
 
 def _unfinished(stages: Sequence[StageFit], planned: Sequence[str]) -> Iterator[str]:
