@@ -49,6 +49,8 @@ SAME_DIRECTION = 1e-4
 """Part of a cause's effect outside the estimates' below which both are the same: its square is a
 difference, which has 16 digits less those of this one."""
 COMMAND_GAIN, COMMAND_LAG = "scale of the command", "lag of the command"
+RESISTED = "loss of speed under a load that resists, {}"
+PULLED = "loss of speed under a load that pulls one way, {}"
 SCALE, DRIFT = "scale of {}", "drift of {} over the campaign"
 LATEST = 0.5
 """Delay or lag that is plausible. [s]"""
@@ -212,9 +214,9 @@ def _scores(stage: StageFit) -> Iterator[_Score]:
         apart = square - float(along[name] @ along[name])
         if square > 0.0 and apart > SAME_DIRECTION**2 * square:
             size, share = -products[name] / apart, products[name] ** 2 / (apart * fit.squares)
-            for channel, own in scales.items():
+            for channel, of_runs in scales.items():
                 if name == DRIFT.format(channel):
-                    share *= _in_order(own)
+                    share *= _in_order(of_runs)
             yield _Score(candidates[name], size, share)
 
 
@@ -281,8 +283,6 @@ def _effects(stage: StageFit, number: int) -> Iterator[tuple[str, Changes]]:
             yield name, {channel: part.by[:, k] for channel, part in by.items()}
 
 
-
-
 def _of_channel(experiment: Experiment, name: str, output: Array, place: float) -> dict[str, Array]:
     """Changes (m,) of simulated less measured if one unit of each is simulated.
 
@@ -298,13 +298,19 @@ def _of_channel(experiment: Experiment, name: str, output: Array, place: float) 
     }
     if channel.kind not in CURRENTS:
         effects[DRIFT.format(name)] = moved * place
-        effects[f"loss of speed under load, {name}"] = -lost(experiment, name, output)
+        effects[RESISTED.format(name)] = -lost(experiment, name, output, resisting=True)
+        effects[PULLED.format(name)] = -lost(experiment, name, output, resisting=False)
     return effects
 
 
-def lost(experiment: Experiment, name: str, output: Array) -> Array:
-    """(m,) what a channel lacks if its motion is slower by one unit while it moves."""
+def lost(experiment: Experiment, name: str, output: Array, *, resisting: bool) -> Array:
+    """(m,) what a channel lacks if its motion is slower by one unit, under a load.
+
+    Of one that resists it while it moves, and of one that pulls one way always.
+    """
     channel, time = experiment[name], experiment[name].time
+    if not resisting:
+        return time - time[0] if channel.is_position else np.ones_like(time)
     speed = np.gradient(output, time) if channel.is_position else output
     moves = np.abs(speed) > 0.01 * float(np.abs(speed).max(initial=0.0))
     way = np.sign(speed) * moves
@@ -352,9 +358,11 @@ def _of_readings(stage: StageFit, name: str) -> Iterator[Candidate]:
     yield Candidate(drift, -0.5, 0.5, partial(read, _undone_drift), warm, 100.0, "%")
     unit = channels[0].unit
     unit = unit if unit.endswith("/s") else f"{unit}/s"
-    loss = f"loss of speed under load, {name}"
-    load = "look for a load, friction or a leaking motor, which the model leaves out"
-    yield Candidate(loss, 0.0, np.inf, partial(read, _undone_loss), load, 1.0, unit)
+    load = "look for a load and for a leaking motor, which the model leaves out"
+    undo = partial(read, partial(_undone_loss, resisting=True))
+    yield Candidate(RESISTED.format(name), 0.0, np.inf, undo, load, 1.0, unit)
+    undo = partial(read, partial(_undone_loss, resisting=False))
+    yield Candidate(PULLED.format(name), -np.inf, np.inf, undo, load, 1.0, unit)
 
 
 def _of_commands(stage: StageFit) -> Iterator[Candidate]:
@@ -543,8 +551,11 @@ def _undone_lag(run: Experiment, name: str, output: Array, _: float, size: float
     return _with_values(run, name, run[name].values + output - lagged)
 
 
-def _undone_loss(run: Experiment, name: str, output: Array, _: float, size: float) -> Experiment:
-    return _with_values(run, name, run[name].values + size * lost(run, name, output))
+def _undone_loss(
+    run: Experiment, name: str, output: Array, _: float, size: float, *, resisting: bool
+) -> Experiment:
+    lacks = lost(run, name, output, resisting=resisting)
+    return _with_values(run, name, run[name].values + size * lacks)
 
 
 def _with_command(

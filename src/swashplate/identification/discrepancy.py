@@ -237,10 +237,11 @@ class Cell(NamedTuple):
 
 
 def cells_of(records: Sequence[Record]) -> tuple[list[Cell], float]:
-    """All windows, by run and class, and the range of the signal. [unit]"""
-    if not records:
+    """All windows, by run and class, and the range of what was measured. [unit]"""
+    ends = [ends for record in records if (ends := _ends(record)) is not None]
+    if not ends:
         return [], 0.0
-    reach = max(r.signal.max() for r in records) - min(r.signal.min() for r in records)
+    reach = max(high for _, high in ends) - min(low for low, _ in ends)
     largest = max(np.abs(r.command).max() for r in records)
     cells = list[Cell]()
     for record in records if reach > 0.0 else ():
@@ -253,7 +254,14 @@ def cells_of(records: Sequence[Record]) -> tuple[list[Cell], float]:
             squares = (errors[rows] ** 2 - noise) / reach**2
             terms = variance_terms(record.signal[rows] / reach, record.rate[rows] / reach)
             cells.append(Cell(record, motion, squares, noise / reach**2, terms))
-    return cells, float(reach)
+    return cells, reach
+
+
+def _ends(record: Record) -> tuple[float, float] | None:
+    """Smallest and largest of what was measured, of a position its speed; None if too short."""
+    values = windowed(record.measured, window_weights(record, WINDOWS["fast"]))
+    values = values[np.isfinite(values)]
+    return (float(values.min()), float(values.max())) if values.size else None
 
 
 def variance_terms(signal: Array, rate: Array) -> Array:
@@ -284,7 +292,7 @@ class PredictionError(Result):
     unit: str
     """Of the signal: of a position that of its speed."""
     reach: float
-    """Range of the signal, of a position that of its speed, over all runs. [unit]"""
+    """Range that was measured of the signal, of a position that of its speed. [unit]"""
     coefficients: tuple[float, float, float]
     """Of the variance of the error over the squared range: 1, (signal/range)², (its change within
     0.1 s / range)²."""
