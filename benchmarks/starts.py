@@ -20,8 +20,8 @@ from scipy.optimize import Bounds, minimize
 from swashplate import Campaign, DomainError
 from swashplate.campaign import rig
 from swashplate.executors import Processes
-from swashplate.identification.drive_model import stage_problem
-from swashplate.identification.fitting import fit, smooth
+from swashplate.identification.drive_model import smooth, stage_problem
+from swashplate.identification.fitting import fit
 from swashplate.identification.problem import Problem
 from swashplate.identification.setup import load_setup
 from swashplate.identification.solving import sobol_starts, solve_from

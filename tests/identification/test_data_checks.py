@@ -14,7 +14,8 @@ from swashplate.identification.data_checks import (
     check_runs,
     refuse_unsound,
 )
-from swashplate.identification.fitting import fit, smooth
+from swashplate.identification.drive_model import smooth
+from swashplate.identification.fitting import fit
 from swashplate.identification.setup import Free, Setup, Stage
 
 NOMINAL = smooth(Drive.preset("hoist").parameters)

@@ -8,15 +8,17 @@ from tests.identification.given import TWO_STAGES, run_of, virtual
 
 from swashplate import Campaign, Drive, Experiment, InputError
 from swashplate.campaign.experiment import InputSignal
+from swashplate.identification.determination import bounds_reached
 from swashplate.identification.drive_model import (
     DriveModel,
     at_rate_of,
     measured_current,
     simulated_current,
+    smooth,
     stage_problem,
     start_currents_of,
 )
-from swashplate.identification.fitting import fit, smooth
+from swashplate.identification.fitting import fit
 from swashplate.identification.setup import Free, Setup, Stage, load_setup
 from swashplate.identification.unknowns import Unknown
 from swashplate.identification.validation import at_instants, predict
@@ -157,7 +159,7 @@ def test_a_bound_that_was_reached_is_said_with_the_entry_that_states_it(campaign
         free = {"lim1": Free(relative=(0.5, upper), log=True)}
         setup = Setup(stages=(Stage(name="card", part="card", free=free),))
         (stage,) = fit(drive, runs, setup).stages
-        said[upper] = [each for each in stage.bounds_reached() if "lim1_plus" in each]
+        said[upper] = [each for each in bounds_reached(stage) if "lim1_plus" in each]
     assert stage.values["lim1_plus"] == pytest.approx(2.2841, rel=0.01)
     (line,) = said[1.3]
     assert "widen lim1 under [stages.free] of the stage 'card'" in line

@@ -13,10 +13,12 @@ from swashplate import Campaign, Drive
 from swashplate.campaign import rig
 from swashplate.identification import faults
 from swashplate.identification.criteria import Verdict, verdict
+from swashplate.identification.determination import identifiability_of
 from swashplate.identification.faults import clipped_channels
-from swashplate.identification.fitting import StageFit, fit
+from swashplate.identification.fitting import fit
 from swashplate.identification.misfit import lack_of_fit
 from swashplate.identification.setup import load_setup
+from swashplate.identification.stage_fit import StageFit
 from swashplate.identification.validation import predict
 from swashplate.maneuvers import ramp, sine, step
 
@@ -105,7 +107,7 @@ def test_the_units_of_the_estimates_are_found_by_computation(sound) -> None:
 def test_an_estimate_at_its_bound_is_a_unit_like_a_fixed_one(tmp_path: Path) -> None:
     # Z8 could make up for a sixth of the supply pressure, and may go down to a half
     stages, found = fitted(tmp_path, NOMINAL.scale(Z9=0.15))
-    assert "Z8" in stages[-1].identifiability.at_bounds
+    assert "Z8" in identifiability_of(stages[-1]).at_bounds
     assert {"Z8", "Z9"} <= set(lack_of_fit(stages).units)
     assert found.grade == "Not usable"
     assert "Z8 by -" in found.headline

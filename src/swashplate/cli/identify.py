@@ -195,7 +195,7 @@ def fit(
 
 def _say_fit(found: Identification) -> None:
     """What was found, stage by stage, and how well each run is followed."""
-    from swashplate.identification.tables import parts_of
+    from swashplate.identification.assessment import parts_of
 
     text_above = False
     for part in parts_of(found):

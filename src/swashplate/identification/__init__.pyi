@@ -2,6 +2,7 @@ from .assessment import Identification as Identification
 from .criteria import Verdict as Verdict
 from .criteria import verdict as verdict
 from .determination import Identifiability as Identifiability
+from .determination import identifiability_of as identifiability_of
 from .drive_model import DriveModel as DriveModel
 from .drive_model import configuration as configuration
 from .experiment_design import Outlook as Outlook
@@ -10,12 +11,13 @@ from .experiment_design import bench as bench
 from .experiment_design import outlook as outlook
 from .fitting import Fit as Fit
 from .fitting import Search as Search
-from .fitting import StageFit as StageFit
 from .fitting import fit as fit
 from .identifying import identify as identify
 from .intervals import Estimate as Estimate
 from .intervals import Uncertainty as Uncertainty
+from .intervals import estimates_of as estimates_of
 from .intervals import uncertainty as uncertainty
+from .intervals import uncertainty_of as uncertainty_of
 from .model import Linearised as Linearised
 from .model import Model as Model
 from .model import OwnModel as OwnModel
@@ -33,6 +35,7 @@ from .solving import Solution as Solution
 from .solving import sobol_starts as sobol_starts
 from .solving import solve as solve
 from .solving import solve_from as solve_from
+from .stage_fit import StageFit as StageFit
 from .unknowns import Prior as Prior
 from .unknowns import Unknown as Unknown
 from .unknowns import Unknowns as Unknowns

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from html import escape
 from math import inf, isfinite, isinf
-from typing import TYPE_CHECKING, Literal, NamedTuple
+from typing import Literal, NamedTuple
 
 import numpy as np
 
@@ -25,8 +25,10 @@ from swashplate.identification.faults import DRIFT, LOSS, Fault, measurement_err
 from swashplate.identification.intervals import open_unknowns
 from swashplate.identification.misfit import Alone, ChannelFit, LackOfFit, lack_of_fit
 from swashplate.identification.solving import Solution
+from swashplate.identification.stage_fit import StageFit
 from swashplate.identification.validation import (
     FOLLOWS,
+    RunQuality,
     Side,
     beyond_noise,
     following,
@@ -35,10 +37,6 @@ from swashplate.identification.validation import (
 )
 from swashplate.results import Result, folded, listing
 from swashplate.tables import Column, Table, listed
-
-if TYPE_CHECKING:
-    from swashplate.identification.fitting import StageFit
-    from swashplate.identification.validation import RunQuality
 
 Grade = Literal["Usable", "Usable for prediction", "Not usable"]
 

@@ -24,6 +24,7 @@ from swashplate.identification.drive_model import (
     SIGNALS,
     kinds_of,
     simulated_run,
+    smooth,
 )
 from swashplate.identification.model import EquationModel
 from swashplate.identification.problem import Loss, Problem
@@ -362,8 +363,6 @@ def check_rank(where: str, problem: Problem) -> list[Finding]:
 
 def beside_the_drives(campaign: Campaign) -> list[str]:
     """What stands out when each axis's drive is simulated under the runs' commands."""
-    from swashplate.identification.fitting import smooth
-
     found = []
     for name, axis in campaign.axes.items():
         if axis.drive is None:

@@ -6,7 +6,7 @@ import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from math import inf, isfinite, sqrt
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,15 +14,14 @@ from scipy.linalg import null_space, qr
 
 from swashplate.errors import InputError
 from swashplate.identification.arrow import dense_factor, triangular_factor, whitening
+from swashplate.identification.intervals import estimates_of, uncertainty_of
 from swashplate.identification.problem import TOLERANCE
+from swashplate.identification.stage_fit import StageFit, once_per_stage
 from swashplate.identification.unknowns import Unknowns
 from swashplate.models.displacement_control import FORCE, MOTION, PRESSURE, TRAVEL, ZERO
 from swashplate.parameters.definitions import CATALOGUE
 from swashplate.results import Result
 from swashplate.tables import listed
-
-if TYPE_CHECKING:
-    from swashplate.identification.fitting import StageFit
 
 Array = NDArray[np.float64]
 Known = Mapping[str, float]
@@ -355,9 +354,41 @@ def _fixing(places: list[int], vector: Array, null: Array, fixed: list[int]) -> 
     return None
 
 
+# --- of a stage -----------------------------------------------------------------------------------
+
+
+@once_per_stage
+def identifiability_of(stage: StageFit) -> Identifiability:
+    """Which unknowns of a stage the tests determine."""
+    linearised, names = stage.linearised, stage.problem.unknowns.names
+    fixed = {name: value for name, value in stage.parameters.numbers.items() if name not in names}
+    try:
+        quoted = uncertainty_of(stage).quoted.matrix
+    except InputError:  # too few samples to tell the noise from
+        quoted = None
+    return identifiability(
+        linearised.triangle,
+        linearised.variables,
+        covariance=quoted,
+        tolerance=linearised.tolerance,
+        fixed=fixed,
+    )
+
+
+def bounds_reached(stage: StageFit) -> tuple[str, ...]:
+    """Sentences on unknowns of the machine that ended at a bound, and what to do about it."""
+    point = stage.problem.unknowns.at(stage.solution.vector)
+    ends = {-1: "lower", 1: "upper"}
+    return tuple(
+        f"{unknown.name} ended at its {ends[side]} bound: {stage.stage.beyond(unknown, side)}."
+        for unknown, side in zip(point, point.at_bound.tolist(), strict=True)
+        if unknown.run is None and side
+    )
+
+
 def without_value(stage: StageFit) -> list[str]:
     """Unknowns of the machine that ended at a bound, or that the tests do not determine."""
-    found = stage.identifiability
+    found = identifiability_of(stage)
     lost = {*found.at_bounds, *found.to_fix}
     machine = (each.name for each in stage.problem.unknowns if each.run is None)
     return [name for name in machine if name in lost]
@@ -366,9 +397,9 @@ def without_value(stage: StageFit) -> list[str]:
 def weak_unknowns(stage: StageFit) -> list[str]:
     """Unknowns of the machine with an interval wider than 10 % of the value, or without one."""
     try:
-        found = {each.name: each.relative_half_width for each in stage.estimates}
+        found = {each.name: each.relative_half_width for each in estimates_of(stage)}
     except InputError:
         found = {}
     machine = [each.name for each in stage.problem.unknowns if each.run is None]
-    bounds = stage.identifiability.at_bounds
+    bounds = identifiability_of(stage).at_bounds
     return [name for name in machine if found.get(name, inf) > WIDE and name not in bounds]

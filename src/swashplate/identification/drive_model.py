@@ -8,7 +8,7 @@ from functools import lru_cache
 from math import isfinite, sqrt
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any, Literal
+from typing import Any, Literal, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -61,6 +61,7 @@ Part = Literal["card", "pump", "chain"]
 """What of the drive is simulated: the card alone, pump and motor over a current, or all."""
 Parameters = ParameterSet | ModelSetup
 """The numbers of what is fitted: a drive, or a model of one's own."""
+Fitted = TypeVar("Fitted", bound=Parameters)
 Starts = Mapping[str, Mapping[str, float]]
 """For some experiments by name the currents at the first sample, as `START_CURRENTS` has them."""
 
@@ -248,6 +249,17 @@ def limits_unreached(
         for column, value in reached.items()
         if value < SHOWN * limits[column]
     }
+
+
+def smooth(parameters: Fitted) -> Fitted:
+    """The set with the decay's switch split within the step; a model of one's own has none.
+
+    Sampled, as published, it makes the current jump by up to 0.7 mA as any of the card's parameters
+    varies, and a fit ends where it was caught (docs/decisions/0008).
+    """
+    if isinstance(parameters, ParameterSet):
+        return replace(parameters, card_switch="split")
+    return parameters
 
 
 def with_card_filter(

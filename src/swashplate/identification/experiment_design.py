@@ -145,8 +145,8 @@ def outlook(
 ) -> Outlook:
     """What runs can tell of a stage's unknowns, before any fit.
 
-    At the nominal values, best those that `fitting.smooth` makes, as a fit takes them. Raises as
-    `drive_model.stage_problem`, and a `DomainError` if the model does not hold there.
+    At the nominal values, best those that `drive_model.smooth` makes, as a fit takes them. Raises
+    as `drive_model.stage_problem`, and a `DomainError` if the model does not hold there.
     """
     problem = stage_problem(stage, set_of(nominal), experiments)
     return Outlook(stage, problem, linearised_fit(problem, problem.start))

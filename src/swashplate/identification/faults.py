@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import degrees, inf, isfinite, sqrt
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,10 +15,8 @@ from swashplate.campaign.experiment import Channel, Experiment
 from swashplate.errors import DomainError
 from swashplate.identification.drive_model import CURRENTS, DriveModel, with_edges
 from swashplate.identification.model import Model, simulated
+from swashplate.identification.stage_fit import StageFit
 from swashplate.tables import listed
-
-if TYPE_CHECKING:
-    from swashplate.identification.fitting import StageFit
 
 Array = NDArray[np.float64]
 

@@ -11,7 +11,7 @@ from functools import cached_property, partial
 from hashlib import blake2b
 from math import isfinite
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,43 +33,34 @@ from swashplate.identification.data_checks import (
     spike_findings,
     unfitted_currents,
 )
-from swashplate.identification.determination import Identifiability, identifiability
 from swashplate.identification.drive_model import (
     DriveModel,
     Parameters,
     configuration,
+    smooth,
     stage_problem,
     start_currents_of,
     with_card_filter,
     with_estimates,
 )
 from swashplate.identification.faults import measurement_error
-from swashplate.identification.intervals import (
-    Estimate,
-    Interval,
-    Uncertainty,
-    stage_uncertainty,
-    weighed,
-)
+from swashplate.identification.intervals import Estimate, uncertainty_of, weighed
 from swashplate.identification.model import EDGE, EquationModel, Model, OwnModel
-from swashplate.identification.problem import LinearisedFit, Loss, Problem, linearised_fit
+from swashplate.identification.problem import Loss, Problem
 from swashplate.identification.setup import FreeParameters, ModelSetup, Setup, Stage
 from swashplate.identification.solving import Progress, Solution, sobol_starts, solve, solve_from
+from swashplate.identification.stage_fit import Interval, StageFit
 from swashplate.identification.unknowns import Prior
-from swashplate.identification.validation import RunQuality, run_qualities
 from swashplate.parameters.definitions import columns_of
 from swashplate.parameters.parameter_set import ParameterSet
 from swashplate.parameters.rules import SIDES
 from swashplate.progress import LOGGER, working
-from swashplate.results import Result, Tabular
-from swashplate.tables import count, listed
+from swashplate.results import Tabular
+from swashplate.tables import Table, count, listed
 
 if TYPE_CHECKING:
     import polars
 
-    from swashplate.tables import Table
-
-P = TypeVar("P", bound=Parameters)
 Array = NDArray[np.float64]
 
 OTHERS = 6
@@ -122,107 +113,6 @@ class Search:
     """Take what is in the store instead of computing it again."""
     watch: Callable[[str, Solution, int], None] | None = None
     """Called with the stage, each result and how many there are by now."""
-
-
-@dataclass(frozen=True, eq=False)
-class StageFit(Result):
-    """What one stage found, what its data tell of its unknowns, and how good the fit is."""
-
-    stage: Stage
-    problem: Problem
-    solution: Solution
-    parameters: Parameters
-    """The drive, or the model of one's own, with what was found."""
-    starts: tuple[Solution, ...] = ()
-    """How each start ended, where there was more than one."""
-    earlier: tuple[StageFit, ...] = field(default=(), repr=False)
-    """The stages before, whose results this one takes for granted."""
-    stored: tuple[Interval, ...] | None = field(default=None, repr=False)
-    """What is known of each unknown's error, if it was computed before, such as by the fit that a
-    folder holds."""
-
-    @property
-    def values(self) -> dict[str, float]:
-        """The unknowns by name, in their units."""
-        return self.problem.unknowns.values(self.solution.vector)
-
-    @property
-    def drive(self) -> Drive:
-        """The drive with what was found; an `InputError` if it is a model of one's own."""
-        if isinstance(self.parameters, ModelSetup):
-            raise InputError(f"{self.parameters.name} is a model of your own, no drive.")
-        return Drive(self.parameters)
-
-    @cached_property
-    def linearised(self) -> LinearisedFit:
-        """Residuals and derivatives at the optimum."""
-        return linearised_fit(self.problem, self.solution.vector, self.solution.loss)
-
-    @cached_property
-    def identifiability(self) -> Identifiability:
-        """Which unknowns the tests determine."""
-        fit, names = self.linearised, self.problem.unknowns.names
-        fixed = {k: v for k, v in self.parameters.numbers.items() if k not in names}
-        try:
-            quoted = self.uncertainty.quoted.matrix
-        except InputError:  # too few samples to tell the noise from
-            quoted = None
-        return identifiability(
-            fit.triangle, fit.variables, covariance=quoted, tolerance=fit.tolerance, fixed=fixed
-        )
-
-    @cached_property
-    def uncertainty(self) -> Uncertainty:
-        """Errors of the estimates; an `InputError` if there are no more samples than unknowns."""
-        return stage_uncertainty(self)
-
-    @cached_property
-    def intervals(self) -> tuple[Interval, ...]:
-        """What is known of each unknown's error: stored, or as `uncertainty` has it.
-
-        With no more samples than unknowns, no unknown has an interval.
-        """
-        if self.stored is not None:
-            return self.stored
-        try:
-            estimates = self.uncertainty.estimates
-        except InputError:
-            return (Interval("undetermined"),) * len(self.problem.unknowns)
-        return tuple(
-            Interval(each.status, each.standard_error, each.lower, each.upper) for each in estimates
-        )
-
-    def _interval(self, number: int) -> Interval:
-        return self.intervals[number]
-
-    @cached_property
-    def estimates(self) -> tuple[Estimate, ...]:
-        """Each unknown with its value; its interval is computed when it is first asked for."""
-        point = self.problem.unknowns.at(self.solution.vector)
-        values = point.estimates.tolist()
-        return tuple(
-            Estimate(name, values[number], unknown.unit, partial(self._interval, number))
-            for number, (name, unknown) in enumerate(zip(point.names, point, strict=True))
-        )
-
-    @cached_property
-    def runs(self) -> tuple[RunQuality, ...]:
-        """Quality of each channel of each run that was fitted."""
-        return run_qualities(self.problem, self.solution.vector)
-
-    def bounds_reached(self) -> tuple[str, ...]:
-        """Sentences on unknowns of the machine that ended at a bound, and what to do about it."""
-        point = self.problem.unknowns.at(self.solution.vector)
-        ends = {-1: "lower", 1: "upper"}
-        return tuple(
-            f"{each.name} ended at its {ends[side]} bound: {self.stage.beyond(each, side)}."
-            for each, side in zip(point, point.at_bound.tolist(), strict=True)
-            if each.run is None and side
-        )
-
-    def tables(self) -> list[Table]:
-        """Estimates with their intervals, then the errors of each run."""
-        return [tables.estimates_table(self), *tables.runs_tables(self.runs)]
 
 
 class Estimated(Tabular, ABC):
@@ -294,7 +184,7 @@ class Fit(Estimated):
     @cached_property
     def estimates(self) -> Mapping[str, Estimate]:
         """Every number of the machine by name, estimated or fixed, and those of single runs."""
-        return tables.estimates_of(self)
+        return tables.estimates_by_name(self.stages)
 
     def to_polars(self) -> polars.DataFrame:
         """What was estimated, one row for each parameter, SI.
@@ -302,7 +192,7 @@ class Fit(Estimated):
         Columns are stage, parameter, unit, nominal, value, lower and upper (ends of the 95 %
         interval), standard_error and status.
         """
-        return tables.all_estimates(self).to_polars()
+        return tables.all_estimates(self.stages).to_polars()
 
     def stage(self, name: str) -> StageFit:
         """The stage of a name; an `UnknownNameError` if there is none."""
@@ -329,8 +219,8 @@ class Fit(Estimated):
         if jumps := sum(each.startswith(EDGE) for each in names):
             many = count(jumps, "time")
             said.append(f"Commands jump {many} between two samples: when is estimated.")
-        said += tables.single_runs_line(self)
-        fixed = tables.fixed_part(self)
+        said += tables.single_runs_line(self.stages)
+        fixed = tables.fixed_part(self.stages, self.nominal)
         return (*said, *fixed.remarks, *fixed.sentences)
 
 
@@ -499,7 +389,7 @@ def _edges_found(stage: StageFit) -> dict[str, Prior]:
     own = [k for k, each in enumerate(unknowns) if each.name.startswith(EDGE)]
     if not own:
         return {}
-    values, quoted = unknowns.at(stage.solution.vector).estimates, stage.uncertainty.quoted
+    values, quoted = unknowns.at(stage.solution.vector).estimates, uncertainty_of(stage).quoted
     found, errors = dict[str, Prior](), quoted.standard_errors * unknowns.scales
     for k in own:
         known = unknowns[k].prior
@@ -653,17 +543,6 @@ def _unexplained(problem: Problem, solution: Solution) -> bool:
 def _explained(problem: Problem, solution: Solution) -> bool:
     """Whether a start ended near what was measured; one that could not be simulated did not."""
     return isfinite(solution.cost) and not _unexplained(problem, solution)
-
-
-def smooth(parameters: P) -> P:
-    """The set with the decay's switch split within the step; a model of one's own has none.
-
-    Sampled, as published, it makes the current jump by up to 0.7 mA as any of the card's parameters
-    varies, and a fit ends where it was caught (docs/decisions/0008).
-    """
-    if isinstance(parameters, ParameterSet):
-        return replace(parameters, card_switch="split")
-    return parameters
 
 
 def _origin(stage: Stage, problem: Problem, limits: Mapping[str, float]) -> dict[str, str]:

@@ -4,14 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cached_property, partial
 from math import inf, log
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Literal, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from swashplate.campaign.experiment import Experiment
+from swashplate.errors import InputError
 from swashplate.identification.drive_model import (
     LIMIT_COLUMNS,
     LIMITS,
@@ -27,6 +29,7 @@ from swashplate.identification.effects import (
     slopes_by,
     slopes_by_earlier,
 )
+from swashplate.identification.interval_ends import CheckedEnd, checked_ends
 from swashplate.identification.noise import (
     Covariance,
     NoiseColour,
@@ -35,30 +38,14 @@ from swashplate.identification.noise import (
     spectral_covariance,
 )
 from swashplate.identification.problem import LinearisedFit, Problem, linearised_fit
-from swashplate.identification.profiles import CheckedEnd, checked_ends
+from swashplate.identification.stage_fit import Interval, StageFit, Status, once_per_stage
 from swashplate.identification.unknowns import Unknowns
 from swashplate.results import Result, short
 from swashplate.tables import percent
 
-if TYPE_CHECKING:
-    from swashplate.campaign.experiment import Experiment
-    from swashplate.identification.fitting import StageFit
-
 Array = NDArray[np.float64]
 Systematic = Mapping[str, Array]
 """(K,) changes of the solver's vector for a standard uncertainty of each systematic effect."""
-Status = Literal[
-    "estimated",
-    "at its lower bound",
-    "at its upper bound",
-    "undetermined",
-    "no lower end",
-    "no upper end",
-    "from the forces",
-    "fixed",
-]
-"""How an estimate came about: ``"from the forces"`` are the solenoids' coefficients that stand for
-estimated forces, ``"fixed"`` is what no stage moved."""
 DECADES = 100.0
 """Factor each way from which an interval says nothing; for an unknown that is not logarithmic, half
 width in its scales."""
@@ -68,17 +55,6 @@ open."""
 OPEN = 0.01
 """Part of a channel's range that a prediction moves by, for 10 % of an unknown, from which it
 depends on that unknown."""
-
-
-class Interval(NamedTuple):
-    """What is known of the error of an estimate."""
-
-    status: Status
-    standard_error: float | None = None
-    """None unless estimated."""
-    lower: float | None = None
-    """None if there is no end."""
-    upper: float | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -419,8 +395,15 @@ def uncertainty(
     )
 
 
-def stage_uncertainty(stage: StageFit) -> Uncertainty:
-    """Errors of a stage's estimates, what it takes for granted and checked ends taken in."""
+@once_per_stage
+def uncertainty_of(stage: StageFit) -> Uncertainty:
+    """Errors of a stage's estimates, what it takes for granted and checked ends taken in.
+
+    Raises
+    ------
+    InputError
+        If there are no more samples than unknowns.
+    """
     problem, vector, handed = stage.problem, stage.solution.vector, []
     effects = effects_of(stage)
     systematic = dict(effects.systematic)
@@ -431,9 +414,10 @@ def stage_uncertainty(stage: StageFit) -> Uncertainty:
     for earlier in stage.earlier:
         if follows_card(stage, earlier):
             slopes = slopes_by_earlier(stage, earlier)
-            handed.append(Handed(earlier.uncertainty.sampled, slopes, earlier.stage.name))
+            known = uncertainty_of(earlier)
+            handed.append(Handed(known.sampled, slopes, earlier.stage.name))
             # an effect acts on this stage by itself, and through what it does to others
-            for effect, change in earlier.uncertainty.systematic.items():
+            for effect, change in known.systematic.items():
                 systematic[effect] = systematic.get(effect, 0.0) + slopes @ change
     found = uncertainty(stage.linearised, handed=handed, systematic=systematic, runs=effects.runs)
     found = replace(found, priors=prior_sentences(problem.unknowns, vector, found.quoted))
@@ -443,6 +427,42 @@ def stage_uncertainty(stage: StageFit) -> Uncertainty:
     first = [unknown.targets[0].startswith(tuple(LIMITS)) for unknown in problem.unknowns]
     ends = checked_ends(problem, vector, fit, half, np.flatnonzero(first).tolist())
     return replace(found, ends=tuple(ends))
+
+
+@once_per_stage
+def intervals_of(stage: StageFit) -> tuple[Interval, ...]:
+    """What is known of the error of each unknown of a stage: stored, or as its uncertainty has it.
+
+    With no more samples than unknowns, no unknown has an interval.
+    """
+    if stage.stored is not None:
+        return stage.stored
+    try:
+        known = uncertainty_of(stage).estimates
+    except InputError:
+        return (Interval("undetermined"),) * len(stage.problem.unknowns)
+    return tuple(
+        Interval(estimate.status, estimate.standard_error, estimate.lower, estimate.upper)
+        for estimate in known
+    )
+
+
+@once_per_stage
+def estimates_of(stage: StageFit) -> tuple[Estimate, ...]:
+    """Each unknown of a stage with its value, in their order.
+
+    The intervals are computed when one of them is first asked for, unless they are stored.
+    """
+    point = stage.problem.unknowns.at(stage.solution.vector)
+    values = point.estimates.tolist()
+    return tuple(
+        Estimate(name, values[number], unknown.unit, partial(_interval_of, stage, number))
+        for number, (name, unknown) in enumerate(zip(point.names, point, strict=True))
+    )
+
+
+def _interval_of(stage: StageFit, number: int) -> Interval:
+    return intervals_of(stage)[number]
 
 
 def released(fit: LinearisedFit) -> LinearisedFit:
@@ -504,7 +524,7 @@ def unseen_limits(stages: Sequence[StageFit]) -> dict[str, float]:
     runs = {run.name: run for stage in stages for run in stage.problem.experiments}
     unseen = limits_unreached(list(runs.values()), stages[-1].drive.parameters)
     for stage in stages:
-        for estimate in stage.estimates:
+        for estimate in estimates_of(stage):
             one_sided = estimate.upper is None and estimate.lower is not None
             if estimate.name in LIMIT_COLUMNS and one_sided:
                 unseen.setdefault(estimate.name, float(estimate.lower or 0.0))
@@ -517,7 +537,7 @@ def open_unknowns(stage: StageFit, experiments: Iterable[Experiment]) -> Iterato
     Only a prediction that leaves the directions which the fitted runs determine is open: of two
     unknowns of which the fit tells the product, it depends on the product alone.
     """
-    found, fit = stage.uncertainty, stage.linearised
+    found, fit = uncertainty_of(stage), stage.linearised
     model, unknowns, vector = stage.problem.model, stage.problem.unknowns, stage.solution.vector
     assert isinstance(model, DriveModel)
     pairs = zip(found.estimates, unknowns, strict=True)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from math import inf, isfinite, sqrt
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,12 +28,11 @@ from swashplate.identification.faults import (
     Kind,
     measurement_error,
 )
+from swashplate.identification.intervals import uncertainty_of
 from swashplate.identification.model import Model, linearised
 from swashplate.identification.problem import TOLERANCE
+from swashplate.identification.stage_fit import StageFit
 from swashplate.parameters.definitions import CATALOGUE, COLUMNS, columns_of
-
-if TYPE_CHECKING:
-    from swashplate.identification.fitting import StageFit
 
 Array = NDArray[np.float64]
 
@@ -420,7 +419,7 @@ def _noise_units(stage: StageFit) -> dict[str, float]:
     Where the measurement error is known, that; elsewhere the residuals themselves, with as many
     samples to one as their correlation says.
     """
-    problem, colours = stage.problem, stage.uncertainty.colours
+    problem, colours = stage.problem, uncertainty_of(stage).colours
     units = {}
     for name in problem.channels:
         channel = next(each[name] for each in problem.experiments if name in each.channels)

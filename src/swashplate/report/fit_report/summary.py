@@ -30,8 +30,8 @@ from swashplate.identification.criteria import (
     Verdict,
 )
 from swashplate.identification.determination import weak_unknowns
-from swashplate.identification.fitting import StageFit
 from swashplate.identification.intervals import unseen_limits
+from swashplate.identification.stage_fit import StageFit
 from swashplate.identification.validation import (
     following,
     percent,
