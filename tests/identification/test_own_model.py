@@ -140,7 +140,7 @@ def test_a_run_has_a_load_a_beginning_and_a_zero_of_its_own() -> None:
     free = (
         *FREE,
         Unknown("start.position", 0.0, -2.0, 2.0, run="a"),
-        Unknown("offset position", 0.0, -2.0, 2.0, run="b"),
+        Unknown("offset position", 0.0, -2.0, 2.0, run="b", kind="zero", channel="position"),
     )
     runs = (first, moved(second, second["position"].values + 0.4))
     values = found(problem(OwnModel(valve, given=loads), *runs, free=free))

@@ -397,7 +397,7 @@ def _interval_words(stages: Sequence[StageFit], found: ParameterSet) -> dict[str
     for each in stages:
         unknowns = each.problem.unknowns
         for estimate, unknown in zip(estimates_of(each), unknowns, strict=True):
-            if unknown.run is None and unknown.name.startswith("force_"):
+            if unknown.kind == "force":
                 forces = ("Z19", "Z20", "Z21", "Z22")
                 words |= {symbol: ["from the fitted forces"] for symbol in forces}
             elif unknown.run is None:
@@ -565,7 +565,7 @@ def _loaded(
     def stored(stage: Stage, problem: Problem) -> Solved:
         entry = next(entries)
         ours, theirs = (
-            (name, [(unknown.name, unknown.run) for unknown in unknowns])
+            (name, [(each.name, each.run, each.kind, each.channel) for each in unknowns])
             for name, unknowns in ((stage.name, problem.unknowns), (entry.name, entry.unknowns))
         )
         sizes = {entry.solution.vector.size, len(entry.unknowns)}

@@ -17,7 +17,7 @@ from swashplate.identification.arrow import dense_factor, triangular_factor, whi
 from swashplate.identification.intervals import estimates_of, uncertainty_of
 from swashplate.identification.problem import TOLERANCE
 from swashplate.identification.stage_fit import StageFit, once_per_stage
-from swashplate.identification.unknowns import Unknowns
+from swashplate.identification.unknowns import Unknown, Unknowns
 from swashplate.models.displacement_control import FORCE, MOTION, PRESSURE, TRAVEL, ZERO
 from swashplate.parameters.definitions import CATALOGUE
 from swashplate.results import Result
@@ -58,7 +58,7 @@ class Gauge:
         0 for what does not move, and throughout if a value that the gauge needs is neither among
         the unknowns nor among the `fixed` ones, by symbol.
         """
-        symbols = [symbol_of(name) for name in variables.names]
+        symbols = [symbol_of(unknown) for unknown in variables]
         pairs = [*zip(symbols, variables.estimates.tolist(), strict=True)]
         known = {**(fixed or {}), **dict(pairs)}
         try:
@@ -68,10 +68,11 @@ class Gauge:
         return np.array(slopes) / variables.slopes
 
 
-def symbol_of(name: str) -> str:
-    """Symbol of an unknown: ``Z16_plus`` is Z16, ``force_plus_2`` force, the run falls away."""
-    bare = re.sub(r"\s*\(.*\)$", "", name.rsplit(".", 1)[-1])
-    return re.sub(r"(_plus|_minus)?(_\d+)?$", "", bare)
+def symbol_of(unknown: Unknown) -> str:
+    """Symbol of an unknown, whose kind that is of any but a parameter: ``Z16_plus`` is Z16."""
+    if unknown.kind != "parameter":
+        return unknown.kind
+    return re.sub(r"(_plus|_minus)$", "", unknown.name.rsplit(".", 1)[-1])
 
 
 def _gauge(
@@ -97,7 +98,7 @@ GAUGES = (
         PRESSURE,
         "Z1·Z9, Z1·Z15 and Z8·√Z1 are",
         "Z1 Z9 Z8",
-        *("initial pressure", "start_pressure", "start pressure"),
+        "start pressure",
     ),
     _gauge(
         "zero of pressure",
@@ -298,7 +299,7 @@ def identifiability(
     null, rank = [], 0
     if places.size:
         scale = lengths[places]
-        symbols = [symbol_of(names[k]) for k in places]
+        symbols = [symbol_of(variables[int(k)]) for k in places]
         _, sizes, rows = np.linalg.svd(triangle[:, places] / scale, full_matrices=True)
         rank = int(np.count_nonzero(sizes > tolerance * sizes[0]))
         free, fixes = rows[rank:].T, list[int]()

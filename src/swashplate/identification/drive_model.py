@@ -32,7 +32,7 @@ from swashplate.equations.marching.record import (
 )
 from swashplate.errors import DomainError, InputError, ParameterError, UnknownParameterError
 from swashplate.executors import available_cores
-from swashplate.identification.model import EDGE, OFFSET, Asked, EquationModel
+from swashplate.identification.model import Asked, EquationModel
 from swashplate.identification.problem import Problem, noise_scales
 from swashplate.identification.setup import (
     Forces,
@@ -45,7 +45,7 @@ from swashplate.identification.setup import (
     load_setup,
     setup_names,
 )
-from swashplate.identification.unknowns import Prior, Unknown, Unknowns, bounded
+from swashplate.identification.unknowns import Prior, Unknown, Unknowns, bounded, zero_name
 from swashplate.parameters.definitions import SWITCHES, Definition, columns_of, find, is_column
 from swashplate.parameters.parameter_set import ParameterSet
 from swashplate.parameters.plausible import check_plausible
@@ -64,11 +64,14 @@ Parameters = ParameterSet | ModelSetup
 Fitted = TypeVar("Fitted", bound=Parameters)
 Starts = Mapping[str, Mapping[str, float]]
 """For some experiments by name the currents at the first sample, as `START_CURRENTS` has them."""
+Instants = Mapping[tuple[str, str], Prior]
+"""What an earlier stage found of the instants of edges, by run and name."""
 
 START_PRESSURE = "start_pressure"
 """Name of δP at the first sample, where it is an unknown of the experiment."""
-START_CURRENTS = ("start_current_plus", "start_current_minus")
-"""Names of a channel's current at the first sample, where it is an unknown of the experiment."""
+START_CURRENTS = {"start_current_plus": "card.plus", "start_current_minus": "card.minus"}
+"""Names of a channel's current at the first sample, where it is an unknown of the experiment, and
+the part of the model that it belongs to."""
 FORCE = Definition("force of the solenoids", "N", plausible=(0.0, 1e4))
 """What stands for their coefficients."""
 MOST_EDGES = 60
@@ -316,8 +319,8 @@ class DriveModel(Result, EquationModel):
     """A drive whose parameters are the unknowns, by columns such as ``"Z16_plus"``.
 
     Besides columns it knows ``"force_plus_1"`` ... (see `Forces`), ``"start_pressure"`` of an
-    experiment [Pa], ``"start_current_plus"`` or ``"..._minus"`` of its card [A], and of each
-    channel ``"offset NAME"``, its free zero.
+    experiment [Pa], ``"start_current_plus"`` or ``"..._minus"`` of its card [A], and the instants
+    of the edges of its command, see `instant_of` [s].
 
     Derivatives are exact, those by refinements as well.
     """
@@ -356,10 +359,10 @@ class DriveModel(Result, EquationModel):
     def ready(self, values: Mapping[str, float], experiment: Experiment, asked: Asked) -> Ready:
         """The drive with numbers; see `EquationModel.ready`."""
         states = {
-            column.removeprefix(START): values[name]
+            state: values[name]
             for name in (START_PRESSURE, *START_CURRENTS)
             if name in values
-            for column in self.moves(name)
+            for state in self._states_started_by(name)
         }
         parameters, own = self.parameters_at(values), Own(states, asked.offsets)
         try:
@@ -371,14 +374,23 @@ class DriveModel(Result, EquationModel):
         """Derivatives by a name of the columns that it moves: of coefficients by a force."""
         if self.forces is not None and name in self.forces.names:
             return self.forces.slopes(name)
-        if name in START_CURRENTS:
-            # I*, that of a sample before, and I; with the differential equation no sample before
-            leaves = ("now", "out") if self.parameters.rate is None else ("now", "before", "out")
-            side = name.removeprefix("start_current_")
-            return {f"{START}card.{side}.{leaf}": 1.0 for leaf in leaves}
-        if name == START_PRESSURE:
-            return {f"{START}{PRESSURE}": 1.0}
+        if states := self._states_started_by(name):
+            return {f"{START}{state}": 1.0 for state in states}
         return {name: 1.0} if is_column(name) else {}
+
+    def _states_started_by(self, name: str) -> list[str]:
+        """Paths of the states that a pressure or a current at the first sample sets."""
+        if name == START_PRESSURE:
+            return [PRESSURE]
+        if name not in START_CURRENTS:
+            return []
+        # I*, that of a sample before, and I; with the differential equation no sample before
+        leaves = ("now", "out") if self.parameters.rate is None else ("now", "before", "out")
+        return [f"{START_CURRENTS[name]}.{leaf}" for leaf in leaves]
+
+    def instants_of(self, experiment: Experiment) -> Mapping[str, Edge]:
+        """Edges of the command by the names of their instants; see `EquationModel.instants_of`."""
+        return _instants_of(experiment.input)
 
     def parameters_at(self, values: Mapping[str, float]) -> ParameterSet:
         """The set for some values of the unknowns; a `DomainError` if one breaks a rule."""
@@ -402,22 +414,35 @@ def _at(model: DriveModel, values: tuple[tuple[str, float], ...]) -> ParameterSe
 def with_edges(experiment: Experiment, values: Mapping[str, float]) -> Experiment:
     """An experiment with the edges of its command where values say."""
     command = experiment.input
-    late = {each.place: values[n] for each in command.edges if (n := _named(each)) in values}
+    edges = _instants_of(command).items()
+    late = {edge.place: values[name] for name, edge in edges if name in values}
     return replace(experiment, input=command.with_edges(late)) if late else experiment
 
 
-def _named(edge: Edge) -> str:
-    return f"{EDGE}{edge.middle:.6g} s"
+def _instants_of(command: InputSignal) -> dict[str, Edge]:
+    """Edges of a command by the names that a model has for their instants."""
+    return {f"edge at {edge.middle:.6g} s": edge for edge in command.edges}
 
 
-def _edges(run: Experiment, found: Mapping[str, Prior]) -> list[Unknown]:
+def _edges(run: Experiment, found: Instants) -> list[Unknown]:
     """Instants of a voltage's edges, anywhere between two samples or as an earlier stage found."""
     unknowns = list[Unknown]()
-    for edge in run.input.edges if run.input.kind == "voltage" else ():
-        name, most = _named(edge), 0.5 * (edge.apart + RISE)
-        prior = found.get(f"{name} ({run.name})", Prior(0.0, edge.apart / sqrt(12.0)))
-        own: Any = {"prior": prior, "run": run.name, "scale": edge.apart}
-        unknowns.append(Unknown(name, prior.mean, -most, most, "s", **own))
+    edges = _instants_of(run.input) if run.input.kind == "voltage" else {}
+    for name, edge in edges.items():
+        most = 0.5 * (edge.apart + RISE)
+        prior = found.get((run.name, name), Prior(0.0, edge.apart / sqrt(12.0)))
+        unknown = Unknown(
+            name,
+            prior.mean,
+            -most,
+            most,
+            "s",
+            prior=prior,
+            run=run.name,
+            kind="instant",
+            scale=edge.apart,
+        )
+        unknowns.append(unknown)
     return unknowns
 
 
@@ -444,7 +469,7 @@ def edges_problem(parameters: ParameterSet, run: Experiment) -> Problem | None:
     scales = {name: scale for name, scale in scales.items() if scale > 0.0}
     if not scales:
         return None
-    zeros = [each for each in zeros if each.name.removeprefix(OFFSET) in scales]
+    zeros = [zero for zero in zeros if zero.channel in scales]
     return Problem(model, (run,), Unknowns((*zeros, *edges)), tuple(scales), scales)
 
 
@@ -452,7 +477,9 @@ def _free_zero(name: str, channel: Channel, run: Experiment) -> Unknown:
     """Zero of a position, with bounds far enough both ways never to be reached."""
     first, reach = float(channel.values[0]), 1.0 + 10.0 * float(np.ptp(channel.values))
     ends = first - reach, first + reach
-    return Unknown(f"{OFFSET}{name}", first, *ends, channel.unit, run=run.name)
+    return Unknown(
+        zero_name(name), first, *ends, channel.unit, run=run.name, kind="zero", channel=name
+    )
 
 
 def kinds_of(part: str) -> tuple[ChannelKind, ...]:
@@ -556,15 +583,15 @@ def stage_problem(
     threads: int | None = None,
     uncertain: Mapping[str, float | str] = MappingProxyType({}),
     starts: Starts = MappingProxyType({}),
-    edges: Mapping[str, Prior] = MappingProxyType({}),
+    instants: Instants = MappingProxyType({}),
 ) -> Problem:
     """The problem of a stage, over the runs that have a channel of it.
 
     `parameters` are the nominal values, those of earlier stages already found; `uncertain` standard
-    uncertainties of what stays fixed, as of `Setup`; `starts` currents at the first sample that a
-    stage before estimated, see `start_currents_of`. Threads are all cores by default. An
-    `InputError` says that no run has what the stage fits or asks for, a `ParameterError` that a
-    free parameter is unknown or its bounds are wrong.
+    uncertainties of what stays fixed, as of `Setup`; `starts` and `instants` what a stage before
+    estimated of currents at the first sample, see `start_currents_of`, and of edges. Threads are
+    all cores by default. An `InputError` says that no run has what the stage fits or asks for, a
+    `ParameterError` that a free parameter is unknown or its bounds are wrong.
     """
     threads = threads or available_cores()
     if isinstance(parameters, ModelSetup):
@@ -585,7 +612,7 @@ def stage_problem(
     begun = parameters.with_numbers(begin, on) if begin else parameters
     own = [unknown for each in runs for unknown in _of_a_run(stage, each, channels, parameters)]
     simulated = stage.part != "pump" or stage.current != "measured"
-    jumps = [unknown for each in runs if simulated for unknown in _edges(each, edges)]
+    jumps = [unknown for each in runs if simulated for unknown in _edges(each, instants)]
     return Problem(
         DriveModel(begun, stage.part, currents, stage.forces, dict(starts)),
         tuple(_weighted(each, stage) for each in runs),
@@ -626,9 +653,10 @@ def _channels_of(stage: Stage, experiments: Sequence[Experiment]) -> tuple[str, 
 def start_currents_of(problem: Problem, vector: Array) -> Starts:
     """Currents at the first sample that a stage estimated, by run; for the stages after it."""
     found: dict[str, dict[str, float]] = {}
-    for each, value in zip(problem.unknowns, problem.unknowns.at(vector).estimates, strict=True):
-        if each.run is not None and each.name in START_CURRENTS:
-            found.setdefault(each.run, {})[each.name] = float(value)
+    values = problem.unknowns.at(vector).estimates.tolist()
+    for unknown, value in zip(problem.unknowns, values, strict=True):
+        if unknown.run is not None and unknown.kind == "start current":
+            found.setdefault(unknown.run, {})[unknown.name] = value
     return found
 
 
@@ -676,7 +704,7 @@ def _of_the_machine(stage: Stage, parameters: ParameterSet) -> list[Unknown]:
     if stage.forces is not None:
         for name, value in stage.forces.values(parameters).items():
             log = value > 0.0
-            force = bounded(name, value, stage.forces.relative, unit="N", log=log)
+            force = bounded(name, value, stage.forces.relative, unit="N", log=log, kind="force")
             check_plausible(f"a bound of {name}", FORCE, force.low, force.high)
             unknowns.append(force)
     return unknowns
@@ -700,11 +728,20 @@ def _of_a_run(
             yield _free_zero(name, channel, experiment)
     if stage.part != "card" and (stage.start_pressure is not None or estimated):
         most = stage.start_pressure or LARGEST_START_PRESSURE
-        yield Unknown(START_PRESSURE, 0.0, -most, most, "Pa", run=run)
+        yield Unknown(START_PRESSURE, 0.0, -most, most, "Pa", run=run, kind="start pressure")
     measured = any(channel.kind in CURRENTS for channel in own.values())
     if estimated and measured and stage.part != "pump" and experiment.input.kind == "voltage":
         first = float(measured_current(experiment).values[0])
         if first != 0.0:  # else neither channel is the driven one
-            name, full = START_CURRENTS[first < 0.0], np.copysign(FULL_VOLTAGE, first)
+            plus, minus = START_CURRENTS
+            full = np.copysign(FULL_VOLTAGE, first)
             most = 2.0 * abs(Drive(parameters).steady_current(float(full)))
-            yield Unknown(name, min(abs(first), 0.9 * most), 0.0, most, "A", run=run)
+            yield Unknown(
+                minus if first < 0.0 else plus,
+                min(abs(first), 0.9 * most),
+                0.0,
+                most,
+                "A",
+                run=run,
+                kind="start current",
+            )

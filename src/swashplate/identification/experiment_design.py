@@ -97,8 +97,7 @@ class Outlook(Result):
         """What an unknown needs, in words; parameters that say nothing of it tilt the plate."""
         forces = self._model.forces
         if forces is not None and name in forces.names:
-            _, side, number = name.split("_")
-            return f"{getattr(forces, side)[int(number) - 1]:g} A beyond Z17"
+            return f"{abs(forces.currents[name]):g} A beyond Z17"
         definition = CATALOGUE.get(COLUMNS.get(name, name))
         return (definition.needs if definition is not None else "") or "a tilted swash plate"
 
@@ -107,7 +106,7 @@ class Outlook(Result):
         groups: dict[str, list[str]] = {}
         for name in self.identifiability.unexcited:
             if name in self.names:
-                force = name.startswith("force_")
+                force = self.problem.unknowns[self.problem.unknowns.index(name)].kind == "force"
                 need = "currents of their size beyond Z17" if force else self.need(name)
                 side = next((f" ({s})" for s in ("plus", "minus") if f"_{s}" in name), "")
                 instead = "ask for forces at smaller currents" if force else "fix it"

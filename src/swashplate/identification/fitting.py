@@ -45,7 +45,7 @@ from swashplate.identification.drive_model import (
 )
 from swashplate.identification.faults import measurement_error
 from swashplate.identification.intervals import Estimate, uncertainty_of, weighed
-from swashplate.identification.model import EDGE, EquationModel, Model, OwnModel
+from swashplate.identification.model import EquationModel, Model, OwnModel
 from swashplate.identification.problem import Loss, Problem
 from swashplate.identification.setup import FreeParameters, ModelSetup, Setup, Stage
 from swashplate.identification.solving import Progress, Solution, sobol_starts, solve, solve_from
@@ -138,7 +138,7 @@ class Estimated(Tabular, ABC):
             raise UnknownNameError(f"{name} has two directions: ask for {' or '.join(sides)}.")
         near = get_close_matches(str(name), self.estimates, 1)
         meant = f" (did you mean {near[0]}?)" if near else ""
-        known = ", ".join(each for each in self.estimates if "(" not in each)
+        known = ", ".join(key for key, each in self.estimates.items() if each.run is None)
         raise UnknownNameError(f"There is no parameter '{name}'{meant}; there are {known}.")
 
     def __contains__(self, name: object) -> bool:
@@ -215,9 +215,10 @@ class Fit(Estimated):
         said = list(self.doubts)
         for part in map(tables.stage_part, self.stages):
             said += [*part.remarks, *part.sentences]
-        names = {each for stage in self.stages for each in stage.problem.unknowns.names}
-        if jumps := sum(each.startswith(EDGE) for each in names):
-            many = count(jumps, "time")
+        unknowns = [unknown for stage in self.stages for unknown in stage.problem.unknowns]
+        jumps = {unknown.label for unknown in unknowns if unknown.kind == "instant"}
+        if jumps:
+            many = count(len(jumps), "time")
             said.append(f"Commands jump {many} between two samples: when is estimated.")
         said += tables.single_runs_line(self.stages)
         fixed = tables.fixed_part(self.stages, self.nominal)
@@ -348,7 +349,7 @@ def staged(
 ) -> tuple[StageFit, ...]:
     """The stages of a set-up, each from what the ones before found, until one is interrupted."""
     parameters, stages, starts = smooth(nominal), list[StageFit](), dict[str, Mapping[str, float]]()
-    edges = dict[str, Prior]()
+    instants = dict[tuple[str, str], Prior]()
     for stage in setup.stages:
         uncertain = setup.standard_uncertainty
         problem = stage_problem(
@@ -358,7 +359,7 @@ def staged(
             threads=threads,
             uncertain=uncertain,
             starts=starts,
-            edges=edges,
+            instants=instants,
         )
         result = solved(stage, problem)
         problem, vector = result.problem, result.solution.vector
@@ -379,25 +380,26 @@ def staged(
             break
         # what was stored has the priors of the stages after it, too
         if stage is not setup.stages[-1] and result.intervals is None:
-            edges |= _edges_found(stages[-1])
+            instants |= _instants_found(stages[-1])
     return tuple(stages)
 
 
-def _edges_found(stage: StageFit) -> dict[str, Prior]:
-    """What a stage found of the instants of edges, by the unknowns' names."""
+def _instants_found(stage: StageFit) -> dict[tuple[str, str], Prior]:
+    """What a stage found of the instants of edges, by run and name."""
     unknowns = stage.problem.unknowns
-    own = [k for k, each in enumerate(unknowns) if each.name.startswith(EDGE)]
-    if not own:
+    numbers = [k for k, unknown in enumerate(unknowns) if unknown.kind == "instant"]
+    if not numbers:
         return {}
     values, quoted = unknowns.at(stage.solution.vector).estimates, uncertainty_of(stage).quoted
-    found, errors = dict[str, Prior](), quoted.standard_errors * unknowns.scales
-    for k in own:
-        known = unknowns[k].prior
-        assert known is not None
-        error = min(float(errors[k]), known.deviation)
-        found[unknowns.names[k]] = Prior(
-            float(values[k]), error if error > 0.0 else known.deviation
-        )
+    found = dict[tuple[str, str], Prior]()
+    errors = quoted.standard_errors * unknowns.scales
+    for k in numbers:
+        unknown = unknowns[k]
+        assert unknown.prior is not None
+        assert unknown.run is not None
+        known = unknown.prior.deviation
+        error = min(float(errors[k]), known)
+        found[unknown.run, unknown.name] = Prior(float(values[k]), error if error > 0.0 else known)
     return found
 
 

@@ -268,10 +268,11 @@ def _stated(
 
 def _check_profiles(result: Fit, profiles: Sequence[str]) -> None:
     """Refuse names of profiles that the fit does not estimate."""
-    known = [name for stage in result.stages for name in stage.problem.unknowns.names]
+    unknowns = [unknown for stage in result.stages for unknown in stage.problem.unknowns]
+    known = [unknown.label for unknown in unknowns]
     for name in profiles:
         if name != "all" and name not in known:
-            machine = ", ".join(each for each in known if "(" not in each)
+            machine = ", ".join(unknown.label for unknown in unknowns if unknown.run is None)
             raise InputError(f"There is no parameter '{name}'; there are {machine}.")
 
 

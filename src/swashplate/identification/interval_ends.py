@@ -227,8 +227,10 @@ def checked_ends(
     drive = isinstance(problem.model, DriveModel)
     minimise = minimiser(problem, tolerance=1e-6, max_evaluations=TRIES)
     for index, unknown in enumerate(problem.unknowns):
+        if unknown.run is not None:
+            continue
         bends = not drive or unknown.targets[0].startswith(SWITCHING)
-        if unknown.run is not None or not reach[index] > (0.0 if bends else STRAIGHT):
+        if not reach[index] > (0.0 if bends else STRAIGHT):
             continue
         direction = inverse[index] / inverse[index, index]
         rise = 0.5 * reach[index] ** 2 / inverse[index, index]

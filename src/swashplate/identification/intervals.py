@@ -72,6 +72,8 @@ class Estimate(Result):
     name: str
     value: float
     unit: str = ""
+    run: str | None = None
+    """The experiment that it belongs to, None for one of the machine."""
     source: Interval | Callable[[], Interval] = field(
         default_factory=lambda: Interval("undetermined"), repr=False
     )
@@ -189,8 +191,8 @@ def estimates(
             float(lower[k]) if told and not below else None,
             float(upper[k]) if told and not above else None,
         )
-        value = float(variables.estimates[k])
-        made.append(Estimate(name, value, variables.items[k].unit, interval))
+        value, unknown = float(variables.estimates[k]), variables.items[k]
+        made.append(Estimate(name, value, unknown.unit, unknown.run, interval))
     return tuple(made)
 
 
@@ -424,8 +426,12 @@ def uncertainty_of(stage: StageFit) -> Uncertainty:
     if not found.noisy:
         return found
     half, fit = reach(found.own), released(stage.linearised)
-    first = [unknown.targets[0].startswith(tuple(LIMITS)) for unknown in problem.unknowns]
-    ends = checked_ends(problem, vector, fit, half, np.flatnonzero(first).tolist())
+    limits = [
+        number
+        for number, unknown in enumerate(problem.unknowns)
+        if unknown.kind == "parameter" and unknown.targets[0].startswith(tuple(LIMITS))
+    ]
+    ends = checked_ends(problem, vector, fit, half, limits)
     return replace(found, ends=tuple(ends))
 
 
@@ -456,8 +462,14 @@ def estimates_of(stage: StageFit) -> tuple[Estimate, ...]:
     point = stage.problem.unknowns.at(stage.solution.vector)
     values = point.estimates.tolist()
     return tuple(
-        Estimate(name, values[number], unknown.unit, partial(_interval_of, stage, number))
-        for number, (name, unknown) in enumerate(zip(point.names, point, strict=True))
+        Estimate(
+            unknown.label,
+            values[number],
+            unknown.unit,
+            unknown.run,
+            partial(_interval_of, stage, number),
+        )
+        for number, unknown in enumerate(point)
     )
 
 

@@ -34,16 +34,15 @@ from swashplate.errors import (
     UnknownNameError,
     meant,
 )
-from swashplate.identification.model import OFFSET, OwnModel, simulated
+from swashplate.identification.model import OwnModel, simulated, states_started_by
 from swashplate.identification.problem import Problem, noise_scales
 from swashplate.identification.solving import solve
-from swashplate.identification.unknowns import Prior, Unknown, Unknowns
+from swashplate.identification.unknowns import Prior, Unknown, Unknowns, zero_name
 from swashplate.parameters.definitions import find
 from swashplate.parameters.parameter_set import ParameterSet
 from swashplate.parameters.plausible import check_plausible
 from swashplate.parameters.rules import SIDES
 from swashplate.results import Result, short
-from swashplate.simulation.instance import START
 
 Array = NDArray[np.float64]
 _SETUPS = files("swashplate.identification").joinpath("setups")
@@ -108,9 +107,15 @@ class Forces(Entry):
     relative: Bounds = Field((0.5, 2.0), description="Bounds as factors on the nominal forces.")
 
     names: ClassVar = tuple(f"force_{side}_{k}" for side in SIDES for k in (1, 2, 3, 4))
-    """Names of the eight forces."""
+    """Names of the eight forces, in the order of `currents`."""
     columns: ClassVar = tuple(f"{symbol}_{side}" for side in SIDES for symbol in COEFFICIENTS)
     """The parameters that they stand for."""
+
+    @property
+    def currents(self) -> dict[str, float]:
+        """The effective current of each force by its name, those of `minus` below 0. [A]"""
+        currents = [*self.plus, *(-size for size in self.minus)]
+        return dict(zip(self.names, currents, strict=True))
 
     @property
     def _inverse(self) -> Array:
@@ -431,8 +436,8 @@ class ModelSetup(Result):
         free = {key: _unknown(key, each) for key, each in self.free.items()}
         if isinstance(own, OwnModel):
             targets = [name for unknown in free.values() for name in unknown.targets]
-            _check_names(own.model, "free", targets)
-            _check_names(own.model, "fixed", self.fixed)
+            _check_names(own, "free", targets)
+            _check_names(own, "fixed", self.fixed)
         ranges = equations.ranges if isinstance(equations, Equations) else {}
         for key, definition in ranges.items():
             if key in free:
@@ -539,18 +544,20 @@ class ModelSetup(Result):
             runs[k] = replace(run, channels=noises)
         of_runs = {each.name for run in experiments for each in self.own(run)}
         machine = [each for each in self.free.values() if each.name not in of_runs]
+        values, zeros = _without_zeros(self.fixed, channels)
         return Problem(
             self.model,
             tuple(runs),
             Unknowns((*machine, *(unknown for each in runs for unknown in self.own(each)))),
             channels,
             noise_scales(runs, channels),
-            dict(self.fixed),
-            tuple(
+            fixed=values,
+            zeros=zeros,
+            uncertain=tuple(
                 {name: deviation(each, self.fixed[name])}
                 for name, each in self.standard_uncertainty.items()
             ),
-            threads if isinstance(self.model, OwnModel) else 1,
+            threads=threads if isinstance(self.model, OwnModel) else 1,
         )
 
     def _given(self, experiments: Sequence[Experiment]) -> tuple[str, ...]:
@@ -562,11 +569,17 @@ class ModelSetup(Result):
 
     def own(self, experiment: Experiment) -> tuple[Unknown, ...]:
         """The unknowns of a single run: where its state begins, and the zeros of its sensors."""
-        zeros = {f"{OFFSET}{name}" for name in experiment.channels}
-        states = (START,) if isinstance(self.model, OwnModel) else ()
-        free = [each for each in self.free.values() if each.run is None]
-        free = [each for each in free if each.name in zeros or each.name.startswith(states)]
-        return tuple(replace(each, run=experiment.name) for each in free)
+        channels, run = {zero_name(name): name for name in experiment.channels}, experiment.name
+        equations = self.model.model if isinstance(self.model, OwnModel) else None
+        found = list[Unknown]()
+        for unknown in self.free.values():
+            if unknown.run is not None:
+                continue
+            if channel := channels.get(unknown.name):
+                found.append(replace(unknown, run=run, kind="zero", channel=channel))
+            elif equations is not None and states_started_by(equations, unknown.name):
+                found.append(replace(unknown, run=run, kind="start"))
+        return tuple(found)
 
     def predicted(self, experiment: Experiment) -> Mapping[str, Array]:
         """A run predicted from its input: for each channel (m,) samples at its stamps. [unit]
@@ -579,18 +592,35 @@ class ModelSetup(Result):
         if not own:
             found = simulated(self.model, self.numbers, experiment)
             return {name: found[name] for name in channels}
-        known = channels, self.scales, self.numbers
-        problem = Problem(self.model, (experiment,), Unknowns(own), *known)
+        values, zeros = _without_zeros(self.numbers, channels)
+        problem = Problem(
+            self.model,
+            (experiment,),
+            Unknowns(own),
+            channels,
+            self.scales,
+            fixed=values,
+            zeros=zeros,
+        )
         return problem.outputs(solve(problem).vector, 0)
 
 
-def _check_names(model: Equations, table: str, names: Iterable[str]) -> None:
-    """Refuse a name that the model's parameters do not have."""
-    paths = parameter_paths(model)
+def _without_zeros(
+    values: Mapping[str, float], channels: Sequence[str]
+) -> tuple[dict[str, float], dict[str, float]]:
+    """Values by the model's names, and the zeros of channels among them by the channel."""
+    names = {zero_name(channel): channel for channel in channels}
+    zeros = {channel: values[name] for name, channel in names.items() if name in values}
+    return {name: value for name, value in values.items() if name not in names}, zeros
+
+
+def _check_names(model: OwnModel, table: str, names: Iterable[str]) -> None:
+    """Refuse a name that is neither a parameter, a start of a state nor the zero of a signal."""
+    paths, zeros = parameter_paths(model.model), [*map(zero_name, model.signals)]
     for name in names:
-        if name not in paths and not name.startswith((START, OFFSET)):
+        if name not in (*paths, *zeros) and not states_started_by(model.model, name):
             raise UnknownNameError(
-                f"{model.name} has no parameter '{name}', which {table} names"
+                f"{model.model.name} has no parameter '{name}', which {table} names"
                 f"{meant(name, paths)}; it has {', '.join(paths)}."
             )
 

@@ -5,7 +5,7 @@ Each is made once; the terminal, the report's page and the files render it.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from math import inf
 from typing import NamedTuple
 
@@ -17,17 +17,16 @@ from swashplate.identification.determination import (
     without_value,
 )
 from swashplate.identification.drive_model import (
-    START_PRESSURE,
     DriveModel,
     Parameters,
     true_value,
 )
 from swashplate.identification.intervals import Estimate, estimates_of, uncertainty_of
-from swashplate.identification.model import EDGE
 from swashplate.identification.noise import LEVEL
 from swashplate.identification.profiles import Profile
 from swashplate.identification.setup import ModelSetup
 from swashplate.identification.stage_fit import Interval, StageFit, Status
+from swashplate.identification.unknowns import Kind, Unknown
 from swashplate.identification.validation import (
     Measures,
     RunQuality,
@@ -106,7 +105,7 @@ def estimates_table(
         made.add(
             stage.stage.name,
             name,
-            meaning_of(unknown.name, stage),
+            meaning_of(unknown, stage),
             *(() if truth is None else (Cell(unknown.unit, chosen_unit(unknown.unit).name),)),
             unknown.start,
             Cell(value, shown[0]),
@@ -163,7 +162,7 @@ def estimates_by_name(stages: Sequence[StageFit]) -> dict[str, Estimate]:
     for name, value in parameters.numbers.items():
         unit = "" if isinstance(parameters, ModelSetup) else parameters[name].unit
         status: Status = "from the forces" if name in moved else "fixed"
-        made.setdefault(name, Estimate(name, value, unit, Interval(status)))
+        made.setdefault(name, Estimate(name, value, unit, source=Interval(status)))
     return made
 
 
@@ -179,29 +178,36 @@ def truth_count(tables: Sequence[Table]) -> tuple[int, int]:
     return said.count("yes"), said.count("yes") + said.count("no")
 
 
-def meaning_of(name: str, stage: StageFit | None = None) -> str:
-    """What an unknown is, in words; empty if nothing is known of the name."""
-    kind, _, channel = name.partition(" ")
-    side = name.rpartition("_")[2]
-    if kind == "offset":
-        return f"free zero of {channel}"
-    if name.startswith(EDGE):
-        return "instant of the command's jump, after the middle of both samples"
-    if stage is not None and stage.stage.part == "model":
-        return "number of the state at the first sample" if name.startswith("start.") else ""
-    if name == START_PRESSURE:
-        return "stroking pressure at the first sample"
-    if name.startswith("start_current_"):
-        return "current of the card at the first sample"
-    if name.startswith("force_"):
-        _, side, number = name.split("_")
-        model, current = None if stage is None else stage.problem.model, ""
-        if isinstance(model, DriveModel) and model.forces is not None:
-            current = f" {getattr(model.forces, side)[int(number) - 1]:g} A beyond the dead zone"
-        return f"solenoid force{current}, {'positive' if side == 'plus' else 'negative'}"
+MEANINGS: Mapping[Kind, str] = {
+    "start": "number of the state at the first sample",
+    "start pressure": "stroking pressure at the first sample",
+    "start current": "current of the card at the first sample",
+    "instant": "instant of the command's jump, after the middle of both samples",
+}
+"""What unknowns of single runs are, in words."""
+
+
+def meaning_of(unknown: Unknown, stage: StageFit) -> str:
+    """What an unknown is, in words; empty if nothing is known of it."""
+    if unknown.kind == "parameter":
+        # names of a user-defined model are its own
+        return "" if stage.stage.part == "model" else meaning_of_parameter(unknown.name)
+    if unknown.kind == "zero":
+        return f"free zero of {unknown.channel}"
+    if unknown.kind == "force":
+        assert stage.stage.forces is not None
+        current = stage.stage.forces.currents[unknown.name]
+        way = "positive" if current > 0.0 else "negative"
+        return f"solenoid force {abs(current):g} A beyond the dead zone, {way}"
+    return MEANINGS[unknown.kind]
+
+
+def meaning_of_parameter(name: str) -> str:
+    """What a parameter is, by its symbol or column; empty if there is none such."""
     definition = CATALOGUE.get(COLUMNS.get(name, name))
     if definition is None:
         return ""
+    side = name.rpartition("_")[2]
     way = {"plus": ", positive", "minus": ", negative"}.get(side, "")
     return definition.name + (way if definition.directional else "")
 
@@ -251,7 +257,7 @@ def fixed_table(stages: Sequence[StageFit], truth: ParameterSet | None = None) -
             if fixed == symbol and others:
                 why = f"fixes the {gauge.name}: {gauge.determined}"
         true = None if truth is None else truth.numbers[column]
-        made.add(column, meaning_of(column), value, true, why, one.source, unit=one.unit)
+        made.add(column, meaning_of_parameter(column), value, true, why, one.source, unit=one.unit)
     return made
 
 
@@ -408,7 +414,7 @@ def fixed_part(stages: Sequence[StageFit], nominal: Parameters) -> Part:
 def single_runs_line(stages: Sequence[StageFit]) -> list[str]:
     """A sentence on the numbers of single runs, which no table for people shows, if any."""
     unknowns = [unknown for each in stages for unknown in each.problem.unknowns]
-    names = [f"{each.name} ({each.run})" for each in unknowns if each.run is not None]
+    names = [unknown.label for unknown in unknowns if unknown.run is not None]
     if not names:
         return []
     many = count(len(names), "number of a single run", "numbers of single runs")
