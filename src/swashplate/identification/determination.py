@@ -69,10 +69,11 @@ class Gauge:
 
 
 def symbol_of(unknown: Unknown) -> str:
-    """Symbol of an unknown, whose kind that is of any but a parameter: ``Z16_plus`` is Z16."""
+    """Symbol of a parameter, such as Z16 of ``Z16_plus``; of any other unknown its kind."""
     if unknown.kind != "parameter":
         return unknown.kind
-    return re.sub(r"(_plus|_minus)$", "", unknown.name.rsplit(".", 1)[-1])
+    column = unknown.name.rsplit(".", 1)[-1]
+    return column.removesuffix("_plus").removesuffix("_minus")
 
 
 def _gauge(
