@@ -379,10 +379,13 @@ class DriveModel(Result, EquationModel):
         return {name: 1.0} if is_column(name) else {}
 
     def _states_started_by(self, name: str) -> list[str]:
-        """Paths of the states that a pressure or a current at the first sample sets."""
+        """Paths of the states that a pressure or a current at the first sample sets.
+
+        A pump alone has no card that could begin with a current.
+        """
         if name == START_PRESSURE:
             return [PRESSURE]
-        if name not in START_CURRENTS:
+        if name not in START_CURRENTS or self.part == "pump":
             return []
         # I*, that of a sample before, and I; with the differential equation no sample before
         leaves = ("now", "out") if self.parameters.rate is None else ("now", "before", "out")
