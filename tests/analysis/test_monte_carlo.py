@@ -1,6 +1,7 @@
 """Draws from a covariance made by hand, and from a fit of a virtual hoist."""
 
 import json
+from operator import attrgetter
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -30,6 +31,13 @@ from swashplate.maneuvers import source_tests
 VOLTAGE = maneuvers.step(9.0, stop=4.0, length=5.0).sample()
 
 
+@pytest.fixture
+def given_uncertainty(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Stages of which the Monte Carlo takes an uncertainty that the test gives."""
+    monkeypatch.setattr("swashplate.analysis.monte_carlo.uncertainty_of", attrgetter("uncertainty"))
+
+
+@pytest.mark.usefixtures("given_uncertainty")
 def test_draws_outside_the_bounds_are_drawn_again(hoist):
     """A normal deviation of 2 % above a bound 2 % away: one in six is outside."""
     unknowns = Unknowns(
@@ -66,6 +74,7 @@ def test_draws_outside_the_bounds_are_drawn_again(hoist):
         drives([])
 
 
+@pytest.mark.usefixtures("given_uncertainty")
 def test_standard_errors_where_no_draw_stays_within_the_bounds(hoist):
     """Of a pump that is hardly known, at its lower bound: the speed goes with it, the time not."""
     unknowns = Unknowns((Unknown("Z10", 12.396, 12.396, 24.0),))

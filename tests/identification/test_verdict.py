@@ -9,11 +9,10 @@ from tests.identification.given import RISE, TIME, bench_run, risen, run_of
 from swashplate import Drive
 from swashplate.identification import Verdict, verdict
 from swashplate.identification.criteria import Criterion
-from swashplate.identification.intervals import uncertainty_of
 from swashplate.identification.problem import Problem
 from swashplate.identification.setup import Stage
 from swashplate.identification.solving import solve
-from swashplate.identification.stage_fit import StageFit
+from swashplate.identification.stage_fit import Interval, StageFit
 from swashplate.identification.unknowns import Unknown, Unknowns
 from swashplate.identification.validation import RunQuality, compared, part_of_range
 
@@ -150,10 +149,7 @@ def test_wide_intervals_ask_for_attention() -> None:
     fitted = stage()
     # gain and lag are known to about a per cent
     assert not any("not determined" in each for each in verdict([fitted], []).sentences)
-    known = uncertainty_of(fitted)
-    own = replace(known.own, matrix=1e6 * known.own.matrix)
-    unsure = stage()
-    vars(unsure)["uncertainty"] = replace(known, own=own)
+    unsure = replace(fitted, stored=(Interval("estimated", 0.5, 0.5, 2.5),) * 2)
     wide = verdict([unsure], []).sentences
     assert "rise: not determined to within ±10 %: gain and lag." in wide
 
