@@ -21,13 +21,13 @@ from .intervals import uncertainty_of as uncertainty_of
 from .model import Linearised as Linearised
 from .model import Model as Model
 from .model import OwnModel as OwnModel
+from .model_setup import ModelSetup as ModelSetup
 from .problem import Problem as Problem
 from .problem import linearised_fit as linearised_fit
 from .profiles import Profile as Profile
 from .profiles import profiles_of as profiles_of
 from .resampling import CrossValidation as CrossValidation
 from .resampling import cross_validate as cross_validate
-from .setup import ModelSetup as ModelSetup
 from .setup import Setup as Setup
 from .setup import Stage as Stage
 from .setup import load_setup as load_setup

@@ -39,10 +39,11 @@ from swashplate.identification.intervals import (
     intervals_of,
     unseen_limits,
 )
+from swashplate.identification.model_setup import ModelSetup
 from swashplate.identification.problem import Problem
 from swashplate.identification.profiles import Profile
 from swashplate.identification.resampling import CrossValidation, folds_tables
-from swashplate.identification.setup import ModelSetup, Setup, Stage, setup_text
+from swashplate.identification.setup import Setup, Stage, setup_text
 from swashplate.identification.solving import Solution
 from swashplate.identification.stage_fit import Interval, StageFit
 from swashplate.identification.unknowns import Unknown, Unknowns

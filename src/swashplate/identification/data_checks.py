@@ -27,8 +27,9 @@ from swashplate.identification.drive_model import (
     smooth,
 )
 from swashplate.identification.model import EquationModel
+from swashplate.identification.model_setup import ModelSetup
 from swashplate.identification.problem import Loss, Problem
-from swashplate.identification.setup import ModelSetup, Setup
+from swashplate.identification.setup import Setup
 from swashplate.parameters.parameter_set import ParameterSet
 from swashplate.parameters.rules import FULL_VOLTAGE
 from swashplate.tables import count

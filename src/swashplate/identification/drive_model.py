@@ -33,11 +33,11 @@ from swashplate.equations.marching.record import (
 from swashplate.errors import DomainError, InputError, ParameterError, UnknownParameterError
 from swashplate.executors import available_cores
 from swashplate.identification.model import Asked, EquationModel
+from swashplate.identification.model_setup import ModelSetup
 from swashplate.identification.problem import Problem, noise_scales
 from swashplate.identification.setup import (
     Forces,
     FreeParameters,
-    ModelSetup,
     Setup,
     Stage,
     deviation,

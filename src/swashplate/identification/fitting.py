@@ -46,8 +46,9 @@ from swashplate.identification.drive_model import (
 from swashplate.identification.faults import measurement_error
 from swashplate.identification.intervals import Estimate, uncertainty_of, weighed
 from swashplate.identification.model import EquationModel, Model, OwnModel
+from swashplate.identification.model_setup import ModelSetup
 from swashplate.identification.problem import Loss, Problem
-from swashplate.identification.setup import FreeParameters, ModelSetup, Setup, Stage
+from swashplate.identification.setup import FreeParameters, Setup, Stage
 from swashplate.identification.solving import Progress, Solution, sobol_starts, solve, solve_from
 from swashplate.identification.stage_fit import Interval, StageFit
 from swashplate.identification.unknowns import Prior
@@ -289,28 +290,24 @@ def fit(
     runs = tests.select(role="fit") if isinstance(tests, Campaign) else tuple(tests)
     if not runs:
         raise InputError("There is no run to fit.")
-    nominal = model.parameters if isinstance(model, Drive) else model
     doubts = refuse_unsound(spike_findings(runs, loss))
     if isinstance(tests, Campaign):
         doubts += refuse_unsound(spike_findings(tests.select(role="validate"), "linear"))
-    if not isinstance(nominal, ParameterSet):
-        if not isinstance(nominal, ModelSetup):
-            entries = free if isinstance(free, Mapping) else {}
-            nominal = ModelSetup(nominal, entries, "", tuple(channels), noise or {}, fixed or {})
-        doubts += refuse_unsound(check_model(runs, nominal))
-        nominal = nominal if nominal.numbers else nominal.nominal(runs)
-        free = nominal.setup
+    stated: _Stated
+    if isinstance(model, Drive):
+        stated = _of_drive(model.parameters, free, runs)
+    elif isinstance(model, ParameterSet):
+        stated = _of_drive(model, free, runs)
+    elif isinstance(model, ModelSetup):
+        stated = _of_model(model, runs)
     else:
-        if free is None:
-            raise InputError(
-                "A fit of a drive needs to know what is free, such as 'hoist' or {'Z8': (0.5, 2)}; "
-                "swashplate.identify takes drive and fit configuration from the campaign."
-            )
-        free = configuration(free, runs)
-        nominal, changed = with_card_filter(free.card_filter, runs, nominal)
-        doubts += refuse_unsound(check_runs(runs, smooth(nominal)))
-        doubts += refuse_unsound(unfitted_currents(runs, free))
-        doubts += changed
+        entries = free if isinstance(free, Mapping) else {}
+        user_defined = ModelSetup(
+            model, entries, channels=tuple(channels), noise=noise or {}, fixed=fixed or {}
+        )
+        stated = _of_model(user_defined, runs)
+    nominal, setup = stated.nominal, stated.setup
+    doubts += stated.doubts
 
     def solved(stage: Stage, problem: Problem) -> Solved:
         def seen(now: Progress) -> None:
@@ -333,10 +330,41 @@ def fit(
         return result
 
     with working(f"Fitting {nominal.name}"):
-        runs, between = settle(runs, smooth(nominal), free, loss=loss, threads=threads)
+        runs, between = settle(runs, smooth(nominal), setup, loss=loss, threads=threads)
         doubts += between
-        stages = staged(free, nominal, runs, solved, threads=threads)
-    return Fit(free, nominal, tuple(runs), stages, doubts)
+        stages = staged(setup, nominal, runs, solved, threads=threads)
+    return Fit(setup, nominal, tuple(runs), stages, doubts)
+
+
+class _Stated(NamedTuple):
+    """What is to be fitted, and what is doubtful about it."""
+
+    nominal: Parameters
+    setup: Setup
+    doubts: tuple[str, ...]
+
+
+def _of_drive(
+    parameters: ParameterSet, free: FreeParameters | None, runs: Sequence[Experiment]
+) -> _Stated:
+    """A drive, the card's filter in the form that is fitted; unsound runs are refused."""
+    if free is None:
+        raise InputError(
+            "A fit of a drive needs to know what is free, such as 'hoist' or {'Z8': (0.5, 2)}; "
+            "swashplate.identify takes drive and fit configuration from the campaign."
+        )
+    setup = configuration(free, runs)
+    nominal, changed = with_card_filter(setup.card_filter, runs, parameters)
+    doubts = refuse_unsound(check_runs(runs, smooth(nominal)))
+    doubts += refuse_unsound(unfitted_currents(runs, setup))
+    return _Stated(nominal, setup, doubts + changed)
+
+
+def _of_model(model: ModelSetup, runs: Sequence[Experiment]) -> _Stated:
+    """A user-defined model with its numbers before the fit; unsound runs are refused."""
+    doubts = refuse_unsound(check_model(runs, model))
+    nominal = model if model.numbers else model.nominal(runs)
+    return _Stated(nominal, nominal.setup, doubts)
 
 
 def staged(

@@ -24,10 +24,11 @@ from swashplate.identification.data_checks import refuse_unsound, spike_findings
 from swashplate.identification.drive_model import Parameters, setup_of
 from swashplate.identification.fitting import Fit, Search, fit
 from swashplate.identification.model import Model
+from swashplate.identification.model_setup import ModelSetup
 from swashplate.identification.problem import Loss
 from swashplate.identification.profiles import Profile, profiles_of
 from swashplate.identification.resampling import cross_validate
-from swashplate.identification.setup import FreeParameters, ModelSetup, Setup
+from swashplate.identification.setup import FreeParameters, Setup
 from swashplate.identification.stage_fit import StageFit
 from swashplate.parameters.files import named_set
 from swashplate.parameters.parameter_set import ParameterSet

@@ -22,9 +22,9 @@ from swashplate.identification.drive_model import (
     true_value,
 )
 from swashplate.identification.intervals import Estimate, estimates_of, uncertainty_of
+from swashplate.identification.model_setup import ModelSetup
 from swashplate.identification.noise import LEVEL
 from swashplate.identification.profiles import Profile
-from swashplate.identification.setup import ModelSetup
 from swashplate.identification.stage_fit import Interval, StageFit, Status
 from swashplate.identification.unknowns import Kind, Unknown
 from swashplate.identification.validation import (

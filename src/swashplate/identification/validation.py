@@ -20,9 +20,9 @@ from swashplate.identification.drive_model import (
     edges_problem,
     with_edges,
 )
+from swashplate.identification.model_setup import ModelSetup
 from swashplate.identification.noise import LONGEST, Grid, correlation_length, grid_of, pair_sums
 from swashplate.identification.problem import Problem
-from swashplate.identification.setup import ModelSetup
 from swashplate.identification.solving import solve
 from swashplate.parameters.parameter_set import HasParameters, ParameterSet, set_of
 from swashplate.results import Result, figures

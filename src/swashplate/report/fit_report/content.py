@@ -21,9 +21,9 @@ from swashplate.identification.determination import Identifiability, identifiabi
 from swashplate.identification.drive_model import Parameters
 from swashplate.identification.fitting import Fit
 from swashplate.identification.intervals import uncertainty_of
+from swashplate.identification.model_setup import ModelSetup
 from swashplate.identification.profiles import Profile
 from swashplate.identification.resampling import CrossValidation, folds_tables
-from swashplate.identification.setup import ModelSetup
 from swashplate.identification.solving import Solution
 from swashplate.identification.stage_fit import StageFit
 from swashplate.identification.validation import RunQuality, at_instants, percent
