@@ -205,6 +205,7 @@ POISON = {
     "cut": (lambda text: text[:-100], "is not JSON"),
     "another key": (put('"axis"', '"ax"'), "'ax'.*'axis' is meant"),
     "other parameters": (put('"Z10"', '"Z3"', 1), "stage pump has other parameters .* fit again"),
+    "another kind": (put('"kind": "parameter"', '"kind": "force"', 1), "stage card has other"),
     "other version": (put('"swashplate": "[^"]*"', '"swashplate": "9.9"'), "9.9"),
     "text for a vector": (put(r'"vector": \[[^]]+\]', '"vector": "abc"'), "finite numbers"),
     "wrong length": (put(r'"vector": \[[^]]+\]', '"vector": [1.0]', 1), "stage card has other"),

@@ -427,7 +427,7 @@ def _instants_of(command: InputSignal) -> dict[str, Edge]:
     return {f"edge at {edge.middle:.6g} s": edge for edge in command.edges}
 
 
-def _edges(run: Experiment, found: Instants) -> list[Unknown]:
+def _unknown_instants(run: Experiment, found: Instants) -> list[Unknown]:
     """Instants of a voltage's edges, anywhere between two samples or as an earlier stage found."""
     unknowns = list[Unknown]()
     edges = _instants_of(run.input) if run.input.kind == "voltage" else {}
@@ -456,7 +456,7 @@ def edges_problem(parameters: ParameterSet, run: Experiment) -> Problem | None:
     that is wrong says little of them. None where there are no edges, or too many, or no
     channel of a drive.
     """
-    model, edges = DriveModel(parameters), _edges(run, {})
+    model, edges = DriveModel(parameters), _unknown_instants(run, {})
     if not 0 < len(edges) <= MOST_EDGES or not model.signals_of(run):
         return None
     scales, zeros = dict[str, float](), list[Unknown]()
@@ -615,7 +615,7 @@ def stage_problem(
     begun = parameters.with_numbers(begin, on) if begin else parameters
     own = [unknown for each in runs for unknown in _of_a_run(stage, each, channels, parameters)]
     simulated = stage.part != "pump" or stage.current != "measured"
-    jumps = [unknown for each in runs if simulated for unknown in _edges(each, instants)]
+    jumps = [unknown for each in runs if simulated for unknown in _unknown_instants(each, instants)]
     return Problem(
         DriveModel(begun, stage.part, currents, stage.forces, dict(starts)),
         tuple(_weighted(each, stage) for each in runs),

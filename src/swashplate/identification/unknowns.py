@@ -117,7 +117,7 @@ class Unknown:
 
     @property
     def targets(self) -> tuple[str, ...]:
-        """Names in the model that take its value; none for a zero, which is added behind it."""
+        """Names in the model that take its value; none for a zero, which no model knows."""
         return () if self.kind == "zero" else self.sets or (self.name,)
 
     @property
