@@ -45,7 +45,9 @@ BY_ORDER = 10.0
 
 @dataclass(frozen=True, eq=False)
 class ModelSetup(Result):
-    """A model of one's own and what is to be found of it, as set and `Setup` of a drive.
+    """A user-defined model and what is to be found of it.
+
+    It is what a `ParameterSet` and a `Setup` together are of a drive.
 
     An entry of `free` is (low, nominal, high), (low, nominal, high, unit) or an `Unknown`. A range
     of positive bounds, the upper one at least ten times the lower one, is searched by its
