@@ -320,7 +320,7 @@ class DriveModel(Result, EquationModel):
 
     Besides columns it knows ``"force_plus_1"`` ... (see `Forces`), ``"start_pressure"`` of an
     experiment [Pa], ``"start_current_plus"`` or ``"..._minus"`` of its card [A], and the instants
-    of the edges of its command, see `instant_of` [s].
+    of the edges of its command, see `instants_of` [s].
 
     Derivatives are exact, those by refinements as well.
     """

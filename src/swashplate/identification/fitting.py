@@ -578,7 +578,8 @@ def _explained(problem: Problem, solution: Solution) -> bool:
 def _origin(stage: Stage, problem: Problem, limits: Mapping[str, float]) -> dict[str, str]:
     """Fingerprints of all that the result of a start depends on."""
     own = repr(problem.model) if isinstance(problem.model, OwnModel) else ""
-    known: object = (own, problem.start.tolist(), sorted(problem.fixed.items()))
+    fixed = sorted(problem.fixed.items()), sorted(problem.zeros.items())
+    known: object = (own, problem.start.tolist(), fixed)
     if isinstance(problem.model, DriveModel):
         drive = problem.model.parameters
         forms = drive.pressure_root, drive.coulomb_sign, drive.rate, sorted(drive.options)

@@ -264,8 +264,8 @@ class Problem(Result):
         """The model with the numbers of one experiment, and this as the march sees it."""
         experiment, (observed, _, _, asked, _) = self.experiments[number], self._own[number]
         model, zeros = cast("EquationModel", self.model), self._zeros(vector, number)
-        asked_of_it = Asked(observed, asked, list(zeros.values()))
-        return model.ready(self.model_values(vector, number), experiment, asked_of_it), observed
+        request = Asked(observed, asked, list(zeros.values()))
+        return model.ready(self.model_values(vector, number), experiment, request), observed
 
     @cached_property
     def _own(self) -> list[tuple[ObservedRecord, list[str], list[str], list[str], Array]]:

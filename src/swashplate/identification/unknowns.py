@@ -124,7 +124,7 @@ class Unknown:
     def label(self) -> str:
         """Its name, with the experiment of one that belongs to one: ``"offset counts (hoistr6)"``.
 
-        For people and for the tables of files; nothing reads it.
+        It stands for the unknown in tables and mappings; nothing takes it apart.
         """
         return self.name if self.run is None else f"{self.name} ({self.run})"
 
@@ -325,12 +325,12 @@ class Unknowns(Result):
 
     def zeros(self, vector: Array, run: str) -> dict[str, float]:
         """Free zeros of one experiment by their channels. [unit of the channel]"""
-        found = dict[str, float]()
+        zeros = dict[str, float]()
         for number in self.columns(run).tolist():
             unknown = self.items[number]
             if unknown.channel is not None:
-                found[unknown.channel] = unknown.to_value(float(vector[number]))
-        return found
+                zeros[unknown.channel] = unknown.to_value(float(vector[number]))
+        return zeros
 
     def chain(self, vector: Array, targets: Sequence[str], run: str) -> Array:
         """(len(targets), q + M) derivatives of the model's numbers by `columns` of the vector."""
