@@ -14,12 +14,10 @@ from swashplate.identification.drive_model import (
     at_rate_of,
     measured_current,
     simulated_current,
-    smooth,
-    stage_problem,
-    start_currents_of,
 )
 from swashplate.identification.fitting import fit
 from swashplate.identification.setup import Free, Setup, Stage, load_setup
+from swashplate.identification.stages import smooth, stage_problem, start_currents_of
 from swashplate.identification.unknowns import Unknown
 from swashplate.identification.validation import at_instants, predict
 from swashplate.maneuvers import source_tests, step

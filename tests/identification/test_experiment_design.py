@@ -12,7 +12,6 @@ from swashplate.identification.determination import (
     Identifiability,
     identifiability,
 )
-from swashplate.identification.drive_model import smooth
 from swashplate.identification.experiment_design import (
     MEMORY,
     Candidate,
@@ -29,6 +28,7 @@ from swashplate.identification.experiment_design import (
 from swashplate.identification.fitting import fit
 from swashplate.identification.intervals import uncertainty_of
 from swashplate.identification.setup import Forces, Free, Setup, Stage, load_setup
+from swashplate.identification.stages import smooth
 from swashplate.identification.unknowns import Prior
 from swashplate.maneuvers import sine, step
 

@@ -19,11 +19,11 @@ from swashplate import (
     ParameterError,
 )
 from swashplate.executors import Processes, Serial, Threads
-from swashplate.identification.drive_model import stage_problem
 from swashplate.identification.model import Linearised
 from swashplate.identification.problem import Evaluation, Problem, noise_scales
 from swashplate.identification.setup import Free, Stage
 from swashplate.identification.solving import Progress, Solution, sobol_starts, solve, solve_from
+from swashplate.identification.stages import stage_problem
 from swashplate.identification.unknowns import Prior, Unknown, Unknowns, bounded
 
 

@@ -31,7 +31,7 @@ from swashplate.tables import PRINTED, TABLE, check_folder, joined, made_folder
 if TYPE_CHECKING:
     from swashplate.identification.assessment import Identification
     from swashplate.identification.criteria import Verdict
-    from swashplate.identification.drive_model import Parameters
+    from swashplate.identification.stages import Parameters
     from swashplate.parameters.parameter_set import ParameterSet
 
 INTERRUPTED = 130

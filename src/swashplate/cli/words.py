@@ -98,8 +98,8 @@ def fit_of(
     path: Path, axis: str | None, setup: str | None, begin: str | None
 ) -> tuple[Campaign, tuple[Experiment, ...], Setup, ParameterSet]:
     """What a fit is about: campaign, runs to fit, what is free, and the drive it begins at."""
-    from swashplate.identification.drive_model import setup_of
     from swashplate.identification.identifying import runs_to_fit
+    from swashplate.identification.stages import setup_of
 
     campaign, chosen = campaign_of(path, axis)
     start = campaign.drive(chosen).parameters if begin is None else parameters_of(begin)

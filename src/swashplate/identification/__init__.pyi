@@ -4,7 +4,6 @@ from .criteria import verdict as verdict
 from .determination import Identifiability as Identifiability
 from .determination import identifiability_of as identifiability_of
 from .drive_model import DriveModel as DriveModel
-from .drive_model import configuration as configuration
 from .experiment_design import Outlook as Outlook
 from .experiment_design import advise as advise
 from .experiment_design import bench as bench
@@ -36,6 +35,7 @@ from .solving import sobol_starts as sobol_starts
 from .solving import solve as solve
 from .solving import solve_from as solve_from
 from .stage_fit import StageFit as StageFit
+from .stages import configuration as configuration
 from .unknowns import Prior as Prior
 from .unknowns import Unknown as Unknown
 from .unknowns import Unknowns as Unknowns

@@ -25,7 +25,6 @@ from swashplate.drive import Drive
 from swashplate.errors import DomainError, FileError, InputError, MissingFileError
 from swashplate.identification import tables
 from swashplate.identification.criteria import REQUIRED, Criterion, Grade, Verdict, verdict
-from swashplate.identification.drive_model import Parameters
 from swashplate.identification.fitting import (
     Estimated,
     Fit,
@@ -46,6 +45,7 @@ from swashplate.identification.resampling import CrossValidation, folds_tables
 from swashplate.identification.setup import Setup, Stage, setup_text
 from swashplate.identification.solving import Solution
 from swashplate.identification.stage_fit import Interval, StageFit
+from swashplate.identification.stages import Parameters
 from swashplate.identification.unknowns import Unknown, Unknowns
 from swashplate.identification.validation import RunQuality, predict
 from swashplate.locks import locked

@@ -19,17 +19,12 @@ from swashplate.campaign.quality import (
     wrapped_positions,
 )
 from swashplate.errors import InputError
-from swashplate.identification.drive_model import (
-    CURRENTS,
-    SIGNALS,
-    kinds_of,
-    simulated_run,
-    smooth,
-)
+from swashplate.identification.drive_model import CURRENTS, SIGNALS, kinds_of, simulated_run
 from swashplate.identification.model import EquationModel
 from swashplate.identification.model_setup import ModelSetup
 from swashplate.identification.problem import Loss, Problem
 from swashplate.identification.setup import Setup
+from swashplate.identification.stages import smooth
 from swashplate.parameters.parameter_set import ParameterSet
 from swashplate.parameters.rules import FULL_VOLTAGE
 from swashplate.tables import count

@@ -23,7 +23,7 @@ from swashplate.drive import Drive
 from swashplate.errors import InputError
 from swashplate.identification.arrow import dense_factor, triangular_factor, whitening
 from swashplate.identification.determination import Identifiability, identifiability
-from swashplate.identification.drive_model import CURRENTS, DriveModel, stage_problem
+from swashplate.identification.drive_model import CURRENTS, DriveModel
 from swashplate.identification.noise import spectral_covariance
 from swashplate.identification.problem import (
     TOLERANCE,
@@ -33,6 +33,7 @@ from swashplate.identification.problem import (
     linearised_fit,
 )
 from swashplate.identification.setup import Setup, Stage
+from swashplate.identification.stages import stage_problem
 from swashplate.identification.unknowns import Unknowns
 from swashplate.maneuvers import Maneuver, multisine, ramp, sine, stairs, step
 from swashplate.parameters.definitions import CATALOGUE, COLUMNS
@@ -144,8 +145,8 @@ def outlook(
 ) -> Outlook:
     """What runs can tell of a stage's unknowns, before any fit.
 
-    At the nominal values, best those that `drive_model.smooth` makes, as a fit takes them. Raises
-    as `drive_model.stage_problem`, and a `DomainError` if the model does not hold there.
+    At the nominal values, best those that `stages.smooth` makes, as a fit takes them. Raises
+    as `stages.stage_problem`, and a `DomainError` if the model does not hold there.
     """
     problem = stage_problem(stage, set_of(nominal), experiments)
     return Outlook(stage, problem, linearised_fit(problem, problem.start))

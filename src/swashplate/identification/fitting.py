@@ -33,16 +33,7 @@ from swashplate.identification.data_checks import (
     spike_findings,
     unfitted_currents,
 )
-from swashplate.identification.drive_model import (
-    DriveModel,
-    Parameters,
-    configuration,
-    smooth,
-    stage_problem,
-    start_currents_of,
-    with_card_filter,
-    with_estimates,
-)
+from swashplate.identification.drive_model import DriveModel, with_card_filter
 from swashplate.identification.faults import measurement_error
 from swashplate.identification.intervals import Estimate, uncertainty_of, weighed
 from swashplate.identification.model import EquationModel, Model, OwnModel
@@ -51,6 +42,14 @@ from swashplate.identification.problem import Loss, Problem
 from swashplate.identification.setup import FreeParameters, Setup, Stage
 from swashplate.identification.solving import Progress, Solution, sobol_starts, solve, solve_from
 from swashplate.identification.stage_fit import Interval, StageFit
+from swashplate.identification.stages import (
+    Parameters,
+    configuration,
+    smooth,
+    stage_problem,
+    start_currents_of,
+    with_estimates,
+)
 from swashplate.identification.unknowns import Prior
 from swashplate.parameters.definitions import columns_of
 from swashplate.parameters.parameter_set import ParameterSet

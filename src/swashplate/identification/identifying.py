@@ -21,7 +21,6 @@ from swashplate.identification.assessment import Identification, versions
 from swashplate.identification.between_samples import doubt
 from swashplate.identification.criteria import REQUIRED
 from swashplate.identification.data_checks import refuse_unsound, spike_findings
-from swashplate.identification.drive_model import Parameters, setup_of
 from swashplate.identification.fitting import Fit, Search, fit
 from swashplate.identification.model import Model
 from swashplate.identification.model_setup import ModelSetup
@@ -30,6 +29,7 @@ from swashplate.identification.profiles import Profile, profiles_of
 from swashplate.identification.resampling import cross_validate
 from swashplate.identification.setup import FreeParameters, Setup
 from swashplate.identification.stage_fit import StageFit
+from swashplate.identification.stages import Parameters, setup_of
 from swashplate.parameters.files import named_set
 from swashplate.parameters.parameter_set import ParameterSet
 

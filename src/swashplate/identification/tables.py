@@ -16,16 +16,13 @@ from swashplate.identification.determination import (
     identifiability_of,
     without_value,
 )
-from swashplate.identification.drive_model import (
-    DriveModel,
-    Parameters,
-    true_value,
-)
+from swashplate.identification.drive_model import DriveModel, true_value
 from swashplate.identification.intervals import Estimate, estimates_of, uncertainty_of
 from swashplate.identification.model_setup import ModelSetup
 from swashplate.identification.noise import LEVEL
 from swashplate.identification.profiles import Profile
 from swashplate.identification.stage_fit import Interval, StageFit, Status
+from swashplate.identification.stages import Parameters
 from swashplate.identification.unknowns import Kind, Unknown
 from swashplate.identification.validation import (
     Measures,

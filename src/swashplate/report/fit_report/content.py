@@ -18,7 +18,6 @@ from swashplate.identification import tables
 from swashplate.identification.assessment import Identification, motion_of
 from swashplate.identification.criteria import Verdict, starts_of, verdict
 from swashplate.identification.determination import Identifiability, identifiability_of
-from swashplate.identification.drive_model import Parameters
 from swashplate.identification.fitting import Fit
 from swashplate.identification.intervals import uncertainty_of
 from swashplate.identification.model_setup import ModelSetup
@@ -26,6 +25,7 @@ from swashplate.identification.profiles import Profile
 from swashplate.identification.resampling import CrossValidation, folds_tables
 from swashplate.identification.solving import Solution
 from swashplate.identification.stage_fit import StageFit
+from swashplate.identification.stages import Parameters
 from swashplate.identification.validation import RunQuality, at_instants, percent
 from swashplate.parameters.parameter_set import ParameterSet
 from swashplate.report.fit_report import charts
