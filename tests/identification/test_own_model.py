@@ -37,6 +37,7 @@ from swashplate.identification import (
     solve,
     verdict,
 )
+from swashplate.identification.intervals import uncertainty_of
 from swashplate.identification.model import linearised
 
 RATE = 20.0
@@ -139,7 +140,7 @@ def test_a_run_has_a_load_a_beginning_and_a_zero_of_its_own() -> None:
     free = (
         *FREE,
         Unknown("start.position", 0.0, -2.0, 2.0, run="a"),
-        Unknown("offset position", 0.0, -2.0, 2.0, run="b"),
+        Unknown("offset position", 0.0, -2.0, 2.0, run="b", kind="zero", channel="position"),
     )
     runs = (first, moved(second, second["position"].values + 0.4))
     values = found(problem(OwnModel(valve, given=loads), *runs, free=free))
@@ -334,7 +335,7 @@ def test_the_truth_is_found_judged_and_predicted() -> None:
     # a range above 0 is searched in the logarithm
     assert [each.log for each in stage.problem.unknowns] == [True, True, False, False]
     assert stage.problem.unknowns[0].unit == "mm/V"
-    for estimate, value in zip(stage.uncertainty.estimates, truth.values(), strict=True):
+    for estimate, value in zip(uncertainty_of(stage).estimates, truth.values(), strict=True):
         assert estimate.lower < value < estimate.upper
     (quality,) = predict(made.parameters, HELD)
     assert quality.channel == "place"
@@ -382,7 +383,7 @@ def test_a_fit_comes_back_with_its_model_alone(tmp_path: Path) -> None:
         )
     again = Identification.load(path, tests, model=ModelSetup(servo, RANGES, noise=NOISE)).fit
     assert again.parameters.numbers == made.parameters.numbers
-    assert again.stages[0].uncertainty.estimates == (made.stages[0].uncertainty.estimates)
+    assert uncertainty_of(again.stages[0]).estimates == (uncertainty_of(made.stages[0]).estimates)
 
 
 class Bend(NamedTuple):

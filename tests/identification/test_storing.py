@@ -13,7 +13,8 @@ from tests.identification.given import TWO_STAGES, put
 from swashplate import Campaign, Drive, FileError, InputError, ParameterError
 from swashplate.identification.assessment import Identification
 from swashplate.identification.fitting import Fit, fingerprint, fit
-from swashplate.identification.profiles import Point, Profile
+from swashplate.identification.interval_ends import Point
+from swashplate.identification.profiles import Profile
 from swashplate.identification.resampling import CrossValidation, Fold
 from swashplate.identification.solving import Solution
 from swashplate.identification.validation import Measures
@@ -68,7 +69,7 @@ def test_a_fit_comes_back_as_it_was(path: Path, campaign: Campaign, fitted: Fit)
             assert np.array_equal(getattr(ours.solution, name), value), name
 
 
-COMPUTED = ("fitting.stage_uncertainty", "assessment.verdict")
+COMPUTED = ("intervals.effects_of", "intervals.uncertainty", "assessment.verdict")
 
 
 def test_what_is_stored_is_not_computed_again(path, campaign, fitted, monkeypatch) -> None:
@@ -198,6 +199,7 @@ POISON = {
     "cut": (lambda text: text[:-100], "is not JSON"),
     "another key": (put('"axis"', '"ax"'), "'ax'.*'axis' is meant"),
     "other parameters": (put('"Z10"', '"Z3"', 1), "stage pump has other parameters .* fit again"),
+    "another kind": (put('"kind": "parameter"', '"kind": "force"', 1), "stage card has other"),
     "other version": (put('"swashplate": "[^"]*"', '"swashplate": "9.9"'), "9.9"),
     "text for a vector": (put(r'"vector": \[[^]]+\]', '"vector": "abc"'), "finite numbers"),
     "wrong length": (put(r'"vector": \[[^]]+\]', '"vector": [1.0]', 1), "stage card has other"),

@@ -8,10 +8,10 @@ from tests.identification.given import RISE, TIME, bench_run, risen, run_of
 
 from swashplate import Drive
 from swashplate.identification import Verdict, verdict
-from swashplate.identification.fitting import StageFit
 from swashplate.identification.problem import Problem
 from swashplate.identification.setup import Stage
 from swashplate.identification.solving import solve
+from swashplate.identification.stage_fit import Interval, StageFit
 from swashplate.identification.unknowns import Unknown, Unknowns
 from swashplate.identification.validation import RunQuality, compared
 
@@ -142,6 +142,13 @@ def test_values_at_a_bound_are_undetermined_and_never_decide_the_use() -> None:
     assert found.quotable + len(found.undetermined) == 2
     assert "undetermined, to 10 % of the value: gain" in found.values
     assert found.usable == found.predicts
+
+
+def test_wide_intervals_are_undetermined() -> None:
+    unsure = replace(stage(), stored=(Interval("estimated", 0.5, 0.5, 2.5),) * 2)
+    found = verdict([unsure], [GOOD])
+    assert found.undetermined == ("gain", "lag")
+    assert found.usable
 
 
 def test_an_interrupted_fit_is_not_usable() -> None:

@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal, NamedTuple, get_args
+from typing import Literal, NamedTuple, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,11 +23,9 @@ from scipy.special import stdtrit
 from swashplate.campaign.experiment import Experiment
 from swashplate.campaign.recognition import UNNAMED
 from swashplate.identification.problem import LinearisedFit, LinearisedRun
+from swashplate.identification.stage_fit import StageFit
+from swashplate.identification.validation import RunQuality
 from swashplate.results import Result
-
-if TYPE_CHECKING:
-    from swashplate.identification.fitting import StageFit
-    from swashplate.identification.validation import RunQuality
 
 Array = NDArray[np.float64]
 Motion = Literal["large", "small", "fast"]

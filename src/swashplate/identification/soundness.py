@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,10 +30,8 @@ from swashplate.identification.discrepancy import (
     without_runs,
 )
 from swashplate.identification.drive_model import DriveModel
-
-if TYPE_CHECKING:
-    from swashplate.identification.fitting import StageFit
-    from swashplate.identification.validation import RunQuality
+from swashplate.identification.stage_fit import StageFit
+from swashplate.identification.validation import RunQuality
 
 Array = NDArray[np.float64]
 
