@@ -60,7 +60,7 @@ class State(NamedTuple):
 
 @equation
 def delivered(speed: float, drop: float, squeeze: float, slip: float) -> float:
-    """What moves the rod, in turns a second: not the slip, and not what fills the chamber.
+    """Turns a second that move the rod: not the slip, and not what squeezes the chamber's oil.
 
     A check valve shuts off the chamber from a pump that slips as fast as it turns.
     """
@@ -73,21 +73,16 @@ def step(
     state: State, pump: float, pressure_a: float, pressure_b: float, p: Actuator, h: float
 ) -> State:
     """Pressures and position one step on; the chamber that is filled leads."""
-    log_a = log(pressure_a + ATMOSPHERE)
-    log_b = log(pressure_b + ATMOSPHERE)
-    drop = pressure_a - pressure_b
-    squeeze_a = p.air_a * (log_a - state.log_a) / FILTER
-    squeeze_b = p.air_b * (log_b - state.log_b) / FILTER
-    if pump > 0.0:
-        speed = p.stroke * delivered(pump, drop, squeeze_a, p.slip)
-    else:
-        speed = -p.stroke * p.area_ratio * delivered(-pump, -drop, squeeze_b, p.slip)
     follow = 1.0 - exp(-h / FILTER)
-    return State(
-        state.log_a + follow * (log_a - state.log_a),
-        state.log_b + follow * (log_b - state.log_b),
-        state.position + h * speed,
-    )
+    rise_a = follow * (log(pressure_a + ATMOSPHERE) - state.log_a)
+    rise_b = follow * (log(pressure_b + ATMOSPHERE) - state.log_b)
+    drop = pressure_a - pressure_b
+    if pump > 0.0:
+        speed = p.stroke * delivered(pump, drop, p.air_a * rise_a / h, p.slip)
+    else:
+        back = delivered(-pump, -drop, p.air_b * rise_b / h, p.slip)
+        speed = -p.stroke * p.area_ratio * back
+    return State(state.log_a + rise_a, state.log_b + rise_b, state.position + h * speed)
 
 
 ACTUATOR = OwnModel(Model("actuator", Actuator, State, step), begin={"position": "position"})

@@ -27,6 +27,7 @@ CYLINDERS = ("boom", "stick", "bucket")
 ANCHOR = 5.0  # the motion since a measured position is compared, and so often begins again [s]
 NOISE = 0.003  # of a window, roughly [m]
 SAMPLES = 95  # of a window, which has one error: each counts for a 95th
+MIDDLE = 0.09  # of the boom's stroke [m]
 SPREAD = 0.15  # of the logarithm of a cylinder's full speed from trial to trial, roughly
 RATE = 150.0  # steps a second, some eight a sample [Hz]
 QUICK = 1e6 / 4.8  # Z8 of the drive "neutral" for a lag of 1 s
@@ -40,6 +41,8 @@ KNOWN = {
     "width": (0.3, 0.5, 0.02, 1.5),
     "loss_out": (0.2, 0.5, 0.0, 1.0),
     "loss_back": (0.2, 0.5, 0.0, 1.0),
+    "rise_out": (0.0, 0.2, -0.5, 0.5),
+    "rise_back": (0.0, 0.2, -0.5, 0.5),
     "speed_out": (0.022, 0.4, 0.005, 0.12),
     "speed_back": (0.022, 0.4, 0.005, 0.12),
 }
@@ -58,6 +61,8 @@ class Valve(NamedTuple):
     width: float  # beyond the overlap, for 63 % of the full flow [%]
     loss_out: float  # of the speed, for each other valve that is fully open [1]
     loss_back: float
+    rise_out: float  # of the speed, with the boom's cylinder 20 mm further out [1]
+    rise_back: float
     speed_out: float  # of the rod at full flow [m/s]
     speed_back: float
 
@@ -77,7 +82,7 @@ def flow(opening: float, overlap: float, width: float) -> float:
 
 
 @equation
-def step(state: Rod, command: float, demand: float, p: Valve, h: float) -> Rod:
+def step(state: Rod, command: float, demand: float, boom: float, p: Valve, h: float) -> Rod:
     """Opening, others' flow and position one step on."""
     follow = 1.0 - exp(-h / p.lag)
     opening = state.opening + follow * (command - state.opening)
@@ -86,6 +91,8 @@ def step(state: Rod, command: float, demand: float, p: Valve, h: float) -> Rod:
     back = p.speed_back * flow(-opening, p.overlap_back, p.width)
     out *= max(1.0 - p.loss_out * others, 0.0)
     back *= max(1.0 - p.loss_back * others, 0.0)
+    out *= 1.0 + p.rise_out * boom
+    back *= 1.0 + p.rise_back * boom
     return Rod(opening, others, state.position + h * (out - back))
 
 
@@ -93,25 +100,30 @@ TAPS = {name: Tap(name, delay="delay", hold="mean") for name in ("command", "dem
 valve = Model("valve", Valve, Rod, step, taps=TAPS)
 
 
-def with_demand(tests: Campaign, run: Experiment) -> Experiment:
-    """A run with a channel for the flow of the other valves, counted in full flows."""
+def with_others(tests: Campaign, run: Experiment) -> Experiment:
+    """A run with channels for the flow of the other valves, in full flows, and the boom's height.
+
+    The height is in 20 mm of the boom's cylinder, from its middle. The residuals show an effect of
+    it on the bucket alone, so that it is 0 for the others.
+    """
     position = run["position"]
     overlap, width = KNOWN["overlap_out"][0], KNOWN["width"][0]
-    openings = [
-        np.abs(other.input.values)
-        for other in tests
-        if other.run == run.run and other.axis != run.axis
-    ]
-    flows = [1.0 - np.exp(-np.maximum(opening - overlap, 0.0) / width) for opening in openings]
-    demand = replace(
-        position,
-        name="demand",
-        kind="other",
-        unit="1",
-        values=np.sum(flows, axis=0),
-        interpolation="previous",
-    )
-    return replace(run, channels={"position": position, "demand": demand})
+    flows = np.zeros(position.time.size)
+    for other in tests:
+        if other.run == run.run and other.axis != run.axis:
+            beyond = np.maximum(np.abs(other.input.values) - overlap, 0.0)
+            flows += 1.0 - np.exp(-beyond / width)
+    heights = np.zeros(position.time.size)
+    if run.axis == "bucket":
+        heights = (tests[f"{run.run} boom"]["position"].values - MIDDLE) / 0.02
+    demand = replace(position, name="demand", kind="other", unit="1", values=flows)
+    boom = replace(position, name="boom", kind="other", unit="1", values=heights)
+    channels = {
+        "position": position,
+        "demand": replace(demand, interpolation="previous"),
+        "boom": boom,
+    }
+    return replace(run, channels=channels)
 
 
 # %% Two models to fit: a valve, and a drive with dead zones, gains, a lag and a delay
@@ -247,8 +259,9 @@ def line(runs: Sequence[Experiment], run: Experiment) -> np.ndarray:
 
 
 # %% A trial predicted by fits to the others
-ALONE = {"loss_out": 0.0, "loss_back": 0.0}  # no other valve acts
-BEST = "valve and pump, learning"
+LEVEL = {"rise_out": 0.0, "rise_back": 0.0}  # the boom's height does not matter
+ALONE = {"loss_out": 0.0, "loss_back": 0.0, **LEVEL}  # nor do the other valves
+BEST = "pump and boom, learning"
 
 
 def predictions(others: Sequence[Experiment], run: Experiment) -> dict[str, np.ndarray]:
@@ -257,12 +270,14 @@ def predictions(others: Sequence[Experiment], run: Experiment) -> dict[str, np.n
     for name, candidate, fixed in (
         ("lag", LAG, {}),
         ("valve", VALVE, ALONE),
-        ("valve and pump", VALVE, {}),
+        ("pump", VALVE, LEVEL),
+        ("pump and boom", VALVE, {}),
     ):
         columns = directions(candidate, fit(candidate, others, fixed), run)
-        found[name] = columns.sum(axis=1)
+        if name in ("lag", "valve"):
+            found[name] = columns.sum(axis=1)
         found[f"{name}, learning"] = learned(columns, run)
-    found["valve and pump, hindsight"] = hindsight(columns, run)
+    found["in hindsight"] = hindsight(columns, run)
     return found
 
 
@@ -454,7 +469,7 @@ def main() -> None:
     axes = (options.cylinder,) if options.cylinder else CYLINDERS
     figure, scores = Figure(figsize=(11, 8), layout="constrained"), {}
     for number, axis in enumerate(axes, start=1):
-        runs = [with_demand(tests, run) for run in tests.select(axis=axis)]
+        runs = [with_others(tests, run) for run in tests.select(axis=axis)]
         print_effects(tests, axis, runs)
         scores[axis] = print_scores(axis, runs)
         if options.figure:
