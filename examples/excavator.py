@@ -405,8 +405,10 @@ def print_effects(tests: Campaign, axis: str, runs: Sequence[Experiment]) -> Non
     explained = 1.0 - left @ left / squares
     largest = np.cumsum(np.sort(left**2)[::-1])
     few = 1 + int(np.searchsorted(largest, 0.5 * largest[-1]))
+    at_rest = np.abs(pieces.simulated).sum(axis=1) < ACTING
     print(f"\n{axis}: of the squared residuals {100.0 * explained:.0f} % are speeds of the trial;")
-    print(f"of the rest {few} of {left.size} half seconds hold a half.\n")
+    print(f"of the rest {few} of {left.size} half seconds hold a half.")
+    print(f"At rest a half second has {rms(left[at_rest]):.2f} mm.\n")
     print("| cause | explains | speed outward | speed back |")
     print("|---|---|---|---|")
     found = {name: effect_of(cause, pieces) for name, cause in pieces.causes.items()}
