@@ -203,10 +203,10 @@ def fit(model: OwnModel, unknowns: Sequence[Unknown], fixed: Values, run: Experi
 
 def errors(fitted: Experiment, run: Experiment) -> dict[str, np.ndarray]:
     """Errors (m,) in a load case by model, each fitted to the other one. [m]"""
-    found = {"straight line": line_error(fitted, run)}
+    by_model = {"straight line": line_error(fitted, run)}
     for name, (model, unknowns, fixed) in MODELS.items():
-        found[name] = error(model, fit(model, unknowns, fixed, fitted), run)
-    return found
+        by_model[name] = error(model, fit(model, unknowns, fixed, fitted), run)
+    return by_model
 
 
 def ratio(of: Sequence[np.ndarray], to: Sequence[np.ndarray]) -> tuple[float, float, float]:
@@ -238,7 +238,10 @@ def main() -> None:
     to_heavy, to_light = errors(light, heavy), errors(heavy, light)
     cases = ((heavy, to_heavy), (light, to_light))
     squares = {
-        name: [np.bincount(windows(run["position"].time), found[name] ** 2) for run, found in cases]
+        name: [
+            np.bincount(windows(run["position"].time), by_model[name] ** 2)
+            for run, by_model in cases
+        ]
         for name in to_heavy
     }
     print("| model | light to heavy [mm] | heavy to light [mm] | to the line | to the lag model |")

@@ -205,8 +205,8 @@ def fit(candidate: Candidate, runs: Sequence[Experiment], fixed: Values) -> Valu
         fixed=fixed,
         compare=since_anchor,
     )
-    found = solve(problem, tolerance=1e-6)
-    values = {**fixed, **problem.unknowns.values(found.vector)}
+    solution = solve(problem, tolerance=1e-6)
+    values = {**fixed, **problem.unknowns.values(solution.vector)}
     for name in candidate.speeds:
         speeds = [values.pop(f"{name} ({run.name})") for run in runs]
         values[name] = float(np.exp(np.mean(np.log(speeds))))
@@ -259,26 +259,26 @@ def line(runs: Sequence[Experiment], run: Experiment) -> np.ndarray:
 
 
 # %% A trial predicted by fits to the others
-LEVEL = {"rise_out": 0.0, "rise_back": 0.0}  # the boom's height does not matter
-ALONE = {"loss_out": 0.0, "loss_back": 0.0, **LEVEL}  # nor do the other valves
+WITHOUT_BOOM = {"rise_out": 0.0, "rise_back": 0.0}
+WITHOUT_OTHERS = {"loss_out": 0.0, "loss_back": 0.0, **WITHOUT_BOOM}
 BEST = "pump and boom, learning"
 
 
 def predictions(others: Sequence[Experiment], run: Experiment) -> dict[str, np.ndarray]:
     """(m,) motion in a trial by model, each fitted to the others. [m]"""
-    found = {"straight line": line(others, run)}
+    by_model = {"straight line": line(others, run)}
     for name, candidate, fixed in (
         ("lag", LAG, {}),
-        ("valve", VALVE, ALONE),
-        ("pump", VALVE, LEVEL),
+        ("valve", VALVE, WITHOUT_OTHERS),
+        ("pump", VALVE, WITHOUT_BOOM),
         ("pump and boom", VALVE, {}),
     ):
         columns = directions(candidate, fit(candidate, others, fixed), run)
         if name in ("lag", "valve"):
-            found[name] = columns.sum(axis=1)
-        found[f"{name}, learning"] = learned(columns, run)
-    found["in hindsight"] = hindsight(columns, run)
-    return found
+            by_model[name] = columns.sum(axis=1)
+        by_model[f"{name}, learning"] = learned(columns, run)
+    by_model["in hindsight"] = hindsight(columns, run)
+    return by_model
 
 
 def rms(rows: np.ndarray) -> float:
@@ -359,7 +359,7 @@ def regression(columns: np.ndarray, residual: np.ndarray) -> tuple[np.ndarray, n
     return coefficients, residual - columns @ coefficients
 
 
-def own_speeds(pieces: Pieces) -> np.ndarray:
+def trial_speeds(pieces: Pieces) -> np.ndarray:
     """(n, 2 trials) columns of a regression that lets each trial have full speeds of its own."""
     numbers = np.unique(pieces.trial)
     by_trial = [pieces.simulated * (pieces.trial == trial)[:, None] for trial in numbers]
@@ -379,10 +379,10 @@ class Effect(NamedTuple):
 def effect_of(cause: np.ndarray, pieces: Pieces) -> Effect:
     """Effect of a cause (n,) on the speed in both directions."""
     acting, residual = pieces.simulated * cause[:, None], pieces.residual
-    own = own_speeds(pieces)
-    columns = np.concatenate([acting, own], axis=1)
+    speeds = trial_speeds(pieces)
+    columns = np.concatenate([acting, speeds], axis=1)
     coefficients, left = regression(columns, residual)
-    _, left_without = regression(own, residual)
+    _, left_without = regression(speeds, residual)
     members = [np.flatnonzero(pieces.window == window) for window in np.unique(pieces.window)]
     random = np.random.default_rng(1)
     resampled = []
@@ -399,9 +399,9 @@ def effect_of(cause: np.ndarray, pieces: Pieces) -> Effect:
 # %% The run
 def print_effects(tests: Campaign, axis: str, runs: Sequence[Experiment]) -> None:
     """Print what the residuals of a cylinder show."""
-    pieces = pieces_of(tests, runs, fit(VALVE, runs, ALONE))
+    pieces = pieces_of(tests, runs, fit(VALVE, runs, WITHOUT_OTHERS))
     squares = pieces.residual @ pieces.residual
-    _, left = regression(own_speeds(pieces), pieces.residual)
+    _, left = regression(trial_speeds(pieces), pieces.residual)
     explained = 1.0 - left @ left / squares
     largest = np.cumsum(np.sort(left**2)[::-1])
     few = 1 + int(np.searchsorted(largest, 0.5 * largest[-1]))
@@ -411,13 +411,13 @@ def print_effects(tests: Campaign, axis: str, runs: Sequence[Experiment]) -> Non
     print(f"At rest a half second has {rms(left[at_rest]):.2f} mm.\n")
     print("| cause | explains | speed outward | speed back |")
     print("|---|---|---|---|")
-    found = {name: effect_of(cause, pieces) for name, cause in pieces.causes.items()}
-    for name, effect in sorted(found.items(), key=lambda item: -item[1].explained):
+    effects = {name: effect_of(cause, pieces) for name, cause in pieces.causes.items()}
+    for name, effect in sorted(effects.items(), key=lambda item: -item[1].explained):
         changes = []
         for acting, change, low, high in zip(*effect[1:], strict=True):
             limits = f"{100.0 * low:+.0f} to {100.0 * high:+.0f}"
-            told = f"{100.0 * change:+.0f} % ({limits}; {acting})"
-            changes.append(told if acting >= FEWEST else f"({acting})")
+            text = f"{100.0 * change:+.0f} % ({limits}; {acting})"
+            changes.append(text if acting >= FEWEST else f"({acting})")
         explains = f"{100.0 * effect.explained:.1f} %"
         print(f"| {name} | {explains} | {changes[0]} | {changes[1]} |", flush=True)
 
@@ -426,11 +426,11 @@ def print_scores(axis: str, runs: Sequence[Experiment]) -> dict[str, list[float]
     """Print the errors in each trial left out [mm]; return them by model."""
     scores: dict[str, list[float]] = {}
     for run in runs:
-        found = predictions([other for other in runs if other is not run], run)
+        by_model = predictions([other for other in runs if other is not run], run)
         if not scores:
-            print(f"\n| {axis}, left out | moves | {' | '.join(found)} |")
-            print("|---" * (len(found) + 2) + "|")
-        errors = {name: rms(predicted - motion(run)) for name, predicted in found.items()}
+            print(f"\n| {axis}, left out | moves | {' | '.join(by_model)} |")
+            print("|---" * (len(by_model) + 2) + "|")
+        errors = {name: rms(predicted - motion(run)) for name, predicted in by_model.items()}
         for name, error in errors.items():
             scores.setdefault(name, []).append(error)
         shown = " | ".join(f"{error:.2f}" for error in (rms(motion(run)), *errors.values()))
@@ -445,7 +445,7 @@ def print_ratios(scores: Mapping[str, Mapping[str, Sequence[float]]]) -> None:
     for name in next(iter(scores.values())):
         if name == BEST:
             continue
-        ratios = [np.divide(by_model[BEST], by_model[name]) for by_model in scores.values()]
+        ratios = [np.divide(axis[BEST], axis[name]) for axis in scores.values()]
         # the cylinders of a trial share its pump and its operator: together they are one ratio
         ratios.append(np.exp(np.mean(np.log(ratios), axis=0)))
         print(f"| {name} | {' | '.join(mean_ratio(row) for row in ratios)} |")
@@ -454,9 +454,9 @@ def print_ratios(scores: Mapping[str, Mapping[str, Sequence[float]]]) -> None:
 def draw(figure: Figure, number: int, others: Sequence[Experiment], run: Experiment) -> None:
     """Draw the errors in a trial left out."""
     plot = figure.add_subplot(3, 1, number, title=run.name, ylabel="error [mm]")
-    found = predictions(others, run)
+    by_model = predictions(others, run)
     for name in ("lag", BEST):
-        plot.plot(run["position"].time, 1e3 * (found[name] - motion(run)), label=name)
+        plot.plot(run["position"].time, 1e3 * (by_model[name] - motion(run)), label=name)
     plot.legend()
 
 
