@@ -12,7 +12,7 @@ from swashplate import Drive
 ROOT = Path(__file__).parents[2]
 PAGE = (ROOT / "docs" / "examples.md").read_text("utf-8")
 EXAMPLES = sorted((ROOT / "examples").glob("*.py"))
-SCRIPTS = {"actuator", "excavator", "crane_gymnasium", "crane_mujoco"}
+SCRIPTS = {"actuator", "eha", "excavator", "crane_gymnasium", "crane_mujoco"}
 """Which need data or packages that are not here; their first cell is code."""
 each_example = pytest.mark.parametrize("path", EXAMPLES, ids=lambda path: path.stem)
 
