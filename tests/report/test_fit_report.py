@@ -19,13 +19,13 @@ from tests.report.conftest import injected, policy_of, with_script
 
 from swashplate import Campaign, Drive, FileError, InputError, maneuvers
 from swashplate.identification.assessment import Identification
-from swashplate.identification.criteria import verdict
 from swashplate.identification.fitting import Fit, fit
 from swashplate.identification.profiles import Point, Profile
 from swashplate.identification.resampling import CrossValidation, Fold
 from swashplate.identification.setup import Setup
 from swashplate.identification.solving import Solution
 from swashplate.identification.validation import Measures, predict, with_speeds
+from swashplate.identification.verdict import verdict
 from swashplate.maneuvers import parse
 from swashplate.report.fit_report import (
     print_report,
