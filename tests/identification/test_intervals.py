@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scipy.optimize import brentq, least_squares
+from swashplate.identification.misfit import lack_of_fit
 from tests.identification.given import (
     TIME,
     bench_run,
@@ -28,7 +29,6 @@ from swashplate.identification.intervals import (
     weighed,
     with_handed,
 )
-from swashplate.identification.misfit import lack_of_fit
 from swashplate.identification.noise import Covariance
 from swashplate.identification.problem import (
     LinearisedRun,

@@ -6,11 +6,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 from scipy.signal import lfilter
+from swashplate.identification.criteria import verdict
 from tests.identification.given import bench_run, first_order, run_of, virtual
 
 from swashplate import Campaign, Drive, InputError, maneuvers
 from swashplate.campaign import rig
-from swashplate.identification.criteria import verdict
 from swashplate.identification.validation import (
     beyond_noise,
     compared,

@@ -14,7 +14,6 @@ from scipy.linalg import solve_banded
 
 from swashplate.campaign.experiment import Experiment
 from swashplate.errors import DomainError, InputError, ParameterError
-from swashplate.identification.discrepancy import white_noise
 from swashplate.identification.drive_model import (
     CURRENTS,
     DriveModel,
@@ -37,8 +36,11 @@ Array = NDArray[np.float64]
 EXPLAINED = 0.5
 """Part of the squared residuals that a cause must remove, and that must not be noise for anything
 to be explained."""
-MOST = 3
-"""Causes that are tried by a refit, those first that explain most to first order."""
+BLOCK = 0.05
+"""Time over which residuals are averaged, so that noise and ripple do not count. [s]"""
+TRIED, NAMED = 5, 3
+"""Causes that are tried by a refit, those first that explain most to first order; and that are
+named at most."""
 TOLERANCE, FEWEST_EVALUATIONS, MOST_EVALUATIONS = 1e-6, 6, 30
 """Of a refit, which begins at the optimum without the cause."""
 WORK = 20_000_000
@@ -46,6 +48,10 @@ WORK = 20_000_000
 SAME_DIRECTION = 1e-4
 """Part of a cause's effect outside the estimates' below which both are the same: its square is a
 difference, which has 16 digits less those of this one."""
+COMMAND_GAIN, COMMAND_LAG = "scale of the command", "lag of the command"
+RESISTED = "loss of speed under a load that resists, {}"
+PULLED = "loss of speed under a load that pulls one way, {}"
+SCALE, DRIFT = "scale of {}", "drift of {} over the campaign"
 LATEST = 0.5
 """Delay or lag that is plausible. [s]"""
 SMALL_GAIN, SMALL_LAG = 1e-3, 0.01
@@ -103,7 +109,7 @@ def causes_of(stages: Sequence[StageFit]) -> tuple[Cause, ...] | None:
     Returns
     -------
     tuple of Cause, or None
-        At most `MOST`, the largest share first: each removes at least half of the squared
+        At most `NAMED`, the largest share first: each removes at least half of the squared
         residuals in a refit, and is of a plausible size. Empty if none does; None if more than half
         of the squares are noise in each stage.
 
@@ -115,37 +121,61 @@ def causes_of(stages: Sequence[StageFit]) -> tuple[Cause, ...] | None:
     found: tuple[Cause, ...] | None = None
     for stage in stages:
         # a robust loss has taken what stands out already
-        if stage.solution.loss != "linear" or noise_share(stage) >= EXPLAINED:
+        before = squares_of(stage.problem, stage.solution.vector)
+        if stage.solution.loss != "linear" or before.noise_share >= EXPLAINED:
             continue
-        found = _causes_of_stage(stage)
+        found = _causes_of_stage(stage, before)
         if found:
             # what an earlier stage lacks, the later ones inherit
             break
     return found
 
 
-def noise_share(stage: StageFit) -> float:
-    """Part of the squared residuals that is noise, independent from sample to sample. [1]"""
-    noise, squares = 0.0, 0.0
-    experiments = {run.name: run for run in stage.problem.experiments}
-    for run in stage.linearised.runs:
-        channel = experiments[run.name][run.channel]
-        weight = np.ones(run.residual.size) if run.weight is None else run.weight
-        white = white_noise(run.residual / weight, channel.values[channel.used])
-        noise += float(np.sum((white * weight) ** 2))
-        squares += float(run.residual @ run.residual)
-    return noise / squares if squares > 0.0 else 1.0
+class Squares(NamedTuple):
+    """Sums of squared residuals of a stage."""
+
+    slow: float
+    """Of their means over `BLOCK`."""
+    fast: float
+    """Of what differs from these."""
+    block: float
+    """Samples to a block, on average."""
+
+    @property
+    def noise_share(self) -> float:
+        """Part of the slow squares that noise as large as the fast ones makes. [1]"""
+        if not self.slow > 0.0:
+            return 1.0
+        return self.fast / (max(self.block - 1.0, 1.0) * self.slow)
 
 
-def _causes_of_stage(stage: StageFit) -> tuple[Cause, ...]:
+def squares_of(problem: Problem, vector: Array) -> Squares:
+    """Squared residuals at a point, of what is slow in them and of what is noise or ripple."""
+    slow = total = samples = blocks = 0.0
+    for number, run in enumerate(problem.experiments):
+        for name, residual in problem.residuals(vector, number).items():
+            used = run[name].used
+            time, left = run[name].time[used], residual[used]
+            if time.size < 2:
+                continue
+            size = max(round(BLOCK / float(np.median(np.diff(time)))), 2)
+            starts = np.arange(0, left.size, size)
+            counts = np.diff(np.append(starts, left.size))
+            slow += float(np.sum(np.add.reduceat(left, starts) ** 2 / counts))
+            total += float(left @ left)
+            samples, blocks = samples + left.size, blocks + starts.size
+    return Squares(slow, max(total - slow, 0.0), samples / max(blocks, 1.0))
+
+
+def _causes_of_stage(stage: StageFit, before: Squares) -> tuple[Cause, ...]:
     scored = [each for each in _scores(stage) if each.candidate.least < each.size]
     scored = [each for each in scored if each.size < each.candidate.most]
     scored.sort(key=lambda each: -each.share)
     found = list[Cause]()
-    for each in scored[:MOST]:
-        if (cause := _refitted(stage, each)) is not None:
+    for each in scored[:TRIED]:
+        if (cause := _refitted(stage, each, before)) is not None:
             found.append(cause)
-    return tuple(sorted(found, key=lambda each: -each.share))
+    return tuple(sorted(found, key=lambda each: -each.share)[:NAMED])
 
 
 # --- to first order -------------------------------------------------------------------------------
@@ -164,7 +194,7 @@ def _scores(stage: StageFit) -> Iterator[_Score]:
     fit = stage.linearised
     candidates = {each.name: each for each in _candidates(stage)}
     squares, products = dict[str, float](), dict[str, float]()
-    along = dict[str, Array]()
+    along, scales = dict[str, Array](), dict[str, list[_RunScale]]()
     jacobians = fit.jacobians()
     for number in range(len(stage.problem.experiments)):
         parts = RunParts(stage, number, jacobians)
@@ -174,12 +204,50 @@ def _scores(stage: StageFit) -> Iterator[_Score]:
             for run, _, change in parts.weighted(changes):
                 squares[name] = squares.get(name, 0.0) + float(change @ change)
                 products[name] = products.get(name, 0.0) + float(change @ run.residual)
+                if name == SCALE.format(run.channel):
+                    # a position has a free zero
+                    motion = change - change.mean()
+                    own = _RunScale(number, motion @ run.residual, motion @ motion)
+                    scales.setdefault(run.channel, []).append(own)
             along[name] = along.get(name, 0.0) + parts.along(changes)
     for name, square in squares.items():
         apart = square - float(along[name] @ along[name])
         if square > 0.0 and apart > SAME_DIRECTION**2 * square:
-            size = -products[name] / apart
-            yield _Score(candidates[name], size, products[name] ** 2 / (apart * fit.squares))
+            size, share = -products[name] / apart, products[name] ** 2 / (apart * fit.squares)
+            for channel, of_runs in scales.items():
+                if name == DRIFT.format(channel):
+                    share *= _in_order(of_runs)
+            yield _Score(candidates[name], size, share)
+
+
+class _RunScale(NamedTuple):
+    """What the residuals of one run say of the scale of its motion."""
+
+    place: int
+    """Of the run among all of its stage."""
+    product: float
+    """Of motion and residuals."""
+    square: float
+    """Of the motion."""
+
+
+def _in_order(runs: Sequence[_RunScale]) -> float:
+    """Part of the differences between the scales of runs that is a straight line over their order.
+
+    Freed of what a line explains by chance (adjusted R², Draper and Smith 1998, section 5.1): a
+    machine that differs between maneuvers differs between runs too, in whatever order they stand.
+    """
+    moving = [each for each in runs if each.square > 0.0]
+    if len(moving) < 3:
+        return 0.0
+    place = np.array([float(each.place) for each in moving])
+    scale = np.array([each.product / each.square for each in moving])
+    total = float(np.sum((scale - scale.mean()) ** 2))
+    along = place - place.mean()
+    if not total > 0.0:
+        return 0.0
+    line = float(along @ scale) ** 2 / float(along @ along)
+    return max(1.0 - (1.0 - line / total) * (scale.size - 1) / (scale.size - 2), 0.0)
 
 
 def _effects(stage: StageFit, number: int) -> Iterator[tuple[str, Changes]]:
@@ -215,9 +283,6 @@ def _effects(stage: StageFit, number: int) -> Iterator[tuple[str, Changes]]:
             yield name, {channel: part.by[:, k] for channel, part in by.items()}
 
 
-COMMAND_GAIN, COMMAND_LAG = "scale of the command", "lag of the command"
-
-
 def _of_channel(experiment: Experiment, name: str, output: Array, place: float) -> dict[str, Array]:
     """Changes (m,) of simulated less measured if one unit of each is simulated.
 
@@ -227,19 +292,25 @@ def _of_channel(experiment: Experiment, name: str, output: Array, place: float) 
     slope = np.gradient(output, time) if time.size > 2 else np.zeros_like(output)
     moved = output - output[0] if channel.is_position else output
     effects = {
-        f"scale of {name}": moved,
+        SCALE.format(name): moved,
         f"time stamps of {name}": -slope,
         f"lag of {name}": (behind_lag(time, output) - output) / SMALL_LAG,
     }
     if channel.kind not in CURRENTS:
-        effects[f"drift of {name} over the campaign"] = moved * place
-        effects[f"loss of speed under load, {name}"] = -lost(experiment, name, output)
+        effects[DRIFT.format(name)] = moved * place
+        effects[RESISTED.format(name)] = -lost(experiment, name, output, resisting=True)
+        effects[PULLED.format(name)] = -lost(experiment, name, output, resisting=False)
     return effects
 
 
-def lost(experiment: Experiment, name: str, output: Array) -> Array:
-    """(m,) what a channel lacks if its motion is slower by one unit while it moves."""
+def lost(experiment: Experiment, name: str, output: Array, *, resisting: bool) -> Array:
+    """(m,) what a channel lacks if its motion is slower by one unit, under a load.
+
+    Of one that resists it while it moves, and of one that pulls one way always.
+    """
     channel, time = experiment[name], experiment[name].time
+    if not resisting:
+        return time - time[0] if channel.is_position else np.ones_like(time)
     speed = np.gradient(output, time) if channel.is_position else output
     moves = np.abs(speed) > 0.01 * float(np.abs(speed).max(initial=0.0))
     way = np.sign(speed) * moves
@@ -274,7 +345,7 @@ def _of_readings(stage: StageFit, name: str) -> Iterator[Candidate]:
     channels = [run[name] for run in stage.problem.experiments if name in run.channels]
     read = partial(_with_reading, stage, name)
     check = f"check the instrument of {name}"
-    yield Candidate(f"scale of {name}", -0.3, 0.3, partial(read, _scaled), check, 100.0, "%")
+    yield Candidate(SCALE.format(name), -0.3, 0.3, partial(read, _scaled), check, 100.0, "%")
     late = f"{check} and its clock, or a delay of the machine"
     stamps = f"time stamps of {name}"
     yield Candidate(stamps, -LATEST, LATEST, partial(read, _late), late, 1e3, "ms")
@@ -282,14 +353,16 @@ def _of_readings(stage: StageFit, name: str) -> Iterator[Candidate]:
     yield Candidate(f"lag of {name}", 0.0, LATEST, partial(read, _undone_lag), slow, 1e3, "ms")
     if channels[0].kind in CURRENTS:
         return
-    drift = f"drift of {name} over the campaign"
+    drift = DRIFT.format(name)
     warm = "keep the machine as it is in use, its oil warm, and test again"
     yield Candidate(drift, -0.5, 0.5, partial(read, _undone_drift), warm, 100.0, "%")
     unit = channels[0].unit
     unit = unit if unit.endswith("/s") else f"{unit}/s"
-    loss = f"loss of speed under load, {name}"
-    load = "look for a load, friction or a leaking motor, which the model leaves out"
-    yield Candidate(loss, 0.0, np.inf, partial(read, _undone_loss), load, 1.0, unit)
+    load = "look for a load and for a leaking motor, which the model leaves out"
+    undo = partial(read, partial(_undone_loss, resisting=True))
+    yield Candidate(RESISTED.format(name), 0.0, np.inf, undo, load, 1.0, unit)
+    undo = partial(read, partial(_undone_loss, resisting=False))
+    yield Candidate(PULLED.format(name), -np.inf, np.inf, undo, load, 1.0, unit)
 
 
 def _of_commands(stage: StageFit) -> Iterator[Candidate]:
@@ -364,10 +437,10 @@ def _driving(stage: StageFit, experiment: Experiment) -> Array:
 # --- a refit with it ------------------------------------------------------------------------------
 
 
-def _refitted(stage: StageFit, score: _Score) -> Cause | None:
+def _refitted(stage: StageFit, score: _Score, before: Squares) -> Cause | None:
     """A candidate after a refit; None if it does not remove half of the squares."""
     candidate = score.candidate
-    best = _solved(stage, candidate, score.size)
+    best = _solved(stage, candidate, score.size, before)
     if best is None:
         return None
     size, share = best
@@ -375,7 +448,8 @@ def _refitted(stage: StageFit, score: _Score) -> Cause | None:
         # along the size the squares are a parabola: its slope at 0 is known
         curvature = share - 2.0 * score.share
         if curvature < 0.0 and abs(score.share / curvature + 1.0) > 0.1:
-            better = _solved(stage, candidate, -score.share / curvature * score.size)
+            other = -score.share / curvature * score.size
+            better = _solved(stage, candidate, other, before)
             if better is not None and better[1] > share:
                 size, share = better
     if share < EXPLAINED or not candidate.least < size < candidate.most:
@@ -384,21 +458,23 @@ def _refitted(stage: StageFit, score: _Score) -> Cause | None:
     return Cause(candidate.name, shown, candidate.unit, share, candidate.advice)
 
 
-def _solved(stage: StageFit, candidate: Candidate, size: float) -> tuple[float, float] | None:
+def _solved(
+    stage: StageFit, candidate: Candidate, size: float, before: Squares
+) -> tuple[float, float] | None:
     """Size of a candidate and the share of the squares that a refit removes; None if it fails."""
-    problem, before = stage.problem, stage.solution
+    problem, vector = stage.problem, stage.solution.vector
     try:
         freed = candidate.freed(size)
         start = freed.start.copy()
         places = {name: k for k, name in enumerate(problem.unknowns.names)}
         for k, name in enumerate(freed.unknowns.names):
             if name in places:
-                start[k] = before.vector[places[name]]
+                start[k] = vector[places[name]]
         most = min(max(WORK // problem.samples, FEWEST_EVALUATIONS), MOST_EVALUATIONS)
         found: Solution = solve(freed, start, tolerance=TOLERANCE, max_evaluations=most)
+        share = 1.0 - squares_of(freed, found.vector).slow / before.slow
     except (DomainError, InputError, ParameterError):
         return None
-    share = 1.0 - found.cost / before.cost if before.cost > 0.0 else 0.0
     if candidate.free:
         value = freed.unknowns.values(found.vector)[candidate.free]
         size = value - stage.parameters.numbers.get(candidate.free, 0.0)
@@ -475,8 +551,11 @@ def _undone_lag(run: Experiment, name: str, output: Array, _: float, size: float
     return _with_values(run, name, run[name].values + output - lagged)
 
 
-def _undone_loss(run: Experiment, name: str, output: Array, _: float, size: float) -> Experiment:
-    return _with_values(run, name, run[name].values + size * lost(run, name, output))
+def _undone_loss(
+    run: Experiment, name: str, output: Array, _: float, size: float, *, resisting: bool
+) -> Experiment:
+    lacks = lost(run, name, output, resisting=resisting)
+    return _with_values(run, name, run[name].values + size * lacks)
 
 
 def _with_command(

@@ -47,7 +47,7 @@ OWN = 0.01
 little of where they would be without it."""
 LEVEL = 0.9
 """Probability with which the error of a new maneuver lies below the stated one."""
-USUAL_SPREAD, WORTH = 1.2, 20.0
+USUAL_SPREAD, WORTH = 1.3, 20.0
 """Standard deviation of the logarithm of a maneuver's squared error over the variance function, and
 how many maneuvers that knowledge is worth (Smyth 2004): measured on machines with 13 maneuvers, as
 five that a campaign repeats do not tell it (docs/calibration.md)."""
@@ -102,8 +102,12 @@ class Record(NamedTuple):
     run: str
     maneuver: str
     held_out: bool
+    start: float
+    """Of the grid. [s]"""
     step: float
     """[s]"""
+    measured: Array
+    """(n,) [unit]"""
     error: Array
     """(n,) simulated less measured. [unit]"""
     noise: float
@@ -144,7 +148,9 @@ def record_of(
         experiment.name,
         experiment.maneuver,
         held_out,
+        float(time[0]),
         step,
+        np.interp(grid, time, channel.values[channel.used]),
         np.interp(grid, time, error),
         white_noise(error, channel.values[channel.used]),
         signal,
@@ -175,21 +181,28 @@ def over_window(record: Record, window: float) -> tuple[Array, float]:
 
     Of a position the slope of the straight line through it, of anything else the mean.
     """
+    weights = window_weights(record, window)
+    return windowed(record.error, weights), record.noise**2 * float(weights @ weights)
+
+
+def window_weights(record: Record, window: float) -> Array:
+    """Odd number of weights of a slope, or of a mean, to be convolved with samples."""
     half = int(0.5 * window / record.step)
-    size = 2 * half + 1
-    errors = np.full(record.error.size, np.nan)
-    if record.is_position:
-        half = max(half, 1)
-        size = 2 * half + 1
-        places = np.arange(-half, half + 1.0)
-        weights = places[::-1] / (np.sum(places**2) * record.step)
-    else:
-        weights = np.full(size, 1.0 / size)
-    if record.error.size > size:
-        # a position's first error is its free zero
-        about = record.error - record.error[0] * record.is_position
-        errors[half : about.size - half] = fftconvolve(about, weights, "valid")
-    return errors, record.noise**2 * float(weights @ weights)
+    if not record.is_position:
+        return np.full(2 * half + 1, 1.0 / (2 * half + 1))
+    places = np.arange(-max(half, 1), max(half, 1) + 1.0)
+    return np.asarray(places[::-1] / (np.sum(places**2) * record.step))
+
+
+def windowed(values: Array, weights: Array) -> Array:
+    """(n,) weighted sums about each of (n,) samples, NaN where a part of the window is missing."""
+    half = weights.size // 2
+    found = np.full(values.size, np.nan)
+    if values.size > weights.size:
+        # about the first sample: a position may begin far from 0
+        sums = fftconvolve(values - values[0], weights, "valid") + values[0] * weights.sum()
+        found[half : values.size - half] = sums
+    return found
 
 
 def classes_of(record: Record, reach: float, largest: float) -> dict[Motion, NDArray[np.bool_]]:
@@ -224,10 +237,11 @@ class Cell(NamedTuple):
 
 
 def cells_of(records: Sequence[Record]) -> tuple[list[Cell], float]:
-    """All windows, by run and class, and the range of the signal. [unit]"""
-    if not records:
+    """All windows, by run and class, and the range of what was measured. [unit]"""
+    ends = [ends for record in records if (ends := _ends(record)) is not None]
+    if not ends:
         return [], 0.0
-    reach = max(r.signal.max() for r in records) - min(r.signal.min() for r in records)
+    reach = max(high for _, high in ends) - min(low for low, _ in ends)
     largest = max(np.abs(r.command).max() for r in records)
     cells = list[Cell]()
     for record in records if reach > 0.0 else ():
@@ -240,7 +254,14 @@ def cells_of(records: Sequence[Record]) -> tuple[list[Cell], float]:
             squares = (errors[rows] ** 2 - noise) / reach**2
             terms = variance_terms(record.signal[rows] / reach, record.rate[rows] / reach)
             cells.append(Cell(record, motion, squares, noise / reach**2, terms))
-    return cells, float(reach)
+    return cells, reach
+
+
+def _ends(record: Record) -> tuple[float, float] | None:
+    """Smallest and largest of what was measured, of a position its speed; None if too short."""
+    values = windowed(record.measured, window_weights(record, WINDOWS["fast"]))
+    values = values[np.isfinite(values)]
+    return (float(values.min()), float(values.max())) if values.size else None
 
 
 def variance_terms(signal: Array, rate: Array) -> Array:
@@ -271,7 +292,7 @@ class PredictionError(Result):
     unit: str
     """Of the signal: of a position that of its speed."""
     reach: float
-    """Range of the signal, of a position that of its speed, over all runs. [unit]"""
+    """Range that was measured of the signal, of a position that of its speed. [unit]"""
     coefficients: tuple[float, float, float]
     """Of the variance of the error over the squared range: 1, (signal/range)², (its change within
     0.1 s / range)²."""
@@ -396,12 +417,15 @@ def bound_of_variance(cells: Sequence[Cell]) -> Array:
 
 
 def log_ratio(cells: Sequence[Cell], coefficients: Array) -> float:
-    """Logarithm of the mean of observed over fitted squares of some windows."""
-    fitted = np.concatenate([cell.terms @ coefficients for cell in cells])
-    squares = np.concatenate([cell.squares for cell in cells])
+    """Logarithm of the observed over the fitted squares of some windows.
+
+    Observed are at least what the noise's own scatter leaves open.
+    """
+    fitted = sum(float(np.sum(cell.terms @ coefficients)) for cell in cells)
+    observed = sum(float(np.sum(cell.squares)) for cell in cells)
     noise = sum(cell.noise * cell.squares.size for cell in cells)
-    least = noise * np.sqrt(2.0 / squares.size) / float(fitted.sum())
-    return float(np.log(max(float(np.mean(squares / fitted)), least, 1e-300)))
+    count = sum(cell.squares.size for cell in cells)
+    return float(np.log(max(observed, noise * np.sqrt(2.0 / count), 1e-300) / fitted))
 
 
 def spread_of(ratios: Array) -> tuple[float, float]:

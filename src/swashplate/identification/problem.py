@@ -182,12 +182,15 @@ class Problem(Result):
             if np.isfinite(total := float(residuals @ residuals)):
                 return total
         # by channel, which also says what is not finite
+        return sum(float(np.sum(each**2)) for each in self.residuals(vector, number).values())
+
+    def residuals(self, vector: Array, number: int) -> Mapping[str, Array]:
+        """Weighted residuals (m,) of the fitted channels of one experiment, 0 if ignored."""
         experiment, weights = self.experiments[number], self.weights[number]
-        compared = (
-            weights[name] * self._compared(experiment[name], y - experiment[name].values)
+        return {
+            name: weights[name] * self._compared(experiment[name], y - experiment[name].values)
             for name, y in self.outputs(vector, number).items()
-        )
-        return sum(float(np.sum(each**2)) for each in compared)
+        }
 
     def outputs(self, vector: Array, number: int) -> Mapping[str, Array]:
         """Simulated samples of the fitted channels of one experiment, offsets included."""

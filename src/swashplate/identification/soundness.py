@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections import defaultdict
+from collections import Counter, defaultdict
 from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import uniform_filter1d
 from scipy.special import stdtrit
 
 from swashplate.identification.data_checks import (
@@ -24,9 +23,10 @@ from swashplate.identification.discrepancy import (
     Record,
     cells_of,
     log_ratio,
-    over_window,
     record_of,
     variance_function,
+    window_weights,
+    windowed,
 )
 from swashplate.identification.drive_model import DriveModel
 
@@ -48,6 +48,9 @@ LATEST = 2.0
 """Delay that is looked for. [s]"""
 STANDS_STILL = 0.5
 """Time for which a reading stands still at once if it is not that of a machine. [s]"""
+MOVES, STEPS = 0.2, 10.0
+"""Part of the largest speed from which a machine moves, and steps of the reading that it then moves
+by at least."""
 
 
 def unsound_data(stages: Sequence[StageFit], predicted: Sequence[RunQuality]) -> list[Finding]:
@@ -75,6 +78,8 @@ def unsound_data(stages: Sequence[StageFit], predicted: Sequence[RunQuality]) ->
 def outlying_runs(stages: Sequence[StageFit], predicted: Sequence[RunQuality]) -> Iterator[Finding]:
     """Runs whose errors are far larger than those of the others, each once, and why.
 
+    A maneuver of which every run stands out shows what the model lacks, and not an unsound log.
+
     Notes
     -----
     Logarithms of the squared errors, each over what the variance function lets expect, are
@@ -97,12 +102,17 @@ def outlying_runs(stages: Sequence[StageFit], predicted: Sequence[RunQuality]) -
             continue
         coefficients = variance_function(cells)
         ratios = np.array([log_ratio(each, coefficients) for each in runs.values()])
-        for outlier in _outliers(ratios):
-            own = list(runs.values())[outlier][0].record
-            if own.run not in seen:
-                seen.add(own.run)
+        own = [each[0].record for each in runs.values()]
+        outliers = _outliers(ratios)
+        others = {record.maneuver for k, record in enumerate(own) if k not in outliers}
+        repeated = Counter(record.maneuver for record in own)
+        for outlier in outliers:
+            record = own[outlier]
+            alike = repeated[record.maneuver] > 1 and record.maneuver not in others
+            if record.run not in seen and not alike:
+                seen.add(record.run)
                 times = float(np.exp(0.5 * (ratios[outlier] - np.median(ratios))))
-                yield refusal(own.run, channel, _sentence(own, channel, records, times))
+                yield refusal(record.run, channel, _sentence(record, channel, records, times))
 
 
 def _outliers(ratios: Array) -> list[int]:
@@ -126,7 +136,7 @@ def _sentence(own: Record, channel: str, records: Sequence[Record], times: float
     measured, simulated = _motion(own)
     left = float(np.mean((simulated - measured) ** 2))
     ignored = 'leave it out with role = "ignore"'
-    if (span := _still(own, measured, simulated)) is not None:
+    if (span := _still(own)) is not None:
         first, last = span
         return (
             f"{said}: it stands still from {first:.4g} to {last:.4g} s. Look at the sensor; ignore "
@@ -161,11 +171,12 @@ def _sentence(own: Record, channel: str, records: Sequence[Record], times: float
 
 
 def _motion(record: Record) -> tuple[Array, Array]:
-    """(n,) what was measured and what is simulated over short windows; of a position speeds."""
-    errors, _ = over_window(record, WINDOW)
-    size = 2 * max(int(0.5 * WINDOW / record.step), 1) + 1
-    simulated = uniform_filter1d(record.signal, size, mode="nearest")
-    return simulated - np.nan_to_num(errors), simulated
+    """(m,) what was measured and what is simulated over short windows; of a position speeds."""
+    weights = window_weights(record, WINDOW)
+    measured = windowed(record.measured, weights)
+    simulated = windowed(record.measured + record.error, weights)
+    whole = np.isfinite(measured)
+    return measured[whole], simulated[whole]
 
 
 def _delayed(record: Record, measured: Array, simulated: Array) -> tuple[float, float]:
@@ -181,15 +192,20 @@ def _delayed(record: Record, measured: Array, simulated: Array) -> tuple[float, 
     return float(shifts[best] * record.step), float(left[best])
 
 
-def _still(record: Record, measured: Array, simulated: Array) -> tuple[float, float] | None:
-    """First and last instant at which the reading stands still though the model moves. [s]"""
+def _still(record: Record) -> tuple[float, float] | None:
+    """First and last instant at which a position stands still though the model moves. [s]"""
     if not record.is_position:
         return None
-    largest = float(np.abs(simulated).max())
-    # a slope of exactly the simulated one is that of a reading that does not change
-    still = (np.abs(measured) < 1e-6 * largest) & (np.abs(simulated) > 0.2 * largest)
+    moves = np.abs(record.signal) > MOVES * float(np.abs(record.signal).max())
+    still = (np.diff(record.measured, prepend=np.nan) == 0.0) & moves
+    # a coarse encoder has many samples a count
+    steps = np.abs(np.diff(record.measured))
+    count = float(steps[steps > 0.0].min(initial=np.inf))
+    moved = np.abs(np.diff(np.cumsum(record.signal) * record.step, prepend=0.0))
     edges = np.flatnonzero(np.diff(still, prepend=False, append=False)).reshape(-1, 2)
-    for first, after in edges:
-        if (after - first) * record.step > STANDS_STILL - WINDOW:
-            return float(first * record.step), float(after * record.step)
+    for first, after in edges.tolist():
+        long = (after - first) * record.step > STANDS_STILL
+        if long and float(moved[first:after].sum()) > STEPS * count:
+            begin = record.start
+            return begin + (first - 1) * record.step, begin + (after - 1) * record.step
     return None

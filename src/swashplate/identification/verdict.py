@@ -175,11 +175,11 @@ class Verdict(Result):
     @property
     def cause(self) -> str:
         """What would explain the error, in a sentence; empty if there is nothing to explain."""
-        if self.causes is None:
+        if self.causes:
+            return f"{'; or '.join(each.words for each in self.causes)}."
+        if self.causes is None or self.predicts:
             return ""
-        if not self.causes:
-            return "None of what was tried explains half of the error that is not noise."
-        return f"{'; or '.join(each.words for each in self.causes)}."
+        return "None found: no single thing that was tried explains half of the error."
 
     def answers(self) -> dict[str, str]:
         """The three answers, and what would explain the error, by their names."""
