@@ -56,11 +56,12 @@ STILL = 1e-4
 """Part of the speed's range by which it changes in a class at least, if it counts."""
 LATE = r"^(time stamps of \w+|lag of the command|tau)$"
 """Which of them is late, logs hardly tell."""
+RESISTED = r"^loss of speed under a load that resists"
 NAMES = {
     "run of another axis": r"ramp_\+1_V",
     "spool friction": r"^solenoid_hysteresis$",
-    "leakage under load, 10 % of the top speed": r"^loss of speed under load",
-    "leakage under load, 2 % of the top speed": r"^loss of speed under load",
+    "leakage under load, 10 % of the top speed": RESISTED,
+    "leakage under load, 2 % of the top speed": RESISTED,
     "drift of 8 % over the campaign": r"^drift of (encoder_counts|shaft_speed)",
     "encoder 20 ms late": LATE,
     "ammeter clipped": r"rectified_current.* clipped",
@@ -112,8 +113,8 @@ def in_new_maneuvers(folder, equipment, record):
         run = logger.new_run(equipment.parameters, equipment.axis, name, conditions[place])
         new = new_record(name, run, drive)
         for motion, inside in discrepancy.classes_of(new, prediction.reach, largest).items():
-            measured = (new.signal - new.error)[inside]
-            if measured.size < FEWEST or np.ptp(measured) < STILL * prediction.reach:
+            speed = new.measured[inside]
+            if speed.size < FEWEST or np.ptp(speed) < STILL * prediction.reach:
                 continue
             stated = prediction.error(new.signal[inside], new.rate[inside])
             true = float(np.sqrt(np.mean(new.error[inside] ** 2))) / prediction.reach
@@ -136,7 +137,9 @@ def new_record(name, run, drive):
         run=name,
         maneuver=name,
         held_out=True,
+        start=0.0,
         step=step,
+        measured=speed,
         error=simulated - speed,
         noise=0.0,
         signal=simulated,

@@ -86,7 +86,13 @@ def test_classes_are_beyond_the_sound_campaign(bench: ModuleType) -> None:
 def test_where_a_verdict_names_a_fault(bench: ModuleType) -> None:
     friction = record("spool friction", 0.0, 10.0, causes=["tau", "solenoid_hysteresis"])
     assert bench.named(friction) == "cause"
-    loss = ["loss of speed under load, encoder_counts"]
+    loss = ["loss of speed under a load that pulls one way, encoder_counts"]
+    assert (
+        bench.named(record("leakage under load, 2 % of the top speed", 0.0, 10.0, causes=loss))
+        == ""
+    )
+    loss = ["loss of speed under a load that resists, encoder_counts"]
+    assert bench.named(record("leakage under load, 2 % of the top speed", 0.0, 10.0, causes=loss))
     assert bench.named(record("spool friction", 0.0, 10.0, causes=loss)) == ""
     assert bench.named(record("none", 0.0, 10.0, causes=loss)) == ""
     hidden = record("supply pressure 20 % low", 0.0, 10.0, assumed=["the fixed Z6, Z9 as stated"])
