@@ -18,6 +18,7 @@ from tests.identification.given import virtual
 from tests.report.conftest import injected, policy_of, with_script
 
 from swashplate import Campaign, Drive, FileError, InputError, maneuvers
+from swashplate.identification import verdict
 from swashplate.identification.assessment import Identification
 from swashplate.identification.fitting import Fit, fit
 from swashplate.identification.profiles import Point, Profile
@@ -25,7 +26,6 @@ from swashplate.identification.resampling import CrossValidation, Fold
 from swashplate.identification.setup import Setup
 from swashplate.identification.solving import Solution
 from swashplate.identification.validation import Measures, predict, with_speeds
-from swashplate.identification.verdict import verdict
 from swashplate.maneuvers import parse
 from swashplate.report.fit_report import (
     print_report,

@@ -13,10 +13,10 @@ from tests.identification.given import run_of
 from swashplate import Drive, Experiment, maneuvers
 from swashplate.analysis import envelope, standard_errors, variances_from_bounds
 from swashplate.campaign import fit_configuration, guess_drive, guess_table, guessed_set
+from swashplate.identification import verdict
 from swashplate.identification.fitting import Fit, fit
 from swashplate.identification.setup import Free, Setup
 from swashplate.identification.validation import predict
-from swashplate.identification.verdict import verdict
 from swashplate.report.fit_report.summary import largest_commands, numbers_of, numbers_table
 from swashplate.tables import Cell
 
