@@ -55,7 +55,7 @@ FEWEST = 50
 STILL = 1e-4
 """Part of the speed's range by which it changes in a class at least, if it counts."""
 LATE = r"^(time stamps of \w+|lag of the command|tau)$"
-"""Which of them is late, logs hardly tell."""
+"""What all instruments see alike: a late command, or a machine that answers late."""
 RESISTED = r"^loss of speed under a load that resists"
 NAMES = {
     "run of another axis": r"ramp_\+1_V",
@@ -63,7 +63,7 @@ NAMES = {
     "leakage under load, 10 % of the top speed": RESISTED,
     "leakage under load, 2 % of the top speed": RESISTED,
     "drift of 8 % over the campaign": r"^drift of (encoder_counts|shaft_speed)",
-    "encoder 20 ms late": LATE,
+    "encoder 20 ms late": r"^time stamps of encoder_counts$",
     "ammeter clipped": r"rectified_current.* clipped",
     "delay 20 ms longer than stated": LATE,
     "encoder reads 3 % too much": r"scale of encoder_counts",
