@@ -13,7 +13,9 @@ from swashplate import Campaign, maneuvers
 from swashplate.campaign import rig
 from swashplate.full_order.drive import FullOrderDrive
 from swashplate.identification.assessment import Identification
+from swashplate.identification.determination import identifiability_of
 from swashplate.identification.fitting import fit
+from swashplate.identification.intervals import uncertainty_of
 from swashplate.identification.setup import load_setup
 from swashplate.report.fit_report import write_fit_report
 
@@ -40,7 +42,7 @@ def fit_study_rows() -> Iterator[Row]:
             # what a stage says is computed where it is asked for; the verdict predicts and refits
             stages = found.fit.stages
             for each in stages:
-                _ = each.identifiability, each.uncertainty, each.runs
+                _ = identifiability_of(each), uncertainty_of(each), each.runs
             _ = found.verdict
             judged.append(time.perf_counter() - begin)
             begin = time.perf_counter()

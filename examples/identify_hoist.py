@@ -18,8 +18,10 @@ from swashplate import Campaign, Drive, identify
 from swashplate.campaign import rig
 from swashplate.identification.drive_model import true_value
 from swashplate.identification.experiment_design import outlook
-from swashplate.identification.fitting import drawn, smooth
+from swashplate.identification.fitting import drawn
+from swashplate.identification.intervals import uncertainty_of
 from swashplate.identification.setup import load_setup
+from swashplate.identification.stages import smooth
 from swashplate.identification.validation import with_speeds
 from swashplate.report.figures import plot_channel, save_figure
 
@@ -83,7 +85,7 @@ true, inside = {}, []
 print("              truth   estimate     95 % from         to")
 for stage in result.fit.stages:
     problem = stage.problem
-    for unknown, each in zip(problem.unknowns, stage.uncertainty.estimates, strict=True):
+    for unknown, each in zip(problem.unknowns, uncertainty_of(stage).estimates, strict=True):
         value = true_value(unknown, problem.model, truth.parameters)
         if value is None:  # the zero of a run's position
             continue

@@ -1,6 +1,7 @@
 """Draws from a covariance made by hand, and from a fit of a virtual hoist."""
 
 import json
+from operator import attrgetter
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -22,6 +23,7 @@ from swashplate.campaign import Campaign, rig
 from swashplate.identification.assessment import Identification
 from swashplate.identification.drive_model import DriveModel
 from swashplate.identification.fitting import Fit, fit
+from swashplate.identification.intervals import uncertainty_of
 from swashplate.identification.setup import Free, Setup, load_setup
 from swashplate.identification.unknowns import Unknown, Unknowns
 from swashplate.maneuvers import source_tests
@@ -29,6 +31,13 @@ from swashplate.maneuvers import source_tests
 VOLTAGE = maneuvers.step(9.0, stop=4.0, length=5.0).sample()
 
 
+@pytest.fixture
+def given_uncertainty(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Stages of which the Monte Carlo takes an uncertainty that the test gives."""
+    monkeypatch.setattr("swashplate.analysis.monte_carlo.uncertainty_of", attrgetter("uncertainty"))
+
+
+@pytest.mark.usefixtures("given_uncertainty")
 def test_draws_outside_the_bounds_are_drawn_again(hoist):
     """A normal deviation of 2 % above a bound 2 % away: one in six is outside."""
     unknowns = Unknowns(
@@ -65,6 +74,7 @@ def test_draws_outside_the_bounds_are_drawn_again(hoist):
         drives([])
 
 
+@pytest.mark.usefixtures("given_uncertainty")
 def test_standard_errors_where_no_draw_stays_within_the_bounds(hoist):
     """Of a pump that is hardly known, at its lower bound: the speed goes with it, the time not."""
     unknowns = Unknowns((Unknown("Z10", 12.396, 12.396, 24.0),))
@@ -163,7 +173,7 @@ def test_a_stored_fit_gives_drives_of_its_quoted_errors(fit_and_folder):
     np.testing.assert_array_equal(again, columns["Z10"][:2])
     assert (other != again).all()
     for each in result.stages:
-        for estimate in each.uncertainty.estimates:
+        for estimate in uncertainty_of(each).estimates:
             if estimate.name in columns:
                 assert estimate.standard_error is not None
                 # 400 draws are good to 4/√800 of a standard error
@@ -178,9 +188,11 @@ def test_a_stored_fit_gives_drives_of_its_quoted_errors(fit_and_folder):
     assert np.corrcoef(columns["Z10"], stop)[0, 1] < -0.5
     # what the card's stage does not know moves the pump along, by the slopes that are quoted
     card, pump = result.stages
-    (handed,) = pump.uncertainty.handed
+    (handed,) = uncertainty_of(pump).handed
     joint = handed.slopes @ handed.covariance.matrix
-    spread = np.outer(pump.uncertainty.quoted.standard_errors, handed.covariance.standard_errors)
+    spread = np.outer(
+        uncertainty_of(pump).quoted.standard_errors, handed.covariance.standard_errors
+    )
     names = card.problem.unknowns.names
     drawn_correlations = [np.corrcoef(columns["Z10"], columns[name])[0, 1] for name in names]
     np.testing.assert_allclose(drawn_correlations, (joint / spread)[0], atol=0.12)

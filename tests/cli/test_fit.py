@@ -21,6 +21,7 @@ import swashplate
 from swashplate import Campaign, Drive
 from swashplate.identification.assessment import Identification
 from swashplate.identification.fitting import Fit, fit
+from swashplate.identification.intervals import uncertainty_of
 from swashplate.identification.setup import Setup
 from swashplate.locks import locked
 
@@ -159,7 +160,7 @@ def test_all_that_can_be_asked_for_besides(done: Words, campaign: Path, tmp_path
     result = swashplate.identify(campaign, None, setup, folds=2, profiles=profiles)
     # nearly quadratic: the profile ends where the linear interval of the noise does
     z8 = result["Z8"]
-    noise = result.fit.stage("pump").uncertainty.own
+    noise = uncertainty_of(result.fit.stage("pump")).own
     half = 1.96 * noise.standard_errors[noise.variables.names.index("Z8")]
     assert found == pytest.approx([z8.value, z8.value * exp(-half), z8.value * exp(half)], rel=0.01)
     summary, printed = result.summary().partition("Stage card")[2], " ".join(said.split())

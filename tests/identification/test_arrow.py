@@ -112,7 +112,9 @@ def test_memory_does_not_grow_with_runs_times_unknowns(monkeypatch) -> None:
         bench_run(f"run {k}", level, 3.0 * level * TIME + k + 0.1 * rng.normal(size=TIME.size))
         for k, level in enumerate(levels)
     ]
-    zeros = [Unknown("offset y", 1.0, -1e3, 1e3, run=run.name) for run in runs]
+    zeros = [
+        Unknown("offset y", 1.0, -1e3, 1e3, run=run.name, kind="zero", channel="y") for run in runs
+    ]
     unknowns = Unknowns((Unknown("gain", 1.0, 0.1, 10.0), *zeros))
     problem = Problem(Level(), tuple(runs), unknowns, ("y",), {"y": 0.1})
     all_derivatives = problem.samples * len(unknowns) * 8

@@ -14,8 +14,9 @@ from swashplate.identification.data_checks import (
     check_runs,
     refuse_unsound,
 )
-from swashplate.identification.fitting import fit, smooth
+from swashplate.identification.fitting import fit
 from swashplate.identification.setup import Free, Setup, Stage
+from swashplate.identification.stages import smooth
 
 NOMINAL = smooth(Drive.preset("hoist").parameters)
 TRUTH = Drive(NOMINAL).scale(Z10=1.1)

@@ -65,7 +65,19 @@ def record(run: str, error: np.ndarray, signal: np.ndarray, maneuver: str = "") 
     command = np.ones(error.size)
     rate = 0.1 * np.gradient(signal, STEP)
     return Record(
-        run, maneuver or run, False, 0.0, STEP, signal, error, 0.0, signal, rate, command, False
+        run,
+        maneuver or run,
+        False,
+        0.0,
+        STEP,
+        signal,
+        error,
+        0.0,
+        np.zeros(error.size),
+        signal,
+        rate,
+        command,
+        False,
     )
 
 

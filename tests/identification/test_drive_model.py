@@ -8,16 +8,16 @@ from tests.identification.given import TWO_STAGES, run_of, virtual
 
 from swashplate import Campaign, Drive, Experiment, InputError
 from swashplate.campaign.experiment import InputSignal
+from swashplate.identification.determination import bounds_reached
 from swashplate.identification.drive_model import (
     DriveModel,
     at_rate_of,
     measured_current,
     simulated_current,
-    stage_problem,
-    start_currents_of,
 )
-from swashplate.identification.fitting import fit, smooth
+from swashplate.identification.fitting import fit
 from swashplate.identification.setup import Free, Setup, Stage, load_setup
+from swashplate.identification.stages import smooth, stage_problem, start_currents_of
 from swashplate.identification.unknowns import Unknown
 from swashplate.identification.validation import at_instants, predict
 from swashplate.maneuvers import source_tests, step
@@ -149,6 +149,30 @@ def test_a_run_cut_out_of_a_rising_current_has_a_current_of_its_own(rate: float 
     assert 2.0 * found.solution.cost == pytest.approx(samples, abs=5.0 * np.sqrt(2.0 * samples))
 
 
+def test_a_chain_that_begins_with_a_current_has_intervals() -> None:
+    """The pump alone, by which a hysteresis of the current is judged, has no such unknown."""
+    drive = Drive(smooth(Drive.preset("hoist").parameters))
+    simulated = drive.simulate(step(9.0, start=1.0, stop=4.0, length=6.0).sample(512.0))
+    random, kept = np.random.default_rng(1), slice(563, None)
+    channels = {
+        "signed_current": simulated.current[kept] + random.normal(0.0, 1e-3, 2510),
+        "shaft_speed": simulated.shaft_speed[kept] + random.normal(0.0, 1e-3, 2510),
+    }
+    run = run_of(
+        "cut",
+        simulated.voltage[kept],
+        channels,
+        time=simulated.time[kept],
+        noise=1e-3,
+        start="estimated",
+    )
+    found = fit(drive, [run], {"lim1_plus": (0.5, 2.0), "Z10": (0.5, 2.0)})
+    assert found.stages[0].values["start_current_plus (cut)"] == pytest.approx(
+        simulated.current[563], abs=0.01
+    )
+    assert found["Z10"].status == "estimated"
+
+
 def test_a_bound_that_was_reached_is_said_with_the_entry_that_states_it(campaign: Campaign) -> None:
     drive = Drive(smooth(campaign.drive("hoist").parameters)).scale(lim1=0.6)
     runs = campaign.select(role="fit")
@@ -157,7 +181,7 @@ def test_a_bound_that_was_reached_is_said_with_the_entry_that_states_it(campaign
         free = {"lim1": Free(relative=(0.5, upper), log=True)}
         setup = Setup(stages=(Stage(name="card", part="card", free=free),))
         (stage,) = fit(drive, runs, setup).stages
-        said[upper] = [each for each in stage.bounds_reached() if "lim1_plus" in each]
+        said[upper] = [each for each in bounds_reached(stage) if "lim1_plus" in each]
     assert stage.values["lim1_plus"] == pytest.approx(2.2841, rel=0.01)
     (line,) = said[1.3]
     assert "widen lim1 under [stages.free] of the stage 'card'" in line

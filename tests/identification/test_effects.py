@@ -14,7 +14,8 @@ from swashplate.campaign.experiment import Accuracy, resolution_of_inputs
 from swashplate.equations import simulate
 from swashplate.identification import ModelSetup, fit
 from swashplate.identification.effects import after_play, changes_of
-from swashplate.identification.fitting import StageFit
+from swashplate.identification.intervals import estimates_of, uncertainty_of
+from swashplate.identification.stage_fit import StageFit
 from swashplate.maneuvers import source_tests
 
 RATE = 512.0
@@ -128,7 +129,7 @@ def stated(run: Experiment) -> Experiment:
 def test_estimates_follow_each_effect_as_a_fit_of_changed_runs_does() -> None:
     runs = [stated(trial("a")), stated(trial("b"))]
     stage = fit(SETUP, runs).stages[0]
-    systematic, middle = stage.uncertainty.systematic, stage.solution.vector
+    systematic, middle = uncertainty_of(stage).systematic, stage.solution.vector
     changed: dict[str, list[Experiment]] = {}
     for number, run in enumerate(runs):
         for effect, experiment, part in changes_of(run, 0.0):
@@ -147,7 +148,7 @@ def test_estimates_follow_each_effect_as_a_fit_of_changed_runs_does() -> None:
 
 def test_variances_of_effects_add_up_and_the_largest_is_named() -> None:
     runs = [stated(trial("a")), stated(trial("b"))]
-    known = fit(SETUP, runs).stages[0].uncertainty
+    known = uncertainty_of(fit(SETUP, runs).stages[0])
     added = sum(change**2 for change in known.systematic.values())
     assert np.diag(known.quoted.matrix) == pytest.approx(np.diag(known.own.matrix) + added)
     gain = known.own.variables.names.index("gain")
@@ -184,15 +185,15 @@ def test_a_hysteresis_of_the_current_goes_into_the_pump_alone(tmp_path) -> None:
         setup = load_setup("slew")
         stages = [stage.model_copy(update={"current_hysteresis": width}) for stage in setup.stages]
         card, pump = fit(drive, campaign, setup.model_copy(update={"stages": tuple(stages)})).stages
-        assert effect not in card.uncertainty.systematic
+        assert effect not in uncertainty_of(card).systematic
         return pump
 
     none, one, two = (of_pump(width) for width in (0.0, 1e-4, 2e-4))
-    assert effect not in none.uncertainty.systematic
+    assert effect not in uncertainty_of(none).systematic
     # one that the drive has is no error of the model
     rough = of_pump(1e-4, drive.replace(solenoid_hysteresis=1e-4))
-    assert effect not in rough.uncertainty.systematic
-    single, double = (pump.uncertainty.systematic[effect] for pump in (one, two))
+    assert effect not in uncertainty_of(rough).systematic
+    single, double = (uncertainty_of(pump).systematic[effect] for pump in (one, two))
     z8 = one.problem.unknowns.names.index("Z8")
     assert double[z8] == pytest.approx(2.0 * single[z8], rel=0.1)
     # a current that comes late makes a slow plate seem slower
@@ -229,13 +230,13 @@ def test_the_scale_of_runs_is_found_and_intervals_hold() -> None:
     """Gains that differ by 2 % from run to run: the mean of eight is known to 0.7 %."""
 
     def deviation(stage: StageFit) -> float:
-        runs = stage.uncertainty.runs
+        runs = uncertainty_of(stage).runs
         return 0.0 if runs is None else runs.deviation
 
     assert np.median(estimated(8, 0.02, 20, 1, deviation)) == pytest.approx(0.02, rel=0.25)
 
     def holds(stage: StageFit) -> float:
-        gain = next(each for each in stage.estimates if each.name == "gain")
+        gain = next(each for each in estimates_of(stage) if each.name == "gain")
         return float(gain.lower <= TRUTH.gain <= gain.upper)
 
     assert np.mean(estimated(8, 0.02, 60, 2, holds)) >= 0.88
@@ -245,7 +246,7 @@ def test_the_scale_of_runs_is_found_and_intervals_hold() -> None:
 
 def test_runs_that_do_not_differ_are_not_said_to() -> None:
     def deviation(stage: StageFit) -> float:
-        runs = stage.uncertainty.runs
+        runs = uncertainty_of(stage).runs
         return 0.0 if runs is None else runs.deviation
 
     assert max(estimated(8, 0.0, 10, 4, deviation)) < 0.002

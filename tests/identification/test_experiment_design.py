@@ -25,8 +25,10 @@ from swashplate.identification.experiment_design import (
     in_turn,
     outlook,
 )
-from swashplate.identification.fitting import fit, smooth
+from swashplate.identification.fitting import fit
+from swashplate.identification.intervals import uncertainty_of
 from swashplate.identification.setup import Forces, Free, Setup, Stage, load_setup
+from swashplate.identification.stages import smooth
 from swashplate.identification.unknowns import Prior
 from swashplate.maneuvers import sine, step
 
@@ -169,7 +171,7 @@ def test_what_is_known_is_what_a_fit_of_the_same_tests_knows(hoist_tests: Campai
     now = np.sqrt(np.diag(np.linalg.inv(known.present.T @ known.present)))
     errors = {}
     for stage in found.stages:
-        noise = stage.uncertainty.sampled
+        noise = uncertainty_of(stage).sampled
         errors |= dict(zip(noise.variables.names, noise.standard_errors, strict=True))
     ratio = np.array([now[k] / errors[name] for k, name in enumerate(known.variables.names)])
     assert 0.5 < np.median(ratio) < 2.0

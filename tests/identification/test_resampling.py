@@ -16,7 +16,8 @@ from tests.identification.given import (
 )
 
 from swashplate import Campaign, Drive, Experiment, InputError
-from swashplate.identification.fitting import StageFit, fit
+from swashplate.identification.fitting import fit
+from swashplate.identification.intervals import uncertainty_of
 from swashplate.identification.problem import Problem
 from swashplate.identification.profiles import profiles_of
 from swashplate.identification.resampling import (
@@ -27,6 +28,7 @@ from swashplate.identification.resampling import (
 )
 from swashplate.identification.setup import Free, Stage
 from swashplate.identification.solving import solve
+from swashplate.identification.stage_fit import StageFit
 from swashplate.identification.unknowns import Unknown, Unknowns
 from swashplate.identification.validation import predict
 from swashplate.parameters.files import load_preset
@@ -50,9 +52,9 @@ def assessed() -> StageFit:
 def test_profiles_of_a_linear_model_are_its_intervals(assessed: StageFit) -> None:
     found = profiles_of(assessed, executor=Backwards())
     assert list(found) == ["slope", "level"]
-    variables = assessed.uncertainty.own.variables
+    variables = uncertainty_of(assessed).own.variables
     for k, (name, each) in enumerate(found.items()):
-        estimate = assessed.uncertainty.estimates[k]
+        estimate = uncertainty_of(assessed).estimates[k]
         assert (estimate.name, each.index) == (name, k)
         ends = variables.to_values(np.array([[each.lower] * 2, [each.upper] * 2]))[:, k]
         np.testing.assert_allclose(ends, [estimate.lower, estimate.upper], rtol=2e-3)

@@ -19,11 +19,11 @@ from swashplate import (
     ParameterError,
 )
 from swashplate.executors import Processes, Serial, Threads
-from swashplate.identification.drive_model import stage_problem
 from swashplate.identification.model import Linearised
 from swashplate.identification.problem import Evaluation, Problem, noise_scales
 from swashplate.identification.setup import Free, Stage
 from swashplate.identification.solving import Progress, Solution, sobol_starts, solve, solve_from
+from swashplate.identification.stages import stage_problem
 from swashplate.identification.unknowns import Prior, Unknown, Unknowns, bounded
 
 
@@ -122,6 +122,7 @@ def made(*runs: Experiment, unknowns: Unknowns = UNKNOWNS) -> Problem:
     return Problem(RISE, runs, unknowns, ("y",), {"y": 0.1})
 
 
+ZERO = Unknown("offset y", 0.0, -1.0, 1.0, run="lift", kind="zero", channel="y")
 REFUSED = {
     "Z2 is nominally 0.*absolute bounds": lambda: bounded("Z2", 0.0, relative=(0.5, 2.0)),
     "begins at 5, outside its bounds 0 and 2": lambda: bounded("a", 5.0, **LOW),
@@ -129,6 +130,10 @@ REFUSED = {
     "lower one first": lambda: bounded("a", 1.0, absolute=(2.0, 0.0)),
     "above 0": lambda: bounded("a", 1.0, **LOW, log=True),
     "positive": lambda: bounded("a", 1.0, **LOW, prior=Prior(1.0, 0.0)),
+    "the zero of a sensor, and nothing else, names a channel": lambda: Unknown(
+        "offset y", 0.0, -1.0, 1.0, kind="zero"
+    ),
+    "offset y is set by two": lambda: Unknowns((ZERO, ZERO)),
     "a is set by two parameters": lambda: Unknowns(
         (Unknown("a", 1, 0, 2), Unknown("b", 1, 0, 2, sets=("a",)))
     ),

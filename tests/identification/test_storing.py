@@ -13,7 +13,8 @@ from tests.identification.given import TWO_STAGES, put
 from swashplate import Campaign, Drive, FileError, InputError, ParameterError
 from swashplate.identification.assessment import Identification
 from swashplate.identification.fitting import Fit, fingerprint, fit
-from swashplate.identification.profiles import Point, Profile
+from swashplate.identification.interval_ends import Point
+from swashplate.identification.profiles import Profile
 from swashplate.identification.resampling import CrossValidation, Fold
 from swashplate.identification.solving import Solution
 from swashplate.identification.validation import Measures
@@ -68,7 +69,7 @@ def test_a_fit_comes_back_as_it_was(path: Path, campaign: Campaign, fitted: Fit)
             assert np.array_equal(getattr(ours.solution, name), value), name
 
 
-COMPUTED = ("fitting.stage_uncertainty", "assessment.verdict")
+COMPUTED = ("intervals.effects_of", "intervals.uncertainty", "assessment.verdict")
 
 
 def test_what_is_stored_is_not_computed_again(path, campaign, fitted, monkeypatch) -> None:
@@ -99,7 +100,7 @@ def test_what_is_not_stored_is_computed_when_it_is_asked_for(path, campaign, fit
     content = json.loads(path.read_text("utf-8"))
     for stage in content["stages"]:
         del stage["intervals"]
-    content["verdict"] = {key: content["verdict"][key] for key in ("grade", "headline", "numbers")}
+    del content["verdict"]
     path.write_text(json.dumps(content), "utf-8")
     older = Identification.load(path, campaign)
     assert older["Z10"] == before["Z10"]
@@ -116,18 +117,12 @@ def test_a_verdict_is_of_its_requirement_and_its_held_out_runs(short_campaign, t
     stored = Identification.load(tmp_path, tests)
     assert stored.required == 1e-6
     assert stored.verdict == strict.verdict
-    states = [
-        criterion.state
-        for result in (stored, replace(stored, required=0.1))
-        for criterion in result.verdict.criteria
-        if criterion.name.startswith("error / range")
-    ]
-    assert states == ["not met", "met"]
+    assert not stored.verdict.predicts
+    assert replace(stored, required=0.9).verdict.predicts
+    assert any(each.held_out for error in stored.verdict.predictions for each in error.classes)
     alone = Identification.load(tmp_path, replace(tests, experiments=tuple(fitted_to)))
     assert not alone.predicted
-    names = [criterion.name for criterion in alone.verdict.criteria]
-    assert "RMSE / standard deviation, fitted" in names
-    assert "RMSE / standard deviation, held-out" not in names
+    assert not any(each.held_out for error in alone.verdict.predictions for each in error.classes)
 
 
 def test_two_do_not_save_into_one_folder_at_once(campaign, fitted, tmp_path) -> None:
@@ -204,6 +199,7 @@ POISON = {
     "cut": (lambda text: text[:-100], "is not JSON"),
     "another key": (put('"axis"', '"ax"'), "'ax'.*'axis' is meant"),
     "other parameters": (put('"Z10"', '"Z3"', 1), "stage pump has other parameters .* fit again"),
+    "another kind": (put('"kind": "parameter"', '"kind": "force"', 1), "stage card has other"),
     "other version": (put('"swashplate": "[^"]*"', '"swashplate": "9.9"'), "9.9"),
     "text for a vector": (put(r'"vector": \[[^]]+\]', '"vector": "abc"'), "finite numbers"),
     "wrong length": (put(r'"vector": \[[^]]+\]', '"vector": [1.0]', 1), "stage card has other"),

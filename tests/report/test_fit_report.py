@@ -21,7 +21,9 @@ from swashplate import Campaign, Drive, FileError, InputError, maneuvers
 from swashplate.identification import verdict
 from swashplate.identification.assessment import Identification
 from swashplate.identification.fitting import Fit, fit
-from swashplate.identification.profiles import Point, Profile
+from swashplate.identification.interval_ends import Point
+from swashplate.identification.intervals import uncertainty_of
+from swashplate.identification.profiles import Profile
 from swashplate.identification.resampling import CrossValidation, Fold
 from swashplate.identification.setup import Setup
 from swashplate.identification.solving import Solution
@@ -182,7 +184,7 @@ def number(text: str) -> float:
 def test_estimates_and_intervals_are_those_of_the_fit(read: Page, judged: Identification) -> None:
     rows = {row["name"]: row for row in read.rows("parameters")}
     for stage in judged.fit.stages:
-        for estimate in stage.uncertainty.estimates:
+        for estimate in uncertainty_of(stage).estimates:
             if estimate.name.startswith("offset"):
                 continue
             row = rows[estimate.name]
@@ -334,7 +336,7 @@ def test_truth_stands_beside_the_estimates(write, judged: Identification, read: 
     assert "truth" not in read.rows("parameters")[0]
     rows = {row["name"]: row for row in page.rows("parameters")}
     assert number(rows["G1_plus"]["truth"]) == pytest.approx(0.051, rel=1e-4)
-    estimates = judged.fit.stages[0].uncertainty.estimates
+    estimates = uncertainty_of(judged.fit.stages[0]).estimates
     (estimate,) = [each for each in estimates if each.name == "G1_plus"]
     holds = estimate.lower <= 0.051 <= estimate.upper
     assert rows["G1_plus"]["holds"] == ("yes" if holds else "no")

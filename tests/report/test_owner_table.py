@@ -14,6 +14,7 @@ from swashplate import Drive, Experiment, maneuvers
 from swashplate.analysis import envelope, standard_errors, variances_from_bounds
 from swashplate.campaign import fit_configuration, guess_drive, guess_table, guessed_set
 from swashplate.identification import verdict
+from swashplate.identification.determination import identifiability_of
 from swashplate.identification.fitting import Fit, fit
 from swashplate.identification.setup import Free, Setup
 from swashplate.identification.validation import predict
@@ -139,7 +140,7 @@ def test_an_estimate_at_its_bound_gives_no_interval(
     """A dead zone of 0.6 V that the search was not allowed, and what it decides."""
     result = fitted(runs, bounds={"V_dz_minus": bounds})
     (stage,) = result.stages
-    assert "V_dz_minus" in stage.identifiability.at_bounds
+    assert "V_dz_minus" in identifiability_of(stage).at_bounds
     shown = cells(result)
     assert "±" not in shown[ROWS["dead zone"]][1]
     assert "V_dz_minus" in shown[ROWS["dead zone"]][1]

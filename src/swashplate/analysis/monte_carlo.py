@@ -16,10 +16,12 @@ from swashplate.analysis.whatif import pulled
 from swashplate.drive import Drive
 from swashplate.errors import DomainError, InputError, ParameterError
 from swashplate.identification.assessment import Identification
+from swashplate.identification.determination import identifiability_of
 from swashplate.identification.drive_model import LIMIT_COLUMNS, DriveModel
 from swashplate.identification.effects import effect_of_fixed, slopes_by
-from swashplate.identification.fitting import StageFit
+from swashplate.identification.intervals import uncertainty_of
 from swashplate.identification.setup import Forces
+from swashplate.identification.stage_fit import StageFit
 from swashplate.parameters.parameter_set import ParameterSet
 from swashplate.parameters.rules import FULL_VOLTAGE
 from swashplate.results import Result
@@ -123,7 +125,7 @@ def drives(stages: Sequence[StageFit], draws: int = 200, seed: int = 0) -> Draws
         unknown.name
         for each in stages
         for unknown, determined in zip(
-            each.problem.unknowns, each.uncertainty.own.determined, strict=True
+            each.problem.unknowns, uncertainty_of(each).own.determined, strict=True
         )
         if not determined and unknown.run is None
     )
@@ -194,7 +196,7 @@ def standard_errors(
     for stage in stages:
         # what belongs to a run alone is no part of the drive
         machine = stage.problem.unknowns.shared
-        sizes, axes = np.linalg.eigh(stage.uncertainty.own.matrix[np.ix_(machine, machine)])
+        sizes, axes = np.linalg.eigh(uncertainty_of(stage).own.matrix[np.ix_(machine, machine)])
         for size, axis in zip(sizes, axes.T, strict=True):
             error = np.zeros(len(stage.problem.unknowns))
             error[machine] = sqrt(max(size, 0.0)) * axis
@@ -228,8 +230,8 @@ def variances_from_bounds(
     base = numbers(stages[-1].drive)
     variances = {}
     for stage in stages:
-        own, names = stage.uncertainty.own, stage.problem.unknowns.names
-        for name in set(stage.identifiability.at_bounds).difference(but):
+        own, names = uncertainty_of(stage).own, stage.problem.unknowns.names
+        for name in set(identifiability_of(stage).at_bounds).difference(but):
             index = names.index(name)
             deviation = sqrt(max(float(own.matrix[index, index]), 0.0))
             if stage.problem.unknowns[index].run is None and deviation > NEGLIGIBLE:
@@ -249,7 +251,7 @@ def changes_left_open(
     base = numbers(stages[-1].drive)
     largest = np.zeros_like(base)
     for stage in stages:
-        seen, names = stage.identifiability, stage.problem.unknowns.names
+        seen, names = identifiability_of(stage), stage.problem.unknowns.names
         directions = [direction.changes for direction in seen.null]
         directions += [{name: 1.0} for name in seen.unexcited if name not in but]
         for changes in directions:
@@ -276,7 +278,7 @@ def _slope(
     largest = max((float(np.abs(error).max()) for error in errors.values()), default=0.0)
     for stage in stages:
         for effect, size in effects.items():
-            change = size * stage.uncertainty.systematic.get(effect, np.zeros(1))
+            change = size * uncertainty_of(stage).systematic.get(effect, np.zeros(1))
             largest = max(largest, float(np.abs(change).max()))
     first = min(STEP, LARGEST_STEP / largest) if largest else STEP
     for step in (first, -first, 0.1 * first, -0.1 * first):
@@ -298,7 +300,7 @@ def _drawn(stages: Sequence[StageFit], random: np.random.Generator) -> Parameter
     effects = dict(zip(names, random.normal(size=len(names)).tolist(), strict=True))
     errors = {}
     for stage in stages:
-        own = stage.uncertainty.own.matrix
+        own = uncertainty_of(stage).own.matrix
         errors[stage.stage.name] = random.multivariate_normal(
             np.zeros(len(own)), own, check_valid="ignore", method="eigh"
         )
@@ -310,7 +312,7 @@ def _effects(stages: Sequence[StageFit]) -> list[str]:
     moving = dict[str, None]()
     for stage in stages:
         machine = stage.problem.unknowns.shared
-        for effect, change in stage.uncertainty.systematic.items():
+        for effect, change in uncertainty_of(stage).systematic.items():
             if np.abs(change[machine]).max(initial=0.0) > NEGLIGIBLE:
                 moving[effect] = None
     # a fixed number may move no estimate, and what is computed of the drive all the same
@@ -343,7 +345,7 @@ def _moved(
         if fixed:
             parameters = parameters.with_numbers(fixed, parameters.options)
         for stage in stages:
-            problem, known = stage.problem, stage.uncertainty
+            problem, known = stage.problem, uncertainty_of(stage)
             assert isinstance(problem.model, DriveModel)
             error = own.get(stage.stage.name, np.zeros(len(problem.unknowns)))
             for handed in known.handed:

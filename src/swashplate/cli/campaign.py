@@ -389,7 +389,7 @@ def excitation(
     """
     from swashplate.identification.data_checks import check_runs, refuse_unsound
     from swashplate.identification.experiment_design import outlook
-    from swashplate.identification.fitting import smooth
+    from swashplate.identification.stages import smooth
 
     with working(f"Reading {path}"):
         _, runs, plan, drive = words.fit_of(path, axis, setup, begin)
@@ -446,8 +446,8 @@ def advise(
     from swashplate.campaign import KINDS
     from swashplate.drive import Drive
     from swashplate.identification import experiment_design as design
-    from swashplate.identification.fitting import smooth
     from swashplate.identification.setup import load_setup
+    from swashplate.identification.stages import smooth
 
     tested = words.file_kind(Path(word)) == "campaign"
     fitted = words.drive_file(drive or word) if drive or not tested else None

@@ -30,7 +30,7 @@ from swashplate.tables import PRINTED, TABLE, check_folder, joined, made_folder
 
 if TYPE_CHECKING:
     from swashplate.identification.assessment import Identification
-    from swashplate.identification.drive_model import Parameters
+    from swashplate.identification.stages import Parameters
     from swashplate.identification.verdict import Verdict
     from swashplate.parameters.parameter_set import ParameterSet
 
@@ -195,7 +195,7 @@ def fit(
 
 def _say_fit(found: Identification) -> None:
     """What was found, stage by stage, and how well each run is followed."""
-    from swashplate.identification.tables import parts_of
+    from swashplate.identification.assessment import parts_of
 
     text_above = False
     for part in parts_of(found):

@@ -24,21 +24,27 @@ from swashplate.documents import read_json
 from swashplate.drive import Drive
 from swashplate.errors import DomainError, FileError, InputError, MissingFileError
 from swashplate.identification import tables
-from swashplate.identification.drive_model import Parameters
 from swashplate.identification.fitting import (
     Estimated,
     Fit,
     Solved,
-    StageFit,
     fingerprint,
     staged,
 )
-from swashplate.identification.intervals import Estimate, Interval, unseen_limits
+from swashplate.identification.intervals import (
+    Estimate,
+    estimates_of,
+    intervals_of,
+    unseen_limits,
+)
+from swashplate.identification.model_setup import ModelSetup
 from swashplate.identification.problem import Problem
 from swashplate.identification.profiles import Profile
-from swashplate.identification.resampling import CrossValidation
-from swashplate.identification.setup import ModelSetup, Setup, Stage, setup_text
+from swashplate.identification.resampling import CrossValidation, folds_tables
+from swashplate.identification.setup import Setup, Stage, setup_text
 from swashplate.identification.solving import Solution
+from swashplate.identification.stage_fit import Interval, StageFit
+from swashplate.identification.stages import Parameters
 from swashplate.identification.unknowns import Unknown, Unknowns
 from swashplate.identification.validation import RunQuality, predict
 from swashplate.identification.verdict import REQUIRED, Verdict, verdict
@@ -103,7 +109,7 @@ class Identification(Estimated):
         Columns are stage, parameter, unit, nominal, value, lower and upper (ends of the 95 %
         interval), standard_error and status.
         """
-        return tables.all_estimates(self.fit).to_polars()
+        return tables.all_estimates(self.fit.stages).to_polars()
 
     @cached_property
     def drive(self) -> Drive:
@@ -140,23 +146,23 @@ class Identification(Estimated):
 
     def tables(self) -> list[Table]:
         """Stated errors, then estimates, profiles, errors of runs, cross-validation."""
-        shown = [table for part in tables.parts_of(self) for table in part.tables]
+        shown = [table for part in parts_of(self) for table in part.tables]
         return [self.verdict.table(), *shown]
 
     def summary(self) -> str:
         """Text: the verdict, then what the command ``fit`` prints."""
-        single = "\n".join(tables.single_runs_line(self.fit))
-        parts = [self.verdict.summary(), *map(str, tables.parts_of(self)), single]
+        single = "\n".join(tables.single_runs_line(self.fit.stages))
+        parts = [self.verdict.summary(), *map(str, parts_of(self)), single]
         return "\n\n".join(part for part in parts if part)
 
     def _repr_html_(self) -> str:
-        parts, estimates, details = tables.parts_of(self), "", ""
+        parts, estimates, details = parts_of(self), "", ""
         for part in parts:
             if part.opened:
                 estimates += "".join(table._repr_html_() for table in part.tables)
             shown = () if part.opened else part.tables
             details += folded(part.title, shown, [*part.remarks, *part.sentences])
-        for line in tables.single_runs_line(self.fit):
+        for line in tables.single_runs_line(self.fit.stages):
             estimates += f"<p>{escape(line)}</p>"
         return f"{self.verdict.html(estimates)}{details}"
 
@@ -296,7 +302,7 @@ class Identification(Estimated):
                     unknowns=each.problem.unknowns.items,
                     solution=each.solution,
                     starts=each.starts,
-                    intervals=each.intervals,
+                    intervals=intervals_of(each),
                 )
                 for each in self.fit.stages
             ),
@@ -350,6 +356,31 @@ class Identification(Estimated):
             return {}
 
 
+def parts_of(found: Identification) -> list[tables.Part]:
+    """What a fit says besides its verdict, in the order in which the command prints it."""
+    fit = found.fit
+    notes = [overview.sentence for overview in found.campaign.overviews]
+    notes += [f"{run.name}: {sentence}." for run in fit.runs for sentence in run.notes]
+    doubts = [f"! {sentence}" for sentence in fit.doubts]
+    made = [tables.Part("Runs", (), (), notes), tables.Part("Doubts", (), doubts)]
+    made += map(tables.stage_part, fit.stages)
+    if found.profiles:
+        said = [sentence for profile in found.profiles for sentence in profile.sentences()]
+        table = tables.profiles_table(found.profiles, fit.stages)
+        made.append(tables.Part("Profile likelihoods", [table], (), said))
+    made.append(tables.fixed_part(fit.stages, fit.nominal))
+    fitted = tables.runs_tables([quality for each in fit.stages for quality in each.runs])
+    made.append(tables.Part("Errors of fitted runs", fitted, heading="Runs that were fitted"))
+    if found.predicted:
+        errors = tables.runs_tables(found.predicted)
+        heading = "Runs that were held out and predicted"
+        made.append(tables.Part("Errors of held-out runs", errors, heading=heading))
+    if found.folds is not None:
+        held_out, _ = folds_tables(found.folds, fit.stages)
+        made.append(tables.Part("Cross-validation", [held_out], (), found.folds.sentences()))
+    return [part for part in made if part.tables or part.remarks or part.sentences]
+
+
 def motion_of(runs: Iterable[Experiment]) -> Motion:
     """What the drive of some runs moves: a rod where all positions were measured in m.
 
@@ -366,8 +397,8 @@ def _interval_words(stages: Sequence[StageFit], found: ParameterSet) -> dict[str
     words: dict[str, list[str]] = {}
     for each in stages:
         unknowns = each.problem.unknowns
-        for estimate, unknown in zip(each.estimates, unknowns, strict=True):
-            if unknown.run is None and unknown.name.startswith("force_"):
+        for estimate, unknown in zip(estimates_of(each), unknowns, strict=True):
+            if unknown.kind == "force":
                 forces = ("Z19", "Z20", "Z21", "Z22")
                 words |= {symbol: ["from the fitted forces"] for symbol in forces}
             elif unknown.run is None:
@@ -516,7 +547,7 @@ def _loaded(
     def stored(stage: Stage, problem: Problem) -> Solved:
         entry = next(entries)
         ours, theirs = (
-            (name, [(unknown.name, unknown.run) for unknown in unknowns])
+            (name, [(each.name, each.run, each.kind, each.channel) for each in unknowns])
             for name, unknowns in ((stage.name, problem.unknowns), (entry.name, entry.unknowns))
         )
         sizes = {entry.solution.vector.size, len(entry.unknowns)}

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from math import isfinite
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,12 +24,10 @@ from swashplate.identification.effects import HYSTERESIS, Changes, RunParts, Sim
 from swashplate.identification.model import linearised
 from swashplate.identification.problem import Problem
 from swashplate.identification.solving import Solution, solve
+from swashplate.identification.stage_fit import StageFit
 from swashplate.identification.unknowns import Unknown, Unknowns
 from swashplate.parameters.definitions import CATALOGUE, COLUMNS, SWITCHES
 from swashplate.results import Result
-
-if TYPE_CHECKING:
-    from swashplate.identification.fitting import StageFit
 
 Array = NDArray[np.float64]
 

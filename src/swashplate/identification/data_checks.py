@@ -19,15 +19,12 @@ from swashplate.campaign.quality import (
     wrapped_positions,
 )
 from swashplate.errors import InputError
-from swashplate.identification.drive_model import (
-    CURRENTS,
-    SIGNALS,
-    kinds_of,
-    simulated_run,
-)
+from swashplate.identification.drive_model import CURRENTS, SIGNALS, kinds_of, simulated_run
 from swashplate.identification.model import EquationModel
+from swashplate.identification.model_setup import ModelSetup
 from swashplate.identification.problem import Loss, Problem
-from swashplate.identification.setup import ModelSetup, Setup
+from swashplate.identification.setup import Setup
+from swashplate.identification.stages import smooth
 from swashplate.parameters.parameter_set import ParameterSet
 from swashplate.parameters.rules import FULL_VOLTAGE
 from swashplate.tables import count
@@ -441,8 +438,6 @@ def check_rank(where: str, problem: Problem) -> list[Finding]:
 
 def beside_the_drives(campaign: Campaign) -> list[str]:
     """What stands out when each axis's drive is simulated under the runs' commands."""
-    from swashplate.identification.fitting import smooth
-
     found = []
     for name, axis in campaign.axes.items():
         if axis.drive is None:

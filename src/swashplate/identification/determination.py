@@ -6,7 +6,7 @@ import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from math import inf, isfinite, sqrt
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,15 +14,14 @@ from scipy.linalg import null_space, qr
 
 from swashplate.errors import InputError
 from swashplate.identification.arrow import dense_factor, triangular_factor, whitening
+from swashplate.identification.intervals import estimates_of, uncertainty_of
 from swashplate.identification.problem import TOLERANCE
-from swashplate.identification.unknowns import Unknowns
+from swashplate.identification.stage_fit import StageFit, once_per_stage
+from swashplate.identification.unknowns import Unknown, Unknowns
 from swashplate.models.displacement_control import FORCE, MOTION, PRESSURE, TRAVEL, ZERO
 from swashplate.parameters.definitions import CATALOGUE
 from swashplate.results import Result
 from swashplate.tables import listed
-
-if TYPE_CHECKING:
-    from swashplate.identification.fitting import StageFit
 
 Array = NDArray[np.float64]
 Known = Mapping[str, float]
@@ -59,7 +58,7 @@ class Gauge:
         0 for what does not move, and throughout if a value that the gauge needs is neither among
         the unknowns nor among the `fixed` ones, by symbol.
         """
-        symbols = [symbol_of(name) for name in variables.names]
+        symbols = [symbol_of(unknown) for unknown in variables]
         pairs = [*zip(symbols, variables.estimates.tolist(), strict=True)]
         known = {**(fixed or {}), **dict(pairs)}
         try:
@@ -69,10 +68,12 @@ class Gauge:
         return np.array(slopes) / variables.slopes
 
 
-def symbol_of(name: str) -> str:
-    """Symbol of an unknown: ``Z16_plus`` is Z16, ``force_plus_2`` force, the run falls away."""
-    bare = re.sub(r"\s*\(.*\)$", "", name.rsplit(".", 1)[-1])
-    return re.sub(r"(_plus|_minus)?(_\d+)?$", "", bare)
+def symbol_of(unknown: Unknown) -> str:
+    """Symbol of a parameter, such as Z16 of ``Z16_plus``; of any other unknown its kind."""
+    if unknown.kind != "parameter":
+        return unknown.kind
+    column = unknown.name.rsplit(".", 1)[-1]
+    return column.removesuffix("_plus").removesuffix("_minus")
 
 
 def _gauge(
@@ -98,7 +99,7 @@ GAUGES = (
         PRESSURE,
         "Z1·Z9, Z1·Z15 and Z8·√Z1 are",
         "Z1 Z9 Z8",
-        *("initial pressure", "start_pressure", "start pressure"),
+        "start pressure",
     ),
     _gauge(
         "zero of pressure",
@@ -299,7 +300,7 @@ def identifiability(
     null, rank = [], 0
     if places.size:
         scale = lengths[places]
-        symbols = [symbol_of(names[k]) for k in places]
+        symbols = [symbol_of(variables[int(k)]) for k in places]
         _, sizes, rows = np.linalg.svd(triangle[:, places] / scale, full_matrices=True)
         rank = int(np.count_nonzero(sizes > tolerance * sizes[0]))
         free, fixes = rows[rank:].T, list[int]()
@@ -355,9 +356,41 @@ def _fixing(places: list[int], vector: Array, null: Array, fixed: list[int]) -> 
     return None
 
 
+# --- of a stage -----------------------------------------------------------------------------------
+
+
+@once_per_stage
+def identifiability_of(stage: StageFit) -> Identifiability:
+    """Which unknowns of a stage the tests determine."""
+    linearised, names = stage.linearised, stage.problem.unknowns.names
+    fixed = {name: value for name, value in stage.parameters.numbers.items() if name not in names}
+    try:
+        quoted = uncertainty_of(stage).quoted.matrix
+    except InputError:  # too few samples to tell the noise from
+        quoted = None
+    return identifiability(
+        linearised.triangle,
+        linearised.variables,
+        covariance=quoted,
+        tolerance=linearised.tolerance,
+        fixed=fixed,
+    )
+
+
+def bounds_reached(stage: StageFit) -> tuple[str, ...]:
+    """Sentences on unknowns of the machine that ended at a bound, and what to do about it."""
+    point = stage.problem.unknowns.at(stage.solution.vector)
+    ends = {-1: "lower", 1: "upper"}
+    return tuple(
+        f"{unknown.name} ended at its {ends[side]} bound: {stage.stage.beyond(unknown, side)}."
+        for unknown, side in zip(point, point.at_bound.tolist(), strict=True)
+        if unknown.run is None and side
+    )
+
+
 def without_value(stage: StageFit) -> list[str]:
     """Unknowns of the machine that ended at a bound, or that the tests do not determine."""
-    found = stage.identifiability
+    found = identifiability_of(stage)
     lost = {*found.at_bounds, *found.to_fix}
     machine = (each.name for each in stage.problem.unknowns if each.run is None)
     return [name for name in machine if name in lost]
@@ -365,6 +398,6 @@ def without_value(stage: StageFit) -> list[str]:
 
 def weak_unknowns(stage: StageFit) -> list[str]:
     """Unknowns of the machine with an interval wider than 10 % of the value, or without one."""
-    pairs = zip(stage.estimates, stage.problem.unknowns, strict=True)
+    pairs = zip(estimates_of(stage), stage.problem.unknowns, strict=True)
     machine = [estimate for estimate, unknown in pairs if unknown.run is None]
     return [each.name for each in machine if each.relative_half_width > WIDE]

@@ -9,9 +9,9 @@ of a new one. Nothing is asked of the instruments: what is noise shows in the er
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal, NamedTuple, get_args
+from typing import Literal, NamedTuple, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,12 +20,12 @@ from scipy.optimize import nnls
 from scipy.signal import fftconvolve
 from scipy.special import stdtrit
 
+from swashplate.campaign.experiment import Experiment
+from swashplate.campaign.recognition import UNNAMED
 from swashplate.identification.problem import LinearisedFit, LinearisedRun
+from swashplate.identification.stage_fit import StageFit
+from swashplate.identification.validation import RunQuality
 from swashplate.results import Result
-
-if TYPE_CHECKING:
-    from swashplate.identification.fitting import StageFit
-    from swashplate.identification.validation import RunQuality
 
 Array = NDArray[np.float64]
 Motion = Literal["large", "small", "fast"]
@@ -72,25 +72,60 @@ def left_out(
     To first order, without a fit. With W whitening JᵀJ and D = J W of the runs of one maneuver,
     their residuals are (I - D Dᵀ)⁻¹ r (Cook and Weisberg 1982, section 3.2; for a group of rows).
     """
-    groups = defaultdict[str, list[tuple[LinearisedRun, NDArray[np.intp], Array]]](list)
+    shifts = _shifts(fit, maneuvers)
     for run, jacobian in fit.jacobians():
-        directions, whitening = fit.inverse.of_run(run.name)
-        groups[maneuvers[run.name]].append((run, directions, jacobian @ whitening))
-    for parts in groups.values():
-        moved = np.unique(np.concatenate([directions for _, directions, _ in parts]))
-        places = [np.searchsorted(moved, directions) for _, directions, _ in parts]
+        yield run, _shifted(fit, run, jacobian, shifts[maneuvers[run.name]])
+
+
+def without_runs(
+    fit: LinearisedFit, names: Collection[str]
+) -> Iterator[tuple[LinearisedRun, Array]]:
+    """Each channel of each run, with the differences (n,) if some runs had been left out."""
+    groups = {run.name: "left out" for run in fit.runs if run.name in names}
+    shifts = _shifts(fit, groups)
+    for run, jacobian in fit.jacobians():
+        yield run, _shifted(fit, run, jacobian, shifts["left out"])
+
+
+class _Shift(NamedTuple):
+    """How far a whitened vector moves if the runs of a group are left out."""
+
+    directions: NDArray[np.intp]
+    """(d,) numbers of the directions that these runs have a part in."""
+    size: Array
+    """(d,)"""
+
+
+def _shifts(fit: LinearisedFit, groups: Mapping[str, str]) -> dict[str, _Shift]:
+    """Of each group of runs; products alone are kept of them."""
+    parts = defaultdict[str, list[tuple[NDArray[np.intp], Array, Array]]](list)
+    for run, jacobian in fit.jacobians():
+        if run.name in groups:
+            directions, whitening = fit.inverse.of_run(run.name)
+            by = jacobian @ whitening
+            parts[groups[run.name]].append((directions, by.T @ by, by.T @ run.residual))
+    found = dict[str, _Shift]()
+    for group, each in parts.items():
+        moved = np.unique(np.concatenate([directions for directions, _, _ in each]))
         products, along = np.zeros((moved.size, moved.size)), np.zeros(moved.size)
-        for (run, _, by), place in zip(parts, places, strict=True):
-            products[np.ix_(place, place)] += by.T @ by
-            along[place] += by.T @ run.residual
+        for directions, product, residual in each:
+            place = np.searchsorted(moved, directions)
+            products[np.ix_(place, place)] += product
+            along[place] += residual
         leverages, axes = np.linalg.eigh(products)
         spare = 1.0 - np.minimum(leverages, 1.0)
         shared = spare > OWN
         gain = np.where(shared, 1.0 / np.where(shared, spare, 1.0), 0.0)
-        shift = axes @ (gain * (axes.T @ along))
-        for (run, _, by), place in zip(parts, places, strict=True):
-            weight = 1.0 if run.weight is None else run.weight
-            yield run, (run.residual + by @ shift[place]) / weight
+        found[group] = _Shift(moved, axes @ (gain * (axes.T @ along)))
+    return found
+
+
+def _shifted(fit: LinearisedFit, run: LinearisedRun, jacobian: Array, shift: _Shift) -> Array:
+    """(n,) differences of a run, simulated less measured, after a shift. [unit]"""
+    directions, whitening = fit.inverse.of_run(run.name)
+    _, own, theirs = np.intersect1d(directions, shift.directions, return_indices=True)
+    moved = run.residual + jacobian @ (whitening[:, own] @ shift.size[theirs])
+    return np.asarray(moved if run.weight is None else moved / run.weight)
 
 
 # --- errors over windows --------------------------------------------------------------------------
@@ -112,6 +147,8 @@ class Record(NamedTuple):
     """(n,) simulated less measured. [unit]"""
     noise: float
     """Standard deviation of what in it is independent from sample to sample. [unit]"""
+    rounding: Array
+    """(n,) what rounding to an encoder's counts makes of what is simulated; else 0. [unit]"""
     signal: Array
     """(n,) what is simulated; of a position its speed. [unit, or unit/s]"""
     rate: Array
@@ -142,22 +179,33 @@ def record_of(
     step = float(np.median(np.diff(time)))
     grid = np.arange(time[0], time[-1] + 0.5 * step, step)
     signal = np.interp(grid, channel.time, quality.simulated)
+    rounding = np.zeros(grid.size)
+    if step_of_counts := channel.resolution:
+        # at constant speed it is slow, and not independent from sample to sample
+        rounding = step_of_counts * np.round(signal / step_of_counts) - signal
     if channel.is_position:
         signal = np.gradient(signal, step)
     return Record(
         experiment.name,
-        experiment.maneuver,
+        maneuver_of(experiment),
         held_out,
         float(time[0]),
         step,
         np.interp(grid, time, channel.values[channel.used]),
         np.interp(grid, time, error),
         white_noise(error, channel.values[channel.used]),
+        rounding,
         signal,
         TIME * np.gradient(signal, step),
         experiment.input.at(grid),
         channel.is_position,
     )
+
+
+def maneuver_of(experiment: Experiment) -> str:
+    """The maneuver of a run; of one that is not known the run, which is like no other."""
+    unknown = experiment.maneuver in ("", UNNAMED)
+    return experiment.name if unknown else experiment.maneuver
 
 
 def white_noise(error: Array, values: Array) -> float:
@@ -251,6 +299,8 @@ def cells_of(records: Sequence[Record]) -> tuple[list[Cell], float]:
             rows = rows[:: max(int(WINDOWS[motion] / record.step), 1)]
             if rows.size < 2:
                 continue
+            rounded = windowed(record.rounding, window_weights(record, WINDOWS[motion]))
+            noise = max(noise, float(np.mean(rounded[rows] ** 2)))
             squares = (errors[rows] ** 2 - noise) / reach**2
             terms = variance_terms(record.signal[rows] / reach, record.rate[rows] / reach)
             cells.append(Cell(record, motion, squares, noise / reach**2, terms))
@@ -379,7 +429,7 @@ def records_of(
 ) -> Iterator[tuple[str, Record]]:
     """Each channel of each run, as if its maneuver had been left out, or held out."""
     for stage in stages:
-        maneuvers = {run.name: run.maneuver for run in stage.problem.experiments}
+        maneuvers = {run.name: maneuver_of(run) for run in stage.problem.experiments}
         errors = {(run.name, run.channel): e for run, e in left_out(stage.linearised, maneuvers)}
         for quality in stage.runs:
             error = errors[quality.experiment.name, quality.channel]

@@ -1,26 +1,22 @@
-"""The drive as a model to be fitted: card, pump or the whole chain; the problem of a stage."""
+"""The drive as a model to be fitted: card, pump or the whole chain, and what drives a run."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from math import isfinite, sqrt
-from pathlib import Path
 from types import MappingProxyType
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from swashplate.campaign import ChannelKind, applying, inside
+from swashplate.campaign import ChannelKind
 from swashplate.campaign.amplifier import CURRENTS as CURRENTS
-from swashplate.campaign.campaign import Campaign
 from swashplate.campaign.experiment import APART, RISE, Channel, Edge, Experiment, InputSignal
 from swashplate.campaign.samples import signed_by_command
 from swashplate.campaign.schema import SIGNALS as SIGNALS
-from swashplate.documents import validated
-from swashplate.drive import Drive
 from swashplate.equations.marching.observation import Observation, ObservedRecord, Own
 from swashplate.equations.marching.record import (
     SLOWEST,
@@ -30,26 +26,13 @@ from swashplate.equations.marching.record import (
     even_rate,
     record_of,
 )
-from swashplate.errors import DomainError, InputError, ParameterError, UnknownParameterError
-from swashplate.executors import available_cores
-from swashplate.identification.model import EDGE, OFFSET, Asked, EquationModel
-from swashplate.identification.problem import Problem, noise_scales
-from swashplate.identification.setup import (
-    Forces,
-    FreeParameters,
-    ModelSetup,
-    Setup,
-    Stage,
-    deviation,
-    free_entries,
-    load_setup,
-    setup_names,
-)
-from swashplate.identification.unknowns import Prior, Unknown, Unknowns, bounded
-from swashplate.parameters.definitions import SWITCHES, Definition, columns_of, find, is_column
+from swashplate.errors import DomainError, InputError, ParameterError
+from swashplate.identification.model import Asked, EquationModel
+from swashplate.identification.problem import Problem
+from swashplate.identification.setup import Forces
+from swashplate.identification.unknowns import Prior, Unknown, Unknowns, zero_name
+from swashplate.parameters.definitions import is_column
 from swashplate.parameters.parameter_set import ParameterSet
-from swashplate.parameters.plausible import check_plausible
-from swashplate.parameters.rules import FULL_VOLTAGE
 from swashplate.results import Result
 from swashplate.simulation.instance import PRESSURE, START, at_every_rate
 from swashplate.simulation.residuals import Ready, made_ready
@@ -59,21 +42,18 @@ from swashplate.simulation.run import check_voltage, simulate_drive
 Array = NDArray[np.float64]
 Part = Literal["card", "pump", "chain"]
 """What of the drive is simulated: the card alone, pump and motor over a current, or all."""
-Parameters = ParameterSet | ModelSetup
-"""The numbers of what is fitted: a drive, or a model of one's own."""
 Starts = Mapping[str, Mapping[str, float]]
 """For some experiments by name the currents at the first sample, as `START_CURRENTS` has them."""
+Instants = Mapping[tuple[str, str], Prior]
+"""What an earlier stage found of the instants of edges, by run and name."""
 
 START_PRESSURE = "start_pressure"
 """Name of δP at the first sample, where it is an unknown of the experiment."""
-START_CURRENTS = ("start_current_plus", "start_current_minus")
-"""Names of a channel's current at the first sample, where it is an unknown of the experiment."""
-FORCE = Definition("force of the solenoids", "N", plausible=(0.0, 1e4))
-"""What stands for their coefficients."""
+START_CURRENTS = {"start_current_plus": "card.plus", "start_current_minus": "card.minus"}
+"""Names of a channel's current at the first sample, where it is an unknown of the experiment, and
+the part of the model that it belongs to."""
 MOST_EDGES = 60
 """Jumps of commands whose instants are estimated; more are taken halfway between their samples."""
-LARGEST_START_PRESSURE = 4e6
-"""Bound of a free pressure at the start where the set-up gives none. [Pa]"""
 FINE = 3
 """Points of the march's grid to a sample of a run whose command jumps: odd, so that the middle of
 two samples lies between two points. The current's jump then comes 0.16 samples too early, not 0.47;
@@ -304,8 +284,8 @@ class DriveModel(Result, EquationModel):
     """A drive whose parameters are the unknowns, by columns such as ``"Z16_plus"``.
 
     Besides columns it knows ``"force_plus_1"`` ... (see `Forces`), ``"start_pressure"`` of an
-    experiment [Pa], ``"start_current_plus"`` or ``"..._minus"`` of its card [A], and of each
-    channel ``"offset NAME"``, its free zero.
+    experiment [Pa], ``"start_current_plus"`` or ``"..._minus"`` of its card [A], and the instants
+    of the edges of its command, see `instants_of` [s].
 
     Derivatives are exact, those by refinements as well.
     """
@@ -344,10 +324,10 @@ class DriveModel(Result, EquationModel):
     def ready(self, values: Mapping[str, float], experiment: Experiment, asked: Asked) -> Ready:
         """The drive with numbers; see `EquationModel.ready`."""
         states = {
-            column.removeprefix(START): values[name]
+            state: values[name]
             for name in (START_PRESSURE, *START_CURRENTS)
             if name in values
-            for column in self.moves(name)
+            for state in self._states_started_by(name)
         }
         parameters, own = self.parameters_at(values), Own(states, asked.offsets)
         try:
@@ -359,14 +339,26 @@ class DriveModel(Result, EquationModel):
         """Derivatives by a name of the columns that it moves: of coefficients by a force."""
         if self.forces is not None and name in self.forces.names:
             return self.forces.slopes(name)
-        if name in START_CURRENTS:
-            # I*, that of a sample before, and I; with the differential equation no sample before
-            leaves = ("now", "out") if self.parameters.rate is None else ("now", "before", "out")
-            side = name.removeprefix("start_current_")
-            return {f"{START}card.{side}.{leaf}": 1.0 for leaf in leaves}
-        if name == START_PRESSURE:
-            return {f"{START}{PRESSURE}": 1.0}
+        if states := self._states_started_by(name):
+            return {f"{START}{state}": 1.0 for state in states}
         return {name: 1.0} if is_column(name) else {}
+
+    def _states_started_by(self, name: str) -> list[str]:
+        """Paths of the states that a pressure or a current at the first sample sets.
+
+        A pump alone has no card that could begin with a current.
+        """
+        if name == START_PRESSURE:
+            return [PRESSURE]
+        if name not in START_CURRENTS or self.part == "pump":
+            return []
+        # I*, that of a sample before, and I; with the differential equation no sample before
+        leaves = ("now", "out") if self.parameters.rate is None else ("now", "before", "out")
+        return [f"{START_CURRENTS[name]}.{leaf}" for leaf in leaves]
+
+    def instants_of(self, experiment: Experiment) -> Mapping[str, Edge]:
+        """Edges of the command by the names of their instants; see `EquationModel.instants_of`."""
+        return _instants_of(experiment.input)
 
     def parameters_at(self, values: Mapping[str, float]) -> ParameterSet:
         """The set for some values of the unknowns; a `DomainError` if one breaks a rule."""
@@ -390,22 +382,35 @@ def _at(model: DriveModel, values: tuple[tuple[str, float], ...]) -> ParameterSe
 def with_edges(experiment: Experiment, values: Mapping[str, float]) -> Experiment:
     """An experiment with the edges of its command where values say."""
     command = experiment.input
-    late = {each.place: values[n] for each in command.edges if (n := _named(each)) in values}
+    edges = _instants_of(command).items()
+    late = {edge.place: values[name] for name, edge in edges if name in values}
     return replace(experiment, input=command.with_edges(late)) if late else experiment
 
 
-def _named(edge: Edge) -> str:
-    return f"{EDGE}{edge.middle:.6g} s"
+def _instants_of(command: InputSignal) -> dict[str, Edge]:
+    """Edges of a command by the names that a model has for their instants."""
+    return {f"edge at {edge.middle:.6g} s": edge for edge in command.edges}
 
 
-def _edges(run: Experiment, found: Mapping[str, Prior]) -> list[Unknown]:
+def unknown_instants(run: Experiment, found: Instants) -> list[Unknown]:
     """Instants of a voltage's edges, anywhere between two samples or as an earlier stage found."""
     unknowns = list[Unknown]()
-    for edge in run.input.edges if run.input.kind == "voltage" else ():
-        name, most = _named(edge), 0.5 * (edge.apart + RISE)
-        prior = found.get(f"{name} ({run.name})", Prior(0.0, edge.apart / sqrt(12.0)))
-        own: Any = {"prior": prior, "run": run.name, "scale": edge.apart}
-        unknowns.append(Unknown(name, prior.mean, -most, most, "s", **own))
+    edges = _instants_of(run.input) if run.input.kind == "voltage" else {}
+    for name, edge in edges.items():
+        most = 0.5 * (edge.apart + RISE)
+        prior = found.get((run.name, name), Prior(0.0, edge.apart / sqrt(12.0)))
+        unknown = Unknown(
+            name,
+            prior.mean,
+            -most,
+            most,
+            "s",
+            prior=prior,
+            run=run.name,
+            kind="instant",
+            scale=edge.apart,
+        )
+        unknowns.append(unknown)
     return unknowns
 
 
@@ -416,7 +421,7 @@ def edges_problem(parameters: ParameterSet, run: Experiment) -> Problem | None:
     that is wrong says little of them. None where there are no edges, or too many, or no
     channel of a drive.
     """
-    model, edges = DriveModel(parameters), _edges(run, {})
+    model, edges = DriveModel(parameters), unknown_instants(run, {})
     if not 0 < len(edges) <= MOST_EDGES or not model.signals_of(run):
         return None
     scales, zeros = dict[str, float](), list[Unknown]()
@@ -427,20 +432,22 @@ def edges_problem(parameters: ParameterSet, run: Experiment) -> Problem | None:
             continue
         if channel.is_position:
             errors -= np.average(errors, weights=channel.weight)
-            zeros.append(_free_zero(name, channel, run))
+            zeros.append(free_zero(name, channel, run))
         scales[name] = float(np.linalg.norm(weight * errors) / np.linalg.norm(weight))
     scales = {name: scale for name, scale in scales.items() if scale > 0.0}
     if not scales:
         return None
-    zeros = [each for each in zeros if each.name.removeprefix(OFFSET) in scales]
+    zeros = [zero for zero in zeros if zero.channel in scales]
     return Problem(model, (run,), Unknowns((*zeros, *edges)), tuple(scales), scales)
 
 
-def _free_zero(name: str, channel: Channel, run: Experiment) -> Unknown:
+def free_zero(name: str, channel: Channel, run: Experiment) -> Unknown:
     """Zero of a position, with bounds far enough both ways never to be reached."""
     first, reach = float(channel.values[0]), 1.0 + 10.0 * float(np.ptp(channel.values))
     ends = first - reach, first + reach
-    return Unknown(f"{OFFSET}{name}", first, *ends, channel.unit, run=run.name)
+    return Unknown(
+        zero_name(name), first, *ends, channel.unit, run=run.name, kind="zero", channel=name
+    )
 
 
 def kinds_of(part: str) -> tuple[ChannelKind, ...]:
@@ -452,247 +459,3 @@ def true_value(unknown: Unknown, model: DriveModel, truth: ParameterSet) -> floa
     """What an unknown of the machine really is; None for one of a single experiment."""
     forces = model.forces.values(truth) if model.forces is not None else {}
     return {**truth.numbers, **forces}[unknown.targets[0]] if unknown.run is None else None
-
-
-# --- from a stage of a fit configuration to its problem -------------------------------------------
-
-
-def configuration(free: FreeParameters, experiments: Sequence[Experiment]) -> Setup:
-    """A drive's fit configuration from any form that a caller may give it in.
-
-    Parameters
-    ----------
-    free : Setup, str, path or mapping
-        A fit configuration, a packaged one by name, a TOML file, or a mapping: the contents of such
-        a file, or free parameters by symbol as of `setup.free_entries`. Those are estimated in one
-        stage: of the card alone if currents were measured, of pump and motor alone, or through the
-        whole chain if both are free or no current was measured.
-    experiments : sequence of Experiment
-        The runs to fit.
-
-    Raises
-    ------
-    FileError, ParameterError
-        If the configuration cannot be read, or an entry is wrong.
-    """
-    if isinstance(free, Setup):
-        return _with_known_names(free, "the fit configuration")
-    if isinstance(free, str | Path):
-        return _with_known_names(load_setup(free), str(free))
-    given: object = free
-    if not isinstance(given, Mapping) or not given:
-        raise InputError(
-            f"What is free is {free!r}, but must be a fit configuration, its name or file, or a "
-            "mapping such as {'Z8': (0.5, 2)}."
-        )
-    if "stages" in free:
-        setup = validated(dict(free), Setup, "the fit configuration")
-        return _with_known_names(setup, "the fit configuration")
-    entries = free_entries(free)
-    blocks = {"card" if find(name).block == "control_card" else "pump" for name in entries}
-    kinds = {channel.kind for run in experiments for channel in run.channels.values()}
-    part: Literal["card", "pump", "chain"] = "chain"
-    if blocks == {"pump"}:
-        part = "pump"
-    elif blocks == {"card"} and not kinds.isdisjoint(CURRENTS):
-        part = "card"
-    return Setup(stages=(Stage(name=part, part=part, free=entries),))
-
-
-def _with_known_names(setup: Setup, origin: str) -> Setup:
-    """The fit configuration of a drive; a name in it that no parameter has is refused."""
-    names = [
-        (f"stage '{stage.name}', free", name)
-        for stage in setup.stages
-        if stage.part != "model"
-        for name in stage.free
-    ]
-    names += [("standard_uncertainty", name) for name in setup.standard_uncertainty]
-    for table, name in names:
-        try:
-            find(name)
-        except UnknownParameterError as error:
-            raise UnknownParameterError(f"{origin}, {table}: {error}") from None
-    return setup
-
-
-def setup_of(
-    campaign: Campaign, axis: str, drive: ParameterSet, free: FreeParameters | None = None
-) -> Setup:
-    """The fit configuration of an axis.
-
-    By default the packaged one of the drive that the campaign names, or else of the given one; an
-    `InputError` if there is none. `free` as of `configuration`.
-    """
-    if free is not None:
-        return configuration(free, campaign.select(axis=axis, role="fit"))
-    name = drive.name if campaign.axes[axis].drive is None else campaign.drive(axis).name
-    if name not in setup_names():
-        raise InputError(
-            f"There is no packaged fit configuration for the drive '{name}': give one of your "
-            "own, a .toml file with stages and free parameters; 'swashplate guess' reads one off "
-            "the logs."
-        )
-    return load_setup(name)
-
-
-def stage_problem(
-    stage: Stage,
-    parameters: Parameters,
-    experiments: Sequence[Experiment],
-    *,
-    threads: int | None = None,
-    uncertain: Mapping[str, float | str] = MappingProxyType({}),
-    starts: Starts = MappingProxyType({}),
-    edges: Mapping[str, Prior] = MappingProxyType({}),
-) -> Problem:
-    """The problem of a stage, over the runs that have a channel of it.
-
-    `parameters` are the nominal values, those of earlier stages already found; `uncertain` standard
-    uncertainties of what stays fixed, as of `Setup`; `starts` currents at the first sample that a
-    stage before estimated, see `start_currents_of`. Threads are all cores by default. An
-    `InputError` says that no run has what the stage fits or asks for, a `ParameterError` that a
-    free parameter is unknown or its bounds are wrong.
-    """
-    threads = threads or available_cores()
-    if isinstance(parameters, ModelSetup):
-        return parameters.problem(experiments, threads=threads)
-    if stage.part == "model":
-        raise InputError("part = 'model' needs a model of your own, not a drive.")
-    channels = _channels_of(stage, experiments)
-    runs = tuple(each for each in experiments if any(name in each.channels for name in channels))
-    currents = {}
-    for each in runs if stage.part == "pump" else ():
-        if stage.current == "measured" or each.input.kind == "current":
-            currents[each.name] = measured_current(each, stage.current_scale)
-        else:
-            currents[each.name] = simulated_current(each, parameters, starts.get(each.name, {}))
-    free = _of_the_machine(stage, parameters)
-    begin = {column: each.start for each in free for column in each.targets if column in SWITCHES}
-    on = parameters.options | {SWITCHES[column] for column in begin}
-    begun = parameters.with_numbers(begin, on) if begin else parameters
-    own = [unknown for each in runs for unknown in _of_a_run(stage, each, channels, parameters)]
-    simulated = stage.part != "pump" or stage.current != "measured"
-    jumps = [unknown for each in runs if simulated for unknown in _edges(each, edges)]
-    return Problem(
-        DriveModel(begun, stage.part, currents, stage.forces, dict(starts)),
-        tuple(_weighted(each, stage) for each in runs),
-        Unknowns((*free, *own, *(jumps if len(jumps) <= MOST_EDGES else ()))),
-        channels,
-        noise_scales(runs, channels),
-        uncertain=tuple(
-            {c: deviation(each, _nominal(parameters, c)) for c in columns_of([name])}
-            for name, each in uncertain.items()
-        ),
-        threads=threads,
-    )
-
-
-def _channels_of(stage: Stage, experiments: Sequence[Experiment]) -> tuple[str, ...]:
-    """Names of the channels that a stage fits; weights of others would be lost in silence."""
-    kinds = stage.channels or kinds_of(stage.part)
-    had = [(name, each.kind) for run in experiments for name, each in run.channels.items()]
-    fitted = {kind for _, kind in had if kind in kinds}
-    if not fitted:
-        hint = ""
-        if stage.part == "card":
-            hint = "; without a current, let 'swashplate guess' write start and fit configuration"
-        raise InputError(
-            f"The stage '{stage.name}' fits {', '.join(kinds)}, but the runs to fit have "
-            f"{', '.join(dict.fromkeys(kind for _, kind in had)) or 'no channel'}{hint}."
-        )
-    weighed = {**stage.weights, **stage.weights_by_input}
-    if weighed and not fitted & set(weighed):
-        raise InputError(
-            f"The stage '{stage.name}' weighs {', '.join(weighed)}, but the runs have "
-            f"{', '.join(sorted(fitted))}: add weights for that, or take a fit configuration "
-            "without."
-        )
-    return tuple(dict.fromkeys(name for name, kind in had if kind in kinds))
-
-
-def start_currents_of(problem: Problem, vector: Array) -> Starts:
-    """Currents at the first sample that a stage estimated, by run; for the stages after it."""
-    found: dict[str, dict[str, float]] = {}
-    for each, value in zip(problem.unknowns, problem.unknowns.at(vector).estimates, strict=True):
-        if each.run is not None and each.name in START_CURRENTS:
-            found.setdefault(each.run, {})[each.name] = float(value)
-    return found
-
-
-def with_estimates(parameters: Parameters, problem: Problem, vector: Array) -> Parameters:
-    """The parameters with what a stage found; a `DomainError` if a value breaks a rule."""
-    found = problem.unknowns.targets(vector, "")
-    if isinstance(parameters, ModelSetup):
-        return replace(parameters, numbers={**parameters.numbers, **found}, scales=problem.scales)
-    assert isinstance(problem.model, DriveModel)
-    return problem.model.parameters_at(found)
-
-
-def _weighted(experiment: Experiment, stage: Stage) -> Experiment:
-    """The experiment with the stage's own weights multiplied in."""
-    if not stage.weights and not stage.weights_by_input:
-        return experiment
-    channels = {}
-    for name, channel in experiment.channels.items():
-        weight = channel.weight.copy()
-        for window in applying(stage.weights.get(channel.kind, ()), experiment.maneuver):
-            weight[inside(window, channel.time)] *= window.factor
-        for sized in applying(stage.weights_by_input.get(channel.kind, ()), experiment.maneuver):
-            within = inside(sized, channel.time)
-            size = np.abs(experiment.input.at(channel.time[within]))
-            weight[within] *= np.interp(size, *np.transpose(sized.factors))
-        channels[name] = replace(channel, weight=weight)
-    return replace(experiment, channels=channels)
-
-
-def _of_the_machine(stage: Stage, parameters: ParameterSet) -> list[Unknown]:
-    """Unknowns of the drive: free parameters, both directions apart unless tied, then forces."""
-    unknowns: list[Unknown] = []
-    for name, entry in stage.free.items():
-        definition, columns = find(name), tuple(columns_of([name]))
-        least = -np.inf if definition.least is None else definition.least
-        how: Any = {"unit": definition.unit, "log": entry.log, "prior": entry.prior}
-        for group in [columns] if entry.tied else [(each,) for each in columns]:
-            nominal = float(np.mean([_nominal(parameters, column) for column in group]))
-            own, bounds = name if entry.tied else group[0], (entry.relative, entry.bounds)
-            unknown = bounded(own, nominal, *bounds, least, sets=group, **how)
-            check_plausible(f"a bound of {own}", definition, unknown.low, unknown.high)
-            if entry.prior is not None:
-                check_plausible(f"the prior mean of {own}", definition, entry.prior.mean)
-            unknowns.append(unknown)
-    if stage.forces is not None:
-        for name, value in stage.forces.values(parameters).items():
-            log = value > 0.0
-            force = bounded(name, value, stage.forces.relative, unit="N", log=log)
-            check_plausible(f"a bound of {name}", FORCE, force.low, force.high)
-            unknowns.append(force)
-    return unknowns
-
-
-def _nominal(parameters: ParameterSet, column: str) -> float:
-    """Where a parameter begins: a refinement that the set does not give, where it is off."""
-    if column in parameters.numbers:
-        return parameters.numbers[column]
-    return parameters[column].values[0]
-
-
-def _of_a_run(
-    stage: Stage, experiment: Experiment, channels: Sequence[str], parameters: ParameterSet
-) -> Iterator[Unknown]:
-    """Unknowns of one experiment: free zeros of positions, pressure and current at the start."""
-    own = {name: experiment.channels[name] for name in channels if name in experiment.channels}
-    run, estimated = experiment.name, experiment.start == "estimated"
-    for name, channel in own.items():
-        if channel.is_position:
-            yield _free_zero(name, channel, experiment)
-    if stage.part != "card" and (stage.start_pressure is not None or estimated):
-        most = stage.start_pressure or LARGEST_START_PRESSURE
-        yield Unknown(START_PRESSURE, 0.0, -most, most, "Pa", run=run)
-    measured = any(channel.kind in CURRENTS for channel in own.values())
-    if estimated and measured and stage.part != "pump" and experiment.input.kind == "voltage":
-        first = float(measured_current(experiment).values[0])
-        if first != 0.0:  # else neither channel is the driven one
-            name, full = START_CURRENTS[first < 0.0], np.copysign(FULL_VOLTAGE, first)
-            most = 2.0 * abs(Drive(parameters).steady_current(float(full)))
-            yield Unknown(name, min(abs(first), 0.9 * most), 0.0, most, "A", run=run)

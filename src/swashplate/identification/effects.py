@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import hypot, sqrt
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,10 +25,8 @@ from swashplate.identification.drive_model import (
 from swashplate.identification.model import Model, simulated
 from swashplate.identification.model import linearised as linearised_model
 from swashplate.identification.problem import LinearisedFit, LinearisedRun
+from swashplate.identification.stage_fit import StageFit
 from swashplate.results import Result
-
-if TYPE_CHECKING:
-    from swashplate.identification.fitting import StageFit
 
 Array = NDArray[np.float64]
 Changes = Mapping[str, Array]

@@ -23,7 +23,7 @@ from swashplate.drive import Drive
 from swashplate.errors import InputError
 from swashplate.identification.arrow import dense_factor, triangular_factor, whitening
 from swashplate.identification.determination import Identifiability, identifiability
-from swashplate.identification.drive_model import CURRENTS, DriveModel, stage_problem
+from swashplate.identification.drive_model import CURRENTS, DriveModel
 from swashplate.identification.noise import spectral_covariance
 from swashplate.identification.problem import (
     TOLERANCE,
@@ -33,6 +33,7 @@ from swashplate.identification.problem import (
     linearised_fit,
 )
 from swashplate.identification.setup import Setup, Stage
+from swashplate.identification.stages import stage_problem
 from swashplate.identification.unknowns import Unknowns
 from swashplate.maneuvers import Maneuver, multisine, ramp, sine, stairs, step
 from swashplate.parameters.definitions import CATALOGUE, COLUMNS
@@ -97,8 +98,7 @@ class Outlook(Result):
         """What an unknown needs, in words; parameters that say nothing of it tilt the plate."""
         forces = self._model.forces
         if forces is not None and name in forces.names:
-            _, side, number = name.split("_")
-            return f"{getattr(forces, side)[int(number) - 1]:g} A beyond Z17"
+            return f"{abs(forces.currents[name]):g} A beyond Z17"
         definition = CATALOGUE.get(COLUMNS.get(name, name))
         return (definition.needs if definition is not None else "") or "a tilted swash plate"
 
@@ -107,7 +107,7 @@ class Outlook(Result):
         groups: dict[str, list[str]] = {}
         for name in self.identifiability.unexcited:
             if name in self.names:
-                force = name.startswith("force_")
+                force = self.problem.unknowns[self.problem.unknowns.index(name)].kind == "force"
                 need = "currents of their size beyond Z17" if force else self.need(name)
                 side = next((f" ({s})" for s in ("plus", "minus") if f"_{s}" in name), "")
                 instead = "ask for forces at smaller currents" if force else "fix it"
@@ -145,8 +145,8 @@ def outlook(
 ) -> Outlook:
     """What runs can tell of a stage's unknowns, before any fit.
 
-    At the nominal values, best those that `fitting.smooth` makes, as a fit takes them. Raises as
-    `drive_model.stage_problem`, and a `DomainError` if the model does not hold there.
+    At the nominal values, best those that `stages.smooth` makes, as a fit takes them. Raises
+    as `stages.stage_problem`, and a `DomainError` if the model does not hold there.
     """
     problem = stage_problem(stage, set_of(nominal), experiments)
     return Outlook(stage, problem, linearised_fit(problem, problem.start))

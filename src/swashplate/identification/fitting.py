@@ -11,7 +11,7 @@ from functools import cached_property, partial
 from hashlib import blake2b
 from math import isfinite, sqrt
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,42 +33,33 @@ from swashplate.identification.data_checks import (
     spike_findings,
     unfitted_currents,
 )
-from swashplate.identification.determination import Identifiability, identifiability
-from swashplate.identification.drive_model import (
-    DriveModel,
+from swashplate.identification.drive_model import DriveModel, with_card_filter
+from swashplate.identification.intervals import Estimate, uncertainty_of, weighed
+from swashplate.identification.model import EquationModel, Model, OwnModel
+from swashplate.identification.model_setup import ModelSetup
+from swashplate.identification.problem import Loss, Problem
+from swashplate.identification.setup import FreeParameters, Setup, Stage
+from swashplate.identification.solving import Progress, Solution, sobol_starts, solve, solve_from
+from swashplate.identification.stage_fit import Interval, StageFit
+from swashplate.identification.stages import (
     Parameters,
     configuration,
+    smooth,
     stage_problem,
     start_currents_of,
-    with_card_filter,
     with_estimates,
 )
-from swashplate.identification.intervals import (
-    Estimate,
-    Interval,
-    Uncertainty,
-    stage_uncertainty,
-    weighed,
-)
-from swashplate.identification.model import EDGE, EquationModel, Model, OwnModel
-from swashplate.identification.problem import LinearisedFit, Loss, Problem, linearised_fit
-from swashplate.identification.setup import FreeParameters, ModelSetup, Setup, Stage
-from swashplate.identification.solving import Progress, Solution, sobol_starts, solve, solve_from
 from swashplate.identification.unknowns import Prior
-from swashplate.identification.validation import RunQuality, run_qualities
 from swashplate.parameters.definitions import columns_of
 from swashplate.parameters.parameter_set import ParameterSet
 from swashplate.parameters.rules import SIDES
 from swashplate.progress import LOGGER, working
-from swashplate.results import Result, Tabular
-from swashplate.tables import count, listed
+from swashplate.results import Tabular
+from swashplate.tables import Table, count, listed
 
 if TYPE_CHECKING:
     import polars
 
-    from swashplate.tables import Table
-
-P = TypeVar("P", bound=Parameters)
 Array = NDArray[np.float64]
 
 OTHERS = 6
@@ -123,107 +114,6 @@ class Search:
     """Called with the stage, each result and how many there are by now."""
 
 
-@dataclass(frozen=True, eq=False)
-class StageFit(Result):
-    """What one stage found, what its data tell of its unknowns, and how good the fit is."""
-
-    stage: Stage
-    problem: Problem
-    solution: Solution
-    parameters: Parameters
-    """The drive, or the model of one's own, with what was found."""
-    starts: tuple[Solution, ...] = ()
-    """How each start ended, where there was more than one."""
-    earlier: tuple[StageFit, ...] = field(default=(), repr=False)
-    """The stages before, whose results this one takes for granted."""
-    stored: tuple[Interval, ...] | None = field(default=None, repr=False)
-    """What is known of each unknown's error, if it was computed before, such as by the fit that a
-    folder holds."""
-
-    @property
-    def values(self) -> dict[str, float]:
-        """The unknowns by name, in their units."""
-        return self.problem.unknowns.values(self.solution.vector)
-
-    @property
-    def drive(self) -> Drive:
-        """The drive with what was found; an `InputError` if it is a model of one's own."""
-        if isinstance(self.parameters, ModelSetup):
-            raise InputError(f"{self.parameters.name} is a model of your own, no drive.")
-        return Drive(self.parameters)
-
-    @cached_property
-    def linearised(self) -> LinearisedFit:
-        """Residuals and derivatives at the optimum."""
-        return linearised_fit(self.problem, self.solution.vector, self.solution.loss)
-
-    @cached_property
-    def identifiability(self) -> Identifiability:
-        """Which unknowns the tests determine."""
-        fit, names = self.linearised, self.problem.unknowns.names
-        fixed = {k: v for k, v in self.parameters.numbers.items() if k not in names}
-        try:
-            quoted = self.uncertainty.quoted.matrix
-        except InputError:  # too few samples to tell the noise from
-            quoted = None
-        return identifiability(
-            fit.triangle, fit.variables, covariance=quoted, tolerance=fit.tolerance, fixed=fixed
-        )
-
-    @cached_property
-    def uncertainty(self) -> Uncertainty:
-        """Errors of the estimates; an `InputError` if there are no more samples than unknowns."""
-        return stage_uncertainty(self)
-
-    @cached_property
-    def intervals(self) -> tuple[Interval, ...]:
-        """What is known of each unknown's error: stored, or as `uncertainty` has it.
-
-        With no more samples than unknowns, no unknown has an interval.
-        """
-        if self.stored is not None:
-            return self.stored
-        try:
-            estimates = self.uncertainty.estimates
-        except InputError:
-            return (Interval("undetermined"),) * len(self.problem.unknowns)
-        return tuple(
-            Interval(each.status, each.standard_error, each.lower, each.upper) for each in estimates
-        )
-
-    def _interval(self, number: int) -> Interval:
-        return self.intervals[number]
-
-    @cached_property
-    def estimates(self) -> tuple[Estimate, ...]:
-        """Each unknown with its value; its interval is computed when it is first asked for."""
-        point = self.problem.unknowns.at(self.solution.vector)
-        values = point.estimates.tolist()
-        return tuple(
-            Estimate(name, values[number], unknown.unit, partial(self._interval, number))
-            for number, (name, unknown) in enumerate(zip(point.names, point, strict=True))
-        )
-
-    @cached_property
-    def runs(self) -> tuple[RunQuality, ...]:
-        """Quality of each channel of each run that was fitted."""
-        return run_qualities(self.problem, self.solution.vector)
-
-    def bounds_reached(self) -> tuple[str, ...]:
-        """Sentences on unknowns of the machine that ended at a bound, and what to do about it."""
-        point = self.problem.unknowns.at(self.solution.vector)
-        ends = {-1: "lower", 1: "upper"}
-        return tuple(
-            f"{each.name} ended at its {ends[side]} bound: {self.stage.beyond(each, side)}."
-            for each, side in zip(point, point.at_bound.tolist(), strict=True)
-            if each.run is None and side
-        )
-
-    def tables(self) -> list[Table]:
-        """Estimates with their intervals, then the errors of each run."""
-        return [tables.estimates_table(self), *tables.runs_tables(self.runs)]
-
-
 class Estimated(Tabular, ABC):
     """A result with estimates by name: ``result["Z8"].value``, ``result["Z16_plus"].interval``."""
 
@@ -247,7 +137,7 @@ class Estimated(Tabular, ABC):
             raise UnknownNameError(f"{name} has two directions: ask for {' or '.join(sides)}.")
         near = get_close_matches(str(name), self.estimates, 1)
         meant = f" (did you mean {near[0]}?)" if near else ""
-        known = ", ".join(each for each in self.estimates if "(" not in each)
+        known = ", ".join(key for key, each in self.estimates.items() if each.run is None)
         raise UnknownNameError(f"There is no parameter '{name}'{meant}; there are {known}.")
 
     def __contains__(self, name: object) -> bool:
@@ -293,7 +183,7 @@ class Fit(Estimated):
     @cached_property
     def estimates(self) -> Mapping[str, Estimate]:
         """Every number of the machine by name, estimated or fixed, and those of single runs."""
-        return tables.estimates_of(self)
+        return tables.estimates_by_name(self.stages)
 
     def to_polars(self) -> polars.DataFrame:
         """What was estimated, one row for each parameter, SI.
@@ -301,7 +191,7 @@ class Fit(Estimated):
         Columns are stage, parameter, unit, nominal, value, lower and upper (ends of the 95 %
         interval), standard_error and status.
         """
-        return tables.all_estimates(self).to_polars()
+        return tables.all_estimates(self.stages).to_polars()
 
     def stage(self, name: str) -> StageFit:
         """The stage of a name; an `UnknownNameError` if there is none."""
@@ -324,12 +214,13 @@ class Fit(Estimated):
         said = list(self.doubts)
         for part in map(tables.stage_part, self.stages):
             said += [*part.remarks, *part.sentences]
-        names = {each for stage in self.stages for each in stage.problem.unknowns.names}
-        if jumps := sum(each.startswith(EDGE) for each in names):
-            many = count(jumps, "time")
+        unknowns = [unknown for stage in self.stages for unknown in stage.problem.unknowns]
+        jumps = {unknown.label for unknown in unknowns if unknown.kind == "instant"}
+        if jumps:
+            many = count(len(jumps), "time")
             said.append(f"Commands jump {many} between two samples: when is estimated.")
-        said += tables.single_runs_line(self)
-        fixed = tables.fixed_part(self)
+        said += tables.single_runs_line(self.stages)
+        fixed = tables.fixed_part(self.stages, self.nominal)
         return (*said, *fixed.remarks, *fixed.sentences)
 
 
@@ -397,28 +288,24 @@ def fit(
     runs = tests.select(role="fit") if isinstance(tests, Campaign) else tuple(tests)
     if not runs:
         raise InputError("There is no run to fit.")
-    nominal = model.parameters if isinstance(model, Drive) else model
     doubts = refuse_unsound(spike_findings(runs, loss))
     if isinstance(tests, Campaign):
         doubts += refuse_unsound(spike_findings(tests.select(role="validate"), "linear"))
-    if not isinstance(nominal, ParameterSet):
-        if not isinstance(nominal, ModelSetup):
-            entries = free if isinstance(free, Mapping) else {}
-            nominal = ModelSetup(nominal, entries, "", tuple(channels), noise or {}, fixed or {})
-        doubts += refuse_unsound(check_model(runs, nominal))
-        nominal = nominal if nominal.numbers else nominal.nominal(runs)
-        free = nominal.setup
+    stated: _Stated
+    if isinstance(model, Drive):
+        stated = _of_drive(model.parameters, free, runs)
+    elif isinstance(model, ParameterSet):
+        stated = _of_drive(model, free, runs)
+    elif isinstance(model, ModelSetup):
+        stated = _of_model(model, runs)
     else:
-        if free is None:
-            raise InputError(
-                "A fit of a drive needs to know what is free, such as 'hoist' or {'Z8': (0.5, 2)}; "
-                "swashplate.identify takes drive and fit configuration from the campaign."
-            )
-        free = configuration(free, runs)
-        nominal, changed = with_card_filter(free.card_filter, runs, nominal)
-        doubts += refuse_unsound(check_runs(runs, smooth(nominal)))
-        doubts += refuse_unsound(unfitted_currents(runs, free))
-        doubts += changed
+        entries = free if isinstance(free, Mapping) else {}
+        user_defined = ModelSetup(
+            model, entries, channels=tuple(channels), noise=noise or {}, fixed=fixed or {}
+        )
+        stated = _of_model(user_defined, runs)
+    nominal, setup = stated.nominal, stated.setup
+    doubts += stated.doubts
 
     def solved(stage: Stage, problem: Problem) -> Solved:
         def seen(now: Progress) -> None:
@@ -441,10 +328,41 @@ def fit(
         return result
 
     with working(f"Fitting {nominal.name}"):
-        runs, between = settle(runs, smooth(nominal), free, loss=loss, threads=threads)
+        runs, between = settle(runs, smooth(nominal), setup, loss=loss, threads=threads)
         doubts += between
-        stages = staged(free, nominal, runs, solved, threads=threads)
-    return Fit(free, nominal, tuple(runs), stages, doubts)
+        stages = staged(setup, nominal, runs, solved, threads=threads)
+    return Fit(setup, nominal, tuple(runs), stages, doubts)
+
+
+class _Stated(NamedTuple):
+    """What is to be fitted, and what is doubtful about it."""
+
+    nominal: Parameters
+    setup: Setup
+    doubts: tuple[str, ...]
+
+
+def _of_drive(
+    parameters: ParameterSet, free: FreeParameters | None, runs: Sequence[Experiment]
+) -> _Stated:
+    """A drive, the card's filter in the form that is fitted; unsound runs are refused."""
+    if free is None:
+        raise InputError(
+            "A fit of a drive needs to know what is free, such as 'hoist' or {'Z8': (0.5, 2)}; "
+            "swashplate.identify takes drive and fit configuration from the campaign."
+        )
+    setup = configuration(free, runs)
+    nominal, changed = with_card_filter(setup.card_filter, runs, parameters)
+    doubts = refuse_unsound(check_runs(runs, smooth(nominal)))
+    doubts += refuse_unsound(unfitted_currents(runs, setup))
+    return _Stated(nominal, setup, doubts + changed)
+
+
+def _of_model(model: ModelSetup, runs: Sequence[Experiment]) -> _Stated:
+    """A user-defined model with its numbers before the fit; unsound runs are refused."""
+    doubts = refuse_unsound(check_model(runs, model))
+    nominal = model if model.numbers else model.nominal(runs)
+    return _Stated(nominal, nominal.setup, doubts)
 
 
 def staged(
@@ -457,7 +375,7 @@ def staged(
 ) -> tuple[StageFit, ...]:
     """The stages of a set-up, each from what the ones before found, until one is interrupted."""
     parameters, stages, starts = smooth(nominal), list[StageFit](), dict[str, Mapping[str, float]]()
-    edges = dict[str, Prior]()
+    instants = dict[tuple[str, str], Prior]()
     for stage in setup.stages:
         uncertain = setup.standard_uncertainty
         problem = stage_problem(
@@ -467,7 +385,7 @@ def staged(
             threads=threads,
             uncertain=uncertain,
             starts=starts,
-            edges=edges,
+            instants=instants,
         )
         result = solved(stage, problem)
         problem, vector = result.problem, result.solution.vector
@@ -488,25 +406,26 @@ def staged(
             break
         # what was stored has the priors of the stages after it, too
         if stage is not setup.stages[-1] and result.intervals is None:
-            edges |= _edges_found(stages[-1])
+            instants |= _instants_found(stages[-1])
     return tuple(stages)
 
 
-def _edges_found(stage: StageFit) -> dict[str, Prior]:
-    """What a stage found of the instants of edges, by the unknowns' names."""
+def _instants_found(stage: StageFit) -> dict[tuple[str, str], Prior]:
+    """What a stage found of the instants of edges, by run and name."""
     unknowns = stage.problem.unknowns
-    own = [k for k, each in enumerate(unknowns) if each.name.startswith(EDGE)]
-    if not own:
+    numbers = [k for k, unknown in enumerate(unknowns) if unknown.kind == "instant"]
+    if not numbers:
         return {}
-    values, quoted = unknowns.at(stage.solution.vector).estimates, stage.uncertainty.quoted
-    found, errors = dict[str, Prior](), quoted.standard_errors * unknowns.scales
-    for k in own:
-        known = unknowns[k].prior
-        assert known is not None
-        error = min(float(errors[k]), known.deviation)
-        found[unknowns.names[k]] = Prior(
-            float(values[k]), error if error > 0.0 else known.deviation
-        )
+    values, quoted = unknowns.at(stage.solution.vector).estimates, uncertainty_of(stage).quoted
+    found = dict[tuple[str, str], Prior]()
+    errors = quoted.standard_errors * unknowns.scales
+    for k in numbers:
+        unknown = unknowns[k]
+        assert unknown.prior is not None
+        assert unknown.run is not None
+        known = unknown.prior.deviation
+        error = min(float(errors[k]), known)
+        found[unknown.run, unknown.name] = Prior(float(values[k]), error if error > 0.0 else known)
     return found
 
 
@@ -661,21 +580,11 @@ def _explained(problem: Problem, solution: Solution) -> bool:
     return isfinite(solution.cost) and not _unexplained(problem, solution)
 
 
-def smooth(parameters: P) -> P:
-    """The set with the decay's switch split within the step; a model of one's own has none.
-
-    Sampled, as published, it makes the current jump by up to 0.7 mA as any of the card's parameters
-    varies, and a fit ends where it was caught (docs/decisions/0008).
-    """
-    if isinstance(parameters, ParameterSet):
-        return replace(parameters, card_switch="split")
-    return parameters
-
-
 def _origin(stage: Stage, problem: Problem, limits: Mapping[str, float]) -> dict[str, str]:
     """Fingerprints of all that the result of a start depends on."""
     own = repr(problem.model) if isinstance(problem.model, OwnModel) else ""
-    known: object = (own, problem.start.tolist(), sorted(problem.fixed.items()))
+    fixed = sorted(problem.fixed.items()), sorted(problem.zeros.items())
+    known: object = (own, problem.start.tolist(), fixed)
     if isinstance(problem.model, DriveModel):
         drive = problem.model.parameters
         forms = drive.pressure_root, drive.coulomb_sign, drive.rate, sorted(drive.options)

@@ -20,13 +20,15 @@ from swashplate.executors import Executor, Serial
 from swashplate.identification.assessment import Identification, versions
 from swashplate.identification.between_samples import doubt
 from swashplate.identification.data_checks import refuse_unsound, spike_findings
-from swashplate.identification.drive_model import Parameters, setup_of
-from swashplate.identification.fitting import Fit, Search, StageFit, fit
+from swashplate.identification.fitting import Fit, Search, fit
 from swashplate.identification.model import Model
+from swashplate.identification.model_setup import ModelSetup
 from swashplate.identification.problem import Loss
 from swashplate.identification.profiles import Profile, profiles_of
 from swashplate.identification.resampling import cross_validate
-from swashplate.identification.setup import FreeParameters, ModelSetup, Setup
+from swashplate.identification.setup import FreeParameters, Setup
+from swashplate.identification.stage_fit import StageFit
+from swashplate.identification.stages import Parameters, setup_of
 from swashplate.identification.verdict import REQUIRED
 from swashplate.parameters.files import named_set
 from swashplate.parameters.parameter_set import ParameterSet
@@ -267,10 +269,11 @@ def _stated(
 
 def _check_profiles(result: Fit, profiles: Sequence[str]) -> None:
     """Refuse names of profiles that the fit does not estimate."""
-    known = [name for stage in result.stages for name in stage.problem.unknowns.names]
+    unknowns = [unknown for stage in result.stages for unknown in stage.problem.unknowns]
+    known = [unknown.label for unknown in unknowns]
     for name in profiles:
         if name != "all" and name not in known:
-            machine = ", ".join(each for each in known if "(" not in each)
+            machine = ", ".join(unknown.label for unknown in unknowns if unknown.run is None)
             raise InputError(f"There is no parameter '{name}'; there are {machine}.")
 
 

@@ -4,14 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cached_property, partial
 from math import inf, log
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Literal, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from swashplate.errors import InputError
 from swashplate.identification.drive_model import (
     LIMIT_COLUMNS,
     LIMITS,
@@ -26,6 +27,7 @@ from swashplate.identification.effects import (
     slopes_by,
     slopes_by_earlier,
 )
+from swashplate.identification.interval_ends import CheckedEnd, checked_ends
 from swashplate.identification.noise import (
     Covariance,
     NoiseColour,
@@ -34,46 +36,20 @@ from swashplate.identification.noise import (
     spectral_covariance,
 )
 from swashplate.identification.problem import LinearisedFit, Problem, linearised_fit
-from swashplate.identification.profiles import CheckedEnd, checked_ends
+from swashplate.identification.stage_fit import Interval, StageFit, Status, once_per_stage
 from swashplate.identification.unknowns import Unknowns
 from swashplate.results import Result, short
 from swashplate.tables import percent
 
-if TYPE_CHECKING:
-    from swashplate.identification.fitting import StageFit
-
 Array = NDArray[np.float64]
 Systematic = Mapping[str, Array]
 """(K,) changes of the solver's vector for a standard uncertainty of each systematic effect."""
-Status = Literal[
-    "estimated",
-    "at its lower bound",
-    "at its upper bound",
-    "undetermined",
-    "no lower end",
-    "no upper end",
-    "from the forces",
-    "fixed",
-]
-"""How an estimate came about: ``"from the forces"`` are the solenoids' coefficients that stand for
-estimated forces, ``"fixed"`` is what no stage moved."""
 DECADES = 100.0
 """Factor each way from which an interval says nothing; for an unknown that is not logarithmic, half
 width in its scales."""
 LEAST = 1e-6
 """Smallest worth of a prior: residuals that are all but zero leave it its say on what they leave
 open."""
-
-
-class Interval(NamedTuple):
-    """What is known of the error of an estimate."""
-
-    status: Status
-    standard_error: float | None = None
-    """None unless estimated."""
-    lower: float | None = None
-    """None if there is no end."""
-    upper: float | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,6 +67,8 @@ class Estimate(Result):
     name: str
     value: float
     unit: str = ""
+    run: str | None = None
+    """The experiment that it belongs to, None for one of the machine."""
     source: Interval | Callable[[], Interval] = field(
         default_factory=lambda: Interval("undetermined"), repr=False
     )
@@ -208,8 +186,8 @@ def estimates(
             float(lower[k]) if told and not below else None,
             float(upper[k]) if told and not above else None,
         )
-        value = float(variables.estimates[k])
-        made.append(Estimate(name, value, variables.items[k].unit, interval))
+        value, unknown = float(variables.estimates[k]), variables.items[k]
+        made.append(Estimate(name, value, unknown.unit, unknown.run, interval))
     return tuple(made)
 
 
@@ -414,8 +392,15 @@ def uncertainty(
     )
 
 
-def stage_uncertainty(stage: StageFit) -> Uncertainty:
-    """Errors of a stage's estimates, what it takes for granted and checked ends taken in."""
+@once_per_stage
+def uncertainty_of(stage: StageFit) -> Uncertainty:
+    """Errors of a stage's estimates, what it takes for granted and checked ends taken in.
+
+    Raises
+    ------
+    InputError
+        If there are no more samples than unknowns.
+    """
     problem, vector, handed = stage.problem, stage.solution.vector, []
     effects = effects_of(stage)
     systematic = dict(effects.systematic)
@@ -426,18 +411,65 @@ def stage_uncertainty(stage: StageFit) -> Uncertainty:
     for earlier in stage.earlier:
         if follows_card(stage, earlier):
             slopes = slopes_by_earlier(stage, earlier)
-            handed.append(Handed(earlier.uncertainty.sampled, slopes, earlier.stage.name))
+            known = uncertainty_of(earlier)
+            handed.append(Handed(known.sampled, slopes, earlier.stage.name))
             # an effect acts on this stage by itself, and through what it does to others
-            for effect, change in earlier.uncertainty.systematic.items():
+            for effect, change in known.systematic.items():
                 systematic[effect] = systematic.get(effect, 0.0) + slopes @ change
     found = uncertainty(stage.linearised, handed=handed, systematic=systematic, runs=effects.runs)
     found = replace(found, priors=prior_sentences(problem.unknowns, vector, found.quoted))
     if not found.noisy:
         return found
     half, fit = reach(found.own), released(stage.linearised)
-    first = [unknown.targets[0].startswith(tuple(LIMITS)) for unknown in problem.unknowns]
-    ends = checked_ends(problem, vector, fit, half, np.flatnonzero(first).tolist())
+    limits = [
+        number
+        for number, unknown in enumerate(problem.unknowns)
+        if unknown.kind == "parameter" and unknown.targets[0].startswith(tuple(LIMITS))
+    ]
+    ends = checked_ends(problem, vector, fit, half, limits)
     return replace(found, ends=tuple(ends))
+
+
+@once_per_stage
+def intervals_of(stage: StageFit) -> tuple[Interval, ...]:
+    """What is known of the error of each unknown of a stage: stored, or as its uncertainty has it.
+
+    With no more samples than unknowns, no unknown has an interval.
+    """
+    if stage.stored is not None:
+        return stage.stored
+    try:
+        known = uncertainty_of(stage).estimates
+    except InputError:
+        return (Interval("undetermined"),) * len(stage.problem.unknowns)
+    return tuple(
+        Interval(estimate.status, estimate.standard_error, estimate.lower, estimate.upper)
+        for estimate in known
+    )
+
+
+@once_per_stage
+def estimates_of(stage: StageFit) -> tuple[Estimate, ...]:
+    """Each unknown of a stage with its value, in their order.
+
+    The intervals are computed when one of them is first asked for, unless they are stored.
+    """
+    point = stage.problem.unknowns.at(stage.solution.vector)
+    values = point.estimates.tolist()
+    return tuple(
+        Estimate(
+            unknown.label,
+            values[number],
+            unknown.unit,
+            unknown.run,
+            partial(_interval_of, stage, number),
+        )
+        for number, unknown in enumerate(point)
+    )
+
+
+def _interval_of(stage: StageFit, number: int) -> Interval:
+    return intervals_of(stage)[number]
 
 
 def released(fit: LinearisedFit) -> LinearisedFit:
@@ -499,7 +531,7 @@ def unseen_limits(stages: Sequence[StageFit]) -> dict[str, float]:
     runs = {run.name: run for stage in stages for run in stage.problem.experiments}
     unseen = limits_unreached(list(runs.values()), stages[-1].drive.parameters)
     for stage in stages:
-        for estimate in stage.estimates:
+        for estimate in estimates_of(stage):
             one_sided = estimate.upper is None and estimate.lower is not None
             if estimate.name in LIMIT_COLUMNS and one_sided:
                 unseen.setdefault(estimate.name, float(estimate.lower or 0.0))

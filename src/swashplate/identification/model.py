@@ -11,7 +11,7 @@ from typing import Any, NamedTuple, Protocol, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from swashplate.campaign.experiment import Experiment
+from swashplate.campaign.experiment import Edge, Experiment
 from swashplate.equations import Model as Equations
 from swashplate.equations import instance_of, parameter_paths, state_paths
 from swashplate.equations.fields import made
@@ -20,16 +20,11 @@ from swashplate.equations.marching.observation import Observation, ObservedRecor
 from swashplate.equations.marching.record import Record, even_rate, on_grid
 from swashplate.errors import DomainError, InputError
 from swashplate.results import Result, short
-from swashplate.simulation.instance import START
 from swashplate.simulation.residuals import Ready
 
 Array = NDArray[np.float64]
-OFFSET = "offset "
-"""What the name of a channel's free zero begins with."""
-EDGE = "edge at "
-EDGE_STEP = 1e-5
-"""What the name of the instant of an edge of the command begins with, see `InputSignal.edges`, and
-the step of its differences. [s]"""
+INSTANT_STEP = 1e-5
+"""Step of the differences by the instant of an edge of the command, see `InputSignal.edges`. [s]"""
 
 
 class Model(Protocol):
@@ -193,6 +188,10 @@ class EquationModel(ABC):
     def ready(self, values: Mapping[str, float], experiment: Experiment, asked: Asked) -> Ready:
         """The model with numbers; columns as the engine names them."""
 
+    def instants_of(self, experiment: Experiment) -> Mapping[str, Edge]:
+        """Edges of the command whose instants the model takes, by the names of these."""
+        return {}
+
     def moves(self, name: str) -> Mapping[str, float]:
         """Derivatives by a name of the columns that it moves."""
         return {name: 1.0}
@@ -214,8 +213,8 @@ class EquationModel(ABC):
         """An experiment as the march sees it, with the edges of its command where `values` say.
 
         With factors (m,) on the residuals of the channels that count, against what was measured;
-        without, all channels that the model gives, against zero. `offsets` are the names of the
-        free zeros.
+        without, all channels that the model gives, against zero. `offsets` are the
+        channels whose zero is free.
         """
         signals, seen = self.signals_of(experiment), []
         for name in signals if weights is None else weights:
@@ -223,7 +222,7 @@ class EquationModel(ABC):
             against: tuple[Array, Array | float] = np.zeros(channel.time.size), 1.0
             if weights is not None:
                 against = channel.values, weights[name]
-            seen.append(Observation(signal, channel.time, *against, f"{OFFSET}{name}" in offsets))
+            seen.append(Observation(signal, channel.time, *against, name in offsets))
         by, record, others = self.driven(experiment, values)
         return ObservedRecord(record, seen, by, experiment.begins, others)
 
@@ -243,12 +242,22 @@ class EquationModel(ABC):
         flat, by, rows = found.residuals, found.columns @ chain, observed.rows_of
         channels = enumerate(self.signals_of(experiment))
         made = {name: Linearised(flat[rows(k)], by[rows(k)]) for k, name in channels}
+        instants = self.instants_of(experiment)
         for place, name in enumerate(names):
-            if name.startswith(EDGE):
-                later = self.simulate({**values, name: values[name] + EDGE_STEP}, experiment)
+            if name in instants:
+                later = self.simulate({**values, name: values[name] + INSTANT_STEP}, experiment)
                 for channel, part in made.items():
-                    part.by[:, place] = (later[channel] - part.values) / EDGE_STEP
+                    part.by[:, place] = (later[channel] - part.values) / INSTANT_STEP
         return made
+
+
+def states_started_by(model: Equations, name: str) -> list[str]:
+    """Paths of the states that a name such as ``"start.PATH"`` sets; none if it is none such."""
+    return [
+        f"{model.prefix(part)}{state}"
+        for part in range(len(model.parts))
+        for state in started_by(model, part, name)
+    ]
 
 
 @dataclass(frozen=True, eq=False)
@@ -256,7 +265,7 @@ class OwnModel(Result, EquationModel):
     """A model of equations whose parameters, by their paths, are the unknowns.
 
     ``"start.PATH"`` is a number of the state at the first sample, by its path or as `free_start` of
-    the model has it: an unknown of each run. ``"offset NAME"`` is the free zero of a channel.
+    the model has it: an unknown of each run.
 
     A channel is compared with the signal of its name. Of the model's external signals those that
     are channels of an experiment are taken from there; the one that is left is its input.
@@ -284,10 +293,15 @@ class OwnModel(Result, EquationModel):
     substeps: int | None = None
     """Steps of the model a sample; by default one."""
 
+    @property
+    def signals(self) -> list[str]:
+        """Names of the signals that it gives."""
+        names = [name for part in self.model.parts for name in part.signal_names]
+        return [*names, *self.model.links, *self.model.integrals]
+
     def signals_of(self, experiment: Experiment) -> Mapping[str, str]:
         """Signal of the model for each channel that it gives; one of none is refused."""
-        known = [name for part in self.model.parts for name in part.signal_names]
-        known += [*self.model.links, *self.model.integrals]
+        known = self.signals
         found = {name: name for name in experiment.channels if name in known}
         if not found:
             raise InputError(
@@ -340,9 +354,9 @@ class OwnModel(Result, EquationModel):
             measured = experiment[channel]
             begin[path] = float(measured.values[int(np.argmax(measured.used))])
         for name, value in values.items():
-            for i in range(len(model.parts)):
-                begin |= {f"{model.prefix(i)}{s}": value for s in started_by(model, i, name)}
-            if name not in paths and not name.startswith((START, OFFSET)):
+            started = states_started_by(model, name)
+            begin |= dict.fromkeys(started, value)
+            if name not in paths and not started:
                 known = ", ".join(paths)
                 raise InputError(f"{model.name} has no parameter '{name}'; it has {known}.")
         for path in begin:

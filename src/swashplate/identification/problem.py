@@ -24,8 +24,6 @@ from swashplate.identification.arrow import (
     whitening,
 )
 from swashplate.identification.model import (
-    EDGE,
-    OFFSET,
     Asked,
     EquationModel,
     Linearised,
@@ -82,6 +80,8 @@ class Problem(Result):
     """What one unit of residual is, by channel: its noise, in its unit."""
     fixed: Mapping[str, float] = field(default_factory=dict)
     """Values of the model's names that are not unknown but differ from the model's own."""
+    zeros: Mapping[str, float] = field(default_factory=dict)
+    """Zeros of channels that are known, by the channel. [unit]"""
     uncertain: tuple[Mapping[str, float], ...] = ()
     """Standard uncertainties of fixed numbers, by the model's names; those of one mapping are off
     together. [unit]"""
@@ -194,9 +194,8 @@ class Problem(Result):
 
     def outputs(self, vector: Array, number: int) -> Mapping[str, Array]:
         """Simulated samples of the fitted channels of one experiment, offsets included."""
-        experiment, values = self.experiments[number], self._values(vector, number)
+        experiment, zeros = self.experiments[number], self._zeros(vector, number)
         outputs = simulated(self.model, self.model_values(vector, number), experiment)
-        zeros = {name: values.get(f"{OFFSET}{name}", 0.0) for name in self.weights[number]}
         return {name: part_of(outputs, experiment, name) + zero for name, zero in zeros.items()}
 
     def linearised(self, vector: Array, number: int) -> Mapping[str, Linearised]:
@@ -205,27 +204,28 @@ class Problem(Result):
         These are by the unknowns that can move the experiment, `Unknowns.columns`.
         """
         experiment, run = self.experiments[number], self.experiments[number].name
-        values, own = self._values(vector, number), self.model_values(vector, number)
-        names = [name for name in self.unknowns.targets(vector, run) if name in own]
-        outputs = linearised(self.model, own, experiment, names)
+        values, zeros = self.model_values(vector, number), self._zeros(vector, number)
+        names = list(self.unknowns.targets(vector, run))
+        outputs = linearised(self.model, values, experiment, names)
         chain, made = self.unknowns.chain(vector, names, run), {}
         for name, weight in self.weights[number].items():
-            channel, zero = experiment[name], f"{OFFSET}{name}"
-            output = part_of(outputs, experiment, name)
-            residual = output.values + values.get(zero, 0.0) - channel.values
+            channel, output = experiment[name], part_of(outputs, experiment, name)
+            residual = output.values + zeros[name] - channel.values
             by = output.by @ chain
-            by += self.unknowns.chain(vector, [zero], run)
+            by += self.unknowns.zeros_chain(vector, [name], run)
             parts = self._compared(channel, residual), self._compared(channel, by)
             made[name] = Linearised(weight * parts[0], weight[:, None] * parts[1])
         return made
 
     def model_values(self, vector: Array, number: int) -> dict[str, float]:
         """Values by the model's names for one experiment; a channel's zero is none of them."""
-        zeros = [f"{OFFSET}{name}" for name in self.channels]
-        return {k: v for k, v in self._values(vector, number).items() if k not in zeros}
-
-    def _values(self, vector: Array, number: int) -> dict[str, float]:
         return {**self.fixed, **self.unknowns.targets(vector, self.experiments[number].name)}
+
+    def _zeros(self, vector: Array, number: int) -> dict[str, float]:
+        """Zero of each fitted channel of one experiment, 0 unless it is known or free."""
+        free = self.unknowns.zeros(vector, self.experiments[number].name)
+        zeros = {**self.zeros, **free}
+        return {name: zeros.get(name, 0.0) for name in self.weights[number]}
 
     def _compared(self, channel: Channel, rows: Array) -> Array:
         return rows if self.compare is None else self.compare(channel, rows)
@@ -245,9 +245,11 @@ class Problem(Result):
         """The triangular factor of [J r] of one experiment, without ever holding J."""
         ready, observed = self._ready(vector, number)
         experiment, (_, names, zeros, asked, by) = self.experiments[number], self._own[number]
-        factor, chain = ready.triangle(observed).factor, partial(self.unknowns.chain, vector)
-        jacobian = factor[:, : len(asked)] @ by @ chain(names, experiment.name)
-        jacobian += factor[:, len(asked) : -1] @ chain(zeros, experiment.name)
+        factor = ready.triangle(observed).factor
+        chain = self.unknowns.chain(vector, names, experiment.name)
+        jacobian = factor[:, : len(asked)] @ by @ chain
+        zeros_chain = self.unknowns.zeros_chain(vector, zeros, experiment.name)
+        jacobian += factor[:, len(asked) : -1] @ zeros_chain
         return self._block(number, np.column_stack([jacobian, factor[:, -1]]))
 
     def _block(self, number: int, rows: Array) -> Block:
@@ -258,28 +260,28 @@ class Problem(Result):
     def _marched(self) -> tuple[bool, ...]:
         """Whether the march itself makes the residuals of each experiment."""
         whole = self.compare is None and isinstance(self.model, EquationModel)
-        moved = {each.run for each in self.unknowns if each.name.startswith(EDGE)}
+        moved = {unknown.run for unknown in self.unknowns if unknown.kind == "instant"}
         return tuple(whole and each.name not in moved for each in self.experiments)
 
     def _ready(self, vector: Array, number: int) -> tuple[Ready, ObservedRecord]:
         """The model with the numbers of one experiment, and this as the march sees it."""
         experiment, (observed, _, _, asked, _) = self.experiments[number], self._own[number]
-        values, model = self._values(vector, number), cast("EquationModel", self.model)
-        offsets = [values.get(f"{OFFSET}{name}", 0.0) for name in self.weights[number]]
-        return model.ready(values, experiment, Asked(observed, asked, offsets)), observed
+        model, zeros = cast("EquationModel", self.model), self._zeros(vector, number)
+        request = Asked(observed, asked, list(zeros.values()))
+        return model.ready(self.model_values(vector, number), experiment, request), observed
 
     @cached_property
     def _own(self) -> list[tuple[ObservedRecord, list[str], list[str], list[str], Array]]:
         """Each experiment as the march of a model of equations sees it.
 
-        With the names of its unknowns and of its free zeros; the columns that the former ask for,
-        and the derivatives of these columns by them.
+        With the names of its unknowns and the channels whose zeros are free; the columns that the
+        former ask for, and the derivatives of these columns by them.
         """
         model, made = cast("EquationModel", self.model), []
         for experiment, weights in zip(self.experiments, self.weights, strict=True):
-            targets = self.unknowns.targets(self.start, experiment.name)
-            zeros = [zero for name in weights if (zero := f"{OFFSET}{name}") in targets]
-            names = [name for name in targets if name not in zeros]
+            names = list(self.unknowns.targets(self.start, experiment.name))
+            free = self.unknowns.zeros(self.start, experiment.name)
+            zeros = [name for name in weights if name in free]
             observed = model.observed(experiment, weights, zeros)
             made.append((observed, names, zeros, *model.columns(names)))
         return made

@@ -12,16 +12,22 @@ from numpy.typing import NDArray
 from swashplate.campaign.experiment import Experiment
 from swashplate.errors import DomainError, InputError
 from swashplate.executors import Executor, Serial
-from swashplate.identification import tables
-from swashplate.identification.drive_model import Parameters
 from swashplate.identification.fitting import Search, fit
 from swashplate.identification.problem import Loss
 from swashplate.identification.setup import Setup
 from swashplate.identification.solving import NO_EFFECT
-from swashplate.identification.validation import Measures, measures, predict, with_speeds
+from swashplate.identification.stage_fit import StageFit
+from swashplate.identification.stages import Parameters
+from swashplate.identification.validation import (
+    Measures,
+    measures,
+    pooled,
+    predict,
+    with_speeds,
+)
 from swashplate.progress import counted
 from swashplate.results import Result
-from swashplate.tables import Table
+from swashplate.tables import NONE, UNIT, Column, Table
 
 Array = NDArray[np.float64]
 
@@ -58,7 +64,7 @@ class CrossValidation(Result):
 
     def tables(self) -> list[Table]:
         """Errors held out, by channel, and the folds."""
-        return tables.folds_tables(self)
+        return folds_tables(self)
 
     def sentences(self) -> tuple[str, ...]:
         """What must be known besides the numbers."""
@@ -77,6 +83,40 @@ class CrossValidation(Result):
                     "prediction is not reliable."
                 )
         return tuple(said)
+
+
+def folds_tables(found: CrossValidation, stages: Sequence[StageFit] = ()) -> list[Table]:
+    """Errors held out, beside those of the fit to all runs if its stages are given; the folds."""
+    fitted_columns = "tpf" if stages else ""
+    whole = pooled(with_speeds(each for stage in stages for each in stage.runs))
+    held_out = Table(
+        "Cross-validation: each part predicted by a fit to the others",
+        (
+            Column("channel"),
+            Column("fit %", ".2f", "1", none="-"),
+            Column("RMSE held out", ".3g"),
+            Column("RMSE fitted", ".3g", none=NONE, of=fitted_columns),
+            UNIT,
+            Column("ratio", ".2f", "1", none=NONE, of=fitted_columns),
+            Column("samples", ",d", "1", of="pf"),
+        ),
+    )
+    for name, predicted in found.measures.items():
+        fitted = whole[name].rmse if name in whole else None
+        ratio = predicted.rmse / fitted if fitted else None
+        cells = (name, predicted.fit_percent, predicted.rmse, fitted, ratio)
+        held_out.add(*cells, predicted.samples, unit=found.units[name])
+    columns = (Column("fold", "d"), Column("held out", wrap=True), Column("fit to the others"))
+    folds = Table("Folds", (*columns, Column("fit % of those held out")))
+    for fold in found.folds:
+        state = "not fitted" if fold.failure else "converged" if fold.converged else "not converged"
+        state = f"{state}; loses {', '.join(fold.lost)}" if fold.lost else state
+        fits = (
+            f"{name} {'-' if each.fit_percent is None else f'{each.fit_percent:.2f}'} %"
+            for name, each in fold.measures.items()
+        )
+        folds.add(fold.number + 1, ", ".join(fold.held), state, ", ".join(fits) or NONE)
+    return [held_out, folds]
 
 
 ONE_WAY = 0.25

@@ -1,16 +1,16 @@
-"""What a fit is to find: of a drive, from TOML or packaged; of one's own model, from Python."""
+"""Fit configuration: what a fit is to find, in one stage or several.
+
+A drive's is written in TOML or packaged, and goes with the numbers of a `ParameterSet`. Of a
+user-defined model a `model_setup.ModelSetup` is both, the numbers and what is to be found: its
+`setup` is a fit configuration of one stage, so that all that comes after sees the same two things.
+"""
 
 from __future__ import annotations
 
-import sys
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Mapping, Sequence
 from functools import cache
-from importlib import import_module
 from importlib.resources import files
-from math import inf
 from pathlib import Path
-from traceback import extract_tb
 from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
@@ -18,32 +18,19 @@ from numpy.typing import NDArray
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
 
 from swashplate.campaign import ChannelKind
-from swashplate.campaign.experiment import Experiment
 from swashplate.campaign.schema import LARGEST_PRESSURE, Weight, Window
 from swashplate.documents import parse_toml, read_text, validated
 from swashplate.entries import Finite, Flag, NotNegative, Positive
-from swashplate.equations import Model as Equations
-from swashplate.equations.fields import check_mapping, is_real
-from swashplate.equations.model import parameter_paths
+from swashplate.equations.fields import is_real
 from swashplate.errors import (
-    FileError,
-    InputError,
-    MissingFileError,
     ParameterError,
-    SwashplateError,
-    UnknownNameError,
     meant,
 )
-from swashplate.identification.model import OFFSET, OwnModel, simulated
-from swashplate.identification.problem import Problem, noise_scales
-from swashplate.identification.solving import solve
-from swashplate.identification.unknowns import Prior, Unknown, Unknowns
+from swashplate.identification.unknowns import Prior, Unknown
 from swashplate.parameters.definitions import find
 from swashplate.parameters.parameter_set import ParameterSet
-from swashplate.parameters.plausible import check_plausible
 from swashplate.parameters.rules import SIDES
-from swashplate.results import Result, short
-from swashplate.simulation.instance import START
+from swashplate.results import short
 
 Array = NDArray[np.float64]
 _SETUPS = files("swashplate.identification").joinpath("setups")
@@ -108,9 +95,15 @@ class Forces(Entry):
     relative: Bounds = Field((0.5, 2.0), description="Bounds as factors on the nominal forces.")
 
     names: ClassVar = tuple(f"force_{side}_{k}" for side in SIDES for k in (1, 2, 3, 4))
-    """Names of the eight forces."""
+    """Names of the eight forces, in the order of `currents`."""
     columns: ClassVar = tuple(f"{symbol}_{side}" for side in SIDES for symbol in COEFFICIENTS)
     """The parameters that they stand for."""
+
+    @property
+    def currents(self) -> dict[str, float]:
+        """The effective current of each force by its name, those of `minus` below 0. [A]"""
+        currents = [*self.plus, *(-size for size in self.minus)]
+        return dict(zip(self.names, currents, strict=True))
 
     @property
     def _inverse(self) -> Array:
@@ -357,257 +350,3 @@ def setup_text(setup: Setup) -> str:
             stage["free"][name] = inline_table()
             stage["free"][name].update(entry)
     return dumps(content)
-
-
-# --- models of one's own --------------------------------------------------------------------------
-
-
-Range = tuple[float, float, float] | tuple[float, float, float, str]
-"""Lower bound, nominal value, upper bound, and the unit if it is said."""
-BY_ORDER = 10.0
-"""Ratio of positive bounds from which a range is searched by the logarithm."""
-
-
-@dataclass(frozen=True, eq=False)
-class ModelSetup(Result):
-    """A model of one's own and what is to be found of it, as set and `Setup` of a drive.
-
-    An entry of `free` is (low, nominal, high), (low, nominal, high, unit) or an `Unknown`. A range
-    of positive bounds, the upper one at least ten times the lower one, is searched by its
-    logarithm. ``"start.PATH"`` of a state and ``"offset CHANNEL"``, the zero of a sensor, are free
-    in each run by themselves.
-    """
-
-    model: Any
-    """A model of equations, an `OwnModel` of them with more said, or an object with `simulate`."""
-    free: Mapping[str, Any]
-    """What is to be found, by the model's names."""
-    name: str = ""
-    """For tables and files; the model's by default."""
-    channels: tuple[str, ...] = ()
-    """Those that are fitted; all that the model gives by default."""
-    noise: Mapping[str, float] = field(default_factory=dict)
-    """Standard deviation of a channel, where the campaign does not state it. [unit]"""
-    fixed: Mapping[str, float] = field(default_factory=dict)
-    """Values of names that are not free."""
-    standard_uncertainty: Mapping[str, StandardUncertainty] = field(default_factory=dict)
-    """What values of `fixed` may be off by, one standard deviation, also as ``"5 %"``."""
-    numbers: Mapping[str, float] = field(default_factory=dict)
-    """The model's numbers, nominal or fitted, those of single runs left out; see `nominal`."""
-    scales: Mapping[str, float] = field(default_factory=dict)
-    """What one unit of residual is, by channel: its noise. [unit]"""
-
-    def __post_init__(self) -> None:
-        for what in ("free", "noise", "fixed", "standard_uncertainty"):
-            check_mapping(what, getattr(self, what))
-        if isinstance(self.channels, str):
-            raise InputError(f"Give the channels as ('{self.channels}',).")
-        own = OwnModel(self.model) if isinstance(self.model, Equations) else self.model
-        if not callable(getattr(own, "simulate", None)):
-            raise InputError(
-                f"A {type(own).__name__} is no model: give a Model of equations, or an object with "
-                "simulate(values, experiment)."
-            )
-        equations = own.model if isinstance(own, OwnModel) else own
-        kind = getattr(equations, "name", None) or type(equations).__name__
-        name = self.name or str(kind).lower()
-        if not self.free:
-            raise InputError(f"Nothing of {name} is free: name what is to be found.")
-        if unknown := [each for each in self.standard_uncertainty if each not in self.fixed]:
-            raise InputError(
-                f"{unknown[0]} has a standard uncertainty but no value: name it in fixed, or give "
-                "it a prior if it is free."
-            )
-        if both := [each for each in self.free if each in self.fixed]:
-            raise InputError(f"{both[0]} of {name} is free and fixed: name it in one of them.")
-        numbers = (("noise", self.noise, 0.0), ("fixed value", self.fixed, -inf))
-        for what, given, least in numbers:
-            for key, number in given.items():
-                if not is_real(number) or not least < number < inf:
-                    must = "finite" if least < 0.0 else "above 0"
-                    raise InputError(
-                        f"{name}: the {what} of '{key}' is {number!r}, but must be {must}."
-                    )
-        free = {key: _unknown(key, each) for key, each in self.free.items()}
-        if isinstance(own, OwnModel):
-            targets = [name for unknown in free.values() for name in unknown.targets]
-            _check_names(own.model, "free", targets)
-            _check_names(own.model, "fixed", self.fixed)
-        ranges = equations.ranges if isinstance(equations, Equations) else {}
-        for key, definition in ranges.items():
-            if key in free:
-                for bound in (free[key].low, free[key].high):
-                    if not definition.holds(bound):
-                        raise ParameterError(f"{name}, a bound: {definition.broken(key, bound)}.")
-                    check_plausible(f"{name}, a bound: {key}", definition, bound)
-                check_plausible(f"{name}: {key}", definition, free[key].start)
-            if key in self.fixed:
-                check_plausible(f"{name}, fixed: {key}", definition, self.fixed[key])
-        for key, made in {"model": own, "name": name, "free": free}.items():
-            object.__setattr__(self, key, made)
-        _ = self.setup  # refuses what is no uncertainty
-
-    @classmethod
-    def from_file(cls, path: str | Path) -> ModelSetup:
-        """The set-up that a Python file states by its names ``model`` and ``free``.
-
-        Besides those it may have ``name``, ``channels``, ``noise``, ``fixed`` and
-        ``standard_uncertainty``. The file is executed, as a module that worker processes import as
-        well.
-
-        Raises
-        ------
-        FileError
-            If there is no such file, or a module of that name is another one.
-        InputError
-            If it lacks one of the names.
-        """
-        file = Path(path).resolve()
-        if not file.exists():
-            raise MissingFileError(f"There is no file {path}: name a Python file with a model.")
-        if not file.is_file() or file.suffix != ".py" or not file.stem.isidentifier():
-            raise FileError(f"{path} is no Python file with a model, such as valve.py.")
-        if str(file.parent) not in sys.path:
-            sys.path.insert(0, str(file.parent))
-        try:
-            module = import_module(file.stem)
-        except SystemExit as error:
-            sys.modules.pop(file.stem, None)
-            raise FileError(
-                f"{path} ended Python with sys.exit({error.code!r}) as it was loaded: guard what "
-                "the file does as a script by if __name__ == '__main__'."
-            ) from None
-        except Exception as error:  # the user's own code, which can raise anything
-            sys.modules.pop(file.stem, None)
-            own = [e.lineno for e in extract_tb(error.__traceback__) if e.filename == str(file)]
-            line = getattr(error, "lineno", None) or (own[-1] if own else None)
-            where = f"{path}, line {line}" if line else f"{path}"
-            raise FileError(f"{where}: {type(error).__name__}: {error}.") from None
-        if module.__file__ is None or Path(module.__file__).resolve() != file:
-            raise FileError(f"{path}: another module is called {file.stem}; rename the file.")
-        for name in ("model", "free"):
-            if not hasattr(module, name):
-                raise InputError(
-                    f"{path} has no '{name}': it needs model = Model(...) and free = "
-                    "{'lag': (0.005, 0.06, 0.5), ...}, lower bound, nominal value and upper bound."
-                )
-        known = ("model", "free", "name", "channels", "noise", "fixed", "standard_uncertainty")
-        try:
-            return cls(**{key: getattr(module, key) for key in known if hasattr(module, key)})
-        except SwashplateError as error:
-            raise type(error)(f"{path}: {error}") from None
-
-    @property
-    def setup(self) -> Setup:
-        """The set-up as that of a fit in stages, of which it has one."""
-        free = {
-            each.name: Free(bounds=(each.low, each.high), log=each.log, prior=each.prior)
-            for each in self.free.values()
-        }
-        stage = Stage(name=self.name, part="model", free=free)
-        content = {"title": self.name, "stages": (stage,)}
-        uncertain = {"standard_uncertainty": dict(self.standard_uncertainty)}
-        return validated(content | uncertain, Setup, self.name)
-
-    def nominal(self, experiments: Sequence[Experiment]) -> ModelSetup:
-        """The set-up with the numbers before a fit to some runs."""
-        had = dict.fromkeys(name for each in experiments for name in each.channels)
-        if strange := [each for each in self.noise if each not in had]:
-            raise InputError(
-                f"{self.name}: noise is stated for '{strange[0]}', but the channels are "
-                f"{', '.join(had) or 'none'}."
-            )
-        problem = self.problem(experiments)
-        numbers = {**self.fixed, **problem.unknowns.targets(problem.start, "")}
-        return replace(self, numbers=numbers, scales=problem.scales)
-
-    def problem(self, experiments: Sequence[Experiment], *, threads: int = 1) -> Problem:
-        """The problem that it states for some runs, one of which has a channel that is fitted."""
-        channels = tuple(self.channels) or self._given(experiments)
-        runs = [each for each in experiments if any(name in each.channels for name in channels)]
-        if not runs:
-            had = dict.fromkeys(name for each in experiments for name in each.channels)
-            raise InputError(
-                f"{self.name} is fitted to {', '.join(channels) or 'nothing'}, but the runs have "
-                f"{', '.join(had) or 'no channel'}."
-            )
-        for k, run in enumerate(runs):  # the noise of channels that the campaign does not state
-            noises = {
-                name: replace(channel, noise=channel.noise or self.noise.get(name))
-                for name, channel in run.channels.items()
-            }
-            runs[k] = replace(run, channels=noises)
-        of_runs = {each.name for run in experiments for each in self.own(run)}
-        machine = [each for each in self.free.values() if each.name not in of_runs]
-        return Problem(
-            self.model,
-            tuple(runs),
-            Unknowns((*machine, *(unknown for each in runs for unknown in self.own(each)))),
-            channels,
-            noise_scales(runs, channels),
-            dict(self.fixed),
-            tuple(
-                {name: deviation(each, self.fixed[name])}
-                for name, each in self.standard_uncertainty.items()
-            ),
-            threads if isinstance(self.model, OwnModel) else 1,
-        )
-
-    def _given(self, experiments: Sequence[Experiment]) -> tuple[str, ...]:
-        """Names of the channels that the model gives."""
-        values = {each.name: each.start for each in self.free.values()} | dict(self.fixed)
-        own = self.model.signals_of if isinstance(self.model, OwnModel) else None
-        given = [own(each) if own else simulated(self.model, values, each) for each in experiments]
-        return tuple(dict.fromkeys(name for each in given for name in each))
-
-    def own(self, experiment: Experiment) -> tuple[Unknown, ...]:
-        """The unknowns of a single run: where its state begins, and the zeros of its sensors."""
-        zeros = {f"{OFFSET}{name}" for name in experiment.channels}
-        states = (START,) if isinstance(self.model, OwnModel) else ()
-        free = [each for each in self.free.values() if each.run is None]
-        free = [each for each in free if each.name in zeros or each.name.startswith(states)]
-        return tuple(replace(each, run=experiment.name) for each in free)
-
-    def predicted(self, experiment: Experiment) -> Mapping[str, Array]:
-        """A run predicted from its input: for each channel (m,) samples at its stamps. [unit]
-
-        What is free in each run by itself, a beginning of the state or the zero of a sensor, is
-        estimated from this run; everything else is as it is.
-        """
-        own = tuple(each for each in self.own(experiment) if each.name not in self.numbers)
-        channels = tuple(name for name in self.scales if name in experiment.channels)
-        if not own:
-            found = simulated(self.model, self.numbers, experiment)
-            return {name: found[name] for name in channels}
-        known = channels, self.scales, self.numbers
-        problem = Problem(self.model, (experiment,), Unknowns(own), *known)
-        return problem.outputs(solve(problem).vector, 0)
-
-
-def _check_names(model: Equations, table: str, names: Iterable[str]) -> None:
-    """Refuse a name that the model's parameters do not have."""
-    paths = parameter_paths(model)
-    for name in names:
-        if name not in paths and not name.startswith((START, OFFSET)):
-            raise UnknownNameError(
-                f"{model.name} has no parameter '{name}', which {table} names"
-                f"{meant(name, paths)}; it has {', '.join(paths)}."
-            )
-
-
-def _unknown(name: str, entry: Range | Unknown) -> Unknown:
-    if isinstance(entry, Unknown):
-        if name not in (entry.name, *entry.sets):
-            raise InputError(
-                f"'{name}' is free as the parameter '{entry.name}': give both one name."
-            )
-        return entry
-    try:
-        low, start, high = (float(number) for number in entry[:3])
-        (unit,) = entry[3:] or ("",)
-    except (TypeError, ValueError):
-        raise InputError(
-            f"{name} is free as {entry!r}: give lower bound, nominal value and upper bound, and "
-            "the unit if you like, or an Unknown."
-        ) from None
-    return Unknown(name, start, low, high, str(unit), low > 0.0 and high >= BY_ORDER * low)

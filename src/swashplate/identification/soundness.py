@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections import Counter, defaultdict
-from collections.abc import Iterator, Sequence
-from typing import TYPE_CHECKING
+from collections import defaultdict
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,12 +27,11 @@ from swashplate.identification.discrepancy import (
     variance_function,
     window_weights,
     windowed,
+    without_runs,
 )
 from swashplate.identification.drive_model import DriveModel
-
-if TYPE_CHECKING:
-    from swashplate.identification.fitting import StageFit
-    from swashplate.identification.validation import RunQuality
+from swashplate.identification.stage_fit import StageFit
+from swashplate.identification.validation import RunQuality
 
 Array = NDArray[np.float64]
 
@@ -83,47 +82,117 @@ def outlying_runs(stages: Sequence[StageFit], predicted: Sequence[RunQuality]) -
     Notes
     -----
     Logarithms of the squared errors, each over what the variance function lets expect, are
-    compared with their median. Their robust deviation is joined with what is usual, as in
-    `discrepancy`; the limit is a quantile of Student's distribution, shared among the runs.
+    compared with their median; the run that is farthest above it is left out of the fit, so that
+    it does not spoil those of the others, and compared again, until one does not stand out. The
+    robust deviation is joined with what is usual, as in `discrepancy`; the limit is a quantile of
+    Student's distribution, shared among the runs.
     """
-    qualities = [*(each for stage in stages for each in stage.runs), *predicted]
     seen = set[str]()
-    for channel in dict.fromkeys(each.channel for each in qualities):
-        records = [
-            record
-            for each in qualities
-            if each.channel == channel and (record := record_of(each)) is not None
+    for stage in stages or (None,):
+        channels = [each.channel for each in predicted]
+        if stage is not None:
+            channels = list(stage.problem.channels)
+        for channel in dict.fromkeys(channels):
+            for finding in _of_channel(stage, channel, predicted):
+                if finding.run not in seen:
+                    seen.add(str(finding.run))
+                    yield finding
+
+
+def _of_channel(
+    stage: StageFit | None, channel: str, predicted: Sequence[RunQuality]
+) -> Iterator[Finding]:
+    """The runs that one channel shows to be unsound."""
+    found = list[str]()
+    while True:
+        before = _Compared.of(_records(stage, channel, predicted, found), found)
+        if before is None or (suspect := before.farthest) is None:
+            return
+        records = _records(stage, channel, predicted, [*found, suspect])
+        after = _Compared.of(records, [*found, suspect])
+        if after is None or after.apart(suspect) <= after.limit or after.alike(suspect):
+            return
+        found.append(suspect)
+        record = next(each for each in records if each.run == suspect)
+        times = float(np.exp(0.5 * after.apart(suspect)))
+        yield refusal(suspect, channel, _sentence(record, channel, records, times))
+
+
+def _records(
+    stage: StageFit | None,
+    channel: str,
+    predicted: Sequence[RunQuality],
+    without: Sequence[str],
+) -> list[Record]:
+    """A channel of all runs, as the fit without some of them simulates it."""
+    records = [record_of(each, held_out=True) for each in predicted if each.channel == channel]
+    if stage is not None:
+        errors = {}
+        if any(run.name in without for run in stage.problem.experiments):
+            left = without_runs(stage.linearised, without)
+            errors = {(run.name, run.channel): error for run, error in left}
+        records += [
+            record_of(each, errors.get((each.experiment.name, channel)))
+            for each in stage.runs
+            if each.channel == channel
         ]
-        runs = defaultdict[str, list[Cell]](list)
+    return [each for each in records if each is not None]
+
+
+@dataclass(frozen=True)
+class _Compared:
+    """Logarithms of the runs' errors, beside those of the runs that are kept."""
+
+    ratios: Mapping[str, float]
+    """By run."""
+    maneuvers: Mapping[str, str]
+    kept: tuple[str, ...]
+    """Runs that the others are compared with."""
+
+    @classmethod
+    def of(cls, records: Sequence[Record], without: Sequence[str]) -> _Compared | None:
+        """Those of some records; None if too few runs are left to compare with."""
         cells, _ = cells_of(records)
+        runs = defaultdict[str, list[Cell]](list)
         for cell in cells:
             runs[cell.record.run].append(cell)
-        if len(runs) < FEWEST_RUNS:
-            continue
-        coefficients = variance_function(cells)
-        ratios = np.array([log_ratio(each, coefficients) for each in runs.values()])
-        own = [each[0].record for each in runs.values()]
-        outliers = _outliers(ratios)
-        others = {record.maneuver for k, record in enumerate(own) if k not in outliers}
-        repeated = Counter(record.maneuver for record in own)
-        for outlier in outliers:
-            record = own[outlier]
-            alike = repeated[record.maneuver] > 1 and record.maneuver not in others
-            if record.run not in seen and not alike:
-                seen.add(record.run)
-                times = float(np.exp(0.5 * (ratios[outlier] - np.median(ratios))))
-                yield refusal(record.run, channel, _sentence(record, channel, records, times))
+        kept = tuple(name for name in runs if name not in without)
+        if len(kept) < FEWEST_RUNS - 1:
+            return None
+        others = [cell for name in kept for cell in runs[name]]
+        coefficients = variance_function(others)
+        ratios = {name: log_ratio(each, coefficients) for name, each in runs.items()}
+        return cls(ratios, {each.run: each.maneuver for each in records}, kept)
 
+    @property
+    def _own(self) -> Array:
+        return np.array([self.ratios[name] for name in self.kept])
 
-def _outliers(ratios: Array) -> list[int]:
-    """Numbers of those that are far above the others, the farthest first."""
-    count = ratios.size
-    apart = ratios - np.median(ratios)
-    own = (float(np.median(np.abs(apart))) / 0.6745) ** 2
-    freedom = count - 1.0 + WORTH
-    variance = ((count - 1.0) * own + WORTH * USUAL_SPREAD**2) / freedom
-    limit = float(stdtrit(freedom, 1.0 - FALSE_ALARM / count)) * np.sqrt(variance * (1 + 1 / count))
-    return [int(k) for k in np.argsort(-apart) if apart[k] > limit]
+    def apart(self, run: str) -> float:
+        """How far a run is above the median of those kept."""
+        return self.ratios[run] - float(np.median(self._own)) if run in self.ratios else 0.0
+
+    @property
+    def farthest(self) -> str | None:
+        """The run kept that is farthest above the median."""
+        if len(self.kept) < FEWEST_RUNS:
+            return None
+        return max(self.kept, key=lambda run: self.ratios[run])
+
+    @property
+    def limit(self) -> float:
+        """How far a run may be above the median."""
+        own, count = self._own, len(self.kept)
+        squared = (float(np.median(np.abs(own - np.median(own)))) / 0.6745) ** 2
+        freedom = count - 1.0 + WORTH
+        variance = ((count - 1.0) * squared + WORTH * USUAL_SPREAD**2) / freedom
+        quantile = float(stdtrit(freedom, 1.0 - FALSE_ALARM / (count + 1.0)))
+        return quantile * float(np.sqrt(variance * (1.0 + 1.0 / count)))
+
+    def alike(self, run: str) -> bool:
+        """Whether each other run of its maneuver stands out, too."""
+        own = [name for name in self.kept if self.maneuvers[name] == self.maneuvers[run]]
+        return bool(own) and all(self.apart(name) > 0.5 * self.apart(run) for name in own)
 
 
 # --- why ------------------------------------------------------------------------------------------

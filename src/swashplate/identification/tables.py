@@ -1,22 +1,37 @@
-"""Tables of a fit: its estimates, what stayed fixed, errors of runs, cross-validation.
+"""Tables of a fit: its estimates, what stayed fixed, errors of runs.
 
 Each is made once; the terminal, the report's page and the files render it.
 """
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from math import inf
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
-from swashplate.identification.determination import GAUGES, without_value
-from swashplate.identification.drive_model import START_PRESSURE, DriveModel, true_value
-from swashplate.identification.intervals import Estimate, Interval, Status
-from swashplate.identification.model import EDGE
+from swashplate.campaign.experiment import Channel, Experiment
+from swashplate.identification.determination import (
+    GAUGES,
+    bounds_reached,
+    identifiability_of,
+    without_value,
+)
+from swashplate.identification.drive_model import DriveModel, true_value
+from swashplate.identification.intervals import Estimate, estimates_of, uncertainty_of
+from swashplate.identification.model_setup import ModelSetup
 from swashplate.identification.noise import LEVEL
-from swashplate.identification.setup import ModelSetup
-from swashplate.identification.validation import ignored_windows, pooled, with_speeds
+from swashplate.identification.profiles import Profile
+from swashplate.identification.stage_fit import Interval, StageFit, Status
+from swashplate.identification.stages import Parameters
+from swashplate.identification.unknowns import Kind, Unknown
+from swashplate.identification.validation import (
+    Measures,
+    RunQuality,
+    ignored_windows,
+    pooled,
+)
 from swashplate.parameters.definitions import CATALOGUE, COLUMNS
+from swashplate.parameters.parameter_set import ParameterSet
 from swashplate.tables import (
     NONE,
     UNIT,
@@ -31,14 +46,6 @@ from swashplate.tables import (
     spread,
 )
 from swashplate.units import chosen_unit, display_unit
-
-if TYPE_CHECKING:
-    from swashplate.campaign.experiment import Channel, Experiment
-    from swashplate.identification.assessment import Identification
-    from swashplate.identification.fitting import Fit, StageFit
-    from swashplate.identification.resampling import CrossValidation
-    from swashplate.identification.validation import Measures, RunQuality
-    from swashplate.parameters.parameter_set import ParameterSet
 
 # --- parameters -----------------------------------------------------------------------------------
 
@@ -77,7 +84,7 @@ def estimates_table(
         ),
         si=True,
     )
-    for unknown, estimate in zip(unknowns, stage.estimates, strict=True):
+    for unknown, estimate in zip(unknowns, estimates_of(stage), strict=True):
         if (unknown.run is None) == own:
             continue
         name, value = estimate.name, estimate.value
@@ -95,7 +102,7 @@ def estimates_table(
         made.add(
             stage.stage.name,
             name,
-            meaning_of(unknown.name, stage),
+            meaning_of(unknown, stage),
             *(() if truth is None else (Cell(unknown.unit, chosen_unit(unknown.unit).name),)),
             unknown.start,
             Cell(value, shown[0]),
@@ -120,14 +127,15 @@ def _half_width(value: float, low: float | None, high: float | None) -> str:
     return "includes 0" if low < 0.0 < high else f"±{percent(0.5 * (high - low), value)}"
 
 
-def profiles_table(found: Identification) -> Table:
+def profiles_table(profiles: Sequence[Profile], stages: Sequence[StageFit]) -> Table:
     """Ends of the intervals that profiles give; none where the cost does not rise enough."""
+    by_name = {stage.stage.name: stage for stage in stages}
     ends = f"{100.0 * LEVEL:g} %"
     lower, upper = (Column(f"{side} {ends}", ".5g", none=NONE) for side in ("lower", "upper"))
     columns = (Column("stage"), Column("parameter"), UNIT, Column("estimate", ".5g"), lower, upper)
     made = Table("Profile likelihoods, of the noise alone", columns, si=True)
-    for one in found.profiles:
-        stage = found.fit.stage(one.stage)
+    for one in profiles:
+        stage = by_name[one.stage]
         unknown = stage.problem.unknowns.items[one.index]
         ends_found = (None, None) if one.better is not None else (one.lower, one.upper)
         numbers = (float(stage.solution.vector[one.index]), *ends_found)
@@ -136,30 +144,28 @@ def profiles_table(found: Identification) -> Table:
     return made
 
 
-def estimates_of(fit: Fit) -> dict[str, Estimate]:
+def estimates_by_name(stages: Sequence[StageFit]) -> dict[str, Estimate]:
     """What a fit says of every number: what each stage estimated, then what stayed fixed.
 
     A parameter that is tied in both directions is there by its symbol and by both columns.
     """
     made: dict[str, Estimate] = {}
-    for stage in fit.stages:
-        for unknown, estimate in zip(stage.problem.unknowns, stage.estimates, strict=True):
+    for stage in stages:
+        for unknown, estimate in zip(stage.problem.unknowns, estimates_of(stage), strict=True):
             made[estimate.name] = estimate
             if unknown.run is None:
                 made.update(dict.fromkeys(unknown.targets, estimate))
-    parameters, moved = fit.parameters, _moved(fit)
+    parameters, moved = stages[-1].parameters, _moved(stages)
     for name, value in parameters.numbers.items():
         unit = "" if isinstance(parameters, ModelSetup) else parameters[name].unit
         status: Status = "from the forces" if name in moved else "fixed"
-        made.setdefault(name, Estimate(name, value, unit, Interval(status)))
+        made.setdefault(name, Estimate(name, value, unit, source=Interval(status)))
     return made
 
 
-def all_estimates(fit: Fit) -> Table:
+def all_estimates(stages: Sequence[StageFit]) -> Table:
     """One table of what all stages estimated: of the machine, then of single runs."""
-    return joined(
-        [estimates_table(stage, own=own) for stage in fit.stages for own in (False, True)]
-    )
+    return joined([estimates_table(stage, own=own) for stage in stages for own in (False, True)])
 
 
 def truth_count(tables: Sequence[Table]) -> tuple[int, int]:
@@ -169,36 +175,43 @@ def truth_count(tables: Sequence[Table]) -> tuple[int, int]:
     return said.count("yes"), said.count("yes") + said.count("no")
 
 
-def meaning_of(name: str, stage: StageFit | None = None) -> str:
-    """What an unknown is, in words; empty if nothing is known of the name."""
-    kind, _, channel = name.partition(" ")
-    side = name.rpartition("_")[2]
-    if kind == "offset":
-        return f"free zero of {channel}"
-    if name.startswith(EDGE):
-        return "instant of the command's jump, after the middle of both samples"
-    if stage is not None and stage.stage.part == "model":
-        return "number of the state at the first sample" if name.startswith("start.") else ""
-    if name == START_PRESSURE:
-        return "stroking pressure at the first sample"
-    if name.startswith("start_current_"):
-        return "current of the card at the first sample"
-    if name.startswith("force_"):
-        _, side, number = name.split("_")
-        model, current = None if stage is None else stage.problem.model, ""
-        if isinstance(model, DriveModel) and model.forces is not None:
-            current = f" {getattr(model.forces, side)[int(number) - 1]:g} A beyond the dead zone"
-        return f"solenoid force{current}, {'positive' if side == 'plus' else 'negative'}"
+MEANINGS: Mapping[Kind, str] = {
+    "start": "number of the state at the first sample",
+    "start pressure": "stroking pressure at the first sample",
+    "start current": "current of the card at the first sample",
+    "instant": "instant of the command's jump, after the middle of both samples",
+}
+"""What unknowns of single runs are, in words."""
+
+
+def meaning_of(unknown: Unknown, stage: StageFit) -> str:
+    """What an unknown is, in words; empty if nothing is known of it."""
+    if unknown.kind == "parameter":
+        # names of a user-defined model are its own
+        return "" if stage.stage.part == "model" else meaning_of_parameter(unknown.name)
+    if unknown.kind == "zero":
+        return f"free zero of {unknown.channel}"
+    if unknown.kind == "force":
+        assert stage.stage.forces is not None
+        current = stage.stage.forces.currents[unknown.name]
+        way = "positive" if current > 0.0 else "negative"
+        return f"solenoid force {abs(current):g} A beyond the dead zone, {way}"
+    return MEANINGS[unknown.kind]
+
+
+def meaning_of_parameter(name: str) -> str:
+    """What a parameter is, by its symbol or column; empty if there is none such."""
     definition = CATALOGUE.get(COLUMNS.get(name, name))
     if definition is None:
         return ""
+    side = name.rpartition("_")[2]
     way = {"plus": ", positive", "minus": ", negative"}.get(side, "")
     return definition.name + (way if definition.directional else "")
 
 
-def _moved(fit: Fit) -> set[str]:
+def _moved(stages: Sequence[StageFit]) -> set[str]:
     """Columns of the drive's parameters that some stage moved."""
-    problems = [each.problem for each in fit.stages]
+    problems = [stage.problem for stage in stages]
     moved = {target for each in problems for unknown in each.unknowns for target in unknown.targets}
     forces = [each.model.forces for each in problems if isinstance(each.model, DriveModel)]
     return moved.union(*(each.columns for each in forces if each is not None))
@@ -208,7 +221,7 @@ def _is_moved(symbol: str, moved: Collection[str]) -> bool:
     return any(column in moved for column in (symbol, f"{symbol}_plus", f"{symbol}_minus"))
 
 
-def fixed_table(fit: Fit, truth: ParameterSet | None = None) -> Table:
+def fixed_table(stages: Sequence[StageFit], truth: ParameterSet | None = None) -> Table:
     """The parameters that no stage moved; `truth` as it is, in no other scales."""
     made = Table(
         "Fixed at their nominal values",
@@ -223,7 +236,7 @@ def fixed_table(fit: Fit, truth: ParameterSet | None = None) -> Table:
         ),
         si=True,
     )
-    moved, parameters = _moved(fit), fit.parameters
+    moved, parameters = _moved(stages), stages[-1].parameters
     if isinstance(parameters, ModelSetup):
         for name, value in parameters.numbers.items():
             if name not in moved:
@@ -241,21 +254,21 @@ def fixed_table(fit: Fit, truth: ParameterSet | None = None) -> Table:
             if fixed == symbol and others:
                 why = f"fixes the {gauge.name}: {gauge.determined}"
         true = None if truth is None else truth.numbers[column]
-        made.add(column, meaning_of(column), value, true, why, one.source, unit=one.unit)
+        made.add(column, meaning_of_parameter(column), value, true, why, one.source, unit=one.unit)
     return made
 
 
-def fixed_line(fit: Fit) -> str:
+def fixed_line(stages: Sequence[StageFit], nominal: Parameters) -> str:
     """The symbols that kept their nominal values, in a sentence."""
-    moved = _moved(fit)
-    plain_names = (n.removesuffix("_plus").removesuffix("_minus") for n in fit.nominal.numbers)
+    moved = _moved(stages)
+    plain_names = (n.removesuffix("_plus").removesuffix("_minus") for n in nominal.numbers)
     kept = [name for name in dict.fromkeys(plain_names) if not _is_moved(name, moved)]
     return f"Fixed at their nominal values: {', '.join(kept) or 'none'}."
 
 
-def unvalued_lines(fit: Fit) -> list[str]:
+def unvalued_lines(stages: Sequence[StageFit]) -> list[str]:
     """A sentence on the parameters without a value of their own, if there are any."""
-    lost = [name for stage in fit.stages for name in without_value(stage)]
+    lost = [name for stage in stages for name in without_value(stage)]
     if not lost:
         return []
     return [
@@ -349,43 +362,6 @@ def ignored_words(experiment: Experiment, channel: Channel) -> str:
     return "; ".join(said) or "nothing"
 
 
-# --- cross-validation -----------------------------------------------------------------------------
-
-
-def folds_tables(found: CrossValidation, stages: Sequence[StageFit] = ()) -> list[Table]:
-    """Errors held out, beside those of the fit to all runs if its stages are given; the folds."""
-    fitted_columns = "tpf" if stages else ""
-    whole = pooled(with_speeds(each for stage in stages for each in stage.runs))
-    held_out = Table(
-        "Cross-validation: each part predicted by a fit to the others",
-        (
-            Column("channel"),
-            Column("fit %", ".2f", "1", none="-"),
-            Column("RMSE held out", ".3g"),
-            Column("RMSE fitted", ".3g", none=NONE, of=fitted_columns),
-            UNIT,
-            Column("ratio", ".2f", "1", none=NONE, of=fitted_columns),
-            Column("samples", ",d", "1", of="pf"),
-        ),
-    )
-    for name, measures in found.measures.items():
-        fitted = whole[name].rmse if name in whole else None
-        ratio = measures.rmse / fitted if fitted else None
-        cells = (name, measures.fit_percent, measures.rmse, fitted, ratio)
-        held_out.add(*cells, measures.samples, unit=found.units[name])
-    columns = (Column("fold", "d"), Column("held out", wrap=True), Column("fit to the others"))
-    folds = Table("Folds", (*columns, Column("fit % of those held out")))
-    for fold in found.folds:
-        state = "not fitted" if fold.failure else "converged" if fold.converged else "not converged"
-        state = f"{state}; loses {', '.join(fold.lost)}" if fold.lost else state
-        fits = (
-            f"{name} {'-' if each.fit_percent is None else f'{each.fit_percent:.2f}'} %"
-            for name, each in fold.measures.items()
-        )
-        folds.add(fold.number + 1, ", ".join(fold.held), state, ", ".join(fits) or NONE)
-    return [held_out, folds]
-
-
 # --- a fit as it is read --------------------------------------------------------------------------
 
 
@@ -419,46 +395,23 @@ def stage_part(stage: StageFit) -> Part:
         [estimates_table(stage)],
         [f"{name}: {solution.message} after {solution.evaluations} evaluations."],
         [
-            *stage.identifiability.sentences(),
-            *stage.uncertainty.sentences(),
-            *stage.bounds_reached(),
+            *identifiability_of(stage).sentences(),
+            *uncertainty_of(stage).sentences(),
+            *bounds_reached(stage),
         ],
         opened=True,
     )
 
 
-def fixed_part(fit: Fit) -> Part:
+def fixed_part(stages: Sequence[StageFit], nominal: Parameters) -> Part:
     """What stayed as it was, and what has no value of its own."""
-    return Part("Fixed parameters", (), [fixed_line(fit)], unvalued_lines(fit))
+    return Part("Fixed parameters", (), [fixed_line(stages, nominal)], unvalued_lines(stages))
 
 
-def parts_of(found: Identification) -> list[Part]:
-    """What a fit says besides its verdict, in the order in which the command prints it."""
-    fit = found.fit
-    notes = [overview.sentence for overview in found.campaign.overviews]
-    notes += [f"{run.name}: {sentence}." for run in fit.runs for sentence in run.notes]
-    doubts = [f"! {sentence}" for sentence in fit.doubts]
-    made = [Part("Runs", (), (), notes), Part("Doubts", (), doubts)]
-    made += map(stage_part, fit.stages)
-    if found.profiles:
-        said = [sentence for profile in found.profiles for sentence in profile.sentences()]
-        made.append(Part("Profile likelihoods", [profiles_table(found)], (), said))
-    made.append(fixed_part(fit))
-    fitted = runs_tables([quality for each in fit.stages for quality in each.runs])
-    made.append(Part("Errors of fitted runs", fitted, heading="Runs that were fitted"))
-    if found.predicted:
-        heading = "Runs that were held out and predicted"
-        made.append(Part("Errors of held-out runs", runs_tables(found.predicted), heading=heading))
-    if found.folds is not None:
-        held_out = folds_tables(found.folds, fit.stages)[:1]
-        made.append(Part("Cross-validation", held_out, (), found.folds.sentences()))
-    return [part for part in made if part.tables or part.remarks or part.sentences]
-
-
-def single_runs_line(fit: Fit) -> list[str]:
+def single_runs_line(stages: Sequence[StageFit]) -> list[str]:
     """A sentence on the numbers of single runs, which no table for people shows, if any."""
-    unknowns = [unknown for each in fit.stages for unknown in each.problem.unknowns]
-    names = [f"{each.name} ({each.run})" for each in unknowns if each.run is not None]
+    unknowns = [unknown for each in stages for unknown in each.problem.unknowns]
+    names = [unknown.label for unknown in unknowns if unknown.run is not None]
     if not names:
         return []
     many = count(len(names), "number of a single run", "numbers of single runs")

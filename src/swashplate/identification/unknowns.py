@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from math import exp, inf, isfinite
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -44,6 +44,20 @@ class Prior:
     """Standard deviation, positive; of a logarithmic unknown that of its logarithm."""
 
 
+Kind = Literal[
+    "parameter",
+    "force",
+    "zero",
+    "start",
+    "start pressure",
+    "start current",
+    "instant",
+]
+"""What an unknown is: a parameter of the model; the force of the solenoids at a current; or of a
+single run the free zero of a channel, a number of the state at the first sample, a drive's pressure
+or a card's current there, or the instant of a jump of the command between two samples."""
+
+
 @dataclass(frozen=True)
 class Unknown:
     """One number that a fit is to find."""
@@ -62,6 +76,9 @@ class Unknown:
     """Names in the model that take its value; its own if empty. Two names tie two directions."""
     run: str | None = None
     """The experiment that it belongs to, None for one of the machine."""
+    kind: Kind = "parameter"
+    channel: str | None = None
+    """The channel whose zero it is; None for any other kind."""
     scale: float = field(default=0.0, repr=False)
     """What one unit of the solver's vector means, of an unknown that is not logarithmic; by default
     the size of its nominal value."""
@@ -71,6 +88,11 @@ class Unknown:
 
     def __post_init__(self) -> None:
         name, low, high = self.name, self.low, self.high
+        if (self.kind == "zero") != (self.channel is not None):
+            raise ParameterError(
+                f"{name} has the kind '{self.kind}' and the channel {self.channel!r}: the zero of "
+                "a sensor, and nothing else, names a channel."
+            )
         if not (isfinite(low) and isfinite(high) and low < high):
             raise ParameterError(
                 f"{name} is bounded by {low:g} and {high:g}; two finite numbers, the lower one "
@@ -95,13 +117,26 @@ class Unknown:
 
     @property
     def targets(self) -> tuple[str, ...]:
-        """Names in the model that take its value."""
-        return self.sets or (self.name,)
+        """Names in the model that take its value; none for a zero, which no model knows."""
+        return () if self.kind == "zero" else self.sets or (self.name,)
+
+    @property
+    def label(self) -> str:
+        """Its name, with the experiment of one that belongs to one: ``"offset counts (hoistr6)"``.
+
+        It stands for the unknown in tables and mappings; nothing takes it apart.
+        """
+        return self.name if self.run is None else f"{self.name} ({self.run})"
 
     def to_value(self, number: float) -> float:
         """The value for a solver's number, kept within the bounds against rounding."""
         value = exp(number) if self.log else number * self.scale
         return min(max(value, self.low), self.high)
+
+
+def zero_name(channel: str) -> str:
+    """What the free zero of a channel is called, also by users who free or fix it by name."""
+    return f"offset {channel}"
 
 
 def bounded(
@@ -137,7 +172,11 @@ class Unknowns(Result):
     """(K,) vector of the point; nominal if None. See `at`."""
 
     def __post_init__(self) -> None:
-        taken = Counter((each.run, target) for each in self.items for target in each.targets)
+        taken = Counter(
+            (unknown.run, target)
+            for unknown in self.items
+            for target in unknown.targets or (unknown.name,)
+        )
         for (_, target), times in taken.items():
             if times > 1:
                 raise ParameterError(f"{target} is set by two parameters; let one set it.")
@@ -153,10 +192,8 @@ class Unknowns(Result):
 
     @cached_property
     def names(self) -> tuple[str, ...]:
-        """Names, with the experiment of those that belong to one: ``"offset counts (hoistr6)"``."""
-        return tuple(
-            each.name if each.run is None else f"{each.name} ({each.run})" for each in self.items
-        )
+        """The label of each."""
+        return tuple(unknown.label for unknown in self.items)
 
     def index(self, name: str) -> int:
         """Place of an unknown; an `InputError` if there is none of that name."""
@@ -286,15 +323,36 @@ class Unknowns(Result):
         values = ((self.items[k], self.items[k].to_value(float(vector[k]))) for k in numbers)
         return {name: value for unknown, value in values for name in unknown.targets}
 
+    def zeros(self, vector: Array, run: str) -> dict[str, float]:
+        """Free zeros of one experiment by their channels. [unit of the channel]"""
+        zeros = dict[str, float]()
+        for number in self.columns(run).tolist():
+            unknown = self.items[number]
+            if unknown.channel is not None:
+                zeros[unknown.channel] = unknown.to_value(float(vector[number]))
+        return zeros
+
     def chain(self, vector: Array, targets: Sequence[str], run: str) -> Array:
         """(len(targets), q + M) derivatives of the model's numbers by `columns` of the vector."""
         columns = self.columns(run)
-        slopes = np.where(self.logarithmic, self.to_values(vector), self.scales)[columns]
         places = dict[str, int]()
         for place in np.argsort(columns).tolist():
             places |= dict.fromkeys(self.items[columns[place]].targets, place)
-        matrix = np.zeros((len(targets), columns.size))
-        for row, place in enumerate(map(places.get, targets)):
+        return self._selected(vector, columns, [places.get(target) for target in targets])
+
+    def zeros_chain(self, vector: Array, channels: Sequence[str], run: str) -> Array:
+        """(len(channels), q + M) derivatives of channels' zeros by `columns` of the vector."""
+        columns = self.columns(run)
+        places = {self.items[column].channel: place for place, column in enumerate(columns)}
+        return self._selected(vector, columns, [places.get(channel) for channel in channels])
+
+    def _selected(
+        self, vector: Array, columns: NDArray[np.intp], places: Sequence[int | None]
+    ) -> Array:
+        """(len(places), columns) slope of the unknown at each place in its row, 0 elsewhere."""
+        slopes = np.where(self.logarithmic, self.to_values(vector), self.scales)[columns]
+        matrix = np.zeros((len(places), columns.size))
+        for row, place in enumerate(places):
             if place is not None:
                 matrix[row, place] = slopes[place]
         return matrix

@@ -13,20 +13,14 @@ from scipy.fft import irfft, next_fast_len, rfft
 from swashplate.campaign.experiment import Channel, Experiment
 from swashplate.campaign.speed import DIFFERENTIATOR, speed_from_angle, speed_of
 from swashplate.errors import InputError
-from swashplate.identification.drive_model import (
-    SIGNALS,
-    DriveModel,
-    Parameters,
-    edges_problem,
-    with_edges,
-)
+from swashplate.identification.drive_model import SIGNALS, DriveModel, edges_problem, with_edges
+from swashplate.identification.model_setup import ModelSetup
 from swashplate.identification.noise import LONGEST, Grid, correlation_length, grid_of, pair_sums
 from swashplate.identification.problem import Problem
-from swashplate.identification.setup import ModelSetup
 from swashplate.identification.solving import solve
+from swashplate.identification.stages import Parameters
 from swashplate.parameters.parameter_set import HasParameters, ParameterSet, set_of
 from swashplate.results import Result, figures
-from swashplate.tables import listed
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -411,31 +405,10 @@ def _noise_square(alike: Sequence[RunQuality]) -> tuple[float, float]:
     return mean, mean * float(np.sqrt(2.0 / values))
 
 
-def beyond_noise(qualities: Sequence[RunQuality], channel: str) -> float:
-    """RMSE of a channel beyond its white noise, over the range that was measured of it. [1]
-
-    What the noise's scatter may be, within two standard errors, is no error.
-    """
-    alike = [each for each in qualities if each.channel == channel]
-    square, scatter = _noise_square(alike)
-    reach, left = range_of(alike), pooled(alike)[channel].rmse ** 2 - square - 2.0 * scatter
-    return float(np.sqrt(max(left, 0.0))) / reach if reach > 0.0 else 0.0
-
-
 def range_of(qualities: Sequence[RunQuality]) -> float:
     """Largest less smallest value that was measured of a channel in some runs."""
     counted = [x.values[x.used] for x in (each.experiment[each.channel] for each in qualities)]
     return max(float(x.max()) for x in counted) - min(float(x.min()) for x in counted)
-
-
-def part_of_range(qualities: Sequence[RunQuality], channel: str) -> float | None:
-    """RMSE of a channel over the range that was measured of it, all runs together.
-
-    The noise of a speed that was made from a position left out. None where nothing moved.
-    """
-    alike = [each for each in qualities if each.channel == channel]
-    reach = range_of(alike)
-    return pooled(alike, without_noise=True)[channel].rmse / reach if reach > 0.0 else None
 
 
 def percent(part: float) -> str:
@@ -454,39 +427,3 @@ def ignored_windows(channel: Channel) -> tuple[tuple[float, float], ...]:
     """First and last instant of each stretch of a channel that does not count. [s]"""
     edges = np.flatnonzero(np.diff(~channel.used, prepend=False, append=False)).reshape(-1, 2)
     return tuple((float(channel.time[a]), float(channel.time[b - 1])) for a, b in edges)
-
-
-class Side(NamedTuple):
-    """Runs that a verdict judges, fitted or predicted; speeds in place of their positions.
-
-    Of a position nearly everything is its trend.
-    """
-
-    which: str
-    qualities: list[RunQuality]
-    measures: dict[str, Measures]
-    parts: dict[str, float | None]
-    """Error over range, by channel."""
-
-    @classmethod
-    def of(cls, which: str, qualities: Sequence[RunQuality]) -> Side:
-        """Those of qualities: a position that has a speed is judged by that, a speed first."""
-        found = with_speeds(qualities)
-        named = {each.channel for each in found}
-        kept = [each for each in found if f"speed from {each.channel}" not in named]
-        kept.sort(key=lambda each: each.experiment[each.channel].kind != "shaft_speed")
-        measures = pooled(kept, without_noise=True)
-        return cls(which, kept, measures, {name: part_of_range(kept, name) for name in measures})
-
-    @property
-    def accuracy(self) -> str:
-        """``speed to 1.2 % of its range (worst run 1.6 %) and current to 2.0 % (...)``."""
-        said = list[str]()
-        for name, part in self.parts.items():
-            alike = [each for each in self.qualities if each.channel == name]
-            if part is not None:
-                reach = range_of(alike)
-                largest = max(pooled([each], without_noise=True)[name].rmse for each in alike)
-                worst = f" (worst run {percent(largest / reach)})" if len(alike) > 1 else ""
-                said.append(f"{name} to {percent(part)}{'' if said else ' of its range'}{worst}")
-        return listed(said) or "channels that never move"

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from html import escape
 from math import isinf, isnan, nan
-from typing import TYPE_CHECKING, get_args
+from typing import get_args
 
 from swashplate.campaign.experiment import Channel, Experiment
 from swashplate.errors import DomainError, InputError
@@ -28,14 +28,11 @@ from swashplate.identification.drive_model import (
 )
 from swashplate.identification.solving import Solution
 from swashplate.identification.soundness import unsound_data
-from swashplate.identification.validation import percent
+from swashplate.identification.stage_fit import StageFit
+from swashplate.identification.validation import RunQuality, percent
 from swashplate.parameters.definitions import COLUMNS
 from swashplate.results import Result, listing
 from swashplate.tables import UNIT, Column, Table, listed
-
-if TYPE_CHECKING:
-    from swashplate.identification.fitting import StageFit
-    from swashplate.identification.validation import RunQuality
 
 REQUIRED = 0.10
 """Largest error of a prediction over the range, if the user requires nothing else."""

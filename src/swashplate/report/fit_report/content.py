@@ -16,13 +16,15 @@ from swashplate.drive import Drive
 from swashplate.errors import InputError
 from swashplate.identification import tables
 from swashplate.identification.assessment import Identification, motion_of
-from swashplate.identification.determination import Identifiability
-from swashplate.identification.drive_model import Parameters
-from swashplate.identification.fitting import Fit, StageFit
+from swashplate.identification.determination import Identifiability, identifiability_of
+from swashplate.identification.fitting import Fit
+from swashplate.identification.intervals import uncertainty_of
+from swashplate.identification.model_setup import ModelSetup
 from swashplate.identification.profiles import Profile
-from swashplate.identification.resampling import CrossValidation
-from swashplate.identification.setup import ModelSetup
+from swashplate.identification.resampling import CrossValidation, folds_tables
 from swashplate.identification.solving import Solution
+from swashplate.identification.stage_fit import StageFit
+from swashplate.identification.stages import Parameters
 from swashplate.identification.validation import RunQuality, at_instants, percent
 from swashplate.identification.verdict import Verdict, starts_of, verdict
 from swashplate.parameters.parameter_set import ParameterSet
@@ -398,7 +400,7 @@ def _parameter_section(fit: Fit, stages: Sequence[StageFit], truth: ParameterSet
         if own.rows:
             summary = f"{count(len(own.rows), 'parameter')} of single runs"
             blocks.append(Block("details", [Block("table", own, "parameters")], summary))
-    fixed = tables.fixed_table(fit, truth)
+    fixed = tables.fixed_table(fit.stages, truth)
     blocks += titled(fixed, "held") if fixed.rows else []
     return Section("parameters", "Parameters", blocks)
 
@@ -406,7 +408,7 @@ def _parameter_section(fit: Fit, stages: Sequence[StageFit], truth: ParameterSet
 def _identifiability_section(stages: Sequence[StageFit]) -> Section:
     blocks = []
     for each in stages:
-        found = each.identifiability
+        found = identifiability_of(each)
         general = [unknown.run is None for unknown in each.problem.unknowns]
         blocks.append(Block("heading", f"Stage {each.stage.name}", "h3"))
         blocks += listed_block(found.sentences())
@@ -422,7 +424,7 @@ def _identifiability_section(stages: Sequence[StageFit]) -> Section:
             blocks.append(Block("table", directions, "directions"))
         blocks.append(Block("heading", "What the intervals rest on", "h4"))
         try:
-            blocks += listed_block(each.uncertainty.sentences())
+            blocks += listed_block(uncertainty_of(each).sentences())
         except InputError as error:
             blocks.append(text(f"There are no intervals: {error}"))
         blocks += _effects(found, general)
@@ -442,7 +444,7 @@ def _effects(found: Identifiability, shown: Sequence[bool]) -> list[Block]:
 def _correlations(stage: StageFit, general: Sequence[bool]) -> list[Block]:
     """The estimates that move together most, if there are any."""
     try:
-        quoted = stage.uncertainty.quoted
+        quoted = uncertainty_of(stage).quoted
     except InputError:  # the sentences above say why there are none
         return []
     kept = [k for k, own in enumerate(general) if own and quoted.determined[k]]
@@ -489,7 +491,7 @@ def _profile_section(fit: Fit, profiles: Sequence[Profile]) -> Section:
 def _folds_section(folds: CrossValidation | None, stages: Sequence[StageFit]) -> Section:
     if folds is None:
         return Section("folds", "Cross-validation", [])
-    held_out, parts = tables.folds_tables(folds, stages)
+    held_out, parts = folds_tables(folds, stages)
     words = (
         f"The runs were dealt into {folds.planned} folds, kinds of test and directions apart (seed "
         f"{folds.seed}). Each fold was predicted from the command alone by a fit to the others "

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swashplate.campaign import Channel, Experiment
-from swashplate.identification.fitting import StageFit
+from swashplate.identification.stage_fit import StageFit
 from swashplate.identification.tables import ignored_words, start_words
 from swashplate.identification.validation import RunQuality, ignored_windows, with_speeds
 from swashplate.report.lines import gap_rows, thinned

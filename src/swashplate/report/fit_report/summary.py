@@ -24,8 +24,8 @@ from swashplate.campaign import Campaign
 from swashplate.drive import Drive
 from swashplate.errors import SwashplateError
 from swashplate.identification.determination import weak_unknowns
-from swashplate.identification.fitting import StageFit
 from swashplate.identification.intervals import unseen_limits
+from swashplate.identification.stage_fit import StageFit
 from swashplate.identification.validation import (
     following,
     percent,

@@ -1,0 +1,325 @@
+"""Stages of a fit: what is fitted, its configuration, and the problem of each stage.
+
+What is fitted is a drive or a user-defined model, `Parameters`; here, and where results are
+written and shown, it is asked which of them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any, Literal, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from swashplate.campaign import applying, inside
+from swashplate.campaign.campaign import Campaign
+from swashplate.campaign.experiment import Experiment
+from swashplate.documents import validated
+from swashplate.drive import Drive
+from swashplate.errors import InputError, UnknownParameterError
+from swashplate.executors import available_cores
+from swashplate.identification.drive_model import (
+    CURRENTS,
+    MOST_EDGES,
+    START_CURRENTS,
+    START_PRESSURE,
+    DriveModel,
+    Instants,
+    Starts,
+    free_zero,
+    kinds_of,
+    measured_current,
+    simulated_current,
+    unknown_instants,
+)
+from swashplate.identification.model_setup import ModelSetup
+from swashplate.identification.problem import Problem, noise_scales
+from swashplate.identification.setup import (
+    FreeParameters,
+    Setup,
+    Stage,
+    deviation,
+    free_entries,
+    load_setup,
+    setup_names,
+)
+from swashplate.identification.unknowns import Unknown, Unknowns, bounded
+from swashplate.parameters.definitions import SWITCHES, Definition, columns_of, find
+from swashplate.parameters.parameter_set import ParameterSet
+from swashplate.parameters.plausible import check_plausible
+from swashplate.parameters.rules import FULL_VOLTAGE
+
+Array = NDArray[np.float64]
+Parameters = ParameterSet | ModelSetup
+"""The numbers of what is fitted: a drive, or a model of one's own."""
+Fitted = TypeVar("Fitted", bound=Parameters)
+FORCE = Definition("force of the solenoids", "N", plausible=(0.0, 1e4))
+"""What stands for their coefficients."""
+LARGEST_START_PRESSURE = 4e6
+"""Bound of a free pressure at the start where the set-up gives none. [Pa]"""
+
+
+def smooth(parameters: Fitted) -> Fitted:
+    """The set with the decay's switch split within the step; a model of one's own has none.
+
+    Sampled, as published, it makes the current jump by up to 0.7 mA as any of the card's parameters
+    varies, and a fit ends where it was caught (docs/decisions/0008).
+    """
+    if isinstance(parameters, ParameterSet):
+        return replace(parameters, card_switch="split")
+    return parameters
+
+
+def configuration(free: FreeParameters, experiments: Sequence[Experiment]) -> Setup:
+    """A drive's fit configuration from any form that a caller may give it in.
+
+    Parameters
+    ----------
+    free : Setup, str, path or mapping
+        A fit configuration, a packaged one by name, a TOML file, or a mapping: the contents of such
+        a file, or free parameters by symbol as of `setup.free_entries`. Those are estimated in one
+        stage: of the card alone if currents were measured, of pump and motor alone, or through the
+        whole chain if both are free or no current was measured.
+    experiments : sequence of Experiment
+        The runs to fit.
+
+    Raises
+    ------
+    FileError, ParameterError
+        If the configuration cannot be read, or an entry is wrong.
+    """
+    if isinstance(free, Setup):
+        return _with_known_names(free, "the fit configuration")
+    if isinstance(free, str | Path):
+        return _with_known_names(load_setup(free), str(free))
+    given: object = free
+    if not isinstance(given, Mapping) or not given:
+        raise InputError(
+            f"What is free is {free!r}, but must be a fit configuration, its name or file, or a "
+            "mapping such as {'Z8': (0.5, 2)}."
+        )
+    if "stages" in free:
+        setup = validated(dict(free), Setup, "the fit configuration")
+        return _with_known_names(setup, "the fit configuration")
+    entries = free_entries(free)
+    blocks = {"card" if find(name).block == "control_card" else "pump" for name in entries}
+    kinds = {channel.kind for run in experiments for channel in run.channels.values()}
+    part: Literal["card", "pump", "chain"] = "chain"
+    if blocks == {"pump"}:
+        part = "pump"
+    elif blocks == {"card"} and not kinds.isdisjoint(CURRENTS):
+        part = "card"
+    return Setup(stages=(Stage(name=part, part=part, free=entries),))
+
+
+def _with_known_names(setup: Setup, origin: str) -> Setup:
+    """The fit configuration of a drive; a name in it that no parameter has is refused."""
+    names = [
+        (f"stage '{stage.name}', free", name)
+        for stage in setup.stages
+        if stage.part != "model"
+        for name in stage.free
+    ]
+    names += [("standard_uncertainty", name) for name in setup.standard_uncertainty]
+    for table, name in names:
+        try:
+            find(name)
+        except UnknownParameterError as error:
+            raise UnknownParameterError(f"{origin}, {table}: {error}") from None
+    return setup
+
+
+def setup_of(
+    campaign: Campaign, axis: str, drive: ParameterSet, free: FreeParameters | None = None
+) -> Setup:
+    """The fit configuration of an axis.
+
+    By default the packaged one of the drive that the campaign names, or else of the given one; an
+    `InputError` if there is none. `free` as of `configuration`.
+    """
+    if free is not None:
+        return configuration(free, campaign.select(axis=axis, role="fit"))
+    name = drive.name if campaign.axes[axis].drive is None else campaign.drive(axis).name
+    if name not in setup_names():
+        raise InputError(
+            f"There is no packaged fit configuration for the drive '{name}': give one of your "
+            "own, a .toml file with stages and free parameters; 'swashplate guess' reads one off "
+            "the logs."
+        )
+    return load_setup(name)
+
+
+def stage_problem(
+    stage: Stage,
+    parameters: Parameters,
+    experiments: Sequence[Experiment],
+    *,
+    threads: int | None = None,
+    uncertain: Mapping[str, float | str] = MappingProxyType({}),
+    starts: Starts = MappingProxyType({}),
+    instants: Instants = MappingProxyType({}),
+) -> Problem:
+    """The problem of a stage, over the runs that have a channel of it.
+
+    `parameters` are the nominal values, those of earlier stages already found; `uncertain` standard
+    uncertainties of what stays fixed, as of `Setup`; `starts` and `instants` what a stage before
+    estimated of currents at the first sample, see `start_currents_of`, and of edges. Threads are
+    all cores by default. An `InputError` says that no run has what the stage fits or asks for, a
+    `ParameterError` that a free parameter is unknown or its bounds are wrong.
+    """
+    threads = threads or available_cores()
+    if isinstance(parameters, ModelSetup):
+        return parameters.problem(experiments, threads=threads)
+    if stage.part == "model":
+        raise InputError("part = 'model' needs a model of your own, not a drive.")
+    channels = _channels_of(stage, experiments)
+    runs = tuple(each for each in experiments if any(name in each.channels for name in channels))
+    currents = {}
+    for each in runs if stage.part == "pump" else ():
+        if stage.current == "measured" or each.input.kind == "current":
+            currents[each.name] = measured_current(each, stage.current_scale)
+        else:
+            currents[each.name] = simulated_current(each, parameters, starts.get(each.name, {}))
+    free = _of_the_machine(stage, parameters)
+    begin = {column: each.start for each in free for column in each.targets if column in SWITCHES}
+    on = parameters.options | {SWITCHES[column] for column in begin}
+    begun = parameters.with_numbers(begin, on) if begin else parameters
+    own = [unknown for each in runs for unknown in _of_a_run(stage, each, channels, parameters)]
+    simulated = stage.part != "pump" or stage.current != "measured"
+    jumps = [unknown for each in runs if simulated for unknown in unknown_instants(each, instants)]
+    return Problem(
+        DriveModel(begun, stage.part, currents, stage.forces, dict(starts)),
+        tuple(_weighted(each, stage) for each in runs),
+        Unknowns((*free, *own, *(jumps if len(jumps) <= MOST_EDGES else ()))),
+        channels,
+        noise_scales(runs, channels),
+        uncertain=tuple(
+            {c: deviation(each, _nominal(parameters, c)) for c in columns_of([name])}
+            for name, each in uncertain.items()
+        ),
+        threads=threads,
+    )
+
+
+def _channels_of(stage: Stage, experiments: Sequence[Experiment]) -> tuple[str, ...]:
+    """Names of the channels that a stage fits; weights of others would be lost in silence."""
+    kinds = stage.channels or kinds_of(stage.part)
+    had = [(name, each.kind) for run in experiments for name, each in run.channels.items()]
+    fitted = {kind for _, kind in had if kind in kinds}
+    if not fitted:
+        hint = ""
+        if stage.part == "card":
+            hint = "; without a current, let 'swashplate guess' write start and fit configuration"
+        raise InputError(
+            f"The stage '{stage.name}' fits {', '.join(kinds)}, but the runs to fit have "
+            f"{', '.join(dict.fromkeys(kind for _, kind in had)) or 'no channel'}{hint}."
+        )
+    weighed = {**stage.weights, **stage.weights_by_input}
+    if weighed and not fitted & set(weighed):
+        raise InputError(
+            f"The stage '{stage.name}' weighs {', '.join(weighed)}, but the runs have "
+            f"{', '.join(sorted(fitted))}: add weights for that, or take a fit configuration "
+            "without."
+        )
+    return tuple(dict.fromkeys(name for name, kind in had if kind in kinds))
+
+
+def start_currents_of(problem: Problem, vector: Array) -> Starts:
+    """Currents at the first sample that a stage estimated, by run; for the stages after it."""
+    found: dict[str, dict[str, float]] = {}
+    values = problem.unknowns.at(vector).estimates.tolist()
+    for unknown, value in zip(problem.unknowns, values, strict=True):
+        if unknown.run is not None and unknown.kind == "start current":
+            found.setdefault(unknown.run, {})[unknown.name] = value
+    return found
+
+
+def with_estimates(parameters: Parameters, problem: Problem, vector: Array) -> Parameters:
+    """The parameters with what a stage found; a `DomainError` if a value breaks a rule."""
+    found = problem.unknowns.targets(vector, "")
+    if isinstance(parameters, ModelSetup):
+        return replace(parameters, numbers={**parameters.numbers, **found}, scales=problem.scales)
+    assert isinstance(problem.model, DriveModel)
+    return problem.model.parameters_at(found)
+
+
+def _weighted(experiment: Experiment, stage: Stage) -> Experiment:
+    """The experiment with the stage's own weights multiplied in."""
+    if not stage.weights and not stage.weights_by_input:
+        return experiment
+    channels = {}
+    for name, channel in experiment.channels.items():
+        weight = channel.weight.copy()
+        for window in applying(stage.weights.get(channel.kind, ()), experiment.maneuver):
+            weight[inside(window, channel.time)] *= window.factor
+        for sized in applying(stage.weights_by_input.get(channel.kind, ()), experiment.maneuver):
+            within = inside(sized, channel.time)
+            size = np.abs(experiment.input.at(channel.time[within]))
+            weight[within] *= np.interp(size, *np.transpose(sized.factors))
+        channels[name] = replace(channel, weight=weight)
+    return replace(experiment, channels=channels)
+
+
+def _of_the_machine(stage: Stage, parameters: ParameterSet) -> list[Unknown]:
+    """Unknowns of the drive: free parameters, both directions apart unless tied, then forces."""
+    unknowns: list[Unknown] = []
+    for name, entry in stage.free.items():
+        definition, columns = find(name), tuple(columns_of([name]))
+        least = -np.inf if definition.least is None else definition.least
+        how: Any = {"unit": definition.unit, "log": entry.log, "prior": entry.prior}
+        for group in [columns] if entry.tied else [(each,) for each in columns]:
+            nominal = float(np.mean([_nominal(parameters, column) for column in group]))
+            own, bounds = name if entry.tied else group[0], (entry.relative, entry.bounds)
+            unknown = bounded(own, nominal, *bounds, least, sets=group, **how)
+            check_plausible(f"a bound of {own}", definition, unknown.low, unknown.high)
+            if entry.prior is not None:
+                check_plausible(f"the prior mean of {own}", definition, entry.prior.mean)
+            unknowns.append(unknown)
+    if stage.forces is not None:
+        for name, value in stage.forces.values(parameters).items():
+            log = value > 0.0
+            force = bounded(name, value, stage.forces.relative, unit="N", log=log, kind="force")
+            check_plausible(f"a bound of {name}", FORCE, force.low, force.high)
+            unknowns.append(force)
+    return unknowns
+
+
+def _nominal(parameters: ParameterSet, column: str) -> float:
+    """Where a parameter begins: a refinement that the set does not give, where it is off."""
+    if column in parameters.numbers:
+        return parameters.numbers[column]
+    return parameters[column].values[0]
+
+
+def _of_a_run(
+    stage: Stage, experiment: Experiment, channels: Sequence[str], parameters: ParameterSet
+) -> Iterator[Unknown]:
+    """Unknowns of one experiment: free zeros of positions, pressure and current at the start."""
+    own = {name: experiment.channels[name] for name in channels if name in experiment.channels}
+    run, estimated = experiment.name, experiment.start == "estimated"
+    for name, channel in own.items():
+        if channel.is_position:
+            yield free_zero(name, channel, experiment)
+    if stage.part != "card" and (stage.start_pressure is not None or estimated):
+        most = stage.start_pressure or LARGEST_START_PRESSURE
+        yield Unknown(START_PRESSURE, 0.0, -most, most, "Pa", run=run, kind="start pressure")
+    measured = any(channel.kind in CURRENTS for channel in own.values())
+    if estimated and measured and stage.part != "pump" and experiment.input.kind == "voltage":
+        first = float(measured_current(experiment).values[0])
+        if first != 0.0:  # else neither channel is the driven one
+            plus, minus = START_CURRENTS
+            full = np.copysign(FULL_VOLTAGE, first)
+            most = 2.0 * abs(Drive(parameters).steady_current(float(full)))
+            yield Unknown(
+                minus if first < 0.0 else plus,
+                min(abs(first), 0.9 * most),
+                0.0,
+                most,
+                "A",
+                run=run,
+                kind="start current",
+            )
