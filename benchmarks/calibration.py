@@ -140,8 +140,8 @@ def overview_row(axis, rate, records):
 
 
 def error_row(axis, rate, records):
-    """What headlines claim of held-out speed, and the errors in new maneuvers: median, largest."""
-    columns = [[record["claim"] for record in records]]
+    """What verdicts state of the speed, and the errors in new maneuvers: median, largest."""
+    columns = [[record["stated"] for record in records]]
     columns += [[record["new"].get(name) for record in records] for name in new_names()]
     return axis, f"{rate:g}", *(f"{number(values)}, {number(values, max)}" for values in columns)
 
@@ -151,15 +151,15 @@ def print_report(records):
     split = groups(records)
     print_table(OVERVIEW, [overview_row(*key, some) for key, some in split.items()])
     print("\nError of the speed, RMS in % of its range: median, largest of the campaigns.")
-    head = ("axis", "rate, Hz", "headline claims", *new_names())
+    head = ("axis", "rate, Hz", "stated, worst class", *new_names())
     print_table(head, [error_row(*key, some) for key, some in split.items()])
     for (axis, rate), some in split.items():
         print_parameters(f"{axis}, {rate:g} Hz", with_interval(some))
         left_out = sorted({name for record in some for name in record["without_counterpart"]})
-        grades = Counter(f"{record['grade']} (exit code {record['exit']})" for record in some)
+        codes = Counter(record["exit"] for record in some)
         drafts = Counter(record["interpolation"] for record in some)
         print(f"\nWithout a counterpart in the machine: {', '.join(left_out) or 'none'}.")
-        print(f"Verdicts: {', '.join(f'{n} {grade}' for grade, n in grades.items())}.")
+        print(f"Exit codes: {', '.join(f'{n} times {code}' for code, n in codes.items())}.")
         print(f"Drafted interpolation: {', '.join(f'{n} {name}' for name, n in drafts.items())}.")
     for record in records:
         if "error" in record:

@@ -208,15 +208,24 @@ def write_table(path, columns):
         writer.writerows(zip(*(values.tolist() for values in columns.values()), strict=True))
 
 
-def claims(headline):
-    """Errors that a verdict claims of the held-out speed: mean and worst run, % of range."""
-    speed = (
-        r"speed(?: from)?[ \w]*? to ([\d.eE+-]+) % of its range(?: \(worst run ([\d.eE+-]+) %\))?"
-    )
-    said = re.search(speed, headline)
-    if not said:
-        return None, None
-    return tuple(float(text) if text else None for text in said.groups())
+def stored_verdict(fitted):
+    """Entries of the verdict in a fit's folder; none of an older installation's."""
+    stored = json.loads((fitted / "fit.json").read_text("utf-8")).get("verdict") or {}
+    return stored.get("verdict", {})
+
+
+def stated_error(predictions, decisive):
+    """Error of the class that is predicted worst, % of range, of the first decisive channel.
+
+    Of a drive that is its shaft's speed. None if nothing is stated.
+    """
+    errors = [
+        100.0 * error
+        for entry in predictions
+        if entry["channel"] in decisive[:1]
+        for _, error, *_ in entry["classes"]
+    ]
+    return max(errors, default=None)
 
 
 def fit(program, truth, folder, *words):
@@ -225,30 +234,32 @@ def fit(program, truth, folder, *words):
     Returns
     -------
     dict
-        "cpu_fit" [s], "memory" [MB], "exit", of the verdict "grade", "headline", "assumed" and
-        "unmet" (criteria), "claim" and "claim_worst" as of `claims`, "estimates" and
-        "without_counterpart" as of `estimates`.
+        "cpu_fit" [s], "memory" [MB], "exit"; of the verdict "usable", "headline", "unsound"
+        (sentences), "causes" (names, in order), "predictions" and "decisive" (as stored) and
+        "assumed"; "stated" as of `stated_error`, "estimates" and "without_counterpart" as of
+        `estimates`.
     """
     code, output, seconds, memory = program.run(
         "fit", "campaign.toml", "--out", "fitted", "--jobs", 1, *words, folder=folder
     )
     if code not in {0, 1}:
         raise CampaignError(output)
-    verdict = json.loads((folder / "fitted" / "fit.json").read_text("utf-8")).get("verdict") or {}
-    headline = verdict.get("headline", "")
-    # an older installation stores no verdict, but prints it
-    claim, worst = claims(headline or output)
+    verdict = stored_verdict(folder / "fitted")
+    headline = re.search(r"^(Usable|Not usable)\b.*", output, re.MULTILINE)
+    predictions, decisive = verdict.get("predictions", []), verdict.get("decisive", [])
     rows, without = estimates(folder / "fitted", truth)
     return {
         "cpu_fit": seconds,
         "memory": memory,
         "exit": code,
-        "grade": verdict.get("grade", ""),
-        "headline": headline,
+        "usable": code == 0,
+        "headline": headline[0] if headline else "",
+        "unsound": [sentence for *_, sentence in verdict.get("unsound", [])],
+        "causes": [name for name, *_ in verdict.get("causes") or []],
+        "predictions": predictions,
+        "decisive": decisive,
         "assumed": verdict.get("assumed", []),
-        "unmet": [name for name, _, _, _, failure, *_ in verdict.get("criteria", []) if failure],
-        "claim": claim,
-        "claim_worst": worst,
+        "stated": stated_error(predictions, decisive),
         "estimates": rows,
         "without_counterpart": without,
     }

@@ -8,7 +8,8 @@ Each campaign is logged by the machine of `second_machine`, which shares no line
 with one fault in the machine, its instruments or its logs. `swashplate campaign init` drafts the
 file, the runs that are held out get their role, nothing else is corrected; `campaign check` and
 `fit` say what they say. The fitted drive's speed is compared with the faulty machine's in maneuvers
-that no campaign has, and its values with the machine's.
+that no campaign has, by class of motion with what the verdict states, and its values with the
+machine's.
 
 Class A: no fit can see the fault, a sound machine with other numbers gives the same signals. Class
 B: it matters, by new maneuvers or by a value, beyond the sound campaign of the same seed. Class C:
@@ -24,7 +25,9 @@ import re
 import sys
 from collections import Counter
 from pathlib import Path
+from statistics import median
 
+import numpy as np
 from command_line import CampaignError, Program, draft, fit, new_names, predicted
 from records import (
     half_width,
@@ -40,41 +43,110 @@ from records import (
 from second_machine import draws, logger
 from second_machine.faults import FAULTS, FEWER, unseen
 
+from swashplate import Drive
+from swashplate.identification import discrepancy
+
 FOLDER = Path(__file__).parent
 RATE = 512.0
 FEWER_RATES = {512.0: "at_512", 50.0: "at_50"}
 """Rates of the campaigns with fewer instruments, and their seeds in levels.toml. [Hz]"""
-LATE = r"time stamps of (encoder_counts|the command)|\btau\b"
-"""Which of them is late, logs hardly tell."""
+FEWEST = 50
+"""Samples of a new maneuver from which a class of motion counts."""
+STILL = 1e-4
+"""Part of the speed's range by which it changes in a class at least, if it counts."""
+LATE = r"^(time stamps of \w+|lag of the command|tau)$"
+"""What all instruments see alike: a late command, or a machine that answers late."""
+RESISTED = r"^loss of speed under a load that resists"
 NAMES = {
-    "run of another axis": r"differ in scale|moves [\d.]+ times as",
-    "spool friction": r"friction or hysteresis",
-    "leakage under load, 10 % of the top speed": r"load or leakage",
-    "leakage under load, 2 % of the top speed": r"load or leakage",
-    "drift of 8 % over the campaign": r"drift of",
-    "encoder 20 ms late": LATE,
-    "ammeter clipped": r"clipped",
+    "run of another axis": r"ramp_\+1_V",
+    "spool friction": r"^solenoid_hysteresis$",
+    "leakage under load, 10 % of the top speed": RESISTED,
+    "leakage under load, 2 % of the top speed": RESISTED,
+    "drift of 8 % over the campaign": r"^drift of (encoder_counts|shaft_speed)",
+    "encoder 20 ms late": r"^time stamps of encoder_counts$",
+    "ammeter clipped": r"rectified_current.* clipped",
     "delay 20 ms longer than stated": LATE,
     "encoder reads 3 % too much": r"scale of encoder_counts",
     "ammeter reads 3 % too much": r"scale of rectified_current",
     "command's stamps 20 ms late": LATE,
-    "encoder loses counts above 70 % of the top speed": r"loses counts|largest speeds",
     "supply pressure 20 % low": r"\bZ9\b",
-    "play of 0.2 degrees before the encoder": r"friction or hysteresis",
 }
-"""Words by which a verdict or `campaign check` names a fault; of others they have none."""
+"""Words by which a verdict names a fault, as cause, as unsound data or as assumed; of others it has
+none."""
+UNSOUND = ("run of another axis", "ammeter clipped")
+"""Faults after which the data are not sound."""
 
 
 # --- one campaign ---------------------------------------------------------------------------------
 
 
-def causes(headline):
-    """Causes that a headline calls likely, with their sizes."""
-    likely = re.search(r"\(likely: (.*)\)", headline)
-    if not likely:
+def in_new_maneuvers(folder, equipment, record):
+    """Stated and true error of the speed in new maneuvers under conditions of the machine's day.
+
+    Parameters
+    ----------
+    folder : Path
+        Holds the logs and the fit.
+    equipment : draws.Equipment
+    record : dict
+        As of `command_line.fit`.
+
+    Returns
+    -------
+    list of dict
+        "maneuver", "motion" (a class of `discrepancy.classes_of`), "stated" and "true", RMS in % of
+        the signal's range; "stated" is None for a class that the verdict calls unknown.
+    """
+    stored = [each for each in record["predictions"] if each["channel"] in record["decisive"][:1]]
+    if not stored:
         return []
-    text = re.sub(r"^one of these, [^:]*: ", "", likely[1])
-    return [cause.strip(" ;") for cause in re.findall(r"(.+?) explains \d+ %", text)]
+    (entry,) = stored
+    known = {motion for motion, *_ in entry["classes"]}
+    prediction = discrepancy.PredictionError(**entry)
+    drive = Drive.from_toml(folder / "fitted" / "drive.toml")
+    logs = sorted((folder / "logs").iterdir())
+    volts = [np.loadtxt(path, delimiter=",", skiprows=1, usecols=1) for path in logs]
+    largest = float(np.abs(np.concatenate(volts)).max())
+    conditions, names, rows = list(equipment.conditions.values()), new_names(), []
+    for index, name in enumerate(names):
+        place = round((index + 0.5) / len(names) * (len(conditions) - 1))
+        run = logger.new_run(equipment.parameters, equipment.axis, name, conditions[place])
+        new = new_record(name, run, drive)
+        for motion, inside in discrepancy.classes_of(new, prediction.reach, largest).items():
+            speed = new.measured[inside]
+            if speed.size < FEWEST or np.ptp(speed) < STILL * prediction.reach:
+                continue
+            stated = prediction.error(new.signal[inside], new.rate[inside])
+            true = float(np.sqrt(np.mean(new.error[inside] ** 2))) / prediction.reach
+            rows.append(
+                {
+                    "maneuver": name,
+                    "motion": motion,
+                    "stated": 100.0 * stated if motion in known else None,
+                    "true": 100.0 * true,
+                }
+            )
+    return rows
+
+
+def new_record(name, run, drive):
+    """A new maneuver, (n, 3) as of `logger.new_run`, beside the simulation of a drive."""
+    _, volts, speed = run.T
+    simulated, step = drive.simulate(volts, logger.NEW_RATE).shaft_speed, 1.0 / logger.NEW_RATE
+    return discrepancy.Record(
+        run=name,
+        maneuver=name,
+        held_out=True,
+        start=0.0,
+        step=step,
+        measured=speed,
+        error=simulated - speed,
+        noise=0.0,
+        signal=simulated,
+        rate=discrepancy.TIME * np.gradient(simulated, step),
+        command=volts,
+        is_position=False,
+    )
 
 
 def findings(program, folder):
@@ -106,8 +178,10 @@ def campaign(program, fault, axis, rate, seed, folder):
         words = guess(program, folder) if record["guessed"] else ()
         record |= fit(program, truth, folder, *words)
     except CampaignError as error:
-        return record | {"grade": "refused", "exit": 2, "headline": " ".join(str(error).split())}
-    record["causes"] = causes(record["headline"])
+        said = " ".join(str(error).split())
+        refused = {"usable": False, "exit": 2, "headline": said, "unsound": [said], "causes": []}
+        return record | refused
+    record["statements"] = in_new_maneuvers(folder, equipment, record)
     record["new"] = predicted(program, folder, truth, condition=equipment.steady)
     return record
 
@@ -192,33 +266,69 @@ def class_of(row):
 
 
 def named(record):
-    """Where a fault is named: in the "verdict", by "check", among what is "assumed", or ""."""
+    """Where a fault is named: as a "cause", as "unsound", among what is "assumed", or ""."""
     words = NAMES.get(record["fault"])
     if words is None:
         return ""
-    texts = {
-        "verdict": record["headline"],
-        "check": " ".join(record["check"]),
-        "assumed": " ".join(record.get("assumed", ())),
+    places = {
+        "cause": record["causes"],
+        "unsound": record["unsound"],
+        "assumed": record.get("assumed", ()),
     }
-    return next((place for place, text in texts.items() if re.search(words, text)), "")
+    return next(
+        (place for place, texts in places.items() if any(re.search(words, each) for each in texts)),
+        "",
+    )
 
 
 # --- tables ---------------------------------------------------------------------------------------
 
-HEAD = (
-    "fault",
-    "axis",
-    "class",
-    "check, findings",
-    "verdict of fit",
+VERDICTS = (
+    "campaigns",
     "exit code",
-    "headline claims, %",
-    "error on new, %",
-    "worst value, half widths",
-    "named",
-    "likely cause",
+    "unsound",
+    "cause named",
+    "right",
+    "wrong",
+    "statements",
+    "hold, %",
+    "stated over true, median",
+    "below half, %",
 )
+HEAD = (
+    *("fault", "axis", "class", "check, findings", *VERDICTS),
+    *("error on new, %", "worst value, half widths", "named"),
+)
+
+
+def verdict_cells(rows):
+    """Cells of `VERDICTS` for some campaigns."""
+    causes = [row for row in rows if row["causes"]]
+    right = sum(named(row) == "cause" for row in causes)
+    ratios = [
+        each["stated"] / each["true"]
+        for row in rows
+        for each in row.get("statements", ())
+        if each["stated"] is not None
+    ]
+    return (
+        len(rows),
+        shares(str(row["exit"]) for row in rows),
+        sum(bool(row["unsound"]) for row in rows),
+        len(causes),
+        right,
+        len(causes) - right,
+        len(ratios),
+        percent(ratio >= 1.0 for ratio in ratios),
+        f"{median(ratios):.2f}" if ratios else "-",
+        percent(ratio < 0.5 for ratio in ratios),
+    )
+
+
+def percent(held):
+    """Part of some that is true, in %."""
+    held = list(held)
+    return f"{100.0 * sum(held) / len(held):.1f}" if held else "-"
 
 
 def shares(values):
@@ -232,19 +342,15 @@ def shares(values):
 def fault_row(fault, axis, rows):
     """Cells of `HEAD` for the campaigns of a fault and an axis; numbers are medians."""
     done = [row for row in rows if "new" in row]
-    first = [re.sub(r" by [+-].*", "", row["causes"][0]) for row in done if row["causes"]]
     return (
         fault,
         axis,
         shares(row["class"] for row in rows),
         number([len(row["check"]) for row in rows]),
-        shares(row["grade"] for row in rows),
-        shares(str(row["exit"]) for row in rows),
-        number([row["claim"] for row in done]),
+        *verdict_cells(rows),
         number([max(row["new"].values()) for row in done]),
         number([max(map(miss_or_zero, row["estimates"]), default=0.0) for row in done]),
         shares(row["named"] for row in rows),
-        shares(first) if first else "-",
     )
 
 
@@ -268,34 +374,23 @@ def print_faults(records):
     print_verdicts(rows)
 
 
-GRADES = ("Usable", "Usable for prediction", "Not usable", "refused")
-
-
 def print_verdicts(rows):
-    """How many campaigns of each class have each verdict, and predict worse than it lets expect."""
-    limit = draws.LEVELS["faults"]["matters"]["prediction"]
-    table = []
-    for name in ("sound", "A", "B", "C", "-"):
-        some = [
-            row
-            for row in rows
-            if (name == "sound") == (row["fault"] == "none") and name in {"sound", row["class"]}
+    """What the verdicts say of sound campaigns, of unsound data, and of the other classes."""
+    groups = {"sound": [row for row in rows if row["fault"] == "none"]}
+    groups["data not sound"] = [row for row in rows if row["fault"] in UNSOUND]
+    for name in "ABC-":
+        groups[f"other faults of class {name}"] = [
+            row for row in rows if row["class"] == name and row["fault"] not in {"none", *UNSOUND}
         ]
-        if some:
-            counts = Counter(row["grade"] for row in some)
-            far = [row for row in some if row["exit"] == 0 and max(row["new"].values()) > limit]
-            table.append((name, len(some), *(counts[grade] for grade in GRADES), len(far)))
-    print_table(
-        ("class", "campaigns", *GRADES, f"exit code 0, but error on new above {limit:g} %"), table
-    )
+    table = [(name, *verdict_cells(some)) for name, some in groups.items() if some]
+    print_table(("campaigns of", *VERDICTS), table)
 
 
 FEWER_HEAD = (
     "axis",
     "rate, Hz",
     "instruments",
-    "campaigns",
-    "verdict of fit",
+    *VERDICTS,
     "error on new, median, largest, %",
     "intervals",
     "that hold the truth",
@@ -322,7 +417,7 @@ def print_fewer(records):
         missed = Counter(row["name"] for row in intervals if not holds(row))
         often = [name for name, count in missed.items() if 2 * count > len(done)]
         table.append((
-            axis, f"{rate:g}", fewer, len(some), shares(record["grade"] for record in some),
+            axis, f"{rate:g}", fewer, *verdict_cells(some),
             f"{number(errors)}, {number(errors, max)}", len(intervals),
             sum(map(holds, intervals)), number(map(half_width, intervals)),
             ", ".join(often) or "-",

@@ -58,7 +58,7 @@ WAYS = ("positive", "negative")
 QUANTITIES = ("dead zone", "top speed", "acceleration", "delay", "lag", "creep")
 FIELDS = (
     *("seed", "sensor", "orifice", "quantity", "way"),
-    *("truth", "printed", "low", "high", "grade", "fit_cpu"),
+    *("truth", "printed", "low", "high", "usable", "fit_cpu"),
 )
 
 
@@ -233,7 +233,9 @@ def rows_of(folder, seed):
             printed = cell if isinstance(cell, str) else cell.text
             low, high = ends(printed)
             words = (seed, sensor[0], orifice, name, way)
-            rows.append((*words, factor * exact, printed, low, high, judged.verdict.grade, seconds))
+            rows.append(
+                (*words, factor * exact, printed, low, high, judged.verdict.usable, seconds)
+            )
     return rows
 
 

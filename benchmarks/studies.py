@@ -39,7 +39,7 @@ def fit_study_rows() -> Iterator[Row]:
             found = Identification(campaign, fit(nominal, runs, setup))
             fitted.append(time.perf_counter() - begin)
             begin = time.perf_counter()
-            # what a stage says is computed where it is asked for; the verdict judges held-out runs
+            # what a stage says is computed where it is asked for; the verdict predicts and refits
             stages = found.fit.stages
             for each in stages:
                 _ = identifiability_of(each), uncertainty_of(each), each.runs

@@ -3,11 +3,14 @@
 import json
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 from types import ModuleType
 from typing import Any
 
 import pytest
+
+from swashplate import Drive
 
 BENCHMARKS = Path(__file__).parents[1] / "benchmarks"
 
@@ -61,8 +64,8 @@ def record(fault: str, new: float, value: float, **more: Any) -> dict[str, Any]:
     """A record of a campaign whose truth is 10, with an interval of ±1."""
     row = {"name": "Z8", "truth": 10.0, "value": value, "lower": value - 1.0, "upper": value + 1.0}
     errors = {"step +1 V": new, "step -1 V": 0.0, "stair": 0.0, "sine 0.5 Hz": 0.0, "chirp": 0.0}
-    entries = {"axis": "hoist", "rate": 512.0, "seed": 0, "unseen": False, "grade": "Usable"}
-    verdict = {"headline": "", "check": [], "new": errors, "estimates": [row]}
+    entries = {"axis": "hoist", "rate": 512.0, "seed": 0, "unseen": False, "exit": 0}
+    verdict = {"unsound": [], "causes": [], "check": [], "new": errors, "estimates": [row]}
     return entries | verdict | {"fault": fault} | more
 
 
@@ -80,24 +83,89 @@ def test_classes_are_beyond_the_sound_campaign(bench: ModuleType) -> None:
     assert rows[2]["beyond"] == pytest.approx((3.1, 0.5))
 
 
-def test_causes_of_a_headline_and_whether_they_name_the_fault(bench: ModuleType) -> None:
-    headline = (
-        "Usable for prediction; values not to be trusted because residuals are 9.4 times their "
-        "error (likely: one of these, which the residuals hardly tell apart: friction or "
-        "hysteresis, as a lag of encoder_counts, by +0.348 deg/s explains 26 %; drift of "
-        "encoder_counts over the campaign by -0.265 % explains 24 % of them)."
+def test_where_a_verdict_names_a_fault(bench: ModuleType) -> None:
+    friction = record("spool friction", 0.0, 10.0, causes=["tau", "solenoid_hysteresis"])
+    assert bench.named(friction) == "cause"
+    loss = ["loss of speed under a load that pulls one way, encoder_counts"]
+    assert (
+        bench.named(record("leakage under load, 2 % of the top speed", 0.0, 10.0, causes=loss))
+        == ""
     )
-    assert bench.causes(headline) == [
-        "friction or hysteresis, as a lag of encoder_counts, by +0.348 deg/s",
-        "drift of encoder_counts over the campaign by -0.265 %",
-    ]
-    assert bench.causes("Usable.") == []
-    assert bench.named(record("spool friction", 0.0, 10.0, headline=headline)) == "verdict"
-    hidden = record("supply pressure 20 % low", 0.0, 10.0, assumed=["in units of the fixed Z9."])
+    loss = ["loss of speed under a load that resists, encoder_counts"]
+    assert bench.named(record("leakage under load, 2 % of the top speed", 0.0, 10.0, causes=loss))
+    assert bench.named(record("spool friction", 0.0, 10.0, causes=loss)) == ""
+    assert bench.named(record("none", 0.0, 10.0, causes=loss)) == ""
+    hidden = record("supply pressure 20 % low", 0.0, 10.0, assumed=["the fixed Z6, Z9 as stated"])
     assert bench.named(hidden) == "assumed"
-    seen = record("run of another axis", 0.0, 10.0, check=["'counts' moves 6.1 times as far."])
-    assert bench.named(seen) == "check"
-    assert bench.named(record("ammeter clipped", 0.0, 10.0, headline=headline)) == ""
+    found = ["hoist_ramp_+1_V-s: 'encoder_counts' is 6.1 times as far from what is simulated."]
+    assert bench.named(record("run of another axis", 0.0, 10.0, unsound=found)) == "unsound"
+    found = ["hoist_step_+4_V: 'encoder_counts' is 6.1 times as far from what is simulated."]
+    assert bench.named(record("run of another axis", 0.0, 10.0, unsound=found)) == ""
+
+
+def test_what_verdicts_say_is_counted(bench: ModuleType) -> None:
+    """Two campaigns: three statements of 2, 1 and 0.4 times the true error, and one cause right."""
+    errors = [(2.0, 1.0), (1.0, 1.0), (0.4, 1.0), (None, 1.0)]
+    statements = [{"stated": stated, "true": true} for stated, true in errors]
+    rows = [
+        record("spool friction", 0.0, 10.0, causes=["solenoid_hysteresis"], statements=statements),
+        record("spool friction", 0.0, 10.0, causes=["tau"], exit=1),
+        record("spool friction", 0.0, 10.0, unsound=["refused"], exit=2),
+    ]
+    cells = dict(zip(bench.VERDICTS, bench.verdict_cells(rows), strict=True))
+    assert cells == {
+        "campaigns": 3,
+        "exit code": "0 (1), 1 (1), 2 (1)",
+        "unsound": 1,
+        "cause named": 2,
+        "right": 1,
+        "wrong": 1,
+        "statements": 3,
+        "hold, %": "66.7",
+        "stated over true, median": "1.00",
+        "below half, %": "33.3",
+    }
+
+
+def test_errors_are_stated_by_class_under_the_days_conditions(
+    bench: ModuleType, tmp_path: Path
+) -> None:
+    """A fit that is the machine of the first half of the day, and a speed that has halved since."""
+    from second_machine import draws
+
+    sound = draws.drawn_equipment("hoist", 1000)
+    runs = list(sound.conditions)
+    speeds = dict.fromkeys(runs, draws.STEADY)
+    speeds |= dict.fromkeys(runs[len(runs) // 2 :], draws.STEADY._replace(speed=0.5))
+    machine = Drive.preset("hoist").parameters.numbers
+    numbers = {name: machine[name] for name in sound.parameters}
+    equipment = replace(sound, parameters=numbers, conditions=speeds)
+    (tmp_path / "fitted").mkdir()
+    (tmp_path / "logs").mkdir()
+    Drive.preset("hoist").to_toml(tmp_path / "fitted" / "drive.toml")
+    (tmp_path / "logs" / "run.csv").write_text("time [s],voltage [V]\n0.0,9.0\n0.1,-8.0\n")
+    entry = {
+        "channel": "encoder_counts",
+        "unit": "rad/s",
+        "reach": 6.0,
+        "coefficients": [0.02**2, 0.0, 0.0],
+        "classes": [["large", 0.02, 3, 1], ["fast", 0.02, 3, 1]],
+    }
+    record = {"predictions": [entry], "decisive": ["encoder_counts", "rectified_current"]}
+    rows = bench.in_new_maneuvers(tmp_path, equipment, record)
+    assert len({(row["maneuver"], row["motion"]) for row in rows}) == len(rows)
+    assert {row["stated"] for row in rows if row["motion"] == "small"} == {None}
+    stated = [row["stated"] for row in rows if row["motion"] != "small"]
+    assert stated == pytest.approx([2.0] * len(stated))
+    worst: dict[str, float] = {}
+    for row in rows:
+        worst[row["maneuver"]] = max(row["true"], worst.get(row["maneuver"], 0.0))
+    names = list(worst)
+    assert names == ["step +1 V", "step -1 V", "stair", "sine 0.5 Hz", "chirp"]
+    # 0.1 % is what two ways of marching one machine differ by
+    assert max(worst[name] for name in names[:2]) < 0.1
+    # half of a speed whose RMS is more than a tenth of the range
+    assert min(worst[name] for name in names[3:]) > 100.0 * 0.5 * 0.1
 
 
 def test_bench_goes_on_where_it_stopped(bench: ModuleType, tmp_path: Path) -> None:
@@ -109,21 +177,21 @@ def test_bench_goes_on_where_it_stopped(bench: ModuleType, tmp_path: Path) -> No
         seen.append(item["seed"])
         if item["seed"] == 1:
             raise bench.CampaignError("no drive")
-        return {"grade": "Usable"}
+        return {"exit": 0}
 
     path = tmp_path / "records.jsonl"
     bench.run_missing(work, bench.missing(items[:2], bench.read(path)), 1, path)
     bench.run_missing(work, bench.missing(items, bench.read(path)), 1, path)
     assert seen == [0, 1, 2]
     assert bench.read(path) == [
-        {"fault": "none", "seed": 0, "grade": "Usable"},
+        {"fault": "none", "seed": 0, "exit": 0},
         {"fault": "none", "seed": 1, "error": "no drive"},
-        {"fault": "none", "seed": 2, "grade": "Usable"},
+        {"fault": "none", "seed": 2, "exit": 0},
     ]
 
 
 @pytest.mark.slow
-def test_faults_go_from_logs_to_a_table(tmp_path: Path) -> None:
+def test_faults_go_from_logs_to_a_table(bench: ModuleType, tmp_path: Path) -> None:
     """A sound campaign and a faulty one of slew: drafted, checked, fitted, predicted, judged."""
     done = subprocess.run(
         [
@@ -144,7 +212,15 @@ def test_faults_go_from_logs_to_a_table(tmp_path: Path) -> None:
     ]
     assert [row["class"] for row in rows] == ["C", "A"]
     assert all(len(row["new"]) == 5 for row in rows)
+    for row in rows:
+        assert row["usable"] == (row["exit"] == 0)
+        assert row["headline"].startswith("Usable: " if row["usable"] else "Not usable")
+        assert {each["maneuver"] for each in row["statements"]} == set(row["new"])
+        assert {"channel", "reach", "coefficients", "classes"} <= set(row["predictions"][0])
     # the fit takes the counts for a faster drum
     errors = [row["new"]["stair"] for row in rows]
     assert errors[1] - errors[0] > 0.5
+    # what no fit can see is no cause, and stands among what is assumed
+    assert bench.named(rows[1]) == "assumed"
     assert "| encoder reads 3 % too much | slew | A |" in done.stdout
+    assert "| sound | 1 | 0 |" in done.stdout

@@ -266,23 +266,27 @@ def test_summaries_and_tables_of_a_notebook(work: Work) -> None:
 
 def test_a_verdict_is_the_first_that_is_read(work: Work) -> None:
     verdict = work.judged.verdict
-    assert verdict.headline.startswith(verdict.grade)
+    assert verdict.headline.startswith("Usable: " if verdict.usable else "Not usable")
+    answers = verdict.answers()
+    assert list(answers)[:3] == ["Data", "Prediction", "Values"]
+    said = "\n".join(f"{name}: {answer}" for name, answer in answers.items())
     for result in (verdict, work.judged):
-        assert result.summary().startswith(f"{verdict.headline}\n\n- {verdict.validity}\n")
+        assert result.summary().startswith(
+            f"{verdict.headline}\n\n{said}\n\n- {verdict.validity}\n"
+        )
         html = result._repr_html_()
         assert html is not None
         assert html.startswith(f"<p><strong>{escape(verdict.headline)}</strong></p>")
-        assert all(escape(criterion.name) in html for criterion in verdict.criteria)
+        assert all(f"<dd>{escape(answer)}</dd>" in html for answer in answers.values())
         assert html.count(escape(verdict.headline)) == 1
         assert len(repr(result)) <= LONGEST + 40
-    # estimates, then criteria that are not met or not judged; what is met is there to be opened
+    # estimates, then how far predictions may be off; what they rest on is there to be opened
     before, _, after = html.partition("<details>")
     assert work.fitted.stages[-1].problem.unknowns.names[0] in before
-    states = {each.state: each for each in verdict.criteria}
-    assert before.index("Stage card") < before.index("Acceptance criteria")
-    assert before.index("Stage pump") < before.index(escape(states["not judged"].name) + "</td>")
-    assert f"{escape(states['met'].name)}</td>" not in before
-    assert f"{escape(states['met'].name)}</td>" in after
+    stated = before.index(verdict.table().title)
+    assert before.index("Stage card") < before.index("Stage pump") < stated
+    assert [each.channel for each in verdict.predictions] == ["current", "counts"]
+    assert all(before.index(f"{each.signal}</td>") > stated for each in verdict.predictions)
     assert "The tests determine all 2 free parameters" in after
     assert "held-out runs" not in html  # there are none
     # the free zeros of the runs' counts are in no table for people

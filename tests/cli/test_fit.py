@@ -164,7 +164,7 @@ def test_all_that_can_be_asked_for_besides(done: Words, campaign: Path, tmp_path
     half = 1.96 * noise.standard_errors[noise.variables.names.index("Z8")]
     assert found == pytest.approx([z8.value, z8.value * exp(-half), z8.value * exp(half)], rel=0.01)
     summary, printed = result.summary().partition("Stage card")[2], " ".join(said.split())
-    printed = printed.partition("Stage card")[2].partition("Acceptance criteria")[0]
+    printed = printed.partition("Stage card")[2].partition("Stated error in a new maneuver")[0]
     sentences = [line for line in summary.splitlines() if re.match(r"(- |\w+: |Fixed at)", line)]
     assert len(sentences) >= 8
     assert [line for line in sentences if " ".join(line.split()) not in printed] == []
@@ -176,12 +176,14 @@ def test_all_that_can_be_asked_for_besides(done: Words, campaign: Path, tmp_path
 def test_a_result_that_is_of_no_use_ends_with_1(run, campaign, tmp_path) -> None:
     narrow = SETUP.replace("relative = [0.5, 2.0]", "relative = [0.99, 1.01]")
     (tmp_path / "narrow.toml").write_text(narrow, "utf-8")
-    words = ("--setup", "narrow.toml", "--no-report", "--evaluations", "900")
+    words = ("--setup", "narrow.toml", "--no-report", "--evaluations", "900", "--require", "3")
     result = run("fit", CAMPAIGN, *words)
     assert result.exit_code == 1
-    assert result.stderr.startswith("Not usable: ")
-    assert "bound" in result.stderr
+    assert result.stderr.startswith("Not usable: predicts speed from counts within ")
+    assert "3 % is required" in " ".join(result.stderr.split())
     said = " ".join(result.stdout.split())
+    # every value but one stands at an end of its bounds, and that one is not determined
+    assert "Values: 0 of 6 may be quoted" in said
     assert "widen J under [stages.free] of the stage 'card' and fit again." in said
     # whoever takes the drive along hears of it, and so do those who get the files
     said = run("export", "fitted", "--c", "folder").stdout
@@ -243,9 +245,10 @@ def test_a_drive_beside_the_runs_that_were_held_out(done, held_out, tmp_path) ->
     assert "hoist_step_4_V" not in said
     assert re.search(r"\ncurrent +\n.* mA ", said, re.DOTALL)
     assert re.search(r"\nspeed from counts +\n.* deg/s ", said, re.DOTALL)
-    assert "'of its range' below means" in " ".join(said.split())
-    assert "Predicts speed from counts to 0." in said
-    assert "<svg" in (tmp_path / "found" / "report.html").read_text("utf-8")
+    assert "'of range' below means" in " ".join(said.split())
+    assert "Usable: predicts speed from counts within 0." in said
+    assert "Data: Not judged: a drive that was not fitted to these runs" in said
+    assert "Values: " not in said
     with (tmp_path / "found" / "measures.csv").open(encoding="utf-8") as file:
         rows = {row["channel"]: row for row in csv.DictReader(file)}
     assert set(rows) == {"current", "counts", "speed from counts"}
@@ -255,17 +258,21 @@ def test_a_drive_beside_the_runs_that_were_held_out(done, held_out, tmp_path) ->
     assert rows["current"]["initial_state"] == "rest"
     assert abs(float(rows["current"]["correlation_with_input"])) < 0.5
     assert rows["speed from counts"]["correlation_with_input"] == ""
-    assert "follow the input" not in said
+    page = (tmp_path / "found" / "report.html").read_text("utf-8")
+    assert "residuals of current follow the input" not in page
+    assert "<svg" in page
 
 
 def test_a_drive_that_is_not_usable_ends_with_1(run, held_out, tmp_path) -> None:
     """A drive of too low a gain misses the more the larger the command."""
     Drive.preset("hoist").scale(Z10=0.4, J=0.4).to_toml(tmp_path / "wrong.toml")
-    result = run("validate", "wrong.toml", CAMPAIGN)
+    result = run("validate", "wrong.toml", CAMPAIGN, "--out", "found")
     assert result.exit_code == 1
     assert result.stderr.startswith("Not usable: ")
+    assert "10 % is required" in " ".join(result.stderr.split())
     assert "NOT MET" in result.stdout
-    assert "current: the residuals of 1 of 1 runs follow the input" in result.stdout
+    page = (tmp_path / "found" / "report.html").read_text("utf-8")
+    assert "residuals of current follow the input" in page
 
 
 def test_validations_that_are_refused(refused: Words, held_out: Path) -> None:
@@ -301,7 +308,7 @@ def fitted(held_out: Path, tmp_path: Path) -> Fit:
 def test_the_report_is_written_again(done: Words, fitted: Fit, tmp_path: Path) -> None:
     said = done("report", "fitted", "--truth", "virtual/truth")  # the campaign is that of the fit
     assert "Report:    fitted/report.html" in said
-    assert "Usable: predicts held-out speed from counts to 0." in said
+    assert "Usable: predicts speed from counts within 0." in said
     page = (tmp_path / "fitted" / "report.html").read_text("utf-8")
     row = re.search(r"Z10</span></th>(?:<td[^>]*>[^<]*</td>){2}<td[^>]*>([^<]*)</td>", page)
     assert float(row[1]) == pytest.approx(fitted.stages[1].values["Z10"], rel=5e-3)

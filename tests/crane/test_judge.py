@@ -251,7 +251,7 @@ def test_own_logs_lead_to_the_verdict_on_the_own_crane(crane, fitted):
     assert len(drawn) == 3
     assert own.fits == {"luff": place}
     source = own.sources["luff"]
-    assert (source.grade, source.verdict) == (verdict.grade, verdict.headline)
+    assert (source.judged_usable, source.verdict) == (verdict.usable, verdict.headline)
     assert {each.sources["luff"].verdict for each in drawn} == {verdict.headline}
     assert crane.with_drive(luff=place / "drive.toml").fits == own.fits
     assert not own.with_drive(luff=crane.luff).fits

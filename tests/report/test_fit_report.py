@@ -18,8 +18,8 @@ from tests.identification.given import virtual
 from tests.report.conftest import injected, policy_of, with_script
 
 from swashplate import Campaign, Drive, FileError, InputError, maneuvers
+from swashplate.identification import verdict
 from swashplate.identification.assessment import Identification
-from swashplate.identification.criteria import verdict
 from swashplate.identification.fitting import Fit, fit
 from swashplate.identification.interval_ends import Point
 from swashplate.identification.intervals import uncertainty_of
@@ -381,6 +381,7 @@ def test_each_run_has_a_light_and_links(
     rows = read.rows("overview")
     assert [row["role"] for row in rows] == ["fit", "fit", "validate"]
     assert rows[-1]["run"] == judged.predicted[0].experiment.name
+    assert {row["why"] for row in rows}.isdisjoint({"not sound"})
     # a run that the drive cannot follow: it went the other way
     *others, last = campaign.experiments
     still = {k: replace(c, values=-c.values) for k, c in last.channels.items()}
@@ -388,7 +389,10 @@ def test_each_run_has_a_light_and_links(
     lights = [of["class"] for tag, of in page.tags if tag == "span" and of.get("role") == "img"]
     assert lights[0] == "light bad"  # of the verdict
     assert lights[-1] == "light bad"
-    assert "of the movement" in page.rows("overview")[-1]["why"]
+    assert [row["why"] == "not sound" for row in page.rows("overview")] == [False, False, True]
+    # why, and what to write, stand on the first screen
+    assert f"Settle first: In {last.name} 'counts' goes against the command" in page.words
+    assert "sign = -1" in page.words.partition("Settle first: ")[2].splitlines()[0]
     targets = {of["id"] for _, of in page.tags if "id" in of}
     links = {of["href"] for tag, of in page.tags if tag == "a"}
     assert {"#run-0", "#run-1", "#run-2"} <= links
@@ -428,7 +432,7 @@ def test_a_validation_has_no_fit(validated: Path, campaign: Campaign, fitted: Fi
     page = Page(validated.read_text("utf-8"))
     assert HOSTILE not in validated.read_text("utf-8")
     assert set(page.tables) == {
-        *("numbers", "overview", "agreement", "residuals", "criteria", "data", "notes")
+        *("numbers", "overview", "agreement", "residuals", "errors", "data", "notes")
     }
     roles = {row["run"]: row["role"] for row in page.rows("agreement")}
     assert roles == {each.name: each.role for each in campaign}
