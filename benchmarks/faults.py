@@ -26,6 +26,7 @@ import sys
 from collections import Counter
 from pathlib import Path
 from statistics import median
+from types import SimpleNamespace
 
 import numpy as np
 from command_line import CampaignError, Program, draft, fit, new_names, predicted
@@ -100,9 +101,7 @@ def in_new_maneuvers(folder, equipment, record):
     stored = [each for each in record["predictions"] if each["channel"] in record["decisive"][:1]]
     if not stored:
         return []
-    (entry,) = stored
-    known = {motion for motion, *_ in entry["classes"]}
-    prediction = discrepancy.PredictionError(**entry)
+    prediction = discrepancy.PredictionError(**stored[0])
     drive = Drive.from_toml(folder / "fitted" / "drive.toml")
     logs = sorted((folder / "logs").iterdir())
     volts = [np.loadtxt(path, delimiter=",", skiprows=1, usecols=1) for path in logs]
@@ -111,42 +110,29 @@ def in_new_maneuvers(folder, equipment, record):
     for index, name in enumerate(names):
         place = round((index + 0.5) / len(names) * (len(conditions) - 1))
         run = logger.new_run(equipment.parameters, equipment.axis, name, conditions[place])
-        new = new_record(name, run, drive)
-        for motion, inside in discrepancy.classes_of(new, prediction.reach, largest).items():
-            speed = new.measured[inside]
-            if speed.size < FEWEST or np.ptp(speed) < STILL * prediction.reach:
-                continue
-            stated = prediction.error(new.signal[inside], new.rate[inside])
-            true = float(np.sqrt(np.mean(new.error[inside] ** 2))) / prediction.reach
-            rows.append(
-                {
-                    "maneuver": name,
-                    "motion": motion,
-                    "stated": 100.0 * stated if motion in known else None,
-                    "true": 100.0 * true,
-                }
-            )
+        errors = stated_and_true(prediction, drive, run, largest)
+        rows += [{"maneuver": name, **each} for each in errors]
     return rows
 
 
-def new_record(name, run, drive):
-    """A new maneuver, (n, 3) as of `logger.new_run`, beside the simulation of a drive."""
-    _, volts, speed = run.T
-    simulated, step = drive.simulate(volts, logger.NEW_RATE).shaft_speed, 1.0 / logger.NEW_RATE
-    return discrepancy.Record(
-        run=name,
-        maneuver=name,
-        held_out=True,
-        start=0.0,
-        step=step,
-        measured=speed,
-        error=simulated - speed,
-        noise=0.0,
-        signal=simulated,
-        rate=discrepancy.TIME * np.gradient(simulated, step),
-        command=volts,
-        is_position=False,
-    )
+def stated_and_true(prediction, drive, run, largest):
+    """Errors of `in_new_maneuvers` in one maneuver, (n, 3) as of `logger.new_run`."""
+    _, command, speed = run.T
+    signal, step = drive.simulate(command, logger.NEW_RATE).shaft_speed, 1.0 / logger.NEW_RATE
+    rate = discrepancy.TIME * np.gradient(signal, step)
+    # all that its class depends on
+    record = SimpleNamespace(step=step, signal=signal, rate=rate, command=command)
+    known = {motion for motion, *_ in prediction.classes}
+    for motion, inside in discrepancy.classes_of(record, prediction.reach, largest).items():
+        if inside.sum() < FEWEST or np.ptp(speed[inside]) < STILL * prediction.reach:
+            continue
+        stated = 100.0 * prediction.error(signal[inside], rate[inside])
+        true = 100.0 * np.sqrt(np.mean((signal - speed)[inside] ** 2)) / prediction.reach
+        yield {
+            "motion": motion,
+            "stated": stated if motion in known else None,
+            "true": float(true),
+        }
 
 
 def findings(program, folder):
