@@ -184,8 +184,8 @@ def test_rounding_to_counts_is_no_error_of_the_speed_predicted(tmp_path: Path) -
     (seen,) = (q for q in with_speeds(predicted) if q.channel == "speed from counts")
     assert seen.measures.rmse > 0.02 * np.ptp(seen.simulated)
     (stated,) = (each for each in verdict((), predicted).predictions if each.channel == "counts")
-    # one run alone: of a new one four times as much may be expected
-    assert all(each.error < 0.04 for each in stated.classes)
+    # one run alone, of counts of 6 degrees: of a new one several times as much may be expected
+    assert all(each.error < 0.2 for each in stated.classes)
 
 
 @pytest.mark.parametrize(("noise", "error"), [(0.02, 0.0), (0.02, 0.05), (0.0, 0.05), (0.2, 0.0)])
