@@ -58,6 +58,7 @@ STILL = 1e-4
 LATE = r"^(time stamps of \w+|lag of the command|tau)$"
 """What all instruments see alike: a late command, or a machine that answers late."""
 RESISTED = r"^loss of speed under a load that resists"
+ONE_RUN = r"sine_4_V_0.1_Hz"
 NAMES = {
     "run of another axis": r"ramp_\+1_V",
     "spool friction": r"^solenoid_hysteresis$",
@@ -71,10 +72,26 @@ NAMES = {
     "ammeter reads 3 % too much": r"scale of rectified_current",
     "command's stamps 20 ms late": LATE,
     "supply pressure 20 % low": r"\bZ9\b",
+    "one run late by 0.2 s": ONE_RUN,
+    "one run of an encoder that slips by 5 %": ONE_RUN,
+    "one run reversed": ONE_RUN,
+    "one run without counts": ONE_RUN,
+    "weak dither": r"^solenoid_hysteresis$",
+    "cold oil, orifices 20 % less at first": r"^drift of (encoder_counts|shaft_speed)",
+    "load in every second run": RESISTED,
+    "ammeter of 5 Hz": r"^(lag|time stamps) of rectified_current$",
+    "command reads 2 % too much": r"^scale of the command$",
 }
 """Words by which a verdict names a fault, as cause, as unsound data or as assumed; of others it has
 none."""
-UNSOUND = ("run of another axis", "ammeter clipped")
+UNSOUND = (
+    "run of another axis",
+    "ammeter clipped",
+    "one run late by 0.2 s",
+    "one run of an encoder that slips by 5 %",
+    "one run reversed",
+    "one run without counts",
+)
 """Faults after which the data are not sound."""
 
 

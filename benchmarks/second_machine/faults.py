@@ -76,6 +76,64 @@ def low_supply(equipment):
     return scaled(equipment, "Z9", SIZES["supply"])
 
 
+def weak_dither(equipment):
+    """Spool and solenoid have half of the hysteresis without a dither."""
+    return with_condition(equipment, hysteresis=SIZES["weak_dither"])
+
+
+def soft_shaft(equipment):
+    """Motor and drum turn against each other."""
+    return with_condition(equipment, shaft_frequency=SIZES["soft_shaft"])
+
+
+def hunting(equipment):
+    """The charge pressure oscillates."""
+    return with_condition(equipment, hunting=SIZES["hunting"])
+
+
+def droop(equipment):
+    """The charge pressure falls with the flow."""
+    return with_condition(equipment, droop=SIZES["droop"])
+
+
+def of_each_run(equipment, change):
+    """Equipment whose machine differs from run to run, by place in the day; new ones are steady."""
+    conditions = {
+        run: change(place, condition)
+        for place, (run, condition) in enumerate(equipment.conditions.items())
+    }
+    return replace(equipment, conditions=conditions)
+
+
+def set_anew(equipment):
+    """The charge pressure is another one in each run."""
+    random = np.random.default_rng([equipment.seed, len(equipment.conditions)])
+    levels = SIZES["level"] * random.standard_normal(len(equipment.conditions))
+    return of_each_run(
+        equipment, lambda place, condition: condition._replace(level=float(levels[place]))
+    )
+
+
+def cold_oil(equipment):
+    """The orifices pass less at first; on average over the runs they are the machine's."""
+    last = len(equipment.conditions) - 1
+
+    def warmer(place, condition):
+        change = SIZES["cold_oil"] * (place / last - 0.5)
+        return condition._replace(orifice=condition.orifice * (1.0 + change))
+
+    return of_each_run(equipment, warmer)
+
+
+def load_in_half(equipment):
+    """Every second run is made with a load that resists motion."""
+    lost = SIZES["leakage_small"] * top_speed(equipment)
+    return of_each_run(
+        equipment,
+        lambda place, condition: condition._replace(leakage=0.0 if place % 2 else lost),
+    )
+
+
 # --- the instruments ------------------------------------------------------------------------------
 
 
@@ -114,6 +172,12 @@ def ammeter_gain(equipment):
     return replace(equipment, ammeter=replace(equipment.ammeter, gain=gain))
 
 
+def ammeter_slow(equipment):
+    """The ammeter has a display's filter."""
+    bandwidth = SIZES["ammeter_bandwidth"]
+    return replace(equipment, ammeter=replace(equipment.ammeter, bandwidth=bandwidth))
+
+
 # --- the logs -------------------------------------------------------------------------------------
 
 
@@ -135,6 +199,43 @@ def other_axis(equipment):
         other, logger=equipment.logger, ammeter=equipment.ammeter, tacho=equipment.tacho
     )
     return replace(equipment, elsewhere={SIZES["other_axis"]: other})
+
+
+def command_zero(equipment):
+    """The command reads a little more than it is."""
+    return replace(equipment, logger=replace(equipment.logger, zero=SIZES["command_zero"]))
+
+
+def command_gain(equipment):
+    """The command reads too much."""
+    gain = SIZES["command_gain"] * equipment.logger.gain
+    return replace(equipment, logger=replace(equipment.logger, gain=gain))
+
+
+def one_run(equipment, **encoder):
+    """Equipment whose encoder differs in one run."""
+    other = replace(equipment, encoder=replace(equipment.encoder, **encoder))
+    return replace(equipment, elsewhere={SIZES["one_run"]: other})
+
+
+def one_late(equipment):
+    """One run's counts have the stamps of later samples."""
+    return one_run(equipment, delay=SIZES["one_run_late"])
+
+
+def one_gain(equipment):
+    """One run's counts are those of a wheel that slips."""
+    return one_run(equipment, step=equipment.encoder.step * SIZES["one_run_gain"])
+
+
+def one_reversed(equipment):
+    """One run's counts fall while the machine goes forward."""
+    return one_run(equipment, step=-equipment.encoder.step)
+
+
+def one_dead(equipment):
+    """One run has no counts."""
+    return one_run(equipment, fastest=0.0)
 
 
 def runs_missing(equipment):
@@ -172,6 +273,20 @@ FAULTS = {
     "supply pressure 20 % low": low_supply,
     "command read with 8 bits": coarse_command,
     "play of 0.2 degrees before the encoder": play,
+    "one run late by 0.2 s": one_late,
+    "one run of an encoder that slips by 5 %": one_gain,
+    "one run reversed": one_reversed,
+    "one run without counts": one_dead,
+    "weak dither": weak_dither,
+    "shaft of 8 Hz": soft_shaft,
+    "charge pressure that hunts by 10 %": hunting,
+    "charge pressure that droops by 10 %": droop,
+    "charge pressure set anew in each run, 5 %": set_anew,
+    "cold oil, orifices 20 % less at first": cold_oil,
+    "load in every second run": load_in_half,
+    "ammeter of 5 Hz": ammeter_slow,
+    "command 50 mV off": command_zero,
+    "command reads 2 % too much": command_gain,
 }
 """What each does to a drive's equipment, hoist or slew."""
 
