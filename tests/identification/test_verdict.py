@@ -151,6 +151,26 @@ def test_wide_intervals_are_undetermined() -> None:
     assert found.usable
 
 
+@pytest.mark.parametrize("added", [1.0, 1.002, 1.3])
+def test_another_sensor_of_the_same_shaft_never_makes_it_worse(added: float) -> None:
+    """Angles predicted to 0.1 %, and a tacho beside them that is right, nearly so, or wrong."""
+    time = np.arange(2000) * 0.01
+    angles, both = [], []
+    for k in range(4):
+        speed = np.sin((0.8 + 0.1 * k) * time)
+        angle = np.cumsum(speed) * 0.01
+        channels = {"position": angle, "shaft_speed": added * speed}
+        run = run_of(f"run {k}", np.sign(speed), channels, time=time)
+        angles.append(compared(run, "position", 1.001 * angle))
+        both += [angles[-1], compared(run, "shaft_speed", speed)]
+    before, after = verdict((), angles, required=0.02), verdict((), both, required=0.02)
+    assert before.usable
+    assert after.usable
+    assert worst(after) <= worst(before)
+    # the tacho's own error is stated all the same
+    assert len(after.predictions) == 2
+
+
 def test_an_interrupted_fit_is_not_usable() -> None:
     whole = stage()
     cut = replace(whole.solution, interrupted=True, converged=False)
