@@ -20,6 +20,7 @@ from tests.report.conftest import injected, policy_of, with_script
 from swashplate import Campaign, Drive, FileError, InputError, maneuvers
 from swashplate.identification import verdict
 from swashplate.identification.assessment import Identification
+from swashplate.identification.causes import Cause
 from swashplate.identification.fitting import Fit, fit
 from swashplate.identification.interval_ends import Point
 from swashplate.identification.intervals import uncertainty_of
@@ -397,6 +398,24 @@ def test_each_run_has_a_light_and_links(
     links = {of["href"] for tag, of in page.tags if tag == "a"}
     assert {"#run-0", "#run-1", "#run-2"} <= links
     assert all(each.removeprefix("#") in targets for each in links)
+
+
+def test_the_first_screen_says_what_would_explain_the_error(
+    tmp_path: Path, judged: Identification
+) -> None:
+    late = Cause("tau", 0.02, "s", 0.8, "measure tau")
+    error, result = judged.verdict.error, replace(judged)
+    assert error is not None
+    found = replace(judged.verdict, causes=(late,), required=0.5 * error.worst.error)
+    vars(result)["verdict"] = found
+    write_fit_report(result, tmp_path / "fit.html")
+    page = Page((tmp_path / "fit.html").read_text("utf-8"))
+    said = "What would explain the error: tau by +0.02 s, which removes 80 % of the squared"
+    assert said in page.words
+    lights = [of["class"] for tag, of in page.tags if tag == "span" and of.get("role") == "img"]
+    assert lights[0] == "light bad"
+    assert found.headline in page.words.replace("\N{NO-BREAK SPACE}", " ")
+    assert "Use the drive" not in page.words
 
 
 def test_cross_validation_has_a_section(write) -> None:
