@@ -124,13 +124,18 @@ def _records(
     predicted: Sequence[RunQuality],
     without: Sequence[str],
 ) -> list[Record]:
-    """A channel of all runs, as the fit without some of them simulates it."""
-    records = [record_of(each, held_out=True) for each in predicted if each.channel == channel]
+    """A channel of all runs, as the fit without some of them simulates it.
+
+    Those that were held out are predicted by the fit of all others: they are left out here if
+    one of these is.
+    """
+    errors, held_out = dict[tuple[str, str], Array](), predicted
+    if stage is not None and any(run.name in without for run in stage.problem.experiments):
+        left = without_runs(stage.linearised, without)
+        errors = {(run.name, run.channel): error for run, error in left}
+        held_out = ()
+    records = [record_of(each, held_out=True) for each in held_out if each.channel == channel]
     if stage is not None:
-        errors = {}
-        if any(run.name in without for run in stage.problem.experiments):
-            left = without_runs(stage.linearised, without)
-            errors = {(run.name, run.channel): error for run, error in left}
         records += [
             record_of(each, errors.get((each.experiment.name, channel)))
             for each in stage.runs
@@ -225,7 +230,7 @@ def _sentence(own: Record, channel: str, records: Sequence[Record], times: float
             f"or {ignored}."
         )
     for other in records:
-        if other.run == own.run or abs(other.step - own.step) > 1e-9:
+        if other.maneuver == own.maneuver or abs(other.step - own.step) > 1e-9:
             continue
         theirs = _motion(other)[1]
         size = min(theirs.size, measured.size)
