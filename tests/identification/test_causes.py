@@ -11,9 +11,9 @@ from swashplate import Campaign, Drive
 from swashplate.campaign import rig
 from swashplate.identification.causes import behind_lag
 from swashplate.identification.fitting import Fit, fit
+from swashplate.identification.judging import Verdict, verdict
 from swashplate.identification.setup import load_setup
 from swashplate.identification.validation import predict
-from swashplate.identification.verdict import Verdict, verdict
 from swashplate.maneuvers import ramp, sine, step
 
 TESTS = {

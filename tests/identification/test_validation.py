@@ -10,6 +10,7 @@ from tests.identification.given import bench_run, first_order, run_of, virtual
 
 from swashplate import Campaign, Drive, InputError, maneuvers
 from swashplate.campaign import rig
+from swashplate.identification.judging import verdict
 from swashplate.identification.validation import (
     compared,
     ignored_windows,
@@ -19,7 +20,6 @@ from swashplate.identification.validation import (
     residual_test,
     with_speeds,
 )
-from swashplate.identification.verdict import verdict
 
 MEASURED = np.array([0.0, 2.0, 4.0, 6.0])
 SIMULATED = np.array([1.0, 2.0, 4.0, 5.0])

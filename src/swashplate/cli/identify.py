@@ -30,8 +30,8 @@ from swashplate.tables import PRINTED, TABLE, check_folder, joined, made_folder
 
 if TYPE_CHECKING:
     from swashplate.identification.assessment import Identification
+    from swashplate.identification.judging import Verdict
     from swashplate.identification.stages import Parameters
-    from swashplate.identification.verdict import Verdict
     from swashplate.parameters.parameter_set import ParameterSet
 
 INTERRUPTED = 130
@@ -268,8 +268,8 @@ def validate(
     from swashplate.identification import tables
     from swashplate.identification.assessment import versions
     from swashplate.identification.data_checks import refuse_unsound, spike_findings
+    from swashplate.identification.judging import verdict
     from swashplate.identification.validation import predict, with_speeds
-    from swashplate.identification.verdict import verdict
 
     if out is not None:
         check_folder(out)

@@ -15,6 +15,8 @@ from .intervals import Uncertainty as Uncertainty
 from .intervals import estimates_of as estimates_of
 from .intervals import uncertainty as uncertainty
 from .intervals import uncertainty_of as uncertainty_of
+from .judging import Verdict as Verdict
+from .judging import verdict as verdict
 from .model import Linearised as Linearised
 from .model import Model as Model
 from .model import OwnModel as OwnModel
@@ -38,5 +40,3 @@ from .unknowns import Prior as Prior
 from .unknowns import Unknown as Unknown
 from .unknowns import Unknowns as Unknowns
 from .validation import predict as predict
-from .verdict import Verdict as Verdict
-from .verdict import verdict as verdict

@@ -37,6 +37,7 @@ from swashplate.identification.intervals import (
     intervals_of,
     unseen_limits,
 )
+from swashplate.identification.judging import REQUIRED, Verdict, verdict
 from swashplate.identification.model_setup import ModelSetup
 from swashplate.identification.problem import Problem
 from swashplate.identification.profiles import Profile
@@ -47,7 +48,6 @@ from swashplate.identification.stage_fit import Interval, StageFit
 from swashplate.identification.stages import Parameters
 from swashplate.identification.unknowns import Unknown, Unknowns
 from swashplate.identification.validation import RunQuality, predict
-from swashplate.identification.verdict import REQUIRED, Verdict, verdict
 from swashplate.locks import locked
 from swashplate.parameters.definitions import find
 from swashplate.parameters.files import (

@@ -21,6 +21,7 @@ from swashplate.identification.assessment import Identification, versions
 from swashplate.identification.between_samples import doubt
 from swashplate.identification.data_checks import refuse_unsound, spike_findings
 from swashplate.identification.fitting import Fit, Search, fit
+from swashplate.identification.judging import REQUIRED
 from swashplate.identification.model import Model
 from swashplate.identification.model_setup import ModelSetup
 from swashplate.identification.problem import Loss
@@ -29,7 +30,6 @@ from swashplate.identification.resampling import cross_validate
 from swashplate.identification.setup import FreeParameters, Setup
 from swashplate.identification.stage_fit import StageFit
 from swashplate.identification.stages import Parameters, setup_of
-from swashplate.identification.verdict import REQUIRED
 from swashplate.parameters.files import named_set
 from swashplate.parameters.parameter_set import ParameterSet
 

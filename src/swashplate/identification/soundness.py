@@ -77,7 +77,8 @@ def unsound_data(stages: Sequence[StageFit], predicted: Sequence[RunQuality]) ->
 def outlying_runs(stages: Sequence[StageFit], predicted: Sequence[RunQuality]) -> Iterator[Finding]:
     """Runs whose errors are far larger than those of the others, each once, and why.
 
-    A maneuver of which every run stands out shows what the model lacks, and not an unsound log.
+    A maneuver of which every run stands out shows what the model lacks, and not an unsound log. So
+    may a run that was held out, unless a run of its maneuver was fitted.
 
     Notes
     -----
@@ -148,6 +149,8 @@ def _records(
 class _Compared:
     """Logarithms of the runs' errors, beside those of the runs that are kept."""
 
+    suspects: tuple[str, ...]
+    """Runs that may be unsound."""
     ratios: Mapping[str, float]
     """By run."""
     maneuvers: Mapping[str, str]
@@ -167,7 +170,13 @@ class _Compared:
         others = [cell for name in kept for cell in runs[name]]
         coefficients = variance_function(others)
         ratios = {name: log_ratio(each, coefficients) for name, each in runs.items()}
-        return cls(ratios, {each.run: each.maneuver for each in records}, kept)
+        fitted = {each.maneuver for each in records if not each.held_out}
+        suspects = tuple(
+            each.run
+            for each in records
+            if each.run in kept and (each.maneuver in fitted or not fitted)
+        )
+        return cls(suspects, ratios, {each.run: each.maneuver for each in records}, kept)
 
     @property
     def _own(self) -> Array:
@@ -179,10 +188,10 @@ class _Compared:
 
     @property
     def farthest(self) -> str | None:
-        """The run kept that is farthest above the median."""
+        """The suspect that is farthest above the median."""
         if len(self.kept) < FEWEST_RUNS:
             return None
-        return max(self.kept, key=lambda run: self.ratios[run])
+        return max(self.suspects, key=lambda run: self.ratios[run], default=None)
 
     @property
     def limit(self) -> float:

@@ -19,6 +19,7 @@ from swashplate.identification.assessment import Identification, motion_of
 from swashplate.identification.determination import Identifiability, identifiability_of
 from swashplate.identification.fitting import Fit
 from swashplate.identification.intervals import uncertainty_of
+from swashplate.identification.judging import Verdict, starts_of, verdict
 from swashplate.identification.model_setup import ModelSetup
 from swashplate.identification.profiles import Profile
 from swashplate.identification.resampling import CrossValidation, folds_tables
@@ -26,7 +27,6 @@ from swashplate.identification.solving import Solution
 from swashplate.identification.stage_fit import StageFit
 from swashplate.identification.stages import Parameters
 from swashplate.identification.validation import RunQuality, at_instants, percent
-from swashplate.identification.verdict import Verdict, starts_of, verdict
 from swashplate.parameters.parameter_set import ParameterSet
 from swashplate.report.fit_report import charts
 from swashplate.report.fit_report.html_page import Block, Section, listed_block, page, text, titled

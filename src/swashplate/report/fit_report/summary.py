@@ -25,6 +25,7 @@ from swashplate.drive import Drive
 from swashplate.errors import SwashplateError
 from swashplate.identification.determination import weak_unknowns
 from swashplate.identification.intervals import unseen_limits
+from swashplate.identification.judging import Verdict
 from swashplate.identification.stage_fit import StageFit
 from swashplate.identification.validation import (
     following,
@@ -32,7 +33,6 @@ from swashplate.identification.validation import (
     pooled,
     range_of,
 )
-from swashplate.identification.verdict import Verdict
 from swashplate.parameters.rules import FULL_VOLTAGE
 from swashplate.report.fit_report.html_page import Block, Section, listed_block, text
 from swashplate.report.fit_report.runs import ShownRun
