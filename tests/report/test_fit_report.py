@@ -382,6 +382,8 @@ def test_each_run_has_a_light_and_links(
     rows = read.rows("overview")
     assert [row["role"] for row in rows] == ["fit", "fit", "validate"]
     assert rows[-1]["run"] == judged.predicted[0].experiment.name
+    # one machine's logs; the run that is held out alone goes down, where nothing was fitted
+    assert {row["why"] for row in rows}.isdisjoint({"not sound"})
     # a run that the drive cannot follow: it went the other way
     *others, last = campaign.experiments
     still = {k: replace(c, values=-c.values) for k, c in last.channels.items()}
@@ -397,12 +399,6 @@ def test_each_run_has_a_light_and_links(
     links = {of["href"] for tag, of in page.tags if tag == "a"}
     assert {"#run-0", "#run-1", "#run-2"} <= links
     assert all(each.removeprefix("#") in targets for each in links)
-
-
-@pytest.mark.xfail(reason="the run held out alone goes down, where nothing was fitted")
-def test_a_run_unlike_those_fitted_is_no_unsound_log(judged: Identification) -> None:
-    """Logs of one simulated machine: what is off is the model."""
-    assert judged.verdict.unsound == ()
 
 
 def test_the_first_screen_says_what_would_explain_the_error(
