@@ -140,7 +140,7 @@ def test_values_at_a_bound_are_undetermined_and_never_decide_the_use() -> None:
     found = verdict([stage(bounds=(0.1, 1.5), lags=(0.1, 5.0))], [GOOD])
     assert "gain" in found.undetermined
     assert found.quotable + len(found.undetermined) == 2
-    assert "undetermined, to 10 % of the value: gain" in found.values
+    assert "not known to within ±10 %: gain" in found.values
     assert found.usable == found.predicts
 
 

@@ -165,8 +165,8 @@ class Verdict(Result):
         if not self.undetermined:
             return f"All {total} may be quoted with their intervals."
         return (
-            f"{self.quotable} of {total} may be quoted with their intervals; undetermined, to "
-            f"{percent(WIDE)} of the value: {listed(self.undetermined)}."
+            f"{self.quotable} of {total} may be quoted with their intervals; not known to within "
+            f"±{percent(WIDE)}: {listed(self.undetermined)}."
         )
 
     @property
