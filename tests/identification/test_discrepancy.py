@@ -128,7 +128,7 @@ def test_nine_of_ten_new_maneuvers_stay_below_the_stated_error(count: int) -> No
         first, *others = drawn(rng, count + 1, 0.6)
         cells, _ = cells_of(others)
         mine, _ = cells_of([first, *others])
-        mine = [cell for cell in mine if cell.record.run == first.run]
+        mine = [cell for cell in mine if cell.run == first.run]
         square = float(np.mean(np.concatenate([cell.squares for cell in mine])))
         held += square <= variance_of(mine, bound_of_variance(cells))
     # five standard deviations of a share of 150 either way, and what the usual spread adds

@@ -21,7 +21,7 @@ from swashplate.identification.drive_model import (
     simulated_current,
 )
 from swashplate.identification.effects import HYSTERESIS, Changes, RunParts, SimulatedRun, source_of
-from swashplate.identification.model import linearised
+from swashplate.identification.model import EquationModel, linearised
 from swashplate.identification.problem import Problem
 from swashplate.identification.solving import Solution, solve
 from swashplate.identification.stage_fit import StageFit
@@ -109,7 +109,7 @@ def causes_of(stages: Sequence[StageFit]) -> tuple[Cause, ...] | None:
     tuple of Cause, or None
         At most `NAMED`, the largest share first: each removes at least half of the squared
         residuals in a refit, and is of a plausible size. Empty if none does; None if more than half
-        of the squares are noise in each stage.
+        of the squares are noise in each stage, or a model is not one of equations.
 
     Notes
     -----
@@ -118,9 +118,12 @@ def causes_of(stages: Sequence[StageFit]) -> tuple[Cause, ...] | None:
     """
     found: tuple[Cause, ...] | None = None
     for stage in stages:
-        # a robust loss has taken what stands out already
+        # a robust loss has taken what stands out already; any object with simulate may take minutes
+        quick = isinstance(stage.problem.model, EquationModel)
+        if stage.solution.loss != "linear" or not quick:
+            continue
         before = squares_of(stage.problem, stage.solution.vector)
-        if stage.solution.loss != "linear" or before.noise_share >= EXPLAINED:
+        if before.noise_share >= EXPLAINED:
             continue
         found = _causes_of_stage(stage, before)
         if found:

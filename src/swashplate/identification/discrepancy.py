@@ -9,7 +9,7 @@ of a new one. Nothing is asked of the instruments: what is noise shows in the er
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal, NamedTuple, get_args
 
@@ -202,6 +202,20 @@ def record_of(
     )
 
 
+@dataclass(frozen=True)
+class Records(Result):
+    """One channel of several runs, one record after another: those of many runs are large."""
+
+    parts: tuple[tuple[RunQuality, Array | None, bool], ...]
+    """Arguments of `record_of`: the quality, the error, and whether the run was held out."""
+
+    def __iter__(self) -> Iterator[Record]:
+        for quality, error, held_out in self.parts:
+            record = record_of(quality, error, held_out=held_out)
+            if record is not None:
+                yield record
+
+
 def maneuver_of(experiment: Experiment) -> str:
     """The maneuver of a run; of one that is not known the run, which is like no other."""
     unknown = experiment.maneuver in ("", UNNAMED)
@@ -274,7 +288,9 @@ def classes_of(record: Record, reach: float, largest: float) -> dict[Motion, NDA
 class Cell(NamedTuple):
     """Windows of one class in one run, one beside another, over the range of the signal."""
 
-    record: Record
+    run: str
+    maneuver: str
+    held_out: bool
     motion: Motion
     squares: Array
     """(m,) squared errors less their noise. [1]"""
@@ -284,14 +300,18 @@ class Cell(NamedTuple):
     """(m, 3) of the variance function: 1, the signal's square, that of its rate. [1]"""
 
 
-def cells_of(records: Sequence[Record]) -> tuple[list[Cell], float]:
-    """All windows, by run and class, and the range of what was measured. [unit]"""
-    ends = [ends for record in records if (ends := _ends(record)) is not None]
-    if not ends:
-        return [], 0.0
-    reach = max(high for _, high in ends) - min(low for low, _ in ends)
-    largest = max(np.abs(r.command).max() for r in records)
-    cells = list[Cell]()
+def cells_of(records: Iterable[Record]) -> tuple[list[Cell], float]:
+    """All windows, by run and class, and the range of what was measured. [unit]
+
+    The records are gone through twice.
+    """
+    low, high, largest = np.inf, -np.inf, 0.0
+    for record in records:
+        values = windowed(record.measured, window_weights(record, WINDOWS["fast"]))
+        low = min(low, float(np.nanmin(values, initial=np.inf)))
+        high = max(high, float(np.nanmax(values, initial=-np.inf)))
+        largest = max(largest, float(np.abs(record.command).max()))
+    reach, cells = high - low, list[Cell]()
     for record in records if reach > 0.0 else ():
         for motion, inside in classes_of(record, reach, largest).items():
             errors, noise = over_window(record, WINDOWS[motion])
@@ -303,15 +323,9 @@ def cells_of(records: Sequence[Record]) -> tuple[list[Cell], float]:
             noise = max(noise, float(np.mean(rounded[rows] ** 2)))
             squares = (errors[rows] ** 2 - noise) / reach**2
             terms = variance_terms(record.signal[rows] / reach, record.rate[rows] / reach)
-            cells.append(Cell(record, motion, squares, noise / reach**2, terms))
-    return cells, reach
-
-
-def _ends(record: Record) -> tuple[float, float] | None:
-    """Smallest and largest of what was measured, of a position its speed; None if too short."""
-    values = windowed(record.measured, window_weights(record, WINDOWS["fast"]))
-    values = values[np.isfinite(values)]
-    return (float(values.min()), float(values.max())) if values.size else None
+            of_run = record.run, record.maneuver, record.held_out
+            cells.append(Cell(*of_run, motion, squares, noise / reach**2, terms))
+    return cells, max(reach, 0.0)
 
 
 def variance_terms(signal: Array, rate: Array) -> Array:
@@ -397,12 +411,11 @@ def prediction_errors(
     channels = dict.fromkeys(name for each in stages for name in each.problem.channels)
     if not stages:
         channels = dict.fromkeys(each.channel for each in predicted)
-    records = list(records_of(stages, predicted))
     qualities = [*(each for stage in stages for each in stage.runs), *predicted]
     found = list[PredictionError]()
     for name in channels:
         measured = next(q.experiment[name] for q in qualities if q.channel == name)
-        cells, reach = cells_of([each for channel, each in records if channel == name])
+        cells, reach = cells_of(records_of(name, stages, predicted))
         if not cells:
             continue
         coefficients = bound_of_variance(cells)
@@ -411,8 +424,8 @@ def prediction_errors(
             ClassError(
                 motion,
                 float(np.sqrt(np.mean(np.vstack([c.terms for c in alike]) @ coefficients))),
-                sum(not cell.record.held_out for cell in alike),
-                sum(cell.record.held_out for cell in alike),
+                sum(not cell.held_out for cell in alike),
+                sum(cell.held_out for cell in alike),
             )
             for motion in get_args(Motion)
             if (alike := [cell for cell in cells if cell.motion == motion])
@@ -425,19 +438,26 @@ def prediction_errors(
 
 
 def records_of(
-    stages: Sequence[StageFit], predicted: Sequence[RunQuality]
-) -> Iterator[tuple[str, Record]]:
-    """Each channel of each run, as if its maneuver had been left out, or held out."""
+    channel: str, stages: Sequence[StageFit], predicted: Sequence[RunQuality]
+) -> Records:
+    """A channel of all runs, as if the maneuver of each had been left out, or held out."""
+    parts = list[tuple[RunQuality, Array | None, bool]]()
     for stage in stages:
+        if channel not in stage.problem.channels:
+            continue
         maneuvers = {run.name: maneuver_of(run) for run in stage.problem.experiments}
-        errors = {(run.name, run.channel): e for run, e in left_out(stage.linearised, maneuvers)}
-        for quality in stage.runs:
-            error = errors[quality.experiment.name, quality.channel]
-            if (record := record_of(quality, error)) is not None:
-                yield quality.channel, record
-    for quality in predicted:
-        if (record := record_of(quality, held_out=True)) is not None:
-            yield quality.channel, record
+        errors = {
+            run.name: error
+            for run, error in left_out(stage.linearised, maneuvers)
+            if run.channel == channel
+        }
+        parts += [
+            (each, errors[each.experiment.name], False)
+            for each in stage.runs
+            if each.channel == channel
+        ]
+    parts += [(each, None, True) for each in predicted if each.channel == channel]
+    return Records(tuple(parts))
 
 
 def variance_function(cells: Sequence[Cell]) -> Array:
@@ -459,7 +479,7 @@ def bound_of_variance(cells: Sequence[Cell]) -> Array:
     coefficients = variance_function(cells)
     maneuvers = defaultdict[str, list[Cell]](list)
     for cell in cells:
-        maneuvers[cell.record.maneuver].append(cell)
+        maneuvers[cell.maneuver].append(cell)
     ratios = np.array([log_ratio(each, coefficients) for each in maneuvers.values()])
     deviation, freedom = spread_of(ratios)
     bound = float(stdtrit(freedom, LEVEL)) * deviation * np.sqrt(1.0 + 1.0 / ratios.size)

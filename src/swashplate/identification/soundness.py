@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -21,9 +21,9 @@ from swashplate.identification.discrepancy import (
     WORTH,
     Cell,
     Record,
+    Records,
     cells_of,
     log_ratio,
-    record_of,
     variance_function,
     window_weights,
     windowed,
@@ -124,25 +124,29 @@ def _records(
     channel: str,
     predicted: Sequence[RunQuality],
     without: Sequence[str],
-) -> list[Record]:
+) -> Records:
     """A channel of all runs, as the fit without some of them simulates it.
 
     Those that were held out are predicted by the fit of all others: they are left out here if
     one of these is.
     """
-    errors, held_out = dict[tuple[str, str], Array](), predicted
-    if stage is not None and any(run.name in without for run in stage.problem.experiments):
-        left = without_runs(stage.linearised, without)
-        errors = {(run.name, run.channel): error for run, error in left}
-        held_out = ()
-    records = [record_of(each, held_out=True) for each in held_out if each.channel == channel]
+    fitted, held_out = list[RunQuality](), list(predicted)
+    errors = dict[str, Array]()
     if stage is not None:
-        records += [
-            record_of(each, errors.get((each.experiment.name, channel)))
-            for each in stage.runs
-            if each.channel == channel
-        ]
-    return [each for each in records if each is not None]
+        fitted = [each for each in stage.runs if each.channel == channel]
+        if any(each.experiment.name in without for each in fitted):
+            held_out = []
+            errors = {
+                run.name: error
+                for run, error in without_runs(stage.linearised, without)
+                if run.channel == channel
+            }
+    return Records(
+        (
+            *((each, None, True) for each in held_out if each.channel == channel),
+            *((each, errors.get(each.experiment.name), False) for each in fitted),
+        )
+    )
 
 
 @dataclass(frozen=True)
@@ -158,25 +162,22 @@ class _Compared:
     """Runs that the others are compared with."""
 
     @classmethod
-    def of(cls, records: Sequence[Record], without: Sequence[str]) -> _Compared | None:
+    def of(cls, records: Iterable[Record], without: Sequence[str]) -> _Compared | None:
         """Those of some records; None if too few runs are left to compare with."""
         cells, _ = cells_of(records)
         runs = defaultdict[str, list[Cell]](list)
         for cell in cells:
-            runs[cell.record.run].append(cell)
+            runs[cell.run].append(cell)
         kept = tuple(name for name in runs if name not in without)
         if len(kept) < FEWEST_RUNS - 1:
             return None
         others = [cell for name in kept for cell in runs[name]]
         coefficients = variance_function(others)
         ratios = {name: log_ratio(each, coefficients) for name, each in runs.items()}
-        fitted = {each.maneuver for each in records if not each.held_out}
-        suspects = tuple(
-            each.run
-            for each in records
-            if each.run in kept and (each.maneuver in fitted or not fitted)
-        )
-        return cls(suspects, ratios, {each.run: each.maneuver for each in records}, kept)
+        maneuvers = {cell.run: cell.maneuver for cell in cells}
+        fitted = {cell.maneuver for cell in cells if not cell.held_out}
+        suspects = tuple(name for name in kept if not fitted or maneuvers[name] in fitted)
+        return cls(suspects, ratios, maneuvers, kept)
 
     @property
     def _own(self) -> Array:
@@ -212,7 +213,7 @@ class _Compared:
 # --- why ------------------------------------------------------------------------------------------
 
 
-def _sentence(own: Record, channel: str, records: Sequence[Record], times: float) -> str:
+def _sentence(own: Record, channel: str, records: Iterable[Record], times: float) -> str:
     """What is wrong with a run, where that can be told, and the line to write."""
     said = f"{own.run}: '{channel}' is {times:.2g} times as far from what is simulated as in the "
     said += "other runs"
