@@ -17,6 +17,7 @@ from swashplate.errors import (
     ParameterError,
     UnknownNameError,
     UnknownParameterError,
+    UnsoundDataError,
 )
 from swashplate.identification import ModelSetup, load_setup
 from swashplate.logs import open_log
@@ -80,6 +81,7 @@ def test_a_missing_key_is_pythons_too(key: str, ask: Callable[[], object]) -> No
         ParameterError,
         UnknownNameError,
         UnknownParameterError,
+        UnsoundDataError,
     ],
 )
 def test_an_error_comes_back_from_another_process(kind: type[SwashplateError]) -> None:

@@ -26,6 +26,7 @@ from .errors import ParameterError as ParameterError
 from .errors import SwashplateError as SwashplateError
 from .errors import UnknownNameError as UnknownNameError
 from .errors import UnknownParameterError as UnknownParameterError
+from .errors import UnsoundDataError as UnsoundDataError
 from .executors import Dask as Dask
 from .executors import Processes as Processes
 from .executors import Serial as Serial

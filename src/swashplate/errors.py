@@ -25,6 +25,10 @@ class InputTypeError(InputError, TypeError):
     """An argument that is not of a kind that a function takes; also a ``TypeError``."""
 
 
+class UnsoundDataError(InputError):
+    """Tests whose data cannot be right, so that no fit of them could mean anything."""
+
+
 class UnknownNameError(InputError, KeyError):
     """A signal, channel, run or estimate that does not exist; also a ``KeyError``."""
 

@@ -100,13 +100,16 @@ def done(run: Callable[..., Result]) -> Callable[..., str]:
 
 @pytest.fixture
 def refused(run: Callable[..., Result], tmp_path: Path) -> Callable[..., str]:
-    """Run what must be refused, in one sentence and without a trace on disk; return it."""
+    """Run what must be refused, in one sentence and without a trace on disk; return it.
 
-    def call(*words: str) -> str:
+    With exit code 2, or 1 of data that are not sound.
+    """
+
+    def call(*words: str, code: int = 2) -> str:
         before = sorted(tmp_path.rglob("*"))
         result = run(*words)
         assert isinstance(result.exception, SystemExit), result.exception
-        assert result.exit_code == 2
+        assert result.exit_code == code
         assert result.stdout == ""
         assert re.fullmatch(r"Error: [^\n]+[^.\n]\.\n", result.stderr), result.stderr
         assert sorted(tmp_path.rglob("*")) == before

@@ -103,7 +103,7 @@ def test_a_tacho_beside_the_drive_before_any_fit(done, refused, tmp_path) -> Non
     assert "go together" in refused("campaign", "plot", "--run", "log")
     assert "no channel 'speed'" in refused(*look[:5], "speed")
     (tmp_path / "campaign.toml").write_text(TACHO.replace('"V"', '"mV"'), "utf-8")
-    said = refused("fit", "campaign.toml", "--setup", "hoist", "--out", "fit")
+    said = refused("fit", "campaign.toml", "--setup", "hoist", "--out", "fit", code=1)
     assert 'if the log is in V, write unit = "V": it then reaches 4 V' in said
 
 

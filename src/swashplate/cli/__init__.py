@@ -21,7 +21,7 @@ from typer.core import TyperGroup
 from swashplate.__about__ import __version__
 from swashplate.cli.options import command
 from swashplate.cli.terminal import CLOSED_PIPE, close_output, say_error
-from swashplate.errors import FileError, InputError, SwashplateError
+from swashplate.errors import FileError, InputError, SwashplateError, UnsoundDataError
 
 HELP = """\
 Hydrostatic drives: from a joystick's voltage to the speed of the shaft.
@@ -60,8 +60,8 @@ Examples:
   swashplate demo                                     everything at once
 
 Files are written in SI units, whole or not at all. Errors are one sentence on
-standard error, with exit code 2; a verdict that is not met ends with 1, an
-interrupted command with 130. 'swashplate COMMAND --help' says more.
+standard error, with exit code 2; a verdict that is not met ends with 1, as do
+data that nothing can be fitted to, an interrupted command with 130. 'swashplate COMMAND --help' says more.
 """
 
 
@@ -129,7 +129,10 @@ class _Commands(Mapping[str, Any]):
 
 
 class Commands(TyperGroup):
-    """The commands; what a user can mend ends as one sentence and exit code 2."""
+    """The commands; what a user can mend ends as one sentence and exit code 2.
+
+    Data that no fit could mean anything of end with 1, as a verdict on a fit that finds them.
+    """
 
     def __init__(self, **given: Any) -> None:
         super().__init__(**given)
@@ -146,6 +149,9 @@ class Commands(TyperGroup):
         except BrokenPipeError:
             close_output()
             raise typer.Exit(CLOSED_PIPE) from None
+        except UnsoundDataError as error:
+            say_error(error)
+            raise typer.Exit(1) from None
         except SwashplateError as error:
             say_error(error)
         except MemoryError:

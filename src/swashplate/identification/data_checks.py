@@ -18,7 +18,7 @@ from swashplate.campaign.quality import (
     unsigned_currents,
     wrapped_positions,
 )
-from swashplate.errors import InputError
+from swashplate.errors import InputError, UnsoundDataError
 from swashplate.identification.drive_model import CURRENTS, SIGNALS, kinds_of, simulated_run
 from swashplate.identification.model import EquationModel
 from swashplate.identification.model_setup import ModelSetup
@@ -152,12 +152,17 @@ def contradicting_runs(
     return [each for each in found if each.run is not None]
 
 
-def refuse_unsound(findings: Sequence[Finding]) -> tuple[str, ...]:
-    """Sentences of what is only a warning; an `InputError` with the first that must be refused."""
+def refuse_unsound(
+    findings: Sequence[Finding], error: type[InputError] = UnsoundDataError
+) -> tuple[str, ...]:
+    """Sentences of what is only a warning; an error if something must be refused.
+
+    It says the first of these, and how many more there are.
+    """
     if refused := _refused(findings):
         more = len(refused) - 1
         also = f" ({more} more finding{'s' if more > 1 else ''} of this weight.)" if more else ""
-        raise InputError(refused[0].sentence + also)
+        raise error(refused[0].sentence + also)
     return tuple(each.sentence for each in findings)
 
 

@@ -313,7 +313,7 @@ def fit(
             if watch is not None:
                 watch(stage.name, now)
 
-        refuse_unsound(check_rank(f"Stage {stage.name}", problem))
+        refuse_unsound(check_rank(f"Stage {stage.name}", problem), InputError)
         limits: dict[str, Any] = {"tolerance": tolerance, "max_evaluations": max_evaluations}
         with working(f"Stage {stage.name}") as work:
             solve_stage = partial(solve, loss=loss, watch=seen, **limits)
