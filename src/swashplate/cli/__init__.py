@@ -61,7 +61,8 @@ Examples:
 
 Files are written in SI units, whole or not at all. Errors are one sentence on
 standard error, with exit code 2; a verdict that is not met ends with 1, as do
-data that nothing can be fitted to, an interrupted command with 130. 'swashplate COMMAND --help' says more.
+data that nothing can be fitted to, an interrupted command with 130.
+'swashplate COMMAND --help' says more.
 """
 
 

@@ -102,21 +102,27 @@ def outlying_runs(stages: Sequence[StageFit], predicted: Sequence[RunQuality]) -
 
 def _of_channel(
     stage: StageFit | None, channel: str, predicted: Sequence[RunQuality]
-) -> Iterator[Finding]:
-    """The runs that one channel shows to be unsound."""
-    found = list[str]()
+) -> list[Finding]:
+    """The runs that one channel shows to be unsound.
+
+    Empty if these would be half of all: runs that disagree altogether show what the model lacks.
+    """
+    found, names = list[Finding](), list[str]()
     while True:
-        before = _Compared.of(_records(stage, channel, predicted, found), found)
+        before = _Compared.of(_records(stage, channel, predicted, names), names)
         if before is None or (suspect := before.farthest) is None:
-            return
-        records = _records(stage, channel, predicted, [*found, suspect])
-        after = _Compared.of(records, [*found, suspect])
+            break
+        records = _records(stage, channel, predicted, [*names, suspect])
+        after = _Compared.of(records, [*names, suspect])
         if after is None or after.apart(suspect) <= after.limit or after.alike(suspect):
-            return
-        found.append(suspect)
+            break
+        names.append(suspect)
         record = next(each for each in records if each.run == suspect)
         times = float(np.exp(0.5 * after.apart(suspect)))
-        yield refusal(suspect, channel, _sentence(record, channel, records, times))
+        found.append(refusal(suspect, channel, _sentence(record, channel, records, times)))
+        if 2 * len(found) >= len(after.ratios):
+            return []
+    return found
 
 
 def _records(
