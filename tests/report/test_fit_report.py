@@ -404,14 +404,14 @@ def test_each_run_has_a_light_and_links(
 def test_the_first_screen_says_what_would_explain_the_error(
     tmp_path: Path, judged: Identification
 ) -> None:
-    late = Cause("tau", 0.02, "s", 0.8, "measure tau")
+    late = Cause("tau", 0.02, 0.8, "tau is 0.04 s instead of the stated 0.02", "measure it")
     error, result = judged.verdict.error, replace(judged)
     assert error is not None
     found = replace(judged.verdict, causes=(late,), required=0.5 * error.worst.error)
     vars(result)["verdict"] = found
     write_fit_report(result, tmp_path / "fit.html")
     page = Page((tmp_path / "fit.html").read_text("utf-8"))
-    said = "What would explain the error: tau by +0.02 s, which removes 80 % of the squared"
+    said = "Error beyond noise: tau is 0.04 s instead of the stated 0.02, which would explain 80 %"
     assert said in page.words
     lights = [of["class"] for tag, of in page.tags if tag == "span" and of.get("role") == "img"]
     assert lights[0] == "light bad"

@@ -26,8 +26,10 @@ from swashplate.identification.problem import Problem
 from swashplate.identification.solving import Solution, solve
 from swashplate.identification.stage_fit import StageFit
 from swashplate.identification.unknowns import Unknown, Unknowns
+from swashplate.identification.validation import percent
 from swashplate.parameters.definitions import CATALOGUE, COLUMNS, SWITCHES
 from swashplate.results import Result
+from swashplate.units import display_unit
 
 Array = NDArray[np.float64]
 
@@ -61,21 +63,19 @@ class Cause(NamedTuple):
 
     name: str
     size: float
-    """Found by a refit. [unit]"""
-    unit: str
+    """Found by a refit. [SI, or 1]"""
     share: float
     """Part of the squared residuals that the refit with it removes. [1]"""
+    statement: str
+    """A clause that says what would be wrong, and by how much."""
     advice: str
     """What to do, as an imperative clause."""
 
     @property
     def words(self) -> str:
-        """It in words, with its size and share, and what to do."""
-        share = f"{100.0 * self.share:.0f} % of the squared residuals"
-        return (
-            f"{self.name} by {self.size:+.3g} {self.unit}, which removes {share} in a refit "
-            f"({self.advice})"
-        )
+        """It in words: what would explain how much, and what to do."""
+        share = f"{100.0 * self.share:.0f} %"
+        return f"{self.statement}, which would explain {share} of it ({self.advice})"
 
 
 @dataclass(frozen=True)
@@ -88,10 +88,9 @@ class Candidate(Result):
     """Sizes that are plausible. [SI, or 1]"""
     freed: Callable[[float], Problem]
     """The problem of the stage with it, for its size to first order."""
+    states: Callable[[float], str]
+    """A clause that says what would be wrong, for a size."""
     advice: str
-    factor: float = 1.0
-    unit: str = ""
-    """What it is printed in, and the factor from SI to that."""
     free: str = ""
     """Unknown that the refit estimates it by; without one it stays at its size."""
 
@@ -346,52 +345,127 @@ def _of_readings(stage: StageFit, name: str) -> Iterator[Candidate]:
     channels = [run[name] for run in stage.problem.experiments if name in run.channels]
     read = partial(_with_reading, stage, name)
     check = f"check the instrument of {name}"
-    yield Candidate(SCALE.format(name), -0.3, 0.3, partial(read, _scaled), check, 100.0, "%")
-    late = f"{check} and its clock, or a delay of the machine"
-    stamps = f"time stamps of {name}"
-    yield Candidate(stamps, -LATEST, LATEST, partial(read, _late), late, 1e3, "ms")
-    slow = f"{check} and its filter"
-    yield Candidate(f"lag of {name}", 0.0, LATEST, partial(read, _undone_lag), slow, 1e3, "ms")
+    yield Candidate(
+        SCALE.format(name),
+        -0.3,
+        0.3,
+        partial(read, _scaled),
+        lambda size: f"{name} reads {percent(abs(size))} too {'much' if size > 0.0 else 'little'}",
+        check,
+    )
+    yield Candidate(
+        f"time stamps of {name}",
+        -LATEST,
+        LATEST,
+        partial(read, _late),
+        lambda size: f"{name} is {_time(abs(size))} {'late' if size > 0.0 else 'early'}",
+        "compare its clock with that of the command, and look for a delay of the machine",
+    )
+    yield Candidate(
+        f"lag of {name}",
+        0.0,
+        LATEST,
+        partial(read, _undone_lag),
+        lambda size: f"{name} lags by {_time(size)}",
+        f"{check} for a filter",
+    )
     if channels[0].kind in CURRENTS:
         return
-    drift = DRIFT.format(name)
-    warm = "keep the machine as it is in use, its oil warm, and test again"
-    yield Candidate(drift, -0.5, 0.5, partial(read, _undone_drift), warm, 100.0, "%")
+    yield Candidate(
+        DRIFT.format(name),
+        -0.5,
+        0.5,
+        partial(read, _undone_drift),
+        lambda size: (
+            f"{name} {'rises' if size > 0.0 else 'falls'} by {percent(abs(size))} from the first "
+            "run to the last"
+        ),
+        "warm the oil as it is in use, and test again",
+    )
     unit = channels[0].unit
     unit = unit if unit.endswith("/s") else f"{unit}/s"
-    load = "look for a load and for a leaking motor, which the model leaves out"
-    undo = partial(read, partial(_undone_loss, resisting=True))
-    yield Candidate(RESISTED.format(name), 0.0, np.inf, undo, load, 1.0, unit)
-    undo = partial(read, partial(_undone_loss, resisting=False))
-    yield Candidate(PULLED.format(name), -np.inf, np.inf, undo, load, 1.0, unit)
+    for kind, resisting, load in (
+        (RESISTED, True, "a load that resists the motion"),
+        (PULLED, False, "a load that pulls one way"),
+    ):
+        yield Candidate(
+            kind.format(name),
+            0.0 if resisting else -np.inf,
+            np.inf,
+            partial(read, partial(_undone_loss, resisting=resisting)),
+            partial(_lost_speed, unit, load),
+            "look for that load, and for a leaking motor",
+        )
+
+
+def _time(size: float) -> str:
+    return f"{1e3 * size:.3g} ms"
+
+
+def _lost_speed(unit: str, load: str, size: float) -> str:
+    shown = display_unit(unit, abs(size))
+    return f"{shown.factor * size:.3g} {shown.name} of speed are lost to {load}"
 
 
 def _of_commands(stage: StageFit) -> Iterator[Candidate]:
     """What may be wrong with the command, or with what takes it."""
-    gain = partial(_with_command, stage, _gained)
-    check = "check the converter of the command"
-    yield Candidate(COMMAND_GAIN, -0.3, 0.3, gain, check, 100.0, "%")
-    lag = partial(_with_command, stage, _lagging)
-    filter_ = "look for a filter or delay between command and amplifier"
-    yield Candidate(COMMAND_LAG, 0.0, LATEST, lag, filter_, 1e3, "ms")
+    yield Candidate(
+        COMMAND_GAIN,
+        -0.3,
+        0.3,
+        partial(_with_command, stage, _gained),
+        # what acts is larger than what is read
+        lambda size: (
+            f"the command reads {percent(abs(size))} too {'little' if size > 0.0 else 'much'}"
+        ),
+        "check its converter",
+    )
+    yield Candidate(
+        COMMAND_LAG,
+        0.0,
+        LATEST,
+        partial(_with_command, stage, _lagging),
+        lambda size: f"the command lags by {_time(size)} on its way to the amplifier",
+        "look for a filter or delay there",
+    )
 
 
 def _of_numbers(stage: StageFit) -> Iterator[Candidate]:
     """What of the drive is fixed, and the hysteresis that it is taken not to have."""
     runs = stage.problem.experiments
-    most = 0.1 * max(float(np.abs(_driving(stage, run)).max()) for run in runs)
+    largest = max(float(np.abs(_driving(stage, run)).max()) for run in runs)
     name = "solenoid_hysteresis"
-    free = f"friction or hysteresis of spool and solenoids: free {name} in the fit configuration"
-    freed = partial(_with_number, stage, name)
-    yield Candidate(name, 0.0, most, freed, free, 1e3, "mA", name)
+    yield Candidate(
+        name,
+        0.0,
+        0.1 * largest,
+        partial(_with_number, stage, name),
+        lambda size: (
+            f"spool and solenoids have a friction or hysteresis of ±{1e3 * size:.3g} mA, "
+            f"{percent(size / largest)} of the largest current"
+        ),
+        f"look at the dither; let the fit configuration estimate {name}",
+        free=name,
+    )
     numbers = stage.parameters.numbers
     for name in fixed_numbers(stage):
-        value, unit = numbers[name], CATALOGUE[COLUMNS[name]].unit
+        value, definition = numbers[name], CATALOGUE[COLUMNS[name]]
         low, high = sorted((-0.5 * value, value))
-        if unit == "s":
+        if definition.unit == "s":
             low, high = -value, LATEST
-        free = f"measure {COLUMNS[name]}, or free it in the fit configuration"
-        yield Candidate(name, low, high, partial(_with_number, stage, name), free, 1.0, unit, name)
+        yield Candidate(
+            name,
+            low,
+            high,
+            partial(_with_number, stage, name),
+            partial(_other_value, name, definition.unit, value),
+            f"measure it ({definition.name}), or let the fit configuration estimate it",
+            free=name,
+        )
+
+
+def _other_value(name: str, unit: str, stated: float, size: float) -> str:
+    return f"{name} is {stated + size:.3g} {unit} instead of the stated {stated:.3g}"
 
 
 def fixed_numbers(stage: StageFit) -> list[str]:
@@ -455,8 +529,7 @@ def _refitted(stage: StageFit, score: _Score, before: Squares) -> Cause | None:
                 size, share = better
     if share < EXPLAINED or not candidate.least < size < candidate.most:
         return None
-    shown = candidate.factor * size
-    return Cause(candidate.name, shown, candidate.unit, share, candidate.advice)
+    return Cause(candidate.name, size, share, candidate.states(size), candidate.advice)
 
 
 def _solved(

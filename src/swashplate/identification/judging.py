@@ -114,7 +114,7 @@ class Verdict(Result):
         if self.unfinished:
             return f"Not usable: {'; '.join(self.unfinished)}."
         if self.unsound:
-            more = f" ({len(self.unsound) - 1} more below.)" if len(self.unsound) > 1 else ""
+            more = f" ({len(self.unsound) - 1} more.)" if len(self.unsound) > 1 else ""
             return f"Not usable, as the data are not sound: {self.unsound[0].sentence}{more}"
         error = self.error
         if error is None:
@@ -172,11 +172,11 @@ class Verdict(Result):
     @property
     def cause(self) -> str:
         """What would explain the error, in a sentence; empty if there is nothing to explain."""
-        if self.causes:
-            return f"{'; or '.join(each.words for each in self.causes)}."
-        if self.causes is None or self.predicts:
+        if self.causes is None:
             return ""
-        return "None found: no single thing that was tried explains half of the error."
+        if not self.causes:
+            return "No single thing that was tried explains half of it; the runs' curves show when."
+        return f"{'; or '.join(each.words for each in self.causes)}."
 
     def answers(self) -> dict[str, str]:
         """The three answers, and what would explain the error, by their names."""
@@ -184,7 +184,7 @@ class Verdict(Result):
             "Data": self.data,
             "Prediction": self.prediction,
             "Values": self.values,
-            "Likely cause": self.cause,
+            "Error beyond noise": self.cause,
         }
         return {name: text for name, text in said.items() if text}
 

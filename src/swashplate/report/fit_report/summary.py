@@ -434,7 +434,7 @@ def _next(
     said: list[str | Markup] = [f"Settle first: {each}." for each in judged.unfinished]
     said += [f"Settle first: {each.sentence}" for each in judged.unsound[:3]]
     if judged.cause:
-        said.append(f"What would explain the error: {judged.cause}")
+        said.append(f"Error beyond noise: {judged.cause}")
     if findings:
         link = Markup('Look into the <a href="#data">{}</a> on the logs.')
         said.append(link.format(count(findings, "finding")))
