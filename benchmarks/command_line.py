@@ -13,6 +13,8 @@ from threading import Timer
 import numpy as np
 from second_machine import draws, logger
 
+HYSTERESIS = "solenoid_hysteresis"
+"""Cause that every second machine has a little of."""
 LONGEST = 600.0
 """After which a command is ended, and the campaign counted as failed. [s]"""
 
@@ -52,7 +54,11 @@ class Program:
 
 
 class CampaignError(Exception):
-    """A command of a campaign that ended with an error."""
+    """A command of a campaign that ended with an error, and its exit code."""
+
+    def __init__(self, output, code=2):
+        super().__init__(output)
+        self.code = code
 
 
 def set_roles(path, held_out):
@@ -235,16 +241,18 @@ def fit(program, truth, folder, *words):
     -------
     dict
         "cpu_fit" [s], "memory" [MB], "exit"; of the verdict "usable", "headline", "unsound"
-        (sentences), "causes" (names, in order), "predictions" and "decisive" (as stored) and
+        (sentences), "causes" (names, in order), "hysteresis" [A] (half
+        its width, if it is one of these), "predictions" and "decisive" (as stored) and
         "assumed"; "stated" as of `stated_error`, "estimates" and "without_counterpart" as of
         `estimates`.
     """
     code, output, seconds, memory = program.run(
         "fit", "campaign.toml", "--out", "fitted", "--jobs", 1, *words, folder=folder
     )
-    if code not in {0, 1}:
-        raise CampaignError(output)
+    if not (folder / "fitted" / "fit.json").exists():
+        raise CampaignError(output, code)
     verdict = stored_verdict(folder / "fitted")
+    causes = verdict.get("causes") or []
     headline = re.search(r"^(Usable|Not usable)\b.*", output, re.MULTILINE)
     predictions, decisive = verdict.get("predictions", []), verdict.get("decisive", [])
     rows, without = estimates(folder / "fitted", truth)
@@ -255,7 +263,8 @@ def fit(program, truth, folder, *words):
         "usable": code == 0,
         "headline": headline[0] if headline else "",
         "unsound": [sentence for *_, sentence in verdict.get("unsound", [])],
-        "causes": [name for name, *_ in verdict.get("causes") or []],
+        "causes": [name for name, *_ in causes],
+        "hysteresis": next((size for name, size, *_ in causes if name == HYSTERESIS), None),
         "predictions": predictions,
         "decisive": decisive,
         "assumed": verdict.get("assumed", []),

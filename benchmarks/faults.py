@@ -182,8 +182,10 @@ def campaign(program, fault, axis, rate, seed, folder):
         record |= fit(program, truth, folder, *words)
     except CampaignError as error:
         said = " ".join(str(error).split())
-        refused = {"usable": False, "exit": 2, "headline": said, "unsound": [said], "causes": []}
-        return record | refused
+        refused = {"usable": False, "exit": error.code, "headline": said, "unsound": [said]}
+        return record | refused | {"causes": []}
+    widths = [condition.hysteresis for condition in equipment.conditions.values()]
+    record["own_hysteresis"] = 0.5 * max(widths)
     record["statements"] = in_new_maneuvers(folder, equipment, record)
     record["new"] = predicted(program, folder, truth, condition=equipment.steady)
     return record
@@ -268,6 +270,12 @@ def class_of(row):
     return "C"
 
 
+def is_right(record):
+    """Whether a cause is the fault, or the hysteresis that the machine has, to half of it."""
+    found, own = record.get("hysteresis"), record.get("own_hysteresis", 0.0)
+    return named(record) == "cause" or (found is not None and own / 1.5 < found < 1.5 * own)
+
+
 def named(record):
     """Where a fault is named: as a "cause", as "unsound", among what is "assumed", or ""."""
     words = NAMES.get(record["fault"])
@@ -307,7 +315,7 @@ HEAD = (
 def verdict_cells(rows):
     """Cells of `VERDICTS` for some campaigns."""
     causes = [row for row in rows if row["causes"]]
-    right = sum(named(row) == "cause" for row in causes)
+    right = sum(map(is_right, causes))
     ratios = [
         each["stated"] / each["true"]
         for row in rows

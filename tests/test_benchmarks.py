@@ -103,6 +103,14 @@ def test_where_a_verdict_names_a_fault(bench: ModuleType) -> None:
     assert bench.named(record("run of another axis", 0.0, 10.0, unsound=found)) == ""
 
 
+def test_a_hysteresis_that_the_machine_has_is_a_right_cause(bench: ModuleType) -> None:
+    found = {"causes": ["solenoid_hysteresis"], "hysteresis": 4e-4}
+    sound = record("none", 0.0, 10.0, own_hysteresis=3.5e-4, **found)
+    assert bench.is_right(sound)
+    assert not bench.is_right(record("none", 0.0, 10.0, own_hysteresis=1e-4, **found))
+    assert not bench.is_right(record("none", 0.0, 10.0, causes=["tau"], own_hysteresis=4e-4))
+
+
 def test_what_verdicts_say_is_counted(bench: ModuleType) -> None:
     """Two campaigns: three statements of 2, 1 and 0.4 times the true error, and one cause right."""
     errors = [(2.0, 1.0), (1.0, 1.0), (0.4, 1.0), (None, 1.0)]
