@@ -111,7 +111,8 @@ def refused(run: Callable[..., Result], tmp_path: Path) -> Callable[..., str]:
         assert isinstance(result.exception, SystemExit), result.exception
         assert result.exit_code == code
         assert result.stdout == ""
-        assert re.fullmatch(r"Error: [^\n]+[^.\n]\.\n", result.stderr), result.stderr
+        lead = {1: "Not usable, as the data are not sound", 2: "Error"}[code]
+        assert re.fullmatch(lead + r": [^\n]+[^.\n]\.\n", result.stderr), result.stderr
         assert sorted(tmp_path.rglob("*")) == before
         return result.stderr
 

@@ -102,7 +102,7 @@ def run_swashplate(command: str, words: list[str], shown: str) -> None:
         shown = "Error: A cluster needs Dask: install swashplate with its extra 'dask'."
     with scheduler(expanded(words)) as given:
         result = CliRunner().invoke(app, given)
-    codes = {"Error": 2, "Not usable": 1, "Fails": 1}
+    codes = {"Error": 2, "Not usable": 1, "Not usable, as the data are not sound": 1, "Fails": 1}
     wanted = max((codes.get(line.partition(":")[0], 0) for line in lines(shown)), default=0)
     assert result.exit_code == wanted, f"{command}\n{result.output}\n{result.exception!r}"
     if file is not None:

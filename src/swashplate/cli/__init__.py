@@ -151,7 +151,7 @@ class Commands(TyperGroup):
             close_output()
             raise typer.Exit(CLOSED_PIPE) from None
         except UnsoundDataError as error:
-            say_error(error)
+            say_error(error, "Not usable, as the data are not sound")
             raise typer.Exit(1) from None
         except SwashplateError as error:
             say_error(error)

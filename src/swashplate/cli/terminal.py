@@ -150,14 +150,14 @@ def bullets(*groups: Iterable[str]) -> None:
             say(f"- {sentence}")
 
 
-def say_error(error: Exception) -> None:
+def say_error(error: Exception, lead: str = "Error") -> None:
     """Print what went wrong as one line on standard error."""
     sentence = " ".join(str(error).split()).rstrip(".")
     # the name of a file may hold what steers a terminal
     shown = "".join(
         each if each.isprintable() else "\N{REPLACEMENT CHARACTER}" for each in sentence
     )
-    side.print(f"Error: {shown}.", soft_wrap=True)
+    side.print(f"{lead}: {shown}.", soft_wrap=True)
 
 
 class Shown:
