@@ -319,9 +319,9 @@ def lost(experiment: Experiment, name: str, output: Array, *, resisting: bool) -
     return np.cumsum(way * np.diff(time, prepend=time[:1]))
 
 
-def behind_lag(time: Array, values: Array) -> Array:
-    """(m,) values behind a first-order lag of `SMALL_LAG`, at rest before."""
-    kept = np.exp(-np.diff(time) / SMALL_LAG)
+def behind_lag(time: Array, values: Array, lag: float = SMALL_LAG) -> Array:
+    """(m,) values behind a first-order lag [s], at rest before."""
+    kept = np.exp(-np.diff(time) / lag)
     bands = np.vstack([np.ones(time.size), np.append(-kept, 0.0)])
     made = solve_banded((1, 0), bands, np.append(values[:1], (1.0 - kept) * values[1:]))
     # a full command stays one, whatever the last digit
@@ -618,11 +618,8 @@ def _late(run: Experiment, name: str, _: Array, __: float, size: float) -> Exper
 
 def _undone_lag(run: Experiment, name: str, output: Array, _: float, size: float) -> Experiment:
     """As read by an instrument without a lag: what it lacks is added as it is simulated."""
-    time = run[name].time
-    kept = np.exp(-np.diff(time) / size)
-    bands = np.vstack([np.ones(time.size), np.append(-kept, 0.0)])
-    lagged = solve_banded((1, 0), bands, np.append(output[:1], (1.0 - kept) * output[1:]))
-    return _with_values(run, name, run[name].values + output - lagged)
+    lacks = output - behind_lag(run[name].time, output, size)
+    return _with_values(run, name, run[name].values + lacks)
 
 
 def _undone_loss(
@@ -659,6 +656,4 @@ def _gained(_: Array, values: Array, size: float) -> Array:
 
 
 def _lagging(time: Array, values: Array, size: float) -> Array:
-    kept = np.exp(-np.diff(time) / size)
-    bands = np.vstack([np.ones(time.size), np.append(-kept, 0.0)])
-    return np.asarray(solve_banded((1, 0), bands, np.append(values[:1], (1 - kept) * values[1:])))
+    return behind_lag(time, values, size)
