@@ -325,7 +325,9 @@ def _decisive(
     shaft = [each for each in predictions if drive and SIGNALS.get(kinds[each.channel]) in SHAFT]
     best = min(shaft, key=lambda each: each.worst.error, default=None)
     others = [each.channel for each in predictions if each not in shaft]
-    return (*((best.channel,) if best is not None else ()), *others)
+    if best is None:
+        return tuple(others)
+    return (best.channel, *others)
 
 
 def _unfinished(stages: Sequence[StageFit], planned: Sequence[str]) -> Iterator[str]:
