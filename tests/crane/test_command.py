@@ -162,7 +162,8 @@ def test_a_cranes_file_takes_the_folder_of_a_fit_beside_it(tmp_path):
     for word in ("fitted", "fitted/drive.toml"):
         path.write_text(text.replace('luff = "luff"', f'luff = "{word}"'), "utf-8")
         made = Crane.from_toml(path)
-        assert not made.fits  # without the numbers of a fit beside it there is nothing to draw from
+        # without the numbers of a fit beside it there is nothing to draw from
+        assert made.sources["luff"].fit is None
         assert made.luff.parameters.numbers == wide.parameters.numbers
         assert made.hoist.name == "hoist"
 

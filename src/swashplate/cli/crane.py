@@ -66,7 +66,7 @@ class Placed:
     def chosen(self) -> Crane:
         """The crane, with its drives; one whose fit is not usable is refused without --force."""
         drives = dict(pairs_of("--drive", self.drive, "luff=mine.toml"))
-        crane = _crane_of(self.crane).with_drive(told=True, **drives)
+        crane = _crane_of(self.crane).with_drive(known=True, **drives)
         if not FORCED.get():
             _refuse_unusable(crane)
         return crane
@@ -140,16 +140,19 @@ class Studied(Placed):
     def sets(self) -> dict[str, Any]:
         """Sets of drives by name."""
         from swashplate.analysis.whatif import find_lever
+        from swashplate.crane import drawn_cranes, upgraded
 
         names = filter(None, map(str.strip, (self.drives or "ideal,identified").split(",")))
         sets: dict[str, Any] = {name: name for name in names}
         if "drawn" in sets:
-            if not self.chosen.fits:
+            sources = self.chosen.sources
+            drawn = [axis for axis, source in sources.items() if source.fit is not None]
+            if not drawn:
                 raise InputError("--drives drawn needs the folder of a fit: --drive luff=FOLDER.")
-            sets["drawn"] = self.chosen.drawn()
-            kept = [axis for axis in AXES if axis not in self.chosen.fits]
+            sets["drawn"] = drawn_cranes(self.chosen)
+            kept = [axis for axis in AXES if axis not in drawn]
             as_given = f"; as given, since they come from no fit: {', '.join(kept)}" if kept else ""
-            side.print(f"Drawn: {', '.join(self.chosen.fits)}{as_given}")
+            side.print(f"Drawn: {', '.join(drawn)}{as_given}")
         crane, changed = self.chosen, []
         for name, text in pairs_of("--scale", self.scale, "luff.orifice=1.5"):
             (axis, _, lever), words = name.partition("."), f"--scale {name}={text}"
@@ -160,7 +163,7 @@ class Studied(Placed):
                 )
             find_lever(lever)
             factor = _number(words, text)
-            crane = crane.upgraded(axis, {lever: factor})
+            crane = upgraded(crane, axis, {lever: factor})
             changed.append(f"{axis} {lever} ×{factor:g}")
         if changed:
             sets[", ".join(changed)] = crane
@@ -243,7 +246,7 @@ def run(
     if out is not None and len(variant or ()) > 1:
         raise InputError("--out writes one run's signals: take one --variant.")
     with working("Simulating"):
-        from swashplate.crane import Stick, run_tables
+        from swashplate.crane import Stick, run_tables, simulate
 
         crane, seaway = placed.chosen, placed.seaway(sea, "ss3,90,1")
         targets = _numbers("--until", until, "slew_deg=45")
@@ -254,7 +257,7 @@ def run(
             drives, _, law = first.partition(":")
             how: dict[str, Any] = {"control": control_of(law)}
             how["actuation"] = "inverse" if drives == "identified" else drives
-            runs[first] = crane.simulate(stick, sea=seaway, brake=brake, **how, **placed.pose)
+            runs[first] = simulate(crane, stick, sea=seaway, brake=brake, **how, **placed.pose)
         tables = run_tables(runs)
     save(out, "All signals, in SI", runs[first].write)
     draw(plot, "plot_crane", runs)
@@ -304,7 +307,9 @@ def judge(
         from swashplate.executors import Dask
 
         more["executor"] = Dask(dask)
-    found: Judgment = study.through(study.chosen.judge, **more)
+    from swashplate.crane import judge as judge_control
+
+    found: Judgment = study.through(judge_control, study.chosen, **more)
     what, write = "Numbers of every seaway, in SI", found.write
     if out is not None and out.suffix.lower() == ".html":
         from swashplate.report.scene import write_judgment
@@ -337,9 +342,11 @@ def follow(
       swashplate crane follow tg3637 --sea ss3 --at boom_deg=60
     """
     with working("Simulating"):
+        from swashplate.crane import follow as largest_sines
+
         seaway = placed.seaway(sea or ["ss3"], "ss3,90")
         names: dict[str, Any] = {"seas": (sea[0].split(",")[0],)} if sea else {}
-        found = placed.chosen.follow(seaway=seaway, **names, **placed.pose)
+        found = largest_sines(placed.chosen, seaway=seaway, **names, **placed.pose)
     save(out, "Amplitudes, in SI", found.tables()[0].write)
     draw(plot, "plot_follow", found)
     _end(placed.chosen, found.tables(), *placed.chosen.provenance())
@@ -374,7 +381,9 @@ def sweep(
     more: dict[str, Any] = {}
     if points is not None:
         more["points"] = [_number(f"--points {points}", each) for each in points.split(",")]
-    found: Sweep = study.through(study.chosen.sweep, over, **more)
+    from swashplate.crane import sweep as swing_over
+
+    found: Sweep = study.through(swing_over, study.chosen, over, **more)
     save(out, "Swing, in SI", found.tables()[0].write)
     draw(plot, "plot_sweep", found)
     _end(study.chosen, found.tables(), *study.chosen.provenance())

@@ -1,13 +1,16 @@
 from . import control as control
+from .changed_drives import drawn_cranes as drawn_cranes
+from .changed_drives import upgraded as upgraded
 from .crane import Crane as Crane
 from .drives import DriveSource as DriveSource
-from .judgment import Demand as Demand
+from .following import Demand as Demand
+from .following import Followable as Followable
+from .following import follow as follow
 from .judgment import Estimate as Estimate
-from .judgment import Followable as Followable
 from .judgment import Judgment as Judgment
 from .judgment import Remedy as Remedy
-from .judgment import follow as follow
 from .judgment import judge as judge
+from .linear_crane import linearize as linearize
 from .result import CraneRun as CraneRun
 from .result import run_tables as run_tables
 from .rope import LoadMotion as LoadMotion
@@ -17,6 +20,7 @@ from .sea import SEA_STATES as SEA_STATES
 from .sea import Seaway as Seaway
 from .sea import Spectrum as Spectrum
 from .sea import ship_motion as ship_motion
+from .simulating import simulate as simulate
 from .stepper import CraneStepper as CraneStepper
 from .stepper import Setup as Setup
 from .stick import Stick as Stick
