@@ -318,6 +318,9 @@ def test_control_does_not_know_the_draw_that_moves_the_crane(crane):
     assert abs(ends[1] - ends[0]) > 1.0
     # a drive that the controller knows gets other voltages, and ends where it should
     assert abs(ends[3] - ends[0]) < 0.1
+    # the drive that the controller counts on is put back
+    assert unknown.known_to_controller == {"slew": crane.slew}
+    assert not unknown.with_drive(slew=crane.slew, known=False).known_to_controller
     # what is redesigned is known: the fitted drive moves with the drawn one
     redesigned = upgraded(drawn, "slew", {"orifice": 2.0})
     assert redesigned.slew == weaker.scale(Z16=2.0)

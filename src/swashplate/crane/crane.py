@@ -127,7 +127,10 @@ class Crane:
             if axis not in replacements
         }
         if not known:
-            known_to_controller |= {axis: self.controller_drive(axis) for axis in replacements}
+            for axis, drive in replacements.items():
+                before = self.controller_drive(axis)
+                if before != drive:
+                    known_to_controller[axis] = before
         sources = {
             axis: source for axis, source in self.sources.items() if axis not in replacements
         }
