@@ -132,7 +132,7 @@ def follow(
     # motion of the tip, linear in the ship's: up, across the boom, along it
     base, omega = seaway or Seaway(), np.linspace(*BAND, 1000)
     heading = np.full(omega.size, radians(base.heading_deg))
-    motion = base.ship.response(omega, heading, base.speed)
+    motion = base.response(omega, heading)
     arm = np.array(tip_of(home.slew, boom, g))[:, None]
     forward, port, up = motion[:3] + np.cross(motion[3:], arm, axis=0)
     c, s = cos(home.slew), sin(home.slew)
@@ -141,7 +141,7 @@ def follow(
     for name in seas:
         spectra = replace(base, sea=name).spectrum.density(omega) * powers
         zeroth = np.trapezoid(spectra, omega, axis=1)
-        second = np.trapezoid(spectra[2] * omega**2, omega)
+        second = np.trapezoid(spectra[2] * base.encounter(omega, heading) ** 2, omega)
         height, across, along = (2.0 * np.sqrt(zeroth)).tolist()
         period = 2.0 * pi * float(np.sqrt(zeroth[2] / second))
         asked[name] = Demand(period, (height, across, along))

@@ -67,9 +67,14 @@ class Case(NamedTuple):
         """Whether it has drives that have limits, not ideal ones."""
         return self.setup["actuation"] != IDEAL
 
-    def run(self, number: int, motion: Array | None) -> CraneRun:
-        """Its run in a seaway by the seaway's number, in that motion of the ship."""
-        sea = motion if motion is None or self.height == 1.0 else self.height * motion
+    def run(self, number: int, motion: Array | None, lean: Array | float = 0.0) -> CraneRun:
+        """Its run in a seaway by the seaway's number, in that motion of the ship.
+
+        The constant part of the motion, the ship's lean, does not grow with the waves' height.
+        """
+        sea = motion
+        if motion is not None and self.height != 1.0:
+            sea = lean + self.height * (motion - lean)
         return self.cranes[number % len(self.cranes)].simulate(self.stick, sea=sea, **self.setup)
 
     def moved(self, **setup: Unpack[Setup]) -> Case:
@@ -206,13 +211,14 @@ def _of_seaway(work: tuple[tuple[Case, ...], Seaway | None, float], item: tuple[
     """Outcomes of all cases in one seaway."""
     (cases, sea, start), (number, seed) = work, item
     longest = max(case.stick.length for case in cases)
-    motion = None
+    motion, lean = None, np.zeros(6)
     if sea is not None:
+        lean = sea.lean
         motion = replace(sea, seed=seed).motion(round(longest * RATE) + 1, RATE)
     made = np.full((len(cases), len(COUNTED)), np.nan)
     for row, case in zip(made, cases, strict=True):
         try:
-            run = case.run(number, motion)
+            run = case.run(number, motion, lean)
         except (DomainError, InputError):  # stopped: by the travel's limits, or the tip too fast
             continue
         counts = run.settling if sea is None else slice(round(start * RATE), None)
