@@ -16,15 +16,23 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from swashplate.analysis.compensation import InverseMap, inverse_map
 from swashplate.analysis.whatif import pulled
+from swashplate.crane.axes import AXES, RATE, check_names
 from swashplate.crane.control import linearize
 from swashplate.crane.drives import DriveLike, DriveSource, drives_of
 from swashplate.crane.kinematics import Boom, Geometry, Home, Vector, luff_rope
 from swashplate.crane.loop import DIRECT, IDEAL
-from swashplate.crane.quantities import GEOMETRY, Quantity, check_sources, in_si, quantity_of
+from swashplate.crane.quantities import (
+    GEOMETRY,
+    OPTIONAL,
+    Quantity,
+    check_sources,
+    in_si,
+    quantity_of,
+)
 from swashplate.crane.result import CraneRun
 from swashplate.crane.sea import Seaway, motion_of
-from swashplate.crane.stepper import RATE, CraneStepper, Setup
-from swashplate.crane.stick import AXES, Array, Stick, check_names
+from swashplate.crane.stepper import CraneStepper, Setup
+from swashplate.crane.stick import Array, Stick
 from swashplate.documents import parse_toml, read_text, validated
 from swashplate.drive import Drive
 from swashplate.errors import InputError, ParameterError
@@ -242,6 +250,11 @@ class Crane:
         return self._si["safe_load"][0]
 
     @property
+    def swing_damping(self) -> float:
+        """Damping ratio of the load's swing by air, sheaves and rope."""
+        return self._si["swing_damping"][0]
+
+    @property
     def boom_limits(self) -> tuple[float, float]:
         """Lowest and highest elevation of the boom. [rad]"""
         low, high = self._si["boom_limits"]
@@ -388,13 +401,14 @@ def preset_text(name: str) -> str:
 
 def _geometry_of(content: CraneFile, origin: str) -> dict[str, Quantity]:
     """All quantities of a crane's file; refuses a name that is missing or unknown."""
-    lacks = [name for name in GEOMETRY if name not in content.geometry]
+    given = {**OPTIONAL, **content.geometry}
+    lacks = [name for name in GEOMETRY if name not in given]
     strange = [name for name in content.geometry if name not in GEOMETRY]
     if lacks or strange:
         extra = f", and knows no '{strange[0]}'" if strange else ""
         need = f"needs an entry '{lacks[0]}'" if lacks else f"has {len(GEOMETRY)} quantities"
         raise ParameterError(f"{origin}: geometry {need}{extra}.")
-    return {name: content.geometry[name] for name in GEOMETRY}
+    return {name: given[name] for name in GEOMETRY}
 
 
 def _read(text: str, origin: str, folder: Path) -> Crane:

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, Literal, NamedTuple, cast, overload
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from swashplate.crane.axes import AXES, RATE, check_names
 from swashplate.crane.control import Chain, Clip, PositionLoop
 from swashplate.crane.crane import Crane
 from swashplate.crane.kinematics import boom_at, reach_rate, tip_of
@@ -20,8 +21,6 @@ from swashplate.crane.loop import largest_sine
 from swashplate.crane.result import PUMPS, CraneRun, limit_table
 from swashplate.crane.rope import GRAVITY
 from swashplate.crane.sea import BAND, SEA_STATES, Seaway
-from swashplate.crane.stepper import RATE
-from swashplate.crane.stick import AXES, check_names
 from swashplate.crane.study import COUNTED, NONE, Case, Laws, Study, with_orifice
 from swashplate.errors import InputError
 from swashplate.results import GivenAxes, Result, Tabular, figures

@@ -68,8 +68,19 @@ GEOMETRY: Mapping[str, Definition] = {
     "boom_limits": Definition("rad", 2, 0.0, 90.0),
     # cranes that lower to the sea bed have 3000 to 4000 m
     "rope_limits": Definition("m", 2, 0.05, 6000.0),
+    # 0.2 to 1 % by air, sheaves and rope; an anti-sway device in the rope may have more
+    "swing_damping": Definition("1", 1, 0.0, 0.2),
 }
 """Quantities of a crane by name, with ranges that every crane lies well within."""
+OPTIONAL: Mapping[str, Quantity] = {
+    "swing_damping": Quantity(
+        value=0.005,
+        unit="1",
+        status="assumed",
+        source="not given; loads on ropes have a damping ratio of 0.2 to 1 % (air, sheaves, rope)",
+    )
+}
+"""Quantities that a file may leave out, as they then are."""
 ROUNDING = 1e-9
 """By which a number may lie beyond its range."""
 SAME = 1e-9
@@ -138,7 +149,8 @@ def in_si(quantities: Mapping[str, Quantity], origin: str) -> dict[str, tuple[fl
     InputError
         For a unit that does not measure the quantity.
     """
-    si = {name: _values(name, quantities[name], origin) for name in GEOMETRY}
+    known = {**OPTIONAL, **quantities}
+    si = {name: _values(name, known[name], origin) for name in GEOMETRY}
     low, high = map(degrees, si["boom_limits"])
     if not 0.0 <= low < high < 90.0:
         raise ParameterError(

@@ -13,8 +13,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from swashplate.crane.axes import check_names
 from swashplate.crane.rope import GRAVITY
-from swashplate.crane.stick import check_names
 from swashplate.crane.transfer_functions import CRANE_SHIP, MOTIONS, Hull, TransferFunctions
 from swashplate.equations import kernel
 from swashplate.errors import InputError

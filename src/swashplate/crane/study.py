@@ -13,13 +13,14 @@ from typing import TYPE_CHECKING, Any, NamedTuple, Unpack, cast
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from swashplate.crane.axes import AXES, RATE, check_names
 from swashplate.crane.control import Control
 from swashplate.crane.crane import Crane, begun
 from swashplate.crane.result import PUMPS, CraneRun
 from swashplate.crane.rope import swing_of
 from swashplate.crane.sea import HIGHEST, Seaway, Spectrum
-from swashplate.crane.stepper import RATE, Actuation, Setup
-from swashplate.crane.stick import AXES, Stick, check_names
+from swashplate.crane.stepper import Actuation, Setup
+from swashplate.crane.stick import Stick
 from swashplate.errors import DomainError, InputError
 from swashplate.executors import Executor, Threads
 from swashplate.progress import counted

@@ -12,9 +12,8 @@ import numpy as np
 from markupsafe import Markup
 
 from swashplate.crane import Crane, CraneRun, Judgment
+from swashplate.crane.axes import AXES, RATE
 from swashplate.crane.drives import UNUSABLE
-from swashplate.crane.stepper import RATE
-from swashplate.crane.stick import AXES
 from swashplate.crane.study import NONE
 from swashplate.errors import DomainError, InputError
 from swashplate.report.fit_report.html_page import (
