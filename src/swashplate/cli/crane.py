@@ -230,15 +230,16 @@ def run(
       sea SEA[,HEADING[,SEED]]: A sea, ss2, ss3, ss3-swell or ss4; where its waves come from, 0
           astern, 90 starboard (the default), 180 ahead, 270 port; and its seed.
       variant DRIVES[:CONTROL]: Drives behind the stick and, after a colon, control: inverse (the
-          default, also called identified), volts or ideal; zv-joint, zvd-tip, ei-tip and the like,
-          feedback=GAIN/DELAY, ship, clip=M, loop=GAIN, joined by +. May be repeated.
+          default, also called identified), volts or ideal; zv-tip, zvd-tip, ei-tip,
+          feedback=GAIN/DELAY, ship, clip=M, loop=GAIN, sensors=NOISE_DEG/DELAY/RATE (noise of the
+          rope's angle, seconds, Hz), joined by +. May be repeated.
       brake --brake/--no-brake: Whether a brake holds the hoist at rest.
       scene FILE: Write the scene that moves: .html.
 
     For example:
       swashplate crane run tg3637 --slew 1 --until slew_deg=45
-      swashplate crane run tg3637 --slew 1 --until slew_deg=45 --variant volts:zv-joint \
-          --variant inverse:zv-joint --variant inverse:zv-tip --plot slew.png
+      swashplate crane run tg3637 --slew 1 --until slew_deg=45 --variant volts \
+          --variant inverse --variant inverse:zv-tip --plot slew.png
       swashplate crane run tg3637 --sea ss3,90,1 --at slew_deg=90 --at rope_m=27 \
           --variant inverse --variant inverse:feedback=0.2+ship+clip
     """
@@ -376,7 +377,7 @@ def sweep(
     For example:
       swashplate crane sweep tg3637 bearing --points 0,45,90,135,180 --plot sectors.png
       swashplate crane sweep tg3637 orifice --points 1,1.5,2,3 --plot orifice.png
-      swashplate crane sweep tg3637 stick --control zv-joint --plot stick.png
+      swashplate crane sweep tg3637 stick --control zv-tip --plot stick.png
     """
     more: dict[str, Any] = {}
     if points is not None:
@@ -412,9 +413,10 @@ def control_of(words: str) -> Control | None:
         "ship": (control.ShipCompensation, 0),
         "clip": (control.Clip, 1),
         "loop": (control.PositionLoop, 1),
+        "sensors": (_sensors, 3),
     }
-    for where, shaper in (("tip", control.TipShaper), ("joint", control.JointShaper)):
-        kinds |= {f"{shape}-{where}": (partial(shaper, shape), 0) for shape in control.IMPULSES}
+    for shape in control.IMPULSES:
+        kinds[f"{shape}-tip"] = (partial(control.TipShaper, shape), 0)
     stages: list[Control] = []
     for word in filter(None, words.split("+")):
         name, _, text = word.partition("=")
@@ -422,11 +424,18 @@ def control_of(words: str) -> Control | None:
         kind, most = kinds.get(name, (None, 0))
         if kind is None or len(numbers) > most:
             raise InputError(
-                f"There is no control '{word}'; there are zv-joint, zv-tip (zvd, ei), "
-                "feedback=0.2/0.25, ship, clip=0.25 and loop=0.7."
+                f"There is no control '{word}'; there are zv-tip (zvd, ei), "
+                "feedback=0.2/0.25, ship, clip=0.25, loop=0.7 and sensors=0.1/0.05/50."
             )
         stages.append(kind(*numbers))
     return control.Chain(tuple(stages)) if stages else None
+
+
+def _sensors(noise_deg: float = 0.1, delay: float = 0.05, rate: float = 50.0) -> Control:
+    """Sensors by the noise of the rope's angle [deg], delay [s] and rate [Hz]."""
+    from swashplate.crane.control import Sensors
+
+    return Sensors(rope_angle_noise_deg=noise_deg, delay=delay, rate=rate)
 
 
 def _numbers(

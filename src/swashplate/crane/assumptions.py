@@ -169,5 +169,3 @@ def _over_none(seaway: Seaway, case: Case, found: list[Outcome]) -> float:
     linear = linear_response(crane, seaway, swing_damping=damping, **pose)
     own = np.sqrt(np.mean([outcome.rms_swing**2 for outcome in found]))
     return float(own / linear.values["swing"].rms)
-
-

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from math import pi
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 

@@ -195,9 +195,7 @@ class Judgment(Tabular):
 
     def acting(self, name: str, axis: str, limit: Limit) -> float:
         """Mean share of time for which a limit of a drive acts; NaN if every run was stopped."""
-        shares = [
-            outcome.limits[AXES.index(axis), PUMPS.index(limit)] for outcome in self.of(name)
-        ]
+        shares = [outcome.limits[AXES.index(axis), PUMPS.index(limit)] for outcome in self.of(name)]
         return mean_of(np.array(shares)).value
 
     # --- answers ----------------------------------------------------------------------------------
@@ -651,9 +649,7 @@ def _with_remedies(judgment: Judgment) -> Judgment:
 Trial = tuple[str, float, Case]
 
 
-def _larger_orifices(
-    judgment: Judgment, cranes: tuple[Crane, ...], law: Control
-) -> list[Trial]:
+def _larger_orifices(judgment: Judgment, cranes: tuple[Crane, ...], law: Control) -> list[Trial]:
     """Larger orifices of the drive whose acceleration limit acts the longest, if one does."""
     case = judgment.study.cases[judgment.judged]
     shares = {axis: judgment.acting(judgment.judged, axis, Limit.ORIFICE) for axis in AXES}
@@ -682,9 +678,7 @@ def _clips(case: Case, cranes: tuple[Crane, ...], law: Control) -> list[Trial]:
     return trials
 
 
-def _tried(
-    judgment: Judgment, case: Case, what: str, size: float, trial: Case
-) -> Remedy | None:
+def _tried(judgment: Judgment, case: Case, what: str, size: float, trial: Case) -> Remedy | None:
     """A trial in all seaways; None as soon as it is sure that it does not pass."""
     none, seaways = judgment.of(NONE), len(judgment.study.seeds)
     limits = judgment.study.crane.limits_si if "sufficiency" in judgment.asked else {}

@@ -10,7 +10,9 @@ from numpy.typing import NDArray
 
 from swashplate.crane.axes import AXES, RATE
 from swashplate.crane.extremes import peaks_of
+from swashplate.crane.operation import leads_of, left_model
 from swashplate.crane.result import PUMPS, CraneRun
+from swashplate.crane.rope import GRAVITY, swing_of
 from swashplate.simulation.result import Limit
 
 Array = NDArray[np.float64]
@@ -21,8 +23,8 @@ ELASTIC_EVERY = 4
 """The same of the tension of an elastic rope, whose bounce has a few hertz."""
 BITS = np.arange(2 ** len(PUMPS))[:, None] >> np.arange(len(PUMPS)) & 1
 """Which of `PUMPS` act, a row for each sum of the loop's bits."""
-SATURATED = (PUMPS.index(Limit.ORIFICE), PUMPS.index(Limit.SWASH_STOP))
-"""Limits at which a drive does not do what it is asked to: acceleration and speed."""
+SATURATED = (1 << PUMPS.index(Limit.ORIFICE)) | (1 << PUMPS.index(Limit.SWASH_STOP))
+"""Bits of the limits at which a drive does not do what it is asked to: acceleration and speed."""
 
 
 class Outcome(NamedTuple):
@@ -43,6 +45,8 @@ class Outcome(NamedTuple):
     """Why the run is not an operation any more from some time on; empty if it is one."""
 
 
+LEAST = 10.0
+"""Time below which nothing counts. [s]"""
 STOPPED = Outcome(
     np.nan, np.nan, np.full((3, len(PUMPS)), np.nan), np.nan, {}, 0.0, "stopped at a limit"
 )
@@ -60,23 +64,51 @@ def outcome_of(run: CraneRun, start: float, wanted: tuple[float, float] | None) 
     wanted : (float, float), optional
         Where the load shall be, horizontal and inertial [m]; None if it shall move.
     """
-    first = round(start * RATE)
-    left = run.left_model
-    last = len(run.time) if left is None else round(left[0] * RATE)
-    if last - first < 2 * EVERY:
-        return STOPPED._replace(left=left[1] if left is not None else STOPPED.left)
+    first, left = round(start * RATE), left_model(run)
+    last = len(run.stored) if left is None else round(left.time * RATE)
+    reason = "" if left is None else left.reason
+    counted = max(last - first, 0) / RATE
+    if counted < LEAST:
+        return STOPPED._replace(left=reason)
     some = slice(first, last, EVERY)
-    out, across = run.leads(some)
+    load, tip = run.load[some], run.tip[some]
+    swing = swing_of(load, tip)
+    out, across = leads_of(load, tip, run.ship[some], run["shaft_slew"][some] + run.fixed.home.slew)
+    hook = run.hook[some, 2]
+    speed = np.abs(np.diff(hook)) * RATE / EVERY
+    hoist = run.crane.geometry.hoist * min(np.abs(run.crane.inverse("hoist").limits))
+    elastic = run.fixed.hanging.stiffness > 0.0
+    pull = run["pull"][slice(first, last, ELASTIC_EVERY if elastic else EVERY)]
     peaks = {
-        "swing": peaks_of(run.swing(some)),
+        "swing": peaks_of(swing),
         "off_lead": peaks_of(np.abs(out)),
         "side_lead": peaks_of(np.abs(across)),
-        "hook_speed": peaks_of(np.abs(run.hook_speed(some))),
+        "dynamic_factor": peaks_of(pull / GRAVITY),
+        "hook_speed": peaks_of(speed),
+        "hoist_demand": peaks_of(speed) / hoist,
     }
-    hoist = run.crane.geometry.hoist * min(np.abs(run.crane.inverse("hoist").limits))
-    peaks["hoist_demand"] = peaks["hook_speed"] / hoist
-    tension = run["pull"][slice(first, last, ELASTIC_EVERY if run.elastic else EVERY)]
-    peaks["dynamic_factor"] = peaks_of(tension / GRAVITY)
     if wanted is not None:
-        away = run.load[some, :2] - np.array(wanted)
+        away = load[:, :2] - np.array(wanted)
         peaks["placement"] = peaks_of(np.hypot(away[:, 0], away[:, 1]))
+    limits = _acting(run, slice(first, last))
+    saturation = _saturated(run, slice(first, last))
+    rms = float(np.sqrt(np.mean(swing**2))) if left is None else np.nan
+    largest = float(swing.max()) if left is None else np.nan
+    return Outcome(rms, largest, limits, saturation, peaks, counted, reason)
+
+
+def _acting(run: CraneRun, some: slice) -> Array:
+    """(3, 5) shares of time for which `PUMPS` act on the drives."""
+    shares = np.zeros((len(AXES), len(PUMPS)))
+    for row, axis in zip(shares, AXES, strict=True):
+        bits = run[f"limits_{axis}"][some].astype(np.uint8)
+        row[:] = np.bincount(bits, minlength=len(BITS)) @ BITS / len(bits)
+    return shares
+
+
+def _saturated(run: CraneRun, some: slice) -> float:
+    """Largest share of time, over the drives, at the acceleration or the speed limit."""
+    return max(
+        float(np.mean((run[f"limits_{axis}"][some].astype(np.uint8) & SATURATED) > 0))
+        for axis in AXES
+    )

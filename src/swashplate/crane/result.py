@@ -13,8 +13,9 @@ from numpy.typing import NDArray
 
 from swashplate.crane.axes import AXES, RATE, check_names
 from swashplate.crane.crane import Crane
-from swashplate.crane.loop import ROWS, Fixed
+from swashplate.crane.loop import Fixed
 from swashplate.crane.rope import GRAVITY, swing_of
+from swashplate.crane.signals import ROWS, Signals
 from swashplate.crane.stepper import ACTUATIONS
 from swashplate.crane.transfer_functions import MOTIONS
 from swashplate.errors import InputError
@@ -36,10 +37,10 @@ PUMPS = (Limit.DEAD_ZONE, Limit.ORIFICE, Limit.SPOOL, Limit.SWASH_STOP, Limit.RE
 """Limits that the loop leaves of each drive, in the order of its bits."""
 
 THREES = {
-    **{"tip": "tip_x", "load": "load_x", "hook": "hook_x", "voltage": "voltage_hoist"},
-    **{"shaft_speed": "speed_hoist", "load_torque": "torque_hoist"},
+    **{"tip": "tip", "load": "load", "hook": "hook", "voltage": "voltage"},
+    **{"shaft_speed": "speed", "load_torque": "torque"},
 }
-"""Signals of three neighbours of `ROWS`, by the first of them."""
+"""Signals of three columns, and how their names in `ROWS` begin."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,8 +55,8 @@ class CraneRun(Tabular):
     """(n, 3) commands of hoist, slew and luff, -1 to 1."""
     ship: Array
     """(n, 6) surge, sway, heave [m], roll, pitch, yaw [rad]; (n, 1) zeros for a ship at rest."""
-    out: Array = field(repr=False)
-    """(n, 28) signals by `loop.ROWS`, SI."""
+    stored: Array = field(repr=False)
+    """What the loop has left of each sample, by `fixed.columns`, SI."""
     fixed: Fixed = field(repr=False)
     """What stayed as it was: home, mass of load and hook, settings of the controller."""
     stick_end: float
@@ -64,7 +65,7 @@ class CraneRun(Tabular):
     rows = ROWS
 
     def __post_init__(self) -> None:
-        self.out.flags.writeable = False
+        self.stored.flags.writeable = False
 
     def __repr__(self) -> str:
         return (
@@ -74,10 +75,21 @@ class CraneRun(Tabular):
 
     def __getitem__(self, signal: str) -> Array:
         """(n,) signal by its name in `rows`, or (n, 3) of `THREES`; an `InputError` for another."""
-        first = THREES.get(signal, signal)
-        check_names("A crane's run has no signal", [first], ROWS, "it has")
-        place = ROWS.index(first)
-        return self.out[:, place : place + 3] if signal in THREES else self.out[:, place]
+        if signal in THREES:
+            return self._signals.three(THREES[signal])
+        check_names("A crane's run has no signal", [signal], ROWS, "it has")
+        return self._signals[signal]
+
+    @cached_property
+    def _signals(self) -> Signals:
+        return Signals(self.stored, self.fixed.columns, self.fixed.geometry, self.fixed.home)
+
+    @cached_property
+    def out(self) -> Array:
+        """(n, 28) all signals, a column for each name in `rows`, SI."""
+        made = self._signals.table()
+        made.flags.writeable = False
+        return made
 
     tip = Named()
     """(n, 3) tip of the boom. [m]"""
@@ -111,7 +123,7 @@ class CraneRun(Tabular):
     @cached_property
     def time(self) -> Array:
         """(n,) [s]"""
-        return np.arange(len(self.out)) / RATE
+        return np.arange(len(self.stored)) / RATE
 
     @cached_property
     def slew_deg(self) -> Array:
@@ -150,11 +162,10 @@ class CraneRun(Tabular):
         25 s from 4 s after the stick's end and the shaper's last impulse; an `InputError` if the
         run ends before.
         """
-        impulses = (*self.fixed.settings.joint[1:], *self.fixed.settings.tip[1:])
-        halves = sum(each > 0.0 for each in impulses)
+        halves = sum(impulse > 0.0 for impulse in self.fixed.settings.tip[1:])
         starts = self.stick_end + halves * pi * sqrt(self.rope[-1] / GRAVITY) + CALMS
         first = round(starts * RATE)
-        if first >= len(self.out):
+        if first >= len(self.stored):
             raise InputError(
                 f"The run is {self.time[-1]:g} s long, but its residual swing counts from "
                 f"{starts:.4g} s on: take a longer stick."
@@ -179,7 +190,7 @@ class CraneRun(Tabular):
 
     def active(self, axis: str, limit: Limit) -> NDArray[np.bool_]:
         """(n,) samples at which a limit of `PUMPS` acts on the drive of an axis."""
-        bits = self.out[:, ROWS.index(f"limits_{axis}")].astype(np.int64)
+        bits = self[f"limits_{axis}"].astype(np.int64)
         return (bits >> PUMPS.index(limit)) & 1 > 0
 
     def limits(self, axis: str) -> dict[str, float]:

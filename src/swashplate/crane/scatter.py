@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from swashplate.errors import InputError
 from swashplate.documents import read_text
+from swashplate.errors import InputError
 from swashplate.results import Result
 
 Array = NDArray[np.float64]
@@ -42,15 +42,13 @@ class Scatter(Result):
     """Sentence on where it comes from; empty if that is the user's matter."""
 
     @classmethod
-    def of(
-        cls, height: ArrayLike, period: ArrayLike, share: ArrayLike, note: str = ""
-    ) -> Scatter:
+    def of(cls, height: ArrayLike, period: ArrayLike, share: ArrayLike, note: str = "") -> Scatter:
         """A diagram of columns; shares may be counts or per cent, and are divided by their sum."""
         columns = [np.asarray(values, dtype=np.float64) for values in (height, period, share)]
         if len({values.shape for values in columns}) != 1 or columns[0].ndim != 1:
             raise InputError("A scatter diagram has as many heights as periods and shares.")
         if not columns[0].size:
-            raise InputError("A scatter diagram needs one row of height, period and share at least.")
+            raise InputError("A scatter diagram needs at least one row: height, period, share.")
         for name, values in zip(("height", "period", "share"), columns, strict=True):
             wrong = np.flatnonzero(~(np.isfinite(values) & (values >= 0.0)))
             if name != "share":
@@ -64,8 +62,8 @@ class Scatter(Result):
         twice = [sea for row, sea in enumerate(seas) if sea in seas[:row]]
         if twice:
             raise InputError(
-                f"The scatter diagram has the sea of {twice[0][0]:g} m and {twice[0][1]:g} s twice: "
-                "add up their shares."
+                f"The scatter diagram has the sea of {twice[0][0]:g} m and {twice[0][1]:g} s "
+                "twice: add up their shares."
             )
         some = columns[2] > 0.0
         if not some.any():
@@ -85,12 +83,19 @@ class Scatter(Result):
     def packaged(cls) -> Scatter:
         """A made-up diagram, of no place: for a first look, never for an answer."""
         text = (files("swashplate.crane") / "sets" / f"{SYNTHETIC}.csv").read_text("utf-8")
-        return _parsed(text, SYNTHETIC, "The scatter diagram is made up, of no place: give your own.")
+        return _parsed(
+            text, SYNTHETIC, "The scatter diagram is made up, of no place: give your own."
+        )
 
 
 def _parsed(text: str, origin: str, note: str = "") -> Scatter:
-    lines = [line for line in text.splitlines() if line.strip() and not line.startswith("#")]
-    heads = [head.split("[")[0].strip().lower() for head in lines[0].split(",")] if lines else []
+    lines = [
+        (number, line)
+        for number, line in enumerate(text.splitlines(), 1)
+        if line.strip() and not line.startswith("#")
+    ]
+    first = lines[0][1].split(",") if lines else []
+    heads = [head.split("[")[0].strip().lower() for head in first]
     lacks = [name for name in NAMES if name not in heads]
     if lacks:
         raise InputError(
@@ -98,7 +103,7 @@ def _parsed(text: str, origin: str, note: str = "") -> Scatter:
             f"{lacks[0]} is missing."
         )
     columns: dict[str, list[float]] = {name: [] for name in NAMES}
-    for number, line in enumerate(lines[1:], 2):
+    for number, line in lines[1:]:
         entries = line.split(",")
         if len(entries) != len(heads):
             raise InputError(

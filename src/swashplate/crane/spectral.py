@@ -9,14 +9,14 @@ crane without control, and the first answer on every sea of a year.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from math import cos, inf, pi, radians, sin, sqrt
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from swashplate.crane.control import Control, Settings, settings_of
+from swashplate.crane.control import Control, Settings, stages_of
 from swashplate.crane.crane import Crane
 from swashplate.crane.extremes import THREE_HOURS, largest_of_gaussian
 from swashplate.crane.kinematics import boom_at, reach_rate, tip_of
@@ -144,7 +144,7 @@ def linear_response(
     the waves.
     """
     seaway = Seaway() if sea is None else sea
-    settings, law = settings_of(control)
+    settings, law, _ = stages_of(control)
     if law is not None:
         raise InputError(
             "The frequency domain knows delayed feedback and ship compensation, not the user's own "
@@ -172,7 +172,7 @@ def linear_response(
     inclined = np.array([pitched, -rolled])
     vertical = 1j * waves.met * tip[2]
     mass = crane.safe_load if load is None else load
-    lifted = -waves.met**2 * tip[2] / GRAVITY
+    lifted = -(waves.met**2) * tip[2] / GRAVITY
     lifted = lifted * _bounce(waves.met, rope_m, mass, suspension or Suspension())
     hoist = crane.geometry.hoist * min(np.abs(crane.inverse("hoist").limits))
     responses: dict[str, tuple[Complex, float]] = {
@@ -199,11 +199,15 @@ def linear_response(
         omega = sqrt(GRAVITY / rope_m)
         inverses = crane.inverse("slew"), crane.inverse("luff")
         rates = reach, float(reach_rate(boom, g))
-        sizes = np.array([
-            settings.share
-            * largest_sine(rate * min(np.abs(drive.limits)), rate * min(drive.acceleration), omega)
-            for drive, rate in zip(inverses, rates, strict=True)
-        ])
+        sizes = np.array(
+            [
+                settings.share
+                * largest_sine(
+                    rate * min(np.abs(drive.limits)), rate * min(drive.acceleration), omega
+                )
+                for drive, rate in zip(inverses, rates, strict=True)
+            ]
+        )
         sizes[1] = settings.clip if settings.clip > 0.0 else sizes[1]
         responses["clip"] = (np.array([across @ asked, along @ asked]) / sizes[:, None], 0.0)
     values = {

@@ -18,9 +18,10 @@ from numpy.typing import NDArray
 from swashplate.crane.axes import RATE, check_names
 from swashplate.crane.control import Control
 from swashplate.crane.crane import Crane
-from swashplate.crane.kinematics import boom_at, rotation, tip_of, to_inertial, Vector
+from swashplate.crane.kinematics import Vector, boom_at, rotation, tip_of, to_inertial
+from swashplate.crane.operation import EDGE_DEG
 from swashplate.crane.outcome import STOPPED, Outcome, outcome_of
-from swashplate.crane.result import EDGE_DEG, CraneRun
+from swashplate.crane.result import CraneRun
 from swashplate.crane.sea import Seaway, Spectrum
 from swashplate.crane.simulating import begun, simulate
 from swashplate.crane.spectral import stationary_start
@@ -219,7 +220,9 @@ class Study(Result):
         """The whole run of a variant in one seaway; a `DomainError` if it is stopped."""
         check_names("There is no variant", [name], self.cases)
         if seed not in self.seeds:
-            raise InputError(f"There is no seaway {seed} in this study; its seeds are {self.seeds}.")
+            raise InputError(
+                f"There is no seaway {seed} in this study; its seeds are {self.seeds}."
+            )
         return self.cases[name].run(self.seeds.index(seed), replace(self.seaway, seed=seed))
 
     def outcomes(

@@ -241,9 +241,7 @@ def _of_column(
     linear = _linear(case, unit, limits)
     rows = np.flatnonzero(scatter.period == column.period)
     rows = rows[np.argsort(scatter.height[rows])]
-    cells = {
-        int(row): _by_spectrum(float(scatter.height[row]), linear, limits) for row in rows
-    }
+    cells = {int(row): _by_spectrum(float(scatter.height[row]), linear, limits) for row in rows}
 
     def simulated(row: int) -> Cell:
         sea = Spectrum(float(scatter.height[row]), column.period, factor)
@@ -317,9 +315,7 @@ def _by_spectrum(height: float, linear: _Linear, limits: Mapping[str, float]) ->
     return None
 
 
-def _by_simulation(
-    study: Study, case: Case, seaway: Seaway, limits: Mapping[str, float]
-) -> Cell:
+def _by_simulation(study: Study, case: Case, seaway: Seaway, limits: Mapping[str, float]) -> Cell:
     """A cell by simulated seaways."""
     one = replace(study, seaway=seaway, executor=Serial(), progress=None)
     outcomes = [found for (found,) in one.outcomes([case])]
