@@ -60,7 +60,7 @@ Array = NDArray[np.float64]
 
 IDEAL, VOLTS, INVERSE, DIRECT, MARCHED = range(5)
 """Actuation: speeds at once; 10 V for full speed; the inverse map's voltage; voltages as given;
-drives that were marched before, whose voltages, speeds and limits stand in the rows already."""
+drives that were marched before."""
 FINE, TOO_FAST, BOOM_OUT, ROPE_OUT, NO_NUMBER = range(5)
 """How a pass ended."""
 ANGLE, SHAFT_SPEED, OPERATOR, WISH, AIM, TORQUE = range(6)
@@ -126,6 +126,8 @@ class Plant(NamedTuple):
     """(n, 4) of each measurement to come, of root mean square 1: rope x and y, roll, pitch."""
     margins: Array
     """Worst margins of the domains of the drives and the law."""
+    marched: Array
+    """(9, n) voltages, speeds and limits of drives that were marched before."""
 
 
 class State(NamedTuple):
@@ -407,16 +409,27 @@ def rope_torques(
 
 
 @inlined
-def leave(row: Array, omega: Array, axes: Array, tip: Vector, hung: Hung, columns: Columns) -> None:
-    """Leave a sample's signals; voltages and limits are those of the actuation."""
+def leave(
+    row: Array,
+    volts: Array,
+    omega: Array,
+    limits: Array,
+    axes: Array,
+    tip: Vector,
+    hung: Hung,
+    columns: Columns,
+) -> None:
+    """Leave a sample's signals, by `Columns`."""
+    voltage, torque, hook = columns.voltage, columns.torque, columns.hook
     for i in range(3):
         row[SPEED + i], row[SHAFT + i] = omega[i], axes[ANGLE, i]
-        if columns.torque != ABSENT:
-            row[columns.torque + i] = axes[TORQUE, i]
+        if voltage != ABSENT:
+            row[voltage + i], row[voltage + 3 + i] = volts[i], limits[i]
+        if torque != ABSENT:
+            row[torque + i] = axes[TORQUE, i]
     row[TIP], row[TIP + 1], row[TIP + 2] = tip
     row[LOAD], row[LOAD + 1], row[LOAD + 2] = hung.load
     row[PULL] = hung.pull
-    hook = columns.hook
     if hook != ABSENT:
         row[hook], row[hook + 1], row[hook + 2] = hung.hook
 
@@ -452,7 +465,7 @@ def loop_of(hoist: Any, slew_drive: Any, luff: Any, law: Any) -> Callable[..., t
         laws, picks, memory, margins = plant.law, plant.picks, plant.memory, plant.margins
         a, b, c = plant.drives
         g, home, columns, sensing = fixed.geometry, fixed.home, fixed.columns, settings.sensing
-        moving, loaded, voltage = ship.shape[1] > 1, fixed.loaded, columns.voltage
+        marched, moving, loaded = plant.marched, ship.shape[1] > 1, fixed.loaded
         sample, axes, tip, hung, still, brake = state
         shafts = shafts_of(axes, ANGLE)
         boom, rope = boom_at(shafts.luff, g, home), rope_length(shafts, g, home)
@@ -463,7 +476,6 @@ def loop_of(hoist: Any, slew_drive: Any, luff: Any, law: Any) -> Callable[..., t
         first = measurement_at(sample - 1, sensing.rate) + 1 if sample > 0 else 0
         ended = FINE
         for m in range(len(stick)):
-            row = out[m]
             if moving:
                 shift = Vector(ship[m, 0], ship[m, 1], ship[m, 2])
                 angles = Vector(ship[m, 3], ship[m, 4], ship[m, 5])
@@ -508,7 +520,8 @@ def loop_of(hoist: Any, slew_drive: Any, luff: Any, law: Any) -> Callable[..., t
                     omega[i] = min(max(wanted[i], inverses[i].low), inverses[i].high)
             elif actuation == MARCHED:
                 for i in range(3):
-                    volts[i], omega[i] = row[voltage + i], row[SPEED + i]
+                    volts[i], omega[i] = marched[i, m], marched[3 + i, m]
+                    limits[i] = marched[6 + i, m]
             else:
                 for i in range(3):
                     volts[i] = stick[m, i]
@@ -523,8 +536,6 @@ def loop_of(hoist: Any, slew_drive: Any, luff: Any, law: Any) -> Callable[..., t
                 margins[2] = min(margins[2], luff(c))
                 omega[0], omega[1], omega[2] = a.outputs[0], b.outputs[0], c.outputs[0]
                 limits[0], limits[1], limits[2] = a.outputs[1], b.outputs[1], c.outputs[1]
-                for i in range(3):
-                    row[voltage + i], row[voltage + 3 + i] = volts[i], limits[i]
             if fixed.brake and actuation != IDEAL:
                 still, brake = braked(volts[0], still, brake, h, inverses[0])
                 omega[0] = omega[0] * (1.0 - brake)
@@ -544,7 +555,7 @@ def loop_of(hoist: Any, slew_drive: Any, luff: Any, law: Any) -> Callable[..., t
                 ended = TOO_FAST
                 break
             tip = following
-            leave(row, omega, axes, tip, hung, columns)
+            leave(out[m], volts, omega, limits, axes, tip, hung, columns)
             if loaded:
                 felt = rope_torques(hung, tip, r, home.slew + shafts.slew, boom, fixed)
                 axes[TORQUE, 0], axes[TORQUE, 1], axes[TORQUE, 2] = felt

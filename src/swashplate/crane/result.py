@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from swashplate.crane.axes import AXES, RATE, check_names
 from swashplate.crane.crane import Crane
 from swashplate.crane.loop import Fixed
-from swashplate.crane.rope import GRAVITY, swing_of
+from swashplate.crane.rope import GRAVITY, rope_leads, swing_of
 from swashplate.crane.signals import ROWS, Signals
 from swashplate.crane.stepper import ACTUATIONS
 from swashplate.crane.transfer_functions import MOTIONS
@@ -31,6 +31,10 @@ Array = NDArray[np.float64]
 
 CALMS, WATCHED = 4.0, 25.0
 """Residual swing counts from so long after the shaper's last impulse, for so long. [s]"""
+FARTHEST_SWING = 30.0
+"""Swing beyond which a run is not an operation any more: the model is a mass on a free rope, and
+nobody goes on with a load that swings beyond it. [deg]"""
+IN_WATER = "the load is in the water"
 SETTLED = 1.0
 """Swing below which a load counts as settled. [deg]"""
 PUMPS = (Limit.DEAD_ZONE, Limit.ORIFICE, Limit.SPOOL, Limit.SWASH_STOP, Limit.RELIEF)
@@ -141,6 +145,39 @@ class CraneRun(Tabular):
         return self.fixed.mass * self["pull"]
 
     @property
+    def dynamic_factor(self) -> Array:
+        """(n,) tension of the rope over the weight of load and hook.
+
+        With a rigid rope it is NaN from the first snap on, see `snap`.
+        """
+        factor = self["pull"] / GRAVITY
+        if self._rigid and self._snaps.size:
+            factor[self._snaps[0] :] = np.nan
+        return np.asarray(factor)
+
+    @property
+    def _rigid(self) -> bool:
+        return self.fixed.hanging.stiffness == 0.0
+
+    @cached_property
+    def _snaps(self) -> NDArray[np.int64]:
+        """Samples in which a slack rope snaps taut."""
+        return 1 + np.flatnonzero(self.slack[:-1] & ~self.slack[1:])
+
+    @property
+    def snap(self) -> float | None:
+        """Largest tension from the first moment on at which a slack rope snaps taut. [N]
+
+        0 if it never does. None if it does so with a rigid rope: that tension would depend on the
+        time step, so it is not computed; an elastic rope has it, `Suspension.stiffness`.
+        """
+        if not self._snaps.size:
+            return 0.0
+        if self._rigid:
+            return None
+        return float(self.tension[self._snaps[0] :].max())
+
+    @property
     def stretch(self) -> Array:
         """(n,) what the tension has added to the rope's length. [m]"""
         return np.asarray(np.linalg.norm(self.hook - self.tip, axis=1) - self.rope)
@@ -154,6 +191,49 @@ class CraneRun(Tabular):
     def swing_deg(self) -> Array:
         """(n,) angle between rope and plumb line. [deg]"""
         return np.degrees(swing_of(self.load, self.tip))
+
+    @cached_property
+    def _leads_deg(self) -> Array:
+        slew = self.fixed.home.slew + self["shaft_slew"]
+        return np.degrees(rope_leads(self.hook - self.tip, slew, self.ship))
+
+    @property
+    def off_lead_deg(self) -> Array:
+        """(n,) angle of the rope in the crane's own axes, positive outwards along the boom.
+
+        The crane's axes turn with slew, roll and pitch, so a list of the ship is in it. [deg]
+        """
+        return self._leads_deg[:, 0]
+
+    @property
+    def side_lead_deg(self) -> Array:
+        """(n,) angle of the rope likewise, across the boom, positive to starboard of it. [deg]"""
+        return self._leads_deg[:, 1]
+
+    @property
+    def hook_velocity(self) -> Array:
+        """(n,) vertical velocity of the hook, inertial, positive upwards. [m/s]"""
+        return np.asarray(np.gradient(self.hook[:, 2], 1.0 / RATE))
+
+    @cached_property
+    def left_model(self) -> tuple[float, str] | None:
+        """Time [s] from which a run is not an operation any more, and why; None if it stays one.
+
+        The first sample at which the load swings beyond 30 degrees, the rope is slack or lies on
+        the boom, or the load is in the water.
+        """
+        inboard = -self.off_lead_deg
+        reasons = {
+            f"the load swings beyond {FARTHEST_SWING:g} deg": self.swing_deg > FARTHEST_SWING,
+            "the rope is slack": self.slack,
+            "the rope lies on the boom": inboard >= 90.0 - self.boom_deg,
+            IN_WATER: self.load[:, 2] < 0.0,
+        }
+        begins = {why: int(np.argmax(when)) for why, when in reasons.items() if when.any()}
+        if not begins:
+            return None
+        why = min(begins, key=begins.__getitem__)
+        return float(self.time[begins[why]]), why
 
     @property
     def settling(self) -> slice:
@@ -211,14 +291,24 @@ class CraneRun(Tabular):
         return run_tables({self.actuation: self})
 
     def sentences(self) -> tuple[str, ...]:
-        """Where the load goes under water, as far as that is known."""
+        """Why the run is not an operation any more, and what of it is not computed."""
+        said = []
         lowest = float(self.load[:, 2].min())
-        if lowest >= 0.0:
-            return ()
-        return (
-            f"The load is down to z = {lowest:.1f} m, below the point of the ship that its motion "
-            "is given for, near the waterline. Water is not in the model.",
-        )
+        if lowest < 0.0:
+            said.append(
+                f"The load is down to z = {lowest:.1f} m, below the point of the ship that its "
+                "motion is given for, near the waterline. Water is not in the model."
+            )
+        if self.left_model is not None and self.left_model[1] != IN_WATER:
+            time, why = self.left_model
+            said.append(f"From {time:.2f} s on the run is not an operation any more: {why}.")
+        if self.snap is None:
+            said.append(
+                f"The slack rope snaps taut at {self.time[self._snaps[0]]:.2f} s. With a rigid "
+                "rope the tension of that is not computed: take an elastic rope, "
+                "suspension=Suspension(stiffness=6e7)."
+            )
+        return tuple(said)
 
     def to_polars(self) -> polars.DataFrame:
         """All signals and the ship's motion, a row for each sample, in SI."""

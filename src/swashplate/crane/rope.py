@@ -13,13 +13,13 @@ of its two quadratics.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import inf, isfinite, pi, sqrt
+from math import atan2, cos, inf, isfinite, pi, sin, sqrt
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from swashplate.crane.kinematics import Vector, dot, moved, size
+from swashplate.crane.kinematics import Vector, dot, moved, rotation, size, to_ship
 from swashplate.equations import equation, kernel
 from swashplate.errors import InputError
 from swashplate.results import Result
@@ -448,6 +448,40 @@ def swing_of(load: Array, tip: Array) -> Array:
     """Angle between rope and plumb line. [rad]"""
     x, y, z = (load - tip).T
     return np.asarray(np.arctan2(np.hypot(x, y), -z))
+
+
+def rope_leads(line: Array, slew: Array, ship: Array) -> Array:
+    """Angles of a rope in the crane's own axes: outwards and to starboard of the boom. [rad]
+
+    Parameters
+    ----------
+    line : (n, 3) array
+        Rope's end less tip, inertial. [m]
+    slew : (n,) array
+        From forward, positive to starboard. [rad]
+    ship : (n, 6) or (n, 1) array
+        Motion of the ship [m], [rad]; one column if it is at rest.
+
+    Returns
+    -------
+    (n, 2) array
+    """
+    made = np.empty((len(line), 2))
+    _leads(np.ascontiguousarray(line), np.ascontiguousarray(slew), ship, made)
+    return made
+
+
+@kernel
+def _leads(line: Array, slew: Array, ship: Array, out: Array) -> None:
+    """Fill the angles outwards and to starboard."""
+    r = rotation(0.0, 0.0, 0.0)
+    for n in range(len(line)):
+        if ship.shape[1] > 1:
+            r = rotation(ship[n, 3], ship[n, 4], ship[n, 5])
+        d = to_ship(r, Vector(line[n, 0], line[n, 1], line[n, 2]))
+        c, s = cos(slew[n]), sin(slew[n])
+        out[n, 0] = atan2(d.x * c - d.y * s, -d.z)
+        out[n, 1] = atan2(-d.x * s - d.y * c, -d.z)
 
 
 def too_fast(length: float, time: float, rate: float) -> str:

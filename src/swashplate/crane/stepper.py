@@ -26,7 +26,7 @@ from swashplate.crane.rope import (
     swing_of,
     too_fast,
 )
-from swashplate.crane.signals import ROWS, SPEED, Signals, columns_of
+from swashplate.crane.signals import ROWS, Signals, columns_of
 from swashplate.drive import Drive
 from swashplate.equations import CompiledStep, Machine, compiled_step
 from swashplate.equations.marching.run import marched
@@ -173,6 +173,7 @@ class CraneStepper:
             readings=np.zeros((1 << on_their_way.bit_length(), loop.READINGS)),
             noise=np.zeros((0, loop.NOISY)),
             margins=np.full(4, np.inf),
+            marched=np.zeros((9, 0)),
         )
 
     def step(
@@ -228,7 +229,7 @@ class CraneStepper:
         fixed, h = self.fixed, 1.0 / RATE
         out = np.empty((len(commands), fixed.columns.width))
         if self._open:  # the drives by themselves, which is quicker
-            voltage = fixed.columns.voltage
+            given = np.empty((9, len(commands)))
             for i, axis in enumerate(AXES):
                 stick = np.ascontiguousarray(commands[:, i])
                 volts = loop.open_voltages(stick, fixed.inverses[i], fixed.actuation)
@@ -236,8 +237,8 @@ class CraneStepper:
                 begun = instance.start({"voltage": 0.0}, h, "rest")
                 wanted = stored_of(instance.model, OUTPUTS)
                 speed, limits = marched(instance, {"voltage": volts}, h, begun, wanted, "command")
-                out[:, voltage + i], out[:, voltage + 3 + i] = volts, limits
-                out[:, SPEED + i] = speed
+                given[i], given[3 + i], given[6 + i] = volts, speed, limits
+            self._plant = self._plant._replace(marched=given)
             fixed = fixed._replace(actuation=loop.MARCHED)
         return self._advanced(fixed, commands, ship, out)
 
