@@ -109,12 +109,11 @@ def _trials(study: Study, case: Case) -> Iterator[_Trial]:
             moved = replace(seaway, ship=other)
             text = f"{other.roll_period:.3g} s"
             yield _Trial("the ship's roll period", used, text, True, moved, case)
-    damping = case.setup.get("swing_damping")
-    assumed = damping is None and crane.quantities["swing_damping"].status == "assumed"
-    damping = crane.swing_damping if damping is None else damping
-    for other in DAMPINGS:
-        words = "a damping of the swing", f"{100.0 * damping:.3g} %", f"{100.0 * other:.3g} %"
-        yield _Trial(*words, assumed, seaway, case.changed(swing_damping=other))
+    used = f"{100.0 * case.swing_damping:.3g} %"
+    assumed = "swing_damping" not in case.hangs and _assumed(crane, "swing_damping")
+    for ratio in DAMPINGS:
+        words = "a damping of the swing", used, f"{100.0 * ratio:.3g} %"
+        yield _Trial(*words, assumed, seaway, case.changed(swing_damping=ratio))
     for factor in (1.0 - HEIGHT, 1.0 + HEIGHT):
         other_sea = replace(spectrum, height=factor * spectrum.height)
         words = "waves", f"{spectrum.height:.3g} m", f"{other_sea.height:.3g} m"
@@ -133,12 +132,16 @@ def _trials(study: Study, case: Case) -> Iterator[_Trial]:
         words = "a heading", f"{seaway.heading_deg:g} deg", f"{moved.heading_deg:g} deg"
         yield _Trial(*words, False, moved, case)
     drum = crane.quantities["luff_drum_radius"]
-    if drum.status == "assumed":
+    if _assumed(crane, "luff_drum_radius"):
         for factor in (1.0 - DRUM, 1.0 + DRUM):
             radius = factor * drum.values[0]
             cranes = tuple(each.with_geometry(luff_drum_radius=radius) for each in case.cranes)
             words = "a luff drum's radius", f"{drum.values[0]:.3g} m", f"{radius:.3g} m"
             yield _Trial(*words, True, seaway, case._replace(cranes=cranes))
+
+
+def _assumed(crane: Crane, name: str) -> bool:
+    return crane.quantities[name].status == "assumed"
 
 
 def _passes(study: Study, seaway: Seaway, case: Case, limits: Mapping[str, float]) -> bool | None:
@@ -162,10 +165,6 @@ def _passes(study: Study, seaway: Seaway, case: Case, limits: Mapping[str, float
 
 def _over_none(seaway: Seaway, case: Case, found: list[Outcome]) -> float:
     """Root mean square swing over that without control."""
-    setup = case.setup
-    pose = {name: setup[name] for name in ("slew_deg", "boom_deg", "rope_m")}
-    damping = setup.get("swing_damping")
-    crane: Crane = case.cranes[0]
-    linear = linear_response(crane, seaway, swing_damping=damping, **pose)
+    linear = linear_response(case.cranes[0], seaway, **case.pose, **case.hangs)
     own = np.sqrt(np.mean([outcome.rms_swing**2 for outcome in found]))
     return float(own / linear.values["swing"].rms)

@@ -231,7 +231,8 @@ class Judgment(Tabular):
     def _idle(self) -> bool:
         """Whether the judged variant swings as no control does, in every seaway."""
         own, none = self.swing(self.judged), self.swing(NONE)
-        return bool(np.allclose(own, none, rtol=IDLE, equal_nan=True)) and np.isfinite(own).any()
+        same = np.allclose(own, none, rtol=IDLE, equal_nan=True)
+        return bool(same and np.isfinite(own).any())
 
     @property
     def passed(self) -> bool:
@@ -482,10 +483,9 @@ class Judgment(Tabular):
             "swing. Control harms if it is worse than none in more than "
             f"{100.0 * self.allowed:g} % of them; the 95 % interval of that share decides."
         )
-        setup = study.cases[NONE].setup
-        damping = setup.get("swing_damping")
-        assumed = damping is None and crane.quantities["swing_damping"].status == "assumed"
-        damping = crane.swing_damping if damping is None else damping
+        none = study.cases[NONE]
+        damping, given = none.swing_damping, "swing_damping" in none.hangs
+        assumed = not given and crane.quantities["swing_damping"].status == "assumed"
         words = f"The load's swing has a damping of {100.0 * damping:g} %"
         sentences = [rule, f"{words}, assumed." if assumed else f"{words}."]
         if crane.assumed:
@@ -583,10 +583,8 @@ def judge(
     none = asked_study.cases[NONE]
     outcomes = tuple(asked_study.outcomes(list(asked_study.cases.values())))
     linear = None
-    pose = {name: none.setup[name] for name in ("slew_deg", "boom_deg", "rope_m")}
-    damping = none.setup.get("swing_damping", crane.swing_damping)
-    if damping > 0.0:
-        linear = linear_response(crane, asked_study.seaway, swing_damping=damping, **pose)
+    if none.swing_damping > 0.0:
+        linear = linear_response(crane, asked_study.seaway, **none.pose, **none.hangs)
     judgment = Judgment(asked_study, outcomes, allowed, questions, linear)
     if turns:
         judgment = replace(judgment, turns=turns_of(asked_study, judgment.judged, crane.limits_si))
@@ -667,9 +665,8 @@ def _larger_orifices(judgment: Judgment, cranes: tuple[Crane, ...], law: Control
 def _clips(case: Case, cranes: tuple[Crane, ...], law: Control) -> list[Trial]:
     """Clips at shares of what the luff can follow at the load's period."""
     stages = [stage for stage in law.stages if not isinstance(stage, Clip | PositionLoop)]
-    pose: dict[str, Any] = {name: case.setup[name] for name in ("slew_deg", "boom_deg", "rope_m")}
-    period = 2.0 * pi * sqrt(pose["rope_m"] / GRAVITY)
-    reach = float(follow(cranes[0], [period], seas=(), **pose).amplitude[0, 2])
+    period = 2.0 * pi * sqrt(case.pose["rope_m"] / GRAVITY)
+    reach = float(follow(cranes[0], [period], seas=(), **case.pose).amplitude[0, 2])
     trials = []
     for share in SHARES:
         control = Chain((*stages, Clip(share=share), LOOP))

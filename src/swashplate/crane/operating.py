@@ -286,16 +286,15 @@ class _Linear(NamedTuple):
 
 def _linear(case: Case, sea: Seaway, limits: Mapping[str, float]) -> _Linear:
     """The first of a case's cranes in a sea of 1 m, in the frequency domain."""
-    setup = case.setup
-    names = ("slew_deg", "boom_deg", "rope_m", "swing_damping", "load", "suspension")
-    pose: dict[str, Any] = {name: setup[name] for name in names if name in setup}
-    values = linear_response(case.cranes[0], sea, setup["control"], **pose).values
+    control = case.setup["control"]
+    response = linear_response(case.cranes[0], sea, control, **case.pose, **case.hangs)
+    values = response.values
     named = {*limits, "hoist_demand"}
     mean = {name: abs(values[name].mean) for name in named}
     slope = {name: values[name].largest - mean[name] for name in named}
     asked = [name for name in DEMANDS if name in values and (case.driven or name == "clip")]
     demand = max((values[name].largest for name in asked), default=0.0)
-    return _Linear(slope, mean, demand if setup["control"] is not None else 0.0)
+    return _Linear(slope, mean, demand if control is not None else 0.0)
 
 
 def _by_spectrum(height: float, linear: _Linear, limits: Mapping[str, float]) -> Cell | None:
@@ -326,6 +325,7 @@ def _by_simulation(study: Study, case: Case, seaway: Seaway, limits: Mapping[str
         name: largest_of_peaks([outcome.peaks[name] for outcome in outcomes], observed).value
         / limit
         for name, limit in limits.items()
+        if all(name in outcome.peaks for outcome in outcomes)
     }
     worst = max(ratios, key=lambda name: ratios[name])
     if ratios[worst] <= 1.0:

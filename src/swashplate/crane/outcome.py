@@ -10,9 +10,8 @@ from numpy.typing import NDArray
 
 from swashplate.crane.axes import AXES, RATE
 from swashplate.crane.extremes import peaks_of
-from swashplate.crane.operation import leads_of, left_model
 from swashplate.crane.result import PUMPS, CraneRun
-from swashplate.crane.rope import GRAVITY, swing_of
+from swashplate.crane.rope import GRAVITY, rope_leads, swing_of
 from swashplate.simulation.result import Limit
 
 Array = NDArray[np.float64]
@@ -64,7 +63,7 @@ def outcome_of(run: CraneRun, start: float, wanted: tuple[float, float] | None) 
     wanted : (float, float), optional
         Where the load shall be, horizontal and inertial [m]; None if it shall move.
     """
-    first, left = round(start * RATE), left_model(run)
+    first, left = round(start * RATE), run.left_model
     last = len(run.stored) if left is None else round(left.time * RATE)
     reason = "" if left is None else left.reason
     counted = max(last - first, 0) / RATE
@@ -73,9 +72,9 @@ def outcome_of(run: CraneRun, start: float, wanted: tuple[float, float] | None) 
     some = slice(first, last, EVERY)
     load, tip = run.load[some], run.tip[some]
     swing = swing_of(load, tip)
-    out, across = leads_of(load, tip, run.ship[some], run["shaft_slew"][some] + run.fixed.home.slew)
-    hook = run.hook[some, 2]
-    speed = np.abs(np.diff(hook)) * RATE / EVERY
+    hook, slew = run.hook[some], run.fixed.home.slew + run["shaft_slew"][some]
+    out, across = rope_leads(hook - tip, slew, run.ship[some]).T
+    speed = np.abs(np.diff(hook[:, 2])) * RATE / EVERY
     hoist = run.crane.geometry.hoist * min(np.abs(run.crane.inverse("hoist").limits))
     elastic = run.fixed.hanging.stiffness > 0.0
     pull = run["pull"][slice(first, last, ELASTIC_EVERY if elastic else EVERY)]
@@ -83,10 +82,11 @@ def outcome_of(run: CraneRun, start: float, wanted: tuple[float, float] | None) 
         "swing": peaks_of(swing),
         "off_lead": peaks_of(np.abs(out)),
         "side_lead": peaks_of(np.abs(across)),
-        "dynamic_factor": peaks_of(pull / GRAVITY),
         "hook_speed": peaks_of(speed),
         "hoist_demand": peaks_of(speed) / hoist,
     }
+    if run.actuation != "ideal":  # whose jumps of speed are impulses of the rope
+        peaks["dynamic_factor"] = peaks_of(pull / GRAVITY)
     if wanted is not None:
         away = load[:, :2] - np.array(wanted)
         peaks["placement"] = peaks_of(np.hypot(away[:, 0], away[:, 1]))

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from math import pi, sqrt
-from typing import TYPE_CHECKING, cast
+from math import inf, pi, sqrt
+from typing import TYPE_CHECKING, NamedTuple, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,6 +35,8 @@ FARTHEST_SWING = 30.0
 """Swing beyond which a run is not an operation any more: the model is a mass on a free rope, and
 nobody goes on with a load that swings beyond it. [deg]"""
 IN_WATER = "the load is in the water"
+LOOK = 32
+"""Samples from one at which swing and place of the load are looked at to the next: 16 a second."""
 SETTLED = 1.0
 """Swing below which a load counts as settled. [deg]"""
 PUMPS = (Limit.DEAD_ZONE, Limit.ORIFICE, Limit.SPOOL, Limit.SWASH_STOP, Limit.RELIEF)
@@ -45,6 +47,14 @@ THREES = {
     **{"shaft_speed": "speed", "load_torque": "torque"},
 }
 """Signals of three columns, and how their names in `ROWS` begin."""
+
+
+class Left(NamedTuple):
+    """When and why a run has left the model."""
+
+    time: float
+    """[s]"""
+    reason: str
 
 
 @dataclass(frozen=True, eq=False)
@@ -216,24 +226,28 @@ class CraneRun(Tabular):
         return np.asarray(np.gradient(self.hook[:, 2], 1.0 / RATE))
 
     @cached_property
-    def left_model(self) -> tuple[float, str] | None:
-        """Time [s] from which a run is not an operation any more, and why; None if it stays one.
+    def left_model(self) -> Left | None:
+        """When and why a run is not an operation any more; None if it stays one.
 
-        The first sample at which the load swings beyond 30 degrees, the rope is slack or lies on
-        the boom, or the load is in the water.
+        The first time at which the load swings beyond 30 degrees, the rope is slack or lies on the
+        boom, or the load is in the water. Ideal drives change their speed at once, which slackens
+        any rope for a moment: theirs is not looked at.
         """
-        inboard = -self.off_lead_deg
-        reasons = {
-            f"the load swings beyond {FARTHEST_SWING:g} deg": self.swing_deg > FARTHEST_SWING,
-            "the rope is slack": self.slack,
-            "the rope lies on the boom": inboard >= 90.0 - self.boom_deg,
-            IN_WATER: self.load[:, 2] < 0.0,
+        some = slice(None, None, LOOK)
+        tip, hook, load = self.tip[some], self.hook[some], self.load[some]
+        slew = self.fixed.home.slew + self["shaft_slew"][some]
+        inboard = -rope_leads(hook - tip, slew, self.ship[some])[:, 0]
+        boom = np.arctan2(self["boom_sin"][some], self["boom_cos"][some])
+        beyond = np.degrees(swing_of(load, tip)) > FARTHEST_SWING
+        times = {
+            f"the load swings beyond {FARTHEST_SWING:g} deg": _first(beyond, LOOK),
+            "the rope lies on the boom": _first(inboard >= 0.5 * pi - boom, LOOK),
+            IN_WATER: _first(load[:, 2] < 0.0, LOOK),
         }
-        begins = {why: int(np.argmax(when)) for why, when in reasons.items() if when.any()}
-        if not begins:
-            return None
-        why = min(begins, key=begins.__getitem__)
-        return float(self.time[begins[why]]), why
+        if self.actuation != "ideal":
+            times["the rope is slack"] = _first(self.slack, 1)
+        reason = min(times, key=times.__getitem__)
+        return Left(times[reason], reason) if np.isfinite(times[reason]) else None
 
     @property
     def settling(self) -> slice:
@@ -321,6 +335,12 @@ class CraneRun(Tabular):
         moving = self.ship.shape[1] > 1
         columns |= {name: self.ship[:, i if moving else 0] for i, name in enumerate(MOTIONS)}
         return pl.DataFrame(columns)
+
+
+def _first(happens: NDArray[np.bool_], every: int) -> float:
+    """Time of the first of samples at which something happens [s]; inf if it never does."""
+    first = int(np.argmax(happens))
+    return first * every / RATE if happens[first] else inf
 
 
 def run_tables(runs: Mapping[str, CraneRun]) -> list[Table]:

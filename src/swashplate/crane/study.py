@@ -19,9 +19,8 @@ from swashplate.crane.axes import RATE, check_names
 from swashplate.crane.control import Control
 from swashplate.crane.crane import Crane
 from swashplate.crane.kinematics import Vector, boom_at, rotation, tip_of, to_inertial
-from swashplate.crane.operation import EDGE_DEG
 from swashplate.crane.outcome import STOPPED, Outcome, outcome_of
-from swashplate.crane.result import CraneRun
+from swashplate.crane.result import FARTHEST_SWING, CraneRun
 from swashplate.crane.sea import Seaway, Spectrum
 from swashplate.crane.simulating import begun, simulate
 from swashplate.crane.spectral import stationary_start
@@ -66,6 +65,27 @@ class Case(NamedTuple):
         """Whether it has drives that have limits, not ideal ones."""
         return self.setup["actuation"] != IDEAL
 
+    @property
+    def pose(self) -> dict[str, Any]:
+        """Where it begins: keywords of `Crane.home`."""
+        return {name: self._setup[name] for name in ("slew_deg", "boom_deg", "rope_m")}
+
+    @property
+    def hangs(self) -> dict[str, Any]:
+        """What hangs on it, as far as it is given: keywords of `linear_response`."""
+        names = ("swing_damping", "load", "suspension")
+        return {name: self._setup[name] for name in names if name in self._setup}
+
+    @property
+    def swing_damping(self) -> float:
+        """Damping ratio of the load's swing."""
+        given = self.setup.get("swing_damping")
+        return self.cranes[0].swing_damping if given is None else given
+
+    @property
+    def _setup(self) -> dict[str, Any]:
+        return dict(self.setup)
+
     def changed(self, **setup: Unpack[Setup]) -> Case:
         """The case set up in another way."""
         return self._replace(setup=self.setup | setup)
@@ -75,17 +95,17 @@ class Case(NamedTuple):
         crane = self.cranes[number % len(self.cranes)]
         if motion is None:
             motion = seaway.motion(round(self.stick.length * RATE) + 1, RATE)
-        return simulate(crane, self.stick, sea=motion, **self.setup, **self._start(crane, seaway))
+        setup = self.setup | self._start(seaway)
+        return simulate(crane, self.stick, sea=motion, **setup)
 
-    def _start(self, crane: Crane, seaway: Seaway) -> Setup:
+    def _start(self, seaway: Seaway) -> Setup:
         """The stationary swing without control at time 0, at most a part of the model's edge."""
-        pose = {name: self.setup[name] for name in ("slew_deg", "boom_deg", "rope_m")}
-        damping = self.setup.get("swing_damping")
-        damping = crane.swing_damping if damping is None else damping
-        if damping <= 0.0:
+        if self.swing_damping <= 0.0:
             return {}
-        offset, velocity = stationary_start(crane, seaway, damping=damping, **pose)
-        largest = LARGEST_START * self.setup["rope_m"] * sin(radians(EDGE_DEG))
+        offset, velocity = stationary_start(
+            self.cranes[0], seaway, damping=self.swing_damping, **self.pose
+        )
+        largest = LARGEST_START * self.setup["rope_m"] * sin(radians(FARTHEST_SWING))
         share = min(largest / max(float(np.hypot(*offset)), 1e-9), 1.0)
         return {
             "load_offset": (share * offset[0], share * offset[1]),
@@ -97,7 +117,7 @@ class Case(NamedTuple):
         if self.stick.samples is not None or self.stick.parts:
             return None
         crane = self.cranes[0]
-        home = crane.home(*(self.setup[name] for name in ("slew_deg", "boom_deg", "rope_m")))
+        home = crane.home(**self.pose)
         tip = tip_of(home.slew, boom_at(0.0, crane.geometry, home), crane.geometry)
         attitude = rotation(radians(seaway.list_deg), radians(seaway.trim_deg), 0.0)
         place = to_inertial(attitude, tip, Vector(0.0, 0.0, 0.0))
