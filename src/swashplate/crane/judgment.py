@@ -19,7 +19,7 @@ from swashplate.crane.kinematics import boom_at, reach_rate, tip_of
 from swashplate.crane.loop import largest_sine
 from swashplate.crane.result import PUMPS, CraneRun, limit_table
 from swashplate.crane.rope import GRAVITY
-from swashplate.crane.sea import BAND, SEA_STATES, Seaway
+from swashplate.crane.sea import SEA_STATES, Seaway, Spectrum
 from swashplate.crane.stepper import RATE
 from swashplate.crane.stick import AXES, check_names
 from swashplate.crane.study import COUNTED, NONE, Case, Laws, Study, with_orifice
@@ -105,7 +105,7 @@ def follow(
     crane: Crane,
     periods: ArrayLike = tuple(range(4, 17)),
     *,
-    seas: Sequence[str] = tuple(SEA_STATES),
+    seas: Sequence[str | Spectrum] = tuple(SEA_STATES),
     seaway: Seaway | None = None,
     slew_deg: float = 90.0,
     boom_deg: float = 45.0,
@@ -115,8 +115,8 @@ def follow(
 
     They are of the drives as control knows them, see `Crane.with_drive`.
 
-    Seas are names of `SEA_STATES`; ship and heading are those of the seaway, by default the crane
-    ship's hull in beam waves.
+    Seas are names of `SEA_STATES` or spectra; ship and heading are those of the seaway, by default
+    the crane ship's hull in beam waves.
     """
     times = np.atleast_1d(np.asarray(periods, dtype=np.float64))
     if not (((times > 0.0) & (times <= SLOWEST)).all() and times.size):
@@ -130,7 +130,8 @@ def follow(
         acceleration = rate * min(inverse.acceleration)
         amplitude[:, i] = [largest_sine(speed, acceleration, w) for w in 2.0 * pi / times]
     # motion of the tip, linear in the ship's: up, across the boom, along it
-    base, omega = seaway or Seaway(), np.linspace(*BAND, 1000)
+    base = seaway or Seaway()
+    omega = base.bins.frequency
     heading = np.full(omega.size, radians(base.heading_deg))
     motion = base.response(omega, heading)
     arm = np.array(tip_of(home.slew, boom, g))[:, None]
@@ -138,13 +139,14 @@ def follow(
     c, s = cos(home.slew), sin(home.slew)
     powers = np.abs([up, s * forward + c * port, c * forward - s * port]) ** 2
     asked = {}
-    for name in seas:
-        spectra = replace(base, sea=name).spectrum.density(omega) * powers
-        zeroth = np.trapezoid(spectra, omega, axis=1)
-        second = np.trapezoid(spectra[2] * base.encounter(omega, heading) ** 2, omega)
+    for sea in seas:
+        seaway = replace(base, sea=sea)
+        variances = powers * seaway.bins.variance
+        zeroth = variances.sum(axis=1)
+        second = (variances[2] * base.encounter(omega, heading) ** 2).sum()
         height, across, along = (2.0 * np.sqrt(zeroth)).tolist()
         period = 2.0 * pi * float(np.sqrt(zeroth[2] / second))
-        asked[name] = Demand(period, (height, across, along))
+        asked[seaway.title] = Demand(period, (height, across, along))
     return Followable(times, amplitude, asked, crane, boom_deg)
 
 

@@ -234,8 +234,8 @@ class Seaway(Result):
             low, high = self.ship.frequencies[[0, -1]]
             raise InputError(
                 f"{self.ship.name} has waves of {low:.3g} to {high:.3g} rad/s, but "
-                f"{100.0 * lost:.0f} % of the energy of {self._sea_words} lies beyond, more than "
-                f"{100.0 * MOST_LOST:.0f} %: take a file that reaches further, or another sea."
+                f"{100.0 * lost:.0f} % of the energy of the sea ({self.title}) lies beyond, more "
+                f"than {100.0 * MOST_LOST:.0f} %: take a file that reaches further, or another sea."
             )
 
     @property
@@ -244,11 +244,11 @@ class Seaway(Result):
         return SEA_STATES[self.sea] if isinstance(self.sea, str) else self.sea
 
     @property
-    def _sea_words(self) -> str:
-        """The sea in words: its name, or height and period."""
+    def title(self) -> str:
+        """The name of its sea, or significant height and peak period."""
         if isinstance(self.sea, str):
             return self.sea
-        return f"a sea of {self.sea.height:g} m with a peak at {self.sea.period:g} s"
+        return f"{self.sea.height:g} m, {self.sea.period:g} s"
 
     @property
     def _lost(self) -> float:
@@ -265,7 +265,7 @@ class Seaway(Result):
         if outside > OUTSIDE:
             shortest, longest = (2.0 * np.pi / omega for omega in BAND[::-1])
             sentences.append(
-                f"{100.0 * outside:.0f} % of the energy of {self._sea_words} lies outside the "
+                f"{100.0 * outside:.0f} % of the energy of the sea ({self.title}) lies outside the "
                 f"waves of {shortest:.3g} to {longest:.3g} s that are simulated: these are made "
                 "larger, so that the significant height is the one asked for."
             )
@@ -273,8 +273,8 @@ class Seaway(Result):
             low, high = self.ship.frequencies[[0, -1]]
             sentences.append(
                 f"{self.ship.name} has waves of {low:.3g} to {high:.3g} rad/s: for the "
-                f"{100.0 * lost:.1f} % of the energy of {self._sea_words} that lies beyond, the "
-                "motions in the nearest of them are taken."
+                f"{100.0 * lost:.1f} % of the energy of the sea ({self.title}) that lies beyond, "
+                "the motions in the nearest of them are taken."
             )
         return tuple(sentences)
 
