@@ -25,7 +25,7 @@ from swashplate.cli.terminal import (
 )
 from swashplate.cli.words import pairs_of
 from swashplate.errors import InputError
-from swashplate.tables import PAGE, Form, Table
+from swashplate.tables import PAGE, Column, Form, Table
 
 if TYPE_CHECKING:
     from swashplate.crane import (
@@ -514,6 +514,54 @@ def sectors(
     sweep(study, "bearing", points=points, out=out, plot=plot)
 
 
+def damping(
+    log: str,
+    *,
+    column: str = "swing",
+    time_column: str = "time",
+    start: float | None = None,
+    stop: float | None = None,
+    rope: float | None = None,
+) -> None:
+    r"""Find the damping ratio of a load that swings freely, from a log of its angle.
+
+    A decaying sine is fitted to the signed angle in one plane, with the crane at
+    rest and at least five swings.
+
+    Options:
+      log LOG: The log: text such as .csv, .parquet, .mat, .h5, .tdms or .mf4.
+      column NAME: Column of the angle; its unit stands in the header, 'swing \[deg]'.
+      time_column NAME: Column of the time in LOG.
+      start S: Time of the log from which on it swings freely.
+      stop S: Time of the log up to which it does.
+      rope M: Length of the rope, by which the period is checked.
+
+    For example:
+      swashplate crane damping swing.csv --column swing --start 12 --stop 90 --rope 20
+    """
+    from swashplate.crane import swing_damping
+    from swashplate.logs import read_series
+
+    series = read_series(log, column, "rad", time_column=time_column)
+    first, last = float(series.time[0]), float(series.time[-1])
+    begins = first if start is None else start
+    ends = last if stop is None else stop
+    if not first <= begins < ends <= last:
+        raise InputError(
+            f"{log} lasts from {first:g} to {last:g} s, but {begins:g} to {ends:g} s are asked for."
+        )
+    within = (begins <= series.time) & (series.time <= ends)
+    try:
+        found = swing_damping(series.time[within], series.values[within], rope=rope)
+    except InputError as error:
+        raise InputError(f"{log}, {column}: {error}") from None
+    ratio = Column("damping ratio", ".3%")
+    interval = [Column(name, ".3%") for name in ("from", "to")]
+    table = Table("Free swing, 95 % interval", (ratio, *interval, Column("period", ".2f", "s")))
+    table.add(*found)
+    show(table)
+
+
 def control_of(words: str) -> Control | None:
     """A controller of words such as ``zv-tip+feedback=0.2+clip``; None if there are none."""
     from swashplate.crane import control
@@ -632,3 +680,4 @@ command(app, "judge")(judge)
 command(app, "follow")(follow)
 command(app, "sweep")(sweep)
 command(app, "sectors")(sectors)
+command(app, "damping")(damping)

@@ -1,6 +1,8 @@
 from . import control as control
 from .crane import Crane as Crane
 from .drives import DriveSource as DriveSource
+from .free_swing import FreeSwing as FreeSwing
+from .free_swing import swing_damping as swing_damping
 from .judgment import Demand as Demand
 from .judgment import Estimate as Estimate
 from .judgment import Followable as Followable
