@@ -73,6 +73,8 @@ def test_logs_that_are_no_free_swing_are_refused():
             swing_damping(time, angle)
     with pytest.raises(InputError, match="once in 8.27 s, but a load on 30 m of rope in 11 s"):
         swing_damping(TIME, free_swing(0.01), rope=30.0)
+    with pytest.raises(InputError, match="The rope is -1 m long"):
+        swing_damping(TIME, free_swing(0.01), rope=-1.0)
 
 
 def said(*words):

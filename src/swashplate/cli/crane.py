@@ -143,9 +143,10 @@ class AtSea(Placed):
 
         words = self.sea or ([] if default is None else [default])
         if not words:
-            for name, value in (self._at_sea | _given(seed=seed)).items():
-                option = name.replace("_", "-")
-                raise InputError(f"--{option} {value} needs a --sea to move in.")
+            given = [*self._at_sea, *_given(seed=seed)]
+            if given:
+                option = given[0].replace("_", "-")
+                raise InputError(f"--{option} needs a sea: give --sea, as --sea ss3.")
             return None
         if len(words) > 1:
             raise InputError(f"--sea {' --sea '.join(words)} is too much: write one sea.")

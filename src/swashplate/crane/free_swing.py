@@ -88,6 +88,8 @@ def swing_damping(time: ArrayLike, angle: ArrayLike, *, rope: float | None = Non
         )
     period = 2.0 * pi / frequency
     if rope is not None:
+        if not rope > 0.0:
+            raise InputError(f"The rope is {rope:g} m long, but must be longer than 0 m.")
         expected = 2.0 * pi * sqrt(rope / GRAVITY)
         if abs(period / expected - 1.0) > NEAR:
             raise InputError(

@@ -54,7 +54,7 @@ HIGHEST = 30.0
 LEAST_ENERGY, OUTSIDE = 0.5, 0.02
 """Share of a spectrum's energy that must lie within the band; share outside from which it is
 announced."""
-MOST_LOST, LOST = 0.05, 0.001
+MOST_LOST, LOST = 0.05, 0.01
 """Largest share of a sea's energy that may lie beyond a file's frequencies, where the motions of
 its ends are taken; share from which that is announced."""
 LEANING, FAR = 45.0, 500.0
@@ -375,14 +375,12 @@ class Seaway(Result):
         mirrored = index > size // 2
         index[mirrored] = size - index[mirrored]
         sums[mirrored] = sums[mirrored].conj()
-        first, last = int(index.min()), int(index.max())
-        rows = np.zeros((last - first + 1, sums.shape[1]), dtype=np.complex128)
-        np.add.at(rows, index - first, sums)
-        spectrum = np.zeros((sums.shape[1], size // 2 + 1), dtype=np.complex128)
-        spectrum[:, first : last + 1] = 0.5 * size * rows.T
-        spectrum[:, [0, -1]] *= 2.0
-        samples = np.fft.irfft(spectrum, size)
-        return np.ascontiguousarray(np.take(samples, np.arange(count) % size, axis=1).T)
+        lines = np.zeros((int(index.max()) + 1, sums.shape[1]), dtype=np.complex128)
+        np.add.at(lines, index, sums)
+        # an inverse real FFT halves and scales all lines but those at 0 and at half of the rate
+        lines[1 : size // 2] *= 0.5
+        samples = np.fft.irfft(size * np.ascontiguousarray(lines.T), size)
+        return np.ascontiguousarray(samples[:, np.arange(count) % size].T)
 
 
 # --- measured motion ------------------------------------------------------------------------------
