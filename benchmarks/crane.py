@@ -9,7 +9,7 @@ from timing import alone
 
 from swashplate.crane import Crane, Seaway, Stick, Study, control, judge, load_motion, simulate
 
-ROPE, OPEN, CLOSED, SEAWAY = 1e-3, 6e-3, 12e-3, 1.2e-3
+ROPE, OPEN, CLOSED, SEAWAY = 1e-3, 6e-3, 12e-3, 12e-3
 THOUSAND, JUDGED = 15.0, 10.0
 """Targets. [s]"""
 MEANT = control.DelayedFeedback(0.2, 0.2) | control.ShipCompensation()
@@ -27,8 +27,8 @@ def crane_rows() -> Iterator[Row]:
 
     rope = np.full(len(tip), 27.0)
     yield row("crane: rope march, 60 s", alone(lambda: load_motion(tip, rope), 15), ROPE)
-    seaway = alone(lambda: Seaway("ss3", seed=1).motion(60 * 512 + 1), 15)
-    yield row("crane: ship's motion in a seaway, 60 s", seaway, SEAWAY)
+    seaway = alone(lambda: Seaway("ss3", seed=1).motion(600 * 512 + 1), 15)
+    yield row("crane: ship's motion in a seaway, 600 s", seaway, SEAWAY)
     plain = alone(lambda: simulate(crane, stick, **how), 9)
     yield row("crane: open loop, three drives, 60 s", plain, OPEN)
     closed = alone(lambda: simulate(crane, stick, sea=ship, control=MEANT, **how), 9)

@@ -8,6 +8,8 @@ from .drives import DriveSource as DriveSource
 from .following import Demand as Demand
 from .following import Followable as Followable
 from .following import follow as follow
+from .free_swing import FreeSwing as FreeSwing
+from .free_swing import swing_damping as swing_damping
 from .judgment import Judged as Judged
 from .judgment import Judgment as Judgment
 from .judgment import Remedy as Remedy

@@ -54,7 +54,7 @@ HIGHEST = 30.0
 LEAST_ENERGY, OUTSIDE = 0.5, 0.02
 """Share of a spectrum's energy that must lie within the band; share outside from which it is
 announced."""
-MOST_LOST, LOST = 0.05, 0.001
+MOST_LOST, LOST = 0.05, 0.01
 """Largest share of a sea's energy that may lie beyond a file's frequencies, where the motions of
 its ends are taken; share from which that is announced."""
 LEANING, FAR = 45.0, 500.0
@@ -234,8 +234,8 @@ class Seaway(Result):
             low, high = self.ship.frequencies[[0, -1]]
             raise InputError(
                 f"{self.ship.name} has waves of {low:.3g} to {high:.3g} rad/s, but "
-                f"{100.0 * lost:.0f} % of the energy of {self._sea_words} lies beyond, more than "
-                f"{100.0 * MOST_LOST:.0f} %: take a file that reaches further, or another sea."
+                f"{100.0 * lost:.0f} % of the energy of the sea ({self.title}) lies beyond, more "
+                f"than {100.0 * MOST_LOST:.0f} %: take a file that reaches further, or another sea."
             )
 
     @property
@@ -244,11 +244,11 @@ class Seaway(Result):
         return SEA_STATES[self.sea] if isinstance(self.sea, str) else self.sea
 
     @property
-    def _sea_words(self) -> str:
-        """The sea in words: its name, or height and period."""
+    def title(self) -> str:
+        """The name of its sea, or significant height and peak period."""
         if isinstance(self.sea, str):
             return self.sea
-        return f"a sea of {self.sea.height:g} m with a peak at {self.sea.period:g} s"
+        return f"{self.sea.height:g} m, {self.sea.period:g} s"
 
     @property
     def _lost(self) -> float:
@@ -265,7 +265,7 @@ class Seaway(Result):
         if outside > OUTSIDE:
             shortest, longest = (2.0 * np.pi / omega for omega in BAND[::-1])
             sentences.append(
-                f"{100.0 * outside:.0f} % of the energy of {self._sea_words} lies outside the "
+                f"{100.0 * outside:.0f} % of the energy of the sea ({self.title}) lies outside the "
                 f"waves of {shortest:.3g} to {longest:.3g} s that are simulated: these are made "
                 "larger, so that the significant height is the one asked for."
             )
@@ -273,8 +273,8 @@ class Seaway(Result):
             low, high = self.ship.frequencies[[0, -1]]
             sentences.append(
                 f"{self.ship.name} has waves of {low:.3g} to {high:.3g} rad/s: for the "
-                f"{100.0 * lost:.1f} % of the energy of {self._sea_words} that lies beyond, the "
-                "motions in the nearest of them are taken."
+                f"{100.0 * lost:.1f} % of the energy of the sea ({self.title}) that lies beyond, "
+                "the motions in the nearest of them are taken."
             )
         return tuple(sentences)
 
@@ -375,14 +375,12 @@ class Seaway(Result):
         mirrored = index > size // 2
         index[mirrored] = size - index[mirrored]
         sums[mirrored] = sums[mirrored].conj()
-        first, last = int(index.min()), int(index.max())
-        rows = np.zeros((last - first + 1, sums.shape[1]), dtype=np.complex128)
-        np.add.at(rows, index - first, sums)
-        spectrum = np.zeros((sums.shape[1], size // 2 + 1), dtype=np.complex128)
-        spectrum[:, first : last + 1] = 0.5 * size * rows.T
-        spectrum[:, [0, -1]] *= 2.0
-        samples = np.fft.irfft(spectrum, size)
-        return np.ascontiguousarray(np.take(samples, np.arange(count) % size, axis=1).T)
+        lines = np.zeros((int(index.max()) + 1, sums.shape[1]), dtype=np.complex128)
+        np.add.at(lines, index, sums)
+        # an inverse real FFT halves and scales all lines but those at 0 and at half of the rate
+        lines[1 : size // 2] *= 0.5
+        samples = np.fft.irfft(size * np.ascontiguousarray(lines.T), size)
+        return np.ascontiguousarray(samples[:, np.arange(count) % size].T)
 
 
 # --- measured motion ------------------------------------------------------------------------------
