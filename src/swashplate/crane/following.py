@@ -93,8 +93,8 @@ def follow(
 
     They are of the drives that the controller knows, see `Crane.with_drive`.
 
-    Seas are names of `SEA_STATES` or spectra; ship and heading are those of the seaway, by default the crane
-    ship's hull in beam waves.
+    Seas are names of `SEA_STATES` or spectra; ship and heading are those of the seaway, by default
+    the crane ship's hull in beam waves.
     """
     times = np.atleast_1d(np.asarray(periods, dtype=np.float64))
     if not (((times > 0.0) & (times <= SLOWEST)).all() and times.size):

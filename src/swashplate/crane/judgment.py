@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from math import pi, sqrt
+from math import nan, pi, sqrt
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple, cast, overload
 
 import numpy as np
@@ -81,18 +81,20 @@ class Judged(NamedTuple):
             return "no"
         return "yes" if self.largest.high <= self.limit else "not decided"
 
+    @property
+    def shown(self) -> tuple[str, float]:
+        """Unit in which it is shown, and the factor from SI to that."""
+        if self.name == "saturation":
+            return "%", 100.0
+        unit = LIMITED[self.name].unit
+        return ("deg", 180.0 / pi) if unit == "rad" else (unit.replace("1", ""), 1.0)
+
     def words(self) -> str:
         """In a sentence: ``"off-lead 9.1 deg (8.7 to 9.5), limit 8 deg"``."""
-        limited = LIMITED[self.name]
-        angle = limited.unit == "rad"
-        scale = 180.0 / pi if angle else 100.0 if self.name == "saturation" else 1.0
-        unit = " deg" if angle else " %" if self.name == "saturation" else f" {limited.unit}"
-        unit = "" if unit == " 1" else unit
-        value, low, high = (scale * number for number in self.largest)
-        return (
-            f"{limited.label} {value:.3g}{unit} ({low:.3g} to {high:.3g}), limit "
-            f"{scale * self.limit:.3g}{unit}"
-        )
+        unit, factor = self.shown
+        value, low, high = (factor * number for number in self.largest)
+        what = f"{LIMITED[self.name].label} {value:.3g} {unit}".rstrip()
+        return f"{what} ({low:.3g} to {high:.3g}), limit {factor * self.limit:.3g} {unit}".rstrip()
 
 
 class Remedy(NamedTuple):
@@ -363,7 +365,7 @@ class Judgment(Tabular):
         tables = [
             self._swing_table(),
             self._worse_table(),
-            *self._limit_tables(),
+            *([self._limit_table()] if self.study.crane.limits else []),
             self._difference_table(),
             limit_table(acting),
         ]
@@ -377,26 +379,22 @@ class Judgment(Tabular):
             (
                 Column("variant", wrap=True),
                 *interval,
-                Column("by spectrum", ".2f", "rad", none="–"),
                 Column("in 3 h", ".2f", "rad", none="–"),
                 Column("left the model", "d"),
             ),
-            "by spectrum: in the frequency domain; in 3 h: most probable largest swing. Runs that "
-            "left the model are not in the means",
+            "in 3 h: most probable largest swing. Runs that left the model are not in the means",
         )
         for name in self.names:
-            spectrum = np.nan
-            if name == NONE and self.linear is not None:
-                spectrum = self.linear.values["swing"].rms
-            largest = largest_of(self.of(name), "swing").value
             table.add(
                 name,
                 *mean_of(self.swing(name), 0.0),
-                spectrum,
-                largest,
+                largest_of(self.of(name), "swing").value,
                 sum(self.left(name).values()),
                 look=name != NONE and self.worse(name).value > self.allowed,
             )
+            if name == NONE and self.linear is not None:
+                swing = self.linear.values["swing"]
+                table.add(f"{NONE}, by its spectrum", swing.rms, nan, nan, swing.largest, 0)
         return table
 
     def _worse_table(self) -> Table:
@@ -410,23 +408,17 @@ class Judgment(Tabular):
             table.add(name, round(found.value * seaways), *found, look=look)
         return table
 
-    def _limit_tables(self) -> list[Table]:
-        """What has a limit, of the judged variant, a table for each unit."""
-        limited = self.limited(self.judged)
-        tables = []
-        for unit in dict.fromkeys(LIMITED[judged.name].unit for judged in limited):
-            spec, shown = (".2f", "rad") if unit == "rad" else (".3f", "" if unit == "1" else unit)
-            heads = [Column(head, spec, shown, none="–") for head in ("limit", "in 3 h")]
-            ends = [Column(head, spec, shown, none="–") for head in ("from", "to")]
-            columns = (Column("quantity"), *heads, *ends, Column("within"))
-            title = f"Limits, '{self.judged}', most probable largest values in 3 h"
-            table = Table(title, columns)
-            for judged in limited:
-                if LIMITED[judged.name].unit == unit:
-                    label, within = LIMITED[judged.name].label, judged.within
-                    table.add(label, judged.limit, *judged.largest, within, look=within != "yes")
-            tables.append(table)
-        return tables
+    def _limit_table(self) -> Table:
+        """What has a limit, of the judged variant."""
+        numbers = [Column(head, ".3g", none="–") for head in ("limit", "in 3 h", "from", "to")]
+        columns = (Column("quantity"), Column("unit"), *numbers, Column("within"))
+        table = Table(f"Limits, '{self.judged}'", columns, "in 3 h: most probable largest value")
+        for judged in self.limited(self.judged):
+            unit, factor = judged.shown
+            values = [factor * number for number in (judged.limit, *judged.largest)]
+            label, within = LIMITED[judged.name].label, judged.within
+            table.add(label, unit, *values, within, look=within != "yes")
+        return table
 
     def _difference_table(self) -> Table:
         spec = [Column(head, "+.2f", "rad", none="–") for head in ("difference", "from", "to")]
