@@ -111,7 +111,7 @@ def test_follow_and_sectors_print_their_tables(tmp_path):
         ("sweep tg3637 height --ship hull.4", "a .4 of WAMIT, and no other file, needs the length"),
         ("run tg --slew 1", "There is no packaged crane 'tg'; there is tg3637."),
         ("run tg3637 --variant fast", "actuation is 'fast'; it is ideal, volts, inverse."),
-        ("run tg3637 --variant ideal:magic", "There is no control 'magic'; there are zv-joint"),
+        ("run tg3637 --variant ideal:magic", "There is no control 'magic'; there are zv-tip"),
         ("run tg3637 --sea ss3,90,1,2", "--sea ss3,90,1,2 is too much: write one sea, --sea ss3"),
         ("run tg3637 --sea ss3,90,1.5", "The seed of a seaway is 1.5, but must be 0, 1, 2"),
         ("judge tg3637 --sea ss3,90,1", "is too much: write one sea, --sea ss3,90."),
