@@ -18,7 +18,7 @@ def test_show_marks_what_is_assumed_and_its_file_is_a_crane(tmp_path):
     assert shown.exit_code == 0
     rows = [line.split() for line in shown.stdout.splitlines()]
     assert ["foot", "offset", "2.5", "m", "assumed"] in rows
-    assert sum("assumed" in row for row in rows[3:]) == 12
+    assert sum("assumed" in row for row in rows[3:]) == 13
     mine = tmp_path / "mine.toml"
     mine.write_text(said("show", "tg3637", "--toml").stdout, "utf-8")
     assert Crane.from_toml(mine).geometry == Crane.preset("tg3637").geometry
@@ -33,7 +33,8 @@ def test_run_compares_variants_and_writes_signals_and_a_figure(tmp_path):
     )  # fmt: skip
     assert both.exit_code == 0, both.output
     rows = {line.split()[0]: line.split()[1:] for line in both.stdout.splitlines() if line.strip()}
-    assert rows["ideal:zv-tip"][:1] == ["0.03"]
+    # undamped it is 0.03; what damping takes off the first impulse is left of the second
+    assert 0.01 < float(rows["ideal:zv-tip"][0]) < 0.1
     assert (tmp_path / "run.png").stat().st_size > 10_000
     out, scene = tmp_path / "run.parquet", tmp_path / "scene.html"
     files = ["--out", str(out), "--scene", str(scene)]

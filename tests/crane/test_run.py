@@ -67,7 +67,8 @@ def test_shaped_paths_leave_what_they_do_on_the_independent_crane(
 
 def test_shaping_the_tips_path_on_ideal_drives_exceeds_40_db(crane):
     # Parker, Robinett, Driessen and Dohrmann (1996): residual sway down by "in excess of 40 dB"
-    found = crane.sweep("stick", {"none": None, "tip": TIP}, points=[0.2, 1.0], drives=["ideal"])
+    laws = {"none": None, "tip": TIP}
+    found = crane.sweep("stick", laws, points=[0.2, 1.0], drives=["ideal"], swing_damping=0.0)
     plain, shaped = found.values[0, :, 1:, 1].T
     assert (20.0 * np.log10(shaped / plain) < -40.0).all()
 
