@@ -113,6 +113,8 @@ def test_follow_and_sectors_print_their_tables(tmp_path):
         ("run tg --slew 1", "There is no packaged crane 'tg'; there is tg3637."),
         ("run tg3637 --variant fast", "actuation is 'fast'; it is ideal, volts, inverse."),
         ("run tg3637 --variant ideal:magic", "There is no control 'magic'; there are zv-tip"),
+        ("run tg3637 --variant ideal:sensors=0.1/9", "delay of sensors is 9.0, but must be"),
+        ("run tg3637 --variant ideal:sensors=1/2/3/4", "There is no control 'sensors=1/2/3/4'"),
         ("run tg3637 --sea ss3,90,1,2", "--sea ss3,90,1,2 is too much: write one sea, --sea ss3"),
         ("run tg3637 --sea ss3,90,1.5", "The seed of a seaway is 1.5, but must be 0, 1, 2"),
         ("judge tg3637 --sea ss3,90,1", "is too much: write one sea, --sea ss3,90."),
@@ -147,6 +149,7 @@ def test_wrong_words_end_in_one_sentence(words, sentence):
         ({"boom_length": True}, "boom_length is True, but must be one number"),
         ({"boom_limits": "39"}, "boom_limits is '39', but must be a list of 2 numbers"),
         ({"slew_axis": 3.0}, "slew_axis must be a list of 3 numbers, not 1"),
+        ({"swing_damping": 0.5}, "swing_damping is 0.5, but on a crane it is 0 to 0.2"),
         ({"jib": 3.0}, "A crane has no jib; it has boom_length"),
     ],
 )
