@@ -31,7 +31,7 @@ from swashplate.identification.setup import Free, Setup, load_setup
 from swashplate.maneuvers import source_tests
 
 MEANT = control.DelayedFeedback(0.2, 0.2) | control.ShipCompensation() | control.PositionLoop(1.5)
-SHORT = {"length": 70.0, "start": 40.0}
+SHORT = {"length": 70.0, "start": 40.0, "swing_damping": 0.0}
 
 
 @pytest.fixture(scope="module")
@@ -204,30 +204,23 @@ def test_orifice_is_that_of_another_luff_drive(crane):
     assert found.values[0, 0, 0, 0] == found.values[0, 1, 0, 0] == alone.counted("no control")[0]
 
 
-# residual swing [deg] of an independent model over the stick: ideal, volts, identified drives, each
-# without shaper and with ZV, on real drives with ZVD
+# residual swing [deg] of an independent model over the stick: ideal, volts, identified drives
 SLEWS = {
-    0.1: (0.831, 0.014, 2.17, 0.201, 0.218, 0.842, 0.023, 0.292),
-    0.2: (1.258, 0.047, 4.44, 0.194, 0.193, 1.243, 0.056, 0.031),
-    0.5: (7.03, 0.204, 10.23, 0.799, 0.582, 6.95, 0.198, 0.072),
-    0.8: (12.51, 0.788, 14.89, 5.73, 3.81, 12.38, 0.780, 0.101),
-    1.0: (7.88, 0.543, 8.95, 11.23, 1.49, 7.75, 0.519, 0.609),
+    0.1: (0.831, 2.17, 0.842),
+    0.2: (1.258, 4.44, 1.243),
+    0.5: (7.03, 10.23, 6.95),
+    0.8: (12.51, 14.89, 12.38),
+    1.0: (7.88, 8.95, 7.75),
 }
 
 
 def test_residual_swing_over_the_stick_is_that_of_the_independent_crane(crane):
-    laws = {"plain": None, "ZV": control.JointShaper("zv"), "ZVD": control.JointShaper("zvd")}
-    found = sweep(crane, "stick", laws, points=list(SLEWS))
-    names = [
-        *("plain, ideal", "ZV, ideal", "plain, volts", "ZV, volts", "ZVD, volts"),
-        *("no control", "ZV, identified", "ZVD, identified"),
-    ]
-    places = [found.names.index(name) for name in names]
+    found = sweep(crane, "stick", {"plain": None}, points=list(SLEWS), swing_damping=0.0)
+    places = [found.names.index(name) for name in ("plain, ideal", "plain, volts", "no control")]
     swing, ends = np.degrees(found.values[0][:, places, 1:]).transpose(2, 0, 1)
-    # steps of the shaper's delay and order of a sample differ: 1.5 %, or half a unit as printed
+    # order of a sample differs: 1.5 %, or half a unit as printed
     np.testing.assert_allclose(swing, list(SLEWS.values()), rtol=0.015, atol=6e-4)
-    # a shaper on the volts is worse than none at full stick, and lands elsewhere
-    np.testing.assert_allclose(ends[-1, 2:4], [46.11, 62.02], rtol=0.002)
+    np.testing.assert_allclose(ends[-1, 1], 46.11, rtol=0.002)
     with pytest.raises(InputError, match="A sweep over the stick sets sea itself"):
         sweep(crane, "stick", MEANT, sea="ss3")
 
