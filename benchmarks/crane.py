@@ -7,7 +7,7 @@ from processes import limited
 from table import Row, duration
 from timing import alone
 
-from swashplate.crane import Crane, Seaway, Stick, Study, control, judge, load_motion
+from swashplate.crane import Crane, Seaway, Stick, Study, control, judge, load_motion, simulate
 
 ROPE, OPEN, CLOSED, SEAWAY = 1e-3, 6e-3, 12e-3, 12e-3
 THOUSAND, JUDGED = 15.0, 10.0
@@ -20,7 +20,7 @@ def crane_rows() -> Iterator[Row]:
     crane, stick = Crane.preset("tg3637"), Stick.rest(60.0)
     how = {"slew_deg": 90.0, "rope_m": 27.0}
     ship = Seaway("ss3", seed=1).motion(60 * 512 + 1)
-    tip = crane.simulate(stick, sea=ship, **how).tip
+    tip = simulate(crane, stick, sea=ship, **how).tip
 
     def row(what: str, seconds: float, target: float) -> Row:
         return limited(what, seconds, target, duration(seconds), f"< {duration(target)}")
@@ -29,9 +29,9 @@ def crane_rows() -> Iterator[Row]:
     yield row("crane: rope march, 60 s", alone(lambda: load_motion(tip, rope), 15), ROPE)
     seaway = alone(lambda: Seaway("ss3", seed=1).motion(600 * 512 + 1), 15)
     yield row("crane: ship's motion in a seaway, 600 s", seaway, SEAWAY)
-    plain = alone(lambda: crane.simulate(stick, **how), 9)
+    plain = alone(lambda: simulate(crane, stick, **how), 9)
     yield row("crane: open loop, three drives, 60 s", plain, OPEN)
-    closed = alone(lambda: crane.simulate(stick, sea=ship, control=MEANT, **how), 9)
+    closed = alone(lambda: simulate(crane, stick, sea=ship, control=MEANT, **how), 9)
     yield row("crane: closed loop in a seaway, 60 s", closed, CLOSED)
     study = Study.of(crane, MEANT, seeds=range(1000))
     many = alone(lambda: study.outcomes([study.cases["identified"]]), 1)

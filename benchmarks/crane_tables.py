@@ -26,6 +26,7 @@ from swashplate.crane import (
     judge,
     load_motion,
     read_ship,
+    simulate,
 )
 from swashplate.crane.control import Control
 from swashplate.crane.judgment import mean_of
@@ -264,7 +265,7 @@ def slew_tables(crane: Crane) -> Iterator[str]:
             stick = Stick.trapezoid(slew=part, until={"slew_deg": 45.0}, length=160.0)
             cells = []
             for (actuation, law), other in zip(variants, numbers, strict=True):
-                run = crane.simulate(stick, control=law, actuation=actuation)
+                run = simulate(crane, stick, control=law, actuation=actuation)
                 cells.append(f"{run.residual_deg:.3g} / {other:g}")
             yield f"| {part:g} | {' | '.join(cells)} |"
 
@@ -298,9 +299,9 @@ def maneuver_table(crane: Crane, count: int) -> Iterator[str]:
     yield "|---|---|--:|--:|--:|--:|--:|--:|"
     for actuation, name, law, calm, sea in MANEUVERS:
         how: Setup = {"control": law, "actuation": actuation, "boom_deg": 38.0, "rope_m": 28.0}
-        run = crane.simulate(stick, **how)
+        run = simulate(crane, stick, **how)
         swing = [
-            crane.simulate(stick, sea=Seaway(peaked("ss3"), seed=seed), **how).rms_deg(
+            simulate(crane, stick, sea=Seaway(peaked("ss3"), seed=seed), **how).rms_deg(
                 run.stick_end
             )
             for seed in range(count)

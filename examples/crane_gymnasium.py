@@ -14,7 +14,7 @@ from typing import Any
 import gymnasium
 import numpy as np
 
-from swashplate.crane import Crane
+from swashplate.crane import Crane, CraneStepper
 
 # %%
 SAMPLES, SECONDS, TARGET = 32, 40.0, radians(45.0)
@@ -36,7 +36,7 @@ class CraneEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         """Begin anew, the load at rest, the rope drawn from 15 to 25 m."""
         super().reset(seed=seed)
         rope = self.np_random.uniform(15.0, 25.0)
-        self.stepper = self.crane.stepper(actuation="direct", rope_m=rope)
+        self.stepper = CraneStepper(self.crane, actuation="direct", rope_m=rope)
         self.time, self.offset = 0.0, np.zeros(2)
         return self.observe(self.stepper.step((0.0, 0.0, 0.0)))[0], {}
 

@@ -20,7 +20,16 @@ import numpy as np
 import osqp
 from scipy import signal, sparse
 
-from swashplate.crane import Crane, Seaway, Stick, control
+from swashplate.crane import (
+    Crane,
+    CraneStepper,
+    Seaway,
+    Stick,
+    control,
+    follow,
+    linearize,
+    simulate,
+)
 from swashplate.crane.kinematics import Boom, reach_rate
 
 parser = argparse.ArgumentParser(description="Model predictive control beside the clip.")
@@ -38,7 +47,7 @@ crane = Crane.preset("tg3637")
 
 # %% [markdown]
 # ## The model
-# `crane.linearize` gives the pendulum along the boom and across it, driven by the tip's speed u.
+# `linearize` gives the pendulum along the boom and across it, driven by the tip's speed u.
 # To each are added the tip's distance y from where the operator wants it over the sea, the drive
 # as a lag T behind its command c, and what the ship adds to the tip's speed, w:
 #
@@ -47,7 +56,7 @@ crane = Crane.preset("tg3637")
 # The program chooses the acceleration a of the command for each step.
 
 # %%
-linear = crane.linearize(POSE["boom_deg"], POSE["rope_m"])
+linear = linearize(crane, POSE["boom_deg"], POSE["rope_m"])
 A, B = np.zeros((5, 5)), np.zeros((5, 2))
 A[:2, :2] = linear.A[:2, :2]
 A[0, 3], A[2, 3] = -1.0, 1.0
@@ -115,7 +124,7 @@ def wanted_path(stick: np.ndarray) -> np.ndarray:
 
 def predictive(ship: np.ndarray, stick: np.ndarray, omega: float) -> tuple[np.ndarray, list[float]]:
     """Signals of the crane under predictive control, and processor times of its steps. [s]"""
-    stepper, axes, g = crane.stepper(**POSE), (Axis(), Axis()), crane.geometry
+    stepper, axes, g = CraneStepper(crane, **POSE), (Axis(), Axis()), crane.geometry
     inverses = crane.inverse("luff"), crane.inverse("slew")
     wanted, command, spent = wanted_path(stick), np.zeros(2), []
     out = [stepper.take(np.zeros((BLOCK, 3)), ship[:BLOCK])]
@@ -196,14 +205,14 @@ def outcome(out: np.ndarray, names: tuple[str, ...], wanted: np.ndarray) -> tupl
 
 def compared(sea: str) -> dict[str, np.ndarray]:
     """(seaways, 2) outcomes of each controller, and what a step of the predictive one takes."""
-    omega = 2.0 * np.pi / crane.follow([7.5], seas=(sea,)).seas[sea].period
+    omega = 2.0 * np.pi / follow(crane, [7.5], seas=(sea,)).seas[sea].period
     made: dict[str, list[tuple[float, float]]] = {name: [] for name in (*LAWS, "predictive")}
     times: list[float] = []
     for seed in range(options.seeds):
         runs = {}
         seaway = Seaway(sea, seed=seed)
         for name, law in LAWS.items():
-            run = crane.simulate(STICK, sea=seaway, control=law, **POSE)
+            run = simulate(crane, STICK, sea=seaway, control=law, **POSE)
             runs[name] = run.out
         wanted = wanted_path(run.stick)
         runs["predictive"], spent = predictive(run.ship, run.stick, omega)

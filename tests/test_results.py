@@ -33,7 +33,15 @@ from swashplate.analysis import (
 )
 from swashplate.campaign import examine, guess_drive
 from swashplate.cli import app
-from swashplate.crane import Crane, Seaway, Stick, TransferFunctions, control
+from swashplate.crane import (
+    Crane,
+    CraneStepper,
+    Seaway,
+    Stick,
+    TransferFunctions,
+    control,
+    simulate,
+)
 from swashplate.full_order import compare
 from swashplate.identification import Fit, Identification, fit, outlook, predict
 from swashplate.results import LONGEST
@@ -110,13 +118,13 @@ def cranes() -> list[object]:
     stick = Stick.trapezoid(slew=0.5, duration=2.0, length=10.0)
     waves = Seaway("ss3", 90.0, seed=1)
     feedback = control.TipShaper("zv") | control.DelayedFeedback(0.2, delay=0.2) | control.Clip()
-    run = crane.simulate(stick, sea=waves, control=feedback)
+    run = simulate(crane, stick, sea=waves, control=feedback)
     values = np.zeros((1, 2, 30, 6), dtype=np.complex128)
     grid = TransferFunctions(
         "box", np.zeros(1), np.array([0.0, np.pi]), np.linspace(0.5, 2.0, 30), values
     )
     parts = (control.JointShaper("zvd"), control.ShipCompensation(), control.PositionLoop(0.7))
-    return [crane, stick, waves, feedback, *parts, run, grid, crane.stepper()]
+    return [crane, stick, waves, feedback, *parts, run, grid, CraneStepper(crane)]
 
 
 @pytest.mark.slow  # all that the package makes is made once

@@ -8,7 +8,7 @@ import pytest
 from typer.testing import CliRunner
 
 from swashplate.cli import app
-from swashplate.crane import Crane, Seaway, Spectrum, Stick, Suspension
+from swashplate.crane import Crane, Seaway, Spectrum, Stick, Suspension, simulate
 from swashplate.errors import FileError, InputError, ParameterError
 
 
@@ -73,7 +73,8 @@ def test_run_takes_sea_ship_and_load_as_they_are_given(tmp_path):
         trim_deg=-1.0,
         reference=(-12.0, 0.0, 9.0),
     )
-    run = Crane.preset("tg3637").simulate(
+    run = simulate(
+        Crane.preset("tg3637"),
         Stick.rest(6.0),
         sea=sea,
         slew_deg=90.0,
@@ -238,7 +239,8 @@ def test_a_cranes_file_takes_the_folder_of_a_fit_beside_it(tmp_path):
     for word in ("fitted", "fitted/drive.toml"):
         path.write_text(text.replace('luff = "luff"', f'luff = "{word}"'), "utf-8")
         made = Crane.from_toml(path)
-        assert not made.fits  # without the numbers of a fit beside it there is nothing to draw from
+        # without the numbers of a fit beside it there is nothing to draw from
+        assert made.sources["luff"].fit is None
         assert made.luff.parameters.numbers == wide.parameters.numbers
         assert made.hoist.name == "hoist"
 

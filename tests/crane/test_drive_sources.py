@@ -8,7 +8,7 @@ from typer.testing import CliRunner
 
 from swashplate import Drive
 from swashplate.cli import app
-from swashplate.crane import Crane, Stick, control, judge
+from swashplate.crane import Crane, Stick, control, judge, simulate, upgraded
 from swashplate.crane.crane import preset_text
 from swashplate.identification import Verdict, load_setup
 from swashplate.identification.assessment import FitFile, StoredVerdict
@@ -168,14 +168,14 @@ def test_in_python_the_verdict_is_data_of_the_crane(fit):
     bad = crane.with_drive(hoist=result)
     assert not bad.sources["hoist"].usable
     # a moved lever makes another drive of the same fit
-    moved = bad.upgraded("hoist", {"orifice": 1.5})
+    moved = upgraded(bad, "hoist", {"orifice": 1.5})
     assert moved.sources["hoist"].judged_usable is False
     assert not bad.with_drive(hoist="hoist").sources
     unjudged = crane.with_drive(hoist=SimpleNamespace(drive=crane.hoist)).sources["hoist"]
     assert unjudged.judged_usable is None
     # a limit that is given a value is no longer open
     fitted = crane.with_drive(hoist=folder)
-    stopped = fitted.upgraded("hoist", {"Z13": 1.1})
+    stopped = upgraded(fitted, "hoist", {"Z13": 1.1})
     assert (fitted.unreached_sentence("hoist"), stopped.unreached_sentence("hoist")) == (
         UNREACHED,
         "",
@@ -208,7 +208,7 @@ def test_judgment_and_page_say_the_verdict(fit, tmp_path, usable, look):
 
 def test_a_scene_says_the_verdict(fit, tmp_path):
     crane = Crane.preset("tg3637").with_drive(hoist=fit(False))
-    write_scene(crane.simulate(Stick.rest(2.0)), tmp_path / "scene.html")
+    write_scene(simulate(crane, Stick.rest(2.0)), tmp_path / "scene.html")
     text = tmp_path.joinpath("scene.html").read_text("utf-8")
     for words in (f"{HEADLINES[False]} {VALIDITY}", UNREACHED):
         assert words.replace("'", "&#39;") in text

@@ -10,7 +10,17 @@ from scipy.stats import binomtest
 from swashplate import Campaign, Drive
 from swashplate.analysis.monte_carlo import Draws, stored_draws
 from swashplate.campaign import rig
-from swashplate.crane import Crane, Stick, control, follow, judge, sweep
+from swashplate.crane import (
+    Crane,
+    Stick,
+    control,
+    drawn_cranes,
+    follow,
+    judge,
+    simulate,
+    sweep,
+    upgraded,
+)
 from swashplate.crane.judgment import mean_of, more_seaways, share_of
 from swashplate.crane.result import PUMPS
 from swashplate.errors import InputError, ParameterError
@@ -169,7 +179,9 @@ def test_axes_follow_what_speed_and_acceleration_allow(crane):
 
 
 def test_boom_along_the_ship_is_calm_where_the_slew_does_the_work(crane):
-    found = crane.sectors(MEANT, points=[0.0, 90.0], seeds=[0], drives=("identified",), **SHORT)
+    found = sweep(
+        crane, "bearing", MEANT, points=[0.0, 90.0], seeds=[0], drives=("identified",), **SHORT
+    )
     mean = found.mean()[..., 0]
     assert found.names == ("no control", "identified")
     assert mean[0, 1] < 0.2 * mean[0, 0]
@@ -205,7 +217,7 @@ SLEWS = {
 
 def test_residual_swing_over_the_stick_is_that_of_the_independent_crane(crane):
     laws = {"plain": None, "ZV": control.JointShaper("zv"), "ZVD": control.JointShaper("zvd")}
-    found = crane.sweep("stick", laws, points=list(SLEWS))
+    found = sweep(crane, "stick", laws, points=list(SLEWS))
     names = [
         *("plain, ideal", "ZV, ideal", "plain, volts", "ZV, volts", "ZVD, volts"),
         *("no control", "ZV, identified", "ZVD, identified"),
@@ -217,7 +229,7 @@ def test_residual_swing_over_the_stick_is_that_of_the_independent_crane(crane):
     # a shaper on the volts is worse than none at full stick, and lands elsewhere
     np.testing.assert_allclose(ends[-1, 2:4], [46.11, 62.02], rtol=0.002)
     with pytest.raises(InputError, match="A sweep over the stick sets sea itself"):
-        crane.sweep("stick", MEANT, sea="ss3")
+        sweep(crane, "stick", MEANT, sea="ss3")
 
 
 # --- drives of fits -------------------------------------------------------------------------------
@@ -251,15 +263,15 @@ def test_own_logs_lead_to_the_verdict_on_the_own_crane(crane, fitted):
     assert crane.with_drive(luff="hoist").luff.name == "hoist"
     with pytest.raises(ParameterError, match="slew: the fit has a drive of the luff"):
         crane.with_drive(slew=result)
-    drawn = own.drawn(luff=stored_draws(place, draws=3, seed=1))
+    drawn = drawn_cranes(own, luff=stored_draws(place, draws=3, seed=1))
     assert len(drawn) == 3
-    assert own.fits == {"luff": place}
     source = own.sources["luff"]
+    assert source.fit == place
     assert (source.judged_usable, source.verdict) == (verdict.usable, verdict.headline)
     assert {each.sources["luff"].verdict for each in drawn} == {verdict.headline}
-    assert crane.with_drive(luff=place / "drive.toml").fits == own.fits
-    assert not own.with_drive(luff=crane.luff).fits
-    assert {each.luff for each in own.drawn()} == set(stored_draws(place).drives)
+    assert crane.with_drive(luff=place / "drive.toml").sources["luff"].fit == place
+    assert not own.with_drive(luff=crane.luff).sources
+    assert {each.luff for each in drawn_cranes(own)} == set(stored_draws(place).drives)
     found = judge(
         own, MEANT, seeds=range(4), drives={"drawn": drawn}, remedies=False, length=30.0, start=10.0
     )
@@ -278,17 +290,17 @@ def scaled(drive, factors):
 
 def test_cranes_are_drawn_axis_by_axis(crane):
     hoist, luff = scaled(crane.hoist, (0.9, 1.0, 1.1)), scaled(crane.luff, (0.8, 1.2))
-    drawn = crane.drawn(hoist=hoist, luff=luff)
+    drawn = drawn_cranes(crane, hoist=hoist, luff=luff)
     assert {each.luff for each in drawn} == set(luff.drives)
     assert {each.hoist for each in drawn} < set(hoist.drives)
     assert all(each.slew == crane.slew for each in drawn)
     with pytest.raises(InputError, match="draws of at least one axis"):
-        crane.drawn()
+        drawn_cranes(crane)
 
 
 def test_draws_of_two_axes_from_one_seed_are_not_correlated(crane):
     factors = np.random.default_rng(0).uniform(0.9, 1.1, 100)
-    drawn = crane.drawn(luff=scaled(crane.luff, factors), slew=scaled(crane.slew, factors))
+    drawn = drawn_cranes(crane, luff=scaled(crane.luff, factors), slew=scaled(crane.slew, factors))
     assert len(drawn) == 100
     pairs = [[each.luff["Z16"].numbers["Z16_plus"], each.slew["Z16"].numbers["Z16_plus"]]
              for each in drawn]  # fmt: skip
@@ -299,21 +311,24 @@ def test_draws_of_two_axes_from_one_seed_are_not_correlated(crane):
 def test_control_does_not_know_the_draw_that_moves_the_crane(crane):
     weaker = crane.slew.scale(Z17=1.05)
     stick = Stick.trapezoid(slew=0.5, until={"slew_deg": 30.0}, length=30.0)
-    (drawn,) = crane.drawn(slew=Draws((weaker,), 0))
-    told, untold = crane.with_drive(slew=weaker), crane.with_drive(slew=weaker, told=False)
-    runs = [each.simulate(stick) for each in (crane, drawn, untold, told)]
+    (drawn,) = drawn_cranes(crane, slew=Draws((weaker,), 0))
+    known, unknown = crane.with_drive(slew=weaker), crane.with_drive(slew=weaker, known=False)
+    runs = [simulate(each, stick) for each in (crane, drawn, unknown, known)]
     volts, ends = [each.voltage[:, 1] for each in runs], [each.slew_deg[-1] for each in runs]
     # the map of the drive before: the same voltages, and another end
     np.testing.assert_array_equal(volts[1], volts[0])
     np.testing.assert_array_equal(volts[2], volts[0])
     assert ends[1] == ends[2]
     assert abs(ends[1] - ends[0]) > 1.0
-    # a drive that control is told of gets other voltages, and ends where it should
+    # a drive that the controller knows gets other voltages, and ends where it should
     assert abs(ends[3] - ends[0]) < 0.1
-    # what is built anew is known: the fitted drive moves with the drawn one
-    upgraded = drawn.upgraded("slew", {"orifice": 2.0})
-    assert upgraded.slew == weaker.scale(Z16=2.0)
-    assert upgraded.known_drive("slew") == crane.slew.scale(Z16=2.0)
+    # the drive that the controller counts on is put back
+    assert unknown.known_to_controller == {"slew": crane.slew}
+    assert not unknown.with_drive(slew=crane.slew, known=False).known_to_controller
+    # what is redesigned is known: the fitted drive moves with the drawn one
+    redesigned = upgraded(drawn, "slew", {"orifice": 2.0})
+    assert redesigned.slew == weaker.scale(Z16=2.0)
+    assert redesigned.controller_drive("slew") == crane.slew.scale(Z16=2.0)
 
 
 def test_what_makes_no_study_is_said(crane):

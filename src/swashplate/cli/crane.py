@@ -72,7 +72,7 @@ class Placed:
     def chosen(self) -> Crane:
         """The crane, with its drives; one whose fit is not usable is refused without --force."""
         drives = dict(pairs_of("--drive", self.drive, "luff=mine.toml"))
-        crane = _crane_of(self.crane).with_drive(told=True, **drives)
+        crane = _crane_of(self.crane).with_drive(known=True, **drives)
         if not FORCED.get():
             _refuse_unusable(crane)
         return crane
@@ -263,16 +263,19 @@ class Studied(Operated):
     def sets(self) -> dict[str, Any]:
         """Sets of drives by name."""
         from swashplate.analysis.whatif import find_lever
+        from swashplate.crane import drawn_cranes, upgraded
 
         names = filter(None, map(str.strip, (self.drives or "ideal,identified").split(",")))
         sets: dict[str, Any] = {name: name for name in names}
         if "drawn" in sets:
-            if not self.chosen.fits:
+            sources = self.chosen.sources
+            drawn = [axis for axis, source in sources.items() if source.fit is not None]
+            if not drawn:
                 raise InputError("--drives drawn needs the folder of a fit: --drive luff=FOLDER.")
-            sets["drawn"] = self.chosen.drawn()
-            kept = [axis for axis in AXES if axis not in self.chosen.fits]
+            sets["drawn"] = drawn_cranes(self.chosen)
+            kept = [axis for axis in AXES if axis not in drawn]
             as_given = f"; as given, since they come from no fit: {', '.join(kept)}" if kept else ""
-            side.print(f"Drawn: {', '.join(self.chosen.fits)}{as_given}")
+            side.print(f"Drawn: {', '.join(drawn)}{as_given}")
         crane, changed = self.chosen, []
         for name, text in pairs_of("--scale", self.scale, "luff.orifice=1.5"):
             (axis, _, lever), words = name.partition("."), f"--scale {name}={text}"
@@ -283,7 +286,7 @@ class Studied(Operated):
                 )
             find_lever(lever)
             factor = _number(words, text)
-            crane = crane.upgraded(axis, {lever: factor})
+            crane = upgraded(crane, axis, {lever: factor})
             changed.append(f"{axis} {lever} ×{factor:g}")
         if changed:
             sets[", ".join(changed)] = crane
@@ -365,8 +368,8 @@ def run(
     if out is not None and len(variant or ()) > 1:
         raise InputError("--out writes one run's signals: take one --variant.")
     with working("Simulating"):
-        from swashplate.crane import Stick, run_tables
-        from swashplate.crane.stepper import RATE
+        from swashplate.crane import Stick, run_tables, simulate
+        from swashplate.crane.axes import RATE
 
         crane, seaway = operated.chosen, operated.seaway(seed=seed, length=length)
         targets = _numbers("--until", until, "slew_deg=45")
@@ -378,7 +381,7 @@ def run(
             drives, _, law = first.partition(":")
             how: dict[str, Any] = {"control": control_of(law)}
             how["actuation"] = "inverse" if drives == "identified" else drives
-            runs[first] = crane.simulate(stick, sea=ship, brake=brake, **how, **operated.setup)
+            runs[first] = simulate(crane, stick, sea=ship, brake=brake, **how, **operated.setup)
         tables = run_tables(runs)
     save(out, "All signals, in SI", runs[first].write)
     draw(plot, "plot_crane", runs)
@@ -428,7 +431,9 @@ def judge(
         from swashplate.executors import Dask
 
         more["executor"] = Dask(dask)
-    found: Judgment = study.through(study.chosen.judge, **more)
+    from swashplate.crane import judge as judge_control
+
+    found: Judgment = study.through(judge_control, study.chosen, **more)
     what, write = "Numbers of every seaway, in SI", found.write
     if out is not None and out.suffix.lower() == ".html":
         from swashplate.report.scene import write_judgment
@@ -455,11 +460,13 @@ def follow(at_sea: AtSea, *, out: TableFile = None, plot: FigureFile = None) -> 
       swashplate crane follow tg3637 --sea 1.5,8 --roll-period 16
     """
     with working("Simulating"):
+        from swashplate.crane import follow as largest_sines
+
         seaway = at_sea.seaway(default="ss3")
         more: dict[str, Any] = {}
         if at_sea.sea and seaway is not None:
             more["seas"] = (seaway.sea,)
-        found = at_sea.chosen.follow(seaway=seaway, **more, **at_sea.pose)
+        found = largest_sines(at_sea.chosen, seaway=seaway, **more, **at_sea.pose)
     save(out, "Amplitudes, in SI", found.tables()[0].write)
     draw(plot, "plot_follow", found)
     about_sea = _sentences(seaway) if at_sea.sea else ()
@@ -495,7 +502,9 @@ def sweep(
     more: dict[str, Any] = {}
     if points is not None:
         more["points"] = [_number(f"--points {points}", each) for each in points.split(",")]
-    found: Sweep = study.through(study.chosen.sweep, over, **more)
+    from swashplate.crane import sweep as swing_over
+
+    found: Sweep = study.through(swing_over, study.chosen, over, **more)
     save(out, "Swing, in SI", found.tables()[0].write)
     draw(plot, "plot_sweep", found)
     _end(study.chosen, found.tables(), *_sentences(study.waters), *study.chosen.provenance())

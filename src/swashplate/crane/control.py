@@ -4,30 +4,21 @@ Each is a value; `|` combines them: ``TipShaper("zv") | DelayedFeedback(0.2) | C
 loop they act in one order, whatever order they are written in: joint shaper, path of the tip, tip
 shaper, offsets of the tip (feedback, ship, own), clip, inverse kinematics, position loop. Every
 stage but a joint shaper works on the path of the tip, and brings the position loop of 0.7 /s with
-it, by which the shafts follow that path; `PositionLoop` sets another gain. The linear crane is for
-controllers that are designed outside the package.
+it, by which the shafts follow that path; `PositionLoop` sets another gain.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from math import cos, radians, sin
 from numbers import Real
-from typing import TYPE_CHECKING, Any, ClassVar, Literal, NamedTuple
+from typing import Any, ClassVar, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from swashplate.crane.kinematics import Boom, boom_rate, reach_rate
-from swashplate.crane.rope import GRAVITY
-from swashplate.crane.stick import AXES
 from swashplate.equations import Model
 from swashplate.errors import InputError
-from swashplate.linear import LinearModel
-
-if TYPE_CHECKING:
-    from swashplate.crane.crane import Crane
 
 Array = NDArray[np.float64]
 Impulses = tuple[float, float, float]
@@ -279,35 +270,3 @@ def feedback_damping(gain: ArrayLike, delay: ArrayLike) -> Array:
     right = np.where((left < 1e-9) & (s.imag > 1e-6) & (np.abs(s) < 2.0), s, -np.inf)
     first = np.take_along_axis(right, np.argmax(right.real, axis=-1)[..., None], axis=-1)[..., 0]
     return np.asarray(-first.real / np.abs(first))
-
-
-# --- the linear crane -----------------------------------------------------------------------------
-
-STATES = ("offset_out", "speed_out", "offset_across", "speed_across", "rope", "slew", "boom")
-OUTPUTS = ("swing_out", "swing_across", "rope", "slew", "boom")
-
-
-def linearize(crane: Crane, boom_deg: float, rope_m: float) -> LinearModel:
-    """Linear crane about a load that hangs at rest; the slew changes nothing in the boom's axes.
-
-    Inputs are the shafts' speeds, hoist, slew, luff. [rad/s] States are load less tip, outwards
-    along the boom and across it to starboard [m], and the load's speed that way [m/s]; rope [m],
-    slew and boom [rad] from where they are. Outputs are angles of the rope outwards and to
-    starboard [rad], rope, slew, boom.
-    An `InputError` for a boom or rope beyond the crane's limits.
-
-    Notes
-    -----
-    Both axes of the swing are pendulums, apart from each other: d' = v - p', v' = -g/L d with p'
-    the speed of the tip, -∂ρ/∂θ of the luff and ρ of the slew.
-    """
-    crane.home(0.0, boom_deg, rope_m)
-    g, boom = crane.geometry, Boom(cos(radians(boom_deg)), sin(radians(boom_deg)))
-    A, B, C = np.zeros((7, 7)), np.zeros((7, 3)), np.zeros((5, 7))
-    for i in (0, 2):
-        A[i, i + 1], A[i + 1, i], C[i // 2, i] = 1.0, -GRAVITY / rope_m, 1.0 / rope_m
-    B[0, 2], B[2, 1] = reach_rate(boom, g), -(g.foot + g.boom * boom.cos)
-    B[4], B[5, 1], B[6, 2] = (-g.hoist, 0.0, g.coupling * g.luff), 1.0, boom_rate(boom, g)
-    C[2:, 4:] = np.eye(3)
-    name = f"{crane.name}_{boom_deg:g}_{rope_m:g}"
-    return LinearModel(A, B, C, np.zeros((5, 3)), STATES, AXES, OUTPUTS, 0.0, None, name, ())

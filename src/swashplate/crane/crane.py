@@ -1,4 +1,4 @@
-"""Cranes: geometry with source and status, three drives, and the way to a run."""
+"""Cranes: geometry with source and status, three drives, and what the controller knows of them."""
 
 from __future__ import annotations
 
@@ -8,33 +8,19 @@ from functools import cached_property, lru_cache
 from importlib.resources import files
 from math import cos, degrees, radians, sin
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal, Unpack
+from typing import Annotated, Literal
 
-import numpy as np
-from numpy.typing import ArrayLike
 from pydantic import BaseModel, ConfigDict, Field
 
 from swashplate.analysis.compensation import InverseMap, inverse_map
-from swashplate.analysis.whatif import pulled
-from swashplate.crane.control import linearize
+from swashplate.crane.axes import AXES, check_names
 from swashplate.crane.drives import DriveLike, DriveSource, drives_of
 from swashplate.crane.kinematics import Boom, Geometry, Home, Vector, luff_rope
-from swashplate.crane.loop import DIRECT, IDEAL
 from swashplate.crane.quantities import GEOMETRY, Quantity, check_sources, in_si, quantity_of
-from swashplate.crane.result import CraneRun
-from swashplate.crane.sea import Seaway, motion_of
-from swashplate.crane.stepper import RATE, CraneStepper, Setup
-from swashplate.crane.stick import AXES, Array, Stick, check_names
 from swashplate.documents import parse_toml, read_text, validated
 from swashplate.drive import Drive
 from swashplate.errors import InputError, ParameterError
 from swashplate.tables import Column, Table
-
-if TYPE_CHECKING:
-    from swashplate.analysis.monte_carlo import Draws
-    from swashplate.crane.judgment import Followable, Judgment
-    from swashplate.crane.study import Laws, Sweep
-    from swashplate.linear import LinearModel
 
 
 class CraneFile(BaseModel):
@@ -56,7 +42,7 @@ class Crane:
     Examples
     --------
     >>> crane = Crane.preset("tg3637")
-    >>> run = crane.simulate(Stick.trapezoid(slew=1.0, until={"slew_deg": 45}))
+    >>> run = simulate(crane, Stick.trapezoid(slew=1.0, until={"slew_deg": 45}))
     >>> run.residual_deg
     """
 
@@ -67,8 +53,8 @@ class Crane:
     hoist: Drive
     slew: Drive
     luff: Drive
-    known: Mapping[str, Drive] = field(default_factory=dict)
-    """Drives that control knows, by axis, where they are not those that move the crane."""
+    known_to_controller: Mapping[str, Drive] = field(default_factory=dict)
+    """Drives that the controller counts on, by axis, if they are not those that move the crane."""
     sources: Mapping[str, DriveSource] = field(default_factory=dict)
     """Where drives come from that are neither packaged nor made in Python, by axis."""
 
@@ -98,11 +84,6 @@ class Crane:
         count = sum(each.status == "assumed" for each in self.quantities.values())
         return f"{count} of {len(self.quantities)} quantities" if count else ""
 
-    @property
-    def fits(self) -> dict[str, Path]:
-        """Folders of the fits that its drives come from, by axis."""
-        return {axis: source.fit for axis, source in self.sources.items() if source.fit is not None}
-
     def provenance(self) -> tuple[str, ...]:
         """Where drives come from, and what their tests left open, in sentences.
 
@@ -124,14 +105,14 @@ class Crane:
         drive: Drive = getattr(self, axis)
         return drive.parameters.unreached_sentence(f"the {axis}'s drive")
 
-    def with_drive(self, *, told: bool = True, **drives: DriveLike) -> Crane:
+    def with_drive(self, *, known: bool = True, **drives: DriveLike) -> Crane:
         """The crane with other drives by axis.
 
         Parameters
         ----------
-        told : bool
-            Whether control knows the new drives, as after a redesign. If not, it counts on those
-            before, as where a drive has worn: inverse maps, the stick's full speed and the clip
+        known : bool
+            Whether the controller knows the new drives, as after a redesign. If not, it counts on
+            those before, as if a drive has worn: inverse maps, the stick's full speed and the clip
             are theirs.
         **drives
             Each is a drive, ``luff=crane.luff.scale(Z16=1.5)``; the result of a fit; or a place: a
@@ -139,68 +120,31 @@ class Crane:
             stands in `sources`; a drive that is not usable is taken, and judgments say so.
         """
         check_names("A crane has no drive", drives, AXES, "it has")
-        made, sources = drives_of(drives, Path())
-        known = {axis: drive for axis, drive in self.known.items() if axis not in made}
-        if not told:
-            known |= {axis: self.known_drive(axis) for axis in made}
-        kept = {axis: source for axis, source in self.sources.items() if axis not in made}
-        return replace(self, known=known, sources=kept | sources, **made)
-
-    def known_drive(self, axis: str) -> Drive:
-        """The drive of an axis as control knows it: its own, unless `known` has another."""
-        drive: Drive = self.known.get(axis, getattr(self, axis))
-        return drive
-
-    def upgraded(self, axis: str, levers: Mapping[str, float]) -> Crane:
-        """The crane with levers moved on the drive of an axis, which control knows, as redesigned.
-
-        Where control knows another drive of that axis, they are moved on that, too.
-        """
-        known = dict(self.known)
-        if axis in known:
-            known[axis] = pulled(known[axis], levers)
-        sources = dict(self.sources)
-        if axis in sources:  # the verdict stays that of what was changed, draws do not
-            sources[axis] = sources[axis]._replace(fit=None)
-        made: dict[str, Any] = {axis: pulled(getattr(self, axis), levers), "known": known}
-        return replace(self, sources=sources, **made)
-
-    def drawn(self, **draws: Draws) -> tuple[Crane, ...]:
-        """Cranes whose drives are drawn from the errors of fits, by axis; others keep their drive.
-
-        Control knows none of the draws: it counts on this crane's drives, which should be the
-        fitted ones. Draws are those of `analysis.monte_carlo.drives`, by default of the fits that
-        the drives come from: as many cranes as the shortest has. Those of each axis are shuffled by
-        themselves, so that draws of two axes from the same seed are not paired.
-        """
-        from swashplate.analysis.monte_carlo import stored_draws
-
-        check_names("A crane has no drive", draws, AXES, "it has")
-        draws = draws or {
-            axis: stored_draws(place, drive=getattr(self, axis))
-            for axis, place in self.fits.items()
+        replacements, new_sources = drives_of(drives, Path())
+        known_to_controller = {
+            axis: drive
+            for axis, drive in self.known_to_controller.items()
+            if axis not in replacements
         }
-        if not draws:
-            raise InputError(
-                "Cranes are drawn from the draws of at least one axis, but no drive of "
-                f"{self.name} comes from the folder of a fit, as luff=FOLDER."
-            )
-        shuffled: dict[str, Any] = {}
-        for axis, each in draws.items():
-            order = np.random.default_rng(AXES.index(axis)).permutation(len(each.drives))
-            shuffled[axis] = [each.drives[k] for k in order]
+        if not known:
+            for axis, drive in replacements.items():
+                before = self.controller_drive(axis)
+                if before != drive:
+                    known_to_controller[axis] = before
         sources = {
-            axis: source._replace(fit=None) if axis in shuffled else source
-            for axis, source in self.sources.items()
+            axis: source for axis, source in self.sources.items() if axis not in replacements
         }
-        sets = zip(*shuffled.values(), strict=False)
-        return tuple(
-            replace(
-                self.with_drive(told=False, **dict(zip(shuffled, each, strict=True))),
-                sources=sources,
-            )
-            for each in sets
+        return replace(
+            self,
+            known_to_controller=known_to_controller,
+            sources=sources | new_sources,
+            **replacements,
         )
+
+    def controller_drive(self, axis: str) -> Drive:
+        """The drive of an axis that the controller counts on."""
+        drive: Drive = self.known_to_controller.get(axis, getattr(self, axis))
+        return drive
 
     def with_geometry(self, **changes: float | tuple[float, ...]) -> Crane:
         """The crane with other quantities, in SI and by name: ``boom_length=38.0``.
@@ -254,8 +198,8 @@ class Crane:
         return low, high
 
     def inverse(self, axis: str) -> InverseMap:
-        """Inverse map of the drive that control knows of ``"hoist"``, ``"slew"`` or ``"luff"``."""
-        return _inverse(self.known_drive(axis))
+        """Inverse map of the controller's drive of ``"hoist"``, ``"slew"`` or ``"luff"``."""
+        return _inverse(self.controller_drive(axis))
 
     def home(self, slew_deg: float = 0.0, boom_deg: float = 45.0, rope_m: float = 20.0) -> Home:
         """Where a run starts; an `InputError` if boom or rope are beyond the crane's limits."""
@@ -277,64 +221,6 @@ class Crane:
         boom = Boom(cos(radians(boom_deg)), sin(radians(boom_deg)))
         return Home(radians(slew_deg), float(luff_rope(boom, self.geometry)), rope_m)
 
-    def simulate(
-        self, stick: Stick, *, sea: Seaway | ArrayLike | None = None, **setup: Unpack[Setup]
-    ) -> CraneRun:
-        """Simulate the whole crane.
-
-        Parameters
-        ----------
-        stick : Stick
-            What the operator asks for; its length is that of the run.
-        sea : Seaway or (n, 6) array_like, optional
-            A seaway, or the ship's motion at 512 Hz: surge, sway, heave [m], roll, pitch, yaw
-            [rad], as `ship_motion` reads it from a log; by default the ship is at rest.
-        **setup
-            Where it begins, what controls it, what hangs on it: see `Setup`.
-
-        Raises
-        ------
-        InputError
-            For a start beyond the crane's limits, a stick longer than the ship's motion, one that
-            does not return, or that begins at full speed on ideal drives, direct actuation, and a
-            tip too fast for the rope.
-        DomainError
-            If boom or rope meet a limit, or a drive leaves its domain.
-        """
-        stepper, commands, end = begun(self, stick, setup)
-        ship = motion_of(sea, len(commands), RATE)
-        return CraneRun(self, commands, ship, stepper.run(commands, ship), stepper.fixed, end)
-
-    def stepper(self, **setup: Unpack[Setup]) -> CraneStepper:
-        """The crane one sample at a time, set up as `simulate`, for loops that the user writes."""
-        return CraneStepper(self, **setup)
-
-    def linearize(self, boom_deg: float = 45.0, rope_m: float = 20.0) -> LinearModel:
-        """The linear crane about a load at rest, see `swashplate.crane.control.linearize`."""
-        return linearize(self, boom_deg, rope_m)
-
-    def judge(self, control: Laws, **how: Any) -> Judgment:
-        """Judgment of control over many seaways; see `swashplate.crane.judge`."""
-        from swashplate.crane.judgment import judge
-
-        return judge(self, control, **how)
-
-    def sweep(self, over: str, control: Laws, **how: Any) -> Sweep:
-        """Swing over a quantity; see `swashplate.crane.sweep`."""
-        from swashplate.crane.study import sweep
-
-        return sweep(self, over, control, **how)
-
-    def sectors(self, control: Laws, **how: Any) -> Sweep:
-        """Swing over the bearing of the boom: `sweep` over ``"bearing"``."""
-        return self.sweep("bearing", control, **how)
-
-    def follow(self, periods: ArrayLike = tuple(range(4, 17)), **how: Any) -> Followable:
-        """Largest sines of the tip that each axis can follow; see `swashplate.crane.follow`."""
-        from swashplate.crane.judgment import follow
-
-        return follow(self, periods, **how)
-
     def table(self) -> Table:
         """Geometry with status and source; what is assumed is marked."""
         heads = ("quantity", "value", "unit", "status")
@@ -349,25 +235,6 @@ class Crane:
 @lru_cache(maxsize=512)
 def _inverse(drive: Drive) -> InverseMap:
     return inverse_map(drive)
-
-
-def begun(crane: Crane, stick: Stick, setup: Setup) -> tuple[CraneStepper, Array, float]:
-    """A run at its start: stepper, commands, and when the last one ends; as `simulate` refuses."""
-    stepper = CraneStepper(crane, **setup)
-    if stepper.fixed.actuation == DIRECT:
-        raise InputError(
-            "With direct actuation commands are voltages, but a stick gives parts of the full "
-            "speed: take Crane.stepper, or actuation='volts'."
-        )
-    if not isinstance(stick, Stick):
-        raise InputError(f"The stick is {stick!r}, but must be a Stick, as Stick.rest(60).")
-    commands, end = stick.sample(crane, stepper.fixed.home, RATE)
-    if stepper.fixed.actuation == IDEAL and commands[0].any():
-        raise InputError(
-            "Ideal drives follow at once, and the crane starts at rest: a recorded stick must "
-            "begin at zero, so put a row of zeros before it."
-        )
-    return stepper, commands, end
 
 
 SETS = files("swashplate.crane") / "sets"

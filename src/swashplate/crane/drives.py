@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, NamedTuple, Protocol
 
-from swashplate.crane.stick import AXES
+from swashplate.crane.axes import AXES
 from swashplate.documents import parse_toml, read_text
 from swashplate.drive import Drive
 from swashplate.errors import ParameterError, SwashplateError

@@ -11,10 +11,11 @@ from typing import TYPE_CHECKING, cast
 import numpy as np
 from numpy.typing import NDArray
 
+from swashplate.crane.axes import AXES, RATE, check_names
+from swashplate.crane.crane import Crane
 from swashplate.crane.loop import ROWS, Fixed
 from swashplate.crane.rope import GRAVITY, swing_of
-from swashplate.crane.stepper import ACTUATIONS, RATE
-from swashplate.crane.stick import AXES, check_names
+from swashplate.crane.stepper import ACTUATIONS
 from swashplate.crane.transfer_functions import MOTIONS
 from swashplate.errors import InputError
 from swashplate.results import Tabular, figures
@@ -24,8 +25,6 @@ from swashplate.tables import Column, Table
 if TYPE_CHECKING:
     import polars
     from matplotlib.figure import Figure
-
-    from swashplate.crane.crane import Crane
 
 Array = NDArray[np.float64]
 

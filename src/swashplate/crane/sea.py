@@ -13,8 +13,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from swashplate.crane.axes import check_names
 from swashplate.crane.rope import GRAVITY
-from swashplate.crane.stick import check_names
 from swashplate.crane.transfer_functions import CRANE_SHIP, MOTIONS, Hull, TransferFunctions
 from swashplate.equations import kernel
 from swashplate.errors import InputError
@@ -394,7 +394,7 @@ def ship_motion(
     rate: float = 512.0,
     options: TextOptions | None = None,
 ) -> Array:
-    """Motion of a ship from a log, (n, 6), as `Crane.simulate` takes it for a sea.
+    """Motion of a ship from a log, (n, 6), as `simulate` takes it for a sea.
 
     Cubic splines through the samples, from the first time stamp on; z up, y to port. [m], [rad]
 

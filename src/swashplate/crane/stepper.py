@@ -5,18 +5,19 @@ from __future__ import annotations
 from functools import lru_cache
 from math import degrees, inf, isfinite, pi, sin, sqrt
 from numbers import Real
-from typing import TYPE_CHECKING, Any, Literal, TypedDict, Unpack, get_args
+from typing import Any, Literal, TypedDict, Unpack, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from swashplate.analysis.compensation import InverseMap
 from swashplate.crane import loop
+from swashplate.crane.axes import AXES, RATE, check_names
 from swashplate.crane.control import GIVES, SEEN, Control, settings_of
+from swashplate.crane.crane import Crane
 from swashplate.crane.kinematics import Shafts, Vector, boom_at, rope_length, shaft_torques, tip_of
 from swashplate.crane.loop import ROWS, Fixed, Inverse, Plant, State
 from swashplate.crane.rope import AIR, GRAVITY, Hung, Suspension, swing_of, too_fast
-from swashplate.crane.stick import AXES, check_names
 from swashplate.drive import Drive
 from swashplate.equations import CompiledStep, Machine, compiled_step
 from swashplate.equations.marching.run import marched
@@ -25,15 +26,10 @@ from swashplate.errors import DomainError, InputError
 from swashplate.parameters.rules import FULL_VOLTAGE
 from swashplate.simulation.instance import instance_of
 
-if TYPE_CHECKING:
-    from swashplate.crane.crane import Crane
-
 Array = NDArray[np.float64]
 Actuation = Literal["ideal", "volts", "inverse", "direct"]
 ACTUATIONS: tuple[str, ...] = get_args(Actuation)
 """In the order of `loop.IDEAL` and the others."""
-RATE = 512.0
-"""Samples a second of the loop: the packaged drives' own. [Hz]"""
 OUTPUTS = ("shaft_speed", "limits")
 """What the loop takes of each drive."""
 RIGID = Suspension()
@@ -46,7 +42,7 @@ would swing against each other from sample to sample."""
 
 
 class Setup(TypedDict, total=False):
-    """How a run is set up: keywords of `Crane.simulate` and `Crane.stepper`, each as it likes.
+    """How a run is set up: keywords of `simulate` and `CraneStepper`, each optional.
 
     Parameters
     ----------
@@ -94,9 +90,14 @@ class Setup(TypedDict, total=False):
 
 
 class CraneStepper:
-    """A crane that takes commands and gives signals, the same numbers as `Crane.simulate`.
+    """A crane that takes commands and gives signals, the same numbers as `simulate`.
 
-    Made by `Crane.stepper`.
+    Parameters
+    ----------
+    crane : Crane
+        The crane with its drives.
+    **setup
+        Where it begins, what controls it, what hangs on it: see `Setup`.
     """
 
     def __init__(self, crane: Crane, **setup: Unpack[Setup]) -> None:
@@ -153,7 +154,7 @@ class CraneStepper:
         -------
         dict
             Signals by name as of `CraneRun.rows`, and the angle ``swing``, SI; errors are those of
-            `Crane.simulate`.
+            `simulate`.
         """
         most = FULL_VOLTAGE if self.fixed.actuation == loop.DIRECT else 1.0
         commands = np.array([command], dtype=np.float64)

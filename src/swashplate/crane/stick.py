@@ -2,37 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from math import cos, radians, sin
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from swashplate.crane.axes import AXES, check_names
+from swashplate.crane.crane import Crane
 from swashplate.crane.kinematics import Boom, Home, luff_rope
 from swashplate.errors import InputError
 from swashplate.results import Result
 
-if TYPE_CHECKING:
-    from swashplate.crane.crane import Crane
-
 Array = NDArray[np.float64]
 
-AXES = ("hoist", "slew", "luff")
 LONGEST = 86_400.0
 """A day, longer than any run. [s]"""
 TARGETS = {"hoist": "rope_m", "slew": "slew_deg", "luff": "boom_deg"}
 """Where an axis is led to: rope below the tip, slew, elevation of the boom."""
-
-
-def check_names(
-    said: str, given: Iterable[str], known: Iterable[str], has: str = "there are"
-) -> None:
-    """Refuse names that are not known, in a sentence that begins as said."""
-    strange = [each for each in given if each not in known]
-    if strange:
-        raise InputError(f"{said} '{strange[0]}'; {has} {', '.join(known)}.")
 
 
 @dataclass(frozen=True, eq=False)

@@ -13,13 +13,16 @@ from typing import TYPE_CHECKING, Any, NamedTuple, Unpack, cast
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from swashplate.crane.axes import AXES, RATE, check_names
+from swashplate.crane.changed_drives import upgraded
 from swashplate.crane.control import Control
-from swashplate.crane.crane import Crane, begun
+from swashplate.crane.crane import Crane
 from swashplate.crane.result import PUMPS, CraneRun
 from swashplate.crane.rope import swing_of
 from swashplate.crane.sea import HIGHEST, Seaway, Spectrum
-from swashplate.crane.stepper import RATE, Actuation, Setup
-from swashplate.crane.stick import AXES, Stick, check_names
+from swashplate.crane.simulating import begun, simulate
+from swashplate.crane.stepper import Actuation, Setup
+from swashplate.crane.stick import Stick
 from swashplate.errors import DomainError, InputError
 from swashplate.executors import Executor, Threads
 from swashplate.progress import counted
@@ -75,7 +78,8 @@ class Case(NamedTuple):
         sea = motion
         if motion is not None and self.height != 1.0:
             sea = lean + self.height * (motion - lean)
-        return self.cranes[number % len(self.cranes)].simulate(self.stick, sea=sea, **self.setup)
+        crane = self.cranes[number % len(self.cranes)]
+        return simulate(crane, self.stick, sea=sea, **self.setup)
 
     def moved(self, **setup: Unpack[Setup]) -> Case:
         """The case set up in another way."""
@@ -126,7 +130,7 @@ class Study(Result):
         drives : sequence of str, or mapping of str to str, Crane or sequence of Crane
             ``"ideal"``, which follow at once within their limits of speed; ``"identified"``, the
             crane's own; ``"volts"``, these without their inverse maps; by name also other cranes,
-            or several of which each seaway takes the next, see `Crane.drawn`.
+            or several of which each seaway takes the next, see `drawn_cranes`.
         stick : Stick, optional
             What the operator does; by default nothing, the crane keeps its load in place.
         length : float
@@ -381,4 +385,4 @@ def with_orifice(cranes: tuple[Crane, ...], factor: float) -> tuple[Crane, ...]:
     """Cranes with another in-line orifice of their luff drives; the same ones for a factor of 1."""
     if factor == 1.0:
         return cranes
-    return tuple(each.upgraded("luff", {"orifice": factor}) for each in cranes)
+    return tuple(upgraded(crane, "luff", {"orifice": factor}) for crane in cranes)

@@ -11,10 +11,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from markupsafe import Markup
 
-from swashplate.crane import Crane, CraneRun, Judgment
+from swashplate.crane import Crane, CraneRun, Judgment, follow
+from swashplate.crane.axes import AXES, RATE
 from swashplate.crane.drives import UNUSABLE
-from swashplate.crane.stepper import RATE
-from swashplate.crane.stick import AXES
 from swashplate.crane.study import NONE
 from swashplate.errors import DomainError, InputError
 from swashplate.report.fit_report.html_page import (
@@ -149,7 +148,7 @@ def write_judgment(judgment: Judgment, path: str | Path) -> None:
     if limits.rows:
         periods = np.linspace(4.0, 14.0, 21)
         seas = [study.sea.sea] if study.sea and isinstance(study.sea.sea, str) else []
-        followable = plot_follow(crane.follow(periods, seas=seas, seaway=study.sea, **pose))
+        followable = plot_follow(follow(crane, periods, seas=seas, seaway=study.sea, **pose))
         limiting = [text(LIMITS_IN_WORDS), _drawn(followable, FOLLOWED), *titled(limits)]
     try:
         runs = {name: judgment.run(name, judgment.typical) for name in (NONE, judged)}

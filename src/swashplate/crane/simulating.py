@@ -1,0 +1,71 @@
+"""A whole run of a crane under the operator's stick."""
+
+from __future__ import annotations
+
+from typing import Unpack
+
+from numpy.typing import ArrayLike
+
+from swashplate.crane.axes import RATE
+from swashplate.crane.crane import Crane
+from swashplate.crane.loop import DIRECT, IDEAL
+from swashplate.crane.result import CraneRun
+from swashplate.crane.sea import Seaway, motion_of
+from swashplate.crane.stepper import CraneStepper, Setup
+from swashplate.crane.stick import Array, Stick
+from swashplate.errors import InputError
+
+
+def simulate(
+    crane: Crane,
+    stick: Stick,
+    *,
+    sea: Seaway | ArrayLike | None = None,
+    **setup: Unpack[Setup],
+) -> CraneRun:
+    """Simulate a whole crane.
+
+    Parameters
+    ----------
+    crane : Crane
+        The crane with its drives.
+    stick : Stick
+        What the operator asks for; its length is that of the run.
+    sea : Seaway or (n, 6) array_like, optional
+        A seaway, or the ship's motion at 512 Hz: surge, sway, heave [m], roll, pitch, yaw [rad], as
+        `ship_motion` reads it from a log; by default the ship is at rest.
+    **setup
+        Where it begins, what controls it, what hangs on it: see `Setup`.
+
+    Raises
+    ------
+    InputError
+        For a start beyond the crane's limits, a stick longer than the ship's motion, one that does
+        not return, or that begins at full speed on ideal drives, direct actuation, and a tip too
+        fast for the rope.
+    DomainError
+        If boom or rope meet a limit, or a drive leaves its domain.
+    """
+    stepper, commands, end = begun(crane, stick, setup)
+    ship = motion_of(sea, len(commands), RATE)
+    signals = stepper.run(commands, ship)
+    return CraneRun(crane, commands, ship, signals, stepper.fixed, end)
+
+
+def begun(crane: Crane, stick: Stick, setup: Setup) -> tuple[CraneStepper, Array, float]:
+    """A run at its start: stepper, commands, and when the last one ends; as `simulate` refuses."""
+    stepper = CraneStepper(crane, **setup)
+    if stepper.fixed.actuation == DIRECT:
+        raise InputError(
+            "With direct actuation commands are voltages, but a stick gives parts of the full "
+            "speed: take a CraneStepper, or actuation='volts'."
+        )
+    if not isinstance(stick, Stick):
+        raise InputError(f"The stick is {stick!r}, but must be a Stick, as Stick.rest(60).")
+    commands, end = stick.sample(crane, stepper.fixed.home, RATE)
+    if stepper.fixed.actuation == IDEAL and commands[0].any():
+        raise InputError(
+            "Ideal drives follow at once, and the crane starts at rest: a recorded stick must "
+            "begin at zero, so put a row of zeros before it."
+        )
+    return stepper, commands, end
