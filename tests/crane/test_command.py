@@ -8,7 +8,7 @@ import pytest
 from typer.testing import CliRunner
 
 from swashplate.cli import app
-from swashplate.crane import Crane, Seaway, Spectrum, Stick, Suspension
+from swashplate.crane import Crane, Seaway, Spectrum, Stick, Suspension, simulate
 from swashplate.errors import FileError, InputError, ParameterError
 
 
@@ -74,7 +74,8 @@ def test_run_takes_sea_ship_and_load_as_they_are_given(tmp_path):
         trim_deg=-1.0,
         reference=(-12.0, 0.0, 9.0),
     )
-    run = Crane.preset("tg3637").simulate(
+    run = simulate(
+        Crane.preset("tg3637"),
         Stick.rest(6.0),
         sea=sea,
         slew_deg=90.0,
