@@ -75,8 +75,8 @@ def test_a_list_is_a_mean_lead(crane):
 
 
 def test_leads_of_a_run_have_the_signs_of_the_frequency_domain(crane):
-    run = simulate(crane, Stick.rest(2.0), sea=np.tile([0, 0, 0, radians(2), radians(1), 0], (1025, 1)),
-                   slew_deg=90.0, rope_m=27.0)  # fmt: skip
+    lean = np.tile([0.0, 0.0, 0.0, radians(2.0), radians(1.0), 0.0], (1025, 1))
+    run = simulate(crane, Stick.rest(2.0), sea=lean, slew_deg=90.0, rope_m=27.0)
     assert run.off_lead_deg[-1] == pytest.approx(2.0, abs=0.05)
     assert run.side_lead_deg[-1] == pytest.approx(-1.0, abs=0.05)
 
@@ -96,9 +96,11 @@ def test_delayed_feedback_damps_as_its_root_says(crane):
     """White forcing of a resonance: variance is as 1/ζ, so 0.5 % to 0.5 + 11.6 % is a ratio."""
     swell = Seaway(Spectrum(0.5, 30.0 / 3.0, 1.0))
     none = linear_response(crane, swell, swing_damping=0.005).values["swing"].rms
-    fed = linear_response(
-        crane, swell, control.DelayedFeedback(0.2, 0.25), swing_damping=0.005
-    ).values["swing"].rms
+    fed = (
+        linear_response(crane, swell, control.DelayedFeedback(0.2, 0.25), swing_damping=0.005)
+        .values["swing"]
+        .rms
+    )
     # resonance alone, without what the waves' own band adds: within a fifth
     assert fed / none == pytest.approx(sqrt(0.005 / 0.121), rel=0.35)
 

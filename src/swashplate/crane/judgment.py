@@ -223,10 +223,9 @@ class Judgment(Tabular):
 
         No, if the judged variant leaves the model once in three hours or more often.
         """
-        limited = self.limited(self.judged)
-        if not limited:
+        if not self.study.crane.limits:
             return None
-        decisions = [judged.within for judged in limited]
+        decisions = [judged.within for judged in self.limited(self.judged)]
         return "no" if self._leaves_often else _all(decisions)
 
     @property
@@ -282,8 +281,10 @@ class Judgment(Tabular):
         if self.sufficient is not None:
             sentences.append(self._sufficiency_sentence())
         sentences += [self._remedy_sentence(remedy) for remedy in self.remedies]
-        if self.tried and not any(remedy.passes for remedy in self.remedies):
-            sentences.append(f"None of these would do all that is asked: {listed(self.tried)}.")
+        if self.tried and not self.remedies:
+            sentences.append(f"None of these would do: {listed(self.tried)}.")
+        elif self.tried and not any(remedy.passes for remedy in self.remedies):
+            sentences.append("Nothing that was tried surely does all that is asked.")
         return " ".join(sentences)
 
     def _harm_sentence(self) -> str:
