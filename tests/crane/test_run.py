@@ -8,9 +8,10 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.signal import StateSpace, lsim
 
-from swashplate.crane import Crane, Seaway, Stick, Suspension, control
+from swashplate.crane import Crane, Seaway, Stick, Suspension, control, judge
 from swashplate.equations import Model, equation
 from swashplate.errors import DomainError, InputError
+from swashplate.executors import Threads
 
 G = 9.80665
 TIP = control.TipShaper("zv")
@@ -467,6 +468,13 @@ def test_noise_of_the_ropes_direction_is_white_and_held_between_measurements(cra
     assert np.abs(still).max() < 1e-3 * wanted
     np.testing.assert_array_equal(run(3, 5.0).out, found.out[: 5 * 512 + 1])
     assert not np.array_equal(run(4, 5.0).out, found.out[: 5 * 512 + 1])
+
+
+def test_noise_is_the_same_on_any_number_of_cores(crane):
+    law = control.DelayedFeedback() | control.Clip() | control.Sensors(seed=2)
+    how = {"seeds": range(3), "length": 50.0, "start": 40.0, "remedies": False}
+    one, two = (judge(crane, law, executor=Threads(count), **how) for count in (1, 2))
+    np.testing.assert_array_equal(one.counted("identified"), two.counted("identified"))
 
 
 def test_noise_of_roll_and_pitch_moves_the_compensated_tip(crane):
