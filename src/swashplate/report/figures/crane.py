@@ -241,8 +241,7 @@ def plot_sweep(result: Sweep, *, title: str = "") -> Figure:
 
 
 def _half(bearings: Array) -> tuple[str, float]:
-    """Side of the ship that bearings [rad] lie on, and its first bearing; empty if they are all
-    around."""
+    """Side of the ship that bearings [rad] lie on, empty if they are on both; its first bearing."""
     if bearings.size and (bearings >= 0.0).all() and (bearings <= np.pi).all():
         return "starboard", 0.0
     if bearings.size and (bearings >= np.pi).all() and (bearings <= 2.0 * np.pi).all():
@@ -366,8 +365,8 @@ def plot_follow(
             place = sea.period + (axis - 1) * APART * (last - first), max(demand, low)
             marker = "D" if demand > low else "v"
             face = color if beyond else "white"
-            how = {"color": color, "mfc": face, "ms": 5.0, "zorder": 3.0, "clip_on": False}
-            panel.plot(*place, marker, **how)
+            how: dict[str, Any] = {"color": color, "mfc": face, "ms": 5.0}
+            panel.plot(*place, marker, zorder=3.0, clip_on=False, **how)
     _name_seas(panel, {name: (sea.period, max(sea.amplitude)) for name, sea in seas.items()})
     return figure if ax is None else ax
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from itertools import pairwise
 from math import isfinite
 from typing import Any, overload
 
@@ -149,7 +150,7 @@ def _swings(ax: Axes, result: Judgment) -> None:
         row = names.index(NONE)
         edge = max(edge, by_spectrum)
         ax.vlines(by_spectrum, row - 0.4, row + 0.4, color=style.INK, linewidth=1.0, zorder=4.0)
-    ticks = [tick for tick in MaxNLocator(8, steps=[1, 2, 5, 10]).tick_values(0.0, edge)]
+    ticks = list(MaxNLocator(8, steps=[1, 2, 5, 10]).tick_values(0.0, edge))
     ticks = [tick for tick in ticks if 0.0 <= tick <= edge]
     words = [f"{tick:g}" for tick in ticks]
     end = 1.03 * edge
@@ -274,7 +275,7 @@ def plot_operability(result: Operability, *, title: str = "") -> Figure:
     """
     weights = _weights(result)
     used = [limit for limit in weights if limit != WORKABLE]
-    colors = {limit: color for limit, color in zip(used, LIMIT_COLORS, strict=False)}
+    colors = dict(zip(used, LIMIT_COLORS, strict=False))
     legend: list[Any] = [
         Patch(facecolor=color, label=label_of(limit)) for limit, color in colors.items()
     ]
@@ -368,4 +369,4 @@ def _edges(values: Array) -> dict[float, tuple[float, float]]:
     between = 0.5 * (middles[1:] + middles[:-1])
     first, last = 2.0 * middles[0] - between[0], 2.0 * middles[-1] - between[-1]
     ends = np.concatenate([[max(first, 0.0)], between, [last]]).tolist()
-    return dict(zip(middles.tolist(), zip(ends[:-1], ends[1:], strict=True), strict=True))
+    return dict(zip(middles.tolist(), pairwise(ends), strict=True))
