@@ -30,8 +30,8 @@ Array = NDArray[np.float64]
 # --- judgment -------------------------------------------------------------------------------------
 
 SWING = "swing, RMS of a seaway (deg)"
-NAME = 30
-"""Letters of a line of a variant's name."""
+NAME, ROOM = 30, style.WIDTH - 2.4
+"""Letters of a line of a variant's name; room for a legend beside such names. [inch]"""
 BREAK, LEFT, END = 1.06, 1.11, 1.16
 """Where the axis breaks, runs that left the model stand, and the panel ends: in parts of the
 largest swing."""
@@ -72,7 +72,7 @@ def plot_judgment(
     if limited:
         legends.append(_limit_legend(result, limited))
         heights.append(0.36 * len(limited) + 0.2)
-    lines = sum(style.legend_rows(legend) + 1 for legend in legends)
+    lines = sum(style.legend_rows(legend, ROOM) + 1 for legend in legends)
     height = style.HEAD + sum(heights) + style.ROW * lines + len(legends) * (style.FOOT + 0.1)
     figure = style.new_figure(style.WIDTH, height)
     grid = figure.subplots(len(heights), 1, squeeze=False, gridspec_kw={"height_ratios": heights})
@@ -85,8 +85,8 @@ def plot_judgment(
     ]
     for panel, legend, words in zip(panels, legends, above, strict=False):
         style.dress(panel)
-        style.put_legend(panel, legend)
-        remark(panel, words, style.legend_rows(legend))
+        style.put_legend(panel, legend, room=ROOM)
+        remark(panel, words, style.legend_rows(legend, ROOM))
     style.label_below(panels[0], SWING)
     _swings(panels[0], result)
     if limited:
@@ -111,11 +111,11 @@ def _mark(name: str, marker: str, color: str, *, face: str = "", size: float = 5
 def _swing_legend(result: Judgment) -> list[Line2D]:
     handles = [
         _mark("a seaway", "o", style.BLUE, size=4.0),
-        _mark("one with more swing than without control", "o", style.VERMILION, size=4.0),
+        _mark("more swing than without control", "o", style.VERMILION, size=4.0),
         _mark("mean, as wide as its 95 % interval", "d", style.INK),
     ]
     if result.linear is not None:
-        handles.append(style.handle("by the spectrum alone", style.INK, width=1.0))
+        handles.append(style.handle("by its spectrum alone", style.INK, width=1.0))
     if any(result.left(name) for name in result.names):
         handles.append(_mark("left the model, not in the mean", "x", style.INK))
     return handles

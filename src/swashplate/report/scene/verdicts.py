@@ -81,7 +81,7 @@ def write_judgment(judgment: Judgment, path: str | Path) -> None:
         Block("verdict", (light(look, judgment.outcome), _headline(judgment)), look),
         *_answers(judgment),
         *_fit_verdicts(crane),
-        *(block for table in limited for block in titled(table)),
+        *(block for table in limited for block in titled(table, "limits")),
         _drawn(plot_judgment(judgment), "Swing of each variant in each seaway, and its limits"),
         *_remedies(judgment, remedies),
     ]
@@ -114,7 +114,7 @@ def _headline(judgment: Judgment) -> str:
             joint = "but"
         answers.append(SUFFICES[judgment.sufficient])
     words = "changes nothing" if judgment.idle else f" {joint} ".join(answers)
-    sentence = f"{judgment.outcome.capitalize()}: '{judgment.judged}' {words}."
+    sentence = f"{judgment.outcome.capitalize()}: control ('{judgment.judged}') {words}."
     return f"{sentence} {judgment.unusable_sentence()}".rstrip()
 
 
@@ -180,7 +180,10 @@ def _example(judgment: Judgment) -> list[Block]:
         runs = {name: judgment.run(name, seed) for name in (NONE, judged)}
     except (DomainError, InputError):  # a run that was stopped has no signals
         return []
-    caption = f"Seaway {seed}, in which '{judged}' swings as in half of all seaways"
+    caption = (
+        f"Seaway {seed}, in which '{judged}' swings as in half of all seaways; it counts from "
+        f"{judgment.study.run_in:g} s on"
+    )
     return [_drawn(plot_crane(runs, title=f"Swing in seaway {seed}"), caption)]
 
 
@@ -220,13 +223,13 @@ def _assumptions(crane: Crane) -> list[Block]:
     blocks = []
     if crane.limits:
         columns = (*map(Column, ("limit", "value", "unit", "status")), Column("source", wrap=True))
-        limits = Table("Limits", columns)
+        limits = Table("Limits, with their sources", columns)
         for name, limit in crane.limits.items():
             value = ", ".join(f"{number:g}" for number in limit.values)
             label, look = LIMITED[name].label, limit.status == "assumed"
             unit = "" if limit.unit == "1" else limit.unit
             limits.add(label, value, unit, limit.status, limit.source, look=look)
-        blocks.append(Block("details", [Block("table", limits)], "Limits, with their sources"))
+        blocks += titled(limits)
     geometry = [Block("table", crane.table())]
     return [*blocks, Block("details", geometry, "Geometry, with its sources"), text(ASSUMED)]
 
@@ -277,7 +280,7 @@ def _lead(operability: Operability) -> str:
     if not rest:
         return sentence
     share = 100.0 * shares[rest[0]]
-    return f"{sentence} Most of the rest is lost by {label_of(rest[0])}: {share:.0f} % of the year."
+    return f"{sentence} {label_of(rest[0]).capitalize()} limits most of the rest: {share:.0f} %."
 
 
 def _drawn(figure: Figure, caption: str) -> Block:
@@ -289,4 +292,4 @@ def _drawn(figure: Figure, caption: str) -> Block:
         figure.savefig(written, format="svg", metadata={"Date": None})
     drawn = written.getvalue()
     drawn = drawn[drawn.index("<svg") :]
-    return Block("figure", Markup(drawn.replace("<svg", '<svg class="chart"', 1)), caption)
+    return Block("figure", Markup(drawn.replace("<svg", '<svg class="chart sheet"', 1)), caption)
