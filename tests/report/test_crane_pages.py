@@ -192,7 +192,7 @@ def test_operabilitys_page_has_one_figure_the_shares_and_what_is_assumed(tmp_pat
     text = written(write_operability, year, tmp_path)
     # 50 and half of 30 per cent can be worked; all of 20 and half of 30 cannot
     lead = "'identified' can work 65 % of the year, the crane without control 0 %."
-    assert f"{lead} Side-lead limits most of the rest: 20 %." in text
+    assert f"{lead} Most often the rest is limited by side-lead first: 20 % of the year." in text
     summary = text.partition('<section id="basis">')[0]
     assert summary.count("<svg") == summary.count("<table") == 1
     for words in ("65.0 %", "15.0 %", "20.0 %", "100.0 %"):

@@ -425,7 +425,8 @@ class Judgment(Tabular):
         table = Table(f"Limits, '{self.judged}'", columns, "in 3 h: most probable largest value")
         for judged in self.limited(self.judged):
             unit, factor = judged.shown
-            values = [factor * number for number in (judged.limit, *judged.largest)]
+            # a side-lead without waves across the boom is 0, not a millionth of a degree
+            values = [round(factor * number, 3) for number in (judged.limit, *judged.largest)]
             label, within = LIMITED[judged.name].label, judged.within
             table.add(label, unit, *values, within, look=within != "yes")
         return table

@@ -35,6 +35,8 @@ NAME, ROOM = 30, style.WIDTH - 2.4
 BREAK, LEFT, END = 1.06, 1.11, 1.16
 """Where the axis breaks, runs that left the model stand, and the panel ends: in parts of the
 largest swing."""
+WIDEST = 2.0
+"""Part of the largest swing up to which an interval is shown whole."""
 LEAST_SHARE, MOST_SHARE = 0.1, 20.0
 """Shares of a limit at which an axis ends; a triangle stands for what lies beyond."""
 WITHIN = {"yes": "within its limit", "no": "beyond its limit", "not decided": "not decided"}
@@ -125,7 +127,10 @@ def _swings(ax: Axes, result: Judgment) -> None:
     """A row for each variant: its seaways, their mean, how many left the model."""
     names = list(reversed(result.names))
     swings = {name: np.degrees(result.swing(name)) for name in names}
-    edge = max(float(np.nanmax(np.append(swing, 0.0))) for swing in swings.values())
+    largest = max(float(np.nanmax(np.append(swing, 0.0))) for swing in swings.values())
+    ends = [mean_of(swing, 0.0).high for swing in swings.values()]
+    # of very few seaways the interval is wider than a panel can show
+    edge = max([largest, *(min(end, WIDEST * largest) for end in ends if isfinite(end))])
     edge = edge or 1.0  # none of them stayed within the model
     random = np.random.default_rng(0)
     labels = []

@@ -280,7 +280,8 @@ def _lead(operability: Operability) -> str:
     if not rest:
         return sentence
     share = 100.0 * shares[rest[0]]
-    return f"{sentence} {label_of(rest[0]).capitalize()} limits most of the rest: {share:.0f} %."
+    limit = label_of(rest[0])
+    return f"{sentence} Most often the rest is limited by {limit} first: {share:.0f} % of the year."
 
 
 def _drawn(figure: Figure, caption: str) -> Block:
