@@ -35,6 +35,7 @@ from swashplate.crane.result import PUMPS, CraneRun, limit_table
 from swashplate.crane.rope import GRAVITY
 from swashplate.crane.spectral import LinearResponse, linear_response
 from swashplate.crane.study import NONE, Case, Controllers, Study
+from swashplate.crane.transfer_functions import CRANE_SHIP, Hull
 from swashplate.errors import InputError
 from swashplate.results import GivenAxes, Tabular, figures
 from swashplate.simulation.result import Limit
@@ -153,9 +154,9 @@ class Judgment(Tabular):
     def plot(
         self, *, ax: Axes | Sequence[Axes] | None = None, title: str = ""
     ) -> Figure | Axes | Sequence[Axes]:
-        """Figure of the swing of every variant in every seaway, its mean and interval.
+        """Figure of the swing of every variant in every seaway, and of all that has a limit.
 
-        By default a new figure; with `ax` it is drawn there, and `ax` returned.
+        By default a new figure; with `ax` the swing alone is drawn there, and `ax` returned.
         """
         return cast("Figure", figures().plot_judgment(self, ax=ax, title=title))
 
@@ -234,7 +235,7 @@ class Judgment(Tabular):
         return left * THREE_HOURS >= len(self.study.seeds) * self.study.length
 
     @property
-    def _idle(self) -> bool:
+    def idle(self) -> bool:
         """Whether the judged variant swings as no control does, in every seaway."""
         own, none = self.swing(self.judged), self.swing(NONE)
         same = np.allclose(own, none, rtol=IDLE, equal_nan=True)
@@ -247,7 +248,7 @@ class Judgment(Tabular):
             "harm": self.harmless,
             "sufficiency": self.sufficient,
         }
-        return not self._idle and all(answers[question] == "yes" for question in self.asked)
+        return not self.idle and all(answers[question] == "yes" for question in self.asked)
 
     @property
     def outcome(self) -> Literal["passes", "fails", "not decided"]:
@@ -257,12 +258,16 @@ class Judgment(Tabular):
         answers = [self.harmless] if "harm" in self.asked else []
         if "sufficiency" in self.asked and self.sufficient is not None:
             answers.append(self.sufficient)
-        return "fails" if "no" in answers or self._idle else "not decided"
+        return "fails" if "no" in answers or self.idle else "not decided"
 
     @property
     def headline(self) -> str:
         """The outcome, both answers, and whether they rest on a drive that is not usable."""
         words = f"{self.outcome.capitalize()}: {self.verdict()}"
+        return " ".join(filter(None, [words, self.unusable_sentence()]))
+
+    def unusable_sentence(self) -> str:
+        """Which fits are not usable that the judged variant rests on; empty if there is none."""
         case = self.study.cases[self.judged]
         unusable = {
             axis
@@ -271,12 +276,13 @@ class Judgment(Tabular):
             if not source.usable
         }
         if not unusable:
-            return words
+            return ""
         axes = listed([axis for axis in AXES if axis in unusable])
-        return f"{words} It rests on the fit of the {axes}, which is not usable."
+        return f"It rests on the fit of the {axes}, which is not usable."
 
     def verdict(self) -> str:
         """Both answers on the judged variant, and what would do if it fails."""
+<<<<<<< HEAD
         sentences = [self._harm_sentence()]
         if self.sufficient is not None:
             sentences.append(self._sufficiency_sentence())
@@ -286,12 +292,17 @@ class Judgment(Tabular):
         elif self.tried and not any(remedy.passes for remedy in self.remedies):
             sentences.append("Nothing that was tried surely does all that is asked.")
         return " ".join(sentences)
+=======
+        sentences = [self.harm_sentence(), self.sufficiency_sentence(), *self.remedy_sentences()]
+        return " ".join(filter(None, sentences))
+>>>>>>> craned
 
-    def _harm_sentence(self) -> str:
+    def harm_sentence(self) -> str:
+        """Whether the judged variant harms, and by how much it changes the swing."""
         share, seaways = self.worse(self.judged), len(self.study.seeds)
         none, own = (np.degrees(mean_of(self.swing(name)).value) for name in (NONE, self.judged))
         drives = f"With the drives '{self.judged}' the controller"
-        if self._idle:
+        if self.idle:
             return (
                 f"{drives} changes nothing: {none:.2f} deg RMS without it, {own:.2f} with it, in "
                 f"{count(seaways, 'seaway')}."
@@ -316,7 +327,10 @@ class Judgment(Tabular):
             f"({more_seaways(share.value, seaways, self.allowed)})."
         )
 
-    def _sufficiency_sentence(self) -> str:
+    def sufficiency_sentence(self) -> str:
+        """Whether the judged variant stays within all limits; empty if the crane has none."""
+        if self.sufficient is None:
+            return ""
         limited = self.limited(self.judged)
         beyond = [judged.words() for judged in limited if judged.within == "no"]
         open_ = [judged.words() for judged in limited if judged.within == "not decided"]
@@ -327,6 +341,12 @@ class Judgment(Tabular):
             causes = beyond or [f"it leaves the model in {count(left, 'seaway')}"]
             return f"It does not suffice: in 3 h {'; '.join(causes)}."
         return f"Whether it suffices is not decided: in 3 h {'; '.join(open_)}. Run more seaways."
+
+    def remedy_sentences(self) -> list[str]:
+        """What would do, or that nothing that was tried would; none if nothing was."""
+        if self.tried and not self.remedies:
+            return [f"None of these would do: {listed(self.tried)}."]
+        return [self._remedy_sentence(remedy) for remedy in self.remedies]
 
     def _remedy_sentence(self, remedy: Remedy) -> str:
         what = remedy.what.capitalize()
@@ -426,7 +446,8 @@ class Judgment(Tabular):
         table = Table(f"Limits, '{self.judged}'", columns, "in 3 h: most probable largest value")
         for judged in self.limited(self.judged):
             unit, factor = judged.shown
-            values = [factor * number for number in (judged.limit, *judged.largest)]
+            # a side-lead without waves across the boom is 0, not a millionth of a degree
+            values = [round(factor * number, 3) for number in (judged.limit, *judged.largest)]
             label, within = LIMITED[judged.name].label, judged.within
             table.add(label, unit, *values, within, look=within != "yes")
         return table
@@ -491,6 +512,10 @@ class Judgment(Tabular):
         assumed = not given and crane.quantities["swing_damping"].status == "assumed"
         words = f"The load's swing has a damping of {100.0 * damping:g} %"
         sentences = [rule, f"{words}, assumed." if assumed else f"{words}."]
+        ship = study.seaway.ship
+        if isinstance(ship, Hull):
+            words = f"The ship's roll period is {ship.roll_period:g} s"
+            sentences.append(f"{words}, assumed." if ship == CRANE_SHIP else f"{words}.")
         if crane.assumed:
             sentences.append(f"{crane.assumed} of the crane are assumed.")
         limits = [name for name, limit in crane.limits.items() if limit.status == "assumed"]
