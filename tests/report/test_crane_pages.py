@@ -93,19 +93,6 @@ def test_scene_runs_in_a_browser_without_errors(scene, runs, browsed):
     assert "<b>" not in re.sub(r"<script.*?</script>", "", made, flags=re.DOTALL)
 
 
-<<<<<<< HEAD
-def test_verdicts_page_says_what_the_judgment_does(tmp_path, judged):
-    write_judgment(judged, tmp_path / "judge.html")
-    text = tmp_path.joinpath("judge.html").read_text("utf-8")
-    assert judged.verdict() in text
-    assert text.count("<svg") == 3
-    assert "min-width: 600px" not in text  # figures are whole on a narrow screen
-    assert not re.search(r"(src|href)\s*=\s*[\"']?(https?:)?//", text)
-    rms = np.degrees(judged.counted("identified").mean())
-    assert f"{rms:.2f}" in text
-    assert "13 of 14 quantities of the crane are assumed" in text
-    assert text.count(">assumed<") == 13
-=======
 BEYOND = "the load swings beyond 30 deg"
 
 
@@ -213,7 +200,6 @@ def test_operabilitys_page_has_one_figure_the_shares_and_what_is_assumed(tmp_pat
     for sentence in year.sentences():
         assert sentence in summary
     assert text.count("<td>assumed</td>") == 7 + 13
->>>>>>> craned
 
 
 @pytest.mark.slow
@@ -254,12 +240,6 @@ def test_seaways_in_words_have_height_period_heading_and_roll():
 def test_figure_of_a_judgment_tells_seaways_from_the_means_interval(judged, assert_legible):
     figure = judged.plot()
     assert_legible(figure)
-<<<<<<< HEAD
-    words = [each.get_text() for ax in figure.axes for each in ax.texts]
-    assert any("13 of 14 quantities of the crane are assumed" in each for each in words)
-    first = made.headline if name == "judgment" else repr(made)
-    assert made.summary().startswith(first)
-=======
     title = figure.get_suptitle()
     assert title == "3 seaways of 1 min, ss3 0.88 m, 7.5 s, abeam from starboard, roll 13 s"
     swing = figure.axes[0]
@@ -400,7 +380,6 @@ def test_figure_of_operability_colours_each_sea_by_what_limits_it(year, assert_l
 def entries(figure):
     (legend,) = figure.legends
     return zip(legend.get_texts(), legend.get_patches(), strict=True)
->>>>>>> craned
 
 
 def test_figures_of_one_panel_draw_in_given_axes(crane, judged):

@@ -282,20 +282,8 @@ class Judgment(Tabular):
 
     def verdict(self) -> str:
         """Both answers on the judged variant, and what would do if it fails."""
-<<<<<<< HEAD
-        sentences = [self._harm_sentence()]
-        if self.sufficient is not None:
-            sentences.append(self._sufficiency_sentence())
-        sentences += [self._remedy_sentence(remedy) for remedy in self.remedies]
-        if self.tried and not self.remedies:
-            sentences.append(f"None of these would do: {listed(self.tried)}.")
-        elif self.tried and not any(remedy.passes for remedy in self.remedies):
-            sentences.append("Nothing that was tried surely does all that is asked.")
-        return " ".join(sentences)
-=======
         sentences = [self.harm_sentence(), self.sufficiency_sentence(), *self.remedy_sentences()]
         return " ".join(filter(None, sentences))
->>>>>>> craned
 
     def harm_sentence(self) -> str:
         """Whether the judged variant harms, and by how much it changes the swing."""
@@ -346,7 +334,10 @@ class Judgment(Tabular):
         """What would do, or that nothing that was tried would; none if nothing was."""
         if self.tried and not self.remedies:
             return [f"None of these would do: {listed(self.tried)}."]
-        return [self._remedy_sentence(remedy) for remedy in self.remedies]
+        sentences = [self._remedy_sentence(remedy) for remedy in self.remedies]
+        if self.tried and not any(remedy.passes for remedy in self.remedies):
+            sentences.append("Nothing that was tried surely does all that is asked.")
+        return sentences
 
     def _remedy_sentence(self, remedy: Remedy) -> str:
         what = remedy.what.capitalize()
