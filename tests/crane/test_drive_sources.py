@@ -21,7 +21,7 @@ HEADLINES = {
     "required.",
 }
 NONE_KNOWN = "has none: fit again"
-SHORT = {"length": 12.0, "start": 5.0}
+SHORT = {"length": 60.0, "run_in": 5.0, "turns": False}
 VALIDITY = "Holds for steps from -9 to 9 V; never reached: the swash plate's stop Z13."
 UNREACHED = (
     "No test of the hoist's drive reached Z13_plus and Z13_minus: beyond what was tested it is "
@@ -84,7 +84,7 @@ COMMANDS = {
     "judge": ("--seeds", "2"),
     "follow": ("--sea", "ss3"),
     "sweep": ("bearing", "--points", "0", "--seeds", "1"),
-    "sectors": ("--points", "0", "--seeds", "1"),
+    "operability": ("--headings", "0"),
 }
 
 

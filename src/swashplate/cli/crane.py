@@ -194,8 +194,9 @@ def judge(
     from swashplate.crane import judge as judge_control
     from swashplate.crane.judgment import SEAWAYS, seaways_needed
 
+    crane = study.chosen
     side.print(seaways_needed(study.seeds or SEAWAYS, allowed / 100.0))
-    found: Judgment = study.through(judge_control, study.chosen, **more)
+    found: Judgment = study.through(judge_control, crane, **more)
     what, write = "Numbers of every seaway, in SI", found.write
     if out is not None and out.suffix.lower() == ".html":
         from swashplate.report.scene import write_judgment

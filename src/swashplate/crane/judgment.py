@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from math import nan, pi, sqrt
+from math import isfinite, nan, pi, sqrt
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple, cast, overload
 
 import numpy as np
@@ -93,6 +93,8 @@ class Judged(NamedTuple):
     def words(self) -> str:
         """In a sentence: ``"off-lead 9.1 deg (8.7 to 9.5), limit 8 deg"``."""
         unit, factor = self.shown
+        if not all(map(isfinite, self.largest)):
+            return f"{LIMITED[self.name].label} not known from so few peaks"
         value, low, high = (factor * number for number in self.largest)
         what = f"{LIMITED[self.name].label} {value:.3g} {unit}".rstrip()
         return f"{what} ({low:.3g} to {high:.3g}), limit {factor * self.limit:.3g} {unit}".rstrip()
@@ -593,10 +595,7 @@ def judge(
     InputError
         For a share out of range, a question that there is not, or sufficiency without limits.
     """
-    if not 0.0 <= allowed < 1.0:
-        raise InputError(
-            f"allowed is {allowed:g}, but is a share of seaways: 0 to below 1, or below 100 %."
-        )
+    _check_allowed(allowed)
     questions = _questions(crane, asked)
     asked_study = Study.of(crane, control, **{"seeds": range(SEAWAYS), **study})
     none = asked_study.cases[NONE]
@@ -613,6 +612,13 @@ def judge(
     return judgment
 
 
+def _check_allowed(allowed: float) -> None:
+    if not 0.0 <= allowed < 1.0:
+        raise InputError(
+            f"allowed is {allowed:g}, but is a share of seaways: 0 to below 1, or below 100 %."
+        )
+
+
 def _questions(crane: Crane, asked: Sequence[Question] | None) -> tuple[Question, ...]:
     if asked is None:
         return QUESTIONS if crane.limits else QUESTIONS[:1]
@@ -627,6 +633,7 @@ def _questions(crane: Crane, asked: Sequence[Question] | None) -> tuple[Question
 
 def seaways_needed(seaways: int, allowed: float) -> str:
     """What a number of seaways can decide, in a sentence to print before they are run."""
+    _check_allowed(allowed)
     needed = fewest_seaways(allowed)
     if seaways >= needed:
         return (

@@ -85,7 +85,8 @@ def outcome_of(run: CraneRun, start: float, wanted: tuple[float, float] | None) 
         "hook_speed": peaks_of(speed),
         "hoist_demand": peaks_of(speed) / hoist,
     }
-    if run.actuation != "ideal":  # whose jumps of speed are impulses of the rope
+    jumps = run.actuation == "ideal" and run.fixed.settings.path
+    if not jumps:  # of speed, which are impulses of the rope
         peaks["dynamic_factor"] = peaks_of(pull / GRAVITY)
     if wanted is not None:
         away = load[:, :2] - np.array(wanted)

@@ -230,8 +230,8 @@ class CraneRun(Tabular):
         """When and why a run is not an operation any more; None if it stays one.
 
         The first time at which the load swings beyond 30 degrees, the rope is slack or lies on the
-        boom, or the load is in the water. Ideal drives change their speed at once, which slackens
-        any rope for a moment: theirs is not looked at.
+        boom, or the load is in the water. Control changes the speed of ideal drives at once, which
+        slackens any rope for a moment: that is not looked at.
         """
         some = slice(None, None, LOOK)
         tip, hook, load = self.tip[some], self.hook[some], self.load[some]
@@ -244,7 +244,7 @@ class CraneRun(Tabular):
             "the rope lies on the boom": _first(inboard >= 0.5 * pi - boom, LOOK),
             IN_WATER: _first(load[:, 2] < 0.0, LOOK),
         }
-        if self.actuation != "ideal":
+        if not (self.actuation == "ideal" and self.fixed.settings.path):
             times["the rope is slack"] = _first(self.slack, 1)
         reason = min(times, key=times.__getitem__)
         return Left(times[reason], reason) if np.isfinite(times[reason]) else None
