@@ -126,8 +126,8 @@ class Plant(NamedTuple):
     """(n, 4) of each measurement to come, of root mean square 1: rope x and y, roll, pitch."""
     margins: Array
     """Worst margins of the domains of the drives and the law."""
-    marched: Array
-    """(9, n) voltages, speeds and limits of drives that were marched before."""
+    marched: tuple[Array, ...]
+    """Three voltages, three speeds, three limits of drives that were marched before."""
 
 
 class State(NamedTuple):
@@ -519,9 +519,9 @@ def loop_of(hoist: Any, slew_drive: Any, luff: Any, law: Any) -> Callable[..., t
                 for i in range(3):
                     omega[i] = min(max(wanted[i], inverses[i].low), inverses[i].high)
             elif actuation == MARCHED:
-                for i in range(3):
-                    volts[i], omega[i] = marched[i, m], marched[3 + i, m]
-                    limits[i] = marched[6 + i, m]
+                volts[0], volts[1], volts[2] = marched[0][m], marched[1][m], marched[2][m]
+                omega[0], omega[1], omega[2] = marched[3][m], marched[4][m], marched[5][m]
+                limits[0], limits[1], limits[2] = marched[6][m], marched[7][m], marched[8][m]
             else:
                 for i in range(3):
                     volts[i] = stick[m, i]

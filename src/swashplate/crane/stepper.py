@@ -173,7 +173,7 @@ class CraneStepper:
             readings=np.zeros((1 << on_their_way.bit_length(), loop.READINGS)),
             noise=np.zeros((0, loop.NOISY)),
             margins=np.full(4, np.inf),
-            marched=np.zeros((9, 0)),
+            marched=(np.zeros(0),) * 9,
         )
 
     def step(
@@ -229,16 +229,18 @@ class CraneStepper:
         fixed, h = self.fixed, 1.0 / RATE
         out = np.empty((len(commands), fixed.columns.width))
         if self._open:  # the drives by themselves, which is quicker
-            given = np.empty((9, len(commands)))
+            voltages, speeds, limits = [], [], []
             for i, axis in enumerate(AXES):
                 stick = np.ascontiguousarray(commands[:, i])
                 volts = loop.open_voltages(stick, fixed.inverses[i], fixed.actuation)
                 instance = instance_of(getattr(self._crane, axis).parameters, by_voltage=True)
                 begun = instance.start({"voltage": 0.0}, h, "rest")
                 wanted = stored_of(instance.model, OUTPUTS)
-                speed, limits = marched(instance, {"voltage": volts}, h, begun, wanted, "command")
-                given[i], given[3 + i], given[6 + i] = volts, speed, limits
-            self._plant = self._plant._replace(marched=given)
+                made = marched(instance, {"voltage": volts}, h, begun, wanted, "command")
+                voltages.append(volts)
+                speeds.append(np.ascontiguousarray(made[0]))
+                limits.append(np.ascontiguousarray(made[1]))
+            self._plant = self._plant._replace(marched=(*voltages, *speeds, *limits))
             fixed = fixed._replace(actuation=loop.MARCHED)
         return self._advanced(fixed, commands, ship, out)
 
