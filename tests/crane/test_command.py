@@ -8,7 +8,7 @@ import pytest
 from typer.testing import CliRunner
 
 from swashplate.cli import app
-from swashplate.crane import Crane, Seaway, Spectrum, Stick, Suspension
+from swashplate.crane import Crane, Seaway, Spectrum, Stick, Suspension, simulate
 from swashplate.errors import FileError, InputError, ParameterError
 
 
@@ -21,7 +21,7 @@ def test_show_marks_what_is_assumed_and_its_file_is_a_crane(tmp_path):
     assert shown.exit_code == 0
     rows = [line.split() for line in shown.stdout.splitlines()]
     assert ["foot", "offset", "2.5", "m", "assumed"] in rows
-    assert sum("assumed" in row for row in rows[3:]) == 12
+    assert sum("assumed" in row for row in rows[3:]) == 13
     mine = tmp_path / "mine.toml"
     mine.write_text(said("show", "tg3637", "--toml").stdout, "utf-8")
     assert Crane.from_toml(mine).geometry == Crane.preset("tg3637").geometry
@@ -36,7 +36,8 @@ def test_run_compares_variants_and_writes_signals_and_a_figure(tmp_path):
     )  # fmt: skip
     assert both.exit_code == 0, both.output
     rows = {line.split()[0]: line.split()[1:] for line in both.stdout.splitlines() if line.strip()}
-    assert rows["ideal:zv-tip"][:1] == ["0.03"]
+    # undamped it is 0.03; what damping takes off the first impulse is left of the second
+    assert 0.01 < float(rows["ideal:zv-tip"][0]) < 0.1
     assert (tmp_path / "run.png").stat().st_size > 10_000
     out, scene = tmp_path / "run.parquet", tmp_path / "scene.html"
     files = ["--out", str(out), "--scene", str(scene)]
@@ -73,7 +74,8 @@ def test_run_takes_sea_ship_and_load_as_they_are_given(tmp_path):
         trim_deg=-1.0,
         reference=(-12.0, 0.0, 9.0),
     )
-    run = Crane.preset("tg3637").simulate(
+    run = simulate(
+        Crane.preset("tg3637"),
         Stick.rest(6.0),
         sea=sea,
         slew_deg=90.0,
@@ -170,7 +172,6 @@ def test_follow_and_sectors_print_their_tables(tmp_path):
         ("sweep tg3637 height --ship hull.4", "a .4 of WAMIT, and no other file, needs the length"),
         ("run tg --slew 1", "There is no packaged crane 'tg'; there is tg3637."),
         ("run tg3637 --variant fast", "actuation is 'fast'; it is ideal, volts, inverse."),
-        ("run tg3637 --variant ideal:magic", "There is no control 'magic'; there are zv-joint"),
         ("run tg3637 --sea ss3,90,1", "no numbers; write --sea ss3 --heading 90 --seed 1."),
         ("judge tg3637 --sea ss3,90", "no numbers; write --sea ss3 --heading 90."),
         ("run tg3637 --sea 1.5", "--sea 1.5: write a name, --sea ss3, or significant height"),
@@ -191,6 +192,9 @@ def test_follow_and_sectors_print_their_tables(tmp_path):
             "--ship hull.re1 has its own roll: leave --roll-period and --roll-damping out",
         ),
         ("sweep tg3637 stick --heading 30", "A sweep over the stick sets sea itself: leave it"),
+        ("run tg3637 --variant ideal:magic", "There is no control 'magic'; there are zv-tip"),
+        ("run tg3637 --variant ideal:sensors=0.1/9", "delay of sensors is 9.0, but must be"),
+        ("run tg3637 --variant ideal:sensors=1/2/3/4", "There is no control 'sensors=1/2/3/4'"),
         ("judge tg3637 --sea ss3 --sea ss2", "--sea ss3 --sea ss2 is too much: write one sea"),
         ("run tg3637 --variant direct", "With direct actuation commands are voltages"),
         ("run tg3637 --drive luff=none", "or the result or folder of a fit, but there is no such"),
@@ -222,6 +226,7 @@ def test_wrong_words_end_in_one_sentence(words, sentence):
         ({"boom_length": True}, "boom_length is True, but must be one number"),
         ({"boom_limits": "39"}, "boom_limits is '39', but must be a list of 2 numbers"),
         ({"slew_axis": 3.0}, "slew_axis must be a list of 3 numbers, not 1"),
+        ({"swing_damping": 0.5}, "swing_damping is 0.5, but on a crane it is 0 to 0.2"),
         ({"jib": 3.0}, "A crane has no jib; it has boom_length"),
     ],
 )

@@ -167,7 +167,7 @@ def test_a_listed_ship_carries_the_boom_to_the_side_that_is_down():
     crane = Crane.preset("tg3637")
     lists = [Seaway(Spectrum(1e-6, 7.5), list_deg=angle) for angle in (0.0, 5.0)]
     runs = [
-        crane.simulate(Stick.rest(1.0), sea=sea, slew_deg=90.0, actuation="ideal") for sea in lists
+        simulate(crane, Stick.rest(1.0), sea=sea, slew_deg=90.0, actuation="ideal") for sea in lists
     ]
     upright, listed = (run.tip[0] for run in runs)
     # starboard, where the boom points, goes down by a turn of 5 degrees about the x axis

@@ -274,7 +274,8 @@ SETS = files("swashplate.crane") / "sets"
 
 def packaged_names() -> list[str]:
     """Names of the packaged cranes."""
-    return sorted(each.name.removesuffix(".toml") for each in SETS.iterdir())
+    names = [file.name for file in SETS.iterdir()]
+    return sorted(name.removesuffix(".toml") for name in names if name.endswith(".toml"))
 
 
 def preset_text(name: str) -> str:

@@ -99,20 +99,27 @@ class Judged(NamedTuple):
 
 
 class Remedy(NamedTuple):
-    """A change with which control passes, or with which it is not decided whether it does."""
+    """A change that was tried on the crane's own drives."""
 
     what: str
     """In words: ``"luff orifice ×1.5"``."""
     size: float
     """Factor on the orifice, or size of the clip. [m]"""
-    sure: bool
-    """Whether it surely passes."""
+    harmless: Decision
+    """Whether control is worse than none as seldom as allowed then."""
+    sufficient: Decision | None
+    """Whether all stays within its limits then; None if that was not asked."""
     worse: Estimate
     """Share of seaways in which control is then worse than none."""
     swing: Estimate
     """Root mean square swing then. [rad]"""
     beyond: tuple[str, ...]
-    """Quantities that would still be beyond their limits, in words."""
+    """What is beyond its limit then, in words."""
+
+    @property
+    def passes(self) -> bool:
+        """Whether it surely does all that was asked."""
+        return self.harmless == "yes" and self.sufficient in ("yes", None)
 
 
 @dataclass(frozen=True, eq=False)
@@ -131,7 +138,7 @@ class Judgment(Tabular):
     """The crane without control in the frequency domain; None if its swing is not damped."""
     remedies: tuple[Remedy, ...] = ()
     tried: tuple[str, ...] = ()
-    """What was tried and does not pass."""
+    """What was tried and does not pass all that was asked."""
     turns: tuple[Turn, ...] = ()
     """Assumed or given numbers that would turn the answer, if they were others."""
 
@@ -217,13 +224,10 @@ class Judgment(Tabular):
 
         No, if the judged variant leaves the model once in three hours or more often.
         """
-        limited = self.limited(self.judged)
-        if not limited:
+        if not self.study.crane.limits:
             return None
-        decisions = [judged.within for judged in limited]
-        if "no" in decisions or self._leaves_often:
-            return "no"
-        return "not decided" if "not decided" in decisions else "yes"
+        decisions = [judged.within for judged in self.limited(self.judged)]
+        return "no" if self._leaves_often else _all(decisions)
 
     @property
     def _leaves_often(self) -> bool:
@@ -330,14 +334,22 @@ class Judgment(Tabular):
         """What would do, or that nothing that was tried would; none if nothing was."""
         if self.tried and not self.remedies:
             return [f"None of these would do: {listed(self.tried)}."]
-        return [self._remedy_sentence(remedy) for remedy in self.remedies]
+        sentences = [self._remedy_sentence(remedy) for remedy in self.remedies]
+        if self.tried and not any(remedy.passes for remedy in self.remedies):
+            sentences.append("Nothing that was tried surely does all that is asked.")
+        return sentences
 
     def _remedy_sentence(self, remedy: Remedy) -> str:
-        seaways = len(self.study.seeds)
-        if remedy.sure:
-            return f"{remedy.what.capitalize()} would do."
-        more = more_seaways(remedy.worse.value, seaways, self.allowed)
-        return f"{remedy.what.capitalize()} may do: run more seaways ({more})."
+        what = remedy.what.capitalize()
+        if remedy.harmless == "not decided":
+            seaways = len(self.study.seeds)
+            more = more_seaways(remedy.worse.value, seaways, self.allowed)
+            return f"{what} may do: run more seaways ({more})."
+        if remedy.passes:
+            return f"{what} would do."
+        if remedy.sufficient == "not decided":
+            return f"{what} would do no harm, and may suffice: run more seaways."
+        return f"{what} would do no harm, but not suffice: in 3 h {'; '.join(remedy.beyond)}."
 
     def _cause(self) -> str:
         """The limit that acts for the longest time."""
@@ -594,7 +606,8 @@ def judge(
         linear = linear_response(crane, asked_study.seaway, **none.pose, **none.hangs)
     judgment = Judgment(asked_study, outcomes, allowed, questions, linear)
     if turns:
-        judgment = replace(judgment, turns=turns_of(asked_study, judgment.judged, crane.limits_si))
+        limits = crane.limits_si if "sufficiency" in questions else {}
+        judgment = replace(judgment, turns=turns_of(asked_study, judgment.judged, limits))
     if judgment.outcome == "fails" and remedies:
         return _with_remedies(judgment)
     return judgment
@@ -637,18 +650,21 @@ def _with_remedies(judgment: Judgment) -> Judgment:
     found: list[Remedy] = []
     tried: list[str] = []
     for trials in (_larger_orifices(judgment, cranes, law), _clips(case, cranes, law)):
-        may: list[Remedy] = []
-        for what, size, trial in trials:
-            remedy = _tried(judgment, case, what, size, trial)
-            if remedy is None:
-                tried.append(what)
-                continue
-            may.append(remedy)
-            if remedy.sure:
-                break
-        # the last one if that surely does, else the least
-        found += may[-1:] if may and may[-1].sure else may[:1]
+        remedies = _tried(judgment, trials)
+        tried += [what for what, *_ in trials[: len(remedies)]]
+        passing = [remedy for remedy in remedies if remedy is not None and remedy.passes]
+        tried = tried[: len(tried) - len(passing)]
+        found += _least([remedy for remedy in remedies if remedy is not None])
     return replace(judgment, remedies=tuple(found), tried=tuple(tried))
+
+
+def _least(remedies: list[Remedy]) -> list[Remedy]:
+    """The least that does no harm, and the least that passes; else the least that may do."""
+    harmless = [remedy for remedy in remedies if remedy.harmless == "yes"]
+    passing = [remedy for remedy in harmless if remedy.passes]
+    if harmless:
+        return list(dict.fromkeys([harmless[0], *passing[:1]]))
+    return remedies[:1]
 
 
 Trial = tuple[str, float, Case]
@@ -682,20 +698,51 @@ def _clips(case: Case, cranes: tuple[Crane, ...], law: Control) -> list[Trial]:
     return trials
 
 
-def _tried(judgment: Judgment, case: Case, what: str, size: float, trial: Case) -> Remedy | None:
-    """A trial in all seaways; None as soon as it is sure that it does not pass."""
+def _tried(judgment: Judgment, trials: Sequence[Trial]) -> list[Remedy | None]:
+    """Trials up to the first that passes; None for one that harms, or does not help on."""
+    remedies: list[Remedy | None] = []
+    harmless = False
+    for what, size, case in trials:
+        remedy = _trial(judgment, what, size, case, only_if_sufficient=harmless)
+        remedies.append(remedy)
+        if remedy is not None and remedy.passes:
+            break
+        harmless = harmless or (remedy is not None and remedy.harmless == "yes")
+    return remedies
+
+
+def _trial(
+    judgment: Judgment, what: str, size: float, case: Case, *, only_if_sufficient: bool
+) -> Remedy | None:
+    """A trial in all seaways; None as soon as it surely harms, or surely is not sufficient."""
     none, seaways = judgment.of(NONE), len(judgment.study.seeds)
-    limits = judgment.study.crane.limits_si if "sufficiency" in judgment.asked else {}
+    asked = "sufficiency" in judgment.asked
+    limits = judgment.study.crane.limits_si if asked else {}
     outcomes: list[Outcome] = []
     for first in range(0, seaways, BLOCK):
         block = range(first, min(first + BLOCK, seaways))
-        outcomes += [found for (found,) in judgment.study.outcomes([trial], block)]
+        outcomes += [found for (found,) in judgment.study.outcomes([case], block)]
         worse = _worse(outcomes, none[: len(outcomes)])
         limited = _judged(outcomes, limits)
-        harms = worse.value * len(outcomes) > judgment.allowed * seaways
-        if harms or any(quantity.within == "no" for quantity in limited):
+        decisions = [quantity.within for quantity in limited]
+        if worse.value * len(outcomes) > judgment.allowed * seaways:
             return None
-    beyond = tuple(quantity.words() for quantity in limited if quantity.within != "yes")
-    sure = worse.high <= judgment.allowed and not beyond
+        if only_if_sufficient and "no" in decisions:
+            return None
     swing = mean_of(np.array([outcome.rms_swing for outcome in outcomes]), 0.0)
-    return Remedy(what, size, sure, worse, swing, beyond)
+    return Remedy(
+        what=what,
+        size=size,
+        harmless="yes" if worse.high <= judgment.allowed else "not decided",
+        sufficient=_all(decisions) if asked else None,
+        worse=worse,
+        swing=swing,
+        beyond=tuple(quantity.words() for quantity in limited if quantity.within == "no"),
+    )
+
+
+def _all(decisions: Sequence[Decision]) -> Decision:
+    """Whether all are yes; no if one is no."""
+    if "no" in decisions:
+        return "no"
+    return "not decided" if "not decided" in decisions else "yes"

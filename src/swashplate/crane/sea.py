@@ -377,7 +377,7 @@ class Seaway(Result):
         sums[mirrored] = sums[mirrored].conj()
         lines = np.zeros((int(index.max()) + 1, sums.shape[1]), dtype=np.complex128)
         np.add.at(lines, index, sums)
-        # an inverse real FFT halves and scales all lines but those at 0 and at half of the rate
+        # an inverse real FFT counts lines twice, except those at 0 and at half of the rate
         lines[1 : size // 2] *= 0.5
         samples = np.fft.irfft(size * np.ascontiguousarray(lines.T), size)
         return np.ascontiguousarray(samples[:, np.arange(count) % size].T)

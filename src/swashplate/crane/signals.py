@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from swashplate.crane.kinematics import Geometry, Home, Shafts, boom_at, rope_length
 from swashplate.equations import kernel
+from swashplate.results import Result
 
 Array = NDArray[np.float64]
 
@@ -65,7 +66,7 @@ def _boom_and_rope(shafts: Array, g: Geometry, home: Home, out: Array) -> None:
 
 
 @dataclass(frozen=True, eq=False)
-class Signals:
+class Signals(Result):
     """Signals by their names of `ROWS`, each computed when it is asked for."""
 
     stored: Array

@@ -123,6 +123,8 @@ def sweep(
     check_names("There is no sweep over", [over], SWEPT)
     swept = SWEPT[over]
     grid = np.atleast_1d(np.asarray(swept.points if points is None else points, dtype=np.float64))
+    if over == "bearing" and "slew_deg" in study:
+        raise InputError("A sweep over the bearing sets slew_deg itself: leave it out.")
     if not (grid.size and (swept.low <= grid).all() and (grid <= swept.high).all()):
         raise InputError(
             f"Points of the {over} must be one or more numbers from {swept.low:g} to "
