@@ -313,8 +313,9 @@ def plot_operability(result: Operability, *, title: str = "") -> Figure:
         panel.set_title(words, loc="left", fontsize=style.NORMAL, color=style.INK)
     for panel in panels[len(names) :]:
         panel.set_axis_off()
-    for panel in panels[:columns] if rows == 1 else panels[-columns:]:
+    for panel in panels[max(len(names) - columns, 0) : len(names)]:  # the lowest of each column
         style.label_below(panel, "peak period (s)")
+        panel.tick_params(labelbottom=True)
     for panel in grid[:, 0]:
         panel.set_ylabel("significant height (m)", fontsize=style.NORMAL, color=style.INK)
     seaway = result.seaway
