@@ -15,12 +15,14 @@ from swashplate.crane import (
     Stick,
     Suspension,
     control,
+    judge,
     linearize,
     simulate,
     sweep,
 )
 from swashplate.equations import Model, equation
 from swashplate.errors import DomainError, InputError
+from swashplate.executors import Threads
 
 G = 9.80665
 TIP = control.TipShaper("zv")
@@ -479,6 +481,13 @@ def test_noise_of_the_ropes_direction_is_white_and_held_between_measurements(cra
     assert np.abs(still).max() < 1e-3 * wanted
     np.testing.assert_array_equal(run(3, 5.0).out, found.out[: 5 * 512 + 1])
     assert not np.array_equal(run(4, 5.0).out, found.out[: 5 * 512 + 1])
+
+
+def test_noise_is_the_same_on_any_number_of_cores(crane):
+    law = control.DelayedFeedback() | control.Clip() | control.Sensors(seed=2)
+    how = {"seeds": range(3), "length": 50.0, "start": 40.0, "remedies": False}
+    one, two = (judge(crane, law, executor=Threads(count), **how) for count in (1, 2))
+    np.testing.assert_array_equal(one.counted("identified"), two.counted("identified"))
 
 
 def test_noise_of_roll_and_pitch_moves_the_compensated_tip(crane):

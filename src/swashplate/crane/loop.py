@@ -420,11 +420,11 @@ def leave(
     columns: Columns,
 ) -> None:
     """Leave a sample's signals, by `Columns`."""
-    voltage, torque, hook = columns.voltage, columns.torque, columns.hook
+    voltage, bits, torque, hook = columns.voltage, columns.limits, columns.torque, columns.hook
     for i in range(3):
         row[SPEED + i], row[SHAFT + i] = omega[i], axes[ANGLE, i]
         if voltage != ABSENT:
-            row[voltage + i], row[voltage + 3 + i] = volts[i], limits[i]
+            row[voltage + i], row[bits + i] = volts[i], limits[i]
         if torque != ABSENT:
             row[torque + i] = axes[TORQUE, i]
     row[TIP], row[TIP + 1], row[TIP + 2] = tip

@@ -253,7 +253,8 @@ def rope_step(
     hook = coasting(now.hook, now.hook_before, square, weight) if hooked else load
     d, b = moved(now.hook, -1.0, tip), moved(now.load, -1.0, now.hook)
     if s.swing_damping > 0.0:
-        share = 2.0 * s.swing_damping * sqrt(GRAVITY / (length + s.sling)) * square / h
+        rate = 1.0 / h
+        share = 2.0 * s.swing_damping * sqrt(GRAVITY / (length + s.sling)) * (square * rate)
         lead = moved(following, -1.0, tip)
         load = slowed(load, moved(now.load, -1.0, now.before), lead, d, share)
         if hooked:

@@ -29,13 +29,18 @@ ROWS = (
 SPEED, SHAFT, TIP, LOAD, PULL = 0, 3, 6, 9, 12
 """Columns that the loop leaves of every run."""
 ABSENT = -1
+BOOM_AND_ROPE = ("rope", "boom_cos", "boom_sin")
+"""What follows from the angles of the shafts."""
+PARTS = {"hoist": 0, "slew": 1, "luff": 2, "x": 0, "y": 1, "z": 2}
+"""Place of an axis in its group."""
 
 
 class Columns(NamedTuple):
     """Columns that the loop leaves only of some runs, `ABSENT` if it does not."""
 
     voltage: int
-    """Of the three voltages, which the limits of the drives follow; not of ideal drives."""
+    limits: int
+    """Of voltages and limits of the drives, the first of three each; not of ideal ones."""
     hook: int
     """Of a hook with slings; without one it is where the load is."""
     torque: int
@@ -47,12 +52,16 @@ class Columns(NamedTuple):
 def columns_of(*, ideal: bool, hooked: bool, loaded: bool) -> Columns:
     """Columns that the loop leaves of a run."""
     width = PULL + 1
-    places = []
-    for wanted, signals in ((not ideal, 6), (hooked, 3), (loaded, 3)):
-        places.append(width if wanted else ABSENT)
-        width += signals if wanted else 0
-    voltage, hook, torque = places
-    return Columns(voltage, hook, torque, width)
+    places = {}
+    for group, present in (
+        ("voltage", not ideal),
+        ("limits", not ideal),
+        ("hook", hooked),
+        ("torque", loaded),
+    ):
+        places[group] = width if present else ABSENT
+        width += 3 if present else 0
+    return Columns(**places, width=width)
 
 
 @kernel
@@ -94,7 +103,7 @@ class Signals(Result):
         first = {
             "voltage": columns.voltage,
             "speed": SPEED,
-            "limits": columns.voltage if columns.voltage == ABSENT else columns.voltage + 3,
+            "limits": columns.limits,
             "shaft": SHAFT,
             "tip": TIP,
             "load": LOAD,
@@ -115,8 +124,3 @@ class Signals(Result):
     def table(self) -> Array:
         """(n, 28) all signals, a column for each name of `ROWS`."""
         return np.stack([self[name] for name in ROWS], axis=1)
-
-
-BOOM_AND_ROPE = ("rope", "boom_cos", "boom_sin")
-PARTS = {"hoist": 0, "slew": 1, "luff": 2, "x": 0, "y": 1, "z": 2}
-"""Place of an axis in its group."""
