@@ -377,6 +377,19 @@ def test_figure_of_operability_colours_each_sea_by_what_limits_it(year, assert_l
     assert "made for a test; 13 of 14 quantities of the crane are assumed" in words
 
 
+def test_figure_of_operability_has_rows_of_three_panels(year, assert_legible):
+    more = {f"identified {number}": year.cells["identified"] for number in range(4)}
+    figure = replace(year, cells={**year.cells, **more}).plot()
+    assert_legible(figure)
+    shown = [ax for ax in figure.axes if ax.axison]
+    assert len(shown) == 6
+    five = {name: cells for name, cells in year.cells.items() if name == "no control"} | more
+    figure = replace(year, cells=five).plot()
+    assert_legible(figure)
+    labels = [ax.get_xlabel() for ax in figure.axes if ax.axison]
+    assert labels == ["", "", *["peak period (s)"] * 3]
+
+
 def entries(figure):
     (legend,) = figure.legends
     return zip(legend.get_texts(), legend.get_patches(), strict=True)

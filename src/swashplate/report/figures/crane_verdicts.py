@@ -35,6 +35,8 @@ NAME, ROOM = 30, style.WIDTH - 2.4
 BREAK, LEFT, END = 1.06, 1.11, 1.16
 """Where the axis breaks, runs that left the model stand, and the panel ends: in parts of the
 largest swing."""
+UNBROKEN_END = 1.03
+"""Where the panel ends if none left it."""
 WIDEST = 2.0
 """Part of the largest swing up to which an interval is shown whole."""
 LEAST_SHARE, MOST_SHARE = 0.1, 20.0
@@ -127,18 +129,12 @@ def _swings(ax: Axes, result: Judgment) -> None:
     """A row for each variant: its seaways, their mean, how many left the model."""
     names = list(reversed(result.names))
     swings = {name: np.degrees(result.swing(name)) for name in names}
-    largest = max(float(np.nanmax(np.append(swing, 0.0))) for swing in swings.values())
-    ends = [mean_of(swing, 0.0).high for swing in swings.values()]
-    # of very few seaways the interval is wider than a panel can show
-    edge = max([largest, *(min(end, WIDEST * largest) for end in ends if isfinite(end))])
-    edge = edge or 1.0  # none of them stayed within the model
+    edge = _largest_swing(result, list(swings.values()))
     random = np.random.default_rng(0)
     labels = []
-    for row, name in enumerate(names):
-        swing = swings[name]
+    for row, (name, swing) in enumerate(swings.items()):
         rows = row + random.uniform(0.0, 0.34, swing.size)
-        more = swing > swings[NONE]
-        colors = np.where(more, style.VERMILION, style.BLUE)
+        colors = np.where(swing > swings[NONE], style.VERMILION, style.BLUE)
         ax.scatter(swing, rows, s=10.0, c=colors, alpha=0.55, linewidths=0.0, zorder=2.0)
         _diamond(ax, row - 0.16, swing)
         left = sum(result.left(name).values())
@@ -151,24 +147,37 @@ def _swings(ax: Axes, result: Judgment) -> None:
             label += f"\nworse than none: {worse} of {swing.size}"
         labels.append(label)
     if result.linear is not None:
-        by_spectrum = float(np.degrees(result.linear.values["swing"].rms))
-        row = names.index(NONE)
-        edge = max(edge, by_spectrum)
-        ax.vlines(by_spectrum, row - 0.4, row + 0.4, color=style.INK, linewidth=1.0, zorder=4.0)
-    ticks = list(MaxNLocator(8, steps=[1, 2, 5, 10]).tick_values(0.0, edge))
-    ticks = [tick for tick in ticks if 0.0 <= tick <= edge]
-    words = [f"{tick:g}" for tick in ticks]
-    end = 1.03 * edge
-    if any(result.left(name) for name in names):
-        ax.axvline(BREAK * edge, color=style.FAINT, linewidth=1.0, linestyle=(0, (2, 2)))
-        ticks.append(LEFT * edge)
-        words.append("left the\nmodel")
-        end = END * edge
-    ax.set_xticks(ticks, words)
-    ax.set_xlim(0.0, end)
+        by_spectrum = np.degrees(result.linear.values["swing"].rms)
+        ends = names.index(NONE) - 0.4, names.index(NONE) + 0.4
+        ax.vlines(by_spectrum, *ends, color=style.INK, linewidth=1.0, zorder=4.0)
+    _swing_axis(ax, edge, broken=any(result.left(name) for name in names))
     ax.grid(False, axis="y")
     ax.set_yticks(range(len(names)), labels, fontsize=style.SMALL)
     ax.set_ylim(-0.5, len(names) - 0.5)
+
+
+def _largest_swing(result: Judgment, swings: Sequence[Array]) -> float:
+    """Largest number of a panel of swings [deg]; 1 if all runs left the model."""
+    largest = max(float(np.nanmax(np.append(swing, 0.0))) for swing in swings)
+    ends = [mean_of(swing, 0.0).high for swing in swings]
+    # of very few seaways the interval is wider than a panel can show
+    edge = max([largest, *(min(end, WIDEST * largest) for end in ends if isfinite(end))])
+    if result.linear is not None:
+        edge = max(edge, float(np.degrees(result.linear.values["swing"].rms)))
+    return edge or 1.0
+
+
+def _swing_axis(ax: Axes, edge: float, *, broken: bool) -> None:
+    """An abscissa up to a swing [deg], and beyond a break the place of what left the model."""
+    ticks = list(MaxNLocator(8, steps=[1, 2, 5, 10]).tick_values(0.0, edge))
+    ticks = [tick for tick in ticks if 0.0 <= tick <= edge]
+    words = [f"{tick:g}" for tick in ticks]
+    if broken:
+        ax.axvline(BREAK * edge, color=style.FAINT, linewidth=1.0, linestyle=(0, (2, 2)))
+        ticks.append(LEFT * edge)
+        words.append("left the\nmodel")
+    ax.set_xticks(ticks, words)
+    ax.set_xlim(0.0, (END if broken else UNBROKEN_END) * edge)
 
 
 def _diamond(ax: Axes, row: float, swing: Array) -> None:
@@ -187,8 +196,8 @@ def _limit_legend(result: Judgment, limited: Sequence[Judged]) -> list[Line2D]:
     decisions = [decision for decision in WITHIN if decision in {one.within for one in limited}]
     handles = []
     for decision in decisions:
-        edge = FACES[decision] if decision != "not decided" else style.INK
-        handles.append(_mark(WITHIN[decision], "o", edge, face=FACES[decision], size=6.0))
+        color = FACES[decision] if decision != "not decided" else style.INK
+        handles.append(_mark(WITHIN[decision], "o", color, face=FACES[decision], size=6.0))
     handles.append(_mark("no control", "s", style.FAINT, face="white", size=4.5))
     if len(result.names) > 2:
         handles.append(_mark("other variants", "o", style.FAINT, face="white", size=4.5))
@@ -214,13 +223,13 @@ def _limits(ax: Axes, result: Judgment, limited: Sequence[Judged]) -> None:
                 _point(ax, share, row, end, marker, style.FAINT, face="white", ms=4.5)
     labels = []
     for row, one in enumerate(reversed(limited)):
-        edge = FACES[one.within] if one.within != "not decided" else style.INK
+        color = FACES[one.within] if one.within != "not decided" else style.INK
         low, high = (_share(value, one.limit) for value in one.largest[1:])
         if isfinite(low) and isfinite(high):
             low, high = (min(max(share, LEAST_SHARE), end) for share in (low, high))
-            ax.hlines(row, low, high, color=edge, linewidth=2.0, zorder=2.5)
+            ax.hlines(row, low, high, color=color, linewidth=2.0, zorder=2.5)
         share = _share(one.largest.value, one.limit)
-        _point(ax, share, row, end, "o", edge, face=FACES[one.within], ms=6.5)
+        _point(ax, share, row, end, "o", color, face=FACES[one.within], ms=6.5)
         unit, factor = one.shown
         # what has no more than three decimals is 0: a side-lead without waves across the boom
         value = f"{round(factor * one.largest.value, 3):.3g}" if isfinite(share) else "–"
@@ -304,8 +313,9 @@ def plot_operability(result: Operability, *, title: str = "") -> Figure:
         panel.set_title(words, loc="left", fontsize=style.NORMAL, color=style.INK)
     for panel in panels[len(names) :]:
         panel.set_axis_off()
-    for panel in panels[:columns] if rows == 1 else panels[-columns:]:
+    for panel in panels[max(len(names) - columns, 0) : len(names)]:  # the lowest of each column
         style.label_below(panel, "peak period (s)")
+        panel.tick_params(labelbottom=True)
     for panel in grid[:, 0]:
         panel.set_ylabel("significant height (m)", fontsize=style.NORMAL, color=style.INK)
     seaway = result.seaway

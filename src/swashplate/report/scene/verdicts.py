@@ -135,14 +135,9 @@ def _remedies(judgment: Judgment, tables: Sequence[Table]) -> list[Block]:
     """What would do, and what was tried in vain."""
     blocks = [text(words) for words in judgment.remedy_sentences()]
     blocks += [block for table in tables for block in titled(table)]
-    beyond = [
-        f"{remedy.what.capitalize()} leaves open: {'; '.join(remedy.beyond)}."
-        for remedy in judgment.remedies
-        if remedy.beyond
-    ]
     if judgment.tried and judgment.remedies:  # else the sentence says so
-        beyond.append(f"Tried, and not enough: {listed(judgment.tried)}.")
-    return [*blocks, *(text(words, "remark") for words in beyond)]
+        blocks.append(text(f"Tried, and not enough: {listed(judgment.tried)}.", "remark"))
+    return blocks
 
 
 def _fit_verdicts(crane: Crane) -> list[Block]:
