@@ -199,8 +199,10 @@ def _limit_legend(result: Judgment, limited: Sequence[Judged]) -> list[Line2D]:
         color = FACES[decision] if decision != "not decided" else style.INK
         handles.append(_mark(WITHIN[decision], "o", color, face=FACES[decision], size=6.0))
     handles.append(_mark("no control", "s", style.FAINT, face="white", size=4.5))
-    if len(result.names) > 2:
-        handles.append(_mark("other variants", "o", style.FAINT, face="white", size=4.5))
+    others = result.names[1:-1]
+    if others:
+        label = f"'{others[0]}'" if len(others) == 1 else "other variants"
+        handles.append(_mark(label, "o", style.FAINT, face="white", size=4.5))
     return handles
 
 
