@@ -365,6 +365,15 @@ def test_loaded_hoist_lowers_faster_by_its_leakage(leaking):
 
 @pytest.mark.slow
 @pytest.mark.interpreted
+def test_drives_that_feel_a_load_are_loaded_by_default(crane, leaking):
+    stick = Stick.trapezoid(hoist=-0.5, duration=2.0, length=4.0)
+    default, asked = (simulate(leaking, stick, **how) for how in ({}, {"loaded": True}))
+    np.testing.assert_array_equal(default.out, asked.out)
+    assert default.load_torque[-1, 0] > 0.0
+    assert not simulate(crane, stick).load_torque.any()
+    assert not simulate(leaking, stick, actuation="ideal").load_torque.any()
+
+
 def test_stepper_takes_the_samples_of_a_loaded_run_with_a_hook(leaking):
     stick = Stick.trapezoid(hoist=0.5, luff=0.5, duration=0.6, start=0.1, ramp=0.2, length=0.8)
     setup = {"loaded": True, "suspension": Suspension(6e7, hook=2000.0, sling=4.0)}

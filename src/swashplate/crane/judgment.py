@@ -34,6 +34,7 @@ from swashplate.crane.outcome import Outcome
 from swashplate.crane.result import PUMPS, CraneRun, limit_table
 from swashplate.crane.rope import GRAVITY
 from swashplate.crane.spectral import LinearResponse, linear_response
+from swashplate.crane.stepper import feels_load
 from swashplate.crane.study import NONE, Case, Controllers, Study
 from swashplate.crane.transfer_functions import CRANE_SHIP, Hull
 from swashplate.errors import InputError
@@ -511,6 +512,8 @@ class Judgment(Tabular):
             sentences.append(f"{words}, assumed." if ship == CRANE_SHIP else f"{words}.")
         if crane.assumed:
             sentences.append(f"{crane.assumed} of the crane are assumed.")
+        if not feels_load(crane):
+            sentences.append("No drive feels the load: they were identified without one.")
         limits = [name for name, limit in crane.limits.items() if limit.status == "assumed"]
         if limits:
             labels = listed([LIMITED[name].label for name in limits])

@@ -26,6 +26,7 @@ from swashplate.crane.result import PUMPS
 from swashplate.crane.scatter import Scatter
 from swashplate.crane.sea import Seaway, Spectrum
 from swashplate.crane.spectral import DEMANDS, linear_response
+from swashplate.crane.stepper import feels_load
 from swashplate.crane.study import BUILT, IDEAL, NONE, Case, Drives, Study
 from swashplate.errors import InputError
 from swashplate.executors import Executor, Serial, Threads
@@ -136,6 +137,8 @@ class Operability(Result):
             )
         if self.scatter.note:
             sentences.append(self.scatter.note)
+        if not feels_load(crane):
+            sentences.append("No drive feels the load: they were identified without one.")
         assumed = [name for name, limit in crane.limits.items() if limit.status == "assumed"]
         if assumed:
             labels = listed([LIMITED[name].label for name in assumed])

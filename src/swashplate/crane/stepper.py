@@ -82,11 +82,11 @@ class Setup(TypedDict, total=False):
         taut rope; shorter than 0.9 of the rope. [m]
     load_velocity : (float, float), default (0, 0)
         Of the load relative to the tip at the start, horizontal, likewise. [m/s]
-    loaded : bool, default False
+    loaded : bool, default whether a real drive of the crane feels a load
         Whether the rope loads the drives: its tension is a torque on each shaft, by virtual work,
-        which they take a sample later as their ``load_torque``. Off, as their tests were without
-        load; drives feel it by their ``motor_leakage`` and ``line_stiffness``. What the boom weighs
-        is not in it.
+        which they take a sample later as their ``load_torque``. Drives feel it by their
+        ``motor_leakage`` and ``line_stiffness``, which the packaged ones do not have: their tests
+        were without load. What the boom weighs is not in it.
     drag_area : float, default 0
         C_d A of the load, at most 100 000. [m²]
     wind : (float, float), default (0, 0)
@@ -106,7 +106,7 @@ class Setup(TypedDict, total=False):
     swing_damping: float | None
     load_offset: tuple[float, float]
     load_velocity: tuple[float, float]
-    loaded: bool
+    loaded: bool | None
     drag_area: float
     wind: tuple[float, float]
     brake: bool
@@ -296,7 +296,7 @@ def _fixed(
     swing_damping: float | None = None,
     load_offset: tuple[float, float] = (0.0, 0.0),
     load_velocity: tuple[float, float] = (0.0, 0.0),
-    loaded: bool = False,
+    loaded: bool | None = None,
     drag_area: float = 0.0,
     wind: tuple[float, float] = (0.0, 0.0),
     brake: bool = True,
@@ -343,6 +343,8 @@ def _fixed(
             "or a crane with another safe_load."
         )
     drag = AIR * drag_area / (2.0 * load) if load > 0.0 else 0.0  # which the suspension refuses
+    if loaded is None:
+        loaded = actuation != "ideal" and feels_load(crane)
     if loaded:
         _check_loaded(crane, actuation, load + suspension.hook, suspension)
     low, high = crane.boom_limits
@@ -388,9 +390,8 @@ def _check_loaded(crane: Crane, actuation: str, mass: float, suspension: Suspens
     """Refuse loads on drives that feel none, or that answer them faster than a sample."""
     if actuation == "ideal":
         raise InputError("Ideal drives follow at once, whatever the load: leave out 'loaded'.")
-    drives = {axis: getattr(crane, axis) for axis in AXES}
-    lost = {axis: _speed_lost(drive) for axis, drive in drives.items()}
-    if not any(lost.values()) and not any("line" in d.parameters.options for d in drives.values()):
+    lost = {axis: _speed_lost(getattr(crane, axis)) for axis in AXES}
+    if not feels_load(crane):
         raise InputError(
             f"No drive of {crane.name} feels a load: give one a motor_leakage or a "
             "line_stiffness, as crane.hoist.replace(motor_leakage=1e-6), or leave out 'loaded'."
@@ -410,6 +411,12 @@ def _compiled(drive: Drive, inputs: tuple[str, ...]) -> tuple[CompiledStep, Mach
     """A drive's step, and a machine at its start to copy."""
     made = drive.compiled_step(OUTPUTS, inputs=inputs, rate=RATE)
     return made, made.machine()
+
+
+def feels_load(crane: Crane) -> bool:
+    """Whether a drive of a crane turns in another way if its shaft is loaded."""
+    drives = [getattr(crane, axis) for axis in AXES]
+    return any("line" in drive.parameters.options or _speed_lost(drive) for drive in drives)
 
 
 @lru_cache(maxsize=64)
