@@ -199,7 +199,7 @@ class Studied(Operated):
     Options:
       control CONTROL: Control, as of 'run' after the colon; by default as it is designed for
           ideal drives.
-      seeds N: Number of seaways; judge takes 80 by default.
+      seeds N: Number of seaways; judge takes 120 by default.
       length S: Time for which each seaway counts, by default 600.
       run_in S: Time before it, by default 120; each run begins in a stationary swing.
       drives NAMES: ideal: follow at once; identified: the crane's own; volts: these, 10 V for full
@@ -235,7 +235,12 @@ class Studied(Operated):
     @cached_property
     def waters(self) -> Seaway | None:
         """The seaway, in ss3 if only the ship is given; None if nothing of either is."""
-        return self.seaway(default="ss3" if self._at_sea or self._lean else None)
+        from swashplate.crane.study import LENGTH, RUN_IN
+
+        counted = LENGTH if self.length is None else self.length
+        before = RUN_IN if self.run_in is None else self.run_in
+        given = self._at_sea or self._lean or self.length or self.run_in
+        return self.seaway(default="ss3" if given else None, length=counted + before)
 
     def sets(self) -> dict[str, Any]:
         """Sets of drives by name."""

@@ -47,6 +47,16 @@ def mean_of(values: Array, least: float = -inf) -> Estimate:
     return Estimate(mean, max(mean - half, least), mean + half)
 
 
+def rms_of(values: Array) -> Estimate:
+    """Root mean square over independent seaways of a root mean square in each; NaN are left out.
+
+    Its square is what a spectrum gives: the mean of the roots is smaller. The interval is the root
+    of Student's for the mean of the squares.
+    """
+    squares = mean_of(values**2, 0.0)
+    return Estimate(*np.sqrt(np.array(squares)).tolist())
+
+
 def share_of(hits: int, of: int, unknown: int = 0) -> Estimate:
     """Share of independent seaways with its exact interval (Clopper and Pearson 1934).
 

@@ -23,6 +23,7 @@ from swashplate.crane.confidence import (
     fewest_seaways,
     mean_of,
     more_seaways,
+    rms_of,
     share_of,
 )
 from swashplate.crane.control import Chain, Clip, Control, PositionLoop
@@ -52,8 +53,9 @@ Question = Literal["harm", "sufficiency"]
 QUESTIONS: tuple[Question, ...] = ("harm", "sufficiency")
 Decision = Literal["yes", "no", "not decided"]
 
-SEAWAYS = 80
-"""Seaways that are judged by default: the least that can tell an allowed share of 5 % are 72."""
+SEAWAYS = 120
+"""Seaways that are judged by default: 72 are the least that can tell an allowed share of 5 %, 110
+if one of them leaves the model with and without control."""
 FACTORS = (1.25, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0)
 """Factors on an in-line orifice that are tried, the smallest first."""
 SHARES = (0.8, 0.6, 0.4)
@@ -291,7 +293,7 @@ class Judgment(Tabular):
     def harm_sentence(self) -> str:
         """Whether the judged variant harms, and by how much it changes the swing."""
         share, seaways = self.worse(self.judged), len(self.study.seeds)
-        none, own = (np.degrees(mean_of(self.swing(name)).value) for name in (NONE, self.judged))
+        none, own = (np.degrees(rms_of(self.swing(name)).value) for name in (NONE, self.judged))
         drives = f"With the drives '{self.judged}' the controller"
         if self.idle:
             return (
@@ -400,19 +402,19 @@ class Judgment(Tabular):
         seaways, minutes = len(self.study.seeds), self.study.length / 60.0
         interval = [Column(head, ".2f", "rad", none="–") for head in ("rms", "from", "to")]
         table = Table(
-            f"Swing in {count(seaways, 'seaway')} of {minutes:g} min, means with 95 % intervals",
+            f"Swing in {count(seaways, 'seaway')} of {minutes:g} min, 95 % intervals",
             (
                 Column("variant", wrap=True),
                 *interval,
                 Column("in 3 h", ".2f", "rad", none="–"),
                 Column("left the model", "d"),
             ),
-            "in 3 h: most probable largest swing. Runs that left the model are not in the means",
+            "in 3 h: most probable largest swing. Runs that left the model are not in the RMS",
         )
         for name in self.names:
             table.add(
                 name,
-                *mean_of(self.swing(name), 0.0),
+                *rms_of(self.swing(name)),
                 largest_of(self.of(name), "swing").value,
                 sum(self.left(name).values()),
                 look=name != NONE and self.worse(name).value > self.allowed,
@@ -572,7 +574,7 @@ def judge(
     turns: bool = True,
     **study: Any,
 ) -> Judgment:
-    """Judge control on several sets of drives over seeded seaways, by default 80 of ten minutes.
+    """Judge control on several sets of drives over seeded seaways, by default 120 of ten minutes.
 
     Parameters
     ----------
@@ -739,7 +741,7 @@ def _trial(
             return None
         if only_if_sufficient and "no" in decisions:
             return None
-    swing = mean_of(np.array([outcome.rms_swing for outcome in outcomes]), 0.0)
+    swing = rms_of(np.array([outcome.rms_swing for outcome in outcomes]))
     return Remedy(
         what=what,
         size=size,

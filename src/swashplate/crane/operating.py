@@ -74,6 +74,7 @@ class Operability(Result):
     """Share of the year that can be worked, by variant, and what limits each sea."""
 
     crane: Crane = field(repr=False)
+    control: Control
     scatter: Scatter
     headings: tuple[float, ...]
     """[deg]"""
@@ -218,7 +219,7 @@ def operability(
         if too_slow < hoist[0] and column.variant == NONE:
             hoist = (too_slow, column.period, column.heading)
     ordered = {name: dict(sorted(of_name.items())) for name, of_name in cells.items()}
-    return Operability(crane, scatter, tuple(map(float, headings)), ordered, base, hoist)
+    return Operability(crane, control, scatter, tuple(map(float, headings)), ordered, base, hoist)
 
 
 class _Column(NamedTuple):

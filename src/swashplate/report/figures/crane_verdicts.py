@@ -17,7 +17,7 @@ from matplotlib.ticker import FixedLocator, FuncFormatter, MaxNLocator, NullLoca
 from numpy.typing import NDArray
 
 from swashplate.crane import LIMITED, Hull, Judged, Judgment, Operability
-from swashplate.crane.confidence import mean_of
+from swashplate.crane.confidence import rms_of
 from swashplate.crane.operating import WORKABLE, label_of
 from swashplate.crane.study import NONE
 from swashplate.report import style
@@ -159,7 +159,7 @@ def _swings(ax: Axes, result: Judgment) -> None:
 def _largest_swing(result: Judgment, swings: Sequence[Array]) -> float:
     """Largest number of a panel of swings [deg]; 1 if all runs left the model."""
     largest = max(float(np.nanmax(np.append(swing, 0.0))) for swing in swings)
-    ends = [mean_of(swing, 0.0).high for swing in swings]
+    ends = [rms_of(swing).high for swing in swings]
     # of very few seaways the interval is wider than a panel can show
     edge = max([largest, *(min(end, WIDEST * largest) for end in ends if isfinite(end))])
     if result.linear is not None:
@@ -182,7 +182,7 @@ def _swing_axis(ax: Axes, edge: float, *, broken: bool) -> None:
 
 def _diamond(ax: Axes, row: float, swing: Array) -> None:
     """The mean of a row as a diamond as wide as its interval; nothing if all left the model."""
-    mean = mean_of(swing, 0.0)
+    mean = rms_of(swing)
     if not isfinite(mean.value):
         return
     low, high = mean.low, mean.high
