@@ -26,7 +26,7 @@ def scatter():
 
 @pytest.fixture(scope="module")
 def found(crane, scatter):
-    return operability(crane, CLIPPED, scatter, headings=(90.0,), length=60.0, run_in=60.0)
+    return operability(crane, CLIPPED, scatter, headings=(90.0,), length=300.0, run_in=60.0)
 
 
 def test_without_control_the_frequency_domain_decides(crane, scatter, found):
@@ -78,7 +78,7 @@ def test_cells_near_a_limit_are_simulated_as_a_study_is(crane, scatter, found):
     assert simulated
     row, cell = simulated[0]
     sea = Seaway(Spectrum(float(scatter.height[row]), float(scatter.period[row])))
-    study = Study.of(crane, CLIPPED, seeds=(0, 1), sea=sea, drives=("identified",), length=60.0,
+    study = Study.of(crane, CLIPPED, seeds=(0, 1), sea=sea, drives=("identified",), length=300.0,
                      run_in=60.0)  # fmt: skip
     outcomes = [one for (one,) in study.outcomes([study.cases["identified"]])]
     assert not any(outcome.left for outcome in outcomes)
@@ -87,7 +87,7 @@ def test_cells_near_a_limit_are_simulated_as_a_study_is(crane, scatter, found):
 
 def test_small_waves_are_not_simulated(crane):
     calm = Scatter.of([0.02], [7.0], [1.0])
-    found = operability(crane, CLIPPED, calm, headings=(90.0,), length=60.0)
+    found = operability(crane, CLIPPED, calm, headings=(90.0,), length=300.0)
     assert not any(cell.simulated for cells in found.cells.values() for cell in cells.values())
     assert found.workable("identified") == 1.0
     assert NEAR > 1.0
@@ -96,7 +96,7 @@ def test_small_waves_are_not_simulated(crane):
 def test_huge_waves_leave_the_model_and_say_so(crane):
     storm = Scatter.of([9.0], [12.0], [1.0])
     found = operability(crane, CLIPPED, storm, headings=(90.0,), drives=("identified",),
-                        length=60.0)  # fmt: skip
+                        length=300.0)  # fmt: skip
     assert found.workable("identified") == 0.0
     (cell,) = found.cells["identified"].values()
     assert cell.limited_by not in (WORKABLE, "")
@@ -111,7 +111,7 @@ def test_the_hoist_is_too_slow_from_a_height_on(crane, scatter, found):
 
 
 def test_numbers_do_not_depend_on_who_runs_them(crane, scatter, found):
-    how = {"headings": (90.0,), "length": 60.0, "run_in": 60.0}
+    how = {"headings": (90.0,), "length": 300.0, "run_in": 60.0}
     for executor in (Serial(), Threads(3)):
         again = operability(crane, CLIPPED, scatter, executor=executor, **how)
         assert again.cells == found.cells or all(
@@ -128,6 +128,8 @@ def test_table_has_a_row_for_each_variant(found):
 def test_a_crane_without_limits_has_no_operability(crane, scatter):
     with pytest.raises(InputError, match=r"has no limits: give its file a table \[limits\]"):
         operability(replace(crane, limits={}), CLIPPED, scatter)
+    with pytest.raises(InputError, match="simulated for 100 s, but .* need 300 s at least"):
+        operability(crane, CLIPPED, scatter, length=100.0)
 
 
 # --- scatter diagrams -----------------------------------------------------------------------------

@@ -119,7 +119,7 @@ def year(crane):
     own |= {(2, 0.0): bad, (2, 90.0): bad}
     cells = {"no control": none, "identified": own}
     hoist = (0.7, 8.0, 90.0)
-    return Operability(crane, scatter, (0.0, 90.0), cells, Seaway(), hoist)
+    return Operability(crane, CLIPPED, scatter, (0.0, 90.0), cells, Seaway(), hoist)
 
 
 def written(write, result, folder):
@@ -249,10 +249,12 @@ def test_figure_of_a_judgment_tells_seaways_from_the_means_interval(judged, asse
     ):
         expected = np.degrees(judged.swing(name))
         np.testing.assert_allclose(np.sort(points.get_offsets()[:, 0]), np.sort(expected))
-        half = stats.sem(expected) * stats.t.ppf(0.975, 2)
+        # the root of the mean square, and of its interval
+        squares = expected**2
+        half = stats.sem(squares) * stats.t.ppf(0.975, 2)
         across = diamond.get_xy()[:, 0]
-        assert across.max() == pytest.approx(expected.mean() + half)
-        assert across.min() == pytest.approx(max(expected.mean() - half, 0.0))
+        assert across.max() == pytest.approx(np.sqrt(squares.mean() + half))
+        assert across.min() == pytest.approx(np.sqrt(max(squares.mean() - half, 0.0)))
     (line,) = swing.collections[3].get_segments()
     assert line[0, 0] == pytest.approx(np.degrees(judged.linear.values["swing"].rms))
 

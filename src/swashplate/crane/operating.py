@@ -46,6 +46,8 @@ NEAR = 1.3
 """Factor within which of a limit the frequency domain is not relied on."""
 SEEDS = (0, 1)
 """Seaways in which a cell is simulated, ten minutes each."""
+SHORTEST = 300.0
+"""Least time for which each of them counts: some fifty peaks of a swing. [s]"""
 ACTS = 0.05
 """Share of time at a limit from which on a drive is what limits a cell."""
 WORKABLE = ""
@@ -201,6 +203,11 @@ def operability(
         raise InputError("Operability needs one heading of the waves at least.")
     base = Seaway() if sea is None else sea
     study = Study.of(crane, control, seeds=SEEDS, sea=base, drives=drives, **setup)
+    if study.length < SHORTEST:
+        raise InputError(
+            f"A sea is simulated for {study.length:g} s, but its largest values in three hours need "
+            f"{SHORTEST:g} s at least."
+        )
     columns = [
         _Column(name, float(heading), float(period))
         for name in study.cases
