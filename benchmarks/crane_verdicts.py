@@ -31,7 +31,7 @@ from swashplate.crane import (
     operability,
     read_ship,
 )
-from swashplate.crane.judgment import largest_of
+from swashplate.crane.judgment import Judgment, largest_of
 
 IDEAL_DESIGN = (
     control.DelayedFeedback(0.2, 0.2) | control.ShipCompensation() | control.PositionLoop(1.5)
@@ -43,40 +43,37 @@ HOURS = 10_800.0
 
 def stability(sets: int, hours: float) -> None:
     """Print the verdicts of other seaways and other lengths."""
-    crane = Crane.preset("tg3637")
-    print(
-        "control            counted  seaways  harmless              sufficient            RMS ± half"
-    )
+    lengths = ((600.0, 120, sets), (1200.0, 120, sets), (3600.0 * hours, 72, 2))
+    print("control, time that counts, seaways, harmless, sufficient, half widths of the RMS")
     for name, law in (("for ideal drives", IDEAL_DESIGN), ("clipped", CLIPPED)):
-        for length, seaways, count in (
-            (600.0, 120, sets),
-            (1200.0, 120, sets),
-            (3600.0 * hours, 72, 2),
-        ):
-            harmless, sufficient, widths = [], [], []
+        for length, seaways, count in lengths:
             for first in range(count):
-                judged = judge(
-                    crane,
-                    law,
-                    seeds=range(1000 * first, 1000 * first + seaways),
-                    drives=("identified",),
-                    length=length,
-                    remedies=False,
-                    turns=False,
-                )
-                harmless.append(judged.harmless)
-                sufficient.append(judged.sufficient)
-                for variant in judged.names:
-                    swing = judged.swing(variant)
-                    mean = np.mean(swing**2)
-                    error = 1.98 * np.std(swing**2, ddof=1) / sqrt(swing.size)
-                    widths.append(0.5 * error / mean)
-                answers = ", ".join(f"{w:.1%}" for w in widths[-2:])
-                print(
-                    f"{name:18s} {length:7.0f} {seaways:8d}  {harmless[-1]:20s}  "
-                    f"{sufficient[-1]!s:20s}  {answers}",
-                    flush=True,
-                )
+                judged = one_verdict(law, range(1000 * first, 1000 * first + seaways), length)
+                widths = ", ".join(f"{half_width(judged.swing(each)):.1%}" for each in judged.names)
+                answers = f"{judged.harmless}, {judged.sufficient}"
+                print(f"{name}, {length:g} s, {seaways}, {answers}, {widths}", flush=True)
+
+
+def one_verdict(law: control.Control, seeds: range, length: float) -> Judgment:
+    """The verdict on the packaged crane's own drives in some seaways."""
+    return judge(
+        Crane.preset("tg3637"),
+        law,
+        seeds=seeds,
+        drives=("identified",),
+        length=length,
+        remedies=False,
+        turns=False,
+    )
+
+
+def half_width(swing: np.ndarray) -> float:
+    """Half of the 95 % interval of a root mean square, over it."""
+    known = swing[np.isfinite(swing)]
+    if known.size < 2:
+        return float("nan")
+    squares = known**2
+    return 0.99 * float(squares.std(ddof=1)) / sqrt(known.size) / float(squares.mean())
 
 
 def cells(count: int) -> None:
@@ -110,11 +107,12 @@ def cells(count: int) -> None:
             ratio = ratios[worst]
         same = (cell.limited_by == "") == (ratio <= 1.0)
         right += same
-        how = "simulated" if cell.simulated else "spectrum"
+        height, period = scatter.height[row], scatter.period[row]
+        how = "simulated" if cell.simulated else "by spectrum"
         print(
-            f"{name:12s} {scatter.height[row]:5.2f} m {scatter.period[row]:5.1f} s {heading:4.0f}°  "
-            f"{cell.limited_by or 'workable':18s} {cell.ratio:6.2f} {how:10s} 3 h: {ratio:6.2f} "
-            f"{worst if ratio > 1 else 'workable':22s} {'' if same else 'DIFFERS'}",
+            f"{name}, {height:g} m, {period:g} s, {heading:g} deg: "
+            f"{cell.limited_by or 'workable'} {cell.ratio:.2f} {how}; in 3 h {ratio:.2f} "
+            f"{worst if ratio > 1.0 else 'workable'}{'' if same else ' DIFFERS'}",
             flush=True,
         )
     print(f"{right} of {count} the same")
