@@ -3,11 +3,13 @@
     .venv/bin/python benchmarks/crane_verdicts.py stability [--sets 10] [--hours 3]
     .venv/bin/python benchmarks/crane_verdicts.py cells [--cells 20]
     .venv/bin/python benchmarks/crane_verdicts.py spectrum
+    .venv/bin/python benchmarks/crane_verdicts.py controllers [--seaways 80]
 
 stability: the verdicts of sets of other seaways, which count for 10 min, 20 min and hours.
 cells: cells of the made-up year, drawn at random, against a run of three hours each.
 spectrum: swing without control by simulation over that by its spectrum, for ships, headings and
 damping ratios; small waves, so that the crane is linear.
+controllers: those that the package has, on the packaged crane's own drives in sea state 3 abeam.
 """
 
 from __future__ import annotations
@@ -18,6 +20,7 @@ from pathlib import Path
 
 import numpy as np
 
+from swashplate.cli.crane_options import control_of
 from swashplate.crane import (
     Crane,
     Hull,
@@ -31,6 +34,7 @@ from swashplate.crane import (
     operability,
     read_ship,
 )
+from swashplate.crane.confidence import rms_of
 from swashplate.crane.judgment import Judgment, largest_of
 
 IDEAL_DESIGN = (
@@ -141,12 +145,58 @@ def spectrum() -> None:
             print(f"{name:16s} {heading:4.0f}°  " + "  ".join(row), flush=True)
 
 
+CONTROLLERS = (
+    "feedback=0.2/0.2+loop=1.5",
+    "feedback=0.2/0.2+ship+loop=1.5",
+    "ship+clip",
+    "feedback=0.2/0.2+clip",
+    "feedback=0.2/0.2+ship+clip",
+    "feedback=0.2/0.2+ship+clip+sensors=0.1/0.05/50",
+    "feedback=0.2/0.2+ship+clip+sensors=0.5/0.2/10",
+    "feedback=0.2/0.2+ship+clip+sensors=1/0.5/5",
+    "feedback=0.1/0.25+clip",
+    "feedback=0.3/0.25+clip",
+)
+"""As the command line takes them."""
+
+
+def controllers(seaways: int) -> None:
+    """Print a row for each controller, as a table of Markdown."""
+    laws = {words: control_of(words) for words in CONTROLLERS}
+    judged = judge(
+        Crane.preset("tg3637"),
+        laws,
+        seeds=range(seaways),
+        drives=("identified",),
+        remedies=False,
+        turns=False,
+    )
+    print(
+        "| `--control` | swing, RMS | worse than none | largest swing in 3 h | place | saturation |"
+    )
+    print("|---|--:|--:|--:|--:|--:|")
+    for name in judged.names:
+        words = name.partition(", ")[0]
+        swing = np.degrees(rms_of(judged.swing(name)))
+        left = sum(judged.left(name).values())
+        worse = "" if name == "no control" else f"{judged.worse(name).value:.0%}"
+        limited = {each.name: each.largest.value for each in judged.limited(name)}
+        rms = "–" if np.isnan(swing[0]) else f"{swing[0]:.2f}°"
+        gone = f" ({left} left)" if left else ""
+        print(
+            f"| {words} | {rms}{gone} | {worse} | {np.degrees(limited['swing']):.0f}° | "
+            f"{limited['placement']:.1f} m | {limited['saturation']:.0%} |",
+            flush=True,
+        )
+
+
 def main() -> None:
     """Run what is asked for."""
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("what", choices=("stability", "cells", "spectrum"))
+    parser.add_argument("what", choices=("stability", "cells", "spectrum", "controllers"))
+    parser.add_argument("--seaways", type=int, default=80)
     parser.add_argument("--sets", type=int, default=10)
     parser.add_argument("--hours", type=float, default=3.0)
     parser.add_argument("--cells", type=int, default=20)
@@ -155,6 +205,8 @@ def main() -> None:
         stability(given.sets, given.hours)
     elif given.what == "cells":
         cells(given.cells)
+    elif given.what == "controllers":
+        controllers(given.seaways)
     else:
         spectrum()
 

@@ -302,7 +302,8 @@ def swept(crane, over, points, values):
     seaways = np.stack([both, 0.5 * both], axis=-1)
     seaways[1] *= 1.1
     points = np.radians(points) if over == "bearing" else np.asarray(points)
-    return Sweep(over, points, ("no control", "identified"), seaways, crane, Seaway())
+    names, spectrum = ("no control", "identified"), np.full(len(points), 0.1)
+    return Sweep(over, points, names, seaways, spectrum, crane, Seaway())
 
 
 @pytest.mark.parametrize("over", ["bearing", "height", "orifice"])

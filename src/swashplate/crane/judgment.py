@@ -503,11 +503,16 @@ class Judgment(Tabular):
             "swing. Control harms if it is worse than none in more than "
             f"{100.0 * self.allowed:g} % of them; the 95 % interval of that share decides."
         )
+        seaway, spectrum = study.seaway, study.seaway.spectrum
+        waves = (
+            f"Waves of {spectrum.height:g} m with a peak at {spectrum.period:g} s and a peak "
+            f"factor of {spectrum.peak_factor:g}, at a heading of {seaway.heading_deg:g} deg."
+        )
         none = study.cases[NONE]
         damping, given = none.swing_damping, "swing_damping" in none.hangs
         assumed = not given and crane.quantities["swing_damping"].status == "assumed"
         words = f"The load's swing has a damping of {100.0 * damping:g} %"
-        sentences = [rule, f"{words}, assumed." if assumed else f"{words}."]
+        sentences = [rule, waves, f"{words}, assumed." if assumed else f"{words}."]
         ship = study.seaway.ship
         if isinstance(ship, Hull):
             words = f"The ship's roll period is {ship.roll_period:g} s"
