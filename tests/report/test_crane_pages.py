@@ -322,7 +322,7 @@ def test_figures_of_sweeps_mark_where_a_run_left_the_model(over, crane, assert_l
     line = ax.lines[0]
     assert list(np.isnan(line.get_ydata())[:4]) == [False, False, True, False]
     if over != "bearing":
-        assert line.get_ydata()[0] == pytest.approx(0.5 * (2.0 + 2.2))
+        assert line.get_ydata()[0] == pytest.approx(np.sqrt(0.5 * (2.0**2 + 2.2**2)))
 
 
 @pytest.mark.parametrize(
