@@ -27,8 +27,8 @@ FIGURES = {
     ),
     "full-order.png": ("full-order hoist step:4 --plot full-order.png",),
     "crane.png": (
-        "crane run tg3637 --slew 1 --until slew_deg=45 --variant volts --variant volts:zv-joint "
-        "--variant inverse:zv-joint --variant inverse:zv-tip --variant ideal:zv-tip "
+        "crane run tg3637 --slew 1 --until slew_deg=45 --variant volts "
+        "--variant inverse --variant inverse:zv-tip --variant ideal:zv-tip "
         "--plot crane.png",
     ),
     "crane-judge.png": (

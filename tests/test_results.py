@@ -123,7 +123,7 @@ def cranes() -> list[object]:
     grid = TransferFunctions(
         "box", np.zeros(1), np.array([0.0, np.pi]), np.linspace(0.5, 2.0, 30), values
     )
-    parts = (control.JointShaper("zvd"), control.ShipCompensation(), control.PositionLoop(0.7))
+    parts = (control.TipShaper("zvd"), control.ShipCompensation(), control.PositionLoop(0.7))
     return [crane, stick, waves, feedback, *parts, run, grid, CraneStepper(crane)]
 
 

@@ -1,11 +1,14 @@
 """``swashplate crane``, the crane's file and figure."""
 
+from dataclasses import replace
+
+import numpy as np
 import polars as pl
 import pytest
 from typer.testing import CliRunner
 
 from swashplate.cli import app
-from swashplate.crane import Crane
+from swashplate.crane import Crane, Seaway, Spectrum, Stick, Suspension, simulate
 from swashplate.errors import FileError, InputError, ParameterError
 
 
@@ -18,7 +21,7 @@ def test_show_marks_what_is_assumed_and_its_file_is_a_crane(tmp_path):
     assert shown.exit_code == 0
     rows = [line.split() for line in shown.stdout.splitlines()]
     assert ["foot", "offset", "2.5", "m", "assumed"] in rows
-    assert sum("assumed" in row for row in rows[3:]) == 12
+    assert sum("assumed" in row for row in rows[3:]) == 13
     mine = tmp_path / "mine.toml"
     mine.write_text(said("show", "tg3637", "--toml").stdout, "utf-8")
     assert Crane.from_toml(mine).geometry == Crane.preset("tg3637").geometry
@@ -33,11 +36,14 @@ def test_run_compares_variants_and_writes_signals_and_a_figure(tmp_path):
     )  # fmt: skip
     assert both.exit_code == 0, both.output
     rows = {line.split()[0]: line.split()[1:] for line in both.stdout.splitlines() if line.strip()}
-    assert rows["ideal:zv-tip"][:1] == ["0.03"]
+    # undamped it is 0.03; what damping takes off the first impulse is left of the second
+    assert 0.01 < float(rows["ideal:zv-tip"][0]) < 0.1
     assert (tmp_path / "run.png").stat().st_size > 10_000
     out, scene = tmp_path / "run.parquet", tmp_path / "scene.html"
     files = ["--out", str(out), "--scene", str(scene)]
-    one = said("run", "tg3637", *words, "--sea", "ss2,90,1", "--variant", "identified", *files)
+    one = said(
+        "run", "tg3637", *words, "--sea", "ss2", "--seed", "1", "--variant", "identified", *files
+    )
     assert one.exit_code == 0, one.output
     assert "Hägglunds TG3637" in scene.read_text("utf-8")
     table = pl.read_parquet(out)
@@ -45,7 +51,62 @@ def test_run_compares_variants_and_writes_signals_and_a_figure(tmp_path):
     assert {"time", "stick_slew", "load_x", "pull", "voltage_luff", "swing"} <= set(table.columns)
 
 
-JUDGE = ["judge", "tg3637", "--seeds", "3", "--no-remedies"]
+def test_run_takes_sea_ship_and_load_as_they_are_given(tmp_path):
+    out = tmp_path / "run.parquet"
+    words = (
+        "--length 6 --sea 0.8,2.5,3.3,spread --heading 60 --seed 2 --roll-period 16 --speed 2 "
+        "--roll-damping 0.1 --list 3 --trim -1 --reference -12,0,9 --suspension stiffness=6e7 "
+        "--suspension bounce_damping=0.05 --drag-area 12 --wind 10,-5 --at slew_deg=90"
+    )
+    shown = said("run", "tg3637", *words.split(), "--out", str(out))
+    assert shown.exit_code == 0, shown.output
+    assert "% of the energy of the sea (0.8 m, 2.5 s) lies outside" in " ".join(
+        shown.stdout.split()
+    )
+    sea = Seaway(
+        Spectrum(0.8, 2.5, 3.3),
+        heading_deg=60.0,
+        seed=2,
+        ship=replace(Seaway().ship, roll_period=16.0, roll_damping=0.1),
+        speed=2.0,
+        spread=True,
+        list_deg=3.0,
+        trim_deg=-1.0,
+        reference=(-12.0, 0.0, 9.0),
+    )
+    run = simulate(
+        Crane.preset("tg3637"),
+        Stick.rest(6.0),
+        sea=sea,
+        slew_deg=90.0,
+        suspension=Suspension(stiffness=6e7, bounce_damping=0.05),
+        drag_area=12.0,
+        wind=(10.0, -5.0),
+    )
+    table = pl.read_parquet(out)
+    for i, name in enumerate(["surge", "sway", "heave", "roll", "pitch", "yaw"]):
+        np.testing.assert_array_equal(table[name].to_numpy(), run.ship[:, i])
+    np.testing.assert_array_equal(table["load_y"].to_numpy(), run.load[:, 1])
+
+
+def test_a_ship_has_its_list_in_calm_water_too(tmp_path):
+    out = tmp_path / "run.parquet"
+    shown = said("run", "tg3637", "--length", "2", "--list", "4", "--out", str(out))
+    assert shown.exit_code == 0, shown.output
+    table = pl.read_parquet(out)
+    np.testing.assert_allclose(np.degrees(table["roll"].to_numpy()), 4.0)
+    assert not table["heave"].to_numpy().any()
+
+
+@pytest.mark.slow
+def test_follow_takes_a_sea_of_numbers():
+    shown = said("follow", "tg3637", "--sea", "1.5,8", "--heading", "180")
+    rows = [line.split("  ")[0].strip() for line in shown.stdout.splitlines()]
+    assert "1.5 m, 8 s" in rows
+    assert "ss3" not in rows
+
+
+JUDGE = ["judge", "tg3637", "--seeds", "3", "--length", "60", "--no-remedies", "--no-turns"]
 
 
 @pytest.mark.slow
@@ -53,43 +114,58 @@ def test_judge_ends_with_the_verdict_as_its_exit_code(tmp_path):
     page, table = tmp_path / "judge.html", tmp_path / "judge.csv"
     fails = said(*JUDGE, "--out", str(table), "--plot", str(tmp_path / "judge.png"))
     assert fails.exit_code == 1, fails.output
-    assert "Fails: The controller makes swing worse than none in" in fails.stderr
+    assert "3 seaways cannot show that control does no harm: 72 are needed" in fails.stderr
+    assert "Fails: With the drives 'identified' the controller harms:" in fails.stderr
+    assert "It does not suffice: in 3 h" in " ".join(fails.stderr.split())
     assert "Numbers of every seaway, in SI:" in fails.stdout
+    assert "no control, by its spectrum" in fails.stdout
     found = pl.read_csv(table)
     assert found.height == 9
-    worse = found.pivot(on="variant", index="seed", values="rms_swing")
-    hits = (worse["identified"] > worse["no control"]).sum()
-    assert f"in {hits} of 3 seaways" in " ".join(fails.stderr.split())
-    # 3 of 3 seaways say that less than 71 % are worse, but not that less than 5 % are
-    better = ["--scale", "luff.orifice=4"]
-    works = said(*JUDGE, *better, "--allowed", "75", "--out", str(page))
-    assert works.exit_code == 0, works.output
-    assert "Works: With the drives 'luff orifice ×4' the controller brings the swing" in " ".join(
-        works.stdout.split()
+    worse = (
+        found.filter(pl.col("variant") == "identified")["rms_swing"].to_numpy()
+        > found.filter(pl.col("variant") == "no control")["rms_swing"].to_numpy()
     )
-    assert "Works: With the drives" in page.read_text("utf-8")
-    open_ = said(*JUDGE, *better)
+    left = (found.filter(pl.col("variant") == "identified")["left"].fill_null("") != "").sum()
+    assert f"in {worse.sum() + left} of 3 seaways" in " ".join(fails.stderr.split())
+    # 3 of 3 seaways say that less than 71 % are worse, but not that less than 5 % are
+    clipped = ["--control", "feedback=0.2/0.2+ship+clip", "--ask", "harm"]
+    passes = said(*JUDGE, *clipped, "--allowed", "75", "--out", str(page))
+    assert passes.exit_code == 0, passes.output
+    assert "Passes: With the drives 'identified' the controller does no harm" in " ".join(
+        passes.stdout.split()
+    )
+    assert "does no harm" in page.read_text("utf-8")
+    open_ = said(*JUDGE, *clipped)
     assert open_.exit_code == 1
-    assert "Not decided: With the drives 'luff orifice ×4' the controller" in " ".join(
+    assert "Not decided: With the drives 'identified' the controller" in " ".join(
         open_.stderr.split()
     )
-    assert "luff orifice ×4" in page.read_text("utf-8")
 
 
 @pytest.mark.slow
-def test_follow_and_sectors_print_their_tables(tmp_path):
+def test_operability_writes_one_page_and_one_table(tmp_path):
+    site, page = tmp_path / "site.csv", tmp_path / "year.html"
+    site.write_text("hs [m],tp [s],share\n0.25,6,60\n1.25,8,40\n", "utf-8")
+    shown = said("operability", "tg3637", str(site), "--headings", "90", "--out", str(page))
+    assert shown.exit_code == 0, shown.output
+    assert "Share of the year, and what limits the rest first" in shown.stdout
+    assert page.read_text("utf-8").count("<table") >= 1
+    assert "made up" not in shown.stdout
+
+
+@pytest.mark.slow
+def test_follow_and_a_sweep_print_their_tables(tmp_path):
     found = said("follow", "tg3637", "--sea", "ss3", "--plot", str(tmp_path / "follow.png"))
     rows = {each.split()[0]: each.split()[1:] for each in found.stdout.splitlines() if each.strip()}
     # of an independent model: 0.110 m/s² along the boom, limited by acceleration at 8 s
     assert float(rows["8.0"][2]) == pytest.approx(0.110 / (2 * 3.14159 / 8.0) ** 2, abs=1.5e-3)
     assert {"ss3"} < set(rows)
     assert "ss4" not in rows
-    around = said(
-        "sectors", "tg3637", "--points", "0,90,180,270", "--seeds", "1", "--drives", "identified"
-    )
+    words = "sweep tg3637 bearing --points 0,90,180 --seeds 1 --drives identified --length 60"
+    around = said(*words.split())
     assert around.exit_code == 0, around.output
-    bearings = [each.split()[0] for each in around.stdout.splitlines() if each.strip()][-4:]
-    assert bearings == ["0", "90", "180", "270"]
+    rows = [line.split()[0] for line in around.stdout.splitlines() if line.strip()]
+    assert [row for row in rows if row in ("0", "90", "180")] == ["0", "90", "180"]
 
 
 @pytest.mark.parametrize(
@@ -106,19 +182,45 @@ def test_follow_and_sectors_print_their_tables(tmp_path):
         ("judge tg3637 --allowed 200", "allowed is 2, but is a share of seaways"),
         ("judge tg3637 --out judge.pdf", "a verdict is written as"),
         ("follow tg3637 --sea ss9", "There is no sea 'ss9'"),
-        ("sweep tg3637 orifice --points 1,much", "--points 1,much: 'much' is no number."),
+        ("sweep tg3637 orifice --points 1,much", "--points 1,much: 'much' is not a number."),
         ("sweep tg3637 wind", "There is no sweep over 'wind'; there are bearing, height, orifice"),
         ("sweep tg3637 height --ship hull.4", "a .4 of WAMIT, and no other file, needs the length"),
         ("run tg --slew 1", "There is no packaged crane 'tg'; there is tg3637."),
         ("run tg3637 --variant fast", "actuation is 'fast'; it is ideal, volts, inverse."),
-        ("run tg3637 --variant ideal:magic", "There is no control 'magic'; there are zv-joint"),
-        ("run tg3637 --sea ss3,90,1,2", "--sea ss3,90,1,2 is too much: write one sea, --sea ss3"),
-        ("run tg3637 --sea ss3,90,1.5", "The seed of a seaway is 1.5, but must be 0, 1, 2"),
-        ("judge tg3637 --sea ss3,90,1", "is too much: write one sea, --sea ss3,90."),
+        ("run tg3637 --sea ss3,90,1", "no numbers; write --sea ss3 --heading 90 --seed 1."),
+        ("judge tg3637 --sea ss3,90", "no numbers; write --sea ss3 --heading 90."),
+        ("run tg3637 --sea 1.5", "--sea 1.5: write a name, --sea ss3, or significant height"),
+        ("run tg3637 --sea 1.5,8,1,90", "or significant height in m and peak period in s, --sea"),
+        ("run tg3637 --sea 1.5,eight", "--sea 1.5,eight: 'eight' is not a number."),
+        ("run tg3637 --sea 1.5,spread,8", "--sea 1.5,spread,8: 'spread' is not a number."),
+        ("run tg3637 --sea 90,8", "The height of a sea is 90, but must be above 0 and at most 30"),
+        ("run tg3637 --heading 30", "--heading needs a sea: give --sea, as --sea ss3."),
+        ("run tg3637 --seed 3", "--seed needs a sea: give --sea, as --sea ss3."),
+        ("run tg3637 --roll-period 9", "--roll-period needs a sea: give --sea, as"),
+        ("run tg3637 --sea ss3 --list 60", "List and trim are 60 and 0 deg, but must be within"),
+        ("run tg3637 --sea ss3 --reference 1,2", "--reference 1,2: write --reference -12,0,9."),
+        ("run tg3637 --wind 5,5", "--wind 5,5 blows on nothing: give the load's --drag-area"),
+        ("run tg3637 --wind 5 --drag-area 9", "--wind 5: write --wind 10,-5."),
+        (
+            "run tg3637 --suspension rope=3",
+            "--suspension has no rope; it has stiffness,",
+        ),
+        (
+            "judge tg3637 --ship hull.re1 --roll-period 9",
+            "--ship hull.re1 has its own roll: leave --roll-period and --roll-damping out",
+        ),
+        ("sweep tg3637 bearing --at slew_deg=3", "A sweep over the bearing sets slew_deg itself"),
+        ("judge tg3637 --ask safety", "no question 'safety'; there are harm, sufficiency"),
+        ("judge tg3637 --length 20", "must count for at least 60 s, eight swings"),
+        ("operability tg3637 --headings 1,x", "--headings 1,x: 'x' is not a number."),
+        ("operability tg3637 none.csv", "none.csv"),
+        ("run tg3637 --variant ideal:magic", "There is no control 'magic'; there are zv-tip"),
+        ("run tg3637 --variant ideal:sensors=0.1/9", "delay of sensors is 9.0, but must be"),
+        ("run tg3637 --variant ideal:sensors=1/2/3/4", "There is no control 'sensors=1/2/3/4'"),
         ("judge tg3637 --sea ss3 --sea ss2", "--sea ss3 --sea ss2 is too much: write one sea"),
         ("run tg3637 --variant direct", "With direct actuation commands are voltages"),
         ("run tg3637 --drive luff=none", "or the result or folder of a fit, but there is no such"),
-        ("run tg3637 --ship hull.re1", "--ship hull.re1 needs a --sea to move in."),
+        ("run tg3637 --ship hull.re1", "--ship needs a sea: give --sea, as --sea ss3."),
         ("run tg3637 --at rope=3", "--at has no rope; it has slew_deg, boom_deg, rope_m."),
         ("run tg3637 --drive boom=hoist", "A crane has no drive 'boom'; it has hoist, slew, luff."),
         ("judge tg3637 --scale boom.orifice=2", "the axes are hoist, slew, luff."),
@@ -146,6 +248,7 @@ def test_wrong_words_end_in_one_sentence(words, sentence):
         ({"boom_length": True}, "boom_length is True, but must be one number"),
         ({"boom_limits": "39"}, "boom_limits is '39', but must be a list of 2 numbers"),
         ({"slew_axis": 3.0}, "slew_axis must be a list of 3 numbers, not 1"),
+        ({"swing_damping": 0.5}, "swing_damping is 0.5, but on a crane it is 0 to 0.2"),
         ({"jib": 3.0}, "A crane has no jib; it has boom_length"),
     ],
 )

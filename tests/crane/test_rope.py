@@ -220,6 +220,87 @@ def test_rope_too_short_for_the_step_is_refused():
         load_motion(tip[:, :2], 2.0)
 
 
+# --- damping of the swing -------------------------------------------------------------------------
+
+
+def decrement(x):
+    """Damping ratio by the logarithmic decrement of all peaks but the first."""
+    peaks = highest(x)
+    peaks = peaks[x[peaks] > 0.0][1:]
+    decay = np.polyfit(np.arange(peaks.size), np.log(x[peaks]), 1)[0] / (2.0 * pi)
+    return -decay / sqrt(1.0 + decay**2)
+
+
+@pytest.mark.parametrize("ratio", [0.002, 0.005, 0.02])
+def test_a_small_free_swing_decays_by_its_damping_ratio(ratio):
+    made = load_motion(still(200.0), 20.0, start=swung(0.5), velocity=REST, swing_damping=ratio)
+    assert decrement(made.position[:, 0]) == pytest.approx(ratio, rel=2e-4)
+    # the amplitude takes 5e-6 of it, and the velocity of half a sample ago adds ζ ω h/2
+    omega = 2.0 * pi / np.diff(rising(made.position[:, 0], RATE)).mean()
+    assert omega / sqrt(G / 20.0) == pytest.approx(sqrt(1.0 - ratio**2), abs=1.5e-5)
+
+
+def test_a_forced_swing_has_the_damped_amplitude_and_only_the_motion_past_the_tip_is_damped():
+    # x'' = -ω₀² (x - p) - 2 ζ ω₀ (x' - p') with p = a sin ωt, at resonance
+    omega, ratio = sqrt(G / 20.0), 0.05
+    time, tip = clock(400.0), still(400.0)
+    tip[:, 1] = 0.01 * np.sin(omega * time)
+    made = load_motion(tip, 20.0, velocity=REST, swing_damping=ratio)
+    away = (made.position - tip)[-round(60.0 * RATE) :, 1]
+    assert away.max() == pytest.approx(0.01 / (2.0 * ratio), rel=2e-3)
+    steady = still(30.0)
+    steady[:, 0] = 3.0 * clock(30.0)
+    led = load_motion(steady, 20.0, swing_damping=0.2)
+    np.testing.assert_allclose(led.position[:, 0], steady[:, 0], atol=1e-10)
+
+
+def test_damping_of_the_swing_leaves_a_straight_hoist_as_it_is():
+    length = 20.0 - 1.0 * clock(10.0) + 0.3 * np.sin(clock(10.0))
+    free, damped = (
+        load_motion(still(10.0), length, velocity=[0.0, 0.0, 0.7], swing_damping=ratio)
+        for ratio in (0.0, 0.2)
+    )
+    np.testing.assert_allclose(damped.pull, free.pull, rtol=1e-9)
+    np.testing.assert_allclose(damped.position, free.position, atol=1e-12)
+    # nor does it damp the bounce of an elastic rope
+    suspension = Suspension(6e7, 0.0)
+    bounces = [
+        load_motion(
+            still(10.0),
+            20.0,
+            start=[0.0, 0.0, -20.3],
+            velocity=REST,
+            suspension=suspension,
+            mass=35000.0,
+            swing_damping=ratio,
+        )
+        for ratio in (0.0, 0.2)
+    ]
+    np.testing.assert_allclose(bounces[1].position, bounces[0].position, atol=1e-12)
+
+
+def test_first_mode_of_a_hook_with_slings_decays_by_about_the_damping_ratio():
+    made = load_motion(
+        still(300.0),
+        15.0,
+        start=[0.1, 0.0, -sqrt(21.0**2 - 0.1**2)],
+        velocity=REST,
+        suspension=Suspension(hook=5000.0, sling=6.0),
+        mass=30000.0,
+        swing_damping=0.01,
+    )
+    # x_load = g/(g - l ω²) x_hook in the second mode, which falls out
+    share = G / (G - 6.0 * 3.94158260**2)
+    first = made.position[:, 0] - share * made.hook[:, 0]
+    # damped as √(g/(L + l)) = 0.68336 rad/s, while the mode has 0.69387
+    assert decrement(first) == pytest.approx(0.01 * 0.68336 / 0.69387, rel=2e-3)
+
+
+def test_damping_beyond_its_range_is_refused():
+    with pytest.raises(InputError, match="swing_damping is 0.3, .* at most 0.2; loads on ropes"):
+        load_motion(still(1.0), 20.0, swing_damping=0.3)
+
+
 # --- elastic rope, hook and slings ----------------------------------------------------------------
 
 
@@ -287,10 +368,10 @@ def test_hook_and_load_fall_together_and_are_caught_together():
         (lambda: Suspension(stiffness=1e300), "rope's stiffness is 1e.300 N, .* inf for a rigid"),
         (lambda: Suspension(hook=1e300, sling=2.0), "hook is 1e.300, .* at most 1e.06"),
         (lambda: Suspension(hook=500.0, sling=1e300), "sling is 1e.300, .* at most 200"),
-        (lambda: Suspension(damping=inf), "damping is inf, .* at most 1"),
+        (lambda: Suspension(bounce_damping=inf), "bounce_damping is inf, .* at most 1"),
         (lambda: load_motion(still(1.0), 3.0, mass=1e-300), "load is 1e-300 kg, .* at least 0.1"),
         (lambda: Suspension(hook=500.0), "500 kg with slings of 0 m: both are above 0, or both 0"),
-        (lambda: Suspension(damping=-1.0), "suspension's damping is -1, but must be at least 0"),
+        (lambda: Suspension(bounce_damping=-1.0), "bounce_damping is -1, but must be at least 0"),
         (
             lambda: load_motion(still(1.0), 3.0, suspension=Suspension(1e9), mass=100.0),
             "100 kg on 3 m of rope with 1e.09 N bounce at 291 Hz, too fast for 512 samples",

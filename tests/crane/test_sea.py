@@ -44,35 +44,148 @@ def test_spectrum_has_the_moments_that_were_worked_out_apart(factor, height, cro
     assert 2.0 * pi * np.sqrt(m0 / m2) == pytest.approx(crossing, abs=2e-4)
 
 
-def test_components_hold_the_seas_energy_and_come_again_by_their_seed():
-    sea = Seaway("ss3", seed=5)
-    waves = sea.waves
-    assert 4.0 * np.sqrt(0.5 * (waves.amplitude**2).sum()) == pytest.approx(0.88, rel=0.03)
-    np.testing.assert_array_equal(waves.phase, Seaway("ss3", seed=5).waves.phase)
-    assert not np.array_equal(waves.phase, Seaway("ss3", seed=6).waves.phase)
-    width = (2.5 - 0.25) / 200
-    np.testing.assert_array_equal(np.floor((waves.frequency - 0.25) / width), np.arange(200))
+def test_a_seaway_is_a_gaussian_process_of_the_height_asked_for():
+    heights, sizes = [], []
+    for seed in range(40):
+        waves = Seaway("ss3", seed=seed).waves
+        heights.append(4.0 * np.sqrt(0.5 * (np.abs(waves.amplitude) ** 2).sum()))
+        # of a Rayleigh variable by its expected square
+        sizes.append(np.abs(waves.amplitude) ** 2 / (2.0 * Seaway("ss3").bins.variance))
+    assert np.mean(np.square(heights)) == pytest.approx(0.88**2, rel=0.01)
+    # the scatter of Hs in 4096 s, by the spectrum: half of √(Σ S²)/Σ S
+    variance = Seaway("ss3").bins.variance
+    expected = 0.5 * np.sqrt((variance**2).sum()) / variance.sum()
+    assert np.std(heights) / 0.88 == pytest.approx(expected, rel=0.4)
+    # an exponential variable: mean 1, and above 3 in e^-3 of all cases
+    assert np.mean(sizes) == pytest.approx(1.0, abs=0.01)
+    assert np.mean(np.array(sizes) > 3.0) == pytest.approx(np.exp(-3.0), rel=0.05)
 
 
-@pytest.mark.parametrize("speed", [0.0, 6.0])
-def test_fast_synthesis_is_the_plain_sum(speed):
-    sea = Seaway("ss4", heading_deg=130.0, seed=2, speed=speed)
+@pytest.mark.parametrize("spectrum", [(1.0, 3.0), (1.0, 4.0), (0.88, 7.5), (5.0, 12.4, 7.0)])
+def test_the_components_variances_add_up_to_the_height(spectrum):
+    sea = Seaway(Spectrum(*spectrum))
+    assert 4.0 * np.sqrt(sea.bins.variance.sum()) == pytest.approx(spectrum[0], rel=1e-12)
+    density = Spectrum(*spectrum).density(sea.bins.frequency)
+    np.testing.assert_allclose(
+        sea.bins.variance / sea.bins.variance.sum(),
+        density / density.sum(),
+        rtol=1e-12,
+        atol=1e-300,
+    )
+
+
+def test_short_seas_say_how_much_lies_outside_the_waves_that_are_simulated():
+    assert Seaway("ss3").sentences() == ()
+    # Bretschneider's energy above 6 rad/s: 1 - exp(-1.25 (2π/2.5/6)⁴), 3.8 %
+    (sentence,) = Seaway(Spectrum(0.5, 2.5)).sentences()
+    assert "4 % of the energy of the sea (0.5 m, 2.5 s)" in sentence
+    assert Spectrum(0.5, 2.5).share(0.2, 6.0) == pytest.approx(
+        np.exp(-1.25 * (2.0 * pi / 2.5 / 6.0) ** 4), abs=1e-5
+    )
+
+
+def test_seaways_come_again_by_their_seed():
+    waves = Seaway("ss3", seed=5).waves
+    np.testing.assert_array_equal(waves.amplitude, Seaway("ss3", seed=5).waves.amplitude)
+    assert not np.array_equal(waves.amplitude, Seaway("ss3", seed=6).waves.amplitude)
+
+
+@pytest.mark.parametrize(
+    "how",
+    [
+        {},
+        {"speed": 6.0, "heading_deg": 130.0},
+        # waves of 6 rad/s are met at 43 rad/s, beyond half of the coarse rate
+        {"speed": 10.0, "heading_deg": 180.0, "ship": Hull(12.0, 4.0, 1.0)},
+        # the ship overtakes waves above 0.98 rad/s
+        {"speed": 10.0, "heading_deg": 0.0, "ship": Hull(12.0, 4.0, 1.0)},
+        {"spread": True, "record": 5000.0},
+        {"list_deg": 3.0, "trim_deg": -1.0, "reference": (-30.0, 0.0, 9.0)},
+    ],
+)
+def test_motion_at_the_coarse_rate_is_the_plain_sum(how):
+    sea = Seaway("ss4", seed=2, **how)
     waves = sea.waves
-    time = np.arange(60 * 512 + 1) / 512.0
-    met = waves.frequency - waves.frequency**2 / G * speed * np.cos(waves.heading)
-    response = sea.ship.response(waves.frequency, waves.heading, speed)
-    some = np.r_[0, 1, 63, 64, 65, 1000, 12345, 30719, 30720]
-    turned = np.exp(1j * (np.outer(time[some], met) + waves.phase))
-    plain = (turned @ (response * waves.amplitude).T).real
-    np.testing.assert_allclose(sea.motion(time.size)[some], plain, atol=2e-8)
+    motion = sea.motion(32 * 300 + 1, rate=32.0)
+    some = np.r_[0, 4, 8, 300, 4800, 9600]
+    turned = np.exp(1j * np.outer(some / 32.0, waves.met)) * waves.amplitude
+    plain = (turned @ sea.response(waves.frequency, waves.heading).T).real
+    plain[:, 3] += radians(sea.list_deg)
+    plain[:, 4] += radians(sea.trim_deg)
+    np.testing.assert_allclose(motion[some], plain, atol=1e-9)
+    if not sea.spread:
+        omega = waves.frequency
+        met = omega - omega**2 / G * sea.speed * np.cos(waves.heading)
+        assert np.abs(waves.met - met).max() <= pi / sea.period * (1.0 + 1e-9)
+
+
+def test_motion_between_the_coarse_points_is_the_plain_sum():
+    sea = Seaway("ss4", heading_deg=130.0, seed=2, speed=3.0)
+    waves = sea.waves
+    some = np.r_[1, 63, 65, 1000, 12345, 30719]
+    turned = np.exp(1j * np.outer(some / 512.0, waves.met)) * waves.amplitude
+    plain = (turned @ sea.response(waves.frequency, waves.heading).T).real
+    np.testing.assert_allclose(sea.motion(60 * 512 + 1)[some], plain, atol=2e-7)
+
+
+def test_the_same_time_has_the_same_motion_whatever_is_asked_for():
+    sea = Seaway("ss3", seed=3)
+    long = sea.motion(1000 * 64 + 1, rate=64.0)
+    np.testing.assert_array_equal(sea.motion(777, rate=64.0), long[:777])
+    np.testing.assert_allclose(sea.motion(97, rate=512.0)[::8], long[:13], atol=1e-12)
+
+
+def test_a_record_comes_again_only_at_its_end():
+    sea = Seaway("ss3", seed=3, record=4097.0)
+    assert sea.period == 8192.0
+    heave = sea.motion(8192 * 8 + 1, rate=8.0)[:, 2]
+    assert heave[-1] == pytest.approx(heave[0], abs=1e-12)
+    # the autocorrelation of heave from 600 s to half of the record, over its value at 0
+    power = np.abs(np.fft.rfft(heave[:-1])) ** 2
+    correlation = np.fft.irfft(power)
+    assert np.abs(correlation[600 * 8 : 4096 * 8]).max() < 0.3 * correlation[0]
+    with pytest.raises(InputError, match=r"comes again after 8192 s, .*record=16384\)"):
+        sea.motion(8192 * 8 + 2, rate=8.0)
+
+
+def test_motions_are_those_of_the_cranes_origin():
+    # heave of a point 30 m forward of a pitching ship: the bow goes down
+    point = (-30.0, 4.0, 9.0)
+    sea = Seaway("ss3", heading_deg=160.0, reference=point)
+    omega, heading = np.array([0.4, 0.6]), np.full(2, radians(160.0))
+    own = HULL.response(omega, heading)
+    moved = sea.response(omega, heading)
+    np.testing.assert_allclose(moved[3:], own[3:])
+    roll, pitch, yaw = own[3:]
+    x, y, z = 30.0, -4.0, -9.0
+    np.testing.assert_allclose(moved[0], own[0] + pitch * z - yaw * y)
+    np.testing.assert_allclose(moved[1], own[1] + yaw * x - roll * z)
+    np.testing.assert_allclose(moved[2], own[2] + roll * y - pitch * x)
+
+
+def test_a_listed_ship_carries_the_boom_to_the_side_that_is_down():
+    crane = Crane.preset("tg3637")
+    lists = [Seaway(Spectrum(1e-6, 7.5), list_deg=angle) for angle in (0.0, 5.0)]
+    runs = [
+        simulate(crane, Stick.rest(1.0), sea=sea, slew_deg=90.0, actuation="ideal") for sea in lists
+    ]
+    upright, listed = (run.tip[0] for run in runs)
+    # starboard, where the boom points, goes down by a turn of 5 degrees about the x axis
+    c, s = np.cos(radians(5.0)), np.sin(radians(5.0))
+    assert listed[1] == pytest.approx(c * upright[1] - s * upright[2], abs=1e-5)
+    assert listed[2] == pytest.approx(s * upright[1] + c * upright[2], abs=1e-5)
+    assert listed[2] < upright[2]
 
 
 def test_spread_seas_come_from_around_their_heading():
-    waves = Seaway("ss3", heading_deg=90.0, seed=1, spread=True, components=2000).waves
-    off = waves.heading - radians(90.0)
+    sea = Seaway("ss3", heading_deg=90.0, seed=1, spread=True)
+    off = sea.waves.heading - radians(90.0)
     assert np.abs(off).max() <= pi / 2.0
     # cos² has the variance π²/12 - 1/2
-    assert off.var() == pytest.approx(pi**2 / 12.0 - 0.5, rel=0.1)
+    assert off.var() == pytest.approx(pi**2 / 12.0 - 0.5, rel=0.02)
+    assert 4.0 * np.sqrt(0.5 * (np.abs(sea.waves.amplitude) ** 2).sum()) == pytest.approx(
+        0.88, rel=0.05
+    )
 
 
 # --- ships ----------------------------------------------------------------------------------------
@@ -129,8 +242,9 @@ def test_s175_in_sea_state_3_moves_as_the_files_own_points_say(s175):
     abeam = s175.values[0, 9]
     density = SEA_STATES["ss3"].density(s175.frequencies)
     energy = np.trapezoid(np.abs(abeam) ** 2 * density[:, None], s175.frequencies, axis=0)
-    motion = Seaway("ss3", seed=1, ship=s175).motion(1800 * 512)
-    np.testing.assert_allclose(motion[:, 1:4].std(axis=0), np.sqrt(energy[1:4]), rtol=0.03)
+    motions = [Seaway("ss3", seed=seed, ship=s175).motion(4096 * 8, 8.0) for seed in range(10)]
+    std = np.std(np.concatenate(motions), axis=0)
+    np.testing.assert_allclose(std[1:4], np.sqrt(energy[1:4]), rtol=0.03)
 
 
 HEADER = ",".join(["heading_deg,omega", *(f"{each}_re,{each}_im" for each in MOTIONS)])
@@ -317,11 +431,15 @@ def test_tables_that_lack_something_or_mean_something_else_are_refused(tmp_path,
 def test_files_that_lack_much_of_the_sea_are_refused(table):
     ship = table(hull_motions, frequencies=(0.1, 0.5, 1.4))
     # Bretschneider's energy above ω is 1 - exp(-1.25 (ω_p/ω)⁴): 14.8 % with a peak at 7.5 s, of
-    # which 1.6 % beyond 2.5 rad/s are in no seaway; below 0.7 rad/s there are 7.7 %
-    with pytest.raises(InputError, match="waves of 0.1 to 1.4 rad/s, but 13 % .* of ss3 lies"):
+    # which hardly any lies beyond 6 rad/s; below 0.7 rad/s there are 7.7 %, above 2.5 rad/s 1.6 %
+    with pytest.raises(InputError, match=r"waves of 0.1 to 1.4 rad/s, but 15 % .* \(ss3\) lies"):
         Seaway("ss3", ship=ship)
-    assert Seaway("ss3-swell", ship=ship).motion(10).shape == (10, 6)
-    with pytest.raises(InputError, match="waves of 0.7 to 2.5 rad/s, but 8 % .* of ss3 lies"):
+    swell = Seaway("ss3-swell", ship=ship)
+    assert swell.motion(10).shape == (10, 6)
+    # above 1.4 rad/s: 1 - exp(-1.25 (2π/11/1.4)⁴)
+    (sentence,) = swell.sentences()
+    assert "0.1 to 1.4 rad/s: for the 3.4 % of the energy of the sea (ss3-swell)" in sentence
+    with pytest.raises(InputError, match=r"waves of 0.7 to 2.5 rad/s, but 9 % .* \(ss3\) lies"):
         Seaway("ss3", ship=table(hull_motions, frequencies=(0.7, 1.0, 2.5)))
 
 
@@ -331,12 +449,14 @@ def test_files_that_lack_much_of_the_sea_are_refused(table):
         (lambda: Seaway("ss3", seed=-1), "The seed of a seaway is -1"),
         (lambda: Spectrum(0.0, 7.5), "height of a sea is 0, but must be above 0"),
         (lambda: Seaway("ss3", heading_deg=1e308), "heading within 720 deg .*, not 1e.308 deg"),
-        (lambda: Seaway("ss3", components=10**9), "2 to 100000 components, not 1e.09"),
+        (lambda: Seaway("ss3", record=100.0), "record of a seaway is 100 s, .* 4096 to 131072 s"),
+        (lambda: Seaway("ss3", list_deg=60.0), "List and trim are 60 and 0 deg, .* within 45 deg"),
+        (lambda: Seaway("ss3", reference=(1.0, 2.0)), "must be a point forward, port and up"),
         (lambda: Spectrum(1e308, 7.5), "height of a sea is 1e.308, .* at most 30"),
         (lambda: Spectrum(1.0, 7.5, 50.0), "peak_factor of a sea is 50, .* at most 10"),
         (lambda: Hull(1e300, 20.0, 9.0), "hull's length is 1e.300, but must be 1 to 600"),
         (lambda: Hull(80.0, 20.0, 1e-300), "hull's draught is 1e-300, but must be 0.05 to 50"),
-        (lambda: Spectrum(1.0, 60.0), "has little energy between waves of 2.51 and 25.1 s"),
+        (lambda: Spectrum(1.0, 60.0), "has little energy between waves of 1.05 and 31.4 s"),
         (lambda: Hull(0.0, 20.0, 9.0), "The hull's length is 0"),
         (lambda: read_ship("hull.dat"), "hull.dat: transfer functions are read from .re1 of VERES"),
         (lambda: Seaway("ss3").motion(100, 500.0), "multiple of 8 samples a second"),

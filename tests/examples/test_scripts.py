@@ -17,7 +17,9 @@ SCRIPTS = {"actuator", "eha", "excavator", "crane_gymnasium", "crane_mujoco"}
 each_example = pytest.mark.parametrize("path", EXAMPLES, ids=lambda path: path.stem)
 
 
-@pytest.mark.parametrize("name", ["simulate", "limits_of_a_crane", "controller", "identify_hoist"])
+@pytest.mark.parametrize(
+    "name", ["simulate", "limits_of_a_crane", "controller", "identify_hoist", "joint_shaper"]
+)
 def test_an_example_prints_what_its_page_shows(run_example, name):
     made = run_example(name, "--figure", "figure.png")
     (said,) = re.findall(rf"examples/{name}\.py\n.*?```text\n(.*?)```", PAGE, re.DOTALL)

@@ -1,31 +1,45 @@
-"""Pages and figures of cranes: scene, verdict, studies."""
+"""Pages and figures of cranes: scene, verdicts, studies."""
 
 import base64
 import json
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
+from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
+from matplotlib.patches import Polygon, Rectangle
+from scipy import stats
 from tests.report.conftest import injected
 
 from swashplate import InputError
 from swashplate.crane import (
     Crane,
+    Demand,
+    Followable,
+    Hull,
+    Operability,
+    Scatter,
     Seaway,
+    Spectrum,
     Stick,
+    Sweep,
+    Turn,
     control,
     follow,
     judge,
     simulate,
-    sweep,
 )
+from swashplate.crane.operating import Cell
 from swashplate.report import figures
-from swashplate.report.scene import write_judgment, write_scene
+from swashplate.report.figures.crane import seaway_words
+from swashplate.report.scene import write_judgment, write_operability, write_scene
 from swashplate.report.scene.pages import COLUMNS
+from swashplate.report.style import BLUE, GREEN, VERMILION
 
 MEANT = control.DelayedFeedback(0.2, 0.2) | control.ShipCompensation()
-SHORT = {"length": 30.0, "start": 10.0}
+SHORT = {"length": 60.0, "run_in": 20.0, "remedies": False, "turns": False}
 
 
 @pytest.fixture(scope="module")
@@ -43,7 +57,7 @@ def runs(crane):
 
 @pytest.fixture(scope="module")
 def judged(crane):
-    return judge(crane, MEANT, seeds=range(3), remedies=False, **SHORT)
+    return judge(crane, MEANT, seeds=range(3), **SHORT)
 
 
 @pytest.fixture
@@ -55,7 +69,7 @@ def scene(tmp_path, runs):
 def test_scene_holds_the_runs_pictures(scene, runs):
     text = scene.read_text("utf-8")
     assert not re.search(r"(src|href)\s*=\s*[\"']?(?!data:)(https?:)?//", text)
-    assert "12 of 13 quantities of the crane are assumed" in text
+    assert "13 of 14 quantities of the crane are assumed" in text
     found = json.loads(re.search(r'id="data">(.*?)</script>', text)[1])
     assert [each["name"] for each in found["runs"]] == list(runs)
     code = base64.b64decode(found["runs"][1]["code"])
@@ -79,17 +93,113 @@ def test_scene_runs_in_a_browser_without_errors(scene, runs, browsed):
     assert "<b>" not in re.sub(r"<script.*?</script>", "", made, flags=re.DOTALL)
 
 
-def test_verdicts_page_says_what_the_judgment_does(tmp_path, judged):
-    write_judgment(judged, tmp_path / "judge.html")
-    text = tmp_path.joinpath("judge.html").read_text("utf-8")
-    assert judged.verdict() in text
-    assert text.count("<svg") == 3
-    assert "min-width: 600px" not in text  # figures are whole on a narrow screen
-    assert not re.search(r"(src|href)\s*=\s*[\"']?(https?:)?//", text)
-    rms = np.degrees(judged.counted("identified").mean())
-    assert f"{rms:.2f}" in text
-    assert "12 of 13 quantities of the crane are assumed" in text
-    assert text.count(">assumed<") == 12
+BEYOND = "the load swings beyond 30 deg"
+
+
+@pytest.fixture(scope="module")
+def harming(judged):
+    """The same as if the judged variant had left the model twice, and swung more in the third."""
+    left = judged.outcomes[0][-1]._replace(rms_swing=np.nan, left=BEYOND)
+    none = judged.outcomes[2][0]
+    more = judged.outcomes[2][-1]._replace(rms_swing=1.5 * none.rms_swing)
+    changed = [left, left, more]
+    outcomes = tuple(
+        (*seaway[:-1], last) for seaway, last in zip(judged.outcomes, changed, strict=True)
+    )
+    return replace(judged, outcomes=outcomes)
+
+
+@pytest.fixture(scope="module")
+def year(crane):
+    """Two heights at two periods, one sea missing; headings 0 and 90."""
+    scatter = Scatter.of([0.5, 0.5, 1.5], [6.0, 8.0, 8.0], [50.0, 30.0, 20.0], "Made for a test.")
+    good, bad = Cell("", 0.2, False), Cell("side_lead", 2.0, True)
+    none = {(row, heading): bad for row in range(3) for heading in (0.0, 90.0)}
+    own = {**dict.fromkeys(none, good), (1, 90.0): Cell("luff orifice", 1.2, True)}
+    own |= {(2, 0.0): bad, (2, 90.0): bad}
+    cells = {"no control": none, "identified": own}
+    hoist = (0.7, 8.0, 90.0)
+    return Operability(crane, control.Clip(), scatter, (0.0, 90.0), cells, Seaway(), hoist)
+
+
+def written(write, result, folder):
+    """The text of a page, whose quotes are not escaped."""
+    write(result, folder / "page.html")
+    return folder.joinpath("page.html").read_text("utf-8").replace("&#39;", "'")
+
+
+def words_of(figure):
+    found = [text.get_text() for ax in figure.axes for text in ax.texts]
+    found += [legend.get_title().get_text() for legend in figure.legends]
+    return " ".join(found).replace("\n", " ")
+
+
+# --- pages ----------------------------------------------------------------------------------------
+
+
+def test_verdicts_page_has_both_answers_with_a_light_of_their_own(tmp_path, judged, harming):
+    text = written(write_judgment, judged, tmp_path)
+    summary, _, rest = text.partition('<section id="hangs">')
+    looks = {"yes": "good", "not decided": "look", "no": "bad"}
+    for subject, decision, sentence in (
+        ("Harm", judged.harmless, judged.harm_sentence()),
+        ("Sufficiency", judged.sufficient, judged.sufficiency_sentence()),
+    ):
+        assert f'<dt class="{looks[decision]}">{subject}</dt>' in summary
+        assert sentence in summary
+    for quantity in ("off-lead", "side-lead", "dynamic factor", "place"):
+        assert f'<th scope="row">{quantity}</th>' in summary
+    assert "3 seaways of 1 min" in summary
+    assert summary.count("<svg") == 1
+    assert rest.count("<svg") == 2
+    failed = written(write_judgment, harming, tmp_path)
+    assert '<div class="headline bad">' in failed
+    assert f"'identified' is not an operation in 2 of 3 seaways: {BEYOND}." in failed
+
+
+def test_verdicts_page_says_what_the_answer_hangs_on(tmp_path, judged):
+    turn = Turn("the ship's roll period", "13 s", "10.4 s", True, False)
+    text = written(write_judgment, replace(judged, turns=(turn,)), tmp_path)
+    hangs = text.partition('<section id="hangs">')[2].partition("</section>")[0]
+    for words in (
+        "The load's swing has a damping of 0.5 %, assumed.",
+        "The ship's roll period is 13 s, assumed.",
+        "13 of 14 quantities of the crane are assumed.",
+        "Limits that are assumed: swing, off-lead, side-lead",
+        turn.words(),
+    ):
+        assert words in hangs
+    # of the limits and of the geometry, every assumed row is marked
+    assert text.count("<td>assumed</td>") == 7 + 13
+    assert "roll period 13 s with a damping of 6 %" in text
+
+
+def test_verdicts_page_of_harm_alone_says_what_was_not_asked(tmp_path, judged):
+    text = written(write_judgment, replace(judged, asked=("harm",)), tmp_path)
+    assert text.count("This was not asked") == 1
+    assert "suffice" not in text.partition('<div class="headline')[2].partition("</div>")[0]
+
+
+def test_pages_are_one_file_each_without_an_outside_link(tmp_path, judged, year):
+    for write, result in ((write_judgment, judged), (write_operability, year)):
+        text = written(write, result, tmp_path)
+        assert not re.search(r"(src|href)\s*=\s*[\"']?(https?:)?//", text)
+        assert "min-width: 600px" not in text  # figures are whole on a narrow screen
+        assert "13 of 14 quantities of the crane are assumed" in text
+
+
+def test_operabilitys_page_has_one_figure_the_shares_and_what_is_assumed(tmp_path, year):
+    text = written(write_operability, year, tmp_path)
+    # 50 and half of 30 per cent can be worked; all of 20 and half of 30 cannot
+    lead = "'identified' can work 65 % of the year, the crane without control 0 %."
+    assert f"{lead} Most often the rest is limited by side-lead first: 20 % of the year." in text
+    summary = text.partition('<section id="basis">')[0]
+    assert summary.count("<svg") == summary.count("<table") == 1
+    for words in ("65.0 %", "15.0 %", "20.0 %", "100.0 %"):
+        assert words in summary
+    for sentence in year.sentences():
+        assert sentence in summary
+    assert text.count("<td>assumed</td>") == 7 + 13
 
 
 @pytest.mark.slow
@@ -99,10 +209,12 @@ def test_verdicts_page_shows_in_a_browser_without_errors(tmp_path, judged, brows
 
 
 @pytest.mark.slow
-def test_nothing_runs_in_a_page_but_its_own_scripts(tmp_path, scene, judged, browsed):
+def test_nothing_runs_in_a_page_but_its_own_scripts(tmp_path, scene, judged, year, browsed):
     assert "data-drawn=" in injected(scene, tmp_path, browsed)
     write_judgment(judged, tmp_path / "judge.html")
     assert "Limits of the drives" in injected(tmp_path / "judge.html", tmp_path, browsed)
+    write_operability(year, tmp_path / "year.html")
+    assert "What it rests on" in injected(tmp_path / "year.html", tmp_path, browsed)
 
 
 def test_scenes_that_cannot_be_are_refused(tmp_path, crane, runs):
@@ -114,41 +226,184 @@ def test_scenes_that_cannot_be_are_refused(tmp_path, crane, runs):
     assert not list(tmp_path.iterdir())
 
 
-SWEEPS = {"bearing": [0, 90, 180, 270], "height": [0.2, 0.5], "orifice": [1.0, 3.0]}
+# --- figures --------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("name", ["judgment", "follow", *SWEEPS])
-def test_figures_of_studies_are_legible_and_say_what_is_assumed(
-    name, crane, judged, assert_legible
-):
-    made = judged if name == "judgment" else follow(crane, [5.0, 8.0, 12.0])
-    if name in SWEEPS:
-        made = sweep(crane, name, MEANT, points=SWEEPS[name], seeds=[0, 1], **SHORT)
-    figure = made.plot()
+def test_seaways_in_words_have_height_period_heading_and_roll():
+    assert seaway_words(Seaway()) == "ss3 0.88 m, 7.5 s, abeam from starboard, roll 13 s"
+    hull = Hull(100.0, 20.0, 6.0, roll_period=10.0)
+    other = Seaway(Spectrum(1.2, 8.0, 3.3), heading_deg=45.0, ship=hull)
+    assert seaway_words(other) == "1.2 m, 8 s, γ 3.3, waves at 45°, roll 10 s"
+    assert seaway_words(Seaway(heading_deg=-180.0), height=False).startswith("peak at 7.5 s, head")
+
+
+def test_figure_of_a_judgment_tells_seaways_from_the_means_interval(judged, assert_legible):
+    figure = judged.plot()
     assert_legible(figure)
-    words = [each.get_text() for ax in figure.axes for each in ax.texts]
-    assert any("12 of 13 quantities of the crane are assumed" in each for each in words)
-    first = made.headline if name == "judgment" else repr(made)
-    assert made.summary().startswith(first)
+    title = figure.get_suptitle()
+    assert title == "3 seaways of 1 min, ss3 0.88 m, 7.5 s, abeam from starboard, roll 13 s"
+    swing = figure.axes[0]
+    diamonds = [patch for patch in swing.patches if isinstance(patch, Polygon)]
+    for name, points, diamond in zip(
+        reversed(judged.names), swing.collections, diamonds, strict=False
+    ):
+        expected = np.degrees(judged.swing(name))
+        np.testing.assert_allclose(np.sort(points.get_offsets()[:, 0]), np.sort(expected))
+        # the root of the mean square, and of its interval
+        squares = expected**2
+        half = stats.sem(squares) * stats.t.ppf(0.975, 2)
+        across = diamond.get_xy()[:, 0]
+        assert across.max() == pytest.approx(np.sqrt(squares.mean() + half))
+        assert across.min() == pytest.approx(np.sqrt(max(squares.mean() - half, 0.0)))
+    (line,) = swing.collections[3].get_segments()
+    assert line[0, 0] == pytest.approx(np.degrees(judged.linear.values["swing"].rms))
+
+
+def test_figure_of_a_judgment_counts_runs_that_left_the_model(harming, assert_legible):
+    figure = harming.plot()
+    assert_legible(figure)
+    swing = figure.axes[0]
+    ticks = [text.get_text() for text in swing.get_xticklabels()]
+    assert ticks[-1] == "left the\nmodel"
+    assert [text.get_text() for text in swing.texts if text.get_text() == "2"]
+    cross = next(line for line in swing.lines if line.get_marker() == "x")
+    largest = max(np.nanmax(np.degrees(harming.swing(name))) for name in harming.names)
+    assert cross.get_xdata()[0] > largest
+    # the last variant is the lowest row; the one of its seaways that stayed swings more than none
+    colors = swing.collections[0].get_facecolors()
+    assert to_hex(colors[-1]) == VERMILION.lower()
+    rows = [text.get_text() for text in swing.get_yticklabels()]
+    assert rows[0] == "identified\nworse than none: 3 of 3"
+    nobody = tuple(
+        tuple(one._replace(rms_swing=np.nan, left=BEYOND) for one in seaway)
+        for seaway in harming.outcomes
+    )
+    assert_legible(replace(harming, outcomes=nobody, linear=None).plot())
+
+
+def test_figure_of_a_judgment_has_shares_of_limits(judged, crane):
+    limits = judged.plot().axes[1]
+    limited = judged.limited(judged.judged)
+    labels = [text.get_text().partition("\n")[0] for text in limits.get_yticklabels()]
+    assert labels[0] == "saturation"
+    assert labels[-1] == "swing"
+    shown = {round(float(line.get_ydata()[0]), 2): line.get_xdata()[0] for line in limits.lines}
+    for row, one in enumerate(reversed(limited)):
+        if one.largest.value == one.largest.value:  # not of too few peaks
+            share = one.largest.value / one.limit
+            assert shown[row] == pytest.approx(np.clip(share, 0.1, limits.get_xlim()[1]))
+    unlimited = replace(judged, study=replace(judged.study, crane=replace(crane, limits={})))
+    assert len(replace(unlimited, asked=("harm",)).plot().axes) == 1
+
+
+def swept(crane, over, points, values):
+    """A sweep of one variant beside no control, in two seaways. [deg]"""
+    both = np.radians(np.array([values, values]))
+    seaways = np.stack([both, 0.5 * both], axis=-1)
+    seaways[1] *= 1.1
+    points = np.radians(points) if over == "bearing" else np.asarray(points)
+    names, spectrum = ("no control", "identified"), np.full(len(points), 0.1)
+    return Sweep(over, points, names, seaways, spectrum, crane, Seaway())
+
+
+@pytest.mark.parametrize("over", ["bearing", "height", "orifice"])
+def test_figures_of_sweeps_mark_where_a_run_left_the_model(over, crane, assert_legible):
+    points = [0.0, 60.0, 120.0, 240.0] if over == "bearing" else [0.5, 1.0, 2.0, 3.0]
+    figure = swept(crane, over, points, [2.0, 3.0, np.nan, 5.0]).plot()
+    assert_legible(figure)
+    words = words_of(figure)
+    assert "13 of 14 quantities of the crane are assumed" in words
+    assert "×: a run left the model" in words
+    ax = figure.axes[0]
+    crosses = [line for line in ax.lines if line.get_marker() == "x"]
+    assert [len(line.get_xdata()) for line in crosses] == [1, 1]
+    expected = np.radians(120.0) if over == "bearing" else 2.0
+    assert crosses[0].get_xdata()[0] == pytest.approx(expected)
+    line = ax.lines[0]
+    assert list(np.isnan(line.get_ydata())[:4]) == [False, False, True, False]
+    if over != "bearing":
+        assert line.get_ydata()[0] == pytest.approx(np.sqrt(0.5 * (2.0**2 + 2.2**2)))
+
+
+@pytest.mark.parametrize(
+    ("points", "ends"),
+    [
+        ([0, 45, 90, 135, 180], (0.0, 180.0)),
+        ([180, 225, 270, 360], (180.0, 360.0)),
+        ([0, 90, 180, 270], (0.0, 360.0)),
+    ],
+)
+def test_bearings_on_one_side_of_the_ship_make_half_a_circle(crane, points, ends, assert_legible):
+    figure = swept(crane, "bearing", points, np.linspace(1.0, 8.0, len(points))).plot()
+    assert_legible(figure)
+    ax = figure.axes[0]
+    assert (ax.get_thetamin(), ax.get_thetamax()) == ends
+
+
+def test_what_seas_ask_has_the_colour_of_its_axis_and_is_filled_if_beyond(crane, assert_legible):
+    periods = np.array([5.0, 10.0, 15.0])
+    amplitude = np.outer([1.0, 2.0, 3.0], [1.0, 2.0, 0.5])
+    seas = {"mine": Demand(10.0, (1.9, 4.1, 1.2)), "calm": Demand(5.0, (0.5, 0.0, 0.4))}
+    figure = Followable(periods, amplitude, seas, crane, 45.0).plot()
+    assert_legible(figure)
+    ax = figure.axes[0]
+    marks = [line for line in ax.lines if line.get_marker() in ("D", "v")]
+    assert [line.get_color() for line in marks] == [BLUE, VERMILION, GREEN] * 2
+    faces = [line.get_markerfacecolor() for line in marks]
+    assert faces == ["white", VERMILION, GREEN, "white", "white", "white"]
+    assert [line.get_marker() for line in marks] == ["D", "D", "D", "D", "v", "D"]
+    assert [line.get_ydata()[0] for line in marks[:3]] == [1.9, 4.1, 1.2]
+    assert "mine" in words_of(figure)
+    assert_legible(follow(crane).plot())
+
+
+def test_figure_of_operability_colours_each_sea_by_what_limits_it(year, assert_legible):
+    figure = year.plot()
+    assert_legible(figure)
+    none, own = figure.axes
+    assert none.get_title(loc="left") == "no control: 0 % of the year"
+    assert own.get_title(loc="left") == "identified: 65 % of the year"
+    legend = {text.get_text(): patch.get_facecolor() for text, patch in entries(figure)}
+    assert set(legend) == {"side-lead", "luff orifice", "can be worked"}
+    cells = [patch for patch in own.patches if isinstance(patch, Rectangle)]
+    assert len(cells) == 3  # the sea that does not come has none
+    good, half, bad = (np.array(cell.get_facecolor()[:3]) for cell in cells)
+    assert (good == 1.0).all()
+    np.testing.assert_allclose(bad, legend["side-lead"][:3])
+    # one heading of two: paler, of the same hue
+    full = np.array(legend["luff orifice"][:3])
+    strength = (1.0 - half) / (1.0 - full)
+    assert np.ptp(strength) < 1e-9
+    assert 0.3 < strength[0] < 1.0
+    assert cells[1].get_bbox().bounds == pytest.approx((7.0, 0.0, 2.0, 1.0))
+    words = words_of(figure)
+    assert "made for a test; 13 of 14 quantities of the crane are assumed" in words
+
+
+def test_figure_of_operability_has_rows_of_three_panels(year, assert_legible):
+    more = {f"identified {number}": year.cells["identified"] for number in range(4)}
+    figure = replace(year, cells={**year.cells, **more}).plot()
+    assert_legible(figure)
+    shown = [ax for ax in figure.axes if ax.axison]
+    assert len(shown) == 6
+    five = {name: cells for name, cells in year.cells.items() if name == "no control"} | more
+    figure = replace(year, cells=five).plot()
+    assert_legible(figure)
+    labels = [ax.get_xlabel() for ax in figure.axes if ax.axison]
+    assert labels == ["", "", *["peak period (s)"] * 3]
+
+
+def entries(figure):
+    (legend,) = figure.legends
+    return zip(legend.get_texts(), legend.get_patches(), strict=True)
 
 
 def test_figures_of_one_panel_draw_in_given_axes(crane, judged):
-    for made in (judged, follow(crane, [5.0, 8.0, 12.0])):
+    for result in (judged, follow(crane, [5.0, 8.0, 12.0])):
         ax = Figure().subplots()
-        assert made.plot(ax=ax, title="here") is ax
+        assert result.plot(ax=ax, title="here") is ax
         assert ax.get_title(loc="left") == "here"
         assert len(ax.lines) + len(ax.collections) >= 3
-
-
-def test_figure_over_the_stick_shows_swing_and_where_the_slew_ends(crane, assert_legible):
-    drives = ("volts", "ideal")
-    made = sweep(crane, "stick", control.TipShaper(), points=[0.8, 1.0], drives=drives)
-    figure = made.plot()
-    assert_legible(figure)
-    swing, ends = figure.axes
-    shown = np.degrees(made.values[0, :, 0, 1])
-    np.testing.assert_allclose(swing.lines[0].get_ydata(), shown)
-    assert (swing.get_ylabel(), ends.get_ylabel()) == ("residual swing (deg)", "slew reached (deg)")
 
 
 def test_figure_of_runs_shows_them_by_name_what_moves_and_the_sea(crane, runs):
@@ -163,6 +418,6 @@ def test_figure_of_runs_shows_them_by_name_what_moves_and_the_sea(crane, runs):
     labels = [ax.get_ylabel() for ax in figure.axes]
     assert labels == ["swing (deg)", "slew (deg)", "boom (deg)", "limits"]
     texts = [each.get_text() for ax in figure.axes for each in ax.texts]
-    assert any("12 of 13 quantities of the crane are assumed" in each for each in texts)
+    assert any("13 of 14 quantities of the crane are assumed" in each for each in texts)
     with pytest.raises(InputError, match="shows 1 to 6 runs of a crane, not 0"):
         figures.plot_crane({})

@@ -1,173 +1,43 @@
-"""``swashplate crane``: geometry, runs, and the judgment of control over many seaways."""
+"""``swashplate crane``: geometry, runs, judgment of control, operability over a year."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, replace
-from functools import cached_property, partial
+from collections.abc import Iterable
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from swashplate.cli.options import FigureFile, TableFile, command
-from swashplate.cli.terminal import (
-    FORCED,
-    draw,
-    long_work,
-    note,
-    save,
-    say,
-    say_saved,
-    show,
-    side,
-    working,
+from swashplate.cli.crane_options import (
+    AXES,
+    AtSea,
+    Operated,
+    Studied,
+    control_of,
+    crane_of,
+    number_of,
+    numbers_of,
+    sea_sentences,
 )
-from swashplate.cli.words import pairs_of
+from swashplate.cli.options import FigureFile, TableFile, command
+from swashplate.cli.terminal import draw, note, save, say, say_saved, show, side, working
 from swashplate.errors import InputError
-from swashplate.tables import PAGE, Form, Table
+from swashplate.tables import PAGE, Column, Form, Table
 
 if TYPE_CHECKING:
-    from swashplate.crane import Crane, Judgment, Seaway, Sweep
-    from swashplate.crane.control import Control
+    from swashplate.crane import Crane, Judgment, Operability, Seaway, Sweep
 
 VERDICT = Form("a verdict", (".html", ".csv", ".parquet"))
+OPERABILITY = Form("an operability", (".html", ".csv", ".parquet"))
 LEAST_ALLOWED = 0.5
 """Percent of seaways below which a share is probably meant."""
-START, AXES = ("slew_deg", "boom_deg", "rope_m"), ("hoist", "slew", "luff")
 
 app = typer.Typer(
     help="Whole cranes: boom, rope and load behind three drives, on a ship.",
     no_args_is_help=True,
     rich_markup_mode="rich",
 )
-
-
-@dataclass(frozen=True)
-class Placed:
-    """A crane, its drives, where it begins, and its ship.
-
-    Options:
-      crane CRANE|FILE.toml: A packaged crane, tg3637, or your own.
-      drive AXIS=SET: Another drive: luff=mine.toml, or the folder of a fit, whose verdict is shown.
-          May be repeated.
-      force: Replace older files, and take drives whose fit is not usable.
-      at NAME=VALUE: Where it begins: slew_deg, boom_deg, rope_m, as rope_m=25. May be repeated.
-      ship FILE[,ULEN]: The ship's transfer functions: .re1 of VERES, .nc of Capytaine, .csv, or
-          .4 of WAMIT with its ULEN, hull.4,175.
-    """
-
-    crane: str
-    drive: list[str] | None = None
-    at: list[str] | None = None
-    ship: str | None = None
-
-    @cached_property
-    def chosen(self) -> Crane:
-        """The crane, with its drives; one whose fit is not usable is refused without --force."""
-        drives = dict(pairs_of("--drive", self.drive, "luff=mine.toml"))
-        crane = _crane_of(self.crane).with_drive(known=True, **drives)
-        if not FORCED.get():
-            _refuse_unusable(crane)
-        return crane
-
-    @property
-    def pose(self) -> dict[str, Any]:
-        """Where a run begins, as far as it is given."""
-        return _numbers("--at", self.at, "rope_m=25", START)
-
-    def seaway(self, given: list[str] | None, example: str) -> Seaway | None:
-        """The seaway of words written as an example such as ``ss3,90,1``, for the ship."""
-        from swashplate.crane import Seaway, read_ship
-
-        if not given:
-            if self.ship is not None:
-                raise InputError(f"--ship {self.ship} needs a --sea to move in.")
-            return None
-        text = " --sea ".join(given)
-        name, *rest = text.split(",")
-        if len(given) > 1 or len(rest) > example.count(","):
-            raise InputError(f"--sea {text} is too much: write one sea, --sea {example}.")
-        heading, *seeds = [_number(f"--sea {text}", each) for each in rest] or [90.0]
-        seed: Any = next((int(each) if each.is_integer() else each for each in seeds), 0)
-        waves = Seaway(name, heading, seed)
-        if self.ship is None:
-            return waves
-        path, _, unit = self.ship.partition(",")
-        length = _number(f"--ship {self.ship}", unit) if unit else None
-        return replace(waves, ship=read_ship(path, length))
-
-
-@dataclass(frozen=True)
-class Studied(Placed):
-    """What a study of seaways is about.
-
-    Options:
-      control CONTROL: Control, as of 'run' behind the colon; by default as it is designed for
-          ideal drives.
-      sea SEA[,HEADING]: A sea, ss2, ss3, ss3-swell or ss4, and where its waves come from: 0
-          astern, 90 starboard, 180 ahead, 270 port; by default ss3,90.
-      seeds N: Number of seaways; judge takes 200 by default.
-      drives NAMES: ideal: follow at once; identified: the crane's own; volts: these, 10 V for full
-          speed; drawn: from the errors of the fits that the drives come from, while control
-          knows the fits; by default ideal,identified. A verdict is on the last.
-      scale AXIS.NAME=FACTOR: Drives with a lever or parameter moved, which control knows, judged
-          last: luff.orifice=1.5. May be repeated.
-    """
-
-    control: str = "feedback=0.2/0.2+ship+loop=1.5"
-    sea: list[str] | None = None
-    seeds: int | None = None
-    drives: str | None = None
-    scale: list[str] | None = None
-
-    def through(self, study: Callable[..., Any], *first: Any, **more: Any) -> Any:
-        """A study of the controller, whose progress is shown."""
-        law = control_of(self.control)
-        if law is None:
-            raise InputError("--control is empty: there is nothing to judge.")
-        how = self.pose | more
-        if self.sea or self.ship is not None:
-            how["sea"] = self.seaway(self.sea or ["ss3"], "ss3,90")
-        if self.seeds is not None:
-            how["seeds"] = range(self.seeds)
-        if self.drives is not None or self.scale:
-            how["drives"] = self.sets()
-        with long_work("Seaways") as shown:
-            how["progress"] = lambda done, of: shown(f"{done} of {of} seaways", done / of)
-            return study(*first, law, **how)
-
-    def sets(self) -> dict[str, Any]:
-        """Sets of drives by name."""
-        from swashplate.analysis.whatif import find_lever
-        from swashplate.crane import drawn_cranes, upgraded
-
-        names = filter(None, map(str.strip, (self.drives or "ideal,identified").split(",")))
-        sets: dict[str, Any] = {name: name for name in names}
-        if "drawn" in sets:
-            sources = self.chosen.sources
-            drawn = [axis for axis, source in sources.items() if source.fit is not None]
-            if not drawn:
-                raise InputError("--drives drawn needs the folder of a fit: --drive luff=FOLDER.")
-            sets["drawn"] = drawn_cranes(self.chosen)
-            kept = [axis for axis in AXES if axis not in drawn]
-            as_given = f"; as given, since they come from no fit: {', '.join(kept)}" if kept else ""
-            side.print(f"Drawn: {', '.join(drawn)}{as_given}")
-        crane, changed = self.chosen, []
-        for name, text in pairs_of("--scale", self.scale, "luff.orifice=1.5"):
-            (axis, _, lever), words = name.partition("."), f"--scale {name}={text}"
-            if not lever or axis not in AXES:
-                raise InputError(
-                    f"{words}: write the axis first, luff.orifice=1.5; the axes are "
-                    f"{', '.join(AXES)}."
-                )
-            find_lever(lever)
-            factor = _number(words, text)
-            crane = upgraded(crane, axis, {lever: factor})
-            changed.append(f"{axis} {lever} ×{factor:g}")
-        if changed:
-            sets[", ".join(changed)] = crane
-        return sets
 
 
 def show_crane(crane: str, *, toml: bool = False) -> None:
@@ -188,7 +58,7 @@ def show_crane(crane: str, *, toml: bool = False) -> None:
         read = read_text if crane.endswith(".toml") else preset_text
         typer.echo(read(crane), nl=False)
         return
-    chosen = _crane_of(crane)
+    chosen = crane_of(crane)
     show(chosen.table())
     for axis in AXES:
         note(f"{axis}: {getattr(chosen, axis).parameters.title}")
@@ -197,7 +67,7 @@ def show_crane(crane: str, *, toml: bool = False) -> None:
 
 
 def run(
-    placed: Placed,
+    operated: Operated,
     *,
     slew: float = 0.0,
     luff: float = 0.0,
@@ -205,7 +75,7 @@ def run(
     until: list[str] | None = None,
     duration: float | None = None,
     length: float = 60.0,
-    sea: list[str] | None = None,
+    seed: int | None = None,
     variant: list[str] | None = None,
     brake: bool = True,
     out: TableFile = None,
@@ -227,19 +97,19 @@ def run(
           repeated.
       duration S: Time for which an axis without target moves.
       length S: Length of the run.
-      sea SEA[,HEADING[,SEED]]: A sea, ss2, ss3, ss3-swell or ss4; where its waves come from, 0
-          astern, 90 starboard (the default), 180 ahead, 270 port; and its seed.
+      seed N: Random seed of the seaway.
       variant DRIVES[:CONTROL]: Drives behind the stick and, after a colon, control: inverse (the
-          default, also called identified), volts or ideal; zv-joint, zvd-tip, ei-tip and the like,
-          feedback=GAIN/DELAY, ship, clip=M, loop=GAIN, joined by +. May be repeated.
+          default, also called identified), volts or ideal; zv-tip, zvd-tip, ei-tip,
+          feedback=GAIN/DELAY, ship, clip=M, loop=GAIN, sensors=NOISE_DEG/DELAY/RATE (noise of the
+          rope's angle, seconds, Hz), joined by +. May be repeated.
       brake --brake/--no-brake: Whether a brake holds the hoist at rest.
       scene FILE: Write the scene that moves: .html.
 
     For example:
       swashplate crane run tg3637 --slew 1 --until slew_deg=45
-      swashplate crane run tg3637 --slew 1 --until slew_deg=45 --variant volts:zv-joint \
-          --variant inverse:zv-joint --variant inverse:zv-tip --plot slew.png
-      swashplate crane run tg3637 --sea ss3,90,1 --at slew_deg=90 --at rope_m=27 \
+      swashplate crane run tg3637 --slew 1 --until slew_deg=45 --variant volts \
+          --variant inverse --variant inverse:zv-tip --plot slew.png
+      swashplate crane run tg3637 --sea ss3 --seed 1 --at slew_deg=90 --at rope_m=27 \
           --variant inverse --variant inverse:feedback=0.2+ship+clip
     """
     runs, first = {}, ""
@@ -247,17 +117,19 @@ def run(
         raise InputError("--out writes one run's signals: take one --variant.")
     with working("Simulating"):
         from swashplate.crane import Stick, run_tables, simulate
+        from swashplate.crane.axes import RATE
 
-        crane, seaway = placed.chosen, placed.seaway(sea, "ss3,90,1")
-        targets = _numbers("--until", until, "slew_deg=45")
+        crane, seaway = operated.chosen, operated.seaway(seed=seed, length=length)
+        targets = numbers_of("--until", until, "slew_deg=45")
         stick = Stick.trapezoid(
             hoist=hoist, slew=slew, luff=luff, until=targets, duration=duration, length=length
         )
+        ship = seaway or operated.motion(round(stick.length * RATE) + 1)
         for first in variant or ["inverse"]:
             drives, _, law = first.partition(":")
             how: dict[str, Any] = {"control": control_of(law)}
             how["actuation"] = "inverse" if drives == "identified" else drives
-            runs[first] = simulate(crane, stick, sea=seaway, brake=brake, **how, **placed.pose)
+            runs[first] = simulate(crane, stick, sea=ship, brake=brake, **how, **operated.setup)
         tables = run_tables(runs)
     save(out, "All signals, in SI", runs[first].write)
     draw(plot, "plot_crane", runs)
@@ -265,35 +137,45 @@ def run(
         from swashplate.report.scene import write_scene
 
         save(scene, "Scene", lambda path: write_scene(runs, path))
-    low = [f"{name}: {each}" for name, run in runs.items() for each in run.sentences()]
-    _end(crane, tables, *low, *crane.provenance())
+    sentences = [f"{name}: {words}" for name, run in runs.items() for words in run.sentences()]
+    if seaway is not None:
+        sentences.insert(0, _stationary_words(operated, seaway))
+    _end(crane, tables, *sea_sentences(seaway), *sentences, *crane.provenance())
 
 
 def judge(
     study: Studied,
     *,
     allowed: float = 5.0,
+    ask: str | None = None,
     remedies: bool = True,
+    turns: bool = True,
     dask: str | None = None,
     out: Annotated[Path | None, VERDICT] = None,
     plot: FigureFile = None,
 ) -> None:
-    """Judge control on a crane's drives over many seaways.
+    """Judge control on a crane's drives over many seaways: does it harm, does it suffice?
 
-    Every variant goes through the same seaways. Control fails if it makes the
-    swing worse than none in more than 5 % of them, as far as the 95 % interval
-    of that share tells; a larger orifice of the luff drive and a clip are then
-    tried. Where the interval holds the 5 % it is not decided, and the verdict
-    says how many seaways would do. The exit code is 0 only if control works.
+    Every variant goes through the same seaways of ten minutes. Control harms if
+    the swing is larger than without it in more than 5 % of them, as far as the
+    95 % interval of that share tells. It suffices if in three hours all that the
+    crane's file limits, from swing to the place of the load, stays within its
+    limits. If it fails, a larger orifice and a clip are tried. The exit code is
+    0 only if every question asked is answered with yes.
 
     Options:
       allowed PERCENT: Seaways in which control may be worse than none, in percent.
+      ask QUESTIONS: What the exit code answers: harm, sufficiency, or both, joined by a comma; by
+          default both, harm alone if the crane has no limits.
       remedies --remedies/--no-remedies: Whether to look for what would do.
+      turns --turns/--no-turns: Whether to look for numbers, as the ship's roll period, that would
+          turn the answer.
       dask ADDRESS: Run on a Dask cluster: tcp://HOST:PORT.
       out FILE: Write the verdict's page, .html, or its numbers, .csv or .parquet.
 
     For example:
-      swashplate crane judge tg3637 --sea ss3 --seeds 50
+      swashplate crane judge tg3637 --sea ss3
+      swashplate crane judge tg3637 --control feedback=0.2/0.2+ship+clip --ask harm
       swashplate crane judge tg3637 --scale luff.orifice=3 --out judge.html
       swashplate crane judge tg3637 --drive luff=fitted --drives identified,drawn
     """
@@ -302,14 +184,19 @@ def judge(
             f"--allowed is in percent, and {allowed:g} % of the seaways would ask for thousands of "
             f"them: did you mean --allowed {100.0 * allowed:g}?"
         )
-    more: dict[str, Any] = {"allowed": allowed / 100.0, "remedies": remedies}
+    more: dict[str, Any] = {"allowed": allowed / 100.0, "remedies": remedies, "turns": turns}
+    if ask is not None:
+        more["asked"] = [question.strip() for question in ask.split(",")]
     if dask is not None:
         from swashplate.executors import Dask
 
         more["executor"] = Dask(dask)
     from swashplate.crane import judge as judge_control
+    from swashplate.crane.judgment import SEAWAYS, seaways_needed
 
-    found: Judgment = study.through(judge_control, study.chosen, **more)
+    crane = study.chosen
+    side.print(seaways_needed(study.seeds or SEAWAYS, allowed / 100.0))
+    found: Judgment = study.through(judge_control, crane, **more)
     what, write = "Numbers of every seaway, in SI", found.write
     if out is not None and out.suffix.lower() == ".html":
         from swashplate.report.scene import write_judgment
@@ -325,31 +212,73 @@ def judge(
     say(found.headline)
 
 
-def follow(
-    placed: Placed,
+def operability(
+    study: Studied,
+    scatter: str | None = None,
     *,
-    sea: list[str] | None = None,
-    out: TableFile = None,
+    headings: str | None = None,
+    out: Annotated[Path | None, OPERABILITY] = None,
     plot: FigureFile = None,
 ) -> None:
-    """Show the largest sines of the tip that each axis can follow, and what seas ask for.
+    """Show the share of a year that a crane can work, and what limits it in each sea.
+
+    A scatter diagram says how often each sea comes. Each sea and heading is held
+    against the limits of the crane's file: in the frequency domain where that is
+    enough, by simulation near a limit. The sea's height, period and heading come
+    from the diagram; ship, peak factor and spreading from the options.
 
     Options:
-      sea SEA[,HEADING]: Only this sea, and where its waves come from, as of 'run'; by default all.
+      scatter FILE.csv: Columns hs, tp and share; without it a made-up diagram, of no place.
+      headings NUMBERS: Headings of the waves in degrees, as likely as each other, joined by
+          commas; by default 0,45,...,315.
+      out FILE: Write the page, .html, or the table, .csv or .parquet.
+
+    For example:
+      swashplate crane operability tg3637
+      swashplate crane operability tg3637 site.csv --scale luff.orifice=3 --out year.html
+      swashplate crane operability mine.toml site.csv --drive luff=fitted --ship ship.re1
+    """
+    from swashplate.crane import Scatter
+    from swashplate.crane import operability as operable
+
+    diagram = Scatter.packaged() if scatter is None else Scatter.from_csv(scatter)
+    more: dict[str, Any] = {}
+    if headings is not None:
+        words = headings.split(",")
+        more["headings"] = [number_of(f"--headings {headings}", word) for word in words]
+    found: Operability = study.through(operable, study.chosen, scatter=diagram, **more)
+    what, write = "Shares of the year", found.tables()[0].write
+    if out is not None and out.suffix.lower() == ".html":
+        from swashplate.report.scene import write_operability
+
+        what, write = "Operability", partial(write_operability, found)
+    save(out, what, write)
+    draw(plot, "plot_operability", found)
+    _end(study.chosen, found.tables(), *found.sentences(), *study.chosen.provenance())
+
+
+def follow(at_sea: AtSea, *, out: TableFile = None, plot: FigureFile = None) -> None:
+    """Show the largest sines of the tip that each axis can follow, and what seas ask for.
+
+    By default of all packaged seas; with --sea only of that.
 
     For example:
       swashplate crane follow tg3637 --plot follow.png
       swashplate crane follow tg3637 --sea ss3 --at boom_deg=60
+      swashplate crane follow tg3637 --sea 1.5,8 --roll-period 16
     """
     with working("Simulating"):
         from swashplate.crane import follow as largest_sines
 
-        seaway = placed.seaway(sea or ["ss3"], "ss3,90")
-        names: dict[str, Any] = {"seas": (sea[0].split(",")[0],)} if sea else {}
-        found = largest_sines(placed.chosen, seaway=seaway, **names, **placed.pose)
+        seaway = at_sea.seaway(default="ss3")
+        more: dict[str, Any] = {}
+        if at_sea.sea and seaway is not None:
+            more["seas"] = (seaway.sea,)
+        found = largest_sines(at_sea.chosen, seaway=seaway, **more, **at_sea.pose)
     save(out, "Amplitudes, in SI", found.tables()[0].write)
     draw(plot, "plot_follow", found)
-    _end(placed.chosen, found.tables(), *placed.chosen.provenance())
+    about_sea = sea_sentences(seaway) if at_sea.sea else ()
+    _end(at_sea.chosen, found.tables(), *about_sea, *at_sea.chosen.provenance())
 
 
 def sweep(
@@ -362,106 +291,76 @@ def sweep(
 ) -> None:
     """Show the swing over a quantity, without control and with it.
 
-    bearing: of the boom, in degrees from the bow to starboard, in 4 seaways.
-    height: significant height of waves in m, with a peak at 7.5 s, in 40; of
-    --sea the heading counts; the figure shows the share of seaways with less
-    than 3 degrees. orifice: factors on the luff drive's in-line orifice, in 20.
-    stick: part of the full speed in a slew by 45 degrees in a calm sea; the
-    residual swing counts.
+    bearing: of the boom, in degrees from the bow to starboard.
+    height: significant height of the waves in m, with the period of --sea.
+    orifice: factors on the luff drive's in-line orifice.
+    Each point is simulated in 6 seaways of 10 min.
 
     Options:
-      over bearing|height|orifice|stick: The quantity.
+      over bearing|height|orifice: The quantity.
       points NUMBERS: Points of the sweep, joined by commas.
 
     For example:
       swashplate crane sweep tg3637 bearing --points 0,45,90,135,180 --plot sectors.png
       swashplate crane sweep tg3637 orifice --points 1,1.5,2,3 --plot orifice.png
-      swashplate crane sweep tg3637 stick --control zv-joint --plot stick.png
     """
     more: dict[str, Any] = {}
     if points is not None:
-        more["points"] = [_number(f"--points {points}", each) for each in points.split(",")]
+        more["points"] = [number_of(f"--points {points}", each) for each in points.split(",")]
     from swashplate.crane import sweep as swing_over
 
     found: Sweep = study.through(swing_over, study.chosen, over, **more)
     save(out, "Swing, in SI", found.tables()[0].write)
     draw(plot, "plot_sweep", found)
-    _end(study.chosen, found.tables(), *study.chosen.provenance())
+    _end(study.chosen, found.tables(), *sea_sentences(study.waters), *study.chosen.provenance())
 
 
-def sectors(
-    study: Studied, *, points: str | None = None, out: TableFile = None, plot: FigureFile = None
+def damping(
+    log: str,
+    *,
+    column: str = "swing",
+    time_column: str = "time",
+    start: float | None = None,
+    stop: float | None = None,
+    rope: float | None = None,
 ) -> None:
-    """Show the swing over the bearing of the boom: 'sweep' over the bearing.
+    r"""Find the damping ratio of a load that swings freely, from a log of its angle.
+
+    A decaying sine is fitted to the signed angle in one plane, with the crane at
+    rest and at least five swings.
 
     Options:
-      points NUMBERS: Bearings in degrees from the bow to starboard, joined by commas.
+      log LOG: The log: text such as .csv, .parquet, .mat, .h5, .tdms or .mf4.
+      column NAME: Column of the angle; its unit stands in the header, 'swing \[deg]'.
+      time_column NAME: Column of the time in LOG.
+      start S: Time of the log from which on it swings freely.
+      stop S: Time of the log up to which it does.
+      rope M: Length of the rope, by which the period is checked.
 
     For example:
-      swashplate crane sectors tg3637 --points 0,45,90,135,180 --plot sectors.png
+      swashplate crane damping swing.csv --column swing --start 12 --stop 90 --rope 20
     """
-    sweep(study, "bearing", points=points, out=out, plot=plot)
+    from swashplate.crane import swing_damping
+    from swashplate.logs import read_series
 
-
-def control_of(words: str) -> Control | None:
-    """A controller of words such as ``zv-tip+feedback=0.2+clip``; None if there are none."""
-    from swashplate.crane import control
-
-    kinds: dict[str, tuple[Any, int]] = {
-        "feedback": (control.DelayedFeedback, 2),
-        "ship": (control.ShipCompensation, 0),
-        "clip": (control.Clip, 1),
-        "loop": (control.PositionLoop, 1),
-    }
-    for where, shaper in (("tip", control.TipShaper), ("joint", control.JointShaper)):
-        kinds |= {f"{shape}-{where}": (partial(shaper, shape), 0) for shape in control.IMPULSES}
-    stages: list[Control] = []
-    for word in filter(None, words.split("+")):
-        name, _, text = word.partition("=")
-        numbers = [_number(f"The control '{word}'", each) for each in text.split("/") if text]
-        kind, most = kinds.get(name, (None, 0))
-        if kind is None or len(numbers) > most:
-            raise InputError(
-                f"There is no control '{word}'; there are zv-joint, zv-tip (zvd, ei), "
-                "feedback=0.2/0.25, ship, clip=0.25 and loop=0.7."
-            )
-        stages.append(kind(*numbers))
-    return control.Chain(tuple(stages)) if stages else None
-
-
-def _numbers(
-    what: str, given: list[str] | None, example: str, known: Sequence[str] = ()
-) -> dict[str, Any]:
-    pairs = pairs_of(what, given, example)
-    strange = [name for name, _ in pairs if known and name not in known]
-    if strange:
-        raise InputError(f"{what} has no {strange[0]}; it has {', '.join(known)}.")
-    return {name: _number(f"{what} {name}={text}", text) for name, text in pairs}
-
-
-def _number(what: str, text: str) -> float:
+    series = read_series(log, column, "rad", time_column=time_column)
+    first, last = float(series.time[0]), float(series.time[-1])
+    begins = first if start is None else start
+    ends = last if stop is None else stop
+    if not first <= begins < ends <= last:
+        raise InputError(
+            f"{log} lasts from {first:g} to {last:g} s, but {begins:g} to {ends:g} s are asked for."
+        )
+    within = (begins <= series.time) & (series.time <= ends)
     try:
-        return float(text)
-    except ValueError:
-        raise InputError(f"{what}: '{text}' is no number.") from None
-
-
-def _crane_of(name: str) -> Crane:
-    """A packaged crane by its name, or the crane of a file."""
-    from swashplate.crane import Crane
-
-    return Crane.from_toml(name) if name.endswith(".toml") else Crane.preset(name)
-
-
-def _refuse_unusable(crane: Crane) -> None:
-    """Refuse a drive whose fit is not usable."""
-    for axis, source in crane.sources.items():
-        if not source.usable:
-            raise InputError(
-                f"{axis}={source.place}: the verdict on the fit of this drive is "
-                f"'{source.verdict.rstrip('.')}'; fit again until it is usable, as its report "
-                f"advises, give another drive, or take this one all the same with --force."
-            )
+        found = swing_damping(series.time[within], series.values[within], rope=rope)
+    except InputError as error:
+        raise InputError(f"{log}, {column}: {error}") from None
+    ratio = Column("damping ratio", ".3%")
+    interval = [Column(name, ".3%") for name in ("from", "to")]
+    table = Table("Free swing, 95 % interval", (ratio, *interval, Column("period", ".2f", "s")))
+    table.add(*found)
+    show(table)
 
 
 def _end(crane: Crane, tables: Iterable[Table], *said: str) -> None:
@@ -472,9 +371,30 @@ def _end(crane: Crane, tables: Iterable[Table], *said: str) -> None:
         say(sentence)
 
 
+def _stationary_words(operated: Operated, seaway: Seaway) -> str:
+    """The swing without control that this sea has in the long run, by its spectrum."""
+    from math import degrees
+
+    from swashplate.crane import linear_response
+
+    setup = operated.setup
+    names = ("slew_deg", "boom_deg", "rope_m", "swing_damping", "load", "suspension")
+    start = {"slew_deg": 0.0, "boom_deg": 45.0, "rope_m": 20.0}
+    hung = start | {name: setup[name] for name in names if name in setup}
+    found = linear_response(operated.chosen, seaway, **hung)
+    damping = operated.swing_damping
+    of_load = operated.chosen.swing_damping if damping is None else damping
+    return (
+        f"Without control the load swings by {degrees(found.values['swing'].rms):.2f} deg RMS in "
+        f"the long run, by the sea's spectrum and a damping of {100.0 * of_load:g} %; a run begins "
+        "at rest."
+    )
+
+
 command(app, "show")(show_crane)
 command(app, "run")(run)
 command(app, "judge")(judge)
+command(app, "operability")(operability)
 command(app, "follow")(follow)
 command(app, "sweep")(sweep)
-command(app, "sectors")(sectors)
+command(app, "damping")(damping)

@@ -191,8 +191,8 @@ _ENTRY = re.compile(r"^  (\w+)((?: --[\w/-]+)*) ?([A-Z\[]\S*)?: (.*(?:\n   .*)*)
 """An entry of a docstring's options."""
 FOLDERS = {"out", "c"}
 """Parameters of commands that write folders; those of files have a form."""
-UNITLESS = {"axes", "doctor", "init", "schema"}
-"""Commands that show no quantity."""
+UNITLESS = {"axes", "damping", "doctor", "init", "schema"}
+"""Commands that show no quantity, or only seconds."""
 
 
 def command(

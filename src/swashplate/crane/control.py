@@ -1,22 +1,25 @@
-"""Control of a crane: shapers, delayed feedback, ship compensation, limits, laws of one's own.
+"""Control of a crane: shaper, delayed feedback, ship compensation, limits, user-defined laws.
 
 Each is a value; `|` combines them: ``TipShaper("zv") | DelayedFeedback(0.2) | Clip()``. In the
-loop they act in one order, whatever order they are written in: joint shaper, path of the tip, tip
-shaper, offsets of the tip (feedback, ship, own), clip, inverse kinematics, position loop. Every
-stage but a joint shaper works on the path of the tip, and brings the position loop of 0.7 /s with
-it, by which the shafts follow that path; `PositionLoop` sets another gain.
+loop they act in one order, whatever order they are written in: path of the tip, tip shaper, offsets
+of the tip (feedback, ship, law), clip, inverse kinematics, position loop. Every stage works on the
+path of the tip, and brings the position loop of 0.7 /s with it, by which the shafts follow that
+path; `PositionLoop` sets another gain. `Sensors` says how well control sees the crane; without them
+it sees what is so. The linear crane is for controllers that are designed outside the package.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from math import radians
 from numbers import Real
 from typing import Any, ClassVar, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from swashplate.crane.axes import RATE
 from swashplate.equations import Model
 from swashplate.errors import InputError
 
@@ -40,14 +43,32 @@ SEEN = (
 """What a law of one's own may take as inputs: load less tip, horizontal, inertial [m]; rope [m];
 slew and boom [rad]; the operator's tip in the ship's frame, shaped [m]; the ship's motion [m],
 [rad]."""
+SENSED = (
+    ("rope_angle_noise_deg", 0.0, 10.0),
+    ("motion_noise_deg", 0.0, 10.0),
+    ("delay", 0.0, 5.0),
+    ("rate", 1.0, RATE),
+)
+"""Plausible ranges of the numbers of sensors."""
 GIVES = ("tip_x", "tip_y")
 """Signals of a law of one's own: what is added to the wanted tip in the ship's frame. [m]"""
+
+
+class Sensing(NamedTuple):
+    """Numbers of `Sensors`, as the loop takes them."""
+
+    rate: float = 0.0
+    """Measurements a sample of the loop; 0 without sensors."""
+    delay: float = 0.0
+    """[samples of the loop]"""
+    rope_angle: float = 0.0
+    motion: float = 0.0
+    """Root mean square noise. [rad]"""
 
 
 class Settings(NamedTuple):
     """Numbers of a controller, as the loop takes them."""
 
-    joint: Impulses = (1.0, 0.0, 0.0)
     tip: Impulses = (1.0, 0.0, 0.0)
     path: bool = False
     """Whether the tip's path is controlled, not only the stick's commands."""
@@ -59,6 +80,7 @@ class Settings(NamedTuple):
     clip: float = 0.0
     """[m]; 0: from the limits, by `share`; no clip if that is 0, too."""
     share: float = 0.0
+    sensing: Sensing = Sensing()
 
 
 class Control:
@@ -110,11 +132,12 @@ class Chain(Control):
 
 
 @dataclass(frozen=True)
-class JointShaper(Control):
-    """Shaper of the stick's commands, each impulse half a period of the present rope later.
+class TipShaper(Control):
+    """Shaper of the path that the operator's commands give the tip in the deck's plane.
 
-    It keeps the way of each joint only while the rope keeps its length, and calm only while the
-    joints move the tip along a line.
+    Each impulse comes half a period of the present rope later. Swing is linear in that path, so
+    what cancels in it cancels in the swing, in a turn as well; and the path ends where the
+    operator's ends, whatever the rope does.
     """
 
     shape: Shaping = "zv"
@@ -123,14 +146,6 @@ class JointShaper(Control):
     def __post_init__(self) -> None:
         if self.shape not in IMPULSES:
             raise InputError(f"A shaper is 'zv', 'zvd' or 'ei', not '{self.shape}'.")
-
-
-class TipShaper(JointShaper):
-    """Shaper of the path that the operator's commands give the tip in the deck's plane.
-
-    Swing is linear in that path, so what cancels in it cancels in the swing, in a turn as well; and
-    the path ends where the operator's ends, whatever the rope does.
-    """
 
 
 @dataclass(frozen=True)
@@ -188,6 +203,52 @@ class PositionLoop(Control):
 
 
 @dataclass(frozen=True)
+class Sensors(Control):
+    """Sensors through which control sees the crane: noise, delay and samples of the signals.
+
+    Delayed feedback, ship compensation and laws take the rope's direction, rope, slew, boom and the
+    ship's motion from them. A measurement holds until the next one; the one of the start has been
+    there before. Noise is white, drawn again for each measurement. The run itself keeps the true
+    signals. The default values are assumed, not those of a certain product.
+    """
+
+    rope_angle_noise_deg: float = 0.1
+    """Root mean square noise of the rope's direction in each of both horizontal axes, at most 10;
+    assumed. [deg]"""
+    motion_noise_deg: float = 0.05
+    """Root mean square noise of roll and of pitch, at most 10; assumed. [deg]"""
+    delay: float = 0.05
+    """From the measurement to where control has it, at most 5; assumed. [s]"""
+    rate: float = 50.0
+    """Measurements a second, 1 to 512; assumed. [Hz]"""
+    seed: int = 0
+    """Of the noise: the same for the same seed."""
+    kind = "set of sensors"
+
+    def __post_init__(self) -> None:
+        for name, least, most in SENSED:
+            value = getattr(self, name)
+            if not (isinstance(value, Real) and least <= float(value) <= most):
+                raise InputError(
+                    f"The {name} of sensors is {value!r}, but must be a number from {least:g} to "
+                    f"{most:g}."
+                )
+        if type(self.seed) is not int or self.seed < 0:
+            raise InputError(
+                f"The seed of sensors is {self.seed!r}, but must be a whole number from 0 on."
+            )
+
+    def sensing(self) -> Sensing:
+        """As the loop takes it."""
+        return Sensing(
+            rate=float(self.rate) / RATE,
+            delay=float(self.delay) * RATE,
+            rope_angle=radians(self.rope_angle_noise_deg),
+            motion=radians(self.motion_noise_deg),
+        )
+
+
+@dataclass(frozen=True)
 class Law(Control):
     """A law of one's own: an offset of the wanted tip, as a model of the engine with its state.
 
@@ -215,31 +276,39 @@ class Law(Control):
             )
 
 
-def settings_of(control: Control | None) -> tuple[Settings, Law | None]:
-    """Numbers of a controller, and the law in it."""
+class Stages(NamedTuple):
+    """What a controller is made of, as a run takes it."""
+
+    settings: Settings
+    law: Law | None
+    sensors: Sensors | None
+
+
+def stages_of(control: Control | None) -> Stages:
+    """Numbers of a controller, the law and the sensors in it."""
     if control is None:
-        return Settings(), None
+        return Stages(Settings(), None, None)
     if not isinstance(control, Control):
         raise InputError(f"{control!r} is no control of a crane; see swashplate.crane.control.")
-    made: dict[str, Any] = {"path": any(type(each) is not JointShaper for each in control.stages)}
-    law = None
-    for each in control.stages:
-        match each:
+    made: dict[str, Any] = {"path": any(not isinstance(stage, Sensors) for stage in control.stages)}
+    law, sensors = None, None
+    for stage in control.stages:
+        match stage:
             case TipShaper():
-                made["tip"] = IMPULSES[each.shape]
-            case JointShaper():
-                made["joint"] = IMPULSES[each.shape]
+                made["tip"] = IMPULSES[stage.shape]
             case DelayedFeedback():
-                made |= {"feedback": each.gain, "delay": each.delay}
+                made |= {"feedback": stage.gain, "delay": stage.delay}
             case ShipCompensation():
                 made["ship"] = True
             case Clip(size):
-                made |= {"clip": 0.0 if size == "auto" else float(size), "share": each.share}
+                made |= {"clip": 0.0 if size == "auto" else float(size), "share": stage.share}
             case PositionLoop():
-                made["gain"] = each.gain
+                made["gain"] = stage.gain
+            case Sensors():
+                made["sensing"], sensors = stage.sensing(), stage
             case Law():
-                law = each
-    return Settings(**made), law
+                law = stage
+    return Stages(Settings(**made), law, sensors)
 
 
 def feedback_damping(gain: ArrayLike, delay: ArrayLike) -> Array:

@@ -16,7 +16,15 @@ from swashplate.analysis.compensation import InverseMap, inverse_map
 from swashplate.crane.axes import AXES, check_names
 from swashplate.crane.drives import DriveLike, DriveSource, drives_of
 from swashplate.crane.kinematics import Boom, Geometry, Home, Vector, luff_rope
-from swashplate.crane.quantities import GEOMETRY, Quantity, check_sources, in_si, quantity_of
+from swashplate.crane.limits import LIMITED, limits_of
+from swashplate.crane.quantities import (
+    GEOMETRY,
+    OPTIONAL,
+    Quantity,
+    check_sources,
+    in_si,
+    quantity_of,
+)
 from swashplate.documents import parse_toml, read_text, validated
 from swashplate.drive import Drive
 from swashplate.errors import InputError, ParameterError
@@ -33,6 +41,7 @@ class CraneFile(BaseModel):
     title: str = ""
     drives: Annotated[dict[Literal["hoist", "slew", "luff"], str], Field(min_length=3)]
     geometry: dict[str, Quantity]
+    limits: dict[str, Quantity] = Field(default_factory=dict)
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,9 +66,11 @@ class Crane:
     """Drives that the controller counts on, by axis, if they are not those that move the crane."""
     sources: Mapping[str, DriveSource] = field(default_factory=dict)
     """Where drives come from that are neither packaged nor made in Python, by axis."""
+    limits: Mapping[str, Quantity] = field(default_factory=dict)
+    """What an operation may reach, by names of `swashplate.crane.LIMITED`."""
 
     def __post_init__(self) -> None:
-        _ = self._si
+        _ = self._si, self.limits_si
 
     @classmethod
     def preset(cls, name: str) -> Crane:
@@ -159,6 +170,17 @@ class Crane:
             quantities[name] = quantity_of(name, value)
         return replace(self, quantities=quantities)
 
+    def with_limits(self, **limits: float) -> Crane:
+        """The crane with other limits, in SI and by name: ``side_lead=0.07``.
+
+        A `ParameterError` for an unknown name, or a value out of its plausible range.
+        """
+        quantities = {
+            name: Quantity(value=float(value), unit=LIMITED[name].unit if name in LIMITED else "1")
+            for name, value in limits.items()
+        }
+        return replace(self, limits={**self.limits, **quantities})
+
     @cached_property
     def _si(self) -> dict[str, tuple[float, ...]]:
         """Quantities in SI; a `ParameterError` for those that make no crane."""
@@ -180,10 +202,20 @@ class Crane:
             si["rope_coupling"],
         )
 
+    @cached_property
+    def limits_si(self) -> dict[str, float]:
+        """Limits in SI, by name; a `ParameterError` for one that no crane has."""
+        return limits_of(self.limits, self.name)
+
     @property
     def safe_load(self) -> float:
         """Mass that it lifts. [kg]"""
         return self._si["safe_load"][0]
+
+    @property
+    def swing_damping(self) -> float:
+        """Damping ratio of the load's swing by air, sheaves and rope."""
+        return self._si["swing_damping"][0]
 
     @property
     def boom_limits(self) -> tuple[float, float]:
@@ -242,7 +274,8 @@ SETS = files("swashplate.crane") / "sets"
 
 def packaged_names() -> list[str]:
     """Names of the packaged cranes."""
-    return sorted(each.name.removesuffix(".toml") for each in SETS.iterdir())
+    names = (entry.name for entry in SETS.iterdir())
+    return sorted(name.removesuffix(".toml") for name in names if name.endswith(".toml"))
 
 
 def preset_text(name: str) -> str:
@@ -255,13 +288,14 @@ def preset_text(name: str) -> str:
 
 def _geometry_of(content: CraneFile, origin: str) -> dict[str, Quantity]:
     """All quantities of a crane's file; refuses a name that is missing or unknown."""
-    lacks = [name for name in GEOMETRY if name not in content.geometry]
+    given = {**OPTIONAL, **content.geometry}
+    lacks = [name for name in GEOMETRY if name not in given]
     strange = [name for name in content.geometry if name not in GEOMETRY]
     if lacks or strange:
         extra = f", and knows no '{strange[0]}'" if strange else ""
         need = f"needs an entry '{lacks[0]}'" if lacks else f"has {len(GEOMETRY)} quantities"
         raise ParameterError(f"{origin}: geometry {need}{extra}.")
-    return {name: content.geometry[name] for name in GEOMETRY}
+    return {name: given[name] for name in GEOMETRY}
 
 
 def _read(text: str, origin: str, folder: Path) -> Crane:
@@ -269,5 +303,13 @@ def _read(text: str, origin: str, folder: Path) -> Crane:
     content = validated(parse_toml(text, origin), CraneFile, origin)
     quantities = _geometry_of(content, origin)
     in_si(quantities, origin)
+    limits_of(content.limits, origin)
     drives, sources = drives_of(content.drives, folder)
-    return Crane(content.name, content.title, quantities, **drives, sources=sources)
+    return Crane(
+        content.name,
+        content.title,
+        quantities,
+        **drives,
+        sources=sources,
+        limits=content.limits,
+    )

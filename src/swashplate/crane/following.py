@@ -14,7 +14,8 @@ from swashplate.crane.axes import AXES
 from swashplate.crane.crane import Crane
 from swashplate.crane.kinematics import boom_at, reach_rate, tip_of
 from swashplate.crane.loop import largest_sine
-from swashplate.crane.sea import BAND, SEA_STATES, Seaway
+from swashplate.crane.sea import SEA_STATES, Seaway, Spectrum
+from swashplate.crane.spectral import tip_motion
 from swashplate.errors import InputError
 from swashplate.results import GivenAxes, Result, figures
 from swashplate.tables import Column, Table
@@ -82,7 +83,7 @@ def follow(
     crane: Crane,
     periods: ArrayLike = tuple(range(4, 17)),
     *,
-    seas: Sequence[str] = tuple(SEA_STATES),
+    seas: Sequence[str | Spectrum] = tuple(SEA_STATES),
     seaway: Seaway | None = None,
     slew_deg: float = 90.0,
     boom_deg: float = 45.0,
@@ -92,8 +93,8 @@ def follow(
 
     They are of the drives that the controller knows, see `Crane.with_drive`.
 
-    Seas are names of `SEA_STATES`; ship and heading are those of the seaway, by default the crane
-    ship's hull in beam waves.
+    Seas are names of `SEA_STATES` or spectra; ship and heading are those of the seaway, by default
+    the crane ship's hull in beam waves.
     """
     times = np.atleast_1d(np.asarray(periods, dtype=np.float64))
     if not (((times > 0.0) & (times <= SLOWEST)).all() and times.size):
@@ -107,19 +108,20 @@ def follow(
         acceleration = rate * min(inverse.acceleration)
         amplitude[:, i] = [largest_sine(speed, acceleration, w) for w in 2.0 * pi / times]
     # motion of the tip, linear in the ship's: up, across the boom, along it
-    base, omega = seaway or Seaway(), np.linspace(*BAND, 1000)
+    base = seaway or Seaway()
+    omega = base.bins.frequency
     heading = np.full(omega.size, radians(base.heading_deg))
-    motion = base.ship.response(omega, heading, base.speed)
-    arm = np.array(tip_of(home.slew, boom, g))[:, None]
-    forward, port, up = motion[:3] + np.cross(motion[3:], arm, axis=0)
+    arm = np.array(tip_of(home.slew, boom, g))
+    forward, port, up = tip_motion(base.response(omega, heading), arm)
     c, s = cos(home.slew), sin(home.slew)
     powers = np.abs([up, s * forward + c * port, c * forward - s * port]) ** 2
     asked = {}
-    for name in seas:
-        spectra = replace(base, sea=name).spectrum.density(omega) * powers
-        zeroth = np.trapezoid(spectra, omega, axis=1)
-        second = np.trapezoid(spectra[2] * omega**2, omega)
+    for sea in seas:
+        of_sea = replace(base, sea=sea)
+        variances = powers * of_sea.bins.variance
+        zeroth = variances.sum(axis=1)
+        second = float((variances[2] * base.encounter(omega, heading) ** 2).sum())
         height, across, along = (2.0 * np.sqrt(zeroth)).tolist()
         period = 2.0 * pi * float(np.sqrt(zeroth[2] / second))
-        asked[name] = Demand(period, (height, across, along))
+        asked[of_sea.title] = Demand(period, (height, across, along))
     return Followable(times, amplitude, asked, crane, boom_deg)

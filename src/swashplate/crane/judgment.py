@@ -1,22 +1,43 @@
-"""Judgment of control over seaways: does it work on the drives, and if not, what would do?"""
+"""Judgment of control over many seaways: does it harm, does it suffice, and what would?
+
+Two questions have two answers. *Harm*: in which share of seaways is the swing larger than without
+control? *Sufficiency*: does all that has a limit stay within it in a sea of three hours?
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from math import inf, pi, sqrt
+from math import isfinite, nan, pi, sqrt
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple, cast, overload
 
 import numpy as np
 from numpy.typing import NDArray
 
-from swashplate.crane.axes import AXES, RATE, check_names
-from swashplate.crane.control import Chain, Clip, PositionLoop
+from swashplate.crane.assumptions import Turn, turns_of
+from swashplate.crane.axes import AXES, check_names
+from swashplate.crane.changed_drives import upgraded
+from swashplate.crane.confidence import (
+    Estimate,
+    counted_words,
+    fewest_seaways,
+    mean_of,
+    more_seaways,
+    rms_of,
+    share_of,
+)
+from swashplate.crane.control import Chain, Clip, Control, PositionLoop
 from swashplate.crane.crane import Crane
+from swashplate.crane.extremes import THREE_HOURS, largest_of_peaks
 from swashplate.crane.following import follow
+from swashplate.crane.limits import LIMITED
+from swashplate.crane.outcome import Outcome
 from swashplate.crane.result import PUMPS, CraneRun, limit_table
 from swashplate.crane.rope import GRAVITY
-from swashplate.crane.study import COUNTED, NONE, Case, Laws, Study, with_orifice
+from swashplate.crane.spectral import LinearResponse, linear_response
+from swashplate.crane.stepper import feels_load
+from swashplate.crane.study import NONE, Case, Controllers, Study
+from swashplate.crane.transfer_functions import CRANE_SHIP, Hull
 from swashplate.errors import InputError
 from swashplate.results import GivenAxes, Tabular, figures
 from swashplate.simulation.result import Limit
@@ -28,87 +49,82 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 Array = NDArray[np.float64]
+Question = Literal["harm", "sufficiency"]
+QUESTIONS: tuple[Question, ...] = ("harm", "sufficiency")
+Decision = Literal["yes", "no", "not decided"]
 
+SEAWAYS = 120
+"""Seaways that are judged by default: 72 are the least that can tell an allowed share of 5 %, 110
+if one of them leaves the model with and without control."""
 FACTORS = (1.25, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0)
-"""Factors on the luff's orifice that are tried, the smallest first."""
+"""Factors on an in-line orifice that are tried, the smallest first."""
 SHARES = (0.8, 0.6, 0.4)
 """Shares of what the luff can follow at which control is clipped on trial, the largest first."""
-ENOUGH = (10, 20, 30, 50, 75, 100, 150, 200, 300, 500, 700, 1000, 1500, 2000, 3000, 5000, 10_000)
-"""Numbers of seaways that are advised where fewer do not decide."""
+ACTS = 0.05
+"""Share of time from which on a drive's acceleration limit is worth a larger orifice."""
 BLOCK = 20
 """Seaways of a trial after which it is given up if it has failed already."""
 LOOP = PositionLoop()
 """What a clip is tried with: a stiffer loop brings back what the clip takes."""
+IDLE = 1e-3
+"""Relative difference of the swing below which control changes nothing."""
 
 
-class Estimate(NamedTuple):
-    """A number with its 95 % confidence interval."""
+class Judged(NamedTuple):
+    """A quantity with a limit, of one variant."""
 
-    value: float
-    low: float
-    high: float
+    name: str
+    limit: float
+    largest: Estimate
+    """Most probable largest value in three hours; of the saturation its mean."""
 
+    @property
+    def within(self) -> Decision:
+        """Whether it stays within the limit; not decided if its interval holds the limit."""
+        if self.largest.low > self.limit:
+            return "no"
+        return "yes" if self.largest.high <= self.limit else "not decided"
 
-def mean_of(values: Array, least: float = -inf) -> Estimate:
-    """Mean of independent values with Student's interval; NaN are left out.
+    @property
+    def shown(self) -> tuple[str, float]:
+        """Unit in which it is shown, and the factor from SI to that."""
+        if self.name == "saturation":
+            return "%", 100.0
+        unit = LIMITED[self.name].unit
+        return ("deg", 180.0 / pi) if unit == "rad" else (unit.replace("1", ""), 1.0)
 
-    Values that cannot be below `least`, as a swing not below 0, have no interval that reaches
-    below it.
-
-    Notes
-    -----
-    Seaways are drawn independently, so that differences within each are, too. Near the limit of a
-    drive they are skewed: with few seaways Student's interval is too narrow on the long side, but
-    a bootstrap of few values is narrower still; with 200 both agree.
-    """
-    from scipy.special import stdtrit
-
-    known = values[np.isfinite(values)]
-    mean = float(known.mean()) if known.size else np.nan
-    if known.size < 2:
-        return Estimate(mean, np.nan, np.nan)
-    t = float(stdtrit(known.size - 1, 0.975))
-    half = t * float(known.std(ddof=1)) / sqrt(known.size)
-    return Estimate(mean, max(mean - half, least), mean + half)
-
-
-def share_of(hits: int, seaways: int) -> Estimate:
-    """Share of independent seaways with its exact interval (Clopper and Pearson 1934)."""
-    from scipy.special import betaincinv
-
-    low = float(betaincinv(hits, seaways - hits + 1, 0.025)) if hits > 0 else 0.0
-    high = float(betaincinv(hits + 1, seaways - hits, 0.975)) if hits < seaways else 1.0
-    return Estimate(hits / seaways, low, high)
-
-
-def counted_words(share: Estimate, seaways: int) -> str:
-    """A share of seaways in words: ``"2 of 37 seaways (95 % interval 0.7 to 18.2 %)"``."""
-    low, high = 100.0 * share.low, 100.0 * share.high
-    of = f"{round(share.value * seaways)} of {count(seaways, 'seaway')}"
-    return f"{of} (95 % interval {low:.1f} to {high:.1f} %)"
-
-
-def more_seaways(share: float, seaways: int, allowed: float) -> str:
-    """How many more seaways than so many tell a share from the one allowed, if the share stays."""
-    for more in ENOUGH:
-        found = share_of(round(share * more), more)
-        if more > seaways and not found.low <= allowed <= found.high:
-            return f"about {more}"
-    # a share as large as the one allowed: more seaways will first tell whether it stays so
-    return f"{10 * seaways} to begin with"
+    def words(self) -> str:
+        """In a sentence: ``"off-lead 9.1 deg (8.7 to 9.5), limit 8 deg"``."""
+        unit, factor = self.shown
+        if not all(map(isfinite, self.largest)):
+            return f"{LIMITED[self.name].label} not known from so few peaks"
+        value, low, high = (factor * number for number in self.largest)
+        what = f"{LIMITED[self.name].label} {value:.3g} {unit}".rstrip()
+        return f"{what} ({low:.3g} to {high:.3g}), limit {factor * self.limit:.3g} {unit}".rstrip()
 
 
 class Remedy(NamedTuple):
-    """A change with which control passes, or with which it is not decided whether it does."""
+    """A change that was tried on the crane's own drives."""
 
     what: str
     """In words: ``"luff orifice ×1.5"``."""
     size: float
     """Factor on the orifice, or size of the clip. [m]"""
+    harmless: Decision
+    """Whether control is worse than none as seldom as allowed then."""
+    sufficient: Decision | None
+    """Whether all stays within its limits then; None if that was not asked."""
     worse: Estimate
     """Share of seaways in which control is then worse than none."""
     swing: Estimate
     """Root mean square swing then. [rad]"""
+    beyond: tuple[str, ...]
+    """What is beyond its limit then, in words."""
+
+    @property
+    def passes(self) -> bool:
+        """Whether it surely does all that was asked."""
+        return self.harmless == "yes" and self.sufficient in ("yes", None)
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,14 +132,20 @@ class Judgment(Tabular):
     """Variants of control and drives in the same seaways, and what follows."""
 
     study: Study
-    """Crane, variants, seaways, and from when on swing counts."""
-    values: Array
-    """(n, m, 18) of seaways and cases, `study.COUNTED`."""
+    """Crane, variants, seaways, and for how long each counts."""
+    outcomes: tuple[tuple[Outcome, ...], ...]
+    """Of every seaway, in the order of the variants."""
     allowed: float
     """Share of seaways in which control may be worse than none."""
+    asked: tuple[Question, ...]
+    """Questions that `passed` answers."""
+    linear: LinearResponse | None
+    """The crane without control in the frequency domain; None if its swing is not damped."""
     remedies: tuple[Remedy, ...] = ()
     tried: tuple[str, ...] = ()
-    """What was tried and is worse than none in more of the seaways than allowed."""
+    """What was tried and does not pass all that was asked."""
+    turns: tuple[Turn, ...] = ()
+    """Assumed or given numbers that would turn the answer, if they were others."""
 
     def __repr__(self) -> str:
         return f"Judgment({count(len(self.study.seeds), 'seaway')}, {', '.join(self.names)})"
@@ -137,11 +159,13 @@ class Judgment(Tabular):
     def plot(
         self, *, ax: Axes | Sequence[Axes] | None = None, title: str = ""
     ) -> Figure | Axes | Sequence[Axes]:
-        """Figure of the swing of every variant in every seaway, its mean and interval.
+        """Figure of the swing of every variant in every seaway, and of all that has a limit.
 
-        By default a new figure; with `ax` it is drawn there, and `ax` returned.
+        By default a new figure; with `ax` the swing alone is drawn there, and `ax` returned.
         """
         return cast("Figure", figures().plot_judgment(self, ax=ax, title=title))
+
+    # --- numbers of variants ----------------------------------------------------------------------
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -153,49 +177,102 @@ class Judgment(Tabular):
         """The variant that the verdict is on: the last one."""
         return self.names[-1]
 
-    def counted(self, name: str, what: str = "rms_swing") -> Array:
-        """(n,) number of a variant in each seaway, of `COUNTED`; NaN where it was stopped."""
+    def of(self, name: str) -> list[Outcome]:
+        """Outcomes of a variant in each seaway."""
         check_names("There is no variant", [name], self.names)
-        return np.asarray(self.values[:, self.names.index(name), COUNTED.index(what)])
+        return [outcomes[self.names.index(name)] for outcomes in self.outcomes]
+
+    def swing(self, name: str) -> Array:
+        """(n,) root mean square swing in each seaway [rad]; NaN where it left the model."""
+        return np.array([outcome.rms_swing for outcome in self.of(name)])
+
+    def left(self, name: str) -> dict[str, int]:
+        """Number of seaways in which a variant is not an operation any more, by reason."""
+        reasons = [outcome.left for outcome in self.of(name) if outcome.left]
+        return {reason: reasons.count(reason) for reason in dict.fromkeys(reasons)}
 
     def difference(self, name: str, other: str = NONE) -> Estimate:
         """Mean paired difference of the root mean square swing to another variant. [rad]"""
-        return mean_of(self.counted(name) - self.counted(other))
+        return mean_of(self.swing(name) - self.swing(other))
 
     def worse(self, name: str) -> Estimate:
-        """Share of seaways in which a variant swings more than no control, or was stopped."""
-        worse = _worse(self.counted(name), self.counted(NONE))
-        return share_of(int(worse.sum()), worse.size)
+        """Share of seaways in which a variant swings more than no control.
+
+        One that leaves the model, or is stopped, is worse than one that does not; if both do, that
+        seaway is not decided.
+        """
+        return _worse(self.of(name), self.of(NONE))
+
+    def limited(self, name: str) -> tuple[Judged, ...]:
+        """All that has a limit, of a variant."""
+        outcomes = self.of(name)
+        return _judged(outcomes, self.study.crane.limits_si)
 
     def acting(self, name: str, axis: str, limit: Limit) -> float:
         """Mean share of time for which a limit of a drive acts; NaN if every run was stopped."""
-        return mean_of(self.counted(name, f"{axis}_{str(limit.name).lower()}")).value
+        shares = [outcome.limits[AXES.index(axis), PUMPS.index(limit)] for outcome in self.of(name)]
+        return mean_of(np.array(shares)).value
+
+    # --- answers ----------------------------------------------------------------------------------
 
     @property
-    def outcome(self) -> Literal["works", "fails", "not decided"]:
-        """Whether the judged variant is worse than none as seldom as allowed, and has an effect.
-
-        Not decided where the interval of the share in which it is worse holds the one allowed.
-        """
+    def harmless(self) -> Decision:
+        """Whether the judged variant is worse than none as seldom as allowed."""
         share = self.worse(self.judged)
-        if share.low > self.allowed or self._idle:
-            return "fails"
-        return "works" if share.high <= self.allowed else "not decided"
+        if share.low > self.allowed:
+            return "no"
+        return "yes" if share.high <= self.allowed else "not decided"
+
+    @property
+    def sufficient(self) -> Decision | None:
+        """Whether all stays within its limits in three hours; None if the crane has no limits.
+
+        No, if the judged variant leaves the model once in three hours or more often.
+        """
+        if not self.study.crane.limits:
+            return None
+        decisions = [judged.within for judged in self.limited(self.judged)]
+        return "no" if self._leaves_often else _all(decisions)
+
+    @property
+    def _leaves_often(self) -> bool:
+        left = sum(self.left(self.judged).values())
+        return left * THREE_HOURS >= len(self.study.seeds) * self.study.length
+
+    @property
+    def idle(self) -> bool:
+        """Whether the judged variant swings as no control does, in every seaway."""
+        own, none = self.swing(self.judged), self.swing(NONE)
+        same = np.allclose(own, none, rtol=IDLE, equal_nan=True)
+        return bool(same and np.isfinite(own).any())
 
     @property
     def passed(self) -> bool:
-        """Whether the judged variant works."""
-        return self.outcome == "works"
+        """Whether all questions asked are answered with yes, and control has an effect."""
+        answers: dict[Question, Decision | None] = {
+            "harm": self.harmless,
+            "sufficiency": self.sufficient,
+        }
+        return not self.idle and all(answers[question] == "yes" for question in self.asked)
 
     @property
-    def _idle(self) -> bool:
-        """Whether the judged variant swings as no control does, in every seaway."""
-        return np.allclose(self.counted(self.judged), self.counted(NONE), rtol=1e-3)
+    def outcome(self) -> Literal["passes", "fails", "not decided"]:
+        """`passed`, or whether more seaways could tell."""
+        if self.passed:
+            return "passes"
+        answers = [self.harmless] if "harm" in self.asked else []
+        if "sufficiency" in self.asked and self.sufficient is not None:
+            answers.append(self.sufficient)
+        return "fails" if "no" in answers or self.idle else "not decided"
 
     @property
     def headline(self) -> str:
-        """The outcome, the verdict, and whether they rest on a drive whose fit is not usable."""
+        """The outcome, both answers, and whether they rest on a drive that is not usable."""
         words = f"{self.outcome.capitalize()}: {self.verdict()}"
+        return " ".join(filter(None, [words, self.unusable_sentence()]))
+
+    def unusable_sentence(self) -> str:
+        """Which fits are not usable that the judged variant rests on; empty if there is none."""
         case = self.study.cases[self.judged]
         unusable = {
             axis
@@ -204,216 +281,485 @@ class Judgment(Tabular):
             if not source.usable
         }
         if not unusable:
-            return words
+            return ""
         axes = listed([axis for axis in AXES if axis in unusable])
-        return f"{words} It rests on the fit of the {axes}, which is not usable."
+        return f"It rests on the fit of the {axes}, which is not usable."
 
     def verdict(self) -> str:
-        """What the judged variant amounts to, and what would do if it fails."""
-        share, seaways, outcome = self.worse(self.judged), len(self.study.seeds), self.outcome
+        """Both answers on the judged variant, and what would do if it fails."""
+        sentences = [self.harm_sentence(), self.sufficiency_sentence(), *self.remedy_sentences()]
+        return " ".join(filter(None, sentences))
+
+    def harm_sentence(self) -> str:
+        """Whether the judged variant harms, and by how much it changes the swing."""
+        share, seaways = self.worse(self.judged), len(self.study.seeds)
+        none, own = (np.degrees(rms_of(self.swing(name)).value) for name in (NONE, self.judged))
+        drives = f"With the drives '{self.judged}' the controller"
+        if self.idle:
+            return (
+                f"{drives} changes nothing: {none:.2f} deg RMS without it, {own:.2f} with it, in "
+                f"{count(seaways, 'seaway')}."
+            )
         worse = f"swing worse than none in {counted_words(share, seaways)}"
-        none, own = (np.degrees(mean_of(self.counted(each)).value) for each in (NONE, self.judged))
-        if outcome == "works":
-            return (
-                f"With the drives '{self.judged}' the controller brings the swing from {none:.2f} "
-                f"to {own:.2f} deg RMS and makes {worse}."
-            )
-        if self._idle:
-            return (
-                f"With the drives '{self.judged}' the controller changes nothing: {none:.2f} deg "
-                f"RMS without it, {own:.2f} with it, in {count(seaways, 'seaway')}."
-            )
-        if outcome == "not decided":
-            return (
-                f"With the drives '{self.judged}' the controller makes {worse}: that does not say "
-                f"whether it is more than the {100.0 * self.allowed:g} % allowed. Run more seaways "
-                f"({more_seaways(share.value, seaways, self.allowed)})."
-            )
-        said = (
-            f"The controller makes {worse}: {none:.2f} deg RMS without it, {own:.2f} with it"
-            f"{self._cause()}."
+        if self.harmless == "yes":
+            return f"{drives} does no harm: it makes {worse}{_rms_words(none, own)}."
+        if self.harmless == "no":
+            return f"{drives} harms: it makes {worse}{_rms_words(none, own)}{self._cause()}."
+        both = sum(
+            bool(own.left and other.left)
+            for own, other in zip(self.of(self.judged), self.of(NONE), strict=True)
         )
-        for each in self.remedies:
-            more = more_seaways(each.worse.value, seaways, self.allowed)
-            sure = each.worse.high <= self.allowed
-            what = "would do" if sure else f"may do: run more seaways ({more})"
-            said += f" {each.what.capitalize()} {what}."
+        if both:
+            return (
+                f"{drives} makes {worse}; in {both} both leave the model, so that it is not "
+                "decided whether control harms: take a smaller sea."
+            )
+        return (
+            f"{drives} makes {worse}: that does not say whether it is more than the "
+            f"{100.0 * self.allowed:g} % allowed. Run more seaways "
+            f"({more_seaways(share.value, seaways, self.allowed)})."
+        )
+
+    def sufficiency_sentence(self) -> str:
+        """Whether the judged variant stays within all limits; empty if the crane has none."""
+        if self.sufficient is None:
+            return ""
+        limited = self.limited(self.judged)
+        beyond = [judged.words() for judged in limited if judged.within == "no"]
+        open_ = [judged.words() for judged in limited if judged.within == "not decided"]
+        left = sum(self.left(self.judged).values())
+        if self.sufficient == "yes":
+            return "It suffices: in 3 h all stays within its limits."
+        if self.sufficient == "no":
+            causes = beyond or [f"it leaves the model in {count(left, 'seaway')}"]
+            return f"It does not suffice: in 3 h {'; '.join(causes)}."
+        return f"Whether it suffices is not decided: in 3 h {'; '.join(open_)}. Run more seaways."
+
+    def remedy_sentences(self) -> list[str]:
+        """What would do, or that nothing that was tried would; none if nothing was."""
         if self.tried and not self.remedies:
-            said += f" None of these would do: {listed(self.tried)}."
-        return said
+            return [f"None of these would do: {listed(self.tried)}."]
+        sentences = [self._remedy_sentence(remedy) for remedy in self.remedies]
+        if self.tried and not any(remedy.passes for remedy in self.remedies):
+            sentences.append("Nothing that was tried surely does all that is asked.")
+        return sentences
+
+    def _remedy_sentence(self, remedy: Remedy) -> str:
+        what = remedy.what.capitalize()
+        if remedy.harmless == "not decided":
+            seaways = len(self.study.seeds)
+            more = more_seaways(remedy.worse.value, seaways, self.allowed)
+            return f"{what} may do: run more seaways ({more})."
+        if remedy.passes:
+            return f"{what} would do."
+        if remedy.sufficient == "not decided":
+            return f"{what} would do no harm, and may suffice: run more seaways."
+        return f"{what} would do no harm, but not suffice: in 3 h {'; '.join(remedy.beyond)}."
 
     def _cause(self) -> str:
         """The limit that acts for the longest time."""
         if not self.study.cases[self.judged].driven:
             return ""
         names = {Limit.ORIFICE: "acceleration limit", Limit.SWASH_STOP: "speed limit"}
-        shares = [(self.acting(self.judged, a, each), a, each) for a in AXES for each in names]
-        share, axis, limit = max(shares, key=lambda each: np.nan_to_num(each[0]))
+        shares = [
+            (self.acting(self.judged, axis, limit), axis, limit) for axis in AXES for limit in names
+        ]
+        share, axis, limit = max(shares, key=lambda entry: float(np.nan_to_num(entry[0])))
         if np.isnan(share):
             return "; it was stopped in all of them"
         return f", {axis} at its {names[limit]} {100.0 * share:.0f} % of the time"
 
+    # --- runs, tables -----------------------------------------------------------------------------
+
     def run(self, name: str, seed: int) -> CraneRun:
-        """The whole run of a variant in one seaway; a `DomainError` if it was stopped."""
-        study = self.study
-        if seed not in study.seeds or name not in self.names or study.sea is None:
-            raise InputError(f"There is no seaway {seed} of a variant '{name}' in this judgment.")
-        case = study.cases[name]
-        motion = replace(study.sea, seed=seed).motion(round(case.stick.length * RATE) + 1)
-        return case.run(study.seeds.index(seed), motion)
+        """The whole run of a variant in one seaway; a `DomainError` if it is stopped."""
+        return self.study.run(name, seed)
 
     @property
     def typical(self) -> int:
         """Seed of the seaway in which the judged variant swings as in half of them."""
-        order = np.argsort(self.counted(self.judged))
+        order = np.argsort(self.swing(self.judged))
         return self.study.seeds[int(order[len(order) // 2])]
 
     def tables(self) -> list[Table]:
-        """Swing of each variant, how often it is worse, paired differences, limits, remedies."""
-        seaways = len(self.study.seeds)
-        interval = [Column(each, ".2f", "rad", none="–") for each in ("rms", "from", "to")]
-        swings = Table(
-            f"Swing in {count(seaways, 'seaway')}, means with 95 % intervals",
-            (
-                *(Column("variant", wrap=True), *interval),
-                Column("largest", ".2f", "rad", none="–"),
-                Column("stopped", "d"),
-            ),
-            "largest: median over the seaways of the largest swing",
-        )
-        share = [Column("worse than none", ".1%"), Column("from", ".1%"), Column("to", ".1%")]
-        worse = Table(
-            "More swing than without control, 95 % intervals",
-            (Column("variant", wrap=True), Column("seaways", "d"), *share),
-        )
-        for name in self.names:
-            rms, largest = self.counted(name), self.counted(name, "largest_swing")
-            known = largest[np.isfinite(largest)]
-            median = float(np.median(known)) if known.size else np.nan
-            found = self.worse(name)
-            look = found.value > self.allowed
-            swings.add(name, *mean_of(rms, 0.0), median, int(np.isnan(rms).sum()), look=look)
-            if name != NONE:
-                worse.add(name, round(found.value * seaways), *found, look=look)
-        spec = [Column(each, "+.2f", "rad", none="–") for each in ("difference", "from", "to")]
-        heads = (Column("variant", wrap=True), Column("less", wrap=True), *spec)
-        paired = Table("Differences of RMS swing within each seaway", heads)
-        for i, other in enumerate(self.names):
-            for name in self.names[i + 1 :]:
-                paired.add(name, other, *self.difference(name, other))
+        """Swing, how often it is worse, what has a limit, differences, drives' limits, remedies."""
         acting = [
-            (name, axis, [self.acting(name, axis, each) for each in PUMPS])
+            (name, axis, [self.acting(name, axis, limit) for limit in PUMPS])
             for name in self.names[1:]
             if self.study.cases[name].driven
             for axis in AXES
         ]
-        columns = (Column("remedy"), *share, *interval)
-        said = f"tried on the crane's own drives; a clip with a position loop of {LOOP.gain:g} /s"
-        remedies = Table("Remedies", columns, said)
-        for each in self.remedies:
-            remedies.add(each.what, *each.worse, *each.swing)
-        return [swings, worse, paired, limit_table(acting), *([remedies] if self.remedies else [])]
+        tables = [
+            self._swing_table(),
+            self._worse_table(),
+            *([self._limit_table()] if self.study.crane.limits else []),
+            self._difference_table(),
+            limit_table(acting),
+        ]
+        return [*tables, self._remedy_table()] if self.remedies else tables
+
+    def _swing_table(self) -> Table:
+        seaways, minutes = len(self.study.seeds), self.study.length / 60.0
+        interval = [Column(head, ".2f", "rad", none="–") for head in ("rms", "from", "to")]
+        table = Table(
+            f"Swing in {count(seaways, 'seaway')} of {minutes:g} min, 95 % intervals",
+            (
+                Column("variant", wrap=True),
+                *interval,
+                Column("in 3 h", ".2f", "rad", none="–"),
+                Column("left the model", "d"),
+            ),
+            "in 3 h: most probable largest swing. Runs that left the model are not in the RMS",
+        )
+        for name in self.names:
+            table.add(
+                name,
+                *rms_of(self.swing(name)),
+                largest_of(self.of(name), "swing").value,
+                sum(self.left(name).values()),
+                look=name != NONE and self.worse(name).value > self.allowed,
+            )
+            if name == NONE and self.linear is not None:
+                swing = self.linear.values["swing"]
+                table.add(f"{NONE}, by its spectrum", swing.rms, nan, nan, swing.largest, 0)
+        return table
+
+    def _worse_table(self) -> Table:
+        share = [Column("worse than none", ".1%"), Column("from", ".1%"), Column("to", ".1%")]
+        columns = (Column("variant", wrap=True), Column("seaways", "d"), *share)
+        table = Table("More swing than without control, 95 % intervals", columns)
+        seaways = len(self.study.seeds)
+        for name in self.names[1:]:
+            found = self.worse(name)
+            look = found.value > self.allowed
+            table.add(name, round(found.value * seaways), *found, look=look)
+        return table
+
+    def _limit_table(self) -> Table:
+        """What has a limit, of the judged variant."""
+        numbers = [Column(head, ".3g", none="–") for head in ("limit", "in 3 h", "from", "to")]
+        columns = (Column("quantity"), Column("unit"), *numbers, Column("within"))
+        table = Table(f"Limits, '{self.judged}'", columns, "in 3 h: most probable largest value")
+        for judged in self.limited(self.judged):
+            unit, factor = judged.shown
+            # a side-lead without waves across the boom is 0, not a millionth of a degree
+            values = [round(factor * number, 3) for number in (judged.limit, *judged.largest)]
+            label, within = LIMITED[judged.name].label, judged.within
+            table.add(label, unit, *values, within, look=within != "yes")
+        return table
+
+    def _difference_table(self) -> Table:
+        spec = [Column(head, "+.2f", "rad", none="–") for head in ("difference", "from", "to")]
+        heads = (Column("variant", wrap=True), Column("less", wrap=True), *spec)
+        table = Table("Differences of RMS swing within each seaway", heads)
+        for index, other in enumerate(self.names):
+            for name in self.names[index + 1 :]:
+                table.add(name, other, *self.difference(name, other))
+        return table
+
+    def _remedy_table(self) -> Table:
+        share = [Column("worse than none", ".1%"), Column("from", ".1%"), Column("to", ".1%")]
+        interval = [Column(head, ".2f", "rad", none="–") for head in ("rms", "from", "to")]
+        note = f"tried on the crane's own drives; a clip with a position loop of {LOOP.gain:g} /s"
+        table = Table("Remedies", (Column("remedy"), *share, *interval), note)
+        for remedy in self.remedies:
+            table.add(remedy.what, *remedy.worse, *remedy.swing)
+        return table
 
     def to_polars(self) -> polars.DataFrame:
         """Numbers of every variant in every seaway, SI, shares of time of limits."""
         import polars as pl
 
-        rows = [
-            {"seed": seed, "variant": name} | dict(zip(COUNTED, values.tolist(), strict=True))
-            for seed, found in zip(self.study.seeds, self.values, strict=True)
-            for name, values in zip(self.names, found, strict=True)
-        ]
+        limits = [f"{axis}_{str(limit.name).lower()}" for axis in AXES for limit in PUMPS]
+        rows = []
+        for seed, outcomes in zip(self.study.seeds, self.outcomes, strict=True):
+            for name, outcome in zip(self.names, outcomes, strict=True):
+                row = {"seed": seed, "variant": name, "rms_swing": outcome.rms_swing}
+                row |= {"largest_swing": outcome.largest_swing, "left": outcome.left}
+                row |= dict(zip(limits, outcome.limits.ravel().tolist(), strict=True))
+                rows.append(row)
         return pl.DataFrame(rows)
 
     def _sentences(self) -> list[str]:
         return list(self.sentences()[1:])  # the first one is the headline
 
     def sentences(self) -> tuple[str, ...]:
-        """The verdict, and what it rests on."""
-        study, assumed = self.study, self.study.crane.assumed
-        rests = (
-            f"Swing counts from {study.start:g} s to {study.cases[NONE].stick.length:g} s of each "
-            "seaway. Control works if it is worse than none in at most "
+        """The verdict, what it rests on, and what would turn it."""
+        study = self.study
+        sentences = [self.verdict(), *self._rests()]
+        for name in self.names:
+            for reason, seaways in self.left(name).items():
+                of = count(len(study.seeds), "seaway")
+                sentences.append(f"'{name}' is not an operation in {seaways} of {of}: {reason}.")
+        sentences += [turn.words() for turn in self.turns]
+        sentences += study.seaway.sentences()
+        return (*sentences, *study.provenance())
+
+    def _rests(self) -> list[str]:
+        """What the answers hang on, in sentences."""
+        study, crane = self.study, self.study.crane
+        rule = (
+            f"Each seaway counts for {study.length:g} s after {study.run_in:g} s from a stationary "
+            "swing. Control harms if it is worse than none in more than "
             f"{100.0 * self.allowed:g} % of them; the 95 % interval of that share decides."
         )
-        crane = (f"{assumed} of the crane are assumed.",) if assumed else ()
-        return (self.verdict(), rests, *crane, *study.provenance())
+        seaway, spectrum = study.seaway, study.seaway.spectrum
+        waves = (
+            f"Waves of {spectrum.height:g} m with a peak at {spectrum.period:g} s and a peak "
+            f"factor of {spectrum.peak_factor:g}, at a heading of {seaway.heading_deg:g} deg."
+        )
+        none = study.cases[NONE]
+        damping, given = none.swing_damping, "swing_damping" in none.hangs
+        assumed = not given and crane.quantities["swing_damping"].status == "assumed"
+        words = f"The load's swing has a damping of {100.0 * damping:g} %"
+        sentences = [rule, waves, f"{words}, assumed." if assumed else f"{words}."]
+        ship = study.seaway.ship
+        if isinstance(ship, Hull):
+            words = f"The ship's roll period is {ship.roll_period:g} s"
+            sentences.append(f"{words}, assumed." if ship == CRANE_SHIP else f"{words}.")
+        if crane.assumed:
+            sentences.append(f"{crane.assumed} of the crane are assumed.")
+        if not feels_load(crane):
+            sentences.append("No drive feels the load: they were identified without one.")
+        limits = [name for name, limit in crane.limits.items() if limit.status == "assumed"]
+        if limits:
+            labels = listed([LIMITED[name].label for name in limits])
+            sentences.append(f"Limits that are assumed: {labels}.")
+        return sentences
 
 
-def _worse(own: Array, none: Array) -> NDArray[np.bool_]:
-    """Seaways in which a variant swings more than no control, or was stopped where that was not."""
-    return np.asarray((own > none) | (np.isnan(own) & np.isfinite(none)))
+def _rms_words(none: float, own: float) -> str:
+    """Swing without control and with it, as far as either is known."""
+    without = "not an operation" if np.isnan(none) else f"{none:.2f} deg RMS"
+    with_it = "not an operation" if np.isnan(own) else f"{own:.2f}"
+    return f": {without} without it, {with_it} with it"
+
+
+def _worse(own: Sequence[Outcome], none: Sequence[Outcome]) -> Estimate:
+    """Share of seaways in which control swings more than none; see `Judgment.worse`."""
+    worse = unknown = 0
+    for one, other in zip(own, none, strict=True):
+        if one.left and other.left:
+            unknown += 1
+        elif one.left or (not other.left and one.rms_swing > other.rms_swing):
+            worse += 1
+    return share_of(worse, len(own), unknown)
+
+
+def largest_of(outcomes: Sequence[Outcome], name: str) -> Estimate:
+    """Most probable largest value of a quantity in three hours, from its peaks in many runs."""
+    runs = [outcome.peaks[name] for outcome in outcomes if name in outcome.peaks]
+    observed = sum(outcome.counted for outcome in outcomes)
+    return largest_of_peaks(runs, max(observed, 1.0))
+
+
+def _judged(outcomes: Sequence[Outcome], limits: Mapping[str, float]) -> tuple[Judged, ...]:
+    """All that has a limit; what the runs do not have, as a place if the operator moves, is not."""
+    judged = []
+    for name, limit in limits.items():
+        if name == "saturation":
+            shares = np.array([outcome.saturation for outcome in outcomes])
+            if np.isfinite(shares).any():
+                judged.append(Judged(name, limit, mean_of(shares, 0.0)))
+        elif any(name in outcome.peaks for outcome in outcomes):
+            judged.append(Judged(name, limit, largest_of(outcomes, name)))
+    return tuple(judged)
+
+
+# --- judging --------------------------------------------------------------------------------------
 
 
 def judge(
     crane: Crane,
-    control: Laws,
+    control: Controllers,
     *,
     allowed: float = 0.05,
+    asked: Sequence[Question] | None = None,
     remedies: bool = True,
+    turns: bool = True,
     **study: Any,
 ) -> Judgment:
-    """Judge control on several sets of drives over seeded seaways, by default 200.
+    """Judge control on several sets of drives over seeded seaways, by default 120 of ten minutes.
 
     Parameters
     ----------
+    crane : Crane
     control : Control or mapping of str to Control
         One controller, or several by name.
     allowed : float
         Share of seaways in which control may be worse than none.
+    asked : sequence of {"harm", "sufficiency"}, optional
+        Questions that `Judgment.passed` answers; by default both, or harm alone if the crane has no
+        limits.
     remedies : bool
-        Whether to look for a larger orifice of the luff and for a clip that would do on the crane's
-        own drives, if control fails: the least of each that surely does, else the least that may.
+        Whether to look for a larger orifice and for a clip that would do on the crane's own drives,
+        if control fails: the least of each that surely does, else the least that may.
+    turns : bool
+        Whether to look for assumed or given numbers that would turn the answer.
     **study
         Seaways, drives, stick, where each run begins: see `Study.of`. The verdict is on the last of
         the drives.
+
+    Raises
+    ------
+    InputError
+        For a share out of range, a question that there is not, or sufficiency without limits.
     """
+    _check_allowed(allowed)
+    questions = _questions(crane, asked)
+    asked_study = Study.of(crane, control, **{"seeds": range(SEAWAYS), **study})
+    none = asked_study.cases[NONE]
+    outcomes = tuple(asked_study.outcomes(list(asked_study.cases.values())))
+    linear = None
+    if none.swing_damping > 0.0:
+        linear = linear_response(crane, asked_study.seaway, **none.pose, **none.hangs)
+    judgment = Judgment(asked_study, outcomes, allowed, questions, linear)
+    if turns:
+        limits = crane.limits_si if "sufficiency" in questions else {}
+        judgment = replace(judgment, turns=turns_of(asked_study, judgment.judged, limits))
+    if judgment.outcome == "fails" and remedies:
+        return _with_remedies(judgment)
+    return judgment
+
+
+def _check_allowed(allowed: float) -> None:
     if not 0.0 <= allowed < 1.0:
         raise InputError(
             f"allowed is {allowed:g}, but is a share of seaways: 0 to below 1, or below 100 %."
         )
-    asked = Study.of(crane, control, **{"seeds": range(200), **study})
-    made = Judgment(asked, asked.outcomes(list(asked.cases.values())), allowed)
-    case = asked.cases[made.judged]
+
+
+def _questions(crane: Crane, asked: Sequence[Question] | None) -> tuple[Question, ...]:
+    if asked is None:
+        return QUESTIONS if crane.limits else QUESTIONS[:1]
+    check_names("There is no question", asked, QUESTIONS)
+    if "sufficiency" in asked and not crane.limits:
+        raise InputError(
+            f"{crane.name} has no limits to suffice for: give its file a table [limits], as "
+            '[limits] with side_lead = { value = 4, unit = "deg" }.'
+        )
+    return tuple(asked)
+
+
+def seaways_needed(seaways: int, allowed: float) -> str:
+    """What a number of seaways can decide, in a sentence to print before they are run."""
+    _check_allowed(allowed)
+    needed = fewest_seaways(allowed)
+    if seaways >= needed:
+        return (
+            f"{count(seaways, 'seaway')} can show that control does no harm: {needed} are needed "
+            f"at least for {100.0 * allowed:g} %."
+        )
+    return (
+        f"{count(seaways, 'seaway')} cannot show that control does no harm: {needed} are needed at "
+        f"least for {100.0 * allowed:g} %."
+    )
+
+
+def _with_remedies(judgment: Judgment) -> Judgment:
+    """The judgment with what would do, of larger orifices and of clips."""
+    study, case = judgment.study, judgment.study.cases[judgment.judged]
     law = case.setup["control"]
-    if made.outcome != "fails" or not remedies or not case.driven or law is None:
-        return made
+    if not case.driven or law is None:
+        return judgment
     # factors are of the crane as it is built, whatever was judged
-    cranes = (crane,) if len(case.cranes) == 1 else case.cranes
-    stages = [each for each in law.stages if not isinstance(each, Clip | PositionLoop)]
-    pose: dict[str, Any] = {name: case.setup[name] for name in ("slew_deg", "boom_deg", "rope_m")}
-    period = 2.0 * pi * sqrt(pose["rope_m"] / GRAVITY)
-    reach = float(follow(cranes[0], [period], seas=(), **pose).amplitude[0, 2])
-    larger = [(f"luff orifice ×{x:g}", x, with_orifice(cranes, x), law) for x in FACTORS]
-    clipped = [
-        (f"a clip of {x * reach:.2g} m", x * reach, cranes, Chain((*stages, Clip(share=x), LOOP)))
-        for x in SHARES
-    ]
+    cranes = (study.crane,) if len(case.cranes) == 1 else case.cranes
     found: list[Remedy] = []
     tried: list[str] = []
-    for trials in (larger, clipped):
-        may: list[Remedy] = []
-        for what, size, built, control in trials:
-            values = _trial(made, case.moved(control=control)._replace(cranes=built))
-            if values is None:
-                tried.append(what)
-                continue
-            worse = share_of(int(_worse(values, made.counted(NONE)).sum()), values.size)
-            may.append(Remedy(what, size, worse, mean_of(values, 0.0)))
-            if worse.high <= allowed:
-                break
-        # the last one if that surely does, else the least
-        found += may[-1:] if may and may[-1].worse.high <= allowed else may[:1]
-    return replace(made, remedies=tuple(found), tried=tuple(tried))
+    for trials in (_larger_orifices(judgment, cranes, law), _clips(case, cranes, law)):
+        remedies = _tried(judgment, trials)
+        tried += [what for what, *_ in trials[: len(remedies)]]
+        passing = [remedy for remedy in remedies if remedy is not None and remedy.passes]
+        tried = tried[: len(tried) - len(passing)]
+        found += _least([remedy for remedy in remedies if remedy is not None])
+    return replace(judgment, remedies=tuple(found), tried=tuple(tried))
 
 
-def _trial(judged: Judgment, case: Case) -> Array | None:
-    """Root mean square swing of a trial in all seaways [rad]; None as soon as it has failed."""
-    none, seaways = judged.counted(NONE), len(judged.study.seeds)
-    made = np.zeros(0)
+def _least(remedies: list[Remedy]) -> list[Remedy]:
+    """The least that does no harm, and the least that passes; else the least that may do."""
+    harmless = [remedy for remedy in remedies if remedy.harmless == "yes"]
+    passing = [remedy for remedy in harmless if remedy.passes]
+    if harmless:
+        return list(dict.fromkeys([harmless[0], *passing[:1]]))
+    return remedies[:1]
+
+
+Trial = tuple[str, float, Case]
+
+
+def _larger_orifices(judgment: Judgment, cranes: tuple[Crane, ...], law: Control) -> list[Trial]:
+    """Larger orifices of the drive whose acceleration limit acts the longest, if one does."""
+    case = judgment.study.cases[judgment.judged]
+    shares = {axis: judgment.acting(judgment.judged, axis, Limit.ORIFICE) for axis in AXES}
+    axis = max(shares, key=lambda name: float(np.nan_to_num(shares[name])))
+    if not shares[axis] >= ACTS:
+        return []
+    trials = []
+    for factor in FACTORS:
+        larger = tuple(upgraded(crane, axis, {"orifice": factor}) for crane in cranes)
+        trial = case.changed(control=law)._replace(cranes=larger)
+        trials.append((f"{axis} orifice ×{factor:g}", factor, trial))
+    return trials
+
+
+def _clips(case: Case, cranes: tuple[Crane, ...], law: Control) -> list[Trial]:
+    """Clips at shares of what the luff can follow at the load's period."""
+    stages = [stage for stage in law.stages if not isinstance(stage, Clip | PositionLoop)]
+    period = 2.0 * pi * sqrt(case.pose["rope_m"] / GRAVITY)
+    reach = float(follow(cranes[0], [period], seas=(), **case.pose).amplitude[0, 2])
+    trials = []
+    for share in SHARES:
+        control = Chain((*stages, Clip(share=share), LOOP))
+        trial = case.changed(control=control)._replace(cranes=cranes)
+        trials.append((f"a clip of {share * reach:.2g} m", share * reach, trial))
+    return trials
+
+
+def _tried(judgment: Judgment, trials: Sequence[Trial]) -> list[Remedy | None]:
+    """Trials up to the first that passes; None for one that harms, or does not help on."""
+    remedies: list[Remedy | None] = []
+    harmless = False
+    for what, size, case in trials:
+        remedy = _trial(judgment, what, size, case, only_if_sufficient=harmless)
+        remedies.append(remedy)
+        if remedy is not None and remedy.passes:
+            break
+        harmless = harmless or (remedy is not None and remedy.harmless == "yes")
+    return remedies
+
+
+def _trial(
+    judgment: Judgment, what: str, size: float, case: Case, *, only_if_sufficient: bool
+) -> Remedy | None:
+    """A trial in all seaways; None as soon as it surely harms, or surely is not sufficient."""
+    none, seaways = judgment.of(NONE), len(judgment.study.seeds)
+    asked = "sufficiency" in judgment.asked
+    limits = judgment.study.crane.limits_si if asked else {}
+    outcomes: list[Outcome] = []
     for first in range(0, seaways, BLOCK):
-        some = range(first, min(first + BLOCK, seaways))
-        made = np.concatenate([made, judged.study.outcomes([case], some)[:, 0, 0]])
-        if _worse(made, none[: made.size]).sum() > judged.allowed * seaways:
+        block = range(first, min(first + BLOCK, seaways))
+        outcomes += [found for (found,) in judgment.study.outcomes([case], block)]
+        worse = _worse(outcomes, none[: len(outcomes)])
+        limited = _judged(outcomes, limits)
+        decisions = [quantity.within for quantity in limited]
+        if worse.value * len(outcomes) > judgment.allowed * seaways:
             return None
-    return made
+        if only_if_sufficient and "no" in decisions:
+            return None
+    swing = rms_of(np.array([outcome.rms_swing for outcome in outcomes]))
+    return Remedy(
+        what=what,
+        size=size,
+        harmless="yes" if worse.high <= judgment.allowed else "not decided",
+        sufficient=_all(decisions) if asked else None,
+        worse=worse,
+        swing=swing,
+        beyond=tuple(quantity.words() for quantity in limited if quantity.within == "no"),
+    )
+
+
+def _all(decisions: Sequence[Decision]) -> Decision:
+    """Whether all are yes; no if one is no."""
+    if "no" in decisions:
+        return "no"
+    return "not decided" if "not decided" in decisions else "yes"

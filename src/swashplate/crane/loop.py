@@ -2,10 +2,11 @@
 
 One sample after the other, at the drives' own rate:
 
-1. what control sees is the last sample, as a controller's computer has it;
-2. the stick's commands become wanted speeds of the shafts, through the path of the tip if control
-   asks for it, and these become speeds (ideal drives) or voltages;
-3. each drive takes its voltage by the engine's compiled step;
+1. what control sees is the last sample, as a controller's computer has it, or what sensors say;
+2. the stick's commands become wanted speeds of the shafts, through the path of the tip, the
+   offsets and the clip if control asks for it;
+3. wanted speeds become speeds: at once (ideal drives), or by voltages, which each drive takes by
+   the engine's compiled step;
 4. shafts move the tip, the ship moves the crane, the tip leads the load.
 
 A stepper is the same kernel over one sample. In open loop nothing of a sample acts on the drives:
@@ -15,17 +16,18 @@ they are marched before.
 from __future__ import annotations
 
 from collections.abc import Callable
-from math import atan2, inf, pi, sqrt
+from math import atan2, floor, inf, pi, sqrt
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from swashplate.crane.control import Settings
+from swashplate.crane.control import SEEN, Sensing, Settings
 from swashplate.crane.kinematics import (
     Boom,
     Geometry,
     Home,
+    Rotation,
     Shafts,
     Vector,
     boom_at,
@@ -40,7 +42,16 @@ from swashplate.crane.kinematics import (
     to_inertial,
     to_ship,
 )
-from swashplate.crane.rope import GRAVITY, Hanging, Hung, hanging_load, rope_step
+from swashplate.crane.rope import (
+    GRAVITY,
+    Hanging,
+    Hung,
+    Start,
+    hanging_load,
+    rope_step,
+    set_off,
+)
+from swashplate.crane.signals import ABSENT, LOAD, PULL, SHAFT, SPEED, TIP, Columns
 from swashplate.equations import Machine, equation, inlined, kernel
 from swashplate.equations.code import generating
 from swashplate.parameters.rules import FULL_VOLTAGE
@@ -49,24 +60,18 @@ Array = NDArray[np.float64]
 
 IDEAL, VOLTS, INVERSE, DIRECT, MARCHED = range(5)
 """Actuation: speeds at once; 10 V for full speed; the inverse map's voltage; voltages as given;
-drives that were marched before, whose voltages, speeds and limits stand in the rows already."""
-ROWS = (
-    *("voltage_hoist", "voltage_slew", "voltage_luff"),
-    *("speed_hoist", "speed_slew", "speed_luff"),
-    *("limits_hoist", "limits_slew", "limits_luff"),
-    *("shaft_hoist", "shaft_slew", "shaft_luff"),
-    *("tip_x", "tip_y", "tip_z", "load_x", "load_y", "load_z", "hook_x", "hook_y", "hook_z"),
-    *("pull", "rope", "boom_cos", "boom_sin"),
-    *("torque_hoist", "torque_slew", "torque_luff"),
-)
-"""What the loop leaves of each sample, SI; the torques are those that the drives have taken."""
+drives that were marched before."""
 FINE, TOO_FAST, BOOM_OUT, ROPE_OUT, NO_NUMBER = range(5)
 """How a pass ended."""
-ANGLE, SPEED, OPERATOR, WISH, AIM, TORQUE = range(6)
+ANGLE, SHAFT_SPEED, OPERATOR, WISH, AIM, TORQUE = range(6)
 """Shafts' angles and speeds; angles to which the stick alone would have brought them, and its
 wanted speeds; angles that control wants; torques of the rope. [rad], [rad/s], [N m]"""
 BRAKE_WAITS, BRAKE_TAKES = 0.3, 0.2
 """Time at rest before the hoist's brake falls in, and time in which it stops the drum. [s]"""
+PATH, SWING = 0, 2
+"""Rows of the memory of delayed signals, of each its x and y."""
+ROUNDING = 1e-9
+"""By which a measurement may come before its sample."""
 
 
 class Inverse(NamedTuple):
@@ -99,9 +104,11 @@ class Fixed(NamedTuple):
     mass: float
     """Of load and hook. [kg]"""
     hanging: Hanging
+    start: Start
     loaded: bool
     """Whether the rope's tension loads the drives."""
     inverses: tuple[Inverse, Inverse, Inverse]
+    columns: Columns
 
 
 class Plant(NamedTuple):
@@ -112,9 +119,15 @@ class Plant(NamedTuple):
     picks: NDArray[np.int64]
     """Which of `SEEN` the law takes."""
     memory: Array
-    """Delayed signals, a row each: three commands, wanted tip x and y, swing x and y."""
+    """Delayed signals, a row each: the operator's tip x and y, swing x and y."""
+    readings: Array
+    """Measurements that are on their way, a row each: numbers of `Seen`."""
+    noise: Array
+    """(n, 4) of each measurement to come, of root mean square 1: rope x and y, roll, pitch."""
     margins: Array
     """Worst margins of the domains of the drives and the law."""
+    marched: tuple[Array, ...]
+    """Three voltages, three speeds, three limits of drives that were marched before."""
 
 
 class State(NamedTuple):
@@ -122,7 +135,7 @@ class State(NamedTuple):
 
     sample: int
     axes: Array
-    """(6, 3) of hoist, slew and luff: `ANGLE`, `SPEED`, `OPERATOR`, `WISH`, `AIM`, `TORQUE`."""
+    """(6, 3) of hoist, slew and luff: rows `ANGLE` to `TORQUE`."""
     tip: Vector
     hung: Hung
     still: float
@@ -131,7 +144,68 @@ class State(NamedTuple):
     """How far the brake has fallen in, 0 to 1."""
 
 
-# --- pieces of a sample ---------------------------------------------------------------------------
+class Seen(NamedTuple):
+    """What control sees of crane and ship."""
+
+    swing_x: float
+    swing_y: float
+    """Load, or hook, less tip, horizontal and inertial. [m]"""
+    rope: float
+    """[m]"""
+    slew: float
+    """From forward. [rad]"""
+    boom: Boom
+    height: float
+    """Of the tip over the point of the ship whose motion is given. [m]"""
+    shift: Vector
+    """Surge, sway, heave. [m]"""
+    angles: Vector
+    """Roll, pitch, yaw. [rad]"""
+
+
+READINGS, NOISY = 13, 4
+"""Numbers of `Seen`, and those of them that have noise."""
+
+# --- what control sees ----------------------------------------------------------------------------
+
+
+@inlined
+def measurement_at(sample: float, rate: float) -> int:
+    """Number of the last measurement at a sample of the loop; the start's, 0, has been before."""
+    return max(int(floor(sample * rate + ROUNDING)), 0)  # noqa: RUF046  # a float if compiled
+
+
+@inlined
+def measured(
+    true: Seen, sample: int, first: int, sensing: Sensing, readings: Array, noise: Array
+) -> Seen:
+    """What control gets from its sensors at a sample; `noise` begins at measurement `first`."""
+    last = len(readings) - 1  # lengths are powers of two
+    number = measurement_at(sample, sensing.rate)
+    if sample == 0 or number > measurement_at(sample - 1, sensing.rate):
+        row, error = readings[number & last], noise[number - first]
+        row[0] = true.swing_x + sensing.rope_angle * true.rope * error[0]
+        row[1] = true.swing_y + sensing.rope_angle * true.rope * error[1]
+        row[2], row[3] = true.rope, true.slew
+        row[4], row[5], row[6] = true.boom.cos, true.boom.sin, true.height
+        row[7], row[8], row[9] = true.shift
+        row[10] = true.angles.x + sensing.motion * error[2]
+        row[11] = true.angles.y + sensing.motion * error[3]
+        row[12] = true.angles.z
+    row = readings[measurement_at(sample - sensing.delay, sensing.rate) & last]
+    return Seen(
+        swing_x=row[0],
+        swing_y=row[1],
+        rope=row[2],
+        slew=row[3],
+        boom=Boom(row[4], row[5]),
+        height=row[6],
+        shift=Vector(row[7], row[8], row[9]),
+        angles=Vector(row[10], row[11], row[12]),
+    )
+
+
+# --- control: path, offsets, clip, inverse kinematics ---------------------------------------------
 
 
 @inlined
@@ -158,6 +232,100 @@ def shaped(
 
 
 @inlined
+def operator_path(
+    wanted: Array, axes: Array, memory: Array, sample: int, half: float, h: float, fixed: Fixed
+) -> tuple[float, float]:
+    """Where the operator's speeds alone would have brought the tip in the ship's frame, shaped. [m]
+
+    `half` is half a period of the load. [samples]
+    """
+    last = memory.shape[1] - 1
+    advance(axes, OPERATOR, WISH, wanted, h, sample > 0)
+    boom = boom_at(axes[OPERATOR, 2], fixed.geometry, fixed.home)
+    ahead = tip_of(fixed.home.slew + axes[OPERATOR, 1], boom, fixed.geometry)
+    memory[PATH, sample & last] = ahead.x
+    memory[PATH + 1, sample & last] = ahead.y
+    impulses = fixed.settings.tip
+    path_x = shaped(memory, PATH, sample, half, impulses)
+    path_y = shaped(memory, PATH + 1, sample, half, impulses)
+    return path_x, path_y
+
+
+@inlined
+def tip_offset(
+    path: tuple[float, float],
+    seen: Seen,
+    r: Rotation,
+    memory: Array,
+    sample: int,
+    half: float,
+    settings: Settings,
+) -> tuple[float, float]:
+    """What delayed feedback and ship compensation add to the path, in the ship's frame. [m]"""
+    last = memory.shape[1] - 1
+    memory[SWING, sample & last] = seen.swing_x
+    memory[SWING + 1, sample & last] = seen.swing_y
+    x, y = 0.0, 0.0
+    if settings.feedback > 0.0:
+        back = 2.0 * half * settings.delay
+        x = settings.feedback * delayed(memory, SWING, sample, back)
+        y = settings.feedback * delayed(memory, SWING + 1, sample, back)
+        turned = to_ship(r, Vector(x, y, 0.0))
+        x, y = turned.x, turned.y
+    if settings.ship:
+        # the path's place on the sea, at the tip's own height
+        over = Vector(path[0] - seen.shift.x, path[1] - seen.shift.y, seen.height)
+        place = to_ship(r, over)
+        x += place.x - path[0]
+        y += place.y - path[1]
+    return x, y
+
+
+@equation
+def largest_sine(speed: float, acceleration: float, omega: float) -> float:
+    """Largest sine at ω [rad/s] that a speed and an acceleration allow, min(v/ω, a/ω²). [m]"""
+    return min(speed / omega, acceleration / (omega * omega))
+
+
+@inlined
+def clipped_offset(
+    offset: tuple[float, float], path: tuple[float, float], boom: Boom, rope: float, fixed: Fixed
+) -> tuple[float, float]:
+    """Offset of the tip, limited along the boom and across it to what the drives can follow."""
+    omega = sqrt(GRAVITY / rope)
+    g, settings = fixed.geometry, fixed.settings
+    e_x, e_y = path[0] - g.axis.x, path[1] - g.axis.y
+    reach = sqrt(e_x * e_x + e_y * e_y)
+    e_x, e_y = e_x / reach, e_y / reach
+    rate, (_, slew, luff), (x, y) = reach_rate(boom, g), fixed.inverses, offset
+    speed, turning = rate * min(luff.high, -luff.low), reach * min(slew.high, -slew.low)
+    along = settings.share * largest_sine(speed, rate * luff.acceleration, omega)
+    along = settings.clip if settings.clip > 0.0 else along
+    across = settings.share * largest_sine(turning, reach * slew.acceleration, omega)
+    out = min(max(x * e_x + y * e_y, -along), along)
+    turn = min(max(y * e_x - x * e_y, -across), across)
+    return out * e_x - turn * e_y, out * e_y + turn * e_x
+
+
+@inlined
+def follow_path(
+    x: float, y: float, axes: Array, wanted: Array, sample: int, h: float, fixed: Fixed
+) -> None:
+    """Wanted speeds of slew and luff for a wanted tip in the ship's frame, and the position loop's.
+
+    [m], [rad/s]
+    """
+    target = shafts_for(x, y, shafts_of(axes, AIM), fixed.geometry, fixed.home)
+    for i, aim in ((1, target.slew), (2, target.luff)):
+        correction = fixed.settings.gain * (aim - axes[ANGLE, i])
+        wanted[i] = (aim - axes[AIM, i]) / h * (sample > 0) + correction
+        axes[AIM, i] = aim
+
+
+# --- actuation and motion -------------------------------------------------------------------------
+
+
+@inlined
 def voltage_for(wanted: float, inverse: Inverse, actuation: int) -> float:
     """Command of a drive for a wanted speed of its shaft, by `InverseMap.voltage`, clipped. [V]"""
     if actuation == VOLTS:
@@ -178,35 +346,9 @@ def voltage_for(wanted: float, inverse: Inverse, actuation: int) -> float:
     return made
 
 
-@equation
-def largest_sine(speed: float, acceleration: float, omega: float) -> float:
-    """Largest sine at ω [rad/s] that a speed and an acceleration allow, min(v/ω, a/ω²). [m]"""
-    return min(speed / omega, acceleration / (omega * omega))
-
-
-@inlined
-def clipped_offset(
-    offset: tuple[float, float], path: tuple[float, float], boom: Boom, rope: float, fixed: Fixed
-) -> tuple[float, float]:
-    """Offset of the tip held, along the boom and across it, within what the drives can follow."""
-    omega = sqrt(GRAVITY / rope)
-    g, settings = fixed.geometry, fixed.settings
-    e_x, e_y = path[0] - g.axis.x, path[1] - g.axis.y
-    reach = sqrt(e_x * e_x + e_y * e_y)
-    e_x, e_y = e_x / reach, e_y / reach
-    rate, (_, slew, luff), (x, y) = reach_rate(boom, g), fixed.inverses, offset
-    speed, turning = rate * min(luff.high, -luff.low), reach * min(slew.high, -slew.low)
-    along = settings.share * largest_sine(speed, rate * luff.acceleration, omega)
-    along = settings.clip if settings.clip > 0.0 else along
-    across = settings.share * largest_sine(turning, reach * slew.acceleration, omega)
-    out = min(max(x * e_x + y * e_y, -along), along)
-    turn = min(max(y * e_x - x * e_y, -across), across)
-    return out * e_x - turn * e_y, out * e_y + turn * e_x
-
-
 @inlined
 def advance(axes: Array, angle: int, speed: int, new: Array, h: float, moves: bool) -> None:
-    """Angles of the shafts one step later, by the trapezoidal rule, and the speeds behind it."""
+    """Angles of the shafts one step later, by the trapezoidal rule, and their new speeds."""
     for i in range(3):
         if moves:
             axes[angle, i] += 0.5 * h * (axes[speed, i] + new[i])
@@ -223,6 +365,73 @@ def shafts_of(axes: Array, row: int) -> Shafts:
 def limited(u: float, inverse: Inverse) -> float:
     """Wanted speed for a stick's fraction of the full speed that way. [rad/s]"""
     return u * inverse.high if u > 0.0 else -u * inverse.low
+
+
+@inlined
+def braked(
+    volts: float, still: float, brake: float, h: float, slow: Inverse
+) -> tuple[float, float]:
+    """Time for which the hoist's command has been in its dead zone, and how far the brake is in."""
+    gap = slow.gap
+    within_zone = slow.voltage[gap] < volts < slow.voltage[gap + 1]
+    still = still + h if within_zone else 0.0
+    falls = h / BRAKE_TAKES if still >= BRAKE_WAITS else -h / BRAKE_TAKES
+    return still, min(max(brake + falls, 0.0), 1.0)
+
+
+@inlined
+def led_load(
+    hung: Hung, tip: Vector, following: Vector, rope: float, before: float, sample: int, h: float,
+    fixed: Fixed,
+) -> Hung:  # fmt: skip
+    """Load and hook after the tip has moved and the rope has changed from a length before. [m]"""
+    s, start = fixed.hanging, fixed.start
+    if sample == 0:
+        return hanging_load(following, start.offset[0], start.offset[1], rope, s)
+    square = h * h
+    if sample == 1:
+        square = 0.5 * square
+        lead = moved(following, -1.0, tip)
+        v = start.velocity
+        hung = set_off(hung, tip, lead, rope - before, v[0], v[1], h)
+    return rope_step(hung, tip, following, rope, s, h, square)
+
+
+@inlined
+def rope_torques(
+    hung: Hung, tip: Vector, r: Rotation, slew: float, boom: Boom, fixed: Fixed
+) -> Shafts:
+    """Torques of the rope's tension on the three shafts. [N m]"""
+    tension = fixed.mass * hung.pull
+    along = moved(hung.hook, -1.0, tip)
+    pulled = moved(Vector(0.0, 0.0, 0.0), tension / size(along), along)
+    return shaft_torques(to_ship(r, pulled), slew, boom, tension, fixed.geometry)
+
+
+@inlined
+def leave(
+    row: Array,
+    volts: Array,
+    omega: Array,
+    limits: Array,
+    axes: Array,
+    tip: Vector,
+    hung: Hung,
+    columns: Columns,
+) -> None:
+    """Leave a sample's signals, by `Columns`."""
+    voltage, bits, torque, hook = columns.voltage, columns.limits, columns.torque, columns.hook
+    for i in range(3):
+        row[SPEED + i], row[SHAFT + i] = omega[i], axes[ANGLE, i]
+        if voltage != ABSENT:
+            row[voltage + i], row[bits + i] = volts[i], limits[i]
+        if torque != ABSENT:
+            row[torque + i] = axes[TORQUE, i]
+    row[TIP], row[TIP + 1], row[TIP + 2] = tip
+    row[LOAD], row[LOAD + 1], row[LOAD + 2] = hung.load
+    row[PULL] = hung.pull
+    if hook != ABSENT:
+        row[hook], row[hook + 1], row[hook + 2] = hung.hook
 
 
 @kernel
@@ -242,7 +451,7 @@ def _no_law(*_: Any) -> float:
 
 
 @generating
-def loop_of(hoist: Any, slew: Any, luff: Any, law: Any) -> Callable[..., tuple[State, int]]:
+def loop_of(hoist: Any, slew_drive: Any, luff: Any, law: Any) -> Callable[..., tuple[State, int]]:
     """The compiled loop over given steps of three drives and of a law, None for no law."""
     own = law is not None
     advance_law = law if own else inlined(_no_law)
@@ -251,70 +460,51 @@ def loop_of(hoist: Any, slew: Any, luff: Any, law: Any) -> Callable[..., tuple[S
     def loop(
         h: float, fixed: Fixed, state: State, plant: Plant, stick: Array, ship: Array, out: Array
     ) -> tuple[State, int]:
-        """Take the stick's samples; the state behind the last, and how the pass ended."""
+        """Take the stick's samples; the state after the last, and how the pass ended."""
         inverses, settings, actuation = fixed.inverses, fixed.settings, fixed.actuation
         laws, picks, memory, margins = plant.law, plant.picks, plant.memory, plant.margins
         a, b, c = plant.drives
-        edge = inverses[0].gap
-        slowest = inverses[0].voltage[edge], inverses[0].voltage[edge + 1]
-        g, home, loaded = fixed.geometry, fixed.home, fixed.loaded
-        moving = ship.shape[1] > 1
-        last = memory.shape[1] - 1
+        g, home, columns, sensing = fixed.geometry, fixed.home, fixed.columns, settings.sensing
+        marched, moving, loaded = plant.marched, ship.shape[1] > 1, fixed.loaded
         sample, axes, tip, hung, still, brake = state
         shafts = shafts_of(axes, ANGLE)
         boom, rope = boom_at(shafts.luff, g, home), rope_length(shafts, g, home)
-        wanted, seen = np.zeros(3), np.zeros(13)
+        wanted, volts, omega, limits = np.zeros(3), np.zeros(3), np.zeros(3), np.zeros(3)
+        known = np.zeros(len(SEEN))
         r, shift = rotation(0.0, 0.0, 0.0), Vector(0.0, 0.0, 0.0)
+        angles = Vector(0.0, 0.0, 0.0)
+        first = measurement_at(sample - 1, sensing.rate) + 1 if sample > 0 else 0
         ended = FINE
         for m in range(len(stick)):
-            row = out[m]
-            volts, omega, limits = row[0:3], row[3:6], row[6:9]
-            half = pi * sqrt(rope / GRAVITY) / h
             if moving:
                 shift = Vector(ship[m, 0], ship[m, 1], ship[m, 2])
-                r = rotation(ship[m, 3], ship[m, 4], ship[m, 5])
-            # the stick's commands
+                angles = Vector(ship[m, 3], ship[m, 4], ship[m, 5])
+                r = rotation(angles.x, angles.y, angles.z)
             for i in range(3):
-                memory[i, sample & last] = stick[m, i]
-                u = stick[m, i]
-                if settings.joint[1] > 0.0:
-                    u = shaped(memory, i, sample, half, settings.joint)
-                wanted[i] = limited(u, inverses[i])
+                wanted[i] = limited(stick[m, i], inverses[i])
             if settings.path:
-                advance(axes, OPERATOR, WISH, wanted, h, sample > 0)
-                lead = boom_at(axes[OPERATOR, 2], g, home)
-                ahead = tip_of(home.slew + axes[OPERATOR, 1], lead, g)
-                memory[3, sample & last] = ahead.x
-                memory[4, sample & last] = ahead.y
-                path_x = shaped(memory, 3, sample, half, settings.tip)
-                path_y = shaped(memory, 4, sample, half, settings.tip)
-                # offsets: the direction of the rope, the ship, a law of one's own
-                swing_x, swing_y = hung.hook.x - tip.x, hung.hook.y - tip.y
-                memory[5, sample & last] = swing_x
-                memory[6, sample & last] = swing_y
-                x, y = 0.0, 0.0
-                if settings.feedback > 0.0:
-                    back = 2.0 * half * settings.delay
-                    x = settings.feedback * delayed(memory, 5, sample, back)
-                    y = settings.feedback * delayed(memory, 6, sample, back)
-                    turned = to_ship(r, Vector(x, y, 0.0))
-                    x, y = turned.x, turned.y
-                if settings.ship:
-                    # over its place on the sea, at the tip's own height
-                    over = Vector(path_x - shift.x, path_y - shift.y, tip.z - shift.z)
-                    place = to_ship(r, over)
-                    x += place.x - path_x
-                    y += place.y - path_y
+                # 1. what control sees
+                swing = moved(hung.hook, -1.0, tip)
+                slew = home.slew + shafts.slew
+                seen = Seen(swing.x, swing.y, rope, slew, boom, tip.z - shift.z, shift, angles)
+                seen_r = r
+                if sensing.rate > 0.0:
+                    seen = measured(seen, sample, first, sensing, plant.readings, plant.noise)
+                    seen_r = rotation(seen.angles.x, seen.angles.y, seen.angles.z)
+                # 2. path, offsets, clip, wanted speeds
+                half = pi * sqrt(rope / GRAVITY) / h
+                path = operator_path(wanted, axes, memory, sample, half, h, fixed)
+                x, y = tip_offset(path, seen, seen_r, memory, sample, half, settings)
                 if own:
-                    seen[0], seen[1], seen[2] = swing_x, swing_y, rope
-                    seen[3], seen[4] = home.slew + shafts.slew, atan2(boom.sin, boom.cos)
-                    seen[5], seen[6] = path_x, path_y
-                    if moving:
-                        seen[7:13] = ship[m]
+                    known[0], known[1], known[2] = seen.swing_x, seen.swing_y, seen.rope
+                    known[3], known[4] = seen.slew, atan2(seen.boom.sin, seen.boom.cos)
+                    known[5], known[6] = path
+                    known[7], known[8], known[9] = seen.shift
+                    known[10], known[11], known[12] = seen.angles
                     for i in range(picks.size):
-                        laws.inputs[i] = seen[picks[i]]
+                        laws.inputs[i] = known[picks[i]]
                     margin = advance_law(laws)
-                    # what is no number would pass through every limit as one
+                    # what is not a number would pass through every limit as one
                     if not abs(laws.outputs[0]) + abs(laws.outputs[1]) < inf:
                         ended = NO_NUMBER
                         break
@@ -322,18 +512,17 @@ def loop_of(hoist: Any, slew: Any, luff: Any, law: Any) -> Callable[..., tuple[S
                     x += laws.outputs[0]
                     y += laws.outputs[1]
                 if settings.clip > 0.0 or settings.share > 0.0:
-                    x, y = clipped_offset((x, y), (path_x, path_y), boom, rope, fixed)
-                target = shafts_for(path_x + x, path_y + y, shafts_of(axes, AIM), g, home)
-                for i, aim in ((1, target.slew), (2, target.luff)):
-                    behind = settings.gain * (aim - axes[ANGLE, i])
-                    wanted[i] = (aim - axes[AIM, i]) / h * (sample > 0) + behind
-                    axes[AIM, i] = aim
-            # actuation
+                    x, y = clipped_offset((x, y), path, boom, rope, fixed)
+                follow_path(path[0] + x, path[1] + y, axes, wanted, sample, h, fixed)
+            # 3. speeds
             if actuation == IDEAL:
                 for i in range(3):
                     omega[i] = min(max(wanted[i], inverses[i].low), inverses[i].high)
-                    volts[i], limits[i] = 0.0, 0.0
-            elif actuation != MARCHED:
+            elif actuation == MARCHED:
+                volts[0], volts[1], volts[2] = marched[0][m], marched[1][m], marched[2][m]
+                omega[0], omega[1], omega[2] = marched[3][m], marched[4][m], marched[5][m]
+                limits[0], limits[1], limits[2] = marched[6][m], marched[7][m], marched[8][m]
+            else:
                 for i in range(3):
                     volts[i] = stick[m, i]
                     if actuation != DIRECT:
@@ -343,58 +532,32 @@ def loop_of(hoist: Any, slew: Any, luff: Any, law: Any) -> Callable[..., tuple[S
                     a.inputs[1], b.inputs[1] = axes[TORQUE, 0], axes[TORQUE, 1]
                     c.inputs[1] = axes[TORQUE, 2]
                 margins[0] = min(margins[0], hoist(a))
-                margins[1] = min(margins[1], slew(b))
+                margins[1] = min(margins[1], slew_drive(b))
                 margins[2] = min(margins[2], luff(c))
                 omega[0], omega[1], omega[2] = a.outputs[0], b.outputs[0], c.outputs[0]
                 limits[0], limits[1], limits[2] = a.outputs[1], b.outputs[1], c.outputs[1]
             if fixed.brake and actuation != IDEAL:
-                within_zone = slowest[0] < volts[0] < slowest[1]
-                still = still + h if within_zone else 0.0
-                falls = h / BRAKE_TAKES if still >= BRAKE_WAITS else -h / BRAKE_TAKES
-                brake = min(max(brake + falls, 0.0), 1.0)
+                still, brake = braked(volts[0], still, brake, h, inverses[0])
                 omega[0] = omega[0] * (1.0 - brake)
-            # kinematics and rope
-            advance(axes, ANGLE, SPEED, omega, h, sample > 0)
-            shafts, shorter = shafts_of(axes, ANGLE), rope
+            # 4. kinematics and rope
+            advance(axes, ANGLE, SHAFT_SPEED, omega, h, sample > 0)
+            shafts, before = shafts_of(axes, ANGLE), rope
             boom, rope = boom_at(shafts.luff, g, home), rope_length(shafts, g, home)
-            shorter -= rope
-            in_ship = tip_of(home.slew + shafts.slew, boom, g)
-            following = to_inertial(r, in_ship, shift)
+            following = to_inertial(r, tip_of(home.slew + shafts.slew, boom, g), shift)
             if not (fixed.ropes[0] <= rope <= fixed.ropes[1]):
                 ended = ROPE_OUT
                 break
             if not (fixed.boom[0] <= boom.sin <= fixed.boom[1] and boom.cos > 0.0):
                 ended = BOOM_OUT
                 break
-            square = h * h
-            if sample == 0:
-                hung = hanging_load(following, Vector(0.0, 0.0, 0.0), rope, fixed.hanging, h)
-            elif sample == 1:  # it has moved with the tip
-                square = 0.5 * square
-                led = moved(following, -1.0, tip)
-                led = Vector(led.x, led.y, led.z + shorter)
-                hung = Hung(
-                    hung.load, moved(hung.load, -1.0, led), hung.hook, moved(hung.hook, -1.0, led),
-                    hung.pull, hung.stretch,
-                )  # fmt: skip
-            if sample > 0:
-                hung = rope_step(hung, tip, following, rope, fixed.hanging, h, square)
+            hung = led_load(hung, tip, following, rope, before, sample, h, fixed)
             if hung.pull < 0.0:
                 ended = TOO_FAST
                 break
             tip = following
-            for i in range(3):
-                row[9 + i], row[25 + i] = axes[ANGLE, i], axes[TORQUE, i]
-            row[12], row[13], row[14] = tip
-            row[15], row[16], row[17] = hung.load
-            row[18], row[19], row[20] = hung.hook
-            row[21], row[22], row[23], row[24] = hung.pull, rope, boom.cos, boom.sin
+            leave(out[m], volts, omega, limits, axes, tip, hung, columns)
             if loaded:
-                tension = fixed.mass * hung.pull
-                along = moved(hung.hook, -1.0, tip)
-                pulled = moved(Vector(0.0, 0.0, 0.0), tension / size(along), along)
-                force = to_ship(r, pulled)
-                felt = shaft_torques(force, home.slew + shafts.slew, boom, tension, g)
+                felt = rope_torques(hung, tip, r, home.slew + shafts.slew, boom, fixed)
                 axes[TORQUE, 0], axes[TORQUE, 1], axes[TORQUE, 2] = felt
             sample += 1
         return State(sample, axes, tip, hung, still, brake), ended

@@ -68,8 +68,19 @@ GEOMETRY: Mapping[str, Definition] = {
     "boom_limits": Definition("rad", 2, 0.0, 90.0),
     # cranes that lower to the sea bed have 3000 to 4000 m
     "rope_limits": Definition("m", 2, 0.05, 6000.0),
+    # 0.2 to 1 % by air, sheaves and rope; an anti-sway device in the rope may have more
+    "swing_damping": Definition("1", 1, 0.0, 0.2),
 }
 """Quantities of a crane by name, with ranges that every crane lies well within."""
+OPTIONAL: Mapping[str, Quantity] = {
+    "swing_damping": Quantity(
+        value=0.005,
+        unit="1",
+        status="assumed",
+        source="not given; loads on ropes have a damping ratio of 0.2 to 1 % (air, sheaves, rope)",
+    )
+}
+"""Quantities that a file may leave out, as they then are."""
 ROUNDING = 1e-9
 """By which a number may lie beyond its range."""
 SAME = 1e-9
@@ -95,23 +106,26 @@ def quantity_of(name: str, value: Any) -> Quantity:
             raise TypeError
         floats = [float(number) for number in numbers]
     except (TypeError, ValueError, OverflowError):
-        raise ParameterError(f"{name} is {value!r:.60}, but must be {_shape(name)}.") from None
+        raise ParameterError(
+            f"{name} is {value!r:.60}, but must be {_shape(GEOMETRY[name])}."
+        ) from None
     if not all(map(isfinite, floats)):
         raise ParameterError(f"{name} is {value!r:.60}, but must be finite.")
     return Quantity(value=floats if len(floats) > 1 else floats[0], unit=GEOMETRY[name].unit)
 
 
-def _shape(name: str) -> str:
+def _shape(definition: Definition) -> str:
     """How many numbers a quantity has, in words."""
-    size = GEOMETRY[name].size
-    return "one number" if size == 1 else f"a list of {size} numbers"
+    return "one number" if definition.size == 1 else f"a list of {definition.size} numbers"
 
 
-def _values(name: str, quantity: Quantity, origin: str) -> tuple[float, ...]:
-    """A quantity in SI, within its plausible range."""
-    definition, given = GEOMETRY[name], quantity.values
+def values_of(
+    name: str, quantity: Quantity, definition: Definition, origin: str
+) -> tuple[float, ...]:
+    """A quantity in SI; a `ParameterError` if it is out of its plausible range."""
+    given = quantity.values
     if len(given) != definition.size:
-        raise ParameterError(f"{origin}: {name} must be {_shape(name)}, not {len(given)}.")
+        raise ParameterError(f"{origin}: {name} must be {_shape(definition)}, not {len(given)}.")
     values = [to_si(each, quantity.unit, definition.unit, f"{origin}: {name}") for each in given]
     in_degrees = definition.unit == "rad"
     for number, value in zip(given, values, strict=True):
@@ -138,7 +152,11 @@ def in_si(quantities: Mapping[str, Quantity], origin: str) -> dict[str, tuple[fl
     InputError
         For a unit that does not measure the quantity.
     """
-    si = {name: _values(name, quantities[name], origin) for name in GEOMETRY}
+    known = {**OPTIONAL, **quantities}
+    si = {
+        name: values_of(name, known[name], definition, origin)
+        for name, definition in GEOMETRY.items()
+    }
     low, high = map(degrees, si["boom_limits"])
     if not 0.0 <= low < high < 90.0:
         raise ParameterError(
@@ -183,8 +201,8 @@ def check_sources(
         if quantities[quantity].source
         and quantities[quantity].source == packaged[quantity].source
         and not _same(
-            _values(quantity, quantities[quantity], origin),
-            _values(quantity, packaged[quantity], name),
+            values_of(quantity, quantities[quantity], GEOMETRY[quantity], origin),
+            values_of(quantity, packaged[quantity], GEOMETRY[quantity], name),
         )
     ]
     if changed:

@@ -5,16 +5,17 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from math import pi, sqrt
-from typing import TYPE_CHECKING, cast
+from math import inf, pi, sqrt
+from typing import TYPE_CHECKING, NamedTuple, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
 from swashplate.crane.axes import AXES, RATE, check_names
 from swashplate.crane.crane import Crane
-from swashplate.crane.loop import ROWS, Fixed
-from swashplate.crane.rope import GRAVITY, swing_of
+from swashplate.crane.loop import Fixed
+from swashplate.crane.rope import GRAVITY, rope_leads, swing_of
+from swashplate.crane.signals import ROWS, Signals
 from swashplate.crane.stepper import ACTUATIONS
 from swashplate.crane.transfer_functions import MOTIONS
 from swashplate.errors import InputError
@@ -30,16 +31,30 @@ Array = NDArray[np.float64]
 
 CALMS, WATCHED = 4.0, 25.0
 """Residual swing counts from so long after the shaper's last impulse, for so long. [s]"""
+FARTHEST_SWING = 30.0
+"""Swing beyond which a run is not an operation any more: the model is a mass on a free rope, and
+nobody goes on with a load that swings beyond it. [deg]"""
+IN_WATER = "the load is in the water"
+LOOK = 32
+"""Samples from one at which swing and place of the load are looked at to the next: 16 a second."""
 SETTLED = 1.0
 """Swing below which a load counts as settled. [deg]"""
 PUMPS = (Limit.DEAD_ZONE, Limit.ORIFICE, Limit.SPOOL, Limit.SWASH_STOP, Limit.RELIEF)
 """Limits that the loop leaves of each drive, in the order of its bits."""
 
 THREES = {
-    **{"tip": "tip_x", "load": "load_x", "hook": "hook_x", "voltage": "voltage_hoist"},
-    **{"shaft_speed": "speed_hoist", "load_torque": "torque_hoist"},
+    **{"tip": "tip", "load": "load", "hook": "hook", "voltage": "voltage"},
+    **{"shaft_speed": "speed", "load_torque": "torque"},
 }
-"""Signals of three neighbours of `ROWS`, by the first of them."""
+"""Signals of three columns, and how their names in `ROWS` begin."""
+
+
+class Left(NamedTuple):
+    """When and why a run has left the model."""
+
+    time: float
+    """[s]"""
+    reason: str
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,8 +69,8 @@ class CraneRun(Tabular):
     """(n, 3) commands of hoist, slew and luff, -1 to 1."""
     ship: Array
     """(n, 6) surge, sway, heave [m], roll, pitch, yaw [rad]; (n, 1) zeros for a ship at rest."""
-    out: Array = field(repr=False)
-    """(n, 28) signals by `loop.ROWS`, SI."""
+    stored: Array = field(repr=False)
+    """What the loop has left of each sample, by `fixed.columns`, SI."""
     fixed: Fixed = field(repr=False)
     """What stayed as it was: home, mass of load and hook, settings of the controller."""
     stick_end: float
@@ -64,7 +79,7 @@ class CraneRun(Tabular):
     rows = ROWS
 
     def __post_init__(self) -> None:
-        self.out.flags.writeable = False
+        self.stored.flags.writeable = False
 
     def __repr__(self) -> str:
         return (
@@ -74,10 +89,21 @@ class CraneRun(Tabular):
 
     def __getitem__(self, signal: str) -> Array:
         """(n,) signal by its name in `rows`, or (n, 3) of `THREES`; an `InputError` for another."""
-        first = THREES.get(signal, signal)
-        check_names("A crane's run has no signal", [first], ROWS, "it has")
-        place = ROWS.index(first)
-        return self.out[:, place : place + 3] if signal in THREES else self.out[:, place]
+        if signal in THREES:
+            return self._signals.three(THREES[signal])
+        check_names("A crane's run has no signal", [signal], ROWS, "it has")
+        return self._signals[signal]
+
+    @cached_property
+    def _signals(self) -> Signals:
+        return Signals(self.stored, self.fixed.columns, self.fixed.geometry, self.fixed.home)
+
+    @cached_property
+    def out(self) -> Array:
+        """(n, 28) all signals, a column for each name in `rows`, SI."""
+        made = self._signals.table()
+        made.flags.writeable = False
+        return made
 
     tip = Named()
     """(n, 3) tip of the boom. [m]"""
@@ -111,7 +137,7 @@ class CraneRun(Tabular):
     @cached_property
     def time(self) -> Array:
         """(n,) [s]"""
-        return np.arange(len(self.out)) / RATE
+        return np.arange(len(self.stored)) / RATE
 
     @cached_property
     def slew_deg(self) -> Array:
@@ -129,6 +155,39 @@ class CraneRun(Tabular):
         return self.fixed.mass * self["pull"]
 
     @property
+    def dynamic_factor(self) -> Array:
+        """(n,) tension of the rope over the weight of load and hook.
+
+        With a rigid rope it is NaN from the first snap on, see `snap`.
+        """
+        factor = self["pull"] / GRAVITY
+        if self._rigid and self._snaps.size:
+            factor[self._snaps[0] :] = np.nan
+        return np.asarray(factor)
+
+    @property
+    def _rigid(self) -> bool:
+        return self.fixed.hanging.stiffness == 0.0
+
+    @cached_property
+    def _snaps(self) -> NDArray[np.int64]:
+        """Samples in which a slack rope snaps taut."""
+        return 1 + np.flatnonzero(self.slack[:-1] & ~self.slack[1:])
+
+    @property
+    def snap(self) -> float | None:
+        """Largest tension from the first moment on at which a slack rope snaps taut. [N]
+
+        0 if it never does. None if it does so with a rigid rope: that tension would depend on the
+        time step, so it is not computed; an elastic rope has it, `Suspension.stiffness`.
+        """
+        if not self._snaps.size:
+            return 0.0
+        if self._rigid:
+            return None
+        return float(self.tension[self._snaps[0] :].max())
+
+    @property
     def stretch(self) -> Array:
         """(n,) what the tension has added to the rope's length. [m]"""
         return np.asarray(np.linalg.norm(self.hook - self.tip, axis=1) - self.rope)
@@ -143,6 +202,53 @@ class CraneRun(Tabular):
         """(n,) angle between rope and plumb line. [deg]"""
         return np.degrees(swing_of(self.load, self.tip))
 
+    @cached_property
+    def _leads_deg(self) -> Array:
+        slew = self.fixed.home.slew + self["shaft_slew"]
+        return np.degrees(rope_leads(self.hook - self.tip, slew, self.ship))
+
+    @property
+    def off_lead_deg(self) -> Array:
+        """(n,) angle of the rope in the crane's own axes, positive outwards along the boom.
+
+        The crane's axes turn with slew, roll and pitch, so a list of the ship is in it. [deg]
+        """
+        return self._leads_deg[:, 0]
+
+    @property
+    def side_lead_deg(self) -> Array:
+        """(n,) angle of the rope likewise, across the boom, positive to starboard of it. [deg]"""
+        return self._leads_deg[:, 1]
+
+    @property
+    def hook_velocity(self) -> Array:
+        """(n,) vertical velocity of the hook, inertial, positive upwards. [m/s]"""
+        return np.asarray(np.gradient(self.hook[:, 2], 1.0 / RATE))
+
+    @cached_property
+    def left_model(self) -> Left | None:
+        """When and why a run is not an operation any more; None if it stays one.
+
+        The first time at which the load swings beyond 30 degrees, the rope is slack or lies on the
+        boom, or the load is in the water. Control changes the speed of ideal drives at once, which
+        slackens any rope for a moment: that is not looked at.
+        """
+        some = slice(None, None, LOOK)
+        tip, hook, load = self.tip[some], self.hook[some], self.load[some]
+        slew = self.fixed.home.slew + self["shaft_slew"][some]
+        inboard = -rope_leads(hook - tip, slew, self.ship[some])[:, 0]
+        boom = np.arctan2(self["boom_sin"][some], self["boom_cos"][some])
+        beyond = np.degrees(swing_of(load, tip)) > FARTHEST_SWING
+        times = {
+            f"the load swings beyond {FARTHEST_SWING:g} deg": _first(beyond, LOOK),
+            "the rope lies on the boom": _first(inboard >= 0.5 * pi - boom, LOOK),
+            IN_WATER: _first(load[:, 2] < 0.0, LOOK),
+        }
+        if not (self.actuation == "ideal" and self.fixed.settings.path):
+            times["the rope is slack"] = _first(self.slack, 1)
+        reason = min(times, key=times.__getitem__)
+        return Left(times[reason], reason) if np.isfinite(times[reason]) else None
+
     @property
     def settling(self) -> slice:
         """Samples in which residual swing counts.
@@ -150,11 +256,10 @@ class CraneRun(Tabular):
         25 s from 4 s after the stick's end and the shaper's last impulse; an `InputError` if the
         run ends before.
         """
-        impulses = (*self.fixed.settings.joint[1:], *self.fixed.settings.tip[1:])
-        halves = sum(each > 0.0 for each in impulses)
+        halves = sum(impulse > 0.0 for impulse in self.fixed.settings.tip[1:])
         starts = self.stick_end + halves * pi * sqrt(self.rope[-1] / GRAVITY) + CALMS
         first = round(starts * RATE)
-        if first >= len(self.out):
+        if first >= len(self.stored):
             raise InputError(
                 f"The run is {self.time[-1]:g} s long, but its residual swing counts from "
                 f"{starts:.4g} s on: take a longer stick."
@@ -179,7 +284,7 @@ class CraneRun(Tabular):
 
     def active(self, axis: str, limit: Limit) -> NDArray[np.bool_]:
         """(n,) samples at which a limit of `PUMPS` acts on the drive of an axis."""
-        bits = self.out[:, ROWS.index(f"limits_{axis}")].astype(np.int64)
+        bits = self[f"limits_{axis}"].astype(np.int64)
         return (bits >> PUMPS.index(limit)) & 1 > 0
 
     def limits(self, axis: str) -> dict[str, float]:
@@ -200,14 +305,24 @@ class CraneRun(Tabular):
         return run_tables({self.actuation: self})
 
     def sentences(self) -> tuple[str, ...]:
-        """Where the load goes under water, as far as that is known."""
+        """Why the run is not an operation any more, and what of it is not computed."""
+        said = []
         lowest = float(self.load[:, 2].min())
-        if lowest >= 0.0:
-            return ()
-        return (
-            f"The load is down to z = {lowest:.1f} m, below the point of the ship that its motion "
-            "is given for, near the waterline. Water is not in the model.",
-        )
+        if lowest < 0.0:
+            said.append(
+                f"The load is down to z = {lowest:.1f} m, below the point of the ship that its "
+                "motion is given for, near the waterline. Water is not in the model."
+            )
+        if self.left_model is not None and self.left_model[1] != IN_WATER:
+            time, why = self.left_model
+            said.append(f"From {time:.2f} s on the run is not an operation any more: {why}.")
+        if self.snap is None:
+            said.append(
+                f"The slack rope snaps taut at {self.time[self._snaps[0]]:.2f} s. With a rigid "
+                "rope the tension of that is not computed: take an elastic rope, "
+                "suspension=Suspension(stiffness=6e7)."
+            )
+        return tuple(said)
 
     def to_polars(self) -> polars.DataFrame:
         """All signals and the ship's motion, a row for each sample, in SI."""
@@ -220,6 +335,12 @@ class CraneRun(Tabular):
         moving = self.ship.shape[1] > 1
         columns |= {name: self.ship[:, i if moving else 0] for i, name in enumerate(MOTIONS)}
         return pl.DataFrame(columns)
+
+
+def _first(happens: NDArray[np.bool_], every: int) -> float:
+    """Time of the first of samples at which something happens [s]; inf if it never does."""
+    first = int(np.argmax(happens))
+    return first * every / RATE if happens[first] else inf
 
 
 def run_tables(runs: Mapping[str, CraneRun]) -> list[Table]:

@@ -13,13 +13,13 @@ of its two quadratics.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import inf, isfinite, pi, sqrt
+from math import atan2, cos, inf, isfinite, pi, sin, sqrt
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from swashplate.crane.kinematics import Vector, dot, moved, size
+from swashplate.crane.kinematics import Vector, dot, moved, rotation, size, to_ship
 from swashplate.equations import equation, kernel
 from swashplate.errors import InputError
 from swashplate.results import Result
@@ -36,6 +36,8 @@ SOFTEST, STIFFEST = 1e3, 1e12
 """Stiffness EA of ropes: of a thin cord, and beyond that of a hundred thick ropes together. [N]"""
 LIGHTEST = 0.1
 """Least load: a lighter one does not pull a rope taut. [kg]"""
+MOST_DAMPED = 0.2
+"""Largest damping ratio of the swing: forty times that of loads on ropes."""
 TOO_FAST = -1.0
 """Pull that says that the tip moves through the rope's length within a step."""
 
@@ -65,7 +67,7 @@ class Suspension(Result):
     stiffness: float = inf
     """EA, force for a strain of one of the rope's parts together, 1 kN to 1 TN; infinite for a
     rigid rope. What lies between the tip and the drum does not stretch. [N]"""
-    damping: float = 0.02
+    bounce_damping: float = 0.02
     """Damping ratio of the load's bounce on the elastic rope, at most 1."""
     hook: float = 0.0
     """Mass of the hook block, at most 1000 t; 0 for a load that hangs on the rope itself. [kg]"""
@@ -78,7 +80,7 @@ class Suspension(Result):
                 f"The rope's stiffness is {self.stiffness:g} N, but must be {SOFTEST:g} to "
                 f"{STIFFEST:g} N, or inf for a rigid rope."
             )
-        for name, most in (("damping", 1.0), ("hook", 1e6), ("sling", 200.0)):
+        for name, most in (("bounce_damping", 1.0), ("hook", 1e6), ("sling", 200.0)):
             value = getattr(self, name)
             if not 0.0 <= value <= most:
                 raise InputError(
@@ -92,12 +94,25 @@ class Suspension(Result):
             )
 
     def hanging(
-        self, load: float, shortest: float, rate: float, drag: float, wind: ArrayLike
+        self,
+        load: float,
+        *,
+        shortest: float,
+        rate: float,
+        drag: float,
+        wind: ArrayLike,
+        swing_damping: float,
     ) -> Hanging:
         """Numbers with a load [kg], on a rope of at least a length [m], at a rate [Hz].
 
-        An `InputError` if the load bounces too fast for the rate.
+        An `InputError` if the load bounces too fast for the rate, and for a damping ratio of the
+        swing beyond its range.
         """
+        if not 0.0 <= swing_damping <= MOST_DAMPED:
+            raise InputError(
+                f"swing_damping is {swing_damping:g}, but must be at least 0 and at most "
+                f"{MOST_DAMPED:g}; loads on ropes have 0.002 to 0.01."
+            )
         if not (isfinite(load) and load >= LIGHTEST):
             raise InputError(f"The load is {load:g} kg, but must be at least {LIGHTEST:g} kg.")
         mass = load + self.hook
@@ -111,7 +126,15 @@ class Suspension(Result):
                 "take a rigid rope."
             )
         along, across, up = map(float, np.asarray(wind))
-        return Hanging(pulls, self.damping, self.sling, ratio, drag, Vector(along, across, up))
+        return Hanging(
+            stiffness=pulls,
+            bounce_damping=self.bounce_damping,
+            swing_damping=float(swing_damping),
+            sling=self.sling,
+            ratio=ratio,
+            drag=drag,
+            wind=Vector(along, across, up),
+        )
 
 
 class Hanging(NamedTuple):
@@ -119,7 +142,10 @@ class Hanging(NamedTuple):
 
     stiffness: float
     """EA for each kilogram of load and hook; 0 for a rigid rope. [N/kg]"""
-    damping: float
+    bounce_damping: float
+    """Damping ratio of the bounce on an elastic rope."""
+    swing_damping: float
+    """ζ, damping ratio of the swing."""
     sling: float
     """[m]; 0 for a load on the rope itself."""
     ratio: float
@@ -152,9 +178,21 @@ def coasting(now: Vector, before: Vector, square: float, a: Vector) -> Vector:
 
 
 @equation
+def slowed(next_: Vector, way: Vector, lead: Vector, d: Vector, share: float) -> Vector:
+    """A body's next place less a share of its way across the rope, relative to the tip. [m]
+
+    `way` and `lead` are what body and tip move within a step, d points along the rope. What a
+    hoist does along the rope is not slowed.
+    """
+    past = moved(way, -1.0, lead)
+    across = moved(past, -dot(past, d) / dot(d, d), d)
+    return moved(next_, -share, across)
+
+
+@equation
 def elastic_pull(stretch: float, before: float, length: float, s: Hanging, h: float) -> float:
     """Pull of a stretched rope, EA ε + 2 ζ √(EA m/L) ε̇ L, never below 0. [N/kg]"""
-    rate = 2.0 * s.damping * sqrt(s.stiffness / length) * (stretch - before) / h
+    rate = 2.0 * s.bounce_damping * sqrt(s.stiffness / length) * (stretch - before) / h
     return max(s.stiffness * stretch / length + rate, 0.0) if stretch > 0.0 else 0.0
 
 
@@ -202,8 +240,9 @@ def rope_step(
     """Load and hook one step later, with the tip at n and n + 1 and the rope at n + 1. [m]
 
     x = 2 x_n - x_(n-1) + h² a - μ d, with the rope's multiplier μ. An elastic rope pulls by its
-    stretch at n, so that the step stays explicit and, undamped, symplectic. `square` is h², half of
-    it in the first step. [s²]
+    stretch at n, so that the step stays explicit and, undamped, symplectic. The swing is damped by
+    the acceleration -2 ζ √(g/(L + l)) v of load and hook, v their velocity relative to the tip and
+    across the rope. `square` is h², half of it in the first step. [s²]
     """
     weight = Vector(0.0, 0.0, -GRAVITY)
     load = coasting(now.load, now.before, square, weight)
@@ -213,6 +252,15 @@ def rope_step(
     hooked, elastic = s.sling > 0.0, s.stiffness > 0.0
     hook = coasting(now.hook, now.hook_before, square, weight) if hooked else load
     d, b = moved(now.hook, -1.0, tip), moved(now.load, -1.0, now.hook)
+    if s.swing_damping > 0.0:
+        rate = 1.0 / h
+        share = 2.0 * s.swing_damping * sqrt(GRAVITY / (length + s.sling)) * (square * rate)
+        lead = moved(following, -1.0, tip)
+        load = slowed(load, moved(now.load, -1.0, now.before), lead, d, share)
+        if hooked:
+            hook = slowed(hook, moved(now.hook, -1.0, now.hook_before), lead, d, share)
+        else:
+            hook = load
     if elastic:
         hook = moved(hook, -square * now.pull * (1.0 + s.ratio) / size(d), d)
     rope, sling = moved(hook, -1.0, following), moved(load, -1.0, hook)
@@ -232,13 +280,53 @@ def rope_step(
     return Hung(load, now.load, hook, now.hook, TOO_FAST if u < 0.0 or w < 0.0 else pull, stretch)
 
 
+class Start(NamedTuple):
+    """How the load begins, relative to the tip, both horizontal and inertial."""
+
+    offset: tuple[float, float] = (0.0, 0.0)
+    """[m]"""
+    velocity: tuple[float, float] = (0.0, 0.0)
+    """[m/s]"""
+
+
 @equation
-def hanging_load(tip: Vector, v: Vector, length: float, s: Hanging, h: float) -> Hung:
-    """Load and hook that hang below a tip and move with it at a velocity. [m/s]"""
-    stretch = GRAVITY * length / s.stiffness if s.stiffness > 0.0 else 0.0
-    hook = moved(tip, -(length + stretch), Vector(0.0, 0.0, 1.0))
-    load = moved(hook, -s.sling, Vector(0.0, 0.0, 1.0))
-    return Hung(load, moved(load, -h, v), hook, moved(hook, -h, v), GRAVITY, stretch)
+def hanging_load(tip: Vector, offset_x: float, offset_y: float, length: float, s: Hanging) -> Hung:
+    """Load and hook at rest at an offset of the load from the tip, straight on a taut rope. [m]"""
+    horizontal = offset_x * offset_x + offset_y * offset_y
+    straight = length + s.sling
+    pull = GRAVITY * sqrt(1.0 - horizontal / (straight * straight))
+    stretch = pull * length / s.stiffness if s.stiffness > 0.0 else 0.0
+    whole = straight + stretch
+    line = Vector(offset_x, offset_y, -sqrt(whole * whole - horizontal))
+    load = moved(tip, 1.0, line)
+    hook = moved(tip, (length + stretch) / whole, line) if s.sling > 0.0 else load
+    return Hung(load, load, hook, hook, pull, stretch)
+
+
+@equation
+def set_off(
+    hung: Hung,
+    tip: Vector,
+    lead: Vector,
+    lowered: float,
+    velocity_x: float,
+    velocity_y: float,
+    h: float,
+) -> Hung:
+    """A load at rest, with the places one step earlier that give it its first velocity.
+
+    It moves with the tip, by `lead` within the step, and away from it along the rope by `lowered`
+    [m]. Its velocity relative to the tip has the given horizontal part [m/s]; the vertical one
+    keeps the rope taut.
+    """
+    line = moved(hung.load, -1.0, tip)
+    rise = -(velocity_x * line.x + velocity_y * line.y) / line.z
+    swing = Vector(velocity_x, velocity_y, rise)
+    led = moved(lead, lowered / size(line), line)
+    hooked = size(moved(hung.hook, -1.0, tip)) / size(line)
+    before = moved(hung.load, -1.0, moved(led, h, swing))
+    hook_before = moved(hung.hook, -1.0, moved(led, h * hooked, swing))
+    return Hung(hung.load, before, hung.hook, hook_before, hung.pull, hung.stretch)
 
 
 # --- march ----------------------------------------------------------------------------------------
@@ -246,7 +334,7 @@ def hanging_load(tip: Vector, v: Vector, length: float, s: Hanging, h: float) ->
 
 @kernel
 def _march(tip: Array, length: Array, start: Hung, s: Hanging, h: float, out: Array) -> int:
-    """Fill load, hook and pull behind the first sample; the sample that failed, or 0."""
+    """Fill load, hook and pull after the first sample; the sample that failed, or 0."""
     now, at = start, Vector(tip[0, 0], tip[0, 1], tip[0, 2])
     for n in range(tip.shape[0]):
         if n > 0:
@@ -285,6 +373,7 @@ def load_motion(
     wind: ArrayLike = (0.0, 0.0, 0.0),
     suspension: Suspension | None = None,
     mass: float = 1.0,
+    swing_damping: float = 0.0,
 ) -> LoadMotion:
     """Path of a load whose rope's upper end moves along a given path.
 
@@ -303,12 +392,14 @@ def load_motion(
     suspension, mass
         Elastic rope, hook with slings, and mass of the load, which then counts [kg]; a hook starts
         straight between tip and load.
+    swing_damping
+        Damping ratio ζ of the swing, 0 to 0.2.
 
     Raises
     ------
     InputError
-        For paths that do not fit together, and where the tip moves, within a step, by the order of
-        the rope's length.
+        For paths that do not fit together, a damping ratio beyond its range, and where the tip
+        moves, within a step, by the order of the rope's length.
     """
     path = np.ascontiguousarray(tip, dtype=np.float64)
     if path.ndim != 2 or path.shape[1] != 3 or len(path) < 2:
@@ -320,8 +411,17 @@ def load_motion(
     slope = (4.0 * path[1] - 3.0 * path[0] - path[min(2, len(path) - 1)]) * rate / 2.0
     v = slope if velocity is None else np.asarray(velocity, dtype=np.float64)
     h, hangs = 1.0 / rate, suspension or Suspension()
-    s = hangs.hanging(mass, float(rope.min()), rate, float(drag), wind)
-    now = hanging_load(Vector(*path[0].tolist()), Vector(*v.tolist()), float(rope[0]), s, h)
+    s = hangs.hanging(
+        mass,
+        shortest=float(rope.min()),
+        rate=rate,
+        drag=float(drag),
+        wind=wind,
+        swing_damping=swing_damping,
+    )
+    now = hanging_load(Vector(*path[0].tolist()), 0.0, 0.0, float(rope[0]), s)
+    before, hook_before = (np.array(body) - v * h for body in (now.load, now.hook))
+    now = now._replace(before=Vector(*before.tolist()), hook_before=Vector(*hook_before.tolist()))
     if start is not None:
         load = np.asarray(start, dtype=np.float64)
         line = load - path[0]
@@ -349,6 +449,40 @@ def swing_of(load: Array, tip: Array) -> Array:
     """Angle between rope and plumb line. [rad]"""
     x, y, z = (load - tip).T
     return np.asarray(np.arctan2(np.hypot(x, y), -z))
+
+
+def rope_leads(line: Array, slew: Array, ship: Array) -> Array:
+    """Angles of a rope in the crane's own axes: outwards and to starboard of the boom. [rad]
+
+    Parameters
+    ----------
+    line : (n, 3) array
+        Rope's end less tip, inertial. [m]
+    slew : (n,) array
+        From forward, positive to starboard. [rad]
+    ship : (n, 6) or (n, 1) array
+        Motion of the ship [m], [rad]; one column if it is at rest.
+
+    Returns
+    -------
+    (n, 2) array
+    """
+    made = np.empty((len(line), 2))
+    _leads(np.ascontiguousarray(line), np.ascontiguousarray(slew), ship, made)
+    return made
+
+
+@kernel
+def _leads(line: Array, slew: Array, ship: Array, out: Array) -> None:
+    """Fill the angles outwards and to starboard."""
+    r = rotation(0.0, 0.0, 0.0)
+    for n in range(len(line)):
+        if ship.shape[1] > 1:
+            r = rotation(ship[n, 3], ship[n, 4], ship[n, 5])
+        d = to_ship(r, Vector(line[n, 0], line[n, 1], line[n, 2]))
+        c, s = cos(slew[n]), sin(slew[n])
+        out[n, 0] = atan2(d.x * c - d.y * s, -d.z)
+        out[n, 1] = atan2(-d.x * s - d.y * c, -d.z)
 
 
 def too_fast(length: float, time: float, rate: float) -> str:

@@ -1,11 +1,11 @@
-"""Seaways and the ship's motion in them: spectra, seeded components, exact fast synthesis."""
+"""Seaways and the ship's motion in them: spectra, seeded components, synthesis by FFT."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from math import log, radians
+from math import ceil, floor, log, pi, radians
 from numbers import Real
 from pathlib import Path
 from typing import NamedTuple
@@ -22,13 +22,19 @@ from swashplate.logs import Series, TextOptions, read_series
 from swashplate.results import Result
 
 Array = NDArray[np.float64]
+Complex = NDArray[np.complex128]
 
-BAND = (0.25, 2.5)
-"""Frequencies of the components, 25 s to 2.5 s. [rad/s]"""
-LONGEST_HOLE = 1.0
-"""Time without a sample in a log of motions that is a hole, where samples are closer. [s]"""
+BAND = (0.2, 6.0)
+"""Frequencies of the components, waves of 31 to 1.05 s. [rad/s]"""
 COARSE = 8.0
 """Rate at which motion and two derivatives are summed up before they are joined smoothly. [Hz]"""
+RECORDS = (4096.0, 131_072.0)
+"""Shortest and longest record. In the shortest a load with a damping ratio of 0.5 % that swings at
+0.6 rad/s has four components within its half-power width; the longest is a day and a half. [s]"""
+DIRECTIONS = 8
+"""Components of each frequency in a spread sea."""
+LONGEST_HOLE = 1.0
+"""Time without a sample in a log of motions that is a hole, where samples are closer. [s]"""
 SPARSEST = 5.0
 """Median time between samples from which a ship's motion cannot be drawn through them. [s]"""
 ALIKE = 1e-3
@@ -45,9 +51,15 @@ LARGEST = 100_000_000
 """Numbers of a motion, 0.8 GB; nine hours at 512 Hz."""
 HIGHEST = 30.0
 """Largest significant height of a sea; the largest one measured is 19 m. [m]"""
-LEAST_ENERGY, MOST_LOST = 0.5, 0.05
-"""Part of a spectrum's energy that must lie within the band; largest part of a sea's that may lie
-beyond a file's frequencies, where the motions of its ends are taken."""
+LEAST_ENERGY, OUTSIDE = 0.5, 0.02
+"""Share of a spectrum's energy that must lie within the band; share outside from which it is
+announced."""
+MOST_LOST, LOST = 0.05, 0.01
+"""Largest share of a sea's energy that may lie beyond a file's frequencies, where the motions of
+its ends are taken; share from which that is announced."""
+LEANING, FAR = 45.0, 500.0
+"""Largest list and trim that are taken [deg]; distance within which the point lies that transfer
+functions are given for [m]."""
 
 
 @dataclass(frozen=True)
@@ -55,7 +67,7 @@ class Spectrum:
     """JONSWAP's spectrum of waves; Bretschneider's with a peak factor of 1.
 
     An `InputError` unless all are above 0 and plausible, and most of the energy lies at waves of
-    2.5 to 25 s.
+    1.05 to 31 s.
     """
 
     height: float
@@ -72,10 +84,8 @@ class Spectrum:
                 raise InputError(
                     f"The {name} of a sea is {value:g}, but must be above 0 and at most {most:g}."
                 )
-        omega = np.linspace(*BAND, 2001)
-        held = float(np.trapezoid(self.density(omega), omega))
-        if held < LEAST_ENERGY * self.height**2 / 16.0:
-            low, high = (2.0 * np.pi / each for each in BAND[::-1])
+        if self.share(*BAND) < LEAST_ENERGY:
+            low, high = (2.0 * np.pi / omega for omega in BAND[::-1])
             raise InputError(
                 f"A sea with a peak at {self.period:g} s has little energy between waves of "
                 f"{low:.3g} and {high:.3g} s, which are simulated: take a period between."
@@ -92,25 +102,53 @@ class Spectrum:
         scale = 1.0 - 0.287 * log(self.peak_factor)
         return np.asarray(base * scale * self.peak_factor**share)
 
+    def share(self, low: float, high: float) -> float:
+        """Share of the energy at frequencies between two [rad/s], 0 to 1."""
+        peak = 2.0 * np.pi / self.period
+        # beyond these there is less than a millionth
+        omega = np.geomspace(0.2 * peak, 50.0 * peak, 4001)
+        density = self.density(omega)
+        slices = 0.5 * (density[1:] + density[:-1]) * np.diff(omega)
+        below = np.concatenate([[0.0], np.cumsum(slices)])
+        start, end = np.interp([low, high], omega, below).tolist()
+        return float((end - start) / below[-1])
+
 
 SEA_STATES: Mapping[str, Spectrum] = {
     "ss2": Spectrum(0.3, 6.3),
     "ss3": Spectrum(0.88, 7.5),
     "ss3-swell": Spectrum(0.88, 11.0),
     "ss4": Spectrum(1.88, 8.8),
+    "ss5": Spectrum(3.25, 9.7),
+    "ss6": Spectrum(5.0, 12.4),
 }
-"""Sea states; heights within the classes of the WMO."""
+"""Sea states, of the WMO's classes: mean significant height and most probable peak period in the
+open North Pacific, Faltinsen (1990), Sea Loads on Ships and Offshore Structures, table 2.3, after
+Lee et al. (1985). The peak period of ``"ss3-swell"`` is assumed, within the 5.3 to 16.1 s there."""
 
 
-class Components(NamedTuple):
-    """Regular waves that add up to a seaway, each an array."""
+class Bins(NamedTuple):
+    """Frequencies of a record, and the surface's variance at each, (n,)."""
 
     frequency: Array
     """[rad/s]"""
-    amplitude: Array
-    """[m]"""
-    phase: Array
-    """At the ship's mean place. [rad]"""
+    variance: Array
+    """[m²]"""
+
+    def __repr__(self) -> str:
+        return f"Bins({self.frequency.size} frequencies)"
+
+
+class Components(NamedTuple):
+    """Regular waves that add up to a seaway, each an array (n,)."""
+
+    frequency: Array
+    """[rad/s]"""
+    met: Array
+    """Frequency at which the ship meets them, on a bin of the record; below 0 if the ship overtakes
+    them. [rad/s]"""
+    amplitude: Complex
+    """A, of a surface Re A e^{i met t} at the ship's mean place. [m]"""
     heading: Array
     """Where they run, from the bow to port; 0 following, 90° abeam. [rad]"""
 
@@ -127,6 +165,14 @@ class Seaway(Result):
     InputError
         For values without sense, and a file of transfer functions beyond whose frequencies more
         than 5 % of the sea's energy lies.
+
+    Notes
+    -----
+    A regular wave stands on each bin of the record's Fourier transform from 0.2 to 6 rad/s. Its
+    complex amplitude is Gaussian, so that its size is Rayleigh's and the surface a Gaussian process
+    at each length of the record. The variances of all add up to Hs²/16, whatever of the spectrum
+    lies outside the band. Under way the frequencies at which the ship meets the waves are rounded
+    to the bins.
     """
 
     sea: str | Spectrum = "ss3"
@@ -142,8 +188,16 @@ class Seaway(Result):
     """Of the ship, forward. [m/s]"""
     spread: bool = False
     """Directions spread by cos² around the heading, instead of long crests."""
-    components: int = 200
-    """Number of regular waves."""
+    record: float = 4096.0
+    """Time after which the seaway comes again, 4096 to 131 072, rounded up to a power of two of
+    samples at 8 Hz, see `period`; other records are other seaways. [s]"""
+    list_deg: float = 0.0
+    """Constant list, positive with starboard down."""
+    trim_deg: float = 0.0
+    """Constant trim, positive with the bow down."""
+    reference: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    """Point that the ship's transfer functions are given for, in the crane's axes: forward, port,
+    up. [m]"""
 
     def __post_init__(self) -> None:
         if not isinstance(self.sea, str | Spectrum):
@@ -156,60 +210,177 @@ class Seaway(Result):
                 f"A seaway has a heading within 720 deg and a ship's speed within 50 m/s, not "
                 f"{self.heading_deg:g} deg and {self.speed:g} m/s."
             )
-        if not 2 <= self.components <= 100_000:
-            raise InputError(f"A seaway has 2 to 100000 components, not {self.components:g}.")
         if not str(self.seed).isdigit():
             raise InputError(f"The seed of a seaway is {self.seed}, but must be 0, 1, 2, ...")
-        if isinstance(self.ship, TransferFunctions):
-            omega = np.linspace(*BAND, 2001)
-            density, (low, high) = self.spectrum.density(omega), self.ship.frequencies[[0, -1]]
-            lost = float(density[(omega < low) | (omega > high)].sum() / density.sum())
-            if lost > MOST_LOST:
-                raise InputError(
-                    f"{self.ship.name} has waves of {low:.3g} to {high:.3g} rad/s, but "
-                    f"{100.0 * lost:.0f} % of the energy of {self.sea} lies beyond, more than "
-                    f"{100.0 * MOST_LOST:.0f} %: take a file that reaches further, or another sea."
-                )
+        shortest, longest = RECORDS
+        if not shortest <= self.record <= longest:
+            raise InputError(
+                f"The record of a seaway is {self.record:g} s, but must be {shortest:g} to "
+                f"{longest:g} s."
+            )
+        if not (abs(self.list_deg) <= LEANING and abs(self.trim_deg) <= LEANING):
+            raise InputError(
+                f"List and trim are {self.list_deg:g} and {self.trim_deg:g} deg, but must be "
+                f"within {LEANING:g} deg."
+            )
+        point = np.asarray(self.reference, dtype=np.float64)
+        if point.shape != (3,) or not (np.abs(point) <= FAR).all():
+            raise InputError(
+                f"The reference of a ship is {self.reference}, but must be a point forward, port "
+                f"and up within {FAR:g} m of the origin of the crane's axes."
+            )
+        lost = self._lost
+        if lost > MOST_LOST and isinstance(self.ship, TransferFunctions):
+            low, high = self.ship.frequencies[[0, -1]]
+            raise InputError(
+                f"{self.ship.name} has waves of {low:.3g} to {high:.3g} rad/s, but "
+                f"{100.0 * lost:.0f} % of the energy of the sea ({self.title}) lies beyond, more "
+                f"than {100.0 * MOST_LOST:.0f} %: take a file that reaches further, or another sea."
+            )
 
     @property
     def spectrum(self) -> Spectrum:
         """Its spectrum."""
         return SEA_STATES[self.sea] if isinstance(self.sea, str) else self.sea
 
+    @property
+    def title(self) -> str:
+        """The name of its sea, or significant height and peak period."""
+        if isinstance(self.sea, str):
+            return self.sea
+        return f"{self.sea.height:g} m, {self.sea.period:g} s"
+
+    @property
+    def _lost(self) -> float:
+        """Share of the simulated energy beyond the frequencies of the ship's file."""
+        if not isinstance(self.ship, TransferFunctions):
+            return 0.0
+        low, high = np.clip(self.ship.frequencies[[0, -1]], *BAND).tolist()
+        return 1.0 - self.spectrum.share(low, high) / self.spectrum.share(*BAND)
+
+    def sentences(self) -> tuple[str, ...]:
+        """What of the sea is not simulated as it is asked for, if that is more than a little."""
+        outside, lost = 1.0 - self.spectrum.share(*BAND), self._lost
+        sentences = []
+        if outside > OUTSIDE:
+            shortest, longest = (2.0 * np.pi / omega for omega in BAND[::-1])
+            sentences.append(
+                f"{100.0 * outside:.0f} % of the energy of the sea ({self.title}) lies outside the "
+                f"waves of {shortest:.3g} to {longest:.3g} s that are simulated: these are made "
+                "larger, so that the significant height is the one asked for."
+            )
+        if lost > LOST and isinstance(self.ship, TransferFunctions):
+            low, high = self.ship.frequencies[[0, -1]]
+            sentences.append(
+                f"{self.ship.name} has waves of {low:.3g} to {high:.3g} rad/s: for the "
+                f"{100.0 * lost:.1f} % of the energy of the sea ({self.title}) that lies beyond, "
+                "the motions in the nearest of them are taken."
+            )
+        return tuple(sentences)
+
+    @property
+    def period(self) -> float:
+        """Time after which the seaway comes again, `record` rounded up. [s]"""
+        return self._samples / COARSE
+
+    @property
+    def _samples(self) -> int:
+        """Samples of the record at `COARSE`, a power of two."""
+        return 1 << (ceil(self.record * COARSE) - 1).bit_length()
+
+    @property
+    def bins(self) -> Bins:
+        """Frequencies of the record within the band, and what of the sea's energy each has.
+
+        The variance of a linear response is the sum over them of its squared modulus times the
+        surface's variance.
+        """
+        width = 2.0 * pi / self.period
+        first, last = ceil(BAND[0] / width), floor(BAND[1] / width)
+        frequency = width * np.arange(first, last + 1, dtype=np.float64)
+        density = self.spectrum.density(frequency)
+        variance = density * (self.spectrum.height**2 / 16.0 / density.sum())
+        return Bins(frequency, variance)
+
     @cached_property
     def waves(self) -> Components:
-        """Regular waves: one anywhere in each of equal bands, so that nothing repeats."""
-        rng, n = np.random.default_rng(self.seed), self.components
-        edges, width = np.linspace(*BAND, n, endpoint=False, retstep=True)
-        omega = edges + rng.random(n) * width
-        amplitude = np.sqrt(2.0 * self.spectrum.density(omega) * width)
-        phase, heading = 2.0 * np.pi * rng.random(n), np.full(n, radians(self.heading_deg))
+        """Regular waves: one on each bin, or several directions of each if the sea is spread."""
+        rng = np.random.default_rng(self.seed)
+        each = DIRECTIONS if self.spread else 1
+        omega, variance = (np.repeat(values, each) for values in self.bins)
+        real, imaginary = rng.standard_normal((2, omega.size))
+        amplitude = np.sqrt(variance / each) * (real + 1j * imaginary)
+        heading = np.full(omega.size, radians(self.heading_deg))
         if self.spread:
-            grid = np.linspace(-0.5 * np.pi, 0.5 * np.pi, 1001)
-            below = 0.5 + (grid + 0.5 * np.sin(2.0 * grid)) / np.pi
-            heading += np.interp(rng.random(n), below, grid)
-        return Components(omega, amplitude, phase, heading)
+            # one direction in each of equally probable sectors
+            probability = (np.arange(omega.size) % each + rng.random(omega.size)) / each
+            grid = np.linspace(-0.5 * pi, 0.5 * pi, 1001)
+            heading += np.interp(probability, 0.5 + (grid + 0.5 * np.sin(2.0 * grid)) / pi, grid)
+        width = 2.0 * pi / self.period
+        met = width * np.rint(self.encounter(omega, heading) / width)
+        return Components(omega, met, amplitude, heading)
+
+    def encounter(self, omega: Array, heading: Array) -> Array:
+        """Frequencies at which the ship meets waves, by their frequency and heading. [rad/s]"""
+        return np.asarray(omega - omega**2 / GRAVITY * self.speed * np.cos(heading))
+
+    def response(self, omega: Array, heading: Array) -> Complex:
+        """Complex amplitudes of six motions of the crane's origin for each metre of wave, (6, n).
+
+        The ship's own, moved there from `reference`, in waves by their frequencies [rad/s] and
+        headings [rad], (n,), at its speed.
+        """
+        response = self.ship.response(omega, heading, self.speed)
+        if any(self.reference):
+            to_origin = -np.array(self.reference)[:, None]
+            response[:3] += np.cross(response[3:], to_origin, axis=0)
+        return response
+
+    @property
+    def lean(self) -> Array:
+        """(6,) constant part of the motion: list and trim."""
+        return np.array([0.0, 0.0, 0.0, radians(self.list_deg), radians(self.trim_deg), 0.0])
 
     def motion(self, count: int, rate: float = 512.0) -> Array:
-        """Motion of the ship, (count, 6): surge, sway, heave [m], roll, pitch, yaw [rad].
+        """Motion of the crane's origin, (count, 6): surge, sway, heave [m], roll, pitch, yaw [rad].
 
-        Samples a second are a multiple of 8. Value and two derivatives are summed up at 8 Hz, from
-        phasors that are turned, not computed; quintic polynomials join them.
+        Samples a second are a multiple of 8. At the same time it is the same, however many samples
+        are asked for; an `InputError` if the record is shorter. Value and two derivatives are
+        summed up at 8 Hz by FFT; quintic polynomials join them.
         """
         inner = round(rate / COARSE)
         if inner < 1 or abs(inner * COARSE - rate) > 1e-9 * rate:
             raise InputError(f"A ship's motion has a multiple of {COARSE:g} samples a second.")
-        omega, amplitude, phase, heading = self.waves
-        met = omega - omega**2 / GRAVITY * self.speed * np.cos(heading)  # as the ship meets them
-        response = self.ship.response(omega, heading, self.speed)
-        motions = (response * (amplitude * np.exp(1j * phase))).T
         intervals = max(-(-(count - 1) // inner), 1)
-        # value, slope and curvature of each motion, by e^{iωt}
-        w = met[:, None]
+        if intervals > self._samples:
+            enough = (1 << (intervals - 1).bit_length()) / COARSE
+            raise InputError(
+                f"The seaway comes again after {self.period:g} s, but {(count - 1) / rate:g} s of "
+                f"it are asked for: take a longer record, Seaway(..., record={enough:g})."
+            )
+        points = self._points(intervals + 1)
+        points[:, :6] += self.lean
+        motion = np.empty((intervals * inner + 1, 6))
+        _join(points, _basis(inner), motion)
+        return motion[:count]
+
+    def _points(self, count: int) -> Array:
+        """Value, slope and curvature of the six motions at `COARSE`, (count, 18), without lean."""
+        waves, size = self.waves, self._samples
+        motions = (self.response(waves.frequency, waves.heading) * waves.amplitude).T
+        w = waves.met[:, None]
         sums = np.hstack([motions, 1j * w * motions, -w * w * motions])
-        made = np.empty((intervals * inner + 1, 6))
-        _synthesised(met, sums.real.copy(), sums.imag.copy(), _basis(inner), made)
-        return made[:count]
+        # a wave met too fast for the rate is one of its aliases, which has the same samples
+        index = np.rint(waves.met * self.period / (2.0 * pi)).astype(np.int64) % size
+        mirrored = index > size // 2
+        index[mirrored] = size - index[mirrored]
+        sums[mirrored] = sums[mirrored].conj()
+        lines = np.zeros((int(index.max()) + 1, sums.shape[1]), dtype=np.complex128)
+        np.add.at(lines, index, sums)
+        # an inverse real FFT counts lines twice, except those at 0 and at half of the rate
+        lines[1 : size // 2] *= 0.5
+        samples = np.fft.irfft(size * np.ascontiguousarray(lines.T), size)
+        return np.ascontiguousarray(samples[:, np.arange(count) % size].T)
 
 
 # --- measured motion ------------------------------------------------------------------------------
@@ -383,31 +554,16 @@ def _basis(inner: int) -> Array:
 
 
 @kernel
-def _synthesised(met: Array, real: Array, imag: Array, basis: Array, out: Array) -> None:
-    """Add up components on the coarse grid, turned from point to point; join the points.
-
-    Amplitudes of value, slope and curvature are a row for each component: the inner loop runs along
-    rows, which the processor takes several numbers at a time.
-    """
-    size, columns = real.shape
-    inner, motions = basis.shape[0], columns // 3
-    c, s = np.ones(size), np.zeros(size)
-    turn_c, turn_s = np.cos(met / COARSE), np.sin(met / COARSE)
-    points = np.zeros((2, columns))
-    for n in range((out.shape[0] - 1) // inner + 1):
-        now, before = points[n % 2], points[(n + 1) % 2]
-        now[:] = 0.0
-        for j in range(size):
-            a, b = c[j], s[j]
-            for k in range(columns):
-                now[k] += a * real[j, k] - b * imag[j, k]
-            c[j], s[j] = a * turn_c[j] - b * turn_s[j], a * turn_s[j] + b * turn_c[j]
-        for i in range(inner if n else 0):
-            row = (n - 1) * inner + i
+def _join(points: Array, basis: Array, out: Array) -> None:
+    """Fill motions between points on the coarse grid, rows of values, slopes and curvatures."""
+    inner, motions = basis.shape[0], out.shape[1]
+    for n in range(points.shape[0] - 1):
+        before, after = points[n], points[n + 1]
+        for i in range(inner):
             for q in range(motions):
                 value = 0.0
                 for k in range(3):
                     value += basis[i, k] * before[k * motions + q]
-                    value += basis[i, 3 + k] * now[k * motions + q]
-                out[row, q] = value
-        out[out.shape[0] - 1] = now[:motions]
+                    value += basis[i, 3 + k] * after[k * motions + q]
+                out[n * inner + i, q] = value
+    out[out.shape[0] - 1] = points[points.shape[0] - 1, :motions]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from functools import lru_cache
-from math import degrees, inf, isfinite, pi, sin, sqrt
+from math import degrees, hypot, inf, isfinite, pi, sin, sqrt
 from numbers import Real
 from typing import Any, Literal, TypedDict, Unpack, get_args
 
@@ -13,11 +13,20 @@ from numpy.typing import ArrayLike, NDArray
 from swashplate.analysis.compensation import InverseMap
 from swashplate.crane import loop
 from swashplate.crane.axes import AXES, RATE, check_names
-from swashplate.crane.control import GIVES, SEEN, Control, settings_of
+from swashplate.crane.control import GIVES, SEEN, Control, stages_of
 from swashplate.crane.crane import Crane
 from swashplate.crane.kinematics import Shafts, Vector, boom_at, rope_length, shaft_torques, tip_of
-from swashplate.crane.loop import ROWS, Fixed, Inverse, Plant, State
-from swashplate.crane.rope import AIR, GRAVITY, Hung, Suspension, swing_of, too_fast
+from swashplate.crane.loop import Fixed, Inverse, Plant, State
+from swashplate.crane.rope import (
+    AIR,
+    GRAVITY,
+    Start,
+    Suspension,
+    hanging_load,
+    swing_of,
+    too_fast,
+)
+from swashplate.crane.signals import ROWS, Signals, columns_of
 from swashplate.drive import Drive
 from swashplate.equations import CompiledStep, Machine, compiled_step
 from swashplate.equations.marching.run import marched
@@ -36,6 +45,10 @@ RIGID = Suspension()
 """A point on a rigid rope."""
 WIDEST, STRONGEST = 1e5, 100.0
 """Largest drag area of a load, and largest wind; gusts of hurricanes have 100 m/s. [m²], [m/s]"""
+FARTHEST = 0.9
+"""Largest offset of the load at the start, as a part of the rope: at 64 degrees."""
+FASTEST_START = 100.0
+"""Largest velocity of the load at the start. [m/s]"""
 QUICKEST = 0.4
 """Largest part of a rope's pull by which a leaking drive may lower it within a sample: at 0.7 they
 would swing against each other from sample to sample."""
@@ -62,11 +75,18 @@ class Setup(TypedDict, total=False):
         Its mass. [kg]
     suspension : Suspension, default a point on a rigid rope
         Elastic rope, hook with slings.
-    loaded : bool, default False
+    swing_damping : float, default the crane's
+        Damping ratio of the load's swing by air, sheaves and rope, 0 to 0.2.
+    load_offset : (float, float), default (0, 0)
+        Load less tip at the start, forward and to port, inertial: the load begins there, on its
+        taut rope; shorter than 0.9 of the rope. [m]
+    load_velocity : (float, float), default (0, 0)
+        Of the load relative to the tip at the start, horizontal, likewise. [m/s]
+    loaded : bool, default whether a real drive of the crane feels a load
         Whether the rope loads the drives: its tension is a torque on each shaft, by virtual work,
-        which they take a sample later as their ``load_torque``. Off, as their tests were without
-        load; drives feel it by their ``motor_leakage`` and ``line_stiffness``. What the boom weighs
-        is not in it.
+        which they take a sample later as their ``load_torque``. Drives feel it by their
+        ``motor_leakage`` and ``line_stiffness``, which the packaged ones do not have: their tests
+        were without load. What the boom weighs is not in it.
     drag_area : float, default 0
         C_d A of the load, at most 100 000. [m²]
     wind : (float, float), default (0, 0)
@@ -83,7 +103,10 @@ class Setup(TypedDict, total=False):
     rope_m: float
     load: float | None
     suspension: Suspension
-    loaded: bool
+    swing_damping: float | None
+    load_offset: tuple[float, float]
+    load_velocity: tuple[float, float]
+    loaded: bool | None
     drag_area: float
     wind: tuple[float, float]
     brake: bool
@@ -104,7 +127,7 @@ class CraneStepper:
         how: dict[str, Any] = dict(setup)
         check_names("A crane's run has no", how, Setup.__annotations__, "it has")
         control = how.pop("control", None)
-        settings, law = settings_of(control)
+        settings, law, self._sensors = stages_of(control)
         self._crane, self.fixed = crane, _fixed(crane, settings, **how)
         fixed = self.fixed
         if fixed.actuation == loop.DIRECT and control is not None:
@@ -121,7 +144,7 @@ class CraneStepper:
             picks = np.array([SEEN.index(each) for each in seen], dtype=np.int64)
         # in open loop nothing acts back on the drives
         self._open = (
-            control is None and not fixed.loaded and fixed.actuation in (loop.VOLTS, loop.INVERSE)
+            not settings.path and not fixed.loaded and fixed.actuation in (loop.VOLTS, loop.INVERSE)
         )
         one, two, three, *last = (each.step for each in self._steps)
         self._loop = loop.loop_of(one, two, three, last[0] if last else None)
@@ -131,12 +154,27 @@ class CraneStepper:
         if fixed.loaded:
             weight = fixed.mass * GRAVITY
             axes[loop.TORQUE] = shaft_torques(Vector(0.0, 0.0, -weight), home.slew, boom, weight, g)
-        self._state = State(0, axes, tip, Hung(tip, tip, tip, tip, 0.0, 0.0), 0.0, 0.0)
+        rope = float(rope_length(Shafts(0.0, 0.0, 0.0), g, home))
+        hung = hanging_load(tip, *fixed.start.offset, rope, fixed.hanging)
+        self._state = State(0, axes, tip, hung, 0.0, 0.0)
         longest = 2.0 * pi * sqrt(fixed.ropes[1] / GRAVITY) * RATE + 4.0
-        memory = np.zeros((7, 1 << int(longest).bit_length()))
-        memory[3:5] = [[tip.x], [tip.y]]
-        drives, best = (hoist, slew, luff), np.full(4, np.inf)
-        self._plant = Plant(drives, own, picks, memory, best)
+        memory = np.zeros((4, 1 << int(longest).bit_length()))
+        memory[loop.PATH : loop.PATH + 2] = [[tip.x], [tip.y]]
+        # the load has hung where it starts
+        memory[loop.SWING : loop.SWING + 2] = [[hung.hook.x - tip.x], [hung.hook.y - tip.y]]
+        sensing = settings.sensing
+        on_their_way = int(sensing.delay * sensing.rate) + 2
+        self._noise = np.random.default_rng(self._sensors.seed if self._sensors else 0)
+        self._plant = Plant(
+            drives=(hoist, slew, luff),
+            law=own,
+            picks=picks,
+            memory=memory,
+            readings=np.zeros((1 << on_their_way.bit_length(), loop.READINGS)),
+            noise=np.zeros((0, loop.NOISY)),
+            margins=np.full(4, np.inf),
+            marched=(np.zeros(0),) * 9,
+        )
 
     def step(
         self, command: tuple[float, float, float], ship: ArrayLike | None = None
@@ -171,18 +209,27 @@ class CraneStepper:
         load, tip = (np.array([made[f"{end}_{axis}"] for axis in "xyz"]) for end in ("load", "tip"))
         return made | {"swing": float(swing_of(load, tip))}
 
+    def signals(self, stored: Array) -> Signals:
+        """Signals of what the loop has left."""
+        return Signals(stored, self.fixed.columns, self.fixed.geometry, self.fixed.home)
+
     def take(self, commands: Array, ship: Array) -> Array:
         """Advance by many samples at once: a row for each, a column for each of `step`'s signals.
 
         Commands are (n, 3), the ship's motion (n, 6), or (n, 1) if it does not move.
         """
-        return self._advanced(self.fixed, commands, ship, np.empty((len(commands), len(ROWS))))
+        out = np.empty((len(commands), self.fixed.columns.width))
+        return self.signals(self._advanced(self.fixed, commands, ship, out)).table()
 
     def run(self, commands: Array, ship: Array) -> Array:
-        """A whole run from the start, as `take`; the stepper itself is then of no more use."""
-        fixed, h, out = self.fixed, 1.0 / RATE, np.empty((len(commands), len(ROWS)))
+        """What the loop leaves of a whole run, by `Fixed.columns`.
+
+        As `take`; the stepper itself is then of no more use.
+        """
+        fixed, h = self.fixed, 1.0 / RATE
+        out = np.empty((len(commands), fixed.columns.width))
         if self._open:  # the drives by themselves, which is quicker
-            given = np.empty((9, len(commands)))
+            voltages, speeds, limits = [], [], []
             for i, axis in enumerate(AXES):
                 stick = np.ascontiguousarray(commands[:, i])
                 volts = loop.open_voltages(stick, fixed.inverses[i], fixed.actuation)
@@ -190,22 +237,32 @@ class CraneStepper:
                 begun = instance.start({"voltage": 0.0}, h, "rest")
                 wanted = stored_of(instance.model, OUTPUTS)
                 made = marched(instance, {"voltage": volts}, h, begun, wanted, "command")
-                given[i], given[3 + i], given[6 + i] = volts, *made
-            out[:, :9] = given.T
+                voltages.append(volts)
+                speeds.append(np.ascontiguousarray(made[0]))
+                limits.append(np.ascontiguousarray(made[1]))
+            self._plant = self._plant._replace(marched=(*voltages, *speeds, *limits))
             fixed = fixed._replace(actuation=loop.MARCHED)
         return self._advanced(fixed, commands, ship, out)
 
     def _advanced(self, fixed: Fixed, commands: Array, ship: Array, out: Array) -> Array:
         """The rows, filled by the loop; refuses what has stopped it."""
-        self._state, ended = self._loop(
-            1.0 / RATE, fixed, self._state, self._plant, commands, ship, out
-        )
+        plant = self._plant._replace(noise=self._next_noise(len(commands)))
+        self._state, ended = self._loop(1.0 / RATE, fixed, self._state, plant, commands, ship, out)
         if ended != loop.FINE:
             raise self._stopped(ended)
         machines, margins = (*self._plant.drives, self._plant.law), self._plant.margins.tolist()
         for step, machine, worst in zip(self._steps, machines, margins, strict=False):
             step.check(machine, worst, "command")
         return out
+
+    def _next_noise(self, samples: int) -> Array:
+        """Noise of the measurements within the next samples, from one stream for the whole run."""
+        sample, rate = self._state.sample, self.fixed.settings.sensing.rate
+        if rate == 0.0 or samples == 0:
+            return self._plant.noise
+        taken = loop.measurement_at(sample - 1, rate) + 1 if sample > 0 else 0
+        due = loop.measurement_at(sample + samples - 1, rate) + 1
+        return self._noise.standard_normal((due - taken, loop.NOISY))
 
     def _stopped(self, ended: int) -> Exception:
         """What has stopped the loop, as the error to raise."""
@@ -236,7 +293,10 @@ def _fixed(
     rope_m: float = 20.0,
     load: float | None = None,
     suspension: Suspension = RIGID,
-    loaded: bool = False,
+    swing_damping: float | None = None,
+    load_offset: tuple[float, float] = (0.0, 0.0),
+    load_velocity: tuple[float, float] = (0.0, 0.0),
+    loaded: bool | None = None,
     drag_area: float = 0.0,
     wind: tuple[float, float] = (0.0, 0.0),
     brake: bool = True,
@@ -245,8 +305,16 @@ def _fixed(
     if actuation not in ACTUATIONS:
         raise InputError(f"actuation is '{actuation}'; it is {', '.join(ACTUATIONS[:-1])}.")
     load = crane.safe_load if load is None else load
-    numbers = {"slew_deg": slew_deg, "boom_deg": boom_deg, "rope_m": rope_m, "load": load}
-    for name, value in (numbers | {"drag_area": drag_area}).items():
+    swing_damping = crane.swing_damping if swing_damping is None else swing_damping
+    numbers = {
+        "slew_deg": slew_deg,
+        "boom_deg": boom_deg,
+        "rope_m": rope_m,
+        "load": load,
+        "drag_area": drag_area,
+        "swing_damping": swing_damping,
+    }
+    for name, value in numbers.items():
         if not isinstance(value, Real):
             raise InputError(f"{name} is {value!r}, but must be a number.")
     if not 0.0 <= drag_area <= WIDEST:
@@ -255,43 +323,75 @@ def _fixed(
         )
     if not isinstance(suspension, Suspension):
         raise InputError(f"suspension is {suspension!r}, but must be a Suspension.")
-    pair = np.array(wind, dtype=object)
-    if pair.shape != (2,) or not all(isinstance(v, Real) and isfinite(v) for v in pair):
-        raise InputError(f"wind is {wind!r}, but must be two speeds, forward and to port, in m/s.")
+    wind = _pair("wind", wind, "two speeds, forward and to port, in m/s")
     if max(map(abs, wind)) > STRONGEST:
         raise InputError(f"wind is {wind!r}, but must be within {STRONGEST:g} m/s on each axis.")
+    offset = _pair("load_offset", load_offset, "two lengths, forward and to port, in m")
+    if not hypot(*offset) < FARTHEST * rope_m:
+        raise InputError(
+            f"load_offset is {hypot(*offset):.4g} m long, but must be shorter than {FARTHEST:g} of "
+            f"the rope of {rope_m:g} m."
+        )
+    velocity = _pair("load_velocity", load_velocity, "two speeds, forward and to port, in m/s")
+    if max(map(abs, velocity)) > FASTEST_START:
+        raise InputError(
+            f"load_velocity is {velocity!r}, but must be within {FASTEST_START:g} m/s on each axis."
+        )
     if load > crane.safe_load:
         raise InputError(
             f"The load is {load:g} kg, but {crane.name} lifts {crane.safe_load:g} kg: take less, "
             "or a crane with another safe_load."
         )
     drag = AIR * drag_area / (2.0 * load) if load > 0.0 else 0.0  # which the suspension refuses
+    if loaded is None:
+        loaded = actuation != "ideal" and feels_load(crane)
     if loaded:
         _check_loaded(crane, actuation, load + suspension.hook, suspension)
     low, high = crane.boom_limits
     hoist, slew, luff = (_inverse(crane.inverse(axis)) for axis in AXES)
-    return Fixed(
-        crane.geometry,
-        crane.home(slew_deg, boom_deg, rope_m),
-        settings,
-        ACTUATIONS.index(actuation),
-        bool(brake),
-        (sin(low), sin(high)),
-        crane.rope_limits,
-        load + suspension.hook,
-        suspension.hanging(load, crane.rope_limits[0], RATE, drag, (*wind, 0.0)),
-        bool(loaded),
-        (hoist, slew, luff),
+    home = crane.home(slew_deg, boom_deg, rope_m)
+    hanging = suspension.hanging(
+        load,
+        shortest=crane.rope_limits[0],
+        rate=RATE,
+        drag=drag,
+        wind=(*wind, 0.0),
+        swing_damping=swing_damping,
     )
+    return Fixed(
+        geometry=crane.geometry,
+        home=home,
+        settings=settings,
+        actuation=ACTUATIONS.index(actuation),
+        brake=bool(brake),
+        boom=(sin(low), sin(high)),
+        ropes=crane.rope_limits,
+        mass=load + suspension.hook,
+        hanging=hanging,
+        start=Start(offset, velocity),
+        loaded=bool(loaded),
+        inverses=(hoist, slew, luff),
+        columns=columns_of(
+            ideal=actuation == "ideal", hooked=suspension.hook > 0.0, loaded=bool(loaded)
+        ),
+    )
+
+
+def _pair(name: str, value: Any, what: str) -> tuple[float, float]:
+    """Two finite numbers; an `InputError` that says what they are."""
+    pair = np.array(value, dtype=object)
+    if pair.shape != (2,) or not all(isinstance(each, Real) and isfinite(each) for each in pair):
+        raise InputError(f"{name} is {value!r}, but must be {what}.")
+    one, two = map(float, pair)
+    return one, two
 
 
 def _check_loaded(crane: Crane, actuation: str, mass: float, suspension: Suspension) -> None:
     """Refuse loads on drives that feel none, or that answer them faster than a sample."""
     if actuation == "ideal":
         raise InputError("Ideal drives follow at once, whatever the load: leave out 'loaded'.")
-    drives = {axis: getattr(crane, axis) for axis in AXES}
-    lost = {axis: _speed_lost(drive) for axis, drive in drives.items()}
-    if not any(lost.values()) and not any("line" in d.parameters.options for d in drives.values()):
+    lost = {axis: _speed_lost(getattr(crane, axis)) for axis in AXES}
+    if not feels_load(crane):
         raise InputError(
             f"No drive of {crane.name} feels a load: give one a motor_leakage or a "
             "line_stiffness, as crane.hoist.replace(motor_leakage=1e-6), or leave out 'loaded'."
@@ -311,6 +411,12 @@ def _compiled(drive: Drive, inputs: tuple[str, ...]) -> tuple[CompiledStep, Mach
     """A drive's step, and a machine at its start to copy."""
     made = drive.compiled_step(OUTPUTS, inputs=inputs, rate=RATE)
     return made, made.machine()
+
+
+def feels_load(crane: Crane) -> bool:
+    """Whether a drive of a crane turns in another way if its shaft is loaded."""
+    drives = [getattr(crane, axis) for axis in AXES]
+    return any("line" in drive.parameters.options or _speed_lost(drive) for drive in drives)
 
 
 @lru_cache(maxsize=64)

@@ -39,6 +39,8 @@ DPI = 150
 POINTS_PER_INCH = 72.0
 WIDTH = 8.6
 """Of a sheet. [inch]"""
+ROOM = WIDTH - 1.2
+"""Of a legend, beside a panel's ordinate. [inch]"""
 GAP, HEAD, FOOT, ROW = 0.24, 0.38, 0.42, 0.18
 """Between panels, for the title, for the abscissa, for a row of a legend. [inch]"""
 
@@ -223,7 +225,9 @@ def handle(name: str, color: str, dashes: Dashes = "solid", width: float = 2.0) 
     return Line2D([], [], color=color, linestyle=dashes, linewidth=width, label=name)
 
 
-def put_legend(ax: Axes, handles: Sequence[Artist], *, beyond: bool = False) -> None:
+def put_legend(
+    ax: Axes, handles: Sequence[Artist], *, beyond: bool = False, room: float = ROOM
+) -> None:
     """Write a legend above a panel, on one line or more, `beyond` its right end if need be."""
     made = ax.legend(
         handles=handles,
@@ -231,7 +235,7 @@ def put_legend(ax: Axes, handles: Sequence[Artist], *, beyond: bool = False) -> 
         bbox_to_anchor=(0.0, 1.01),
         borderaxespad=0.0,
         borderpad=0.2,
-        ncols=legend_columns([str(each.get_label()) for each in handles]),
+        ncols=legend_columns([str(each.get_label()) for each in handles], room),
         frameon=False,
         fontsize=SMALL,
         labelcolor=INK,
@@ -243,16 +247,16 @@ def put_legend(ax: Axes, handles: Sequence[Artist], *, beyond: bool = False) -> 
     made.set_in_layout(not beyond)
 
 
-def legend_columns(names: Sequence[str], room: float = WIDTH - 1.2) -> int:
+def legend_columns(names: Sequence[str], room: float = ROOM) -> int:
     """Columns of a legend that surely fit into some room [inch], all on one line if they do."""
     widths = [0.39 + 0.056 * len(name) for name in names]
     return len(names) if sum(widths) <= room else max(1, int(room / max(widths)))
 
 
-def legend_rows(handles: Sequence[Artist]) -> int:
-    """Lines of the legend of these handles."""
+def legend_rows(handles: Sequence[Artist], room: float = ROOM) -> int:
+    """Lines of the legend of these handles in some room [inch]."""
     names = [str(each.get_label()) for each in handles]
-    return -(-len(names) // legend_columns(names))
+    return -(-len(names) // legend_columns(names, room))
 
 
 def zero_line(ax: Axes, *, upright: bool = False) -> None:

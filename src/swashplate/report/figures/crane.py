@@ -1,8 +1,9 @@
-"""Figures of cranes: runs and what limits their drives; judgment, sweeps, what axes can follow."""
+"""Figures of cranes: runs and what limits their drives, sweeps, what axes can follow."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from textwrap import wrap
 from typing import Any, overload
 
 import numpy as np
@@ -11,8 +12,8 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 from numpy.typing import NDArray
 
-from swashplate.crane import Crane, CraneRun, Followable, Judgment, Seaway, Sweep
-from swashplate.crane.judgment import mean_of
+from swashplate.crane import Crane, CraneRun, Followable, Hull, Seaway, Sweep
+from swashplate.crane.confidence import rms_of
 from swashplate.errors import InputError
 from swashplate.report import style
 from swashplate.report.lines import SHADES, draw, fit_time, shade_handle, stretches
@@ -30,6 +31,8 @@ ACTING = (Limit.ORIFICE, Limit.SWASH_STOP)
 """Limits that a crane's drives are judged by: of acceleration and of speed."""
 LEAST = 0.01
 """Least swing on a logarithmic scale. [deg]"""
+LETTERS = 118
+"""Letters of a line above a panel."""
 
 
 def assumed(crane: Crane) -> str:
@@ -37,21 +40,43 @@ def assumed(crane: Crane) -> str:
     return f"{crane.assumed} of the crane are assumed" if crane.assumed else ""
 
 
-def seaway_words(sea: Seaway | None, height: bool = True) -> str:
-    """A seaway in a few words, with the height of its waves or without."""
-    if sea is None:
-        return "calm sea"
-    what = str(sea.sea)
-    if not isinstance(sea.sea, str):
-        what = f"{sea.sea.height:g} m, " * height + f"peak at {sea.sea.period:g} s"
-    return f"{what}, waves at {sea.heading_deg:g}°"
+HEADINGS = {
+    0.0: "following",
+    90.0: "abeam from starboard",
+    180.0: "head sea",
+    270.0: "abeam from port",
+}
+"""Names of headings of the waves. [deg]"""
 
 
-def remark(ax: Axes, *said: str, rows: int = 0, right: bool = False) -> None:
+def seaway_words(sea: Seaway, height: bool = True) -> str:
+    """A seaway in a few words, with the height of its waves or without.
+
+    ``"ss3 0.88 m, 7.5 s, abeam from starboard, roll 13 s"``
+    """
+    spectrum = sea.spectrum
+    first = f"{spectrum.height:g} m, {spectrum.period:g} s"
+    if not height:
+        first = f"peak at {spectrum.period:g} s"
+    elif isinstance(sea.sea, str):
+        first = f"{sea.sea} {first}"
+    heading = HEADINGS.get(sea.heading_deg % 360.0, f"waves at {sea.heading_deg:g}°")
+    words = [first, heading]
+    if spectrum.peak_factor != 1.0:
+        words.insert(1, f"γ {spectrum.peak_factor:g}")
+    if isinstance(sea.ship, Hull):
+        words.append(f"roll {sea.ship.roll_period:g} s")
+    return ", ".join(words)
+
+
+def remarks(*said: str) -> str:
+    """Remarks joined, in lines that fit above a panel."""
+    return "\n".join(wrap("; ".join(filter(None, said)), LETTERS))
+
+
+def remark(ax: Axes, words: str, rows: int = 0) -> None:
     """Write grey words above a panel, over so many rows of a legend."""
-    words, shift = "; ".join(filter(None, said)), (0.0, 5.0 + 13.0 * rows)
-    side = "right" if right else "left"
-    style.write(ax, words, (float(right), 1.0), shift, color=style.GREY, ha=side)
+    style.write(ax, words, (0.0, 1.0), (0.0, 3.0 + 13.0 * rows), color=style.GREY, va="bottom")
 
 
 def _panels(
@@ -64,8 +89,10 @@ def _panels(
 ) -> tuple[Figure, list[Axes]]:
     """Panels with a legend of lines, where there are several, and a remark."""
     legend = [style.handle(name, *look) for name, look in looks.items()] if len(looks) > 1 else []
-    figure, axes = style.sheet(heights, title, labels, below, legend=legend, lines=1)
-    remark(axes[0], *said, rows=style.legend_rows(legend) if legend else 0)
+    words = remarks(*said)
+    lines = 1 + words.count("\n")
+    figure, axes = style.sheet(heights, title, labels, below, legend=legend, lines=lines)
+    remark(axes[0], words, style.legend_rows(legend) if legend else 0)
     return figure, axes
 
 
@@ -143,111 +170,157 @@ def _acting(ax: Axes, runs: Mapping[str, CraneRun], looks: Mapping[str, style.St
     style.put_legend(ax, [shade_handle(SHADES[limit]) for limit in ACTING])
 
 
-# --- studies --------------------------------------------------------------------------------------
+# --- sweeps ---------------------------------------------------------------------------------------
 
 
 LOOKS = {
-    "bearing": ("Swing over the bearing of the boom", "RMS, mean of {}", "", ""),
-    "height": (
-        *("Seaways in which the load swings less than {:g}°", "{} a height"),
-        *("share of seaways (%)", "significant height of the waves (m)"),
-    ),
+    "bearing": ("Swing over the bearing of the boom", ""),
+    "height": ("Swing over the height of the waves", "significant height of the waves (m)"),
     "orifice": (
-        *("Swing over the size of the luff drive's orifice", "mean of {} with its 95 % interval"),
-        *("swing, RMS (deg)", "orifice of the luff drive, to the identified one"),
-    ),
-    "stick": (
-        *("Residual swing after a slew", ""),
-        *("residual swing (deg)", "stick, part of the full speed"),
+        *("Swing over the size of the luff drive's orifice",),
+        *("orifice of the luff drive, to the identified one",),
     ),
 }
-"""Title of a sweep over a quantity, remark on its seaways, ordinate, abscissa."""
+"""Title of a sweep over a quantity, and its abscissa."""
+RADII = (0.1, 0.3, 1.0, 3.0, 10.0, 30.0)
+"""Circles of a polar figure. [deg]"""
+ACROSS, AROUND = 5.0, 0.46
+"""Size of a polar figure, and room for the words around it. [inch]"""
+CENTRE = 0.05
+"""Swing at the centre of a polar figure, whose radius is logarithmic. [deg]"""
 
 
-def plot_sweep(result: Sweep, *, limit_deg: float = 3.0, title: str = "") -> Figure:
-    """Figure of the swing over a quantity, for several variants.
+def plot_sweep(result: Sweep, *, title: str = "") -> Figure:
+    """Figure of the swing over a quantity, for several variants: mean and 95 % interval.
 
-    Over the bearing of the boom it is polar, with a logarithmic radius; over the waves' height it
-    shows the share of seaways in which the largest swing stays below a limit; over the stick the
-    residual swing, and where the slew ends.
+    Over the bearing of the boom it is polar, with a logarithmic radius, half a circle if the
+    bearings are on one side of the ship. If one of the runs at a point left the model, the line has
+    a gap there, and a cross marks it.
     """
-    looks, points = style.strokes(result.names), result.points
-    usual, seaways, label, below = LOOKS[result.over]
-    words = title or usual.format(limit_deg)
-    sea = seaway_words(result.sea, result.over != "height")
-    said = (sea, seaways.format(count(len(result.values), "seaway")), assumed(result.crane))
+    looks = style.strokes(result.names)
+    usual, below = LOOKS[result.over]
+    means = "over {} with its 95 % interval"
     if result.over == "bearing":
-        return _polar(result, words, looks, *said)
-    stick = result.over == "stick"
-    heights, labels = ([2.7, 1.4] if stick else [3.0]), (label, "slew reached (deg)")
-    figure, (ax, *ends) = _panels(heights, labels, below, words, looks, *said)
-    values, shares = np.degrees(result.values), 100.0 * result.below(limit_deg)
-    for k, (color, dashes) in enumerate(looks.values()):
-        how: dict[str, Any] = {"color": color, "linestyle": dashes, "linewidth": 1.4}
-        if result.over == "height":
-            ax.plot(points, shares[:, k], marker="o", ms=3.5, clip_on=False, **how)
-        elif stick:
-            ax.plot(points, np.maximum(values[0, :, k, 1], LEAST), marker="o", ms=3.0, **how)
-            ends[0].plot(points, values[0, :, k, 2], marker="o", ms=3.0, **how)
-        else:
-            found = np.array([mean_of(values[:, n, k, 0], 0.0) for n in range(points.size)])
-            middle, low, high = np.maximum(found, LEAST).T
-            ax.fill_between(points, low, high, color=color, alpha=0.15, linewidth=0.0)
-            ax.plot(points, middle, **how)
+        means = "RMS over {}"
+    left = bool(np.isnan(result.rms()).any())
+    said = (
+        seaway_words(result.seaway, result.over != "height"),
+        means.format(count(len(result.values), "seaway")),
+        "" if result.over == "bearing" else "thin line: no control, by its spectrum",
+        "×: a run left the model" if left else "",
+        assumed(result.crane),
+    )
+    if result.over == "bearing":
+        return _polar(result, title or usual, looks, *said)
+    labels = ("swing, RMS (deg)",)
+    figure, (ax,) = _panels([3.0], labels, below, title or usual, looks, *said)
+    values, points = np.degrees(result.values), result.points
+    highest = LEAST
+    for variant, (color, dashes) in enumerate(looks.values()):
+        of_variant = values[:, :, variant].T
+        estimates = np.array([rms_of(seaways) for seaways in of_variant])
+        gone = np.isnan(of_variant).any(axis=1)
+        estimates[gone] = np.nan  # a mean of those that stayed would be too small
+        middle, low, high = np.maximum(estimates, LEAST).T
+        ax.fill_between(points, low, high, color=color, alpha=0.12, linewidth=0.0)
+        ax.plot(points, middle, color=color, linestyle=dashes, linewidth=1.4, marker="o", ms=3.0)
+        # crosses of several variants at a point stand below one another
+        height = np.full(int(gone.sum()), 0.97 - 0.05 * variant)
+        across = ax.get_xaxis_transform()
+        ax.plot(points[gone], height, "x", color=color, ms=5.0, transform=across, clip_on=False)
+        highest = max(highest, float(np.nanmax(np.append(middle, LEAST))))
+    ax.plot(points, np.degrees(result.spectrum), color=style.GREY, linewidth=0.8, zorder=1.5)
     if result.over == "height":
-        ax.set_ylim(0.0, 100.0)
-        ax.set_xlim(left=0.0)
-    elif stick:
-        _logarithmic(ax, LEAST, 1.3 * float(np.nanmax(values[..., 1])))
+        ax.set_ylim(0.0, 1.25 * highest)
+        ax.set_xlim(0.0, 1.02 * float(points.max()))
     else:
-        mean = values[..., 0].mean(axis=0)
-        low = max(LEAST, 0.5 * float(np.nanmin(mean)))
-        _logarithmic(ax, low, 1.6 * float(np.nanmax(mean)))
+        finite = values[np.isfinite(values)]
+        low = max(LEAST, 0.5 * float(finite.min(initial=highest)))
+        _logarithmic(ax, low, 2.0 * highest)
         ax.axvline(1.0, color=style.FAINT, linewidth=0.8, zorder=1.0)
         style.write(ax, "as built", (1.0, low), (4.0, 4.0), coords="data", color=style.GREY)
-        ax.set_xlim(points[0], points[-1])
     return figure
 
 
+def _half(bearings: Array) -> tuple[str, float]:
+    """Side of the ship that bearings [rad] lie on, empty if they are on both; its first bearing."""
+    if bearings.size and (bearings >= 0.0).all() and (bearings <= np.pi).all():
+        return "starboard", 0.0
+    if bearings.size and (bearings >= np.pi).all() and (bearings <= 2.0 * np.pi).all():
+        return "port", np.pi
+    return "", 0.0
+
+
 def _polar(result: Sweep, title: str, looks: dict[str, style.Stroke], *said: str) -> Figure:
-    """Swing over the bearing around the ship."""
+    """Swing over the bearing around the ship, or over the half of it that the bearings are on."""
     legend = [style.handle(name, *look) for name, look in looks.items()]
     rows = style.legend_rows(legend)
-    above = style.HEAD + style.ROW * (rows + 1)
-    figure = style.new_figure(style.WIDTH, above + 5.4 + style.FOOT, layout="none")
+    words = remarks(*said)
+    above = style.HEAD + style.ROW * (rows + 1 + words.count("\n"))
+    half, first = _half(result.points)
+    tall = 0.5 * ACROSS if half else ACROSS
+    height = above + tall + 2.0 * AROUND
+    figure = style.new_figure(style.WIDTH, height, layout="none")
     style.write_title(figure, title)
-    top = 1.0 - (above + 0.05) / float(figure.get_figheight())
-    ax: Any = figure.add_axes((0.16, 0.06, 0.68, top - 0.11), projection="polar")
-    ax.set_theta_zero_location("N")
+    # the axes are a square, of which half a circle takes the middle
+    left, bottom = 0.5 * (style.WIDTH - ACROSS), AROUND + 0.5 * (tall - ACROSS)
+    square = left / style.WIDTH, bottom / height, ACROSS / style.WIDTH, ACROSS / height
+    ax: Any = figure.add_axes(square, projection="polar")
+    ax.set_theta_offset(first + np.pi if half else 0.5 * np.pi)  # half a circle lies flat
     ax.set_theta_direction(-1)
-    mean, floor = np.degrees(result.mean()[..., 0]), np.log10(0.05)
-    # closed where the bearings go all the way around, not where they are part of a circle
+    if half:
+        ax.set_thetamin(np.degrees(first))
+        ax.set_thetamax(np.degrees(first) + 180.0)
+        ax.spines["start"].set_color(style.FAINT)
+        ax.spines["end"].set_color(style.FAINT)
+    mean = np.degrees(result.rms())
+    largest = float(np.nanmax(np.append(mean, RADII[1])))
+    # closed if the bearings go all the way around, not if they are part of a circle
     again = result.points[:1] + 2.0 * np.pi
     gap = again - result.points[-1]
     again = again[gap <= 1.5 * np.diff(result.points).max(initial=0.0)]
     around = np.append(result.points, again)
+    edge = float(np.log10(1.3 * largest / CENTRE))
     for values, (color, dashes) in zip(mean.T, looks.values(), strict=True):
-        radius = np.log10(np.maximum(np.append(values, values[: again.size]), 0.05)) - floor
-        ax.plot(around, radius, color=color, linestyle=dashes, linewidth=1.4)
-    shown = [each for each in (0.1, 0.3, 1.0, 3.0, 10.0, 30.0) if each <= 1.3 * np.nanmax(mean)]
-    ax.set_ylim(0.0, np.log10(1.3 * np.nanmax(mean)) - floor)
-    ax.set_yticks(np.log10(shown) - floor, [f"{each:g}°" for each in shown])
-    ax.set_rlabel_position(52.5)  # lines cross it straight on
+        radius = np.log10(np.maximum(np.append(values, values[: again.size]), CENTRE) / CENTRE)
+        ax.plot(around, radius, color=color, linestyle=dashes, linewidth=1.4, marker="o", ms=2.5)
+        gone = result.points[np.isnan(values)]
+        ax.plot(gone, np.full(gone.size, edge), "x", color=color, ms=6.0, clip_on=False)
+    shown = [radius for radius in RADII if radius <= 1.3 * largest]
+    ax.set_ylim(0.0, edge)
+    ax.set_yticks(np.log10(np.array(shown) / CENTRE), [f"{radius:g}°" for radius in shown])
+    if not half:
+        ax.set_rlabel_position(52.5)  # lines cross it straight on
     names = {0: "bow", 90: "starboard", 180: "stern", 270: "port"}
     angles = range(0, 360, 30)
-    ax.set_xticks(np.radians(angles), [names.get(each, f"{each}°") for each in angles])
+    if half:
+        angles = range(round(np.degrees(first)), round(np.degrees(first)) + 181, 30)
+    labels = [names.get(angle % 360, f"{angle}°") for angle in angles]
+    ax.set_xticks(np.radians(angles), labels)
     ax.tick_params(labelsize=style.SMALL, labelcolor=style.INK)
     ax.tick_params(axis="x", pad=8.0)
-    for angle, text in zip(angles, ax.get_xticklabels(), strict=True):
-        side = "left" if angle < 180 else "right"
-        text.set_horizontalalignment("center" if angle % 180 == 0 else side)
+    if not half:
+        for angle, text in zip(angles, ax.get_xticklabels(), strict=True):
+            side = "left" if angle < 180 else "right"
+            text.set_horizontalalignment("center" if angle % 180 == 0 else side)
     ax.grid(True, color=style.GRID, linewidth=0.6)
     ax.spines["polar"].set_color(style.FAINT)
-    head = figure.add_axes((0.012, top + 0.01, 0.9, 0.001))
+    head = figure.add_axes((0.012, 1.0 - (above + 0.02) / height, 0.9, 0.001))
     head.set_axis_off()
     style.put_legend(head, legend)
-    remark(head, *said, rows=rows)
+    remark(head, words, rows)
     return figure
+
+
+# --- what axes can follow -------------------------------------------------------------------------
+
+
+AXIS_LINES = ("hoist, up", "slew, across the boom", "luff, along the boom")
+DEMANDED = "diamonds: what holding the tip asks of each, filled if that is more than it has"
+APART = 0.006
+"""Distance of the diamonds of the three axes, in parts of the abscissa."""
+LOWEST_DEMAND = 0.2
+"""Least amplitude shown, over the least that an axis can follow; a triangle stands for less."""
 
 
 @overload
@@ -261,76 +334,58 @@ def plot_follow(result: Followable, *, ax: GivenAxes, title: str = "") -> GivenA
 def plot_follow(
     result: Followable, *, ax: Axes | Sequence[Axes] | None = None, title: str = ""
 ) -> Figure | Axes | Sequence[Axes]:
-    """Figure of the amplitude that each axis can follow over the period, with seas as points.
+    """Figure of the amplitude that each axis can follow over the period, and what seas ask of it.
+
+    What a sea asks is a diamond in the axis's colour, filled if it is more than the axis can, or a
+    triangle at the lower end of the ordinate if it is less than that.
 
     By default a new figure; with `ax` it is drawn there, without the remark above, and `ax`
     returned.
     """
-    looks = style.strokes(("hoist, up", "slew, across the boom", "luff, along the boom"))
-    said = f"boom at {result.boom_deg:.0f}°; points: what holding the tip asks of the luff"
+    looks = style.strokes(AXIS_LINES)
     words = title or "What the axes can follow"
     labels = ("amplitude (m)",), "period (s)"
     if ax is None:
-        figure, (panel,) = _panels([3.3], *labels, words, looks, said, assumed(result.crane))
+        said = f"boom at {result.boom_deg:.0f}°", DEMANDED, assumed(result.crane)
+        figure, (panel,) = _panels([3.6], *labels, words, looks, *said)
     else:
         legend = [style.handle(name, *look) for name, look in looks.items()]
         (panel,) = style.dress_given(ax, title, *labels, what="panel", legend=legend)
-    for (color, dashes), values in zip(looks.values(), result.amplitude.T, strict=True):
-        panel.plot(result.periods, values, color=color, linestyle=dashes, linewidth=1.4)
-    box = {"facecolor": "white", "edgecolor": "none", "pad": 0.6}
-    for name, each in result.seas.items():
-        place = each.period, each.amplitude[2]
-        panel.plot(*place, "D", color=style.INK, ms=4.5)
-        style.write(panel, name, place, (6.0, -3.0), coords="data", bbox=box)
-    every = [*result.amplitude.ravel(), *(each.amplitude[2] for each in result.seas.values())]
-    _logarithmic(panel, 0.8 * min(every), 1.25 * max(every))
-    panel.set_xlim(result.periods[0], result.periods[-1])
+    lines = list(zip(looks.values(), result.amplitude.T, strict=True))
+    for (color, dashes), amplitudes in lines:
+        panel.plot(result.periods, amplitudes, color=color, linestyle=dashes, linewidth=1.4)
+    first, last = float(result.periods[0]), float(result.periods[-1])
+    seas = {name: sea for name, sea in result.seas.items() if first <= sea.period <= last}
+    asked = [demand for sea in seas.values() for demand in sea.amplitude]
+    low = LOWEST_DEMAND * float(result.amplitude.min())
+    _logarithmic(panel, low, 1.8 * max([float(result.amplitude.max()), *asked]))
+    panel.set_xlim(first, last)
+    for sea in seas.values():
+        for axis, demand in enumerate(sea.amplitude):
+            (color, _), amplitudes = lines[axis]
+            beyond = demand > np.interp(sea.period, result.periods, amplitudes)
+            place = sea.period + (axis - 1) * APART * (last - first), max(demand, low)
+            marker = "D" if demand > low else "v"
+            face = color if beyond else "white"
+            how: dict[str, Any] = {"color": color, "mfc": face, "ms": 5.0}
+            panel.plot(*place, marker, zorder=3.0, clip_on=False, **how)
+    _name_seas(panel, {name: (sea.period, max(sea.amplitude)) for name, sea in seas.items()})
     return figure if ax is None else ax
 
 
-@overload
-def plot_judgment(result: Judgment, *, ax: None = None, title: str = "") -> Figure: ...
-
-
-@overload
-def plot_judgment(result: Judgment, *, ax: GivenAxes, title: str = "") -> GivenAxes: ...
-
-
-def plot_judgment(
-    result: Judgment, *, ax: Axes | Sequence[Axes] | None = None, title: str = ""
-) -> Figure | Axes | Sequence[Axes]:
-    """Figure of a judgment: swing of every variant in every seaway, its mean and interval.
-
-    By default a new figure; with `ax` it is drawn there, without the remark above, and `ax`
-    returned.
-    """
-    names, study = list(reversed(result.names)), result.study
-    words = title or f"Swing in {count(len(study.seeds), 'seaway')}"
-    below = "swing, RMS of a seaway (deg)"
-    if ax is None:
-        figure, (panel,) = style.sheet([0.42 * len(names) + 0.3], words, below=below, lines=1)
-        said = "bars: mean with its 95 % interval"
-        remark(panel, seaway_words(study.sea), said, assumed(study.crane), right=True)
-    else:
-        (panel,) = style.dress_given(ax, title, [""], below, what="panel")
-    random = np.random.default_rng(0)
-    labels, edge = [], 0.0
-    for row, name in enumerate(names):
-        values = np.degrees(result.counted(name))
-        known = values[np.isfinite(values)]
-        edge = max(edge, float(known.max(initial=0.0)))
-        share = result.worse(name).value if name in result.names[1:] else 0.0
-        color = style.VERMILION if share > result.allowed else style.BLUE
-        spread = row + random.uniform(-0.25, 0.25, known.size)
-        panel.plot(known, spread, "o", color=color, ms=3.2, alpha=0.45, mew=0.0)
-        mean = mean_of(known, 0.0)
-        panel.hlines(row, mean.low, mean.high, color=style.INK, linewidth=3.0)
-        panel.vlines(mean.value, row - 0.3, row + 0.3, color=style.INK, linewidth=1.6)
-        of = f"{round(share * values.size)} of {values.size}"
-        worse = f"\nworse than none: {of}" if name in result.names[1:] else ""
-        labels.append(name + worse)
-    panel.grid(False, axis="y")
-    panel.set_yticks(range(len(names)), labels, fontsize=style.NORMAL)
-    panel.set_ylim(-0.6, len(names) - 0.4)
-    panel.set_xlim(0.0, 1.05 * edge)
-    return figure if ax is None else ax
+def _name_seas(ax: Axes, tops: Mapping[str, tuple[float, float]]) -> None:
+    """Names of seas above their highest diamonds, moved up if they would meet another name."""
+    box = {"facecolor": "white", "edgecolor": "none", "pad": 0.6, "alpha": 0.85}
+    low, high = np.log(ax.get_ylim())
+    first, last = ax.get_xlim()
+    names: list[tuple[float, float, float]] = []
+    for name, (period, top) in sorted(tops.items(), key=lambda entry: entry[1]):
+        across = (period - first) / (last - first)
+        up, wide = (np.log(top) - low) / (high - low), 0.012 * len(name)
+        while any(
+            abs(across - other) < 0.5 * (wide + width) and abs(up - height) < 0.06
+            for other, height, width in names
+        ):
+            up += 0.01
+        names.append((across, up, wide))
+        style.write(ax, name, (across, up), (0.0, 6.0), ha="center", bbox=box)

@@ -1,4 +1,4 @@
-"""Pages of cranes: a scene that moves, and the verdict of a judgment."""
+"""Pages of cranes: a scene that moves, the verdict of a judgment, operability."""
 
 import lazy_loader
 

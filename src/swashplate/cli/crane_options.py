@@ -1,0 +1,389 @@
+"""Options of ``swashplate crane``: the crane, its ship and sea, its load, what a study is about."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, fields, replace
+from functools import cached_property, partial
+from typing import TYPE_CHECKING, Any
+
+from swashplate.cli.terminal import FORCED, long_work, side
+from swashplate.cli.words import pairs_of
+from swashplate.errors import InputError
+
+if TYPE_CHECKING:
+    from swashplate.crane import Crane, Hull, Seaway, Spectrum, TransferFunctions
+    from swashplate.crane.control import Control
+    from swashplate.crane.sea import Array
+
+START, AXES = ("slew_deg", "boom_deg", "rope_m"), ("hoist", "slew", "luff")
+
+
+@dataclass(frozen=True)
+class Placed:
+    """A crane, its drives, and where it begins.
+
+    Options:
+      crane CRANE|FILE.toml: A packaged crane, tg3637, or your own.
+      drive AXIS=SET: Another drive: luff=mine.toml, or the folder of a fit, whose verdict is shown.
+          May be repeated.
+      force: Replace older files, and take drives whose fit is not usable.
+      at NAME=VALUE: Where it begins: slew_deg, boom_deg, rope_m, as rope_m=25. May be repeated.
+    """
+
+    crane: str
+    drive: list[str] | None = None
+    at: list[str] | None = None
+
+    @cached_property
+    def chosen(self) -> Crane:
+        """The crane, with its drives; one whose fit is not usable is refused without --force."""
+        drives = dict(pairs_of("--drive", self.drive, "luff=mine.toml"))
+        crane = crane_of(self.crane).with_drive(known=True, **drives)
+        if not FORCED.get():
+            _refuse_unusable(crane)
+        return crane
+
+    @property
+    def pose(self) -> dict[str, Any]:
+        """Where a run begins, as far as it is given."""
+        return numbers_of("--at", self.at, "rope_m=25", START)
+
+
+@dataclass(frozen=True)
+class AtSea(Placed):
+    """A crane on its ship in a sea.
+
+    Options:
+      sea SEA: The sea: ss2, ss3, ss3-swell, ss4, ss5 or ss6; or significant height in m and peak
+          period in s, with the peak factor if it is not 1, and 'spread' for directions spread by
+          cos²: 1.5,8 or 1.5,8,3.3,spread.
+      heading DEG: Where the waves come from: 0 astern, 90 starboard (the default), 180 ahead, 270
+          port.
+      ship FILE[,ULEN]: The ship's transfer functions: .re1 of VERES, .nc of Capytaine, .csv, or
+          .4 of WAMIT with its ULEN, hull.4,175; by default the packaged hull's.
+      roll_period S: Natural roll period of the packaged hull, assumed to be 13 s.
+      roll_damping RATIO: Damping ratio of the packaged hull's roll, assumed to be 0.06.
+      speed M/S: Speed of the ship, forward.
+      list_deg --list DEG: Constant list, positive with starboard down.
+      trim_deg --trim DEG: Constant trim, positive with the bow down.
+      reference X,Y,Z: Point that the ship's transfer functions are given for, in the crane's axes:
+          forward, port and up in m, by default 0,0,0.
+    """
+
+    sea: list[str] | None = None
+    heading: float | None = None
+    ship: str | None = None
+    roll_period: float | None = None
+    roll_damping: float | None = None
+    speed: float | None = None
+    list_deg: float | None = None
+    trim_deg: float | None = None
+    reference: str | None = None
+
+    @property
+    def _lean(self) -> dict[str, Any]:
+        """List and trim, as far as they are given."""
+        return _given(list_deg=self.list_deg, trim_deg=self.trim_deg)
+
+    @property
+    def _at_sea(self) -> dict[str, Any]:
+        """What is given of waves and ship besides the sea and the lean, by the option's name."""
+        return _given(
+            heading=self.heading,
+            ship=self.ship,
+            roll_period=self.roll_period,
+            roll_damping=self.roll_damping,
+            speed=self.speed,
+            reference=self.reference,
+        )
+
+    def seaway(
+        self, default: str | None = None, *, seed: int | None = None, length: float = 0.0
+    ) -> Seaway | None:
+        """The seaway in its sea, or in a default one; None if there is neither.
+
+        Its record is at least as long as a length. [s]
+        """
+        from swashplate.crane import Seaway
+        from swashplate.crane.sea import RECORDS
+
+        words = self.sea or ([] if default is None else [default])
+        if not words:
+            given = [*self._at_sea, *_given(seed=seed)]
+            if given:
+                option = given[0].replace("_", "-")
+                raise InputError(f"--{option} needs a sea: give --sea, as --sea ss3.")
+            return None
+        if len(words) > 1:
+            raise InputError(f"--sea {' --sea '.join(words)} is too much: write one sea.")
+        sea, spread = _sea_of(words[0])
+        options = self._lean | _given(heading_deg=self.heading, speed=self.speed, seed=seed)
+        if self.reference is not None:
+            options["reference"] = _vector("--reference", self.reference, "-12,0,9")
+        record = max(RECORDS[0], length)
+        return Seaway(sea, ship=self._hull(), spread=spread, record=record, **options)
+
+    def motion(self, count: int) -> Array | None:
+        """Motion of the ship in calm water, (count, 6): its lean; None if it is upright."""
+        import numpy as np
+
+        from swashplate.crane import Seaway
+
+        if not self._lean:
+            return None
+        return np.tile(Seaway(**self._lean).lean, (count, 1))
+
+    def _hull(self) -> Hull | TransferFunctions:
+        """The ship of a file, or the packaged hull as its roll is given."""
+        from swashplate.crane import read_ship
+        from swashplate.crane.transfer_functions import CRANE_SHIP
+
+        roll = _given(roll_period=self.roll_period, roll_damping=self.roll_damping)
+        if self.ship is None:
+            return replace(CRANE_SHIP, **roll)
+        if roll:
+            raise InputError(
+                f"--ship {self.ship} has its own roll: leave --roll-period and --roll-damping out, "
+                "which are of the packaged hull."
+            )
+        path, _, unit = self.ship.partition(",")
+        return read_ship(path, number_of(f"--ship {self.ship}", unit) if unit else None)
+
+
+@dataclass(frozen=True)
+class Operated(AtSea):
+    """A crane on its ship, and the load on its rope.
+
+    Options:
+      suspension NAME=VALUE: How the load hangs: stiffness of the rope (EA) in N, as stiffness=6e7;
+          damping ratio of its bounce on an elastic rope; hook in kg and sling in m. May be
+          repeated.
+      wind FORWARD,PORT: Velocity of the air in m/s. Needs --drag-area.
+      drag_area M2: Drag area of the load, its drag coefficient times its area.
+      load KG: Mass of the load; by default the crane's safe load.
+      swing_damping RATIO: Damping ratio of the load's swing; by default the crane's, 0.005 assumed.
+    """
+
+    load: float | None = None
+    swing_damping: float | None = None
+    suspension: list[str] | None = None
+    wind: str | None = None
+    drag_area: float | None = None
+
+    @property
+    def setup(self) -> dict[str, Any]:
+        """Where a run begins, and what hangs on the crane, as far as it is given."""
+        from swashplate.crane import Suspension
+
+        setup = self.pose | _given(
+            drag_area=self.drag_area, load=self.load, swing_damping=self.swing_damping
+        )
+        names = [each.name for each in fields(Suspension)]
+        values = numbers_of("--suspension", self.suspension, "stiffness=6e7", names)
+        if values:
+            setup["suspension"] = Suspension(**values)
+        if self.wind is not None:
+            if self.drag_area is None:
+                raise InputError(
+                    f"--wind {self.wind} blows on nothing: give the load's --drag-area, as 12."
+                )
+            setup["wind"] = _vector("--wind", self.wind, "10,-5")
+        return setup
+
+
+@dataclass(frozen=True)
+class Studied(Operated):
+    """What a study of seaways is about.
+
+    Options:
+      control CONTROL: Control, as of 'run' after the colon; by default as it is designed for
+          ideal drives.
+      seeds N: Number of seaways; judge takes 120 by default.
+      length S: Time for which each seaway counts, by default 600.
+      run_in S: Time before it, by default 120; each run begins in a stationary swing.
+      drives NAMES: ideal: follow at once; identified: the crane's own; volts: these, 10 V for full
+          speed; drawn: from the errors of the fits that the drives come from, while control
+          knows the fits; by default ideal,identified. A verdict is on the last.
+      scale AXIS.NAME=FACTOR: Drives with a lever or parameter moved, which control knows, judged
+          last: luff.orifice=1.5. May be repeated.
+    """
+
+    control: str = "feedback=0.2/0.2+ship+loop=1.5"
+    seeds: int | None = None
+    length: float | None = None
+    run_in: float | None = None
+    drives: str | None = None
+    scale: list[str] | None = None
+
+    def through(self, study: Callable[..., Any], *first: Any, **more: Any) -> Any:
+        """A study of the controller, whose progress is shown."""
+        law = control_of(self.control)
+        if law is None:
+            raise InputError("--control is empty: there is nothing to judge.")
+        how = self.setup | _given(length=self.length, run_in=self.run_in) | more
+        if self.waters is not None:
+            how["sea"] = self.waters
+        if self.seeds is not None:
+            how["seeds"] = range(self.seeds)
+        if self.drives is not None or self.scale:
+            how["drives"] = self.sets()
+        with long_work("Seaways") as shown:
+            how["progress"] = lambda done, of: shown(f"{done} of {of} seaways", done / of)
+            return study(*first, law, **how)
+
+    @cached_property
+    def waters(self) -> Seaway | None:
+        """The seaway, in ss3 if only the ship is given; None if nothing of either is."""
+        from swashplate.crane.study import LENGTH, RUN_IN
+
+        counted = LENGTH if self.length is None else self.length
+        before = RUN_IN if self.run_in is None else self.run_in
+        given = self._at_sea or self._lean or self.length or self.run_in
+        return self.seaway(default="ss3" if given else None, length=counted + before)
+
+    def sets(self) -> dict[str, Any]:
+        """Sets of drives by name."""
+        from swashplate.analysis.whatif import find_lever
+        from swashplate.crane import drawn_cranes, upgraded
+
+        names = filter(None, map(str.strip, (self.drives or "ideal,identified").split(",")))
+        sets: dict[str, Any] = {name: name for name in names}
+        if "drawn" in sets:
+            sources = self.chosen.sources
+            drawn = [axis for axis, source in sources.items() if source.fit is not None]
+            if not drawn:
+                raise InputError("--drives drawn needs the folder of a fit: --drive luff=FOLDER.")
+            sets["drawn"] = drawn_cranes(self.chosen)
+            kept = [axis for axis in AXES if axis not in drawn]
+            as_given = f"; as given, since they come from no fit: {', '.join(kept)}" if kept else ""
+            side.print(f"Drawn: {', '.join(drawn)}{as_given}")
+        crane, changed = self.chosen, []
+        for name, text in pairs_of("--scale", self.scale, "luff.orifice=1.5"):
+            (axis, _, lever), words = name.partition("."), f"--scale {name}={text}"
+            if not lever or axis not in AXES:
+                raise InputError(
+                    f"{words}: write the axis first, luff.orifice=1.5; the axes are "
+                    f"{', '.join(AXES)}."
+                )
+            find_lever(lever)
+            factor = number_of(words, text)
+            crane = upgraded(crane, axis, {lever: factor})
+            changed.append(f"{axis} {lever} ×{factor:g}")
+        if changed:
+            sets[", ".join(changed)] = crane
+        return sets
+
+
+def control_of(words: str) -> Control | None:
+    """A controller of words such as ``zv-tip+feedback=0.2+clip``; None if there are none."""
+    from swashplate.crane import control
+
+    kinds: dict[str, tuple[Any, int]] = {
+        "feedback": (control.DelayedFeedback, 2),
+        "ship": (control.ShipCompensation, 0),
+        "clip": (control.Clip, 1),
+        "loop": (control.PositionLoop, 1),
+        "sensors": (_sensors, 3),
+    }
+    for shape in control.IMPULSES:
+        kinds[f"{shape}-tip"] = (partial(control.TipShaper, shape), 0)
+    stages: list[Control] = []
+    for word in filter(None, words.split("+")):
+        name, _, text = word.partition("=")
+        numbers = [number_of(f"The control '{word}'", each) for each in text.split("/") if text]
+        kind, most = kinds.get(name, (None, 0))
+        if kind is None or len(numbers) > most:
+            raise InputError(
+                f"There is no control '{word}'; there are zv-tip (zvd, ei), "
+                "feedback=0.2/0.25, ship, clip=0.25, loop=0.7 and sensors=0.1/0.05/50."
+            )
+        stages.append(kind(*numbers))
+    return control.Chain(tuple(stages)) if stages else None
+
+
+def _sensors(noise_deg: float = 0.1, delay: float = 0.05, rate: float = 50.0) -> Control:
+    """Sensors by the noise of the rope's angle [deg], delay [s] and rate [Hz]."""
+    from swashplate.crane.control import Sensors
+
+    return Sensors(rope_angle_noise_deg=noise_deg, delay=delay, rate=rate)
+
+
+def _given(**options: Any) -> dict[str, Any]:
+    """The options that are given."""
+    return {name: value for name, value in options.items() if value is not None}
+
+
+def sea_sentences(seaway: Seaway | None) -> tuple[str, ...]:
+    """What a seaway does not simulate as it is asked for."""
+    return () if seaway is None else seaway.sentences()
+
+
+def _sea_of(text: str) -> tuple[str | Spectrum, bool]:
+    """A sea's name or spectrum of words such as ``1.5,8,3.3,spread``, and whether it is spread."""
+    from swashplate.crane import Spectrum
+
+    first, *rest = (word.strip() for word in text.split(","))
+    spread = rest[-1:] == ["spread"]
+    numbers = rest[:-1] if spread else rest
+    if first[:1].isalpha():
+        if numbers:
+            options = zip(("--heading", "--seed"), numbers, strict=False)
+            instead = " ".join(f"{option} {number}" for option, number in options)
+            raise InputError(
+                f"--sea {text}: after the name of a sea there are no numbers; write --sea {first} "
+                f"{instead}."
+            )
+        return first, spread
+    if not 1 <= len(numbers) <= 2:
+        raise InputError(
+            f"--sea {text}: write a name, --sea ss3, or significant height in m and peak period in "
+            "s, --sea 1.5,8, with the peak factor, --sea 1.5,8,3.3."
+        )
+    height, *others = (number_of(f"--sea {text}", word) for word in (first, *numbers))
+    return Spectrum(height, *others), spread
+
+
+def _vector(option: str, text: str, example: str) -> tuple[float, ...]:
+    """As many numbers, joined by commas, as an example has."""
+    numbers = tuple(number_of(f"{option} {text}", word) for word in text.split(","))
+    if len(numbers) != len(example.split(",")):
+        raise InputError(f"{option} {text}: write {option} {example}.")
+    return numbers
+
+
+def numbers_of(
+    what: str, given: list[str] | None, example: str, known: Sequence[str] = ()
+) -> dict[str, Any]:
+    """Numbers by name of an option's pairs; refuses a name that is not known."""
+    pairs = pairs_of(what, given, example)
+    strange = [name for name, _ in pairs if known and name not in known]
+    if strange:
+        raise InputError(f"{what} has no {strange[0]}; it has {', '.join(known)}.")
+    return {name: number_of(f"{what} {name}={text}", text) for name, text in pairs}
+
+
+def number_of(what: str, text: str) -> float:
+    """A number of an option's text; refuses what is not one."""
+    try:
+        return float(text)
+    except ValueError:
+        raise InputError(f"{what}: '{text}' is not a number.") from None
+
+
+def crane_of(name: str) -> Crane:
+    """A packaged crane by its name, or the crane of a file."""
+    from swashplate.crane import Crane
+
+    return Crane.from_toml(name) if name.endswith(".toml") else Crane.preset(name)
+
+
+def _refuse_unusable(crane: Crane) -> None:
+    """Refuse a drive whose fit is not usable."""
+    for axis, source in crane.sources.items():
+        if not source.usable:
+            raise InputError(
+                f"{axis}={source.place}: the verdict on the fit of this drive is "
+                f"'{source.verdict.rstrip('.')}'; fit again until it is usable, as its report "
+                f"advises, give another drive, or take this one all the same with --force."
+            )

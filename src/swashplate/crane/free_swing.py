@@ -1,0 +1,214 @@
+"""Damping of a load that swings freely, from a log of its angle."""
+
+from __future__ import annotations
+
+from math import pi, sqrt
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from swashplate.crane.rope import GRAVITY
+from swashplate.errors import InputError
+
+Array = NDArray[np.float64]
+
+FEWEST = 5.0
+"""Swings of a log below which nothing is said of its damping."""
+WIDEST = 1.0
+"""Angle beyond which a log is probably in degrees. [rad]"""
+EXPLAINED = 0.5
+"""Least share of the log's variance that a decaying sine must explain."""
+NEAR = 0.2
+"""Largest relative difference between the log's period and that of the rope: at 1 rad a pendulum
+swings 7 % slower, and a hook above the load shortens or lengthens its rope."""
+STRONGEST = 0.9
+"""Size of the damping ratio within which is searched."""
+PADDED = 8
+"""Points of the transform that finds the frequency, over those of the log."""
+UNKNOWNS = 5
+"""Offset, amplitude, phase, frequency, damping ratio."""
+
+
+class FreeSwing(NamedTuple):
+    """Damping ratio of a free swing with its 95 % confidence interval, and its period."""
+
+    value: float
+    low: float
+    high: float
+    period: float
+    """Undamped. [s]"""
+
+
+def swing_damping(time: ArrayLike, angle: ArrayLike, *, rope: float | None = None) -> FreeSwing:
+    """Damping ratio of a free swing in one plane, by a decaying sine through a log of its angle.
+
+    Parameters
+    ----------
+    time : (n,) array_like
+        Rising. [s]
+    angle : (n,) array_like
+        Of the rope, signed, in one plane; an offset of the sensor is fitted. [rad]
+    rope : float, optional
+        Length of the rope, by which the log's period is checked. [m]
+
+    Raises
+    ------
+    InputError
+        For fewer than five swings, an angle that is never negative or beyond 1 rad, a log that is
+        no decaying sine for the most part, whose swing does not surely fall, or whose period is
+        not that of the rope.
+
+    Notes
+    -----
+    The fit is by least squares; it starts at the largest line of the spectrum and the logarithmic
+    decrement. The interval takes what is left for correlated: the samples count as many as they
+    are over one plus twice the sum of its autocorrelation up to the first that is not positive.
+    """
+    from scipy.optimize import least_squares
+    from scipy.special import stdtrit
+
+    stamps, swing = _checked(time, angle)
+    start = _start(stamps, swing)
+    found = least_squares(
+        _residual,
+        start,
+        jac=_jacobian,
+        bounds=([-np.inf] * 3 + [0.0, -STRONGEST], [np.inf] * 4 + [STRONGEST]),
+        x_scale="jac",
+        args=(stamps, swing),
+    )
+    frequency, ratio = found.x[3:].tolist()
+    left = found.fun
+    explained = 1.0 - float(np.var(left) / np.var(swing))
+    if explained < EXPLAINED:
+        raise InputError(
+            f"A decaying sine explains {100.0 * max(explained, 0.0):.0f} % of what the log holds, "
+            "which is no free swing: cut the log to where the crane is at rest."
+        )
+    period = 2.0 * pi / frequency
+    if rope is not None:
+        if not rope > 0.0:
+            raise InputError(f"The rope is {rope:g} m long, but must be longer than 0 m.")
+        expected = 2.0 * pi * sqrt(rope / GRAVITY)
+        if abs(period / expected - 1.0) > NEAR:
+            raise InputError(
+                f"The log swings once in {period:.3g} s, but a load on {rope:g} m of rope in "
+                f"{expected:.3g} s: look at the column and at the unit of the time."
+            )
+    correlation = _correlation_time(left)
+    freedom = left.size / correlation - UNKNOWNS
+    if freedom < 1.0:
+        raise InputError(
+            "What the log holds beside the swing changes too slowly to tell the swing's damping: "
+            "take a drift off, or a longer log."
+        )
+    variance = float(left @ left) / freedom
+    covariance = np.linalg.inv(found.jac.T @ found.jac)
+    half = float(stdtrit(freedom, 0.975)) * sqrt(variance * covariance[4, 4])
+    if ratio - half <= 0.0:
+        raise InputError(
+            f"The log does not show that the swing falls: its damping ratio would be {ratio:.2g}, "
+            f"within {ratio - half:.2g} and {ratio + half:.2g}: take a longer log of a load that "
+            "is left alone."
+        )
+    return FreeSwing(ratio, ratio - half, ratio + half, period)
+
+
+def _checked(time: ArrayLike, angle: ArrayLike) -> tuple[Array, Array]:
+    """Stamps from 0 on [s] and the angle [rad]; refuses what cannot be a free swing."""
+    stamps, swing = (np.asarray(values, dtype=np.float64) for values in (time, angle))
+    if stamps.ndim != 1 or stamps.shape != swing.shape or stamps.size <= UNKNOWNS:
+        raise InputError(
+            "Time and angle of a swing must be two rows of as many numbers, more than "
+            f"{UNKNOWNS}, not of shapes {stamps.shape} and {swing.shape}."
+        )
+    if not (np.isfinite(stamps).all() and np.isfinite(swing).all() and (np.diff(stamps) > 0).all()):
+        raise InputError("Time and angle of a swing must be finite, and the time must rise.")
+    largest = float(np.abs(swing).max())
+    if largest > WIDEST:
+        raise InputError(
+            f"The swing reaches {largest:.3g} rad, more than the {WIDEST:g} rad that are taken: "
+            "if it is in degrees, say so in the log's header, swing [deg], or convert it."
+        )
+    if swing.min() >= 0.0 or swing.max() <= 0.0:
+        raise InputError(
+            "The swing never changes its sign: take the signed angle in one plane, or take a "
+            "constant off."
+        )
+    return stamps - stamps[0], swing
+
+
+def _start(time: Array, swing: Array) -> Array:
+    """Offset, cosine, sine [rad], frequency [rad/s] and damping ratio to start the fit at.
+
+    An `InputError` for fewer than five swings.
+    """
+    grid = np.linspace(0.0, time[-1], time.size)
+    even = np.interp(grid, time, swing)
+    power = np.abs(np.fft.rfft((even - even.mean()) * np.hanning(grid.size), PADDED * grid.size))
+    largest = int(np.argmax(power[1:])) + 1
+    frequency = 2.0 * pi * largest / (PADDED * grid.size * grid[1])
+    swings = frequency * time[-1] / (2.0 * pi)
+    # of a pure offset or a drift the largest line is the lowest one
+    if swings < FEWEST:
+        raise InputError(
+            f"The log has {swings:.1f} swings, but {FEWEST:g} are needed: take a longer one, from "
+            "where the crane comes to rest."
+        )
+    basis = np.stack(
+        [np.ones(time.size), np.cos(frequency * time), np.sin(frequency * time)], axis=1
+    )
+    number = np.minimum((time / time[-1] * int(swings)).astype(np.int64), int(swings) - 1)
+    amplitudes, middles = [], []
+    for k in range(int(swings)):
+        one = number == k
+        if one.sum() > basis.shape[1]:
+            waves = np.linalg.lstsq(basis[one], swing[one], rcond=None)[0]
+            amplitudes.append(np.hypot(*waves[1:]))
+            middles.append(time[one].mean())
+    decay = 0.0
+    if len(middles) > 1:
+        decay = -float(np.polyfit(middles, np.log(np.maximum(amplitudes, 1e-12)), 1)[0])
+    decaying = np.exp(-decay * time)[:, None] * basis[:, 1:]
+    offset, cosine, sine = np.linalg.lstsq(
+        np.column_stack([basis[:, 0], decaying]), swing, rcond=None
+    )[0]
+    return np.array([offset, cosine, sine, frequency, np.clip(decay / frequency, -0.5, 0.5)])
+
+
+def _parts(x: Array, time: Array) -> tuple[Array, Array, Array]:
+    """Decaying exponential, and it times cosine and sine of the damped swing, at times."""
+    frequency, ratio = x[3:]
+    damped = frequency * np.sqrt(1.0 - ratio * ratio)
+    fall = np.exp(-ratio * frequency * time)
+    return fall, fall * np.cos(damped * time), fall * np.sin(damped * time)
+
+
+def _residual(x: Array, time: Array, swing: Array) -> Array:
+    """A decaying sine less the log. [rad]"""
+    offset, cosine, sine = x[:3]
+    _, c, s = _parts(x, time)
+    return np.asarray(offset + cosine * c + sine * s - swing)
+
+
+def _jacobian(x: Array, time: Array, swing: Array) -> Array:
+    """Derivatives of the residual by the unknowns, (n, 5)."""
+    _, cosine, sine, frequency, ratio = x
+    _, c, s = _parts(x, time)
+    root = np.sqrt(1.0 - ratio * ratio)
+    value, turned = cosine * c + sine * s, sine * c - cosine * s
+    by_frequency = time * (-ratio * value + root * turned)
+    by_ratio = frequency * time * (-value - ratio / root * turned)
+    return np.stack([np.ones(swing.size), c, s, by_frequency, by_ratio], axis=1)
+
+
+def _correlation_time(left: Array) -> float:
+    """One plus twice the sum of the autocorrelation up to the first that is not positive."""
+    power = np.abs(np.fft.rfft(left - left.mean(), 2 * left.size)) ** 2
+    covariance = np.fft.irfft(power)[: left.size]
+    if not covariance[0] > 0.0:
+        return 1.0
+    correlation = covariance / covariance[0]
+    ends = np.flatnonzero(correlation <= 0.0)
+    return float(1.0 + 2.0 * correlation[1 : ends[0] if ends.size else None].sum())

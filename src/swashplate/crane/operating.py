@@ -1,0 +1,356 @@
+"""Operability: the share of a year that can be worked, and what limits it, sea by sea.
+
+A scatter diagram says how often each significant height comes with each peak period. Of each of its
+cells and each heading the frequency domain says at once what is linear: the crane without control,
+and with control as long as no drive is at a limit. Where that is near a limit, or asks of a drive
+what it cannot do, the cell is simulated. At one period and heading what is beyond a limit stays so
+in higher waves, so that only the boundary is looked for.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Any, NamedTuple, cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from swashplate.crane.axes import AXES
+from swashplate.crane.control import Control
+from swashplate.crane.crane import Crane
+from swashplate.crane.extremes import largest_of_peaks
+from swashplate.crane.limits import LIMITED
+from swashplate.crane.outcome import Outcome
+from swashplate.crane.result import PUMPS
+from swashplate.crane.scatter import Scatter
+from swashplate.crane.sea import Seaway, Spectrum
+from swashplate.crane.spectral import DEMANDS, linear_response
+from swashplate.crane.stepper import feels_load
+from swashplate.crane.study import BUILT, IDEAL, NONE, Case, Drives, Study
+from swashplate.errors import InputError
+from swashplate.executors import Executor, Serial, Threads
+from swashplate.progress import counted
+from swashplate.results import Result, figures
+from swashplate.simulation.result import Limit
+from swashplate.tables import Column, Table, listed
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+Array = NDArray[np.float64]
+
+HEADINGS = tuple(range(0, 360, 45))
+"""Headings of the waves by default, as likely as each other. [deg]"""
+NEAR = 1.3
+"""Factor within which of a limit the frequency domain is not relied on."""
+SEEDS = (0, 1)
+"""Seaways in which a cell is simulated, ten minutes each."""
+SHORTEST = 300.0
+"""Least time for which each of them counts: some fifty peaks of a swing. [s]"""
+ACTS = 0.05
+"""Share of time at a limit from which on a drive is what limits a cell."""
+WORKABLE = ""
+"""What limits a cell that can be worked: nothing."""
+LEFT = "leaves the model"
+"""What limits a cell in which a run is not an operation any more."""
+DRIVES_LIMITS: Mapping[Limit, str] = {
+    Limit.ORIFICE: "orifice",
+    Limit.SWASH_STOP: "swash stop",
+    Limit.RELIEF: "relief",
+}
+
+
+class Cell(NamedTuple):
+    """A sea of one height, period and heading, for one variant."""
+
+    limited_by: str
+    """Quantity of `LIMITED`, or drive and its limit, ``"luff orifice"``; empty if workable."""
+    ratio: float
+    """Largest ratio of a value to its limit; inf if the run left the model."""
+    simulated: bool
+
+
+@dataclass(frozen=True, eq=False)
+class Operability(Result):
+    """Share of the year that can be worked, by variant, and what limits each sea."""
+
+    crane: Crane = field(repr=False)
+    control: Control
+    scatter: Scatter
+    headings: tuple[float, ...]
+    """[deg]"""
+    cells: Mapping[str, Mapping[tuple[int, float], Cell]] = field(repr=False)
+    """By variant, and by row of the scatter diagram and heading."""
+    seaway: Seaway
+    """Ship, peak factor, spreading."""
+    hoist_limit: tuple[float, float, float]
+    """Least significant height at which the hoist is too slow for the hook, with period and
+    heading; inf if none. [m], [s], [deg]"""
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Variants, the crane without control first."""
+        return tuple(self.cells)
+
+    def workable(self, name: str) -> float:
+        """Share of the year that a variant can work, 0 to 1, headings as likely as each other."""
+        return self.shares(name).get(WORKABLE, 0.0)
+
+    def shares(self, name: str) -> dict[str, float]:
+        """Share of the year by what limits it, the largest first; `WORKABLE` is workable."""
+        shares: dict[str, float] = {}
+        for (row, _), cell in self.cells[name].items():
+            share = float(self.scatter.share[row]) / len(self.headings)
+            shares[cell.limited_by] = shares.get(cell.limited_by, 0.0) + share
+        return dict(sorted(shares.items(), key=lambda entry: -entry[1]))
+
+    def plot(self, *, title: str = "") -> Figure:
+        """Figure of what limits each sea, a panel for each variant."""
+        return cast("Figure", figures().plot_operability(self, title=title))
+
+    def tables(self) -> list[Table]:
+        """Share of the year that each variant can work, and what limits the rest."""
+        limits = dict.fromkeys(
+            limit for name in self.names for limit in self.shares(name) if limit != WORKABLE
+        )
+        heads = [Column(label_of(limit), ".1%", wrap=True) for limit in limits]
+        columns = (Column("variant", wrap=True), Column("workable", ".1%"), *heads)
+        table = Table("Share of the year, and what limits the rest first", columns)
+        for name in self.names:
+            shares = self.shares(name)
+            rest = [shares.get(limit, 0.0) for limit in limits]
+            table.add(name, self.workable(name), *rest)
+        return [table]
+
+    def sentences(self) -> tuple[str, ...]:
+        """What the shares rest on."""
+        crane = self.crane
+        simulated = sum(cell.simulated for cells in self.cells.values() for cell in cells.values())
+        every = sum(map(len, self.cells.values()))
+        sentences = [
+            f"Of {every} cells {simulated} were simulated or lie beyond one that was; the others "
+            "are from the frequency domain.",
+        ]
+        height, period, heading = self.hoist_limit
+        if np.isfinite(height):
+            sentences.append(
+                f"The hoist is slower than the hook moves up and down from {height:.2g} m on, at "
+                f"{period:g} s and a heading of {heading:g} deg."
+            )
+        if self.scatter.note:
+            sentences.append(self.scatter.note)
+        if not feels_load(crane):
+            sentences.append("No drive feels the load: they were identified without one.")
+        assumed = [name for name, limit in crane.limits.items() if limit.status == "assumed"]
+        if assumed:
+            labels = listed([LIMITED[name].label for name in assumed])
+            sentences.append(f"Limits that are assumed: {labels}.")
+        if crane.assumed:
+            sentences.append(f"{crane.assumed} of the crane are assumed.")
+        return tuple(sentences)
+
+
+def label_of(limit: str) -> str:
+    """What limits a cell, as a table has it."""
+    return LIMITED[limit].label if limit in LIMITED else limit
+
+
+def operability(
+    crane: Crane,
+    control: Control,
+    scatter: Scatter,
+    *,
+    headings: Sequence[float] = HEADINGS,
+    drives: Drives = (IDEAL, BUILT),
+    sea: Seaway | None = None,
+    executor: Executor | None = None,
+    **setup: Any,
+) -> Operability:
+    """Share of a year that a crane can work with control, by its limits.
+
+    Parameters
+    ----------
+    crane : Crane
+        With limits, see `limits.LIMITED`; the saturation is left out.
+    control : Control
+        One controller; the crane without control is always a variant.
+    scatter : Scatter
+        Seas and their shares of the year.
+    headings : sequence of float
+        Of the waves, as likely as each other. [deg]
+    drives
+        As of `judge`.
+    sea : Seaway, optional
+        Ship, peak factor, spreading, speed; its height, period and heading do not count.
+    executor : Executor, optional
+        Threads by default; the numbers do not depend on it.
+    **setup
+        As of `Study.of`, without a stick.
+
+    Raises
+    ------
+    InputError
+        For a crane without limits, and no heading.
+    """
+    limits = {name: limit for name, limit in crane.limits_si.items() if name != "saturation"}
+    if not limits:
+        raise InputError(
+            f"{crane.name} has no limits: give its file a table [limits], as [limits] with "
+            'side_lead = { value = 4, unit = "deg" }.'
+        )
+    if not headings:
+        raise InputError("Operability needs one heading of the waves at least.")
+    base = Seaway() if sea is None else sea
+    study = Study.of(crane, control, seeds=SEEDS, sea=base, drives=drives, **setup)
+    if study.length < SHORTEST:
+        raise InputError(
+            f"A sea is simulated for {study.length:g} s, but its largest values in three hours "
+            f"need {SHORTEST:g} s at least."
+        )
+    columns = [
+        _Column(name, float(heading), float(period))
+        for name in study.cases
+        for heading in headings
+        for period in dict.fromkeys(scatter.period.tolist())
+    ]
+    work = (study, scatter, limits)
+    cells: dict[str, dict[tuple[int, float], Cell]] = {name: {} for name in study.cases}
+    hoist = (np.inf, np.nan, np.nan)
+    runs = (executor or Threads()).run(_of_column, work, columns)
+    for position, (found, too_slow) in counted(
+        runs, len(columns), "columns", f"Operability of {crane.name}"
+    ):
+        column = columns[position]
+        cells[column.variant] |= {(row, column.heading): cell for row, cell in found.items()}
+        if too_slow < hoist[0] and column.variant == NONE:
+            hoist = (too_slow, column.period, column.heading)
+    ordered = {name: dict(sorted(of_name.items())) for name, of_name in cells.items()}
+    return Operability(crane, control, scatter, tuple(map(float, headings)), ordered, base, hoist)
+
+
+class _Column(NamedTuple):
+    """All heights of one period and heading, for a variant."""
+
+    variant: str
+    heading: float
+    period: float
+
+
+def _of_column(
+    work: tuple[Study, Scatter, Mapping[str, float]], column: _Column
+) -> tuple[dict[int, Cell], float]:
+    """Cells of a column by their row, and the height from which on the hoist is too slow. [m]"""
+    study, scatter, limits = work
+    case = study.cases[column.variant]
+    factor = study.seaway.spectrum.peak_factor
+    unit = replace(
+        study.seaway,
+        sea=Spectrum(1.0, column.period, factor),
+        heading_deg=column.heading,
+    )
+    linear = _linear(case, unit, limits)
+    rows = np.flatnonzero(scatter.period == column.period)
+    rows = rows[np.argsort(scatter.height[rows])]
+    cells = {int(row): _by_spectrum(float(scatter.height[row]), linear, limits) for row in rows}
+
+    def simulated(row: int) -> Cell:
+        sea = Spectrum(float(scatter.height[row]), column.period, factor)
+        return _by_simulation(study, case, replace(unit, sea=sea), limits)
+
+    open_rows = [row for row, cell in cells.items() if cell is None]
+    found = cells | _boundary(open_rows, simulated)
+    slope = linear.slope["hoist_demand"]
+    too_slow = limits.get("hoist_demand", np.inf) / slope if slope > 0.0 else np.inf
+    return {row: cell for row, cell in found.items() if cell is not None}, too_slow
+
+
+def _boundary(rows: Sequence[int], simulated: Callable[[int], Cell]) -> dict[int, Cell]:
+    """Cells of rows, the lowest waves first: half of them are decided by each that is simulated."""
+    cells: dict[int, Cell] = {}
+    low, high = 0, len(rows)
+    limiting = Cell(LEFT, np.inf, True)
+    while low < high:
+        middle = (low + high) // 2
+        cell = simulated(rows[middle])
+        cells[rows[middle]] = cell
+        if cell.limited_by == WORKABLE:
+            low = middle + 1
+        else:
+            high, limiting = middle, cell
+    for position, row in enumerate(rows):
+        if row not in cells:
+            cells[row] = Cell(WORKABLE, np.nan, True) if position < low else limiting
+    return cells
+
+
+class _Linear(NamedTuple):
+    """A crane in a sea of 1 m, in the frequency domain."""
+
+    slope: Mapping[str, float]
+    """Largest values for each metre of significant height, by names of `LIMITED`."""
+    mean: Mapping[str, float]
+    """What they are without waves."""
+    demand: float
+    """Largest part for each metre of what drives and clip can do that control asks for."""
+
+
+def _linear(case: Case, sea: Seaway, limits: Mapping[str, float]) -> _Linear:
+    """The first of a case's cranes in a sea of 1 m, in the frequency domain."""
+    control = case.setup["control"]
+    response = linear_response(case.cranes[0], sea, control, **case.pose, **case.hangs)
+    values = response.values
+    named = {*limits, "hoist_demand"}
+    mean = {name: abs(values[name].mean) for name in named}
+    slope = {name: values[name].largest - mean[name] for name in named}
+    asked = [name for name in DEMANDS if name in values and (case.driven or name == "clip")]
+    demand = max((values[name].largest for name in asked), default=0.0)
+    return _Linear(slope, mean, demand if control is not None else 0.0)
+
+
+def _by_spectrum(height: float, linear: _Linear, limits: Mapping[str, float]) -> Cell | None:
+    """A cell by the frequency domain; None if it is too near a limit, of a drive as well."""
+    ratios = {
+        name: (linear.mean[name] + height * linear.slope[name]) / limit
+        for name, limit in limits.items()
+    }
+    worst = max(ratios, key=lambda name: ratios[name])
+    ratio = ratios[worst]
+    if linear.demand == 0.0:  # no drive moves
+        return Cell(worst if ratio > 1.0 else WORKABLE, ratio, False)
+    if ratio > NEAR:  # drives that are at their limits do not make it better
+        return Cell(worst, ratio, False)
+    if ratio < 1.0 / NEAR and linear.demand * height < 1.0 / NEAR:
+        return Cell(WORKABLE, ratio, False)
+    return None
+
+
+def _by_simulation(study: Study, case: Case, seaway: Seaway, limits: Mapping[str, float]) -> Cell:
+    """A cell by simulated seaways."""
+    one = replace(study, seaway=seaway, executor=Serial(), progress=None)
+    outcomes = [found for (found,) in one.outcomes([case])]
+    if any(outcome.left for outcome in outcomes):
+        return Cell(_drive_limit(outcomes) or LEFT, np.inf, True)
+    observed = sum(outcome.counted for outcome in outcomes)
+    ratios = {
+        name: largest_of_peaks([outcome.peaks[name] for outcome in outcomes], observed).value
+        / limit
+        for name, limit in limits.items()
+        if all(name in outcome.peaks for outcome in outcomes)
+    }
+    worst = max(ratios, key=lambda name: ratios[name])
+    if ratios[worst] <= 1.0:
+        return Cell(WORKABLE, ratios[worst], True)
+    return Cell(_drive_limit(outcomes) or worst, ratios[worst], True)
+
+
+def _drive_limit(outcomes: Sequence[Outcome]) -> str:
+    """Drive and limit that act for the longest time, in words; empty if none acts for long."""
+    shares = np.mean([np.nan_to_num(outcome.limits) for outcome in outcomes], axis=0)
+    longest, words = ACTS, ""
+    for row, axis in zip(shares, AXES, strict=True):
+        for limit, name in DRIVES_LIMITS.items():
+            share = float(row[PUMPS.index(limit)])
+            if share > longest:
+                longest, words = share, f"{axis} {name}"
+    return words

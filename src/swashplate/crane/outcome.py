@@ -1,0 +1,115 @@
+"""What counts of a run: swing, peaks of all that has a limit, limits of the drives, the end."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from swashplate.crane.axes import AXES, RATE
+from swashplate.crane.extremes import peaks_of
+from swashplate.crane.result import PUMPS, CraneRun
+from swashplate.crane.rope import GRAVITY, rope_leads, swing_of
+from swashplate.simulation.result import Limit
+
+Array = NDArray[np.float64]
+
+EVERY = 32
+"""Samples from one of those that count to the next: 16 a second, of periods of 2 s and more."""
+ELASTIC_EVERY = 4
+"""The same of the tension of an elastic rope, whose bounce has a few hertz."""
+BITS = np.arange(2 ** len(PUMPS))[:, None] >> np.arange(len(PUMPS)) & 1
+"""Which of `PUMPS` act, a row for each sum of the loop's bits."""
+SATURATED = (1 << PUMPS.index(Limit.ORIFICE)) | (1 << PUMPS.index(Limit.SWASH_STOP))
+"""Bits of the limits at which a drive does not do what it is asked to: acceleration and speed."""
+
+
+class Outcome(NamedTuple):
+    """What counts of one run, in SI."""
+
+    rms_swing: float
+    """NaN if the run left the model or was stopped."""
+    largest_swing: float
+    limits: Array
+    """(3, 5) shares of time for which `PUMPS` act on hoist, slew, luff."""
+    saturation: float
+    """Largest share of time, over the drives, at the acceleration or the speed limit."""
+    peaks: Mapping[str, Array]
+    """Peaks of quantities by names of `limits.LIMITED`, until the run left the model."""
+    counted: float
+    """Time for which peaks count. [s]"""
+    left: str
+    """Why the run is not an operation any more from some time on; empty if it is one."""
+
+
+LEAST = 10.0
+"""Time below which nothing counts. [s]"""
+STOPPED = Outcome(
+    np.nan, np.nan, np.full((3, len(PUMPS)), np.nan), np.nan, {}, 0.0, "stopped at a limit"
+)
+"""Of a run that met a limit of the crane's travel, or left the domain of a drive's model."""
+
+
+def outcome_of(run: CraneRun, start: float, wanted: tuple[float, float] | None) -> Outcome:
+    """What counts of a run from a time [s] on.
+
+    Parameters
+    ----------
+    run : CraneRun
+    start : float
+        [s]
+    wanted : (float, float), optional
+        Where the load shall be, horizontal and inertial [m]; None if it shall move.
+    """
+    first, left = round(start * RATE), run.left_model
+    last = len(run.stored) if left is None else round(left.time * RATE)
+    reason = "" if left is None else left.reason
+    counted = max(last - first, 0) / RATE
+    if counted < LEAST:
+        return STOPPED._replace(left=reason)
+    some = slice(first, last, EVERY)
+    load, tip = run.load[some], run.tip[some]
+    swing = swing_of(load, tip)
+    hook, slew = run.hook[some], run.fixed.home.slew + run["shaft_slew"][some]
+    out, across = rope_leads(hook - tip, slew, run.ship[some]).T
+    speed = np.abs(np.diff(hook[:, 2])) * RATE / EVERY
+    hoist = run.crane.geometry.hoist * min(np.abs(run.crane.inverse("hoist").limits))
+    elastic = run.fixed.hanging.stiffness > 0.0
+    pull = run["pull"][slice(first, last, ELASTIC_EVERY if elastic else EVERY)]
+    peaks = {
+        "swing": peaks_of(swing),
+        "off_lead": peaks_of(np.abs(out)),
+        "side_lead": peaks_of(np.abs(across)),
+        "hook_speed": peaks_of(speed),
+        "hoist_demand": peaks_of(speed) / hoist,
+    }
+    jumps = run.actuation == "ideal" and run.fixed.settings.path
+    if not jumps:  # of speed, which are impulses of the rope
+        peaks["dynamic_factor"] = peaks_of(pull / GRAVITY)
+    if wanted is not None:
+        away = load[:, :2] - np.array(wanted)
+        peaks["placement"] = peaks_of(np.hypot(away[:, 0], away[:, 1]))
+    limits = _acting(run, slice(first, last))
+    saturation = _saturated(run, slice(first, last))
+    rms = float(np.sqrt(np.mean(swing**2))) if left is None else np.nan
+    largest = float(swing.max()) if left is None else np.nan
+    return Outcome(rms, largest, limits, saturation, peaks, counted, reason)
+
+
+def _acting(run: CraneRun, some: slice) -> Array:
+    """(3, 5) shares of time for which `PUMPS` act on the drives."""
+    shares = np.zeros((len(AXES), len(PUMPS)))
+    for row, axis in zip(shares, AXES, strict=True):
+        bits = run[f"limits_{axis}"][some].astype(np.uint8)
+        row[:] = np.bincount(bits, minlength=len(BITS)) @ BITS / len(bits)
+    return shares
+
+
+def _saturated(run: CraneRun, some: slice) -> float:
+    """Largest share of time, over the drives, at the acceleration or the speed limit."""
+    return max(
+        float(np.mean((run[f"limits_{axis}"][some].astype(np.uint8) & SATURATED) > 0))
+        for axis in AXES
+    )

@@ -1,0 +1,291 @@
+"""The crane in waves in the frequency domain: exact for small motion, without a simulation.
+
+The ship's transfer functions move the tip, the tip moves the load, a pendulum with its damping; a
+spectrum of waves gives variances of all that is linear in them. Control is linear as long as its
+drives follow at once: delayed feedback and ship compensation. It is the check of every simulated
+crane without control, and the first answer on every sea of a year.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from math import cos, inf, pi, radians, sin, sqrt
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from swashplate.crane.control import Control, Settings, stages_of
+from swashplate.crane.crane import Crane
+from swashplate.crane.extremes import THREE_HOURS, largest_of_gaussian
+from swashplate.crane.kinematics import boom_at, reach_rate, tip_of
+from swashplate.crane.limits import LIMITED
+from swashplate.crane.loop import largest_sine
+from swashplate.crane.rope import GRAVITY, Suspension
+from swashplate.crane.sea import BAND, Seaway
+from swashplate.errors import InputError
+from swashplate.results import Result
+from swashplate.tables import Column, Table
+
+Array = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+
+FINEST = 1e-4
+"""Least distance of frequencies. [rad/s]"""
+WIDEST = 2e-3
+"""Largest distance of frequencies: a hundredth of the lowest one's. [rad/s]"""
+PER_RESONANCE = 4.0
+"""Frequencies within the half-power width of the load's resonance."""
+SPREAD_HEADINGS = 19
+"""Headings of a sea whose directions spread."""
+DEMANDS = ("slew_speed", "slew_acceleration", "luff_speed", "luff_acceleration", "clip")
+"""What control asks of slew and luff, as shares of what their drives can do, and of its clip, if it
+has one, as a share of its size."""
+
+
+class LinearValue(NamedTuple):
+    """A quantity in a sea, in SI."""
+
+    mean: float
+    """Without waves: of a list, a trim."""
+    rms: float
+    """Of what waves add; of a vector the root mean square of its magnitude."""
+    period: float
+    """Mean time between crossings upwards. [s]"""
+    largest: float
+    """Most probable largest magnitude in the duration, with the mean."""
+
+
+@dataclass(frozen=True, eq=False)
+class LinearResponse(Result):
+    """What a sea does to a crane whose drives follow at once, and what it asks of them."""
+
+    values: Mapping[str, LinearValue]
+    """By names of `limits.LIMITED`, saturation apart, and of `DEMANDS`."""
+    seaway: Seaway
+    duration: float
+    """Of the largest values. [s]"""
+    crane: Crane = field(repr=False)
+
+    def tables(self) -> list[Table]:
+        """Root mean square, period and largest value of each quantity."""
+        made = []
+        for unit in ("rad", "m", "m/s", "1"):
+            names = [name for name in self.values if _unit(name) == unit]
+            spec = ".2f" if unit == "rad" else ".3f"
+            title = f"In the frequency domain, largest in {self.duration / 3600.0:g} h"
+            shown = "" if unit == "1" else unit
+            columns = [Column("quantity", wrap=True), Column("rms", spec, shown)]
+            columns += [Column("period", ".1f", "s"), Column("largest", spec, shown)]
+            table = Table(title, columns)
+            for name in names:
+                value = self.values[name]
+                table.add(name.replace("_", " "), value.rms, value.period, value.largest)
+            made.append(table)
+        return made
+
+
+def _unit(name: str) -> str:
+    return LIMITED[name].unit if name in LIMITED else "1"
+
+
+class Waves(NamedTuple):
+    """Regular waves whose variances add up to a sea's, on a fine grid of frequencies."""
+
+    frequency: Array
+    heading: Array
+    met: Array
+    """As the ship meets them. [rad/s]"""
+    variance: Array
+    """Of the surface. [m²]"""
+
+
+def linear_response(
+    crane: Crane,
+    sea: Seaway | None = None,
+    control: Control | None = None,
+    *,
+    slew_deg: float = 90.0,
+    boom_deg: float = 45.0,
+    rope_m: float = 27.0,
+    swing_damping: float | None = None,
+    load: float | None = None,
+    suspension: Suspension | None = None,
+    duration: float = THREE_HOURS,
+) -> LinearResponse:
+    """What a sea does to a crane at rest, by transfer functions and spectrum.
+
+    Parameters
+    ----------
+    crane : Crane
+    sea : Seaway
+        By default sea state 3 abeam on the packaged hull.
+    control : Control, optional
+        Delayed feedback and ship compensation of drives that follow at once; a shaper, a position
+        loop and a clip change nothing as long as the operator's stick rests and the clip does not
+        act.
+    slew_deg, boom_deg, rope_m, swing_damping, load, suspension
+        As of `simulate`.
+    duration : float
+        For which the largest values are stated. [s]
+
+    Raises
+    ------
+    InputError
+        For a user's own law, whose transfer function is not known, a damping of 0 without control,
+        for which the swing has no stationary state, and what `Crane.home` refuses.
+
+    Notes
+    -----
+    With the tip's horizontal motion T by the ship alone, the load's place d from the tip obeys
+    d (ω₀² - ω² + 2 i ζ ω₀ ω - ω² k e^{-iωτ}) = ω² (1 - c) T, with gain k and delay τ of the
+    feedback, and c = 1 if the ship's motion is compensated. ω is the frequency as the ship meets
+    the waves.
+    """
+    seaway = Seaway() if sea is None else sea
+    settings, law, _ = stages_of(control)
+    if law is not None:
+        raise InputError(
+            "The frequency domain knows delayed feedback and ship compensation, not the user's own "
+            f"law {law.model.name}: simulate it."
+        )
+    damping = crane.swing_damping if swing_damping is None else swing_damping
+    if damping <= 0.0 and settings.feedback <= 0.0 and not settings.ship:
+        raise InputError(
+            "Without damping the swing in waves grows without end: swing_damping must be above 0, "
+            "as 0.005."
+        )
+    home = crane.home(slew_deg, boom_deg, rope_m)
+    g = crane.geometry
+    boom = boom_at(0.0, g, home)
+    waves = waves_of(seaway, sqrt(GRAVITY / rope_m) * damping)
+    arm = np.array(tip_of(home.slew, boom, g))
+    motion = seaway.response(waves.frequency, waves.heading)
+    tip = tip_motion(motion, arm)
+    moved, load_from_tip = _controlled(tip, waves.met, rope_m, damping, settings)
+    c, s = cos(home.slew), sin(home.slew)
+    along, across = np.array([c, -s]), np.array([-s, -c])
+    # the rope's direction in the ship's axes, which turn by roll and pitch
+    direction = load_from_tip / rope_m + np.array([motion[4], -motion[3]])
+    rolled, pitched = radians(seaway.list_deg), radians(seaway.trim_deg)
+    inclined = np.array([pitched, -rolled])
+    vertical = 1j * waves.met * tip[2]
+    mass = crane.safe_load if load is None else load
+    lifted = -(waves.met**2) * tip[2] / GRAVITY
+    lifted = lifted * _bounce(waves.met, rope_m, mass, suspension or Suspension())
+    hoist = crane.geometry.hoist * min(np.abs(crane.inverse("hoist").limits))
+    responses: dict[str, tuple[Complex, float]] = {
+        "swing": (load_from_tip / rope_m, 0.0),
+        "off_lead": ((along @ direction)[None], float(along @ inclined)),
+        "side_lead": ((across @ direction)[None], float(across @ inclined)),
+        "dynamic_factor": (lifted[None], 1.0),
+        "hook_speed": (vertical[None], 0.0),
+        "hoist_demand": (vertical[None] / hoist, 0.0),
+        "placement": (moved + load_from_tip, 0.0),
+    }
+    asked = moved - tip[:2]  # of the drives, in the ship's axes
+    reach = g.foot + g.boom * boom.cos
+    for axis, rate, part in (
+        ("slew", reach, across @ asked),
+        ("luff", float(reach_rate(boom, g)), along @ asked),
+    ):
+        inverse = crane.inverse(axis)
+        speed = 1j * waves.met * part / (rate * min(np.abs(inverse.limits)))
+        rise = -(waves.met**2) * part / (rate * min(inverse.acceleration))
+        responses[f"{axis}_speed"] = (speed[None], 0.0)
+        responses[f"{axis}_acceleration"] = (rise[None], 0.0)
+    if settings.clip > 0.0 or settings.share > 0.0:
+        omega = sqrt(GRAVITY / rope_m)
+        inverses = crane.inverse("slew"), crane.inverse("luff")
+        rates = reach, float(reach_rate(boom, g))
+        sizes = np.array(
+            [
+                settings.share
+                * largest_sine(
+                    rate * min(np.abs(drive.limits)), rate * min(drive.acceleration), omega
+                )
+                for drive, rate in zip(inverses, rates, strict=True)
+            ]
+        )
+        sizes[1] = settings.clip if settings.clip > 0.0 else sizes[1]
+        responses["clip"] = (np.array([across @ asked, along @ asked]) / sizes[:, None], 0.0)
+    values = {
+        name: _value(response, mean, waves, duration / (2.0 if name == "dynamic_factor" else 1.0))
+        for name, (response, mean) in responses.items()
+    }
+    return LinearResponse(values, seaway, duration, crane)
+
+
+def waves_of(seaway: Seaway, width: float) -> Waves:
+    """Waves of a seaway, fine enough for a resonance of half that width. [rad/s]"""
+    step = min(max(2.0 * width / PER_RESONANCE, FINEST), WIDEST)
+    omega = np.arange(BAND[0], BAND[1], step) + 0.5 * step
+    density = seaway.spectrum.density(omega)
+    # the band holds all of the sea's energy, as in a simulated seaway
+    variance = density * seaway.spectrum.height**2 / 16.0 / density.sum()
+    heading = np.full(omega.size, radians(seaway.heading_deg))
+    if seaway.spread:
+        angles = (np.arange(SPREAD_HEADINGS) + 0.5) * pi / SPREAD_HEADINGS - 0.5 * pi
+        shares = np.cos(angles) ** 2 / np.sum(np.cos(angles) ** 2)
+        variance = np.outer(shares, variance).ravel()
+        heading = np.add.outer(angles, heading).ravel()
+        omega = np.tile(omega, SPREAD_HEADINGS)
+    return Waves(omega, heading, seaway.encounter(omega, heading), variance)
+
+
+def tip_motion(motion: Complex, arm: Array) -> Complex:
+    """Motion of a point of the ship, (3, n), by its six motions, (6, n): s + θ × arm."""
+    return np.asarray(motion[:3] + np.cross(motion[3:], arm[:, None], axis=0))
+
+
+def swing_response(met: Array, rope: float, damping: float) -> Complex:
+    """Load less tip over the tip's horizontal motion, ω²/(ω₀² - ω² + 2 i ζ ω₀ ω)."""
+    own = sqrt(GRAVITY / rope)
+    return np.asarray(met**2 / (own**2 - met**2 + 2j * damping * own * met))
+
+
+def _controlled(
+    tip: Complex, met: Array, rope: float, damping: float, settings: Settings
+) -> tuple[Complex, Complex]:
+    """The tip's horizontal motion under control, and load less tip, (2, n) each."""
+    left = (0.0 if settings.ship else 1.0) * tip[:2]
+    own = sqrt(GRAVITY / rope)
+    back = settings.feedback * np.exp(-2j * pi * settings.delay * met / own)
+    load = met**2 * left / (own**2 - met**2 * (1.0 + back) + 2j * damping * own * met)
+    return left + back * load, load
+
+
+def _bounce(met: Array, rope: float, mass: float, suspension: Suspension) -> Complex:
+    """Transmissibility of an elastic rope; 1 for a rigid one."""
+    if suspension.stiffness == inf:
+        return np.ones(met.size, dtype=np.complex128)
+    own = sqrt(suspension.stiffness / (rope * (mass + suspension.hook)))
+    damped = 2j * suspension.bounce_damping * own * met
+    return np.asarray((own**2 + damped) / (own**2 - met**2 + damped))
+
+
+def _value(response: Complex, mean: float, waves: Waves, duration: float) -> LinearValue:
+    """Moments of a quantity whose components have those amplitudes for each metre of wave."""
+    spread = np.real((response * waves.variance) @ response.conj().T)
+    rates = np.real((response * (waves.variance * waves.met**2)) @ response.conj().T)
+    widths, axes = np.linalg.eigh(spread)
+    speeds = np.diagonal(axes.T @ rates @ axes)
+    widths = np.maximum(widths, 0.0)
+    total, speed = float(widths.sum()), float(np.maximum(speeds, 0.0).sum())
+    largest = float(largest_of_gaussian(widths[None], np.maximum(speeds, 0.0)[None], duration)[0])
+    period = 2.0 * pi * sqrt(total / speed) if speed > 0.0 else inf
+    return LinearValue(mean, sqrt(total), period, abs(mean) + largest)
+
+
+def stationary_start(
+    crane: Crane, seaway: Seaway, *, slew_deg: float, boom_deg: float, rope_m: float, damping: float
+) -> tuple[tuple[float, float], tuple[float, float]]:
+    """Load less tip and its rate at time 0 of the stationary swing without control. [m], [m/s]"""
+    home = crane.home(slew_deg, boom_deg, rope_m)
+    arm = np.array(tip_of(home.slew, boom_at(0.0, crane.geometry, home), crane.geometry))
+    waves = seaway.waves
+    tip = tip_motion(seaway.response(waves.frequency, waves.heading), arm)[:2] * waves.amplitude
+    load = swing_response(waves.met, rope_m, damping) * tip
+    (x, y), (u, v) = load.sum(axis=1).real, (1j * waves.met * load).sum(axis=1).real
+    return (float(x), float(y)), (float(u), float(v))

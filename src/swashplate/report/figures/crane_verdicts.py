@@ -1,0 +1,389 @@
+"""Figures of what is decided on a crane: judgment of its control, operability over a year."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from itertools import pairwise
+from math import isfinite
+from typing import Any, overload
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.colors import to_rgb
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch, Polygon, Rectangle
+from matplotlib.ticker import FixedLocator, FuncFormatter, MaxNLocator, NullLocator
+from numpy.typing import NDArray
+
+from swashplate.crane import LIMITED, Hull, Judged, Judgment, Operability
+from swashplate.crane.confidence import rms_of
+from swashplate.crane.operating import WORKABLE, label_of
+from swashplate.crane.study import NONE
+from swashplate.report import style
+from swashplate.report.figures.crane import assumed, remark, remarks, seaway_words
+from swashplate.results import GivenAxes
+from swashplate.tables import count
+
+Array = NDArray[np.float64]
+
+# --- judgment -------------------------------------------------------------------------------------
+
+SWING = "swing, RMS of a seaway (deg)"
+NAME, ROOM = 30, style.WIDTH - 2.4
+"""Letters of a line of a variant's name; room for a legend beside such names. [inch]"""
+BREAK, LEFT, END = 1.06, 1.11, 1.16
+"""Where the axis breaks, runs that left the model stand, and the panel ends: in parts of the
+largest swing."""
+UNBROKEN_END = 1.03
+"""Where the panel ends if none left it."""
+WIDEST = 2.0
+"""Part of the largest swing up to which an interval is shown whole."""
+LEAST_SHARE, MOST_SHARE = 0.1, 20.0
+"""Shares of a limit at which an axis ends; a triangle stands for what lies beyond."""
+WITHIN = {"yes": "within its limit", "no": "beyond its limit", "not decided": "not decided"}
+FACES = {"yes": style.BLUE, "no": style.VERMILION, "not decided": "white"}
+"""Colours of a quantity by whether it stays within its limit."""
+
+
+@overload
+def plot_judgment(result: Judgment, *, ax: None = None, title: str = "") -> Figure: ...
+
+
+@overload
+def plot_judgment(result: Judgment, *, ax: GivenAxes, title: str = "") -> GivenAxes: ...
+
+
+def plot_judgment(
+    result: Judgment, *, ax: Axes | Sequence[Axes] | None = None, title: str = ""
+) -> Figure | Axes | Sequence[Axes]:
+    """Figure of a judgment: swing of each variant in each seaway, and what has a limit.
+
+    The first panel has a point for each seaway and a diamond as wide as the 95 % interval of the
+    mean; runs that left the model are counted beyond a break of the axis. The second one has the
+    most probable largest values in three hours as shares of their limits.
+
+    By default a new figure; with `ax`, of one panel, the swing alone is drawn there, without the
+    remark above, and `ax` returned.
+    """
+    if ax is not None:
+        (panel,) = style.dress_given(ax, title, [""], SWING, what="panel")
+        _swings(panel, result)
+        return ax
+    study, limited = result.study, result.limited(result.judged)
+    legends = [_swing_legend(result)]
+    heights = [0.46 * len(result.names) + 0.2]
+    if limited:
+        legends.append(_limit_legend(result, limited))
+        heights.append(0.36 * len(limited) + 0.2)
+    lines = sum(style.legend_rows(legend, ROOM) + 1 for legend in legends)
+    height = style.HEAD + sum(heights) + style.ROW * lines + len(legends) * (style.FOOT + 0.1)
+    figure = style.new_figure(style.WIDTH, height)
+    grid = figure.subplots(len(heights), 1, squeeze=False, gridspec_kw={"height_ratios": heights})
+    panels = list(grid[:, 0])
+    seaways = f"{count(len(study.seeds), 'seaway')} of {study.length / 60.0:g} min"
+    style.write_title(figure, title or f"{seaways}, {seaway_words(study.seaway)}")
+    above = [
+        assumed(study.crane),
+        f"'{result.judged}' and its limits; bars: 95 % intervals",
+    ]
+    for panel, legend, words in zip(panels, legends, above, strict=False):
+        style.dress(panel)
+        style.put_legend(panel, legend, room=ROOM)
+        remark(panel, words, style.legend_rows(legend, ROOM))
+    style.label_below(panels[0], SWING)
+    _swings(panels[0], result)
+    if limited:
+        _limits(panels[1], result, limited)
+    return figure
+
+
+def _mark(name: str, marker: str, color: str, *, face: str = "", size: float = 5.0) -> Line2D:
+    """A marker's handle for a legend."""
+    return Line2D(
+        [],
+        [],
+        color=color,
+        marker=marker,
+        markersize=size,
+        markerfacecolor=face or color,
+        linestyle="none",
+        label=name,
+    )
+
+
+def _swing_legend(result: Judgment) -> list[Line2D]:
+    handles = [
+        _mark("a seaway", "o", style.BLUE, size=4.0),
+        _mark("more swing than without control", "o", style.VERMILION, size=4.0),
+        _mark("mean, as wide as its 95 % interval", "d", style.INK),
+    ]
+    if result.linear is not None:
+        handles.append(style.handle("by its spectrum alone", style.INK, width=1.0))
+    if any(result.left(name) for name in result.names):
+        handles.append(_mark("left the model, not in the mean", "x", style.INK))
+    return handles
+
+
+def _swings(ax: Axes, result: Judgment) -> None:
+    """A row for each variant: its seaways, their mean, how many left the model."""
+    names = list(reversed(result.names))
+    swings = {name: np.degrees(result.swing(name)) for name in names}
+    edge = _largest_swing(result, list(swings.values()))
+    random = np.random.default_rng(0)
+    labels = []
+    for row, (name, swing) in enumerate(swings.items()):
+        rows = row + random.uniform(0.0, 0.34, swing.size)
+        colors = np.where(swing > swings[NONE], style.VERMILION, style.BLUE)
+        ax.scatter(swing, rows, s=10.0, c=colors, alpha=0.55, linewidths=0.0, zorder=2.0)
+        _diamond(ax, row - 0.16, swing)
+        left = sum(result.left(name).values())
+        if left:
+            ax.plot(LEFT * edge, row, "x", color=style.INK, ms=6.0)
+            style.write(ax, f"{left}", (LEFT * edge, row), (7.0, -3.0), coords="data")
+        label = style.in_lines(name, NAME)
+        if name != NONE:
+            worse = round(result.worse(name).value * swing.size)
+            label += f"\nworse than none: {worse} of {swing.size}"
+        labels.append(label)
+    if result.linear is not None:
+        by_spectrum = np.degrees(result.linear.values["swing"].rms)
+        ends = names.index(NONE) - 0.4, names.index(NONE) + 0.4
+        ax.vlines(by_spectrum, *ends, color=style.INK, linewidth=1.0, zorder=4.0)
+    _swing_axis(ax, edge, broken=any(result.left(name) for name in names))
+    ax.grid(False, axis="y")
+    ax.set_yticks(range(len(names)), labels, fontsize=style.SMALL)
+    ax.set_ylim(-0.5, len(names) - 0.5)
+
+
+def _largest_swing(result: Judgment, swings: Sequence[Array]) -> float:
+    """Largest number of a panel of swings [deg]; 1 if all runs left the model."""
+    largest = max(float(np.nanmax(np.append(swing, 0.0))) for swing in swings)
+    ends = [rms_of(swing).high for swing in swings]
+    # of very few seaways the interval is wider than a panel can show
+    edge = max([largest, *(min(end, WIDEST * largest) for end in ends if isfinite(end))])
+    if result.linear is not None:
+        edge = max(edge, float(np.degrees(result.linear.values["swing"].rms)))
+    return edge or 1.0
+
+
+def _swing_axis(ax: Axes, edge: float, *, broken: bool) -> None:
+    """An abscissa up to a swing [deg], and beyond a break the place of what left the model."""
+    ticks = list(MaxNLocator(8, steps=[1, 2, 5, 10]).tick_values(0.0, edge))
+    ticks = [tick for tick in ticks if 0.0 <= tick <= edge]
+    words = [f"{tick:g}" for tick in ticks]
+    if broken:
+        ax.axvline(BREAK * edge, color=style.FAINT, linewidth=1.0, linestyle=(0, (2, 2)))
+        ticks.append(LEFT * edge)
+        words.append("left the\nmodel")
+    ax.set_xticks(ticks, words)
+    ax.set_xlim(0.0, (END if broken else UNBROKEN_END) * edge)
+
+
+def _diamond(ax: Axes, row: float, swing: Array) -> None:
+    """The mean of a row as a diamond as wide as its interval; nothing if all left the model."""
+    mean = rms_of(swing)
+    if not isfinite(mean.value):
+        return
+    low, high = mean.low, mean.high
+    if not isfinite(low):  # of one seaway there is no interval
+        low = high = mean.value
+    corners = [(low, row), (mean.value, row + 0.12), (high, row), (mean.value, row - 0.12)]
+    ax.add_patch(Polygon(corners, facecolor=style.INK, edgecolor=style.INK, lw=0.8, zorder=3.0))
+
+
+def _limit_legend(result: Judgment, limited: Sequence[Judged]) -> list[Line2D]:
+    decisions = [decision for decision in WITHIN if decision in {one.within for one in limited}]
+    handles = []
+    for decision in decisions:
+        color = FACES[decision] if decision != "not decided" else style.INK
+        handles.append(_mark(WITHIN[decision], "o", color, face=FACES[decision], size=6.0))
+    handles.append(_mark("no control", "s", style.FAINT, face="white", size=4.5))
+    others = result.names[1:-1]
+    if others:
+        label = f"'{others[0]}'" if len(others) == 1 else "other variants"
+        handles.append(_mark(label, "o", style.FAINT, face="white", size=4.5))
+    return handles
+
+
+def _limits(ax: Axes, result: Judgment, limited: Sequence[Judged]) -> None:
+    """A row for each quantity that has a limit: its largest value as a share of that."""
+    others = {name: result.limited(name) for name in result.names[:-1]}
+    shares = [_share(one.largest.high, one.limit) for one in limited]
+    shares += [_share(one.largest.value, one.limit) for found in others.values() for one in found]
+    top = max([2.0, *(1.25 * share for share in shares if isfinite(share))])
+    end = min(top, MOST_SHARE)
+    quantities = [one.name for one in reversed(limited)]
+    ax.axvspan(1.0, end, color=style.VERMILION, alpha=0.07, linewidth=0.0, zorder=0.5)
+    ax.axvline(1.0, color=style.VERMILION, linewidth=1.0, zorder=1.5)
+    for name, found in others.items():
+        marker = "s" if name == NONE else "o"
+        for one in found:
+            if one.name in quantities:
+                row = quantities.index(one.name) + 0.18
+                share = _share(one.largest.value, one.limit)
+                _point(ax, share, row, end, marker, style.FAINT, face="white", ms=4.5)
+    labels = []
+    for row, one in enumerate(reversed(limited)):
+        color = FACES[one.within] if one.within != "not decided" else style.INK
+        low, high = (_share(value, one.limit) for value in one.largest[1:])
+        if isfinite(low) and isfinite(high):
+            low, high = (min(max(share, LEAST_SHARE), end) for share in (low, high))
+            ax.hlines(row, low, high, color=color, linewidth=2.0, zorder=2.5)
+        share = _share(one.largest.value, one.limit)
+        _point(ax, share, row, end, "o", color, face=FACES[one.within], ms=6.5)
+        unit, factor = one.shown
+        # what has no more than three decimals is 0: a side-lead without waves across the boom
+        value = f"{round(factor * one.largest.value, 3):.3g}" if isfinite(share) else "–"
+        shown = f"{value} of {factor * one.limit:.3g} {unit}".rstrip()
+        labels.append(f"{LIMITED[one.name].label}\n{shown}")
+    ax.set_xscale("log")
+    ax.set_xlim(LEAST_SHARE, end)
+    ax.xaxis.set_major_locator(FixedLocator([0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0]))
+    ax.xaxis.set_minor_locator(NullLocator())
+    ax.xaxis.set_major_formatter(FuncFormatter(lambda share, _: f"{share:g}"))
+    style.label_below(ax, "most probable largest value in 3 h (saturation: mean), over its limit")
+    ax.grid(False, axis="y")
+    ax.set_yticks(range(len(labels)), labels, fontsize=style.SMALL)
+    ax.set_ylim(-0.5, len(labels) - 0.5)
+
+
+def _share(value: float, limit: float) -> float:
+    """A value over its limit, which is 0 if no drive may be at a limit of its own."""
+    if limit > 0.0:
+        return value / limit
+    return MOST_SHARE if value > 0.0 else 0.0
+
+
+def _point(
+    ax: Axes, share: float, row: float, end: float, marker: str, color: str, **how: Any
+) -> None:
+    """A share of a limit; a triangle at the end of the axis for one beyond it, nothing for NaN."""
+    if not isfinite(share):
+        return
+    if share < LEAST_SHARE:
+        marker = "<"
+    elif share > end:
+        marker = ">"
+    face = how.pop("face")
+    place = min(max(share, LEAST_SHARE), end)
+    ax.plot(place, row, marker, color=color, mfc=face, zorder=3.0, clip_on=False, **how)
+
+
+# --- operability ----------------------------------------------------------------------------------
+
+LIMIT_COLORS = (
+    *(style.BLUE, style.VERMILION, style.GREEN, style.PURPLE, style.ORANGE),
+    *(style.INK, style.SKY),
+)
+"""Colours of limits, the most frequent first; pale ones of the first five are told apart, too."""
+PALEST = 0.3
+"""Strength of the colour of a cell that one heading alone spoils."""
+ABREAST = 3
+"""Panels side by side."""
+
+
+def plot_operability(result: Operability, *, title: str = "") -> Figure:
+    """Figure of operability: what limits each sea of the scatter diagram, a panel for each variant.
+
+    A cell has the colour of what limits it first at most of the headings, the stronger the more
+    headings cannot be worked; it is white if all can.
+    """
+    weights = _weights(result)
+    used = [limit for limit in weights if limit != WORKABLE]
+    colors = dict(zip(used, LIMIT_COLORS, strict=False))
+    legend: list[Any] = [
+        Patch(facecolor=color, label=label_of(limit)) for limit, color in colors.items()
+    ]
+    if len(used) > len(colors):
+        legend.append(Patch(facecolor=style.FAINT, label="others"))
+    legend.append(Patch(facecolor="white", edgecolor=style.FAINT, label="can be worked"))
+    names = result.names
+    columns = min(len(names), ABREAST)
+    rows = -(-len(names) // columns)
+    lines = style.legend_rows(legend) + 3
+    height = style.HEAD + style.ROW * lines + rows * 2.7 + style.FOOT
+    figure = style.new_figure(style.WIDTH, height)
+    grid = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False)
+    panels = list(grid.ravel())
+    style.write_title(figure, title or "Share of the year that can be worked, and what limits it")
+    for panel, name in zip(panels, names, strict=False):
+        style.dress(panel)
+        _cells(panel, result, name, colors)
+        worked = f"{100.0 * result.workable(name):.0f} % of the year"
+        words = f"{style.in_lines(name, NAME)}: {worked}"
+        panel.set_title(words, loc="left", fontsize=style.NORMAL, color=style.INK)
+    for panel in panels[len(names) :]:
+        panel.set_axis_off()
+    for panel in panels[max(len(names) - columns, 0) : len(names)]:  # the lowest of each column
+        style.label_below(panel, "peak period (s)")
+        panel.tick_params(labelbottom=True)
+    for panel in grid[:, 0]:
+        panel.set_ylabel("significant height (m)", fontsize=style.NORMAL, color=style.INK)
+    seaway = result.seaway
+    ship = f"roll {seaway.ship.roll_period:g} s" if isinstance(seaway.ship, Hull) else ""
+    headings = count(len(result.headings), "heading")
+    note = result.scatter.note.removesuffix(".")
+    said = [
+        f"the stronger a colour, the more of {headings} cannot be worked",
+        ship,
+        note[:1].lower() + note[1:],
+        assumed(result.crane),
+    ]
+    made = figure.legend(
+        title=remarks(*said),
+        title_fontproperties={"size": style.SMALL},
+        alignment="left",
+        handles=legend,
+        loc="outside lower left",
+        ncols=style.legend_columns([str(handle.get_label()) for handle in legend]),
+        frameon=False,
+        fontsize=style.SMALL,
+        labelcolor=style.INK,
+    )
+    made.get_title().set_color(style.GREY)
+    return figure
+
+
+def _weights(result: Operability) -> dict[str, float]:
+    """Share of the year by what limits it, over all variants, the largest first."""
+    weights: dict[str, float] = {}
+    for name in result.names:
+        for limit, share in result.shares(name).items():
+            weights[limit] = weights.get(limit, 0.0) + share
+    return dict(sorted(weights.items(), key=lambda entry: -entry[1]))
+
+
+def _cells(ax: Axes, result: Operability, name: str, colors: Mapping[str, str]) -> None:
+    """The cells of the scatter diagram, each in its colour."""
+    scatter, cells = result.scatter, result.cells[name]
+    periods, heights = _edges(scatter.period), _edges(scatter.height)
+    for row, (period, height) in enumerate(
+        zip(scatter.period.tolist(), scatter.height.tolist(), strict=True)
+    ):
+        limits = [cells[row, heading].limited_by for heading in result.headings]
+        spoiled = [limit for limit in limits if limit != WORKABLE]
+        color: Any = "white"
+        if spoiled:
+            most = max(dict.fromkeys(spoiled), key=spoiled.count)
+            strength = PALEST + (1.0 - PALEST) * len(spoiled) / len(limits)
+            full = np.array(to_rgb(colors.get(most, style.FAINT)))
+            color = tuple(1.0 - strength * (1.0 - full))
+        (left, right), (low, high) = periods[period], heights[height]
+        box = (left, low), right - left, high - low
+        ax.add_patch(Rectangle(*box, facecolor=color, edgecolor=style.FAINT, linewidth=0.6))
+    ax.set_xlim(min(low for low, _ in periods.values()), max(high for _, high in periods.values()))
+    ax.set_ylim(0.0, max(high for _, high in heights.values()))
+    ax.grid(False)
+
+
+def _edges(values: Array) -> dict[float, tuple[float, float]]:
+    """Ends of the cells of a scatter diagram by their middles, half way to the neighbours."""
+    middles = np.unique(values)
+    if middles.size == 1:
+        half = 0.25 * middles
+        return {float(middles[0]): (float(middles[0] - half[0]), float(middles[0] + half[0]))}
+    between = 0.5 * (middles[1:] + middles[:-1])
+    first, last = 2.0 * middles[0] - between[0], 2.0 * middles[-1] - between[-1]
+    ends = np.concatenate([[max(first, 0.0)], between, [last]]).tolist()
+    return dict(zip(middles.tolist(), pairwise(ends), strict=True))

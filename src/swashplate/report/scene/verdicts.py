@@ -1,0 +1,291 @@
+"""Pages of what is decided on a crane: judgment of its control, operability; each is one file."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from io import StringIO
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from markupsafe import Markup
+
+from swashplate.crane import LIMITED, Crane, Hull, Judgment, Operability, Seaway, follow
+from swashplate.crane.axes import AXES
+from swashplate.crane.drives import UNUSABLE
+from swashplate.crane.judgment import Decision
+from swashplate.crane.operating import WORKABLE, label_of
+from swashplate.crane.study import NONE
+from swashplate.errors import DomainError, InputError
+from swashplate.report.fit_report.html_page import (
+    Block,
+    Section,
+    listed_block,
+    page,
+    text,
+    titled,
+)
+from swashplate.tables import Column, Table, count, listed, write_text
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from swashplate.report.fit_report.summary import Light
+
+# --- judgment -------------------------------------------------------------------------------------
+
+LIGHTS: dict[Decision, Light] = {"yes": "good", "not decided": "look", "no": "bad"}
+OUTCOMES: dict[str, Light] = {"passes": "good", "not decided": "look", "fails": "bad"}
+HARM: dict[Decision, str] = {"yes": "does no harm", "not decided": "may harm", "no": "harms"}
+SUFFICES: dict[Decision, str] = {
+    "yes": "suffices",
+    "not decided": "may not suffice",
+    "no": "does not suffice",
+}
+IN_WORDS = (
+    "No control: the crane as it is, under the operator's stick alone. Every variant goes through "
+    "the same seaways, so that differences are within each seaway. Swing is the angle between rope "
+    "and plumb line, RMS its root mean square over a seaway."
+)
+LIMITS_IN_WORDS = (
+    "Orifice: the in-line orifice limits the flow to the stroking piston, so that the shaft cannot "
+    "accelerate faster. Swash stop: the pump is at full stroke, so that it cannot turn faster. A "
+    "controller that counts on more comes late, and late it feeds the swing."
+)
+FOLLOWED = (
+    "Largest sine of the tip that each axis can follow, and what the sea asks of it: a filled "
+    "diamond above the line of its colour is more than the axis has"
+)
+ASSUMED = "Shaded rows are assumed: measure or agree them before you rely on a number."
+PERIODS = np.linspace(4.0, 16.0, 25)
+"""Of the sines that axes are asked to follow. [s]"""
+
+
+def write_judgment(judgment: Judgment, path: str | Path) -> None:
+    """Write a judgment's page: one HTML file, whole or not at all, that needs no network.
+
+    It replaces an older file; a `FileError` if it cannot be written.
+    """
+    # a scene alone needs no figures
+    from swashplate.report.figures import plot_judgment
+    from swashplate.report.figures.crane import seaway_words
+    from swashplate.report.fit_report.summary import light
+
+    study, crane = judgment.study, judgment.study.crane
+    tables = judgment.tables()
+    swings, worse = tables[:2]
+    limited = tables[2:3] if crane.limits else []
+    differences, acting, *remedies = tables[2 + len(limited) :]
+    look = OUTCOMES[judgment.outcome]
+    summary = [
+        Block("verdict", (light(look, judgment.outcome), _headline(judgment)), look),
+        *_answers(judgment),
+        *_fit_verdicts(crane),
+        *(block for table in limited for block in titled(table, "limits")),
+        _drawn(plot_judgment(judgment), "Swing of each variant in each seaway, and its limits"),
+        *_remedies(judgment, remedies),
+    ]
+    provenance = study.provenance()
+    hangs = [words for words in judgment.sentences()[1:] if words not in provenance]
+    swing_tables = [block for table in (swings, worse, differences) for block in titled(table)]
+    sections = [
+        Section("summary", "Summary", summary),
+        Section("hangs", "What the answer hangs on", listed_block(hangs)),
+        Section("swing", "Swing", [text(IN_WORDS), *swing_tables]),
+        Section("limits", "Limits of the drives", _drives_limits(judgment, acting)),
+        Section("example", "One of the seaways", _example(judgment)),
+        Section("basis", "What it rests on", _basis(judgment)),
+    ]
+    facts = [
+        seaway_words(study.seaway),
+        f"{count(len(study.seeds), 'seaway')} of {study.length / 60.0:g} min",
+        f"{count(len(judgment.names) - 1, 'variant')} beside no control",
+    ]
+    title = crane.title or crane.name
+    write_text(page(sections, what="Crane", title=title, facts=" · ".join(facts)), path)
+
+
+def _headline(judgment: Judgment) -> str:
+    """The outcome and the answers to what was asked, in one short sentence."""
+    answers = [HARM[judgment.harmless]] if "harm" in judgment.asked else []
+    joint = "and"
+    if "sufficiency" in judgment.asked and judgment.sufficient is not None:
+        if answers and (judgment.harmless == "yes") != (judgment.sufficient == "yes"):
+            joint = "but"
+        answers.append(SUFFICES[judgment.sufficient])
+    words = "changes nothing" if judgment.idle else f" {joint} ".join(answers)
+    sentence = f"{judgment.outcome.capitalize()}: control ('{judgment.judged}') {words}."
+    return f"{sentence} {judgment.unusable_sentence()}".rstrip()
+
+
+def _answers(judgment: Judgment) -> list[Block]:
+    """Both answers with a light of their own, asked or not."""
+    harmless: Decision = "no" if judgment.idle else judgment.harmless
+    terms = [("Harm", LIGHTS[harmless], [judgment.harm_sentence()])]
+    if judgment.sufficient is not None:
+        sentence = judgment.sufficiency_sentence()
+        terms.append(("Sufficiency", LIGHTS[judgment.sufficient], [sentence]))
+    for subject, _, sentences in terms:
+        if subject.lower() not in judgment.asked:
+            sentences.append("This was not asked: it does not count for the outcome.")
+    return [Block("terms", terms, "verdict")]
+
+
+def _remedies(judgment: Judgment, tables: Sequence[Table]) -> list[Block]:
+    """What would do, and what was tried in vain."""
+    blocks = [text(words) for words in judgment.remedy_sentences()]
+    blocks += [block for table in tables for block in titled(table)]
+    if judgment.tried and judgment.remedies:  # else the sentence says so
+        blocks.append(text(f"Tried, and not enough: {listed(judgment.tried)}.", "remark"))
+    return blocks
+
+
+def _fit_verdicts(crane: Crane) -> list[Block]:
+    """The verdict on the fit of each drive that comes from one, and what its tests left open."""
+    looks: dict[bool | None, Light] = {True: "good", False: "bad"}
+    terms: list[tuple[str, Light, list[str]]] = []
+    for axis in AXES:
+        source, unreached = crane.sources.get(axis), crane.unreached_sentence(axis)
+        look: Light = "look" if source is None else looks.get(source.judged_usable, "look")
+        words = [source.words()] if source is not None else []
+        if unreached:
+            words.append(unreached)
+        if words:
+            terms.append((f"{axis.capitalize()}'s drive", look, words))
+    return [Block("terms", terms, "verdict")] if terms else []
+
+
+def _drives_limits(judgment: Judgment, acting: Table) -> list[Block]:
+    """What the axes can follow, and for how long limits act; nothing for ideal drives alone."""
+    if not acting.rows:
+        return []
+    study = judgment.study
+    pose = study.cases[NONE].pose
+    seas = [study.seaway.sea]
+    followable = follow(study.crane, PERIODS, seas=seas, seaway=study.seaway, **pose)
+    return [text(LIMITS_IN_WORDS), _drawn(followable.plot(), FOLLOWED), *titled(acting)]
+
+
+def _example(judgment: Judgment) -> list[Block]:
+    """The runs of a typical seaway; nothing if one of them was stopped."""
+    from swashplate.report.figures import plot_crane
+
+    seed, judged = judgment.typical, judgment.judged
+    try:
+        runs = {name: judgment.run(name, seed) for name in (NONE, judged)}
+    except (DomainError, InputError):  # a run that was stopped has no signals
+        return []
+    caption = (
+        f"Seaway {seed}, in which '{judged}' swings as in half of all seaways; it counts from "
+        f"{judgment.study.run_in:g} s on"
+    )
+    return [_drawn(plot_crane(runs, title=f"Swing in seaway {seed}"), caption)]
+
+
+def _basis(judgment: Judgment) -> list[Block]:
+    """Pose, controllers, drives, ship, limits and geometry."""
+    study, crane = judgment.study, judgment.study.crane
+    pose = study.cases[NONE].pose
+    basis = [
+        f"Boom at {pose['slew_deg']:g}° from the bow to starboard and {pose['boom_deg']:g}° up, "
+        f"rope {pose['rope_m']:g} m.",
+        _ship_sentence(study.seaway),
+    ]
+    for name, case in study.cases.items():
+        if name != NONE:
+            drives = count(len(case.cranes), "crane") if case.driven else "ideal drives"
+            basis.append(f"{name}: {case.setup['control']!r}, {drives}.")
+    for axis in AXES:
+        title = getattr(crane, axis).parameters.title.partition(f". {UNUSABLE}")[0]
+        basis.append(f"{axis}: {title.rstrip('.')}.")
+    basis += study.provenance()
+    return [*listed_block(basis), *_assumptions(crane)]
+
+
+def _ship_sentence(seaway: Seaway) -> str:
+    ship = seaway.ship
+    if not isinstance(ship, Hull):
+        return f"Ship: {ship.name}."
+    return (
+        f"Ship: a hull of {ship.length:g} m by {ship.beam:g} m with a draught of "
+        f"{ship.draught:g} m, roll period {ship.roll_period:g} s with a damping of "
+        f"{100.0 * ship.roll_damping:g} %."
+    )
+
+
+def _assumptions(crane: Crane) -> list[Block]:
+    """Limits and geometry with their sources, what is assumed marked."""
+    blocks = []
+    if crane.limits:
+        columns = (*map(Column, ("limit", "value", "unit", "status")), Column("source", wrap=True))
+        limits = Table("Limits, with their sources", columns)
+        for name, limit in crane.limits.items():
+            value = ", ".join(f"{number:g}" for number in limit.values)
+            label, look = LIMITED[name].label, limit.status == "assumed"
+            unit = "" if limit.unit == "1" else limit.unit
+            limits.add(label, value, unit, limit.status, limit.source, look=look)
+        blocks += titled(limits)
+    geometry = [Block("table", crane.table())]
+    return [*blocks, Block("details", geometry, "Geometry, with its sources"), text(ASSUMED)]
+
+
+# --- operability ----------------------------------------------------------------------------------
+
+CELLS = (
+    "What limits each sea of the year: the colour by what limits it first at most of the headings, "
+    "the stronger the more headings cannot be worked"
+)
+
+
+def write_operability(operability: Operability, path: str | Path) -> None:
+    """Write the page of an operability: one HTML file, whole or not at all, without a network.
+
+    It replaces an older file; a `FileError` if it cannot be written.
+    """
+    crane, seaway = operability.crane, operability.seaway
+    (table,) = operability.tables()
+    summary = [
+        text(_lead(operability), "lead"),
+        _drawn(operability.plot(), CELLS),
+        *titled(table),
+        *listed_block(operability.sentences()),
+    ]
+    basis = [_ship_sentence(seaway), *crane.provenance()]
+    sections = [
+        Section("summary", "Summary", summary),
+        Section("basis", "What it rests on", [*listed_block(basis), *_assumptions(crane)]),
+    ]
+    facts = [
+        f"{count(operability.scatter.height.size, 'sea')} of the scatter diagram",
+        f"{count(len(operability.headings), 'heading')}, as likely as each other",
+    ]
+    title = crane.title or crane.name
+    write_text(page(sections, what="Operability", title=title, facts=" · ".join(facts)), path)
+
+
+def _lead(operability: Operability) -> str:
+    """The share of the year of the last variant and without control, and what limits most of it."""
+    name = operability.names[-1]
+    worked, none = (100.0 * operability.workable(variant) for variant in (name, NONE))
+    sentence = (
+        f"'{name}' can work {worked:.0f} % of the year, the crane without control {none:.0f} %."
+    )
+    shares = operability.shares(name)
+    rest = [limit for limit in shares if limit != WORKABLE]
+    if not rest:
+        return sentence
+    share = 100.0 * shares[rest[0]]
+    limit = label_of(rest[0])
+    return f"{sentence} Most often the rest is limited by {limit} first: {share:.0f} % of the year."
+
+
+def _drawn(figure: Figure, caption: str) -> Block:
+    """A figure as SVG within the page, whole on a narrow screen as well."""
+    from matplotlib import rc_context
+
+    written = StringIO()
+    with rc_context({"svg.hashsalt": "swashplate"}):
+        figure.savefig(written, format="svg", metadata={"Date": None})
+    drawn = written.getvalue()
+    drawn = drawn[drawn.index("<svg") :]
+    return Block("figure", Markup(drawn.replace("<svg", '<svg class="chart sheet"', 1)), caption)

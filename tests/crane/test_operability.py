@@ -1,0 +1,178 @@
+"""Operability over a scatter diagram, and the diagrams themselves."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from swashplate.crane import Crane, Scatter, Seaway, Spectrum, control, linear_response, operability
+from swashplate.crane.operating import LEFT, NEAR, WORKABLE
+from swashplate.crane.study import Study
+from swashplate.errors import FileError, InputError
+from swashplate.executors import Serial, Threads
+
+CLIPPED = control.DelayedFeedback(0.2, 0.2) | control.ShipCompensation() | control.Clip()
+
+
+@pytest.fixture(scope="module")
+def crane():
+    return Crane.preset("tg3637")
+
+
+@pytest.fixture(scope="module")
+def scatter():
+    return Scatter.of([0.1, 0.3, 0.6, 2.5, 0.5], [6.0, 6.0, 6.0, 6.0, 10.0], [3, 3, 2, 1, 1])
+
+
+@pytest.fixture(scope="module")
+def found(crane, scatter):
+    return operability(crane, CLIPPED, scatter, headings=(90.0,), length=300.0, run_in=60.0)
+
+
+def test_without_control_the_frequency_domain_decides(crane, scatter, found):
+    """Each cell against the limits by hand: the largest of value over limit."""
+    for row, (height, period) in enumerate(zip(scatter.height, scatter.period, strict=True)):
+        sea = Seaway(Spectrum(float(height), float(period)))
+        values = linear_response(crane, sea).values
+        ratios = {
+            name: values[name].largest / limit
+            for name, limit in crane.limits_si.items()
+            if name != "saturation"
+        }
+        worst = max(ratios, key=ratios.get)
+        cell = found.cells["no control"][row, 90.0]
+        assert cell.ratio == pytest.approx(ratios[worst], rel=1e-6)
+        assert cell.limited_by == (worst if ratios[worst] > 1.0 else WORKABLE)
+        assert not cell.simulated
+
+
+def test_shares_are_those_of_the_cells_and_add_up_to_a_year(scatter, found):
+    for name in found.names:
+        assert sum(found.shares(name).values()) == pytest.approx(1.0)
+        workable = sum(
+            float(scatter.share[row])
+            for (row, _), cell in found.cells[name].items()
+            if cell.limited_by == WORKABLE
+        )
+        assert found.workable(name) == pytest.approx(workable)
+
+
+def test_what_is_beyond_a_limit_stays_so_in_higher_waves(scatter, found):
+    heights = np.flatnonzero(scatter.period == 6.0)
+    for name in found.names:
+        workable = [
+            found.cells[name][int(row), 90.0].limited_by == WORKABLE
+            for row in heights[np.argsort(scatter.height[heights])]
+        ]
+        assert workable == sorted(workable, reverse=True)
+
+
+def test_cells_near_a_limit_are_simulated_as_a_study_is(crane, scatter, found):
+    """A cell that was simulated has what a study of the same seaways says."""
+    simulated = [
+        (row, cell)
+        for (row, _), cell in found.cells["identified"].items()
+        if cell.simulated and np.isfinite(cell.ratio)
+    ]
+    assert simulated
+    row, cell = simulated[0]
+    sea = Seaway(Spectrum(float(scatter.height[row]), float(scatter.period[row])))
+    study = Study.of(crane, CLIPPED, seeds=(0, 1), sea=sea, drives=("identified",), length=300.0,
+                     run_in=60.0)  # fmt: skip
+    outcomes = [one for (one,) in study.outcomes([study.cases["identified"]])]
+    assert not any(outcome.left for outcome in outcomes)
+    assert (cell.ratio > 1.0) == (cell.limited_by != WORKABLE)
+
+
+def test_small_waves_are_not_simulated(crane):
+    calm = Scatter.of([0.02], [7.0], [1.0])
+    found = operability(crane, CLIPPED, calm, headings=(90.0,), length=300.0)
+    assert not any(cell.simulated for cells in found.cells.values() for cell in cells.values())
+    assert found.workable("identified") == 1.0
+    assert NEAR > 1.0
+
+
+def test_huge_waves_leave_the_model_and_say_so(crane):
+    storm = Scatter.of([9.0], [12.0], [1.0])
+    found = operability(crane, CLIPPED, storm, headings=(90.0,), drives=("identified",),
+                        length=300.0)  # fmt: skip
+    assert found.workable("identified") == 0.0
+    (cell,) = found.cells["identified"].values()
+    assert cell.limited_by not in (WORKABLE, "")
+    assert LEFT != WORKABLE
+
+
+def test_the_hoist_is_too_slow_from_a_height_on(crane, scatter, found):
+    height, period, heading = found.hoist_limit
+    values = linear_response(crane, Seaway(Spectrum(height, period), heading_deg=heading)).values
+    assert values["hoist_demand"].largest == pytest.approx(1.0, rel=1e-6)
+    assert any("The hoist is slower than the hook moves" in words for words in found.sentences())
+
+
+def test_numbers_do_not_depend_on_who_runs_them(crane, scatter, found):
+    how = {"headings": (90.0,), "length": 300.0, "run_in": 60.0}
+    for executor in (Serial(), Threads(3)):
+        again = operability(crane, CLIPPED, scatter, executor=executor, **how)
+        assert again.cells == found.cells or all(
+            again.shares(name) == found.shares(name) for name in found.names
+        )
+
+
+def test_table_has_a_row_for_each_variant(found):
+    (table,) = found.tables()
+    assert [row.cells[0] for row in table.rows] == ["no control", "ideal", "identified"]
+    assert table.rows[0].cells[1] == found.workable("no control")
+
+
+def test_a_crane_without_limits_has_no_operability(crane, scatter):
+    with pytest.raises(InputError, match=r"has no limits: give its file a table \[limits\]"):
+        operability(replace(crane, limits={}), CLIPPED, scatter)
+    with pytest.raises(InputError, match="simulated for 100 s, but .* need 300 s at least"):
+        operability(crane, CLIPPED, scatter, length=100.0)
+
+
+# --- scatter diagrams -----------------------------------------------------------------------------
+
+
+def test_a_diagram_is_read_whatever_the_order_of_its_columns(tmp_path):
+    path = tmp_path / "site.csv"
+    path.write_text("# a place\nshare [%],tp [s],hs [m]\n30,7,0.5\n0,9,2\n10,8,1.5\n", "utf-8")
+    found = Scatter.from_csv(path)
+    np.testing.assert_array_equal(found.height, [0.5, 1.5])
+    np.testing.assert_array_equal(found.period, [7.0, 8.0])
+    np.testing.assert_allclose(found.share, [0.75, 0.25])
+    assert not found.note
+
+
+@pytest.mark.parametrize(
+    ("text", "sentence"),
+    [
+        ("", "has the columns hs, tp and share in its first line; hs is missing"),
+        ("hs,tp\n1,2\n", "share is missing"),
+        ("hs,tp,share\n1,2\n", "line 2 has 2 entries, but the first has 3"),
+        ("hs,tp,share\n1,two,3\n", "line 2: tp is 'two', but must be a number"),
+        ("# x\nhs,tp,share\n1,-2,3\n", "Row 1 of the scatter diagram has a period of -2"),
+        ("hs,tp,share\n1,2,3\n1,2,4\n", "has the sea of 1 m and 2 s twice"),
+        ("hs,tp,share\n1,2,0\n", "All shares of the scatter diagram are 0"),
+        ("hs,tp,share\n", "needs at least one row"),
+        ("hs,tp,share\n1,nan,1\n", "Row 1 of the scatter diagram has a period of nan"),
+    ],
+)
+def test_what_is_no_diagram_is_said(tmp_path, text, sentence):
+    path = tmp_path / "site.csv"
+    path.write_text(text, "utf-8")
+    with pytest.raises(InputError) as error:
+        Scatter.from_csv(path)
+    assert sentence in str(error.value)
+    assert str(path) in str(error.value)
+
+
+def test_a_diagram_that_is_not_there_is_said(tmp_path):
+    with pytest.raises(FileError, match=r"none\.csv"):
+        Scatter.from_csv(tmp_path / "none.csv")
+
+
+def test_the_packaged_diagram_says_that_it_is_made_up():
+    packaged = Scatter.packaged()
+    assert packaged.share.sum() == pytest.approx(1.0)
+    assert "made up, of no place" in packaged.note
