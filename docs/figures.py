@@ -32,8 +32,7 @@ FIGURES = {
         "--plot crane.png",
     ),
     "crane-judge.png": (
-        "crane judge tg3637 --seeds 40 --scale luff.orifice=1.5 --no-remedies "
-        "--plot crane-judge.png",
+        "crane judge tg3637 --no-remedies --no-turns --plot crane-judge.png",
     ),
     "crane-follow.png": ("crane follow tg3637 --plot crane-follow.png",),
     "encoder.png": (
