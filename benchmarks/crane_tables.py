@@ -133,10 +133,10 @@ def part_cells(sets: list[list[Array]], part: float, known: float) -> Iterator[s
     finally:
         extremes.UPPER = usual
     values = np.array([estimate.value for estimate in found]) / known
-    held = np.mean([estimate.low <= known <= estimate.high for estimate in found])
+    held = np.sum([estimate.low <= known <= estimate.high for estimate in found])
     yield f"{values.mean():.3f}"
     yield f"{values.std(ddof=1):.3f}"
-    yield f"{held:.0%}"
+    yield f"{held:.0f} of {len(sets)}"
 
 
 def main() -> None:
