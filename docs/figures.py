@@ -36,7 +36,8 @@ FIGURES = {
         "--plot crane-judge.png",
     ),
     "crane-operability.png": (
-        "crane operability tg3637 --control feedback=0.2/0.2+ship+clip --plot crane-operability.png",
+        "crane operability tg3637 --control feedback=0.2/0.2+ship+clip "
+        "--plot crane-operability.png",
     ),
     "crane-follow.png": ("crane follow tg3637 --plot crane-follow.png",),
     "encoder.png": (
