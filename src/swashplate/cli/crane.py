@@ -192,7 +192,7 @@ def judge(
 
         more["executor"] = Dask(dask)
     from swashplate.crane import judge as judge_control
-    from swashplate.crane.judgment import SEAWAYS, seaways_needed
+    from swashplate.crane.judging import SEAWAYS, seaways_needed
 
     crane = study.chosen
     side.print(seaways_needed(study.seeds or SEAWAYS, allowed / 100.0))
