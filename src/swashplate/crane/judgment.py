@@ -481,9 +481,11 @@ class Judgment(Tabular):
     def _rests(self) -> list[str]:
         """What the answers hang on, in sentences."""
         study, crane = self.study, self.study.crane
+        none = study.cases[NONE]
+        start = "a stationary swing" if none.swing_damping > 0.0 else "rest, as it is undamped"
         rule = (
-            f"Each seaway counts for {study.length:g} s after {study.run_in:g} s from a stationary "
-            "swing. Control harms if it is worse than none in more than "
+            f"Each seaway counts for {study.length:g} s after {study.run_in:g} s from {start}. "
+            "Control harms if it is worse than none in more than "
             f"{100.0 * self.allowed:g} % of them; the 95 % interval of that share decides."
         )
         seaway, spectrum = study.seaway, study.seaway.spectrum
@@ -491,7 +493,6 @@ class Judgment(Tabular):
             f"Waves of {spectrum.height:g} m with a peak at {spectrum.period:g} s and a peak "
             f"factor of {spectrum.peak_factor:g}, at a heading of {seaway.heading_deg:g} deg."
         )
-        none = study.cases[NONE]
         damping, given = none.swing_damping, "swing_damping" in none.hangs
         assumed = not given and crane.quantities["swing_damping"].status == "assumed"
         words = f"The load's swing has a damping of {100.0 * damping:g} %"
