@@ -25,7 +25,7 @@ from swashplate.crane import (
     upgraded,
 )
 from swashplate.crane.confidence import fewest_seaways, mean_of, more_seaways, share_of
-from swashplate.crane.judgment import seaways_needed
+from swashplate.crane.judging import seaways_needed
 from swashplate.crane.outcome import STOPPED
 from swashplate.crane.result import PUMPS
 from swashplate.crane.rope import GRAVITY
@@ -321,7 +321,7 @@ def test_boom_along_the_ship_is_calm_where_the_slew_does_the_work(crane):
         crane, "bearing", CLIPPED, points=[0.0, 90.0], seeds=[0], drives=("identified",), **SHORT
     )
     assert found.names == ("no control", "identified")
-    none, own = found.mean().T
+    none, own = found.rms().T
     assert own[0] < 0.2 * none[0]
     assert own[1] > own[0]
 

@@ -55,7 +55,6 @@ def test_shares_are_those_of_the_cells_and_add_up_to_a_year(scatter, found):
             if cell.limited_by == WORKABLE
         )
         assert found.workable(name) == pytest.approx(workable)
-    assert found.workable("no control") < found.workable("identified")
 
 
 def test_what_is_beyond_a_limit_stays_so_in_higher_waves(scatter, found):

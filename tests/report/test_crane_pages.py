@@ -119,7 +119,7 @@ def year(crane):
     own |= {(2, 0.0): bad, (2, 90.0): bad}
     cells = {"no control": none, "identified": own}
     hoist = (0.7, 8.0, 90.0)
-    return Operability(crane, CLIPPED, scatter, (0.0, 90.0), cells, Seaway(), hoist)
+    return Operability(crane, control.Clip(), scatter, (0.0, 90.0), cells, Seaway(), hoist)
 
 
 def written(write, result, folder):
@@ -302,7 +302,8 @@ def swept(crane, over, points, values):
     seaways = np.stack([both, 0.5 * both], axis=-1)
     seaways[1] *= 1.1
     points = np.radians(points) if over == "bearing" else np.asarray(points)
-    return Sweep(over, points, ("no control", "identified"), seaways, crane, Seaway())
+    names, spectrum = ("no control", "identified"), np.full(len(points), 0.1)
+    return Sweep(over, points, names, seaways, spectrum, crane, Seaway())
 
 
 @pytest.mark.parametrize("over", ["bearing", "height", "orifice"])
@@ -321,7 +322,7 @@ def test_figures_of_sweeps_mark_where_a_run_left_the_model(over, crane, assert_l
     line = ax.lines[0]
     assert list(np.isnan(line.get_ydata())[:4]) == [False, False, True, False]
     if over != "bearing":
-        assert line.get_ydata()[0] == pytest.approx(0.5 * (2.0 + 2.2))
+        assert line.get_ydata()[0] == pytest.approx(np.sqrt(0.5 * (2.0**2 + 2.2**2)))
 
 
 @pytest.mark.parametrize(

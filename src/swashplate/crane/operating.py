@@ -205,8 +205,8 @@ def operability(
     study = Study.of(crane, control, seeds=SEEDS, sea=base, drives=drives, **setup)
     if study.length < SHORTEST:
         raise InputError(
-            f"A sea is simulated for {study.length:g} s, but its largest values in three hours need "
-            f"{SHORTEST:g} s at least."
+            f"A sea is simulated for {study.length:g} s, but its largest values in three hours "
+            f"need {SHORTEST:g} s at least."
         )
     columns = [
         _Column(name, float(heading), float(period))

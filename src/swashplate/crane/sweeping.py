@@ -13,6 +13,7 @@ from swashplate.crane.axes import check_names
 from swashplate.crane.changed_drives import upgraded
 from swashplate.crane.crane import Crane
 from swashplate.crane.sea import HIGHEST, Seaway
+from swashplate.crane.spectral import linear_response
 from swashplate.crane.study import NONE, Case, Controllers, Study
 from swashplate.errors import InputError
 from swashplate.results import Result, figures
@@ -73,12 +74,15 @@ class Sweep(Result):
     names: tuple[str, ...]
     values: Array = field(repr=False)
     """(seaways, n, variants) root mean square swing [rad]; NaN if the run left the model."""
+    spectrum: Array = field(repr=False)
+    """(n,) root mean square swing without control in the frequency domain [rad]; NaN if the swing
+    is not damped."""
     crane: Crane = field(repr=False)
     seaway: Seaway = field(repr=False)
 
-    def mean(self) -> Array:
-        """(n, variants) means over the seaways [rad]; NaN if one of the runs left the model."""
-        return np.asarray(np.mean(self.values, axis=0))
+    def rms(self) -> Array:
+        """(n, variants) root mean square over the seaways [rad]; NaN if a run left the model."""
+        return np.asarray(np.sqrt(np.mean(self.values**2, axis=0)))
 
     def plot(self, *, title: str = "") -> Figure:
         """Figure of the swing over the quantity; `swashplate.report.figures.plot_sweep`."""
@@ -89,9 +93,11 @@ class Sweep(Result):
         unit = SWEPT[self.over].unit.replace("deg", "rad")
         columns = [Column(self.over, ".0f" if unit == "rad" else ".2f", unit)]
         columns += [Column(name, ".2f", "rad", none="left the model") for name in self.names]
-        table = Table("Swing, RMS, mean over seaways", columns)
-        for point, row in zip(self.points.tolist(), self.mean().tolist(), strict=True):
-            table.add(point, *row)
+        columns.append(Column(f"{NONE}, by its spectrum", ".2f", "rad", none="–"))
+        table = Table("Swing, RMS over seaways", columns)
+        rows = zip(self.points.tolist(), self.rms().tolist(), self.spectrum.tolist(), strict=True)
+        for point, row, spectrum in rows:
+            table.add(point, *row, spectrum)
         return [table]
 
 
@@ -135,11 +141,15 @@ def sweep(
     none = asked.cases[NONE]
     variants = {name: case for name, case in asked.cases.items() if name == NONE or case != none}
     values = np.empty((len(asked.seeds), grid.size, len(variants)))
+    spectrum = np.full(grid.size, np.nan)
     for index, point in enumerate(grid.tolist()):
         places = [swept.at(asked.seaway, case, point) for case in variants.values()]
         seaway, cases = places[0][0], tuple(case for _, case in places)
         outcomes = replace(asked, seaway=seaway).outcomes(cases)
         values[:, index] = [[outcome.rms_swing for outcome in of] for of in outcomes]
+        if cases[0].swing_damping > 0.0:
+            linear = linear_response(crane, seaway, **cases[0].pose, **cases[0].hangs)
+            spectrum[index] = linear.values["swing"].rms
     if over == "bearing":
         grid = np.radians(grid)
-    return Sweep(over, grid, tuple(variants), values, crane, asked.seaway)
+    return Sweep(over, grid, tuple(variants), values, spectrum, crane, asked.seaway)

@@ -13,7 +13,7 @@ from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 from numpy.typing import NDArray
 
 from swashplate.crane import Crane, CraneRun, Followable, Hull, Seaway, Sweep
-from swashplate.crane.confidence import mean_of
+from swashplate.crane.confidence import rms_of
 from swashplate.errors import InputError
 from swashplate.report import style
 from swashplate.report.lines import SHADES, draw, fit_time, shade_handle, stretches
@@ -199,13 +199,14 @@ def plot_sweep(result: Sweep, *, title: str = "") -> Figure:
     """
     looks = style.strokes(result.names)
     usual, below = LOOKS[result.over]
-    means = "mean of {} with its 95 % interval"
+    means = "over {} with its 95 % interval"
     if result.over == "bearing":
-        means = "RMS, mean of {}"
-    left = bool(np.isnan(result.mean()).any())
+        means = "RMS over {}"
+    left = bool(np.isnan(result.rms()).any())
     said = (
         seaway_words(result.seaway, result.over != "height"),
         means.format(count(len(result.values), "seaway")),
+        "" if result.over == "bearing" else "thin line: no control, by its spectrum",
         "×: a run left the model" if left else "",
         assumed(result.crane),
     )
@@ -217,7 +218,7 @@ def plot_sweep(result: Sweep, *, title: str = "") -> Figure:
     highest = LEAST
     for variant, (color, dashes) in enumerate(looks.values()):
         of_variant = values[:, :, variant].T
-        estimates = np.array([mean_of(seaways, 0.0) for seaways in of_variant])
+        estimates = np.array([rms_of(seaways) for seaways in of_variant])
         gone = np.isnan(of_variant).any(axis=1)
         estimates[gone] = np.nan  # a mean of those that stayed would be too small
         middle, low, high = np.maximum(estimates, LEAST).T
@@ -228,6 +229,7 @@ def plot_sweep(result: Sweep, *, title: str = "") -> Figure:
         across = ax.get_xaxis_transform()
         ax.plot(points[gone], height, "x", color=color, ms=5.0, transform=across, clip_on=False)
         highest = max(highest, float(np.nanmax(np.append(middle, LEAST))))
+    ax.plot(points, np.degrees(result.spectrum), color=style.GREY, linewidth=0.8, zorder=1.5)
     if result.over == "height":
         ax.set_ylim(0.0, 1.25 * highest)
         ax.set_xlim(0.0, 1.02 * float(points.max()))
@@ -271,7 +273,7 @@ def _polar(result: Sweep, title: str, looks: dict[str, style.Stroke], *said: str
         ax.set_thetamax(np.degrees(first) + 180.0)
         ax.spines["start"].set_color(style.FAINT)
         ax.spines["end"].set_color(style.FAINT)
-    mean = np.degrees(result.mean())
+    mean = np.degrees(result.rms())
     largest = float(np.nanmax(np.append(mean, RADII[1])))
     # closed if the bearings go all the way around, not if they are part of a circle
     again = result.points[:1] + 2.0 * np.pi

@@ -1,0 +1,215 @@
+"""How far the answers on the packaged crane depend on what they should not depend on.
+
+    .venv/bin/python benchmarks/crane_verdicts.py stability [--sets 10] [--hours 3]
+    .venv/bin/python benchmarks/crane_verdicts.py cells [--cells 20]
+    .venv/bin/python benchmarks/crane_verdicts.py spectrum
+    .venv/bin/python benchmarks/crane_verdicts.py controllers [--seaways 80]
+
+stability: the verdicts of sets of other seaways, which count for 10 min, 20 min and hours.
+cells: cells of the made-up year, drawn at random, against a run of three hours each.
+spectrum: swing without control by simulation over that by its spectrum, for ships, headings and
+damping ratios; small waves, so that the crane is linear.
+controllers: those that the package has, on the packaged crane's own drives in sea state 3 abeam.
+"""
+
+from __future__ import annotations
+
+import argparse
+from math import sqrt
+from pathlib import Path
+
+import numpy as np
+
+from swashplate.cli.crane_options import control_of
+from swashplate.crane import (
+    Crane,
+    Hull,
+    Scatter,
+    Seaway,
+    Spectrum,
+    Study,
+    control,
+    judge,
+    linear_response,
+    operability,
+    read_ship,
+)
+from swashplate.crane.confidence import rms_of
+from swashplate.crane.judgment import Judgment, largest_of
+
+IDEAL_DESIGN = (
+    control.DelayedFeedback(0.2, 0.2) | control.ShipCompensation() | control.PositionLoop(1.5)
+)
+CLIPPED = control.DelayedFeedback(0.2, 0.2) | control.ShipCompensation() | control.Clip()
+S175 = Path(__file__).parents[2] / "shared" / "data" / "s175" / "input.re1"
+HOURS = 10_800.0
+
+
+def stability(sets: int, hours: float) -> None:
+    """Print the verdicts of other seaways and other lengths."""
+    lengths = ((600.0, 120, sets), (1200.0, 120, sets), (3600.0 * hours, 72, 2))
+    print("control, time that counts, seaways, harmless, sufficient, half widths of the RMS")
+    for name, law in (("for ideal drives", IDEAL_DESIGN), ("clipped", CLIPPED)):
+        for length, seaways, count in lengths:
+            for first in range(count):
+                judged = one_verdict(law, range(1000 * first, 1000 * first + seaways), length)
+                widths = ", ".join(f"{half_width(judged.swing(each)):.1%}" for each in judged.names)
+                answers = f"{judged.harmless}, {judged.sufficient}"
+                print(f"{name}, {length:g} s, {seaways}, {answers}, {widths}", flush=True)
+
+
+def one_verdict(law: control.Control, seeds: range, length: float) -> Judgment:
+    """The verdict on the packaged crane's own drives in some seaways."""
+    return judge(
+        Crane.preset("tg3637"),
+        law,
+        seeds=seeds,
+        drives=("identified",),
+        length=length,
+        remedies=False,
+        turns=False,
+    )
+
+
+def half_width(swing: np.ndarray) -> float:
+    """Half of the 95 % interval of a root mean square, over it."""
+    known = swing[np.isfinite(swing)]
+    if known.size < 2:
+        return float("nan")
+    squares = known**2
+    return 0.99 * float(squares.std(ddof=1)) / sqrt(known.size) / float(squares.mean())
+
+
+def cells(count: int) -> None:
+    """Print cells against runs of three hours."""
+    crane, scatter = Crane.preset("tg3637"), Scatter.packaged()
+    year = operability(crane, CLIPPED, scatter)
+    random = np.random.default_rng(0)
+    keys = [
+        (name, key) for name in ("identified", "ideal", "no control") for key in year.cells[name]
+    ]
+    right = 0
+    for index in random.choice(len(keys), count, replace=False):
+        name, (row, heading) = keys[index]
+        cell = year.cells[name][row, heading]
+        sea = Seaway(
+            Spectrum(float(scatter.height[row]), float(scatter.period[row])), heading_deg=heading
+        )
+        drives = ("identified",) if name == "no control" else (name,)
+        study = Study.of(crane, CLIPPED, seeds=[77], sea=sea, drives=drives, length=HOURS)
+        case = list(study.cases.values())[0 if name == "no control" else 1]
+        outcomes = [one for (one,) in study.outcomes([case])]
+        if outcomes[0].left:
+            worst, ratio = outcomes[0].left, np.inf
+        else:
+            ratios = {
+                limited: largest_of(outcomes, limited).value / limit
+                for limited, limit in crane.limits_si.items()
+                if limited in outcomes[0].peaks
+            }
+            worst = max(ratios, key=lambda limited: ratios[limited])
+            ratio = ratios[worst]
+        same = (cell.limited_by == "") == (ratio <= 1.0)
+        right += same
+        height, period = scatter.height[row], scatter.period[row]
+        how = "simulated" if cell.simulated else "by spectrum"
+        print(
+            f"{name}, {height:g} m, {period:g} s, {heading:g} deg: "
+            f"{cell.limited_by or 'workable'} {cell.ratio:.2f} {how}; in 3 h {ratio:.2f} "
+            f"{worst if ratio > 1.0 else 'workable'}{'' if same else ' DIFFERS'}",
+            flush=True,
+        )
+    print(f"{right} of {count} the same")
+
+
+def spectrum() -> None:
+    """Print simulated swing over that of the spectrum."""
+    crane = Crane.preset("tg3637")
+    ships = {"hull, roll 13 s": Hull(203.8, 23.2, 9.75)}
+    if S175.exists():
+        ships["S175"] = read_ship(S175)
+    for name, ship in ships.items():
+        for heading in (60.0, 90.0, 135.0):
+            row = []
+            for damping in (0.002, 0.005, 0.01, 0.02, 0.05):
+                sea = Seaway(Spectrum(0.2, 8.0), heading_deg=heading, ship=ship)
+                study = Study.of(
+                    crane, CLIPPED, sea=sea, seeds=range(48), swing_damping=damping, run_in=0.0
+                )
+                found = study.outcomes([study.cases["no control"]])
+                squares = np.array([outcome.rms_swing for (outcome,) in found]) ** 2
+                expected = linear_response(crane, sea, swing_damping=damping).values["swing"].rms
+                half = 2.01 * squares.std(ddof=1) / sqrt(squares.size) / squares.mean() / 2.0
+                ratio = sqrt(squares.mean()) / expected
+                row.append(f"{ratio:.3f} ± {half:.3f}")
+            print(f"{name:16s} {heading:4.0f}°  " + "  ".join(row), flush=True)
+
+
+CONTROLLERS = (
+    "feedback=0.2/0.2+loop=1.5",
+    "feedback=0.2/0.2+ship+loop=1.5",
+    "ship+clip",
+    "feedback=0.2/0.2+clip",
+    "feedback=0.2/0.2+ship+clip",
+    "feedback=0.2/0.2+ship+clip+sensors=0.1/0.05/50",
+    "feedback=0.2/0.2+ship+clip+sensors=0.5/0.2/10",
+    "feedback=0.2/0.2+ship+clip+sensors=1/0.5/5",
+    "feedback=0.1/0.25+clip",
+    "feedback=0.3/0.25+clip",
+)
+"""As the command line takes them."""
+
+
+def controllers(seaways: int) -> None:
+    """Print a row for each controller, as a table of Markdown."""
+    laws = {words: control_of(words) for words in CONTROLLERS}
+    judged = judge(
+        Crane.preset("tg3637"),
+        laws,
+        seeds=range(seaways),
+        drives=("identified",),
+        remedies=False,
+        turns=False,
+    )
+    print(
+        "| `--control` | swing, RMS | worse than none | largest swing in 3 h | place | saturation |"
+    )
+    print("|---|--:|--:|--:|--:|--:|")
+    for name in judged.names:
+        words = name.partition(", ")[0]
+        swing = np.degrees(rms_of(judged.swing(name)))
+        left = sum(judged.left(name).values())
+        worse = "" if name == "no control" else f"{judged.worse(name).value:.0%}"
+        limited = {each.name: each.largest.value for each in judged.limited(name)}
+        rms = "–" if np.isnan(swing[0]) else f"{swing[0]:.2f}°"
+        gone = f" ({left} left)" if left else ""
+        print(
+            f"| {words} | {rms}{gone} | {worse} | {np.degrees(limited['swing']):.0f}° | "
+            f"{limited['placement']:.1f} m | {limited['saturation']:.0%} |",
+            flush=True,
+        )
+
+
+def main() -> None:
+    """Run what is asked for."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("what", choices=("stability", "cells", "spectrum", "controllers"))
+    parser.add_argument("--seaways", type=int, default=80)
+    parser.add_argument("--sets", type=int, default=10)
+    parser.add_argument("--hours", type=float, default=3.0)
+    parser.add_argument("--cells", type=int, default=20)
+    given = parser.parse_args()
+    if given.what == "stability":
+        stability(given.sets, given.hours)
+    elif given.what == "cells":
+        cells(given.cells)
+    elif given.what == "controllers":
+        controllers(given.seaways)
+    else:
+        spectrum()
+
+
+if __name__ == "__main__":
+    main()
