@@ -1,11 +1,13 @@
-"""Rows of the table for the crane: rope, open and closed loop, seaways, a judgment."""
+"""Rows of the table for the crane: rope, seaway, runs, a judgment, a year of operability."""
 
 from collections.abc import Iterator
+from statistics import median
+from time import process_time
 
 import numpy as np
 from processes import limited
 from table import Row, duration
-from timing import alone
+from timing import Run, alone
 
 from swashplate.crane import (
     Crane,
@@ -22,42 +24,63 @@ from swashplate.crane import (
 ROPE, SEAWAY = 1e-3, 12e-3
 IDEAL, OPEN, CLOSED = 4.0, 9.0, 17.0
 """Targets, times of the rope's march."""
-JUDGED, YEAR = 10.0, 60.0
-"""Targets on two cores: of 20 seaways 20 s of processor time. [s]"""
+JUDGED, YEAR = 20.0, 60.0
+"""Targets: processor time of a judgment, and time of a year on two cores. [s]"""
 CLIPPED = control.DelayedFeedback(0.2, 0.2) | control.ShipCompensation() | control.Clip()
 
 
 def crane_rows() -> Iterator[Row]:
-    """60 s at 512 Hz unless said otherwise, on one core but for what says so."""
+    """60 s at 512 Hz unless said otherwise, in processor time but for what says so."""
     crane, stick = Crane.preset("tg3637"), Stick.rest(60.0)
     how = {"slew_deg": 90.0, "rope_m": 27.0}
     ship = Seaway("ss3", seed=1).motion(60 * 512 + 1)
     tip = simulate(crane, stick, sea=ship, **how).tip
+    lengths = np.full(len(tip), 27.0)
 
     def row(what: str, seconds: float, target: float) -> Row:
         return limited(what, seconds, target, duration(seconds), f"< {duration(target)}")
 
-    lengths = np.full(len(tip), 27.0)
-    rope = alone(lambda: load_motion(tip, lengths), 15)
-    yield row("crane: rope march, 60 s", rope, ROPE)
-    seaway = alone(lambda: Seaway("ss3", seed=1).motion(600 * 512 + 1), 15)
-    yield row("crane: ship's motion in a seaway, 600 s", seaway, SEAWAY)
-
-    def over_rope(what: str, seconds: float, target: float) -> Row:
+    def over_rope(what: str, run: Run, target: float) -> Row:
+        seconds = processor_time(run, 15)
         ratio = seconds / rope
         shown = f"{duration(seconds)}, {ratio:.1f} times the rope"
         return limited(what, ratio, target, shown, f"< {target:g} times the rope")
 
+    rope = processor_time(lambda: load_motion(tip, lengths), 15)
+    yield row("crane: rope march, 60 s", rope, ROPE)
+    seaway = processor_time(lambda: Seaway("ss3", seed=1).motion(600 * 512 + 1), 15)
+    yield row("crane: ship's motion in a seaway, 600 s", seaway, SEAWAY)
     moving = {**how, "sea": ship}
-    ideal = alone(lambda: simulate(crane, stick, actuation="ideal", **moving), 9)
-    yield over_rope("crane: ideal drives in a seaway, 60 s", ideal, IDEAL)
-    plain = alone(lambda: simulate(crane, stick, **moving), 9)
-    yield over_rope("crane: open loop, three drives, in a seaway, 60 s", plain, OPEN)
+    yield over_rope(
+        "crane: ideal drives in a seaway, 60 s",
+        lambda: simulate(crane, stick, actuation="ideal", **moving),
+        IDEAL,
+    )
+    yield over_rope(
+        "crane: open loop, three drives, in a seaway, 60 s",
+        lambda: simulate(crane, stick, **moving),
+        OPEN,
+    )
     law = control.TipShaper("zv") | CLIPPED
-    closed = alone(lambda: simulate(crane, stick, control=law, **moving), 9)
-    yield over_rope("crane: closed loop, three drives, in a seaway, 60 s", closed, CLOSED)
+    yield over_rope(
+        "crane: closed loop, three drives, in a seaway, 60 s",
+        lambda: simulate(crane, stick, control=law, **moving),
+        CLOSED,
+    )
     short = {"remedies": False, "turns": False}
-    judged = alone(lambda: judge(crane, CLIPPED, seeds=range(20), **short), 1)
-    yield row("crane: judgment, 20 seaways of 10 min, 3 variants, all cores", judged, JUDGED)
+    judged = processor_time(lambda: judge(crane, CLIPPED, seeds=range(20), **short), 1)
+    yield row("crane: judgment, 20 seaways of 10 min, 3 variants", judged, JUDGED)
     year = alone(lambda: operability(crane, CLIPPED, Scatter.packaged()), 1)
-    yield row("crane: operability, a year, 8 headings, 3 variants, all cores", year, YEAR)
+    yield row(
+        "crane: operability, a year, 8 headings, 3 variants, all cores, wall clock", year, YEAR
+    )
+
+
+def processor_time(run: Run, rounds: int) -> float:
+    """Median processor time of a run on all its threads, which other loads change little. [s]"""
+    found = []
+    for _ in range(rounds):
+        begin = process_time()
+        run()
+        found.append(process_time() - begin)
+    return median(found)

@@ -32,8 +32,12 @@ FIGURES = {
         "--plot crane.png",
     ),
     "crane-judge.png": (
-        "crane judge tg3637 --seeds 40 --scale luff.orifice=1.5 --no-remedies "
+        "crane judge tg3637 --scale luff.orifice=2.5 --no-remedies --no-turns "
         "--plot crane-judge.png",
+    ),
+    "crane-operability.png": (
+        "crane operability tg3637 --control feedback=0.2/0.2+ship+clip "
+        "--plot crane-operability.png",
     ),
     "crane-follow.png": ("crane follow tg3637 --plot crane-follow.png",),
     "encoder.png": (

@@ -25,7 +25,7 @@ from swashplate.crane import (
     upgraded,
 )
 from swashplate.crane.confidence import fewest_seaways, mean_of, more_seaways, share_of
-from swashplate.crane.judgment import seaways_needed
+from swashplate.crane.judging import seaways_needed
 from swashplate.crane.outcome import STOPPED
 from swashplate.crane.result import PUMPS
 from swashplate.crane.rope import GRAVITY

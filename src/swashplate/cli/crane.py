@@ -41,7 +41,7 @@ app = typer.Typer(
 
 
 def show_crane(crane: str, *, toml: bool = False) -> None:
-    """Show a crane's geometry: values, which are assumed, and where they come from.
+    """Show a crane's geometry and limits: which are assumed, and where they come from.
 
     Options:
       crane CRANE|FILE.toml: A packaged crane, tg3637, or your own.
@@ -59,7 +59,7 @@ def show_crane(crane: str, *, toml: bool = False) -> None:
         typer.echo(read(crane), nl=False)
         return
     chosen = crane_of(crane)
-    show(chosen.table())
+    show(chosen.table(), *([chosen.limit_table()] if chosen.limits else []))
     for axis in AXES:
         note(f"{axis}: {getattr(chosen, axis).parameters.title}")
     for sentence in chosen.provenance():
@@ -192,7 +192,7 @@ def judge(
 
         more["executor"] = Dask(dask)
     from swashplate.crane import judge as judge_control
-    from swashplate.crane.judgment import SEAWAYS, seaways_needed
+    from swashplate.crane.judging import SEAWAYS, seaways_needed
 
     crane = study.chosen
     side.print(seaways_needed(study.seeds or SEAWAYS, allowed / 100.0))

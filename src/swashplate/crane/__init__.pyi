@@ -10,10 +10,10 @@ from .following import Followable as Followable
 from .following import follow as follow
 from .free_swing import FreeSwing as FreeSwing
 from .free_swing import swing_damping as swing_damping
+from .judging import judge as judge
 from .judgment import Judged as Judged
 from .judgment import Judgment as Judgment
 from .judgment import Remedy as Remedy
-from .judgment import judge as judge
 from .limits import LIMITED as LIMITED
 from .linear_crane import linearize as linearize
 from .operating import Operability as Operability

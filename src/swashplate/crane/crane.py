@@ -255,13 +255,25 @@ class Crane:
 
     def table(self) -> Table:
         """Geometry with status and source; what is assumed is marked."""
-        heads = ("quantity", "value", "unit", "status")
-        made = Table(self.title or self.name, (*map(Column, heads), Column("source", wrap=True)))
-        for name, each in self.quantities.items():
-            text = ", ".join(f"{value:g}" for value in each.values)
-            look = each.status == "assumed"
-            made.add(name.replace("_", " "), text, each.unit, each.status, each.source, look=look)
-        return made
+        names = {name: name.replace("_", " ") for name in self.quantities}
+        return _table(self.title or self.name, self.quantities, names)
+
+    def limit_table(self) -> Table:
+        """Limits with status and source; what is assumed is marked."""
+        names = {name: limited.label for name, limited in LIMITED.items()}
+        return _table("Limits of an operation", self.limits, names)
+
+
+def _table(title: str, quantities: Mapping[str, Quantity], names: Mapping[str, str]) -> Table:
+    """Quantities with unit, status and source, by what they are called."""
+    heads = ("quantity", "value", "unit", "status")
+    table = Table(title, (*map(Column, heads), Column("source", wrap=True)))
+    for name, quantity in quantities.items():
+        value = ", ".join(f"{number:g}" for number in quantity.values)
+        assumed = quantity.status == "assumed"
+        cells = (names[name], value, quantity.unit, quantity.status, quantity.source)
+        table.add(*cells, look=assumed)
+    return table
 
 
 @lru_cache(maxsize=512)

@@ -23,8 +23,8 @@ GROUPS = 10
 """Groups of runs, one of which at a time is left out for the interval of an extreme."""
 UPPER, FEWEST_UPPER = 0.1, 20
 """Part of the peaks that the tail is fitted to, and their least number. On Gaussian signals whose
-extreme is known, narrow and wide, of one and two components, the upper tenth errs by 1 %, the upper
-half by 5 %: docs/crane-checks.md."""
+extreme is known, narrow and wide, of one and two components, the upper tenth errs by 2.5 % at most,
+the upper half by 5 %: docs/crane-checks.md."""
 DIRECTIONS = 240
 """Directions over half a circle in which a vector's crossings are added up."""
 THINNEST = 0.01

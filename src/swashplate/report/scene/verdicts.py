@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from markupsafe import Markup
 
-from swashplate.crane import LIMITED, Crane, Hull, Judgment, Operability, Seaway, follow
+from swashplate.crane import Crane, Hull, Judgment, Operability, Seaway, follow
 from swashplate.crane.axes import AXES
 from swashplate.crane.drives import UNUSABLE
 from swashplate.crane.judgment import Decision
@@ -25,7 +25,7 @@ from swashplate.report.fit_report.html_page import (
     text,
     titled,
 )
-from swashplate.tables import Column, Table, count, listed, write_text
+from swashplate.tables import Table, count, listed, write_text
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -217,14 +217,7 @@ def _assumptions(crane: Crane) -> list[Block]:
     """Limits and geometry with their sources, what is assumed marked."""
     blocks = []
     if crane.limits:
-        columns = (*map(Column, ("limit", "value", "unit", "status")), Column("source", wrap=True))
-        limits = Table("Limits, with their sources", columns)
-        for name, limit in crane.limits.items():
-            value = ", ".join(f"{number:g}" for number in limit.values)
-            label, look = LIMITED[name].label, limit.status == "assumed"
-            unit = "" if limit.unit == "1" else limit.unit
-            limits.add(label, value, unit, limit.status, limit.source, look=look)
-        blocks += titled(limits)
+        blocks += titled(crane.limit_table())
     geometry = [Block("table", crane.table())]
     return [*blocks, Block("details", geometry, "Geometry, with its sources"), text(ASSUMED)]
 
