@@ -136,7 +136,7 @@ def _remedies(judgment: Judgment, tables: Sequence[Table]) -> list[Block]:
     blocks = [text(words) for words in judgment.remedy_sentences()]
     blocks += [block for table in tables for block in titled(table)]
     if judgment.tried and judgment.remedies:  # else the sentence says so
-        blocks.append(text(f"Tried, and not enough: {listed(judgment.tried)}.", "remark"))
+        blocks.append(text(f"Tried as well, and not better: {listed(judgment.tried)}.", "remark"))
     return blocks
 
 
