@@ -133,6 +133,12 @@ def test_table_has_a_row_for_each_variant(found):
     assert table.rows[0].cells[1] == found.workable("no control")
 
 
+def test_seaways_of_a_cell_are_as_many_as_asked_for(crane):
+    one = operability(crane, CLIPPED, Scatter.of([0.3], [6.0], [1.0]), headings=(90.0,),
+                      drives=("identified",), length=300.0, seeds=range(1))  # fmt: skip
+    assert "in 1 seaway of 5 min" in " ".join(one.sentences())
+
+
 def test_each_cell_is_a_row(scatter, found):
     frame = found.to_polars()
     assert frame.height == 3 * len(scatter.height)

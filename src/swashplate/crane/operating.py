@@ -33,7 +33,7 @@ from swashplate.executors import Executor, Serial, Threads
 from swashplate.progress import counted
 from swashplate.results import Tabular, figures
 from swashplate.simulation.result import Limit
-from swashplate.tables import Column, Table, listed
+from swashplate.tables import Column, Table, count, listed
 
 if TYPE_CHECKING:
     import polars
@@ -228,7 +228,7 @@ def operability(
     if not headings:
         raise InputError("Operability needs one heading of the waves at least.")
     base = Seaway() if sea is None else sea
-    study = Study.of(crane, control, seeds=SEEDS, sea=base, drives=drives, **setup)
+    study = Study.of(crane, control, sea=base, drives=drives, **{"seeds": SEEDS, **setup})
     if study.length < SHORTEST:
         raise InputError(
             f"A sea is simulated for {study.length:g} s, but its largest values in three hours "
@@ -254,7 +254,8 @@ def operability(
         if too_slow < hoist[0] and column.variant == NONE:
             hoist = (too_slow, column.period, column.heading)
     ordered = {name: dict(sorted(of_name.items())) for name, of_name in cells.items()}
-    simulated = f"A cell is simulated in {len(SEEDS)} seaways of {study.length / 60.0:g} min."
+    seaways = count(len(study.seeds), "seaway")
+    simulated = f"A cell is simulated in {seaways} of {study.length / 60.0:g} min."
     case = f"{study.cases[list(study.cases)[-1]].words()} {simulated}"
     return Operability(
         crane, control, scatter, tuple(map(float, headings)), ordered, base, case, hoist
