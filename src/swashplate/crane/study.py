@@ -130,7 +130,7 @@ class Case(NamedTuple):
         if clips:
             size = clip_size(clips[0], crane, pose)
             clip = f"; the clip is {size:.2g} m along the boom, sized for the crane's own drives"
-        return f"Control {control!r}: {stands}{clip}."
+        return f"Control by {control.words()}: {stands}{clip}."
 
     def wanted(self, seaway: Seaway) -> tuple[float, float] | None:
         """Where the load shall be, horizontal and inertial [m]; None if the operator moves it."""
