@@ -214,6 +214,7 @@ def test_follow_and_a_sweep_print_their_tables(tmp_path):
         ("judge tg3637 --length 20", "must count for at least 60 s, eight swings"),
         ("operability tg3637 --headings 1,x", "--headings 1,x: 'x' is not a number."),
         ("operability tg3637 none.csv", "none.csv"),
+        ("operability tg3637 --heading 45", "--heading is of one sea: operability goes over"),
         ("run tg3637 --variant ideal:magic", "There is no control 'magic'; there are zv-tip"),
         ("run tg3637 --variant ideal:sensors=0.1/9", "delay of sensors is 9.0, but must be"),
         ("run tg3637 --variant ideal:sensors=1/2/3/4", "There is no control 'sensors=1/2/3/4'"),

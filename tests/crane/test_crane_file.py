@@ -155,6 +155,13 @@ def test_a_source_does_not_stay_with_another_value(read):
     read(slew_axis='{ value = [40.0, 8.5, 19.0], unit = "m", source = "port pedestal, drawing 7" }')
 
 
+def test_a_limits_source_does_not_stay_with_another_value(tmp_path):
+    path = tmp_path / "mine.toml"
+    path.write_text(preset_text("tg3637").replace("value = 4.0", "value = 3.0"), "utf-8")
+    with pytest.raises(ParameterError, match=r"mine\.toml: side_lead has another value than tg"):
+        Crane.from_toml(path)
+
+
 def test_published_values_have_a_source(read):
     with pytest.raises(ParameterError, match=r"mine\.toml: geometry\.safe_load: .*source"):
         read(safe_load='{ value = 15.0, unit = "t", status = "published" }')

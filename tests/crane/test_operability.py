@@ -5,7 +5,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from swashplate.crane import Crane, Scatter, Seaway, Spectrum, control, linear_response, operability
+from swashplate.crane import (
+    Crane,
+    Scatter,
+    Seaway,
+    Spectrum,
+    TransferFunctions,
+    control,
+    linear_response,
+    operability,
+)
 from swashplate.crane.operating import LEFT, NEAR, WORKABLE
 from swashplate.crane.study import Study
 from swashplate.errors import FileError, InputError
@@ -122,6 +131,49 @@ def test_table_has_a_row_for_each_variant(found):
     (table,) = found.tables()
     assert [row.cells[0] for row in table.rows] == ["no control", "ideal", "identified"]
     assert table.rows[0].cells[1] == found.workable("no control")
+
+
+def test_seaways_of_a_cell_are_as_many_as_asked_for(crane):
+    one = operability(crane, CLIPPED, Scatter.of([0.3], [6.0], [1.0]), headings=(90.0,),
+                      drives=("identified",), length=300.0, seeds=range(1))  # fmt: skip
+    assert "in 1 seaway of 5 min" in " ".join(one.sentences())
+
+
+def test_each_cell_is_a_row(scatter, found):
+    frame = found.to_polars()
+    assert frame.height == 3 * len(scatter.height)
+    assert frame["share"].sum() == pytest.approx(3.0)
+    calm = frame.filter(variant="no control", hs=0.1)
+    assert calm["limited_by"].to_list() == [""]
+    assert calm["heading"].to_list() == [pytest.approx(np.pi / 2.0)]
+
+
+def test_what_was_computed_is_said(found):
+    words = " ".join(found.sentences())
+    parts = (
+        "delayed feedback of 0.2 at 0.2 periods, ship compensation, a clip at 0.8",
+        "boom 45 deg up and 90 deg from the bow",
+        "rope 27 m",
+        "load 35000 kg",
+        "the clip is 0.24 m along the boom",
+        "2 seaways of 5 min",
+        "Headings as likely as each other: 90 deg.",
+    )
+    for part in parts:
+        assert part in words
+
+
+def test_a_ship_that_does_not_reach_a_sea_of_the_diagram_is_refused_by_that_sea(crane):
+    class Short(TransferFunctions):
+        def __post_init__(self):
+            pass
+
+    grid = np.linspace(0.2, 1.5, 20)
+    ship = Short("short.csv", np.zeros(1), np.radians([0.0, 180.0]), grid,
+                 np.zeros((1, 2, 20, 6), complex))  # fmt: skip
+    with pytest.raises(InputError, match=r"short\.csv has waves .*0\.5 m, 5 s"):
+        operability(crane, CLIPPED, Scatter.of([0.5], [5.0], [1.0]), sea=Seaway(
+            Spectrum(1.0, 12.0), ship=ship))  # fmt: skip
 
 
 def test_a_crane_without_limits_has_no_operability(crane, scatter):

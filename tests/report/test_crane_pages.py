@@ -119,7 +119,8 @@ def year(crane):
     own |= {(2, 0.0): bad, (2, 90.0): bad}
     cells = {"no control": none, "identified": own}
     hoist = (0.7, 8.0, 90.0)
-    return Operability(crane, control.Clip(), scatter, (0.0, 90.0), cells, Seaway(), hoist)
+    law, headings = control.Clip(), (0.0, 90.0)
+    return Operability(crane, law, scatter, headings, cells, Seaway(), "The case.", hoist)
 
 
 def written(write, result, folder):

@@ -231,7 +231,7 @@ def operability(
       scatter FILE.csv: Columns hs, tp and share; without it a made-up diagram, of no place.
       headings NUMBERS: Headings of the waves in degrees, as likely as each other, joined by
           commas; by default 0,45,...,315.
-      out FILE: Write the page, .html, or the table, .csv or .parquet.
+      out FILE: Write the page, .html, or what limits each sea and heading, .csv or .parquet.
 
     For example:
       swashplate crane operability tg3637
@@ -242,12 +242,16 @@ def operability(
     from swashplate.crane import operability as operable
 
     diagram = Scatter.packaged() if scatter is None else Scatter.from_csv(scatter)
+    if study.heading is not None:
+        raise InputError("--heading is of one sea: operability goes over --headings.")
+    if study.sea:
+        note("Of --sea the peak factor and the spreading count.")
     more: dict[str, Any] = {}
     if headings is not None:
         words = headings.split(",")
         more["headings"] = [number_of(f"--headings {headings}", word) for word in words]
     found: Operability = study.through(operable, study.chosen, scatter=diagram, **more)
-    what, write = "Shares of the year", found.tables()[0].write
+    what, write = "Cells of the year, in SI", found.write
     if out is not None and out.suffix.lower() == ".html":
         from swashplate.report.scene import write_operability
 

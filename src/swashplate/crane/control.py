@@ -109,6 +109,10 @@ class Control:
         """Single stages."""
         return (self,)
 
+    def words(self) -> str:
+        """What it is, with its numbers: ``"delayed feedback of 0.2 at 0.25 periods"``."""
+        return self.kind
+
 
 @dataclass(frozen=True, repr=False)
 class Chain(Control):
@@ -124,6 +128,10 @@ class Chain(Control):
 
     def __repr__(self) -> str:
         return " | ".join(map(repr, self.parts))
+
+    def words(self) -> str:
+        """All stages."""
+        return ", ".join(stage.words() for stage in self.parts)
 
     @property
     def stages(self) -> tuple[Control, ...]:
@@ -147,6 +155,10 @@ class TipShaper(Control):
         if self.shape not in IMPULSES:
             raise InputError(f"A shaper is 'zv', 'zvd' or 'ei', not '{self.shape}'.")
 
+    def words(self) -> str:
+        """Its shape."""
+        return f"{self.kind} {self.shape} of the tip's path"
+
 
 @dataclass(frozen=True)
 class DelayedFeedback(Control):
@@ -162,6 +174,10 @@ class DelayedFeedback(Control):
     """τ in periods of the present rope, at most 1. The damping ratio is about k/2 at 0.25."""
     kind = "delayed feedback"
     largest: ClassVar[Mapping[str, float]] = {"gain": 2.0, "delay": 1.0}
+
+    def words(self) -> str:
+        """Gain and delay."""
+        return f"{self.kind} of {self.gain:g} at {self.delay:g} periods"
 
 
 @dataclass(frozen=True)
@@ -188,6 +204,12 @@ class Clip(Control):
     kind = "a clip"
     largest: ClassVar[Mapping[str, float]] = {"size": 100.0, "share": 10.0}
 
+    def words(self) -> str:
+        """Its size, or the share of what slew and luff can follow."""
+        if self.size == "auto":
+            return f"{self.kind} at {self.share:g} of what slew and luff can follow"
+        return f"{self.kind} of {self.size:g} m"
+
 
 @dataclass(frozen=True)
 class PositionLoop(Control):
@@ -200,6 +222,10 @@ class PositionLoop(Control):
     """Speed added for each radian of a shaft's error, at most 50. [1/s]"""
     kind = "position loop"
     largest: ClassVar[Mapping[str, float]] = {"gain": 50.0}
+
+    def words(self) -> str:
+        """Its gain."""
+        return f"{self.kind} of {self.gain:g} /s"
 
 
 @dataclass(frozen=True)
@@ -224,6 +250,13 @@ class Sensors(Control):
     seed: int = 0
     """Of the noise: the same for the same seed."""
     kind = "set of sensors"
+
+    def words(self) -> str:
+        """Noise, delay and rate."""
+        return (
+            f"sensors with {self.rope_angle_noise_deg:g} deg of noise, {self.delay:g} s late, at "
+            f"{self.rate:g} Hz"
+        )
 
     def __post_init__(self) -> None:
         for name, least, most in SENSED:
@@ -260,6 +293,10 @@ class Law(Control):
     values: Any = ()
     """Named tuple of its parameters."""
     kind = "law"
+
+    def words(self) -> str:
+        """Its model's name."""
+        return f"{self.kind} {self.model.name}"
 
     def __post_init__(self) -> None:
         strange = [each for each in self.model.external if each not in SEEN]

@@ -16,7 +16,7 @@ from swashplate.analysis.compensation import InverseMap, inverse_map
 from swashplate.crane.axes import AXES, check_names
 from swashplate.crane.drives import DriveLike, DriveSource, drives_of
 from swashplate.crane.kinematics import Boom, Geometry, Home, Vector, luff_rope
-from swashplate.crane.limits import LIMITED, limits_of
+from swashplate.crane.limits import DEFINITIONS, LIMITED, limits_of
 from swashplate.crane.quantities import (
     GEOMETRY,
     OPTIONAL,
@@ -82,7 +82,13 @@ class Crane:
         """A crane from a file; a `ParameterError` names file, entry and rule."""
         crane = _read(read_text(path), str(path), Path(path).parent)
         for name in packaged_names():
-            check_sources(crane.quantities, cls.preset(name).quantities, str(path), name)
+            packaged = cls.preset(name)
+            checked = (
+                (crane.quantities, packaged.quantities, GEOMETRY),
+                (crane.limits, packaged.limits, DEFINITIONS),
+            )
+            for own, of_packaged, definitions in checked:
+                check_sources(own, of_packaged, definitions, str(path), name)
         return crane
 
     def __repr__(self) -> str:

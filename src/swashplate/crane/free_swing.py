@@ -19,9 +19,9 @@ WIDEST = 1.0
 """Angle beyond which a log is probably in degrees. [rad]"""
 EXPLAINED = 0.5
 """Least share of the log's variance that a decaying sine must explain."""
-NEAR = 0.2
+NEAR = 0.1
 """Largest relative difference between the log's period and that of the rope: at 1 rad a pendulum
-swings 7 % slower, and a hook above the load shortens or lengthens its rope."""
+swings 7 % slower, and a hook above the load makes the rope a few per cent longer or shorter."""
 STRONGEST = 0.9
 """Size of the damping ratio within which is searched."""
 PADDED = 8

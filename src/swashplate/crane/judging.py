@@ -150,7 +150,9 @@ def _with_remedies(judgment: Judgment) -> Judgment:
         passing = [remedy for remedy in remedies if remedy is not None and remedy.passes]
         tried = tried[: len(tried) - len(passing)]
         found += _least([remedy for remedy in remedies if remedy is not None])
-    return replace(judgment, remedies=tuple(found), tried=tuple(tried))
+    named = [remedy.what for remedy in found]
+    others = [what for what in tried if what not in named]
+    return replace(judgment, remedies=tuple(found), tried=tuple(others))
 
 
 def _least(remedies: list[Remedy]) -> list[Remedy]:
@@ -183,10 +185,13 @@ def _larger_orifices(judgment: Judgment, cranes: tuple[Crane, ...], law: Control
 def _clips(case: Case, cranes: tuple[Crane, ...], law: Control) -> list[Trial]:
     """Clips at shares of what the luff can follow at the load's period."""
     stages = [stage for stage in law.stages if not isinstance(stage, Clip | PositionLoop)]
+    present = [stage.share for stage in law.stages if isinstance(stage, Clip)]
     period = 2.0 * pi * sqrt(case.pose["rope_m"] / GRAVITY)
     reach = float(follow(cranes[0], [period], seas=(), **case.pose).amplitude[0, 2])
     trials = []
     for share in SHARES:
+        if present and share >= present[0]:
+            continue  # what is judged has that clip already
         control = Chain((*stages, Clip(share=share), LOOP))
         trial = case.changed(control=control)._replace(cranes=cranes)
         trials.append((f"a clip of {share * reach:.2g} m", share * reach, trial))

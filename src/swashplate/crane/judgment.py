@@ -49,6 +49,10 @@ Decision = Literal["yes", "no", "not decided"]
 
 LOOP = PositionLoop()
 """What a clip is tried with: a stiffer loop brings back what the clip takes."""
+NOTHING_TURNS = (
+    "No other damping, roll period, height, period, peak factor, heading or drum that was tried, "
+    "each alone, surely turns the answer, by short runs."
+)
 IDLE = 1e-3
 """Relative difference of the swing below which control changes nothing."""
 
@@ -126,9 +130,10 @@ class Judgment(Tabular):
     """The crane without control in the frequency domain; None if its swing is not damped."""
     remedies: tuple[Remedy, ...] = ()
     tried: tuple[str, ...] = ()
-    """What was tried and does not pass all that was asked."""
-    turns: tuple[Turn, ...] = ()
-    """Assumed or given numbers that would turn the answer, if they were others."""
+    """What else was tried, and does not pass all that was asked."""
+    turns: tuple[Turn, ...] | None = None
+    """Assumed or given numbers that would turn the answer, if they were others; None if none were
+    looked for."""
 
     def __repr__(self) -> str:
         return f"Judgment({count(len(self.study.seeds), 'seaway')}, {', '.join(self.names)})"
@@ -323,7 +328,7 @@ class Judgment(Tabular):
         if self.tried and not self.remedies:
             return [f"None of these would do: {listed(self.tried)}."]
         sentences = [self._remedy_sentence(remedy) for remedy in self.remedies]
-        if self.tried and not any(remedy.passes for remedy in self.remedies):
+        if self.remedies and not any(remedy.passes for remedy in self.remedies):
             sentences.append("Nothing that was tried surely does all that is asked.")
         return sentences
 
@@ -332,6 +337,9 @@ class Judgment(Tabular):
         if remedy.harmless == "not decided":
             seaways = len(self.study.seeds)
             more = more_seaways(remedy.worse.value, seaways, self.allowed)
+            if remedy.sufficient == "no":
+                beyond = "; ".join(remedy.beyond)
+                return f"{what} may do no harm, but would not suffice: in 3 h {beyond}."
             return f"{what} may do: run more seaways ({more})."
         if remedy.passes:
             return f"{what} would do."
@@ -420,15 +428,19 @@ class Judgment(Tabular):
 
     def _limit_table(self) -> Table:
         """What has a limit, of the judged variant."""
-        numbers = [Column(head, ".3g", none="–") for head in ("limit", "in 3 h", "from", "to")]
-        columns = (Column("quantity"), Column("unit"), *numbers, Column("within"))
+        heads = ("limit", "in 3 h", "from", "to")
+        numbers = [Column(head, ".3g", none="–") for head in heads]
+        last = (Column("within"), Column(NONE, ".3g", none="–"))
+        columns = (Column("quantity"), Column("unit"), *numbers, *last)
         table = Table(f"Limits, '{self.judged}'", columns, "in 3 h: most probable largest value")
+        none = {judged.name: judged.largest.value for judged in self.limited(NONE)}
         for judged in self.limited(self.judged):
             unit, factor = judged.shown
             # a side-lead without waves across the boom is 0, not a millionth of a degree
             values = [round(factor * number, 3) for number in (judged.limit, *judged.largest)]
             label, within = LIMITED[judged.name].label, judged.within
-            table.add(label, unit, *values, within, look=within != "yes")
+            without = round(factor * none.get(judged.name, nan), 3)
+            table.add(label, unit, *values, within, without, look=within != "yes")
         return table
 
     def _difference_table(self) -> Table:
@@ -474,7 +486,8 @@ class Judgment(Tabular):
             for reason, seaways in self.left(name).items():
                 of = count(len(study.seeds), "seaway")
                 sentences.append(f"'{name}' is not an operation in {seaways} of {of}: {reason}.")
-        sentences += [turn.words() for turn in self.turns]
+        if self.turns is not None:
+            sentences += [turn.words() for turn in self.turns] or [NOTHING_TURNS]
         sentences += study.seaway.sentences()
         return (*sentences, *study.provenance())
 
@@ -496,7 +509,8 @@ class Judgment(Tabular):
         damping, given = none.swing_damping, "swing_damping" in none.hangs
         assumed = not given and crane.quantities["swing_damping"].status == "assumed"
         words = f"The load's swing has a damping of {100.0 * damping:g} %"
-        sentences = [rule, waves, f"{words}, assumed." if assumed else f"{words}."]
+        case = study.cases[self.judged].words()
+        sentences = [case, rule, waves, f"{words}, assumed." if assumed else f"{words}."]
         ship = study.seaway.ship
         if isinstance(ship, Hull):
             words = f"The ship's roll period is {ship.roll_period:g} s"

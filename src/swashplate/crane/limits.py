@@ -53,6 +53,13 @@ LIMITED: Mapping[str, Limited] = {
 largest value in three hours."""
 
 
+DEFINITIONS: Mapping[str, Definition] = {
+    name: Definition(limited.unit, 1, limited.low, limited.high)
+    for name, limited in LIMITED.items()
+}
+"""The same as quantities of a crane's file."""
+
+
 def limits_of(limits: Mapping[str, Quantity], origin: str) -> dict[str, float]:
     """Limits in SI by name.
 
@@ -75,7 +82,5 @@ def limits_of(limits: Mapping[str, Quantity], origin: str) -> dict[str, float]:
         )
     values = {}
     for name, quantity in limits.items():
-        limited = LIMITED[name]
-        definition = Definition(limited.unit, 1, limited.low, limited.high)
-        values[name] = values_of(name, quantity, definition, origin)[0]
+        values[name] = values_of(name, quantity, DEFINITIONS[name], origin)[0]
     return values

@@ -31,11 +31,12 @@ from swashplate.crane.study import BUILT, IDEAL, NONE, Case, Drives, Study
 from swashplate.errors import InputError
 from swashplate.executors import Executor, Serial, Threads
 from swashplate.progress import counted
-from swashplate.results import Result, figures
+from swashplate.results import Tabular, figures
 from swashplate.simulation.result import Limit
-from swashplate.tables import Column, Table, listed
+from swashplate.tables import Column, Table, count, listed
 
 if TYPE_CHECKING:
+    import polars
     from matplotlib.figure import Figure
 
 Array = NDArray[np.float64]
@@ -72,7 +73,7 @@ class Cell(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class Operability(Result):
+class Operability(Tabular):
     """Share of the year that can be worked, by variant, and what limits each sea."""
 
     crane: Crane = field(repr=False)
@@ -84,6 +85,8 @@ class Operability(Result):
     """By variant, and by row of the scatter diagram and heading."""
     seaway: Seaway
     """Ship, peak factor, spreading."""
+    case: str
+    """Where the crane stands and what controls it, in a sentence, and how cells are simulated."""
     hoist_limit: tuple[float, float, float]
     """Least significant height at which the hoist is too slow for the hook, with period and
     heading; inf if none. [m], [s], [deg]"""
@@ -123,12 +126,35 @@ class Operability(Result):
             table.add(name, self.workable(name), *rest)
         return [table]
 
+    def to_polars(self) -> polars.DataFrame:
+        """What limits each cell: a row for each variant, sea and heading, SI."""
+        import polars as pl
+
+        rows = [
+            {
+                "variant": name,
+                "hs": float(self.scatter.height[row]),
+                "tp": float(self.scatter.period[row]),
+                "heading": float(np.radians(heading)),
+                "share": float(self.scatter.share[row]) / len(self.headings),
+                "limited_by": label_of(cell.limited_by),
+                "ratio": cell.ratio,
+                "simulated": cell.simulated,
+            }
+            for name, cells in self.cells.items()
+            for (row, heading), cell in cells.items()
+        ]
+        return pl.DataFrame(rows)
+
     def sentences(self) -> tuple[str, ...]:
         """What the shares rest on."""
         crane = self.crane
         simulated = sum(cell.simulated for cells in self.cells.values() for cell in cells.values())
         every = sum(map(len, self.cells.values()))
+        headings = listed([f"{heading:g}" for heading in self.headings])
         sentences = [
+            self.case,
+            f"Headings as likely as each other: {headings} deg.",
             f"Of {every} cells {simulated} were simulated or lie beyond one that was; the others "
             "are from the frequency domain.",
         ]
@@ -202,12 +228,14 @@ def operability(
     if not headings:
         raise InputError("Operability needs one heading of the waves at least.")
     base = Seaway() if sea is None else sea
-    study = Study.of(crane, control, seeds=SEEDS, sea=base, drives=drives, **setup)
+    study = Study.of(crane, control, sea=base, drives=drives, **{"seeds": SEEDS, **setup})
     if study.length < SHORTEST:
         raise InputError(
             f"A sea is simulated for {study.length:g} s, but its largest values in three hours "
             f"need {SHORTEST:g} s at least."
         )
+    for height, period in zip(scatter.height.tolist(), scatter.period.tolist(), strict=True):
+        replace(base, sea=Spectrum(height, period, base.spectrum.peak_factor))  # or it is refused
     columns = [
         _Column(name, float(heading), float(period))
         for name in study.cases
@@ -226,7 +254,12 @@ def operability(
         if too_slow < hoist[0] and column.variant == NONE:
             hoist = (too_slow, column.period, column.heading)
     ordered = {name: dict(sorted(of_name.items())) for name, of_name in cells.items()}
-    return Operability(crane, control, scatter, tuple(map(float, headings)), ordered, base, hoist)
+    seaways = count(len(study.seeds), "seaway")
+    simulated = f"A cell is simulated in {seaways} of {study.length / 60.0:g} min."
+    case = f"{study.cases[list(study.cases)[-1]].words()} {simulated}"
+    return Operability(
+        crane, control, scatter, tuple(map(float, headings)), ordered, base, case, hoist
+    )
 
 
 class _Column(NamedTuple):

@@ -177,7 +177,11 @@ def in_si(quantities: Mapping[str, Quantity], origin: str) -> dict[str, tuple[fl
 
 
 def check_sources(
-    quantities: Mapping[str, Quantity], packaged: Mapping[str, Quantity], origin: str, name: str
+    quantities: Mapping[str, Quantity],
+    packaged: Mapping[str, Quantity],
+    definitions: Mapping[str, Definition],
+    origin: str,
+    name: str,
 ) -> None:
     """Refuse a source that was written for another value.
 
@@ -187,6 +191,8 @@ def check_sources(
         Of a crane whose file began as a copy of a packaged one.
     packaged : mapping of str to Quantity
         The packaged crane's.
+    definitions : mapping of str to Definition
+        `GEOMETRY`, or those of limits.
     origin, name : str
         The file, and the packaged crane, as errors name them.
 
@@ -197,12 +203,13 @@ def check_sources(
     """
     changed = [
         quantity
-        for quantity in GEOMETRY
+        for quantity, definition in definitions.items()
+        if quantity in quantities and quantity in packaged
         if quantities[quantity].source
         and quantities[quantity].source == packaged[quantity].source
         and not _same(
-            values_of(quantity, quantities[quantity], GEOMETRY[quantity], origin),
-            values_of(quantity, packaged[quantity], GEOMETRY[quantity], name),
+            values_of(quantity, quantities[quantity], definition, origin),
+            values_of(quantity, packaged[quantity], definition, name),
         )
     ]
     if changed:

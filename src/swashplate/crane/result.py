@@ -316,7 +316,8 @@ class CraneRun(Tabular):
         if self.left_model is not None and self.left_model[1] != IN_WATER:
             time, why = self.left_model
             said.append(f"From {time:.2f} s on the run is not an operation any more: {why}.")
-        if self.snap is None:
+        jumps = self.actuation == "ideal" and self.fixed.settings.path
+        if self.snap is None and not jumps:
             said.append(
                 f"The slack rope snaps taut at {self.time[self._snaps[0]]:.2f} s. With a rigid "
                 "rope the tension of that is not computed: take an elastic rope, "

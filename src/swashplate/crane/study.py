@@ -9,18 +9,20 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from math import radians, sin
+from math import pi, radians, sin, sqrt
 from typing import Any, NamedTuple, Unpack
 
 import numpy as np
 from numpy.typing import NDArray
 
 from swashplate.crane.axes import RATE, check_names
-from swashplate.crane.control import Control
+from swashplate.crane.control import Clip, Control
 from swashplate.crane.crane import Crane
+from swashplate.crane.following import follow
 from swashplate.crane.kinematics import Vector, boom_at, rotation, tip_of, to_inertial
 from swashplate.crane.outcome import STOPPED, Outcome, outcome_of
 from swashplate.crane.result import FARTHEST_SWING, CraneRun
+from swashplate.crane.rope import GRAVITY
 from swashplate.crane.sea import Seaway, Spectrum
 from swashplate.crane.simulating import begun, simulate
 from swashplate.crane.spectral import stationary_start
@@ -111,6 +113,24 @@ class Case(NamedTuple):
             "load_offset": (share * offset[0], share * offset[1]),
             "load_velocity": (share * velocity[0], share * velocity[1]),
         }
+
+    def words(self) -> str:
+        """Where the crane stands, what hangs on it and what controls it, in a sentence."""
+        crane, pose, control = self.cranes[0], self.pose, self.setup["control"]
+        load = self.hangs.get("load")
+        mass = crane.safe_load if load is None else load
+        stands = (
+            f"boom {pose['boom_deg']:g} deg up and {pose['slew_deg']:g} deg from the bow to "
+            f"starboard, rope {pose['rope_m']:g} m, load {mass:g} kg"
+        )
+        if control is None:
+            return f"Without control: {stands}."
+        clips = [stage for stage in control.stages if isinstance(stage, Clip)]
+        clip = ""
+        if clips:
+            size = clip_size(clips[0], crane, pose)
+            clip = f"; the clip is {size:.2g} m along the boom, sized for the crane's own drives"
+        return f"Control by {control.words()}: {stands}{clip}."
 
     def wanted(self, seaway: Seaway) -> tuple[float, float] | None:
         """Where the load shall be, horizontal and inertial [m]; None if the operator moves it."""
@@ -264,6 +284,15 @@ class Study(Result):
             if self.progress is not None and numbers is None:
                 self.progress(done, len(chosen))
         return outcomes
+
+
+def clip_size(clip: Clip, crane: Crane, pose: Mapping[str, Any]) -> float:
+    """What control may add to the tip along the boom, at most. [m]"""
+    if clip.size != "auto":
+        return float(clip.size)
+    period = 2.0 * pi * sqrt(pose["rope_m"] / GRAVITY)
+    reach = follow(crane, [period], seas=(), **pose).amplitude[0, 2]
+    return clip.share * float(reach)
 
 
 def _driven(case: Case, name: str, given: str | Crane | Sequence[Crane]) -> Case:

@@ -136,7 +136,7 @@ def _remedies(judgment: Judgment, tables: Sequence[Table]) -> list[Block]:
     blocks = [text(words) for words in judgment.remedy_sentences()]
     blocks += [block for table in tables for block in titled(table)]
     if judgment.tried and judgment.remedies:  # else the sentence says so
-        blocks.append(text(f"Tried, and not enough: {listed(judgment.tried)}.", "remark"))
+        blocks.append(text(f"Tried as well, and not better: {listed(judgment.tried)}.", "remark"))
     return blocks
 
 
@@ -192,9 +192,11 @@ def _basis(judgment: Judgment) -> list[Block]:
         _ship_sentence(study.seaway),
     ]
     for name, case in study.cases.items():
+        control = case.setup["control"]
         if name != NONE:
             drives = count(len(case.cranes), "crane") if case.driven else "ideal drives"
-            basis.append(f"{name}: {case.setup['control']!r}, {drives}.")
+            words = control.words() if control is not None else "no control"
+            basis.append(f"{name}: {words}, {drives}.")
     for axis in AXES:
         title = getattr(crane, axis).parameters.title.partition(f". {UNUSABLE}")[0]
         basis.append(f"{axis}: {title.rstrip('.')}.")
