@@ -14,7 +14,7 @@ import sys
 
 import numpy as np
 
-from swashplate.crane import Crane, Stick
+from swashplate.crane import Crane, Stick, simulate
 from swashplate.report.figures import plot_crane, save_figure
 
 parser = argparse.ArgumentParser(description="Shape the operator's commands.")
@@ -49,7 +49,7 @@ def shaped(commands: np.ndarray, rope: float) -> np.ndarray:
 
 # %%
 operator = Stick.trapezoid(slew=1.0, until={"slew_deg": 45.0}, length=60.0)
-plain = crane.simulate(operator, actuation="ideal", rope_m=ROPE, swing_damping=0.0)
+plain = simulate(crane, operator, actuation="ideal", rope_m=ROPE, swing_damping=0.0)
 sticks = {
     "as it is": operator,
     "shaped": Stick.record(shaped(plain.stick, ROPE), RATE),
@@ -59,7 +59,7 @@ sticks = {
 runs = {}
 for actuation in ("ideal", "volts", "inverse"):
     for name, stick in sticks.items():
-        run = crane.simulate(stick, actuation=actuation, rope_m=ROPE, swing_damping=0.0)
+        run = simulate(crane, stick, actuation=actuation, rope_m=ROPE, swing_damping=0.0)
         runs[f"{actuation}, {name}"] = run
         print(
             f"{actuation:8s} {name:9s} {run.residual_deg:5.2f} deg are left, "

@@ -176,7 +176,10 @@ class Verdict(Result):
             return ""
         if not self.causes:
             return "No single thing that was tried explains half of it; the runs' curves show when."
-        return f"{'; or '.join(each.words for each in self.causes)}."
+        causes = "; ".join(cause.words for cause in self.causes)
+        if len(self.causes) > 1:
+            return f"one of these, which these data do not tell apart: {causes}."
+        return f"{causes}."
 
     def answers(self) -> dict[str, str]:
         """The three answers, and what would explain the error, by their names."""
