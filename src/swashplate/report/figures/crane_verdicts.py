@@ -60,8 +60,8 @@ def plot_judgment(
     """Figure of a judgment: swing of each variant in each seaway, and what has a limit.
 
     The first panel has a point for each seaway and a diamond as wide as the 95 % interval of their
-    root mean square; runs that left the model are counted beyond a break of the axis. The second one has the
-    most probable largest values in three hours as shares of their limits.
+    root mean square; runs that left the model are counted beyond a break of the axis. The second
+    one has the most probable largest values in three hours as shares of their limits.
 
     By default a new figure; with `ax`, of one panel, the swing alone is drawn there, without the
     remark above, and `ax` returned.
