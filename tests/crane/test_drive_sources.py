@@ -36,7 +36,7 @@ def verdict_of(usable):
     speed = PredictionError(
         "shaft_speed", "rad/s", 3.0, (error**2, 0.0, 0.0), (ClassError("large", error, 3, 1),)
     )
-    return Verdict(0.1, (speed,), ("shaft_speed",), validity=VALIDITY)
+    return Verdict(0.1, (speed,), ("shaft_speed",), validity=VALIDITY, fastest_sine=0.1)
 
 
 @pytest.fixture
@@ -163,6 +163,7 @@ def test_in_python_the_verdict_is_data_of_the_crane(fit):
         True,
         HEADLINES[True],
         VALIDITY,
+        0.1,
     )
     result = SimpleNamespace(drive=crane.hoist, verdict=verdict_of(False))
     bad = crane.with_drive(hoist=result)
@@ -192,6 +193,10 @@ def test_judgment_and_page_say_the_verdict(fit, tmp_path, usable, look):
     verdict = NONE_KNOWN if usable is None else f"{HEADLINES[usable]} {VALIDITY}"
     found = judge(crane, control.DelayedFeedback(), seeds=[1], **SHORT)
     assert any(verdict in sentence for sentence in found.sentences())
+    slow = (
+        "The waves' peak is at 0.133 Hz, but the hoist's drive was tested with sines of up to 0.1"
+    )
+    assert any(slow in sentence for sentence in found.sentences()) == (usable is not None)
     write_judgment(found, tmp_path / "judge.html")
     page = tmp_path.joinpath("judge.html").read_text("utf-8")
     summary, basis = page.partition('<section id="swing">')[0], page.partition('id="basis"')[2]

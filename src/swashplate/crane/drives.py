@@ -46,6 +46,8 @@ class DriveSource(NamedTuple):
     """Headline of the verdict, or the clause why none is known."""
     validity: str = ""
     """Sentence that says what the verdict holds for; empty if that is not known."""
+    fastest_sine: float = 0.0
+    """Highest frequency of the sines of its tests; 0 if that is not known. [Hz]"""
 
     @property
     def usable(self) -> bool:
@@ -136,7 +138,19 @@ def _source(given: DriveLike, drive: Drive, path: Path | None) -> DriveSource | 
     verdict = getattr(given, "verdict", None)
     if verdict is None:
         return DriveSource("that of a fit", None, None, "the fit was not judged")
-    return DriveSource("that of a fit", None, verdict.usable, verdict.headline, verdict.validity)
+    return _judged_source("that of a fit", None, verdict)
+
+
+def _judged_source(place: str, fit: Path | None, verdict: Verdict) -> DriveSource:
+    """The source of a drive whose fit was judged."""
+    return DriveSource(
+        place,
+        fit,
+        verdict.usable,
+        verdict.headline,
+        verdict.validity,
+        verdict.fastest_sine,
+    )
 
 
 def _source_of_file(path: Path, drive: Drive) -> DriveSource:
@@ -147,7 +161,7 @@ def _source_of_file(path: Path, drive: Drive) -> DriveSource:
         fit = path.parent
         verdict, why = _stored_verdict(stored, drive)
         if verdict is not None:
-            return DriveSource(str(path), fit, verdict.usable, verdict.headline, verdict.validity)
+            return _judged_source(str(path), fit, verdict)
     stated = _stated_in_title(drive)
     if stated:
         return DriveSource(str(path), fit, False, stated)

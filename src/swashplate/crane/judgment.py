@@ -519,6 +519,13 @@ class Judgment(Tabular):
             sentences.append(f"{crane.assumed} of the crane are assumed.")
         if not feels_load(crane):
             sentences.append("No drive feels the load: they were identified without one.")
+        peak = 1.0 / spectrum.period
+        for axis, source in crane.sources.items():
+            if 0.0 < source.fastest_sine < peak:
+                sentences.append(
+                    f"The waves' peak is at {peak:.3g} Hz, but the {axis}'s drive was tested with "
+                    f"sines of up to {source.fastest_sine:.3g} Hz: test it faster."
+                )
         limits = [name for name, limit in crane.limits.items() if limit.status == "assumed"]
         if limits:
             labels = listed([LIMITED[name].label for name in limits])

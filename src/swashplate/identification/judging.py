@@ -74,6 +74,8 @@ class Verdict(Result):
     validity: str = ""
     """Sentence that names the maneuvers and the range that it holds for, and what they never
     reach; empty for a drive that was not fitted."""
+    fastest_sine: float = 0.0
+    """Highest frequency of the sines that it was fitted to or tested with; 0 without sines. [Hz]"""
     assumed: tuple[str, ...] = ()
     """What these logs cannot show, and what is assumed of it."""
     remarks: tuple[str, ...] = ()
@@ -298,6 +300,7 @@ def verdict(
         undetermined=tuple(name for name in machine if name in lost),
         causes=causes,
         validity=_validity(stages, tested),
+        fastest_sine=_fastest_sine(tested),
         assumed=tuple(_assumed(stages)),
         remarks=tuple(_starts(stages)),
     )
@@ -393,19 +396,23 @@ def _assumed(stages: Sequence[StageFit]) -> Iterator[str]:
 
 def maneuvers_tested(tested: Mapping[str, Experiment]) -> str:
     """``ramps, steps and sines of up to 0.3 Hz from -9 to 9 V``."""
-    runs, fastest = list(tested.values()), 0.0
+    runs, fastest = list(tested.values()), _fastest_sine(tested)
     several = {each: f"{each}s" for each in ("ramp", "step", "sine", "chirp")}
     several["unnamed"] = "unnamed motions"
     kinds = dict[str, None]()
     for each in runs:
         word = each.maneuver.split(" ")[0]
         kinds[several.get(word, word)] = None
-        if each.recognised is not None:
-            fastest = max(fastest, each.recognised.frequency or 0.0)
     low = min(float(each.input.values.min()) for each in runs)
     high = max(float(each.input.values.max()) for each in runs)
     words = [f"sines of up to {fastest:.3g} Hz" if k == "sines" and fastest else k for k in kinds]
     return f"{listed(words)} from {low:.3g} to {high:.3g} {runs[0].input.unit}"
+
+
+def _fastest_sine(tested: Mapping[str, Experiment]) -> float:
+    """Highest frequency of the sines among runs; 0 if there are none. [Hz]"""
+    recognised = [run.recognised for run in tested.values() if run.recognised is not None]
+    return max((maneuver.frequency or 0.0 for maneuver in recognised), default=0.0)
 
 
 def _validity(stages: Sequence[StageFit], tested: Mapping[str, Experiment]) -> str:

@@ -59,9 +59,9 @@ def plot_judgment(
 ) -> Figure | Axes | Sequence[Axes]:
     """Figure of a judgment: swing of each variant in each seaway, and what has a limit.
 
-    The first panel has a point for each seaway and a diamond as wide as the 95 % interval of the
-    mean; runs that left the model are counted beyond a break of the axis. The second one has the
-    most probable largest values in three hours as shares of their limits.
+    The first panel has a point for each seaway and a diamond as wide as the 95 % interval of their
+    root mean square; runs that left the model are counted beyond a break of the axis. The second
+    one has the most probable largest values in three hours as shares of their limits.
 
     By default a new figure; with `ax`, of one panel, the swing alone is drawn there, without the
     remark above, and `ax` returned.
@@ -116,12 +116,12 @@ def _swing_legend(result: Judgment) -> list[Line2D]:
     handles = [
         _mark("a seaway", "o", style.BLUE, size=4.0),
         _mark("more swing than without control", "o", style.VERMILION, size=4.0),
-        _mark("mean, as wide as its 95 % interval", "d", style.INK),
+        _mark("RMS over seaways, as wide as its 95 % interval", "d", style.INK),
     ]
     if result.linear is not None:
         handles.append(style.handle("by its spectrum alone", style.INK, width=1.0))
     if any(result.left(name) for name in result.names):
-        handles.append(_mark("left the model, not in the mean", "x", style.INK))
+        handles.append(_mark("left the model, not in the RMS", "x", style.INK))
     return handles
 
 
