@@ -98,6 +98,14 @@ def test_a_ship_has_its_list_in_calm_water_too(tmp_path):
     assert not table["heave"].to_numpy().any()
 
 
+def test_an_undamped_load_runs_in_a_sea_without_a_stationary_swing():
+    words = "run tg3637 --sea ss2 --length 5 --swing-damping"
+    damped, undamped = (said(*words.split(), ratio) for ratio in ("0.01", "0"))
+    assert damped.exit_code == undamped.exit_code == 0, undamped.output
+    assert "a damping of 1 %" in " ".join(damped.stdout.split())
+    assert "in the long run" not in undamped.stdout
+
+
 @pytest.mark.slow
 def test_follow_takes_a_sea_of_numbers():
     shown = said("follow", "tg3637", "--sea", "1.5,8", "--heading", "180")

@@ -268,6 +268,14 @@ def test_what_the_answer_hangs_on_stands_with_it(crane, judged):
     assert "a damping of 1 %." in " ".join(given.sentences())
 
 
+def test_an_undamped_swing_has_no_stationary_answer(crane):
+    found = judge(crane, CLIPPED, seeds=range(2), swing_damping=0.0, drives=("ideal",),
+                  **{**QUICK, "turns": True})  # fmt: skip
+    assert found.linear is None
+    assert found.turns is None
+    assert "from rest, as it is undamped" in " ".join(found.sentences())
+
+
 @pytest.mark.slow
 def test_what_would_turn_the_answer(crane):
     """Control that harms in sea state 3 passes in waves a quarter as high, and a turn says so."""

@@ -138,8 +138,9 @@ def run(
 
         save(scene, "Scene", lambda path: write_scene(runs, path))
     sentences = [f"{name}: {words}" for name, run in runs.items() for words in run.sentences()]
-    if seaway is not None:
-        sentences.insert(0, _stationary_words(operated, seaway))
+    damping = crane.swing_damping if operated.swing_damping is None else operated.swing_damping
+    if seaway is not None and damping > 0.0:
+        sentences.insert(0, _stationary_words(operated, seaway, damping))
     _end(crane, tables, *sea_sentences(seaway), *sentences, *crane.provenance())
 
 
@@ -375,7 +376,7 @@ def _end(crane: Crane, tables: Iterable[Table], *said: str) -> None:
         say(sentence)
 
 
-def _stationary_words(operated: Operated, seaway: Seaway) -> str:
+def _stationary_words(operated: Operated, seaway: Seaway, damping: float) -> str:
     """The swing without control that this sea has in the long run, by its spectrum."""
     from math import degrees
 
@@ -386,11 +387,9 @@ def _stationary_words(operated: Operated, seaway: Seaway) -> str:
     start = {"slew_deg": 0.0, "boom_deg": 45.0, "rope_m": 20.0}
     hung = start | {name: setup[name] for name in names if name in setup}
     found = linear_response(operated.chosen, seaway, **hung)
-    damping = operated.swing_damping
-    of_load = operated.chosen.swing_damping if damping is None else damping
     return (
         f"Without control the load swings by {degrees(found.values['swing'].rms):.2f} deg RMS in "
-        f"the long run, by the sea's spectrum and a damping of {100.0 * of_load:g} %; a run begins "
+        f"the long run, by the sea's spectrum and a damping of {100.0 * damping:g} %; a run begins "
         "at rest."
     )
 

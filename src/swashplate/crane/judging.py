@@ -92,7 +92,7 @@ def judge(
     if none.swing_damping > 0.0:
         linear = linear_response(crane, asked_study.seaway, **none.pose, **none.hangs)
     judgment = Judgment(asked_study, outcomes, allowed, questions, linear)
-    if turns:
+    if turns and none.swing_damping > 0.0:  # of an undamped swing there is no stationary answer
         limits = crane.limits_si if "sufficiency" in questions else {}
         judgment = replace(judgment, turns=turns_of(asked_study, judgment.judged, limits))
     if judgment.outcome == "fails" and remedies:

@@ -30,8 +30,7 @@ from swashplate.crane.limits import LIMITED
 from swashplate.crane.outcome import Outcome
 from swashplate.crane.result import PUMPS, CraneRun, limit_table
 from swashplate.crane.spectral import LinearResponse
-from swashplate.crane.stepper import feels_load
-from swashplate.crane.study import NONE, Study
+from swashplate.crane.study import NONE, Study, assumed_words
 from swashplate.crane.transfer_functions import CRANE_SHIP, Hull
 from swashplate.results import GivenAxes, Tabular, figures
 from swashplate.simulation.result import Limit
@@ -515,10 +514,6 @@ class Judgment(Tabular):
         if isinstance(ship, Hull):
             words = f"The ship's roll period is {ship.roll_period:g} s"
             sentences.append(f"{words}, assumed." if ship == CRANE_SHIP else f"{words}.")
-        if crane.assumed:
-            sentences.append(f"{crane.assumed} of the crane are assumed.")
-        if not feels_load(crane):
-            sentences.append("No drive feels the load: they were identified without one.")
         peak = 1.0 / spectrum.period
         for axis, source in crane.sources.items():
             if 0.0 < source.fastest_sine < peak:
@@ -526,11 +521,7 @@ class Judgment(Tabular):
                     f"The waves' peak is at {peak:.3g} Hz, but the {axis}'s drive was tested with "
                     f"sines of up to {source.fastest_sine:.3g} Hz: test it faster."
                 )
-        limits = [name for name, limit in crane.limits.items() if limit.status == "assumed"]
-        if limits:
-            labels = listed([LIMITED[name].label for name in limits])
-            sentences.append(f"Limits that are assumed: {labels}.")
-        return sentences
+        return [*sentences, *assumed_words(crane)]
 
 
 def _rms_words(none: float, own: float) -> str:

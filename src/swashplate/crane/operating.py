@@ -26,8 +26,7 @@ from swashplate.crane.result import PUMPS
 from swashplate.crane.scatter import Scatter
 from swashplate.crane.sea import Seaway, Spectrum
 from swashplate.crane.spectral import DEMANDS, linear_response
-from swashplate.crane.stepper import feels_load
-from swashplate.crane.study import BUILT, IDEAL, NONE, Case, Drives, Study
+from swashplate.crane.study import BUILT, IDEAL, NONE, Case, Drives, Study, assumed_words
 from swashplate.errors import InputError
 from swashplate.executors import Executor, Serial, Threads
 from swashplate.progress import counted
@@ -68,7 +67,8 @@ class Cell(NamedTuple):
     limited_by: str
     """Quantity of `LIMITED`, or drive and its limit, ``"luff orifice"``; empty if workable."""
     ratio: float
-    """Largest ratio of a value to its limit; inf if the run left the model."""
+    """Largest ratio of a value to its limit; inf if the run left the model, NaN if it was not asked
+    for, as lower than a sea that is workable."""
     simulated: bool
 
 
@@ -138,7 +138,8 @@ class Operability(Tabular):
                 "heading": float(np.radians(heading)),
                 "share": float(self.scatter.share[row]) / len(self.headings),
                 "limited_by": label_of(cell.limited_by),
-                "ratio": cell.ratio,
+                # not known below a cell that was simulated, and beyond the model
+                "ratio": cell.ratio if np.isfinite(cell.ratio) else None,
                 "simulated": cell.simulated,
             }
             for name, cells in self.cells.items()
@@ -148,7 +149,6 @@ class Operability(Tabular):
 
     def sentences(self) -> tuple[str, ...]:
         """What the shares rest on."""
-        crane = self.crane
         simulated = sum(cell.simulated for cells in self.cells.values() for cell in cells.values())
         every = sum(map(len, self.cells.values()))
         headings = listed([f"{heading:g}" for heading in self.headings])
@@ -166,15 +166,7 @@ class Operability(Tabular):
             )
         if self.scatter.note:
             sentences.append(self.scatter.note)
-        if not feels_load(crane):
-            sentences.append("No drive feels the load: they were identified without one.")
-        assumed = [name for name, limit in crane.limits.items() if limit.status == "assumed"]
-        if assumed:
-            labels = listed([LIMITED[name].label for name in assumed])
-            sentences.append(f"Limits that are assumed: {labels}.")
-        if crane.assumed:
-            sentences.append(f"{crane.assumed} of the crane are assumed.")
-        return tuple(sentences)
+        return (*sentences, *assumed_words(self.crane))
 
 
 def label_of(limit: str) -> str:

@@ -20,18 +20,20 @@ from swashplate.crane.control import Clip, Control
 from swashplate.crane.crane import Crane
 from swashplate.crane.following import follow
 from swashplate.crane.kinematics import Vector, boom_at, rotation, tip_of, to_inertial
+from swashplate.crane.limits import LIMITED
 from swashplate.crane.outcome import STOPPED, Outcome, outcome_of
 from swashplate.crane.result import FARTHEST_SWING, CraneRun
 from swashplate.crane.rope import GRAVITY
 from swashplate.crane.sea import Seaway, Spectrum
 from swashplate.crane.simulating import begun, simulate
 from swashplate.crane.spectral import stationary_start
-from swashplate.crane.stepper import Actuation, Setup
+from swashplate.crane.stepper import Actuation, Setup, feels_load
 from swashplate.crane.stick import Stick
 from swashplate.errors import DomainError, InputError
 from swashplate.executors import Executor, Threads
 from swashplate.progress import counted
 from swashplate.results import Result
+from swashplate.tables import listed
 
 Array = NDArray[np.float64]
 Controllers = Control | Mapping[str, Control | None]
@@ -284,6 +286,21 @@ class Study(Result):
             if self.progress is not None and numbers is None:
                 self.progress(done, len(chosen))
         return outcomes
+
+
+def assumed_words(crane: Crane) -> list[str]:
+    """What is assumed of a crane and its limits, and whether its drives feel the load."""
+    sentences = []
+    if crane.assumed:
+        sentences.append(f"{crane.assumed} of the crane are assumed.")
+    if not feels_load(crane):
+        sentences.append("No drive feels the load: they were identified without one.")
+    limits = [
+        LIMITED[name].label for name, limit in crane.limits.items() if limit.status == "assumed"
+    ]
+    if limits:
+        sentences.append(f"Limits that are assumed: {listed(limits)}.")
+    return sentences
 
 
 def clip_size(clip: Clip, crane: Crane, pose: Mapping[str, Any]) -> float:
