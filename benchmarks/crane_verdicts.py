@@ -15,6 +15,7 @@ controllers: those that the package has, on the packaged crane's own drives in s
 from __future__ import annotations
 
 import argparse
+from dataclasses import replace
 from math import sqrt
 from pathlib import Path
 
@@ -47,28 +48,36 @@ HOURS = 10_800.0
 
 def stability(sets: int, hours: float) -> None:
     """Print the verdicts of other seaways and other lengths."""
-    lengths = ((600.0, 120, sets), (1200.0, 120, sets), (3600.0 * hours, 72, 2))
+    lengths = ((600.0, 160), (1200.0, 120), (3600.0 * hours, 72))
+    controllers = {"for ideal drives": IDEAL_DESIGN, "clipped": CLIPPED}
     print("control, time that counts, seaways, harmless, sufficient, half widths of the RMS")
-    for name, law in (("for ideal drives", IDEAL_DESIGN), ("clipped", CLIPPED)):
-        for length, seaways, count in lengths:
-            for first in range(count):
-                judged = one_verdict(law, range(1000 * first, 1000 * first + seaways), length)
-                widths = ", ".join(f"{half_width(judged.swing(each)):.1%}" for each in judged.names)
+    for length, seaways in lengths:
+        for first in range(sets):
+            seeds = range(1000 * first, 1000 * first + seaways)
+            for name, judged in zip(controllers, verdicts(controllers, seeds, length), strict=True):
+                widths = ", ".join(f"{half_width(judged.swing(case)):.1%}" for case in judged.names)
                 answers = f"{judged.harmless}, {judged.sufficient}"
                 print(f"{name}, {length:g} s, {seaways}, {answers}, {widths}", flush=True)
 
 
-def one_verdict(law: control.Control, seeds: range, length: float) -> Judgment:
-    """The verdict on the packaged crane's own drives in some seaways."""
-    return judge(
-        Crane.preset("tg3637"),
-        law,
-        seeds=seeds,
-        drives=("identified",),
-        length=length,
-        remedies=False,
-        turns=False,
-    )
+def verdicts(
+    controllers: dict[str, control.Control], seeds: range, length: float
+) -> list[Judgment]:
+    """The verdict on each controller with the packaged crane's own drives; what is without control
+    is simulated once.
+    """
+    crane = Crane.preset("tg3637")
+    study = Study.of(crane, controllers, seeds=seeds, drives=("identified",), length=length)
+    names = list(study.cases)
+    outcomes = study.outcomes(list(study.cases.values()))
+    judgments = []
+    for index, name in enumerate(names[1:], start=1):
+        cases = {names[0]: study.cases[names[0]], name: study.cases[name]}
+        pairs = tuple((of_seed[0], of_seed[index]) for of_seed in outcomes)
+        judgments.append(
+            Judgment(replace(study, cases=cases), pairs, 0.05, ("harm", "sufficiency"), None)
+        )
+    return judgments
 
 
 def half_width(swing: np.ndarray) -> float:

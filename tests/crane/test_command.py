@@ -21,7 +21,7 @@ def test_show_marks_what_is_assumed_and_its_file_is_a_crane(tmp_path):
     assert shown.exit_code == 0
     rows = [line.split() for line in shown.stdout.splitlines()]
     assert ["foot", "offset", "2.5", "m", "assumed"] in rows
-    assert sum("assumed" in row for row in rows[3:]) == 13 + 7  # geometry, limits
+    assert sum("assumed" in row for row in rows[3:]) == 14 + 7  # geometry, limits
     mine = tmp_path / "mine.toml"
     mine.write_text(said("show", "tg3637", "--toml").stdout, "utf-8")
     assert Crane.from_toml(mine).geometry == Crane.preset("tg3637").geometry

@@ -66,6 +66,7 @@ RANGES = {
     "safe_load": r"1 to 3e\+07 kg",
     "boom_limits": "0 to 90 deg",
     "rope_limits": "0.05 to 6000 m",
+    "deck": "0 to 100 m",
 }
 
 
@@ -131,7 +132,7 @@ CRANES = {
 @pytest.mark.parametrize("kind", CRANES)
 def test_cranes_from_small_to_large_are_read(read, kind):
     crane = read(**{name: quantity(*entry) for name, entry in CRANES[kind].items()})
-    assert crane.assumed == "1 of 14 quantities"
+    assert crane.assumed == "2 of 15 quantities"
     assert crane.swing_damping == 0.005
     low, high = crane.rope_limits
     home = crane.home(boom_deg=45.0, rope_m=0.5 * (low + high))

@@ -1,5 +1,6 @@
 """Whole runs: against an independent implementation, and against each other."""
 
+from dataclasses import replace
 from math import exp, log10, pi, sqrt
 from typing import NamedTuple
 
@@ -19,6 +20,7 @@ from swashplate.crane import (
     linearize,
     simulate,
 )
+from swashplate.crane.rope import in_ship_axes
 from swashplate.equations import Model, equation
 from swashplate.errors import DomainError, InputError
 from swashplate.executors import Threads
@@ -600,6 +602,8 @@ def test_snap_of_a_rigid_rope_is_not_computed(crane):
     [
         ({"boom_deg": 20.0, "rope_m": 40.0}, "the load is in the water"),
         ({"load_offset": (11.5, 0.0)}, "the load swings beyond 30 deg"),
+        # over the bow the load hangs at y = -8.5, within the sides; the tip is 44.5 m up
+        ({"rope_m": 38.0}, "the load is in the deck"),
         # 8 m of 20 m towards the crane are 23.6 degrees, beyond a boom at 70
         ({"load_offset": (-8.0, 0.0), "boom_deg": 70.0}, "the rope lies on the boom"),
         ({"load_offset": (0.0, 8.0), "boom_deg": 70.0, "slew_deg": 90.0}, "the rope lies on the"),
@@ -612,6 +616,28 @@ def test_a_run_that_is_not_an_operation_any_more_says_since_when(crane, how, why
     assert time == 0.0
     assert reason.startswith(why)
     assert run.sentences()
+
+
+def test_a_load_beside_the_ship_or_on_a_crane_without_a_deck_is_not_in_the_deck(crane):
+    low = {"rope_m": 38.0}
+    beside = simulate(crane, Stick.rest(0.1), slew_deg=90.0, **low)
+    quantities = {name: value for name, value in crane.quantities.items() if name != "deck"}
+    bare = replace(crane, quantities=quantities)
+    assert bare.deck is None
+    assert beside.left_model is None
+    assert simulate(bare, Stick.rest(0.1), **low).left_model is None
+
+
+def test_the_deck_turns_and_heaves_with_the_ship(crane):
+    # a ship that has rolled by 20 degrees and heaved 3 m: port is up by sin 20 deg of the breadth
+    n, roll, heave = 600, np.radians(20.0), 3.0
+    ship = np.zeros((n, 6))
+    ship[:, 2], ship[:, 3] = heave, roll
+    points = np.array([[1.0, 5.0, 2.0]]).repeat(n, axis=0)
+    port = 5.0 * np.cos(roll) + (2.0 - heave) * np.sin(roll)
+    up = -5.0 * np.sin(roll) + (2.0 - heave) * np.cos(roll)
+    np.testing.assert_allclose(in_ship_axes(points, ship)[7], [1.0, port, up], rtol=1e-14)
+    np.testing.assert_array_equal(in_ship_axes(points, np.zeros((n, 1))), points)
 
 
 def test_a_run_within_the_model_has_not_left_it(crane):

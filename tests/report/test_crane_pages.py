@@ -69,7 +69,7 @@ def scene(tmp_path, runs):
 def test_scene_holds_the_runs_pictures(scene, runs):
     text = scene.read_text("utf-8")
     assert not re.search(r"(src|href)\s*=\s*[\"']?(?!data:)(https?:)?//", text)
-    assert "13 of 14 quantities of the crane are assumed" in text
+    assert "14 of 15 quantities of the crane are assumed" in text
     found = json.loads(re.search(r'id="data">(.*?)</script>', text)[1])
     assert [each["name"] for each in found["runs"]] == list(runs)
     code = base64.b64decode(found["runs"][1]["code"])
@@ -165,13 +165,13 @@ def test_verdicts_page_says_what_the_answer_hangs_on(tmp_path, judged):
     for words in (
         "The load's swing has a damping of 0.5 %, assumed.",
         "The ship's roll period is 13 s, assumed.",
-        "13 of 14 quantities of the crane are assumed.",
+        "14 of 15 quantities of the crane are assumed.",
         "Limits that are assumed: swing, off-lead, side-lead",
         turn.words(),
     ):
         assert words in hangs
     # of the limits and of the geometry, every assumed row is marked
-    assert text.count("<td>assumed</td>") == 7 + 13
+    assert text.count("<td>assumed</td>") == 7 + 14
     assert "roll period 13 s with a damping of 6 %" in text
 
 
@@ -186,7 +186,7 @@ def test_pages_are_one_file_each_without_an_outside_link(tmp_path, judged, year)
         text = written(write, result, tmp_path)
         assert not re.search(r"(src|href)\s*=\s*[\"']?(https?:)?//", text)
         assert "min-width: 600px" not in text  # figures are whole on a narrow screen
-        assert "13 of 14 quantities of the crane are assumed" in text
+        assert "14 of 15 quantities of the crane are assumed" in text
 
 
 def test_operabilitys_page_has_one_figure_the_shares_and_what_is_assumed(tmp_path, year):
@@ -200,7 +200,7 @@ def test_operabilitys_page_has_one_figure_the_shares_and_what_is_assumed(tmp_pat
         assert words in summary
     for sentence in year.sentences():
         assert sentence in summary
-    assert text.count("<td>assumed</td>") == 7 + 13
+    assert text.count("<td>assumed</td>") == 7 + 14
 
 
 @pytest.mark.slow
@@ -313,7 +313,7 @@ def test_figures_of_sweeps_mark_where_a_run_left_the_model(over, crane, assert_l
     figure = swept(crane, over, points, [2.0, 3.0, np.nan, 5.0]).plot()
     assert_legible(figure)
     words = words_of(figure)
-    assert "13 of 14 quantities of the crane are assumed" in words
+    assert "14 of 15 quantities of the crane are assumed" in words
     assert "×: a run left the model" in words
     ax = figure.axes[0]
     crosses = [line for line in ax.lines if line.get_marker() == "x"]
@@ -378,7 +378,7 @@ def test_figure_of_operability_colours_each_sea_by_what_limits_it(year, assert_l
     assert 0.3 < strength[0] < 1.0
     assert cells[1].get_bbox().bounds == pytest.approx((7.0, 0.0, 2.0, 1.0))
     words = words_of(figure)
-    assert "made for a test; 13 of 14 quantities of the crane are assumed" in words
+    assert "made for a test; 14 of 15 quantities of the crane are assumed" in words
 
 
 def test_figure_of_operability_has_rows_of_three_panels(year, assert_legible):
@@ -419,6 +419,6 @@ def test_figure_of_runs_shows_them_by_name_what_moves_and_the_sea(crane, runs):
     labels = [ax.get_ylabel() for ax in figure.axes]
     assert labels == ["swing (deg)", "slew (deg)", "boom (deg)", "limits"]
     texts = [each.get_text() for ax in figure.axes for each in ax.texts]
-    assert any("13 of 14 quantities of the crane are assumed" in each for each in texts)
+    assert any("14 of 15 quantities of the crane are assumed" in each for each in texts)
     with pytest.raises(InputError, match="shows 1 to 6 runs of a crane, not 0"):
         figures.plot_crane({})

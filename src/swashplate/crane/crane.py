@@ -8,7 +8,7 @@ from functools import cached_property, lru_cache
 from importlib.resources import files
 from math import cos, degrees, radians, sin
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Literal, NamedTuple
 
 from pydantic import BaseModel, ConfigDict, Field
 
@@ -18,8 +18,9 @@ from swashplate.crane.drives import DriveLike, DriveSource, drives_of
 from swashplate.crane.kinematics import Boom, Geometry, Home, Vector, luff_rope
 from swashplate.crane.limits import DEFINITIONS, LIMITED, limits_of
 from swashplate.crane.quantities import (
+    DEFAULTS,
     GEOMETRY,
-    OPTIONAL,
+    MAY_LACK,
     Quantity,
     check_sources,
     in_si,
@@ -29,6 +30,15 @@ from swashplate.documents import parse_toml, read_text, validated
 from swashplate.drive import Drive
 from swashplate.errors import InputError, ParameterError
 from swashplate.tables import Column, Table
+
+
+class Deck(NamedTuple):
+    """The ship's deck, as high and as wide all along the ship."""
+
+    height: float
+    """Above the origin that the ship's motion is given for. [m]"""
+    half_breadth: float
+    """From the plane of symmetry to the side. [m]"""
 
 
 class CraneFile(BaseModel):
@@ -235,6 +245,12 @@ class Crane:
         low, high = self._si["rope_limits"]
         return low, high
 
+    @property
+    def deck(self) -> Deck | None:
+        """The ship's deck, if the crane's file has it."""
+        values = self._si.get("deck")
+        return None if values is None else Deck(*values)
+
     def inverse(self, axis: str) -> InverseMap:
         """Inverse map of the controller's drive of ``"hoist"``, ``"slew"`` or ``"luff"``."""
         return _inverse(self.controller_drive(axis))
@@ -306,14 +322,14 @@ def preset_text(name: str) -> str:
 
 def _geometry_of(content: CraneFile, origin: str) -> dict[str, Quantity]:
     """All quantities of a crane's file; refuses a name that is missing or unknown."""
-    given = {**OPTIONAL, **content.geometry}
-    lacks = [name for name in GEOMETRY if name not in given]
+    given = {**DEFAULTS, **content.geometry}
+    lacks = [name for name in GEOMETRY if name not in given and name not in MAY_LACK]
     strange = [name for name in content.geometry if name not in GEOMETRY]
     if lacks or strange:
         extra = f", and knows no '{strange[0]}'" if strange else ""
         need = f"needs an entry '{lacks[0]}'" if lacks else f"has {len(GEOMETRY)} quantities"
         raise ParameterError(f"{origin}: geometry {need}{extra}.")
-    return {name: given[name] for name in GEOMETRY}
+    return {name: given[name] for name in GEOMETRY if name in given}
 
 
 def _read(text: str, origin: str, folder: Path) -> Crane:

@@ -70,9 +70,13 @@ GEOMETRY: Mapping[str, Definition] = {
     "rope_limits": Definition("m", 2, 0.05, 6000.0),
     # 0.2 to 1 % by air, sheaves and rope; an anti-sway device in the rope may have more
     "swing_damping": Definition("1", 1, 0.0, 0.2),
+    # height above the ship's origin, and half of its breadth: the widest heavy-lift ships have 124 m
+    "deck": Definition("m", 2, 0.0, 100.0),
 }
 """Quantities of a crane by name, with ranges that every crane lies well within."""
-OPTIONAL: Mapping[str, Quantity] = {
+MAY_LACK = ("deck",)
+"""Quantities that a crane may be without: what they decide is then not looked at."""
+DEFAULTS: Mapping[str, Quantity] = {
     "swing_damping": Quantity(
         value=0.005,
         unit="1",
@@ -152,10 +156,11 @@ def in_si(quantities: Mapping[str, Quantity], origin: str) -> dict[str, tuple[fl
     InputError
         For a unit that does not measure the quantity.
     """
-    known = {**OPTIONAL, **quantities}
+    known = {**DEFAULTS, **quantities}
     si = {
         name: values_of(name, known[name], definition, origin)
         for name, definition in GEOMETRY.items()
+        if name in known or name not in MAY_LACK
     }
     low, high = map(degrees, si["boom_limits"])
     if not 0.0 <= low < high < 90.0:

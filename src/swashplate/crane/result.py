@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from swashplate.crane.axes import AXES, RATE, check_names
 from swashplate.crane.crane import Crane
 from swashplate.crane.loop import Fixed
-from swashplate.crane.rope import GRAVITY, rope_leads, swing_of
+from swashplate.crane.rope import GRAVITY, in_ship_axes, rope_leads, swing_of
 from swashplate.crane.signals import ROWS, Signals
 from swashplate.crane.stepper import ACTUATIONS
 from swashplate.crane.transfer_functions import MOTIONS
@@ -35,6 +35,7 @@ FARTHEST_SWING = 30.0
 """Swing beyond which a run is not an operation any more: the model is a mass on a free rope, and
 nobody goes on with a load that swings beyond it. [deg]"""
 IN_WATER = "the load is in the water"
+IN_DECK = "the load is in the deck"
 LOOK = 32
 """Samples from one at which swing and place of the load are looked at to the next: 16 a second."""
 SETTLED = 1.0
@@ -230,7 +231,8 @@ class CraneRun(Tabular):
         """When and why a run is not an operation any more; None if it stays one.
 
         The first time at which the load swings beyond 30 degrees, the rope is slack or lies on the
-        boom, or the load is in the water. Control changes the speed of ideal drives at once, which
+        boom, or the load is in the water, or in the deck if the crane's file has one. The load is a
+        point, and nothing that stands on the deck is known. Control changes the speed of ideal drives at once, which
         slackens any rope for a moment: that is not looked at.
         """
         some = slice(None, None, LOOK)
@@ -244,6 +246,11 @@ class CraneRun(Tabular):
             "the rope lies on the boom": _first(inboard >= 0.5 * pi - boom, LOOK),
             IN_WATER: _first(load[:, 2] < 0.0, LOOK),
         }
+        deck = self.crane.deck
+        if deck is not None:
+            aboard = in_ship_axes(load, self.ship[some])
+            below = (aboard[:, 2] < deck.height) & (np.abs(aboard[:, 1]) < deck.half_breadth)
+            times[IN_DECK] = _first(below, LOOK)
         if not (self.actuation == "ideal" and self.fixed.settings.path):
             times["the rope is slack"] = _first(self.slack, 1)
         reason = min(times, key=times.__getitem__)

@@ -485,6 +485,41 @@ def _leads(line: Array, slew: Array, ship: Array, out: Array) -> None:
         out[n, 1] = atan2(-d.x * s - d.y * c, -d.z)
 
 
+def in_ship_axes(points: Array, ship: Array) -> Array:
+    """Points as coordinates along the ship's axes, from its origin. [m]
+
+    Parameters
+    ----------
+    points : (n, 3) array
+        Inertial. [m]
+    ship : (n, 6) or (n, 1) array
+        Motion of the ship [m], [rad]; one column if it is at rest.
+
+    Returns
+    -------
+    (n, 3) array
+    """
+    if ship.shape[1] == 1:
+        return points
+    coordinates = np.empty_like(points)
+    _in_ship_axes(np.ascontiguousarray(points), np.ascontiguousarray(ship), coordinates)
+    return coordinates
+
+
+@kernel
+def _in_ship_axes(points: Array, ship: Array, out: Array) -> None:
+    """Fill the coordinates along the ship's axes."""
+    for n in range(len(points)):
+        r = rotation(ship[n, 3], ship[n, 4], ship[n, 5])
+        from_origin = Vector(
+            points[n, 0] - ship[n, 0], points[n, 1] - ship[n, 1], points[n, 2] - ship[n, 2]
+        )
+        along = to_ship(r, from_origin)
+        out[n, 0] = along.x
+        out[n, 1] = along.y
+        out[n, 2] = along.z
+
+
 def too_fast(length: float, time: float, rate: float) -> str:
     """Sentence for a rope that is too short for the step."""
     return (
