@@ -70,7 +70,7 @@ GEOMETRY: Mapping[str, Definition] = {
     "rope_limits": Definition("m", 2, 0.05, 6000.0),
     # 0.2 to 1 % by air, sheaves and rope; an anti-sway device in the rope may have more
     "swing_damping": Definition("1", 1, 0.0, 0.2),
-    # height above the ship's origin, and half of its breadth: the widest heavy-lift ships have 124 m
+    # height above the ship's origin, and half of its breadth: the widest ships have 124 m
     "deck": Definition("m", 2, 0.0, 100.0),
 }
 """Quantities of a crane by name, with ranges that every crane lies well within."""

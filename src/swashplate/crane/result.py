@@ -232,8 +232,8 @@ class CraneRun(Tabular):
 
         The first time at which the load swings beyond 30 degrees, the rope is slack or lies on the
         boom, or the load is in the water, or in the deck if the crane's file has one. The load is a
-        point, and nothing that stands on the deck is known. Control changes the speed of ideal drives at once, which
-        slackens any rope for a moment: that is not looked at.
+        point, and nothing that stands on the deck is known. Control changes the speed of ideal
+        drives at once, which slackens any rope for a moment: that is not looked at.
         """
         some = slice(None, None, LOOK)
         tip, hook, load = self.tip[some], self.hook[some], self.load[some]
