@@ -53,7 +53,7 @@ from swashplate.crane.rope import (
 )
 from swashplate.crane.signals import ABSENT, LOAD, PULL, SHAFT, SPEED, TIP, Columns
 from swashplate.equations import Machine, equation, inlined, kernel
-from swashplate.equations.code import generating
+from swashplate.equations.functions import generating
 from swashplate.parameters.rules import FULL_VOLTAGE
 
 Array = NDArray[np.float64]

@@ -35,7 +35,7 @@ from swashplate.equations.declaration import (
     known,
     remember_text,
 )
-from swashplate.equations.syntax import plain
+from swashplate.equations.language import plain
 
 P = ParamSpec("P")
 R = TypeVar("R")

@@ -15,7 +15,7 @@ from typing import Any, TypeVar
 
 from numba import config, njit
 
-from swashplate.equations.syntax import is_named_tuple, parsed, plain, resolved
+from swashplate.equations.language import is_named_tuple, parsed, plain, resolved
 from swashplate.errors import EquationError
 
 F = TypeVar("F", bound=Callable[..., Any])

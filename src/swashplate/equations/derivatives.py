@@ -6,11 +6,12 @@ from collections.abc import Callable, Mapping
 from hashlib import blake2b
 from typing import Any, TypeVar
 
-from swashplate.equations.adjoints import Derived, derived_function, listing
-from swashplate.equations.code import GENERATING, Code, Value, arguments, leaves
 from swashplate.equations.declaration import inlined, module_of
-from swashplate.equations.reading import RULES, read
-from swashplate.equations.syntax import parsed, plain
+from swashplate.equations.functions import GENERATING
+from swashplate.equations.gradients import Derived, derived_function, listing
+from swashplate.equations.language import parsed, plain
+from swashplate.equations.tracing import RULES, Trace
+from swashplate.equations.values import Value, arguments, leaves
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -111,8 +112,8 @@ def _derived(function: Any, by: tuple[str, ...], given: Mapping[str, Value], mar
             said = ", ".join(offer) or "none below it"
             source.refuse(None, f"no float at {path}", f"there are {said}")
         inputs |= below
-    code = Code(given, ruled=True)
-    results = [(path or "value", node) for path, node in leaves(read(code, function, given))]
+    trace = Trace()
+    results = [(path or "value", node) for path, node in leaves(trace.call(function, given))]
     label = "_".join(path.rpartition(".")[2] for path in inputs)
     label = label if len(label) <= 32 else f"{len(inputs)}"
     name = f"{source.name}_by_{label}{mark}" if inputs else f"{source.name}_decided{mark}"
@@ -121,8 +122,8 @@ def _derived(function: Any, by: tuple[str, ...], given: Mapping[str, Value], mar
         name,
         f"{source.name} with its {says} ({module_of(source.function)}, line {source.node.lineno}).",
         [each.arg for each in source.arguments],
-        code,
         results,
         [*inputs.items()],
+        trace.labels,
         chained=True,
     )

@@ -15,7 +15,7 @@ from typing import Any, Final, TypeGuard, get_type_hints
 
 import numpy as np
 
-from swashplate.equations.syntax import is_named_tuple
+from swashplate.equations.language import is_named_tuple
 from swashplate.errors import InputError
 
 Flag = bool | None

@@ -2,33 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from math import inf
-from typing import Any, NamedTuple, TypeVar
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from swashplate.equations import expressions as ex
-from swashplate.equations.adjoints import Derivatives, Derived, derived_function, listing
-from swashplate.equations.code import (
-    Call,
-    Code,
-    Function,
-    Rule,
-    Tuple,
-    Value,
-    alike,
-    leaves,
-    rebuilt,
-)
+from swashplate.equations import graph
 from swashplate.equations.declaration import inlined
-from swashplate.equations.expressions import ONE, ZERO, Node, make
-from swashplate.equations.syntax import Parsed
-from swashplate.equations.writing import UNNAMED, function_source, function_text, named_by_text
+from swashplate.equations.functions import Function, fresh_name
+from swashplate.equations.gradients import Derived, derived_function, gradients, listing
+from swashplate.equations.graph import ONE, ZERO, Call, Node, Rule, choose, make, names_in
+from swashplate.equations.language import Parsed
+from swashplate.equations.printing import UNNAMED, function_source, function_text, named_by_text
+from swashplate.equations.values import Tuple, Value, alike, leaves, rebuilt
+
+if TYPE_CHECKING:
+    from swashplate.equations.tracing import Trace
 
 S = TypeVar("S")
-Read = Callable[[Code, Any, Mapping[str, Value]], Value]
 
 STEPS = 128
 """Most steps of the search for a root; some 10 are usual."""
@@ -154,39 +147,21 @@ def blank(size: int) -> NDArray[np.float64]:
     return np.zeros(size)
 
 
-# --- as they are read -----------------------------------------------------------------------------
-
-
-def interpolated(code: Code, x: Node, knots: Sequence[Node], values: Sequence[Node]) -> Node:
-    """`interpolate` as straight code."""
-    ends = [knots[0], knots[1], values[0], values[1]]
-    for i in range(1, len(knots) - 1):
-        beyond = make(">=", x, knots[i])
-        now = knots[i], knots[i + 1], values[i], values[i + 1]
-        ends = [
-            _named(code, ex.choose(beyond, b, a), name)
-            for a, b, name in zip(ends, now, ("left", "right", "low", "high"), strict=True)
-        ]
-    left, right, low, high = ends
-    share = _named(code, make("/", make("-", x, left), make("-", right, left)), "share")
-    inside = make("min", make("max", ZERO, share), ONE)
-    return make("+", low, make("*", inside, make("-", high, low)))
-
-
-def _named(code: Code, node: Node, stem: str) -> Node:
-    named = code.named(node, stem)
-    assert isinstance(named, Node)
-    return named
+# --- as they are traced ---------------------------------------------------------------------------
 
 
 class _Inner(NamedTuple):
-    """An equation that is done many times: straight code of the scalars that it reads."""
+    """An equation that is done many times, with scalars for all that it reads."""
 
     name: str
-    code: Code
-    leading: list[str]  # Scalars of its first arguments.
-    formals: list[str]  # Scalars of the others.
-    actuals: list[Node]  # What these stand for where it is called.
+    labels: dict[Node, str]
+    taken: set[str]
+    leading: list[str]
+    """Scalars of its first arguments, which the loop gives."""
+    formals: list[str]
+    """Scalars of the others."""
+    actuals: list[Node]
+    """What these stand for where it is called."""
     result: Value
 
     def function(self) -> Function:
@@ -194,90 +169,91 @@ class _Inner(NamedTuple):
         nodes = [node for _, node in leaves(self.result)]
         given = [*self.leading, *self.formals]
         name = f"{self.name}_{UNNAMED}"
-        text, names = function_text(name, f"{self.name} of scalars.", given, self.code, nodes)
+        text, names = function_text(name, f"{self.name} of scalars.", given, nodes, self.labels)
         return Function(*named_by_text(name, text), dict(names))
 
 
 def _inner(
-    outer: Code, source: Parsed, leading: Sequence[Value], rest: Sequence[Value], read: Read
+    outer: Trace, source: Parsed, leading: Sequence[Value], rest: Sequence[Value]
 ) -> _Inner:
     """An equation whose `leading` arguments the loop gives, the others as where it is called."""
-    code = Code(ruled=outer.ruled)
-    code.under_way = [*outer.under_way]
+    trace = outer.inner()
+    taken = set[str]()
     names = [each.arg for each in source.arguments]
     given, stands_for = dict[str, Value](), dict[str, Node]()
     for k, (name, value) in enumerate(zip(names, [*leading, *rest], strict=True)):
         nodes = []
         for path, node in leaves(value):
             if k < len(leading) or node.op != "number":
-                formal = code.fresh(f"{name}_{path}" if path else name)
+                stem = f"{name}_{path}" if path else name
+                formal = fresh_name(stem.replace(".", "_"), taken)
                 stands_for[formal] = node
-                node = ex.name(formal, node.kind)
+                node = graph.name(formal, node.kind)
             nodes.append(node)
         given[name] = rebuilt(value, iter(nodes))
-    result = read(code, source.function, given)
-    used = code.reads([node for _, node in leaves(result)])
+    result = trace.call(source.function, given)
+    used = names_in(node for _, node in leaves(result))
     count = sum(1 for value in leading for _ in leaves(value))
     first, others = list(stands_for)[:count], list(stands_for)[count:]
     formals = [name for name in others if name in used]
     actuals = [stands_for[name] for name in formals]
-    return _Inner(source.name, code, first, formals, actuals, result)
+    return _Inner(source.name, trace.labels, taken, first, formals, actuals, result)
 
 
 def solved(
-    code: Code, residual: Parsed, low: Value, high: Value, rest: Sequence[Value], read: Read
+    trace: Trace, residual: Parsed, low: Value, high: Value, rest: Sequence[Value]
 ) -> Value:
     """`root` as a call of a generated function, with the rule of its derivatives."""
-    inner = _inner(code, residual, [ex.name("x")], rest, read)
+    inner = _inner(trace, residual, [graph.name("x")], rest)
     if not (isinstance(inner.result, Node) and isinstance(low, Node) and isinstance(high, Node)):
-        code.under_way[-1].refuse(
+        trace.under_way[-1].refuse(
             None, "a residual or a bracket that is a tuple", "let each be one float"
         )
-    function, ends = inner.function(), [inner.code.fresh(each) for each in ("low", "high")]
+    function = inner.function()
+    ends = [fresh_name(each, inner.taken) for each in ("low", "high")]
     given = ", ".join([*ends, *inner.formals])
     name = f"root_of_{function.name}"
     line = f"return (root({function.name}, {given}),)"
     text = function_source(f"{name}({given})", f"Root of {residual.name}.", [line], "")
     solver = Function(name, text, {"root": root, function.name: function})
-    x = ex.name(code.fresh("root"))
-    call = Call(solver, (low, high, *inner.actuals), (x.value,))
-    if not code.ruled:
-        code.items.append(call)
-        return x
-    # the implicit function theorem within the bracket
-    unknown, *others = (each.arg for each in residual.arguments)
-    known = {a: code.named(b, a) for a, b in zip(others, rest, strict=True)}
-    numbers = (node for each in known.values() for _, node in leaves(each) if node.op == "name")
-    by = list(dict.fromkeys(numbers))  # once each, also where two arguments are the same number
-    items, made = code.aside(lambda: read(code, residual.function, {unknown: x, **known}))
-    alone = Code(code.taken, ruled=True)
-    alone.items = items
-    assert isinstance(made, Node)
-    found = Derivatives(alone, [made], [x.value, *(node.value for node in by)])
-    code.taken |= found.taken
-    partials = {i: node for (_, i), node in zip(found.entries, found.partials, strict=True)}
-    if 0 not in partials:
-        residual.refuse(None, f"no derivative by {unknown}", "use the unknown in it")
-    inside = make("and", make("<", low, x), make("<", x, high))
-    divisible = make("and", inside, make("!=", partials[0], ZERO))
-    inverse = make("/", ONE, ex.choose(divisible, partials[0], ex.number(inf)))
-    slopes = [
-        (low, ex.choose(make("<=", x, low), ONE, ZERO)),
-        (high, ex.choose(make(">=", x, high), ONE, ZERO)),
-    ]
-    for i, node in enumerate(by):
-        if i + 1 in partials:
-            slope = make("*", ex.negative(partials[i + 1]), inverse)
-            slopes.append((node, ex.choose(inside, slope, ZERO)))
-    code.items.append(Rule([call, *found.items], (x.value,), [slopes]))
-    return x
+    call = make("call", low, high, *inner.actuals, value=Call(solver, 1))
+    x = trace.make("result", call, value=0)
+    trace.label(x, "root")
+    by = list(dict.fromkeys(node for value in rest for _, node in leaves(value)))
+    moving = [node for node in by if node.op != "number" and node.kind == "float"]
+    chain = tuple(trace.under_way)
+
+    def slopes() -> tuple[Node, ...]:
+        # the implicit function theorem within the bracket
+        names = [each.arg for each in residual.arguments]
+        with trace.within(chain):
+            value = trace.call(residual.function, dict(zip(names, [x, *rest], strict=True)))
+        assert isinstance(value, Node)
+        partials = gradients([value], [x, *moving])
+        if (0, 0) not in partials:
+            residual.refuse(None, f"no derivative by {names[0]}", "use the unknown in it")
+        inside = graph.both(make("<", low, x), make("<", x, high))
+        divisible = graph.both(inside, make("!=", partials[0, 0], ZERO))
+        inverse = make("/", ONE, choose(divisible, partials[0, 0], graph.number(inf)))
+        found = [
+            choose(make("<=", x, low), ONE, ZERO),
+            choose(make(">=", x, high), ONE, ZERO),
+        ]
+        for i in range(1, len(moving) + 1):
+            slope = ZERO
+            if (0, i) in partials:
+                slope = make("*", graph.negative(partials[0, i]), inverse)
+            found.append(choose(inside, slope, ZERO))
+        return tuple(found)
+
+    return trace.make("ruled", x, value=Rule((low, high, *moving), slopes))
 
 
 def repetition(
-    code: Code, step: Parsed, count: Value, state: Value, rest: Sequence[Value], read: Read
+    trace: Trace, step: Parsed, count: Value, state: Value, rest: Sequence[Value]
 ) -> Value:
     """`repeated` as a call of a generated function, with one that carries its derivatives along."""
-    inner = _inner(code, step, [state, ex.name("number")], rest, read)
+    inner = _inner(trace, step, [state, graph.name("number")], rest)
     names: tuple[str, ...] = ("state",)
     items: tuple[Value, ...] = (state,)
     if isinstance(state, Tuple) and state.cls:
@@ -286,9 +262,9 @@ def repetition(
     if not (numbers and isinstance(count, Node) and alike(inner.result, state)):
         what = f"repeated of {step.name}, which does not return a state"
         instead = "let it take and return the same named tuple of floats, or a float"
-        code.under_way[-1].refuse(None, what, instead)
+        trace.under_way[-1].refuse(None, what, instead)
     *now, number = inner.leading
-    times = inner.code.fresh("count")
+    times = fresh_name("count", inner.taken)
     given = [times, *now, *inner.formals]
     states = ", ".join(now)
     called = ", ".join([*now, f"float({number})", *inner.formals])
@@ -301,14 +277,17 @@ def repetition(
     name = f"repeated_{function.name}"
     text = function_source(f"{name}({', '.join(given)})", f"{step.name}, repeated.", lines, "")
     loop = Function(name, text, {function.name: function})
-    results = tuple(code.fresh(each) for each in names)
-    arguments = (count, *(node for _, node in leaves(state)), *inner.actuals)
 
     def derivative(by: tuple[int, ...]) -> Derived:
         return _carried(inner, name, given, called, [given[k] for k in by if k > 0], by)
 
-    code.items.append(Call(loop, arguments, results, derivative))
-    return rebuilt(state, iter([ex.name(each) for each in results]))
+    arguments = (count, *(node for _, node in leaves(state)), *inner.actuals)
+    call = make("call", *arguments, value=Call(loop, len(names), derivative))
+    results = []
+    for index, word in enumerate(names):
+        results.append(trace.make("result", call, value=index))
+        trace.label(results[-1], word)
+    return rebuilt(state, iter(results))
 
 
 def _carried(
@@ -325,21 +304,21 @@ def _carried(
     `inputs` among them.
     """
     *now, number = inner.leading
-    code, width = inner.code, len(inputs)
+    width, taken = len(inputs), {*inner.taken}
     every = [*now, *(each for each in inputs if each not in now)]
     step = derived_function(
         f"{inner.name}_{UNNAMED}",
         f"{inner.name} of scalars with its derivatives by {listing(every)}.",
         [*inner.leading, *inner.formals],
-        code,
         [*leaves(inner.result)],
         [(each, each) for each in every],
+        inner.labels,
         chained=True,
     )
-    slopes, c = code.fresh("slopes"), code.fresh("c")
-    new = [code.fresh(f"new_{each}") for each in now]
-    before = [code.fresh(f"by_{each}") for each in now]
-    partials = [code.fresh(f"d_{new[o]}_{every[i]}") for o, i in step.entries]
+    slopes, c = fresh_name("slopes", taken), fresh_name("c", taken)
+    new = [fresh_name(f"new_{each}", taken) for each in now]
+    before = [fresh_name(f"by_{each}", taken) for each in now]
+    partials = [fresh_name(f"d_{new[o]}_{every[i]}", taken) for o, i in step.entries]
     place = {
         (o, each): f"{slopes}[{o * width + k}"
         for o in range(len(now))

@@ -40,7 +40,7 @@ from swashplate.equations.fields import (
     floats_of,
     ranges_of,
 )
-from swashplate.equations.syntax import is_named_tuple, plain, type_of
+from swashplate.equations.language import is_named_tuple, plain, type_of
 from swashplate.errors import InputError
 
 Equation = Callable[..., Any]

@@ -18,7 +18,7 @@ from typing import Any, NamedTuple, get_type_hints
 
 from swashplate.equations.declaration import closure, equation, equation_of_text, is_function
 from swashplate.equations.model import Equation, Model, arguments_of, join
-from swashplate.equations.syntax import is_named_tuple, plain
+from swashplate.equations.language import is_named_tuple, plain
 from swashplate.errors import InputError
 
 

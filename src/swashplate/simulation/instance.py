@@ -16,7 +16,7 @@ from swashplate.equations.fields import declared_by
 from swashplate.equations.marching.run import Instance, Part
 from swashplate.equations.model import Model
 from swashplate.equations.replacement import Replacement, again, check_members, uses
-from swashplate.equations.syntax import plain
+from swashplate.equations.language import plain
 from swashplate.errors import InputError
 from swashplate.models.card import Card
 from swashplate.models.channel import CardOptions, Channel

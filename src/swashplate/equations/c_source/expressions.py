@@ -23,7 +23,7 @@ from swashplate.equations.c_source.text import (
     fields_of,
     literal,
 )
-from swashplate.equations.syntax import (
+from swashplate.equations.language import (
     ARITHMETIC,
     COMPARISONS,
     MATH,

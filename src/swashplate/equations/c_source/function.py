@@ -15,7 +15,7 @@ from typing import Any
 
 from swashplate.equations.c_source.expressions import Expressions, constant_of, pointed
 from swashplate.equations.c_source.text import DOUBLE, INT, Kind, Text, c_name, comment, wrapped
-from swashplate.equations.syntax import Parsed
+from swashplate.equations.language import Parsed
 
 if typing.TYPE_CHECKING:
     from swashplate.equations.c_source.unit import Unit

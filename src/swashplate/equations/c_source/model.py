@@ -21,7 +21,7 @@ from swashplate.equations.marching.march import Sampler, output_of
 from swashplate.equations.marching.part import HOLDS, TapOf, taps_of
 from swashplate.equations.marching.run import Instance
 from swashplate.equations.model import Equation, Link, Model, Window, arguments_of
-from swashplate.equations.syntax import is_named_tuple, plain
+from swashplate.equations.language import is_named_tuple, plain
 
 OWN = """
 number_at put_at is_finite all_finite in_range number_of placed seen constant_window before_all

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from importlib.resources import files
 from typing import Any, NamedTuple, get_type_hints
 
-from swashplate.equations.syntax import MATH
+from swashplate.equations.language import MATH
 
 WIDTH = 100
 """Longest line of C."""

@@ -28,7 +28,7 @@ from swashplate.equations.c_source.text import (
     wrapped,
 )
 from swashplate.equations.fields import Definition
-from swashplate.equations.syntax import Parsed, is_named_tuple, parsed, plain
+from swashplate.equations.language import Parsed, is_named_tuple, parsed, plain
 from swashplate.errors import EquationError
 
 

@@ -8,7 +8,7 @@ from contextlib import suppress
 import numpy as np
 from numpy.typing import NDArray
 
-from swashplate.equations.code import generating
+from swashplate.equations.functions import generating
 from swashplate.equations.marching.graph import Graph, Group, Moved, PartGraph, Term, abreast
 from swashplate.equations.marching.part import Stored
 from swashplate.equations.marching.rows import (

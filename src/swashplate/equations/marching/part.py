@@ -27,7 +27,7 @@ from swashplate.equations.model import (
     previous,
 )
 from swashplate.equations.reading import read
-from swashplate.equations.syntax import is_named_tuple, plain
+from swashplate.equations.language import is_named_tuple, plain
 from swashplate.errors import InputError
 
 HOLDS: dict[str, Equation] = {
@@ -270,25 +270,3 @@ def _named(kind: Any, name_of: Callable[[str], str], path: str = "") -> Value:
         else:
             items.append(ex.name(name_of(f"{path}{name}")))
     return Tuple(kind, tuple(items))
-
-
-# --- without branches -----------------------------------------------------------------------------
-
-
-def _choose(test: bool, one: Any, two: Any) -> Any:
-    return one if test else two
-
-
-def _selected(typing: Any, test: Any, one: Any, two: Any) -> Any:
-    kind = typing.unify_types(one, two)
-
-    def generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
-        sides = (context.cast(builder, values[k], signature.args[k], kind) for k in (1, 2))
-        return builder.select(values[0], *sides)
-
-    return kind(types.boolean, one, two), generate
-
-
-choose: Any = _choose if JIT_OFF else intrinsic(_selected)
-"""``choose(test, a, b)`` is one of two numbers that both have been computed: from ``a if test else
-b`` the compiler makes branches, or a choice between two addresses, and gathers."""

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from swashplate.equations.cache import kernel, on_disk
 from swashplate.equations.declaration import JIT_OFF, known
-from swashplate.equations.syntax import plain
+from swashplate.equations.language import plain
 
 PIECE = "count, first, h, records, before, whole, fraction, params, given, states, met, flat"
 """Arguments of a piece.

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swashplate.equations.cache import generated, kernel
-from swashplate.equations.code import compiled_names, generating
+from swashplate.equations.functions import compiled_names, generating
 from swashplate.equations.declaration import inlined, interpreted
 from swashplate.equations.fields import (
     check_mapping,
@@ -35,7 +35,7 @@ from swashplate.equations.model import (
     place,
     state_paths,
 )
-from swashplate.equations.syntax import plain
+from swashplate.equations.language import plain
 from swashplate.errors import DomainError, InputError, ParameterError
 
 Array = NDArray[np.float64]

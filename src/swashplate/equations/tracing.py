@@ -1,33 +1,23 @@
-"""Reading equations: the statements of a function, done with names and numbers as straight code."""
+"""Equations run on symbols: the statements of a function, done with the nodes of one graph.
+
+Named tuples come apart, calls are followed, loops are unrolled, options decided if they are known.
+What is left are operations in the order of the equations: results keep their last bit.
+"""
 
 from __future__ import annotations
 
 import ast
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from inspect import Parameter, Signature
-from types import FunctionType, ModuleType, SimpleNamespace
+from types import FunctionType, ModuleType
 from typing import Any, TypeVar
 from weakref import WeakKeyDictionary
 
-from swashplate.equations import expressions as ex
-from swashplate.equations.code import (
-    Choice,
-    Code,
-    Flag,
-    Item,
-    Let,
-    Rule,
-    Tuple,
-    Value,
-    alike,
-    fixed,
-    leaves,
-    rebuilt,
-)
+from swashplate.equations import graph
 from swashplate.equations.declaration import JIT_OFF
-from swashplate.equations.expressions import Node, make
-from swashplate.equations.loops import interpolate, interpolated, repeated, repetition, root, solved
-from swashplate.equations.syntax import (
+from swashplate.equations.graph import FALSE, LEAVES, ONE, TRUE, ZERO, Node, Rule, choose, make
+from swashplate.equations.language import (
     ARITHMETIC,
     CHOICES,
     COMPARISONS,
@@ -38,9 +28,8 @@ from swashplate.equations.syntax import (
     parsed,
     plain,
 )
-
-Way = tuple[list[Item], Value]
-"""What is done one way of a decision, and what comes of it."""
+from swashplate.equations.loops import interpolate, repeated, repetition, root, solved
+from swashplate.equations.values import Flag, Tuple, Value, alike, fixed, leaves, rebuilt
 
 Names = dict[str, Value]
 R = TypeVar("R")
@@ -52,72 +41,135 @@ LOOPS = {
     "repeated": ("step, count, state", ("a state", "the number of the repetition"), repetition),
 }
 """What loops take ahead of the rest, what their equation takes ahead of it, how they are made."""
-FEW = 8
-"""Operations that may be done in vain, so that a branch becomes a conditional expression."""
 
 
-def read(code: Code, equation: Any, given: Mapping[str, Value]) -> Value:
-    """Append what an equation does to some code, and return its result.
+class Trace:
+    """Equations that are run on symbols, and what is known of the nodes that this makes.
 
-    Arguments that are not `given` by name have their defaults.
+    Attributes
+    ----------
+    labels : dict of Node to str
+        What equations call a value, the first that does.
+    origins : dict of Node to Parsed
+        The equation that a value comes from.
+    under_way : list of Parsed
+        Equations that are being run, each called by the one before.
     """
-    source = parsed(equation)
-    if source in code.under_way:
-        source.refuse(None, "a call of itself", "write a loop over a literal range")
-    defaults = {name: fixed(each) for name, each in source.defaults.items()}
-    known = {name: each for name, each in defaults.items() if each is not None} | dict(given)
-    known = {each.arg: known[each.arg] for each in source.arguments if each.arg in known}
-    code.under_way.append(source)
-    try:
-        rule = RULES.get(plain(equation)) if code.ruled else None
-        if rule is not None:
-            return _ruled(code, source, parsed(rule), known)
-        return _Reader(source, code).result(known)
-    finally:
-        code.under_way.pop()
+
+    def __init__(self) -> None:
+        self.labels: dict[Node, str] = {}
+        self.origins: dict[Node, Parsed] = {}
+        self.under_way: list[Parsed] = []
+        self._rules: dict[tuple[Any, ...], Rule] = {}
+
+    def call(self, equation: Any, given: Mapping[str, Value]) -> Value:
+        """What an equation returns; arguments that are not `given` by name have their defaults."""
+        source = parsed(equation)
+        if source in self.under_way:
+            source.refuse(None, "a call of itself", "write a loop over a literal range")
+        defaults = {name: fixed(each) for name, each in source.defaults.items()}
+        known = {name: each for name, each in defaults.items() if each is not None} | dict(given)
+        known = {each.arg: known[each.arg] for each in source.arguments if each.arg in known}
+        with self.running(source):
+            result = _Tracer(source, self).result(known)
+            rule = RULES.get(plain(equation))
+            return result if rule is None else self._ruled(source, parsed(rule), known, result)
+
+    def inner(self) -> Trace:
+        """A trace of its own for what is run within an equation, again and again."""
+        trace = Trace()
+        trace.under_way = [*self.under_way]
+        return trace
+
+    @contextmanager
+    def running(self, source: Parsed) -> Iterator[None]:
+        """While an equation is being run."""
+        self.under_way.append(source)
+        try:
+            yield
+        finally:
+            self.under_way.pop()
+
+    @contextmanager
+    def within(self, chain: Sequence[Parsed]) -> Iterator[None]:
+        """Back within equations that were under way at some time."""
+        outer, self.under_way = self.under_way, [*chain]
+        try:
+            yield
+        finally:
+            self.under_way = outer
+
+    def make(self, op: str, *args: Node, value: Any = None) -> Node:
+        """A node that comes from the equation that is being run."""
+        return self.noted(make(op, *args, value=value))
+
+    def noted(self, node: Node) -> Node:
+        """A node, with the equation that it comes from."""
+        if self.under_way and node.op not in LEAVES:
+            self.origins.setdefault(node, self.under_way[-1])
+        return node
+
+    def label(self, value: Value, stem: str) -> None:
+        """Remember what an equation calls a value."""
+        for path, node in leaves(value):
+            plain_node = graph.plain_value(node)
+            if plain_node.op not in LEAVES:
+                name = "_".join(filter(None, (stem, path))) or "value"
+                self.labels.setdefault(plain_node, name)
+
+    def _ruled(
+        self, source: Parsed, rule: Parsed, known: Mapping[str, Value], result: Value
+    ) -> Value:
+        """The result of an equation with declared derivatives."""
+        by = {
+            ".".join(filter(None, (name, path))): node
+            for name, value in known.items()
+            for path, node in leaves(value)
+            if node.kind == "float"
+        }
+        results = [*leaves(result)]
+        chain = tuple(self.under_way)
+
+        def slopes() -> tuple[Node, ...]:
+            with self.within(chain), self.running(rule):
+                partials = [node for _, node in leaves(_Tracer(rule, self).result(known))]
+            if len(partials) != len(by) * len(results):
+                rule.refuse(
+                    None,
+                    f"a number of derivatives that is not {len(by) * len(results)}",
+                    f"return those by {', '.join(by)}, in order",
+                )
+            return tuple(partials)
+
+        key = (source.function, *by.values(), *(node for _, node in results))
+        whole = self._rules.setdefault(key, Rule(tuple(by.values()), slopes))
+        nodes = []
+        for k, (path, node) in enumerate(results):
+            part = self._rules.setdefault((*key, k), _part_of(whole, k))
+            self.label(node, f"{source.name}_{path}" if path else source.name)
+            nodes.append(self.make("ruled", node, value=part))
+        return rebuilt(result, iter(nodes))
 
 
-def _ruled(code: Code, source: Parsed, rule: Parsed, known: Mapping[str, Value]) -> Value:
-    """An equation with declared derivatives: both are done, and stay together."""
-    given = {name: code.named(value, name) for name, value in known.items()}
-    code.ruled = False  # what is declared is not differentiated
-    try:
-        items, (result, slopes) = code.aside(
-            lambda: (_Reader(source, code).result(given), _Reader(rule, code).result(given))
-        )
-    finally:
-        code.ruled = True
-    below = [(name, *leaf) for name, value in given.items() for leaf in leaves(value)]
-    by = {".".join(filter(None, (a, b))): node for a, b, node in below if node.kind == "float"}
-    nodes, found = [*leaves(result)], [node for _, node in leaves(slopes)]
-    if len(found) != len(by) * len(nodes):
-        rule.refuse(
-            None,
-            f"a number of derivatives that is not {len(by) * len(nodes)}",
-            f"return those by {', '.join(by)}, in order",
-        )
-    results = {}
-    for path, node in nodes:
-        name = code.fresh(f"{source.name}_{path}" if path else source.name)
-        items.append(Let(name, node))
-        pairs = [(argument, found.pop(0)) for argument in by.values()]
-        moved = [(a, b) for a, b in pairs if a.op != "number" and not ex.is_number(b, 0.0)]
-        results[name] = (ex.name(name, node.kind), moved)
-    code.items.append(Rule(items, (*results,), [moved for _, moved in results.values()]))
-    return rebuilt(result, iter([node for node, _ in results.values()]))
+def _part_of(rule: Rule, index: int) -> Rule:
+    """The rule of one result among several."""
+    size = len(rule.arguments)
+    return Rule(rule.arguments, lambda: rule.slopes[index * size : (index + 1) * size])
 
 
-class _Reader:
-    """Does the statements of one equation."""
+class _Tracer:
+    """Runs the statements of one equation."""
 
-    def __init__(self, source: Parsed, code: Code) -> None:
-        self.source, self.code, self.refuse = source, code, source.refuse
+    def __init__(self, source: Parsed, trace: Trace) -> None:
+        self.source, self.trace, self.refuse = source, trace, source.refuse
         self.local = source.local
-        self.env: Names = {}
+        self.names: Names = {}
 
     def result(self, given: Mapping[str, Value]) -> Value:
         """What the equation returns for some arguments."""
-        self.env = {name: self.code.named(value, name) for name, value in given.items()}
+        self.names = dict(given)
+        for name, value in given.items():
+            self.trace.label(value, name)
         return self.returned(self.source.node.body)
 
     def returned(self, statements: Sequence[ast.stmt]) -> Value:
@@ -142,7 +194,7 @@ class _Reader:
                     elif has_return([each]):
                         one, _ = self.way(self.returned, [*each.body, *pending])
                         two, _ = self.way(self.returned, [*each.orelse, *pending])
-                        return self.either(each, test, one, two, "value")
+                        return self.either(each, test, one, two)
                     else:
                         self.merge(test, each)
                 case ast.For(target=target, iter=ast.Call(args=args)):
@@ -162,52 +214,34 @@ class _Reader:
                     self.bind(target, self.value(term))
         return None
 
-    def way(self, read: Callable[[Any], R], what: Any) -> tuple[tuple[list[Item], R], Names]:
+    def way(self, run: Callable[[Any], R], what: Any) -> tuple[R, Names]:
         """What one way of a decision comes to, and its names; those here stay as they are."""
-        outer, self.env = self.env, dict(self.env)
+        outer, self.names = self.names, dict(self.names)
         try:
-            return self.code.aside(lambda: read(what)), self.env
+            return run(what), self.names
         finally:
-            self.env = outer
+            self.names = outer
 
     def merge(self, test: Node, each: ast.If) -> None:
         """An `if` that does not return: what both of its ways set is merged."""
-        (then, _), one = self.way(self.block, each.body)
-        (other, _), two = self.way(self.block, each.orelse)
-        changed = [n for n in {**one, **two} if one.get(n) is not two.get(n)]
-        for name in [n for n in changed if n not in one or n not in two]:
-            self.env.pop(name, None)  # without a value one way: refused where it is read
-            changed.remove(name)
-        for name in changed:
-            if not alike(one[name], two[name]):
-                self.refuse(each, f"{name} of two structures", "give it the same kind of value")
-        names = SimpleNamespace(_fields=tuple(changed))
-        first, second = (Tuple(names, tuple(env[n] for n in changed)) for env in (one, two))
-        found = self.code.named(self.either(each, test, (then, first), (other, second), ""), "")
-        assert isinstance(found, Tuple)
-        self.env.update(zip(changed, found.items, strict=True))
+        _, one = self.way(self.block, each.body)
+        _, two = self.way(self.block, each.orelse)
+        for name in {**one, **two}:
+            if name not in one or name not in two:
+                self.names.pop(name, None)  # without a value one way: refused where it is read
+            elif one[name] is not two[name]:
+                if not alike(one[name], two[name]):
+                    self.refuse(each, f"{name} of two structures", "give it the same kind of value")
+                self.names[name] = self.either(each, test, one[name], two[name])
+                self.trace.label(self.names[name], name)
 
-    def either(self, at: ast.AST, test: Node, one: Way, two: Way, stem: str) -> Value:
-        """The value of one of two ways: conditional expressions where both are cheap."""
-        (then, first), (other, second) = one, two
-        if not alike(first, second):
+    def either(self, at: ast.AST, test: Node, one: Value, two: Value) -> Value:
+        """The value of one of two ways."""
+        if not alike(one, two):
             self.refuse(at, "results of different structure", "give the same tuple on every way")
-        pairs = [(*a, b) for a, (_, b) in zip(leaves(first), leaves(second), strict=True)]
-        flat, more = _flat(then, [a for _, a, _ in pairs]), _flat(other, [b for _, _, b in pairs])
-        if flat is not None and more is not None:
-            return rebuilt(
-                first, iter([ex.choose(test, *ab) for ab in zip(flat, more, strict=True)])
-            )
-        choice, nodes = Choice(test, then, other, []), []
-        for path, a, b in pairs:
-            if a is not b:
-                name = self.code.fresh("_".join(filter(None, (stem, path))))
-                choice.merged.append((name, a, b))
-                a = ex.name(name, make("if", test, a, b).kind)
-            nodes.append(a)
-        if choice.merged:
-            self.code.items.append(choice)
-        return rebuilt(first, iter(nodes))
+        pairs = zip(leaves(one), leaves(two), strict=True)
+        chosen = (self.trace.noted(choose(test, a, b)) for (_, a), (_, b) in pairs)
+        return rebuilt(one, chosen)
 
     def bind(self, target: ast.expr, value: Value) -> None:
         """Give a name its value, or each of several in a tuple."""
@@ -220,7 +254,8 @@ class _Reader:
                 self.bind(each, item)
             return
         assert isinstance(target, ast.Name)
-        self.env[target.id] = self.code.named(value, target.id)
+        self.names[target.id] = value
+        self.trace.label(value, target.id)
 
     # -- expressions -------------------------------------------------------------------------------
 
@@ -228,9 +263,10 @@ class _Reader:
         """A decision; an option that is on counts as true."""
         value = self.value(node)
         if isinstance(value, Flag):
-            return ex.number(self.known(node, value) is not None)
+            known = self.known(node, value)
+            return known if isinstance(known, Node) else graph.number(known is not None)
         if isinstance(value, Node):
-            return ex.number(bool(value.value)) if value.op == "number" else value
+            return graph.number(bool(value.value)) if value.op == "number" else value
         self.refuse(node, "a test of a tuple", "compare its elements")
 
     def known(self, node: ast.AST, option: Flag) -> Any:
@@ -255,11 +291,11 @@ class _Reader:
             case ast.Constant(value=None):
                 return Flag(None)
             case ast.Constant(value=int(number) | float(number)):
-                return ex.number(number)
+                return graph.number(number)
             case ast.Tuple(elts=items):
                 return Tuple(None, tuple(map(self.value, items)))
-            case ast.Name(id=name) if name in self.env:
-                return self.env[name]
+            case ast.Name(id=name) if name in self.names:
+                return self.names[name]
             case ast.Name(id=name):
                 if name in self.local:
                     instead = "give it a value on every way"
@@ -271,12 +307,14 @@ class _Reader:
                 return self.element(node)
             case ast.UnaryOp(op=ast.Not()):
                 test = self.test(node.operand)
-                return ex.number(not test.value) if test.op == "number" else make("not", test)
+                return self.negated(test)
             case ast.UnaryOp():
                 inner = self.scalar(node.operand)
                 if isinstance(node.op, ast.UAdd):
                     return inner
-                return ex.number(-inner.value) if inner.op == "number" else make("neg", inner)
+                if inner.op == "number":
+                    return graph.number(-inner.value)
+                return self.trace.make("neg", inner)
             case ast.BinOp():
                 return self.arithmetic(node)
             case ast.Compare():
@@ -287,9 +325,7 @@ class _Reader:
                 test = self.test(node.test)
                 if test.op == "number":
                     return self.value(node.body if test.value else node.orelse)
-                one, _ = self.way(self.value, node.body)
-                two, _ = self.way(self.value, node.orelse)
-                return self.either(node, test, one, two, "chosen")
+                return self.either(node, test, self.value(node.body), self.value(node.orelse))
             case ast.Call():
                 return self.call(node)
         self.refuse(node, "this expression", "use arithmetic")
@@ -312,7 +348,7 @@ class _Reader:
     def field(self, node: ast.Attribute) -> Value:
         """Value of a field, or of a constant of a module."""
         base = node.value
-        module = isinstance(base, ast.Name) and base.id not in {*self.local, *self.env}
+        module = isinstance(base, ast.Name) and base.id not in {*self.local, *self.names}
         if module and isinstance(self.outside(base), ModuleType):
             return self.constant(node, node.attr, self.outside(node))
         value = self.value(base)
@@ -331,54 +367,59 @@ class _Reader:
         found: Value = value.items[index.value]
         return found
 
+    def negated(self, test: Node) -> Node:
+        """`not` of a test."""
+        if test.op == "number":
+            return graph.number(not test.value)
+        return self.trace.make("not", test)
+
     def arithmetic(self, node: ast.BinOp) -> Node:
         """Value of an arithmetic operation, exactly as written."""
         op, left = ARITHMETIC[type(node.op)], self.scalar(node.left)
         if op == "**":
-            return make("**", left, value=ast.literal_eval(node.right))
+            return self.trace.make("**", left, value=ast.literal_eval(node.right))
         right = self.scalar(node.right)
         if left.kind == right.kind == "int" and left.op == right.op == "number" and op != "/":
             counted = {"+": int.__add__, "-": int.__sub__, "*": int.__mul__}[op]
-            return ex.number(counted(left.value, right.value))
+            return graph.number(counted(left.value, right.value))
         if op == "*" and left.kind == right.kind == "float":  # a factor that is known to be one
             for one, other in ((left, right), (right, left)):
-                if ex.is_number(one, 1.0):
+                if graph.is_number(one, 1.0):
                     return other
-        return make(op, left, right)
+        return self.trace.make(op, left, right)
 
     def comparison(self, node: ast.Compare) -> Node:
         """A comparison, also of several terms, and `is None`."""
-        left, found = self.value(node.left), ex.number(True)
+        left, found = self.value(node.left), TRUE
         for op, right_node in zip(node.ops, node.comparators, strict=True):
             if isinstance(op, ast.Is | ast.IsNot):
-                missing = isinstance(left, Flag) and self.known(node, left) is None
-                found = _joined(found, ex.number(missing == isinstance(op, ast.Is)), True)
+                found = graph.both(found, self.missing(node, left, isinstance(op, ast.Is)))
                 continue
             right = self.scalar(right_node)
             if not isinstance(left, Node):
                 self.refuse(node, "a comparison of a tuple", "compare its elements")
-            found = _joined(found, make(COMPARISONS[type(op)], left, right), True)
+            found = graph.both(found, self.trace.make(COMPARISONS[type(op)], left, right))
             left = right
         return found
 
+    def missing(self, node: ast.AST, value: Value, off: bool) -> Node:
+        """Whether a value `is None` (`off`), or is not."""
+        known = self.known(node, value) if isinstance(value, Flag) else True
+        if isinstance(known, Node):
+            return self.negated(known) if off else known
+        return graph.number((known is None) == off)
+
     def joined(self, node: ast.BoolOp) -> Node:
-        """`and` and `or`; what must not be done in vain is put behind the test."""
+        """`and` and `or`, which are choices: the second test only counts after the first."""
         conjunction = isinstance(node.op, ast.And)
-        test = ex.number(conjunction)
+        test = TRUE if conjunction else FALSE
         for each in node.values:
             if test.op == "number" and bool(test.value) != conjunction:
                 return test
-            (items, more), _ = self.way(self.test, each)
-            if test.op == "number" or (not items and more.cheap):
-                self.code.items += items
-                test = _joined(test, more, conjunction)
-                continue
-            one: Way = (items, more)
-            two: Way = ([], ex.number(not conjunction))
-            one, two = (one, two) if conjunction else (two, one)
-            found = self.either(node, test, one, two, "test")
-            assert isinstance(found, Node)
-            test = found
+            more = self.test(each)
+            test = self.trace.noted(
+                graph.both(test, more) if conjunction else graph.either(test, more)
+            )
         return test
 
     # -- calls -------------------------------------------------------------------------------------
@@ -400,7 +441,7 @@ class _Reader:
             self.refuse(node, f"a call of {text}", f"make {text} an @equation")
         callee = parsed(found)
         names = [each.arg for each in callee.arguments]
-        return read(self.code, found, self.arguments(node, names, callee.defaults))
+        return self.trace.call(found, self.arguments(node, names, callee.defaults))
 
     def function(self, node: ast.Call, op: str) -> Node:
         """Value of a function of numbers."""
@@ -409,7 +450,10 @@ class _Reader:
         exactly = len(args) == least or (len(args) > least and op in ("min", "max"))
         if not exactly or node.keywords:
             self.refuse(node, f"{op} of {len(args)} arguments", f"give it {least}")
-        return make(op, *args)
+        made = args[0]
+        for each in args[1:] or [None]:
+            made = self.trace.make(op, made) if each is None else self.trace.make(op, made, each)
+        return made
 
     def arguments(self, node: ast.Call, names: Sequence[str], optional: Any) -> Names:
         """Values for arguments of these names, in their order as far as they are given."""
@@ -440,11 +484,11 @@ class _Reader:
         if len(inner.arguments) != len(own) + len(values) - 2:
             what = f"{word} of {inner.name} with other arguments"
             self.refuse(node, what, f"let it take {', '.join(own)} and the rest")
-        return make_of(self.code, inner, values[0], values[1], values[2:], read)
+        return make_of(self.trace, inner, values[0], values[1], values[2:])
 
     def table(self, given: Mapping[str, Value], node: ast.Call) -> Value:
         """Value of `interpolate`."""
-        x, knots, values = (self.code.named(value, name) for name, value in given.items())
+        x, knots, values = given.values()
         if not (
             isinstance(x, Node)
             and isinstance(knots, Tuple)
@@ -458,31 +502,23 @@ class _Reader:
                 "lengths",
             )
         numbers = [[node for _, node in leaves(each)] for each in (knots, values)]
-        return interpolated(self.code, x, *numbers)
+        return self.interpolated(x, *numbers)
 
-
-def _joined(one: Node, two: Node, conjunction: bool) -> Node:
-    """Two tests joined by `and` or `or`; known ones vanish."""
-    for known, rest in ((one, two), (two, one)):
-        if known.op == "number":
-            return rest if bool(known.value) == conjunction else known
-    word = "and" if conjunction else "or"
-    parts = [part for each in (one, two) for part in (each.args if each.op == word else (each,))]
-    return make(word, *parts)
-
-
-def _flat(items: Sequence[Item], ends: Sequence[Node]) -> list[Node] | None:
-    """Ends with the items in them, nothing if they cannot be done whatever a test says."""
-    meanings: dict[str, Node] = {}
-    operations = sum(map(ex.size, ends)) if items else 0
-    for each in items:
-        if not isinstance(each, Let) or not each.node.cheap:
-            return None
-        operations += ex.size(each.node)
-        meanings[each.name] = ex.substitute(each.node, meanings)
-    if operations > FEW or not all(node.cheap for node in ends):
-        return None
-    return [ex.substitute(node, meanings) for node in ends]
+    def interpolated(self, x: Node, knots: Sequence[Node], values: Sequence[Node]) -> Node:
+        """`interpolate`, written out."""
+        make, label = self.trace.make, self.trace.label
+        ends = [knots[0], knots[1], values[0], values[1]]
+        for i in range(1, len(knots) - 1):
+            beyond = make(">=", x, knots[i])
+            now = knots[i], knots[i + 1], values[i], values[i + 1]
+            ends = [choose(beyond, b, a) for a, b in zip(ends, now, strict=True)]
+            for node, name in zip(ends, ("left", "right", "low", "high"), strict=True):
+                label(self.trace.noted(node), name)
+        left, right, low, high = ends
+        share = make("/", make("-", x, left), make("-", right, left))
+        label(share, "share")
+        inside = make("min", make("max", ZERO, share), ONE)
+        return make("+", low, make("*", inside, make("-", high, low)))
 
 
 def _is_equation(found: Any) -> bool:

@@ -19,7 +19,7 @@ from types import FunctionType, SimpleNamespace
 from typing import Any, NoReturn
 from weakref import WeakKeyDictionary
 
-from swashplate.equations.expressions import CALLED
+from swashplate.equations.graph import CALLED
 from swashplate.errors import EquationError
 
 MATH: dict[Any, str] = {getattr(math, name): name for name in CALLED}

@@ -1,0 +1,127 @@
+"""Generated functions: their texts, and what makes and remembers them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from functools import cached_property, lru_cache, wraps
+from threading import RLock
+from time import perf_counter
+from typing import Any, ParamSpec, TypeVar
+
+from numba import types
+from numba.extending import intrinsic
+
+from swashplate.equations.declaration import JIT_OFF, inlined, interpreted, remember_text
+from swashplate.equations.language import CHOICES, MATH
+
+P = ParamSpec("P")
+R = TypeVar("R")
+
+GENERATING = RLock()
+"""Held by the one thread that reads equations or writes code, which compares by identity."""
+def _choose(test: bool, one: Any, two: Any) -> Any:
+    return one if test else two
+
+
+def _selected(typing: Any, test: Any, one: Any, two: Any) -> Any:
+    kind = typing.unify_types(one, two)
+
+    def generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
+        sides = (context.cast(builder, values[k], signature.args[k], kind) for k in (1, 2))
+        return builder.select(values[0], *sides)
+
+    return kind(types.boolean, one, two), generate
+
+
+choose: Any = _choose if JIT_OFF else intrinsic(_selected)
+"""``choose(test, a, b)`` is one of two numbers that both have been computed: from ``a if test else
+b`` the compiler makes branches, or a choice between two addresses, and gathers."""
+
+
+FUNCTIONS: dict[str, Any] = {name: each for each, name in [*MATH.items(), *CHOICES.items()]}
+"""What texts call."""
+FUNCTIONS["choose"] = choose
+RESERVED = {*FUNCTIONS, "inf", "nan", "range", "int", "float", "None", "True", "False"}
+"""Names that texts use themselves."""
+
+
+_clock = {"depth": 0.0, "seconds": 0.0}
+
+
+def generating(function: Callable[P, R]) -> Callable[P, R]:
+    """Remember what a function generates, and let one thread at a time do so."""
+    remembered = lru_cache(maxsize=256)(function)
+
+    @wraps(function)
+    def alone(*args: P.args, **kwargs: P.kwargs) -> R:
+        with GENERATING:
+            begun, _clock["depth"] = perf_counter(), _clock["depth"] + 1.0
+            try:
+                return remembered(*args, **kwargs)  # type: ignore[arg-type]
+            finally:
+                _clock["depth"] -= 1.0
+                if not _clock["depth"]:
+                    _clock["seconds"] += perf_counter() - begun
+
+    return alone
+
+
+def generating_time() -> float:
+    """Time for which this process read equations, wrote code, and loaded or compiled it. [s]"""
+    return _clock["seconds"]
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Function:
+    """A generated function: its name, its text, and what that refers to."""
+
+    name: str
+    source: str
+    names: dict[str, Any] = field(default_factory=dict)
+
+    def __repr__(self) -> str:
+        return f"{type(self).__name__}({self.name!r})"
+
+    @property
+    def texts(self) -> dict[str, str]:
+        """Texts of this function and of all that it calls, those first, by name."""
+        inner = [each.texts for each in self.names.values() if isinstance(each, Function)]
+        return {k: v for each in [*inner, {self.name: self.source}] for k, v in each.items()}
+
+    @cached_property
+    def python(self) -> Callable[..., Any]:
+        """The function, as plain Python throughout."""
+        names = self.names.items()
+        made: Callable[..., Any] = self._made(
+            {k: v.python if isinstance(v, Function) else interpreted(v) for k, v in names}
+            | {"choose": _choose}
+        )
+        return made
+
+    @cached_property
+    def compiled(self) -> Any:
+        """The function, compiled so that callers inline it."""
+        return inlined(self._made(compiled_names(self.names)))
+
+    def _made(self, space: dict[str, Any]) -> Any:
+        file = remember_text(self.name, self.source)
+        space = {**FUNCTIONS, "inf": math.inf, "nan": math.nan, **space}
+        exec(compile(self.source, file, "exec"), space)
+        return space[self.name]
+
+
+def compiled_names(names: Mapping[str, Any]) -> dict[str, Any]:
+    """What a text refers to, with generated functions compiled."""
+    return {k: v.compiled if isinstance(v, Function) else v for k, v in names.items()}
+
+
+def fresh_name(stem: str, taken: set[str]) -> str:
+    """A name that is not yet taken, and is from now on."""
+    name, times = stem, 1
+    while name in taken:
+        times += 1
+        name = f"{stem}_{times}"
+    taken.add(name)
+    return name

@@ -1,0 +1,415 @@
+"""Derivatives of what equations say: adjoints, carried backwards over their graph.
+
+What a result follows nowhere is a structural zero: it has no entry.
+
+Conventions where a derivative does not exist:
+
+- Of `min` and `max` at a tie the last argument counts; `abs` at zero counts as rising.
+- A conditional expression has the derivative of the side that is taken; decisions and `floor`
+  have none.
+- Where `sqrt`, `asin`, `acos`, `hypot` or `atan2` have an infinite slope or none, it counts as 0.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+from swashplate.equations import graph
+from swashplate.equations.functions import Function
+from swashplate.equations.graph import (
+    CALLED,
+    FALSE,
+    ONE,
+    TRUE,
+    ZERO,
+    Call,
+    Node,
+    choose,
+    make,
+    minus,
+    negative,
+    ordered,
+    times,
+)
+from swashplate.equations.printing import function_text, named_by_text
+from swashplate.errors import EquationError
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Derived(Function):
+    """A function that returns the values of an equation, then its partial derivatives.
+
+    It takes the arguments of the equation and returns one flat tuple.
+
+    Attributes
+    ----------
+    outputs, inputs : tuple of str
+        Dotted paths of the wanted results and of what they are differentiated by.
+    entries : tuple of (int, int)
+        Numbers of output and input of each partial derivative that is not structurally zero, in
+        the order in which they follow the values.
+    """
+
+    outputs: tuple[str, ...] = ()
+    inputs: tuple[str, ...] = ()
+    entries: tuple[tuple[int, int], ...] = ()
+
+
+def derived_function(
+    name: str,
+    says: str,
+    formals: Sequence[str],
+    results: Sequence[tuple[str, Node]],
+    by: Sequence[tuple[str, str]],
+    labels: Mapping[Node, str],
+    *,
+    chained: bool = False,
+) -> Derived:
+    """The function of some results with their derivatives.
+
+    `formals` are its arguments, `results` paths and nodes of what is returned, `by` paths and names
+    of what that is differentiated by; `name` may have `UNNAMED` in it.
+    """
+    values = [node for _, node in results]
+    found = Gradients(values, [graph.name(n) for _, n in by], chained=chained)
+    hints = {**labels, **found.hints([p for p, _ in results], [p for p, _ in by], labels)}
+    text, functions = function_text(
+        name, says, formals, [*found.values, *found.partials.values()], hints, flat=True
+    )
+    for each in formals:
+        if each in CALLED and f"{each}(" in text:
+            raise EquationError(
+                f"An argument is called {each}, and so is the function that its derivatives need: "
+                "give the argument another name."
+            )
+    outputs, inputs = tuple(path for path, _ in results), tuple(path for path, _ in by)
+    entries = tuple(found.partials)
+    return Derived(*named_by_text(name, text), dict(functions), outputs, inputs, entries)
+
+
+def gradients(
+    results: Sequence[Node], by: Sequence[Node], *, chained: bool = False
+) -> dict[tuple[int, int], Node]:
+    """Partial derivatives of results by some nodes that are not structurally zero.
+
+    By the indices of result and node; see `Gradients`.
+    """
+    return Gradients(results, by, chained=chained).partials
+
+
+class Contribution(NamedTuple):
+    """An amount of an adjoint, which counts if `test` is true.
+
+    It is `masked` if it is zero already where the test is false.
+    """
+
+    test: Node
+    amount: Node
+    masked: bool
+
+    @property
+    def zero_elsewhere(self) -> Node:
+        """The amount, zero where it does not count."""
+        return self.amount if self.masked else _masked(self.test, self.amount)
+
+
+class Gradients:
+    """Results with their derivatives by some nodes, what lies below these being left alone.
+
+    `chained` is shorter where the results are links of one chain: one that others follow is swept
+    once, their adjoints end at it, and go on with its derivatives.
+
+    Attributes
+    ----------
+    values : list of Node
+        The results again: calls in them give their derivatives as well.
+    partials : dict of (int, int) to Node
+        By the indices of result and node, in their order.
+    adjoints : list of dict of Node to Node
+        Of each result, the derivatives by all that it follows.
+    """
+
+    def __init__(
+        self, results: Sequence[Node], by: Sequence[Node], *, chained: bool = False
+    ) -> None:
+        self._by = dict.fromkeys(by)
+        self._order = ordered(results, operands=_reached)
+        self._moves = self._moving()
+        self._divisors = {node.args[1] for node in self._order if node.op == "/"}
+        self._calls: dict[Node, tuple[Node, dict[tuple[int, int], Node]]] = {}
+        """Calls that move something: with derivatives, and these by indices of result and argument.
+        """
+        self._tame: dict[Node, bool] = {}
+        index = {node: k for k, node in enumerate(self._order)}
+        self._links: dict[Node, dict[Node, Node]] = {}
+        self.adjoints: list[dict[Node, Node]] = [{}] * len(results)
+        # a result that others follow comes first: their adjoints end at it
+        for k in sorted(range(len(results)), key=lambda k: index[results[k]]):
+            self.adjoints[k] = self._swept(results[k])
+            if chained and results[k] not in self._by:
+                self._links.setdefault(results[k], self.adjoints[k])
+        plain = {node: derived for node, (derived, _) in self._calls.items()}
+        pairs = [
+            (o, i)
+            for o in range(len(results))
+            for i, node in enumerate(by)
+            if self.adjoints[o].get(node, ZERO) is not ZERO
+        ]
+        partials = [self.adjoints[o][by[i]] for o, i in pairs]
+        made = graph.rewritten([*results, *partials], plain)
+        self.values = made[: len(results)]
+        self.partials = dict(zip(pairs, made[len(results) :], strict=True))
+
+    def hints(
+        self, outputs: Sequence[str], inputs: Sequence[str], labels: Mapping[Node, str]
+    ) -> dict[Node, str]:
+        """Names for derivatives, should they need one."""
+        found: dict[Node, str] = {}
+        spoken = {*self._order}
+        for (o, i), node in self.partials.items():
+            label = "" if len(outputs) == 1 else f"{word(outputs[o])}_"
+            if node not in spoken:
+                found.setdefault(node, f"d_{label}{word(inputs[i])}")
+        for o, bars in enumerate(self.adjoints):
+            label = "" if len(outputs) == 1 else f"{word(outputs[o])}_"
+            for node, bar in bars.items():
+                name = labels.get(graph.plain_value(node))
+                if name and bar not in spoken:
+                    found.setdefault(bar, f"d_{label}{name}")
+        return found
+
+    # -- what moves --------------------------------------------------------------------------------
+
+    def _moving(self) -> set[Node]:
+        """Nodes that follow, continuously, what is differentiated by."""
+        moves = set(self._by)
+        for node in self._order:
+            if node not in moves and any(a in moves for a in _followed(node)):
+                moves.add(node)
+        return moves
+
+    # -- backward ----------------------------------------------------------------------------------
+
+    def _swept(self, result: Node) -> dict[Node, Node]:
+        """Derivatives of a result by all that it follows."""
+        if result in self._links:
+            return self._links[result]
+        bars: dict[Node, list[Contribution]] = {result: [Contribution(TRUE, ONE, False)]}
+        found: dict[Node, Node] = {}
+        for node in reversed(self._order):
+            if node not in bars or node not in self._moves:
+                continue
+            total = _total(bars.pop(node))
+            found[node] = total.zero_elsewhere
+            if found[node] is ZERO or node in self._by:
+                continue
+            if node in self._links:
+                for below, slope in self._links[node].items():
+                    if below in self._by:
+                        bar = Contribution(TRUE, times(found[node], slope), False)
+                        bars.setdefault(below, []).append(bar)
+                continue
+            for argument, push in self._pushed(node):
+                if argument in self._moves:
+                    bar = push(total)
+                    if bar.amount is not ZERO:
+                        bars.setdefault(argument, []).append(bar)
+        return found
+
+    def _pushed(
+        self, node: Node
+    ) -> Iterator[tuple[Node, Callable[[Contribution], Contribution]]]:
+        """Operands of a node, each with what an adjoint becomes on the way to it."""
+        if node.op in ("min", "max", "if"):
+            test, one, two = node.args if node.op == "if" else _sides(node)
+            yield one, lambda bar: _taken(bar, test)
+            yield two, lambda bar: _taken(bar, _opposite(test))
+            return
+        for argument, slope in self._slopes(node):
+            yield argument, lambda bar, slope=slope: self._multiplied(bar, slope)
+
+    def _multiplied(self, bar: Contribution, slope: Callable[[Node], Node]) -> Contribution:
+        """A contribution times a derivative, which need not be finite where it does not count."""
+        amount = slope(bar.amount)
+        light = bar.masked and self._is_tame(slope(ONE))
+        return Contribution(bar.test, amount, light)
+
+    def _is_tame(self, node: Node) -> bool:
+        """Whether a node is finite wherever the names in it are moderate."""
+        for each in ordered([node], self._tame):
+            tame = each.op in TAME and all(self._tame[a] for a in each.args)
+            self._tame[each] = tame
+        return self._tame[node]
+
+    def _slopes(self, node: Node) -> Iterator[tuple[Node, Callable[[Node], Node]]]:
+        """Operands of an operation, each with what a weight becomes on the way to it."""
+        op, args = node.op, node.args
+        if op == "ruled":
+            for argument, slope in zip(node.value.arguments, node.value.slopes, strict=True):
+                if slope is not ZERO and not graph.is_number(slope, 0.0):
+                    yield argument, lambda w, slope=slope: times(w, slope)
+        elif op == "result":
+            call = args[0]
+            for (k, i), slope in self._derivatives_of(call).items():
+                if k == node.value:
+                    yield call.args[i], lambda w, slope=slope: times(w, slope)
+        elif op == "neg":
+            yield args[0], negative
+        elif op in ("+", "-"):
+            yield args[0], lambda w: w
+            yield args[1], (lambda w: w) if op == "+" else negative
+        elif op == "*" and args[0] is args[1]:
+            yield args[0], lambda w: times(graph.number(2.0), times(w, args[0]))
+        elif op == "*":
+            yield args[0], lambda w: times(w, args[1])
+            yield args[1], lambda w: times(w, args[0])
+        elif op == "/":
+            by = graph.inverse(args[1])
+            yield args[0], lambda w: times(w, by)
+            yield args[1], lambda w: negative(times(times(w, by), node))
+        elif op == "**" and node.value:
+            yield args[0], lambda w: times(times(graph.number(float(node.value)), w), _power(node))
+        elif op == "abs":
+            test = make(">=", args[0], ZERO)
+            yield args[0], lambda w: choose(test, w, negative(w))
+        elif op == "atan2":
+            by = self._over(graph.plus(make("*", args[0], args[0]), make("*", args[1], args[1])))
+            yield args[0], lambda w: times(w, times(args[1], by))
+            yield args[1], lambda w: negative(times(w, times(args[0], by)))
+        elif op == "hypot":
+            by = self._over(node)
+            yield args[0], lambda w: times(w, times(args[0], by))
+            yield args[1], lambda w: times(w, times(args[1], by))
+        elif op in FUNCTIONS:
+            slope = FUNCTIONS[op](args[0], node, self._over)
+            yield args[0], lambda w: times(w, slope)
+
+    def _over(self, node: Node) -> Node:
+        """1 over something not negative; 0 where it is zero, if it can be."""
+        return graph.inverse(node) if node in self._divisors else graph.finite_inverse(node)
+
+    def _derivatives_of(self, call: Node) -> dict[tuple[int, int], Node]:
+        """Derivatives of a call's results by its arguments that move, by their indices."""
+        if call not in self._calls:
+            by = tuple(k for k, node in enumerate(call.args) if node in self._moves)
+            own: Call = call.value
+            if not by or own.derivative is None:
+                return {}
+            derived = own.derivative(by)
+            count = len(derived.outputs)
+            own = Call(derived, count + len(derived.entries))
+            again = make("call", *call.args, value=own)
+            partials = {
+                (o, by[i]): make("result", again, value=count + k)
+                for k, (o, i) in enumerate(derived.entries)
+            }
+            self._calls[call] = again, partials
+        return self._calls[call][1]
+
+
+TAME = {"number", "name", "+", "-", "*", "neg", "abs", "min", "max", "if", "not"}
+TAME |= {*graph.COMPARISONS}
+"""Operations that make finite numbers of moderate ones."""
+
+
+def _reached(node: Node) -> Sequence[Node]:
+    """Operands of a node, and what else a declared derivative is by."""
+    return (*node.args, *node.value.arguments) if node.op == "ruled" else node.args
+
+
+def _followed(node: Node) -> Sequence[Node]:
+    """Operands that a value follows continuously: no decision, and nothing in whole numbers."""
+    if node.kind != "float" or node.op in ("number", "name"):
+        return ()
+    if node.op == "ruled":
+        return node.value.arguments  # type: ignore[no-any-return]
+    return node.args[1:] if node.op == "if" else node.args
+
+
+def _sides(node: Node) -> tuple[Node, Node, Node]:
+    """`min` or `max` as a choice: at a tie the last operand counts."""
+    one, two = node.args
+    return make("<" if node.op == "min" else ">", one, two), one, two
+
+
+def _taken(bar: Contribution, test: Node) -> Contribution:
+    """A contribution that only counts on one side of a choice."""
+    return Contribution(graph.both(bar.test, test), bar.amount, False)
+
+
+def _total(bars: Sequence[Contribution]) -> Contribution:
+    """All contributions to an adjoint as one."""
+    total = bars[0]
+    for bar in bars[1:]:
+        if bar.test is total.test:
+            amount = graph.plus(total.amount, bar.amount)
+            total = Contribution(bar.test, amount, total.masked and bar.masked)
+        else:
+            amount = graph.plus(total.zero_elsewhere, bar.zero_elsewhere)
+            total = Contribution(_union(total.test, bar.test), amount, True)
+    return total
+
+
+def _masked(test: Node, amount: Node) -> Node:
+    """An amount if a test is true, else zero; one test after the other, as equations have them."""
+    if test.op == "if" and test.args[2] is FALSE:
+        return choose(test.args[0], _masked(test.args[1], amount), ZERO)
+    if test.op == "if" and test.args[1] is FALSE:
+        return choose(test.args[0], ZERO, _masked(test.args[2], amount))
+    return choose(test, amount, ZERO)
+
+
+def _union(one: Node, two: Node) -> Node:
+    """Whether one or the other is true."""
+    if one is two or one is TRUE:
+        return one
+    if two is TRUE or _opposite(one) is two:
+        return TRUE
+    if one.op == "if" == two.op and one.args[0] is two.args[0]:
+        test, *sides = zip(one.args, two.args, strict=True)
+        return choose(test[0], *(_union(*side) for side in sides))
+    return graph.either(one, two)
+
+
+def _opposite(test: Node) -> Node:
+    """`not` of a test."""
+    return test.args[0] if test.op == "not" else make("not", test)
+
+
+def _power(node: Node) -> Node:
+    """A power with an exponent that is less by one."""
+    base, exponent = node.args[0], node.value
+    if exponent in (1, 2):
+        return ONE if exponent == 1 else base
+    return make("**", base, value=exponent - 1)
+
+
+def _arc(a: Node, over: Callable[[Node], Node]) -> Node:
+    return over(make("sqrt", minus(ONE, make("*", a, a))))
+
+
+FUNCTIONS: dict[str, Callable[[Node, Node, Callable[[Node], Node]], Node]] = {
+    "sqrt": lambda a, value, over: times(graph.number(0.5), over(value)),
+    "exp": lambda a, value, over: value,
+    "log": lambda a, value, over: graph.inverse(a),
+    "sin": lambda a, value, over: make("cos", a),
+    "cos": lambda a, value, over: negative(make("sin", a)),
+    "tan": lambda a, value, over: graph.plus(ONE, make("*", value, value)),
+    "atan": lambda a, value, over: graph.inverse(graph.plus(ONE, make("*", a, a))),
+    "tanh": lambda a, value, over: minus(ONE, make("*", value, value)),
+    "asin": lambda a, value, over: _arc(a, over),
+    "acos": lambda a, value, over: negative(_arc(a, over)),
+}
+"""Derivatives of functions of one number, from its argument, its value and `Gradients._over`."""
+
+
+def word(path: str) -> str:
+    """A path as part of a name."""
+    return path.replace(".", "_").replace("[", "_").replace("]", "")
+
+
+def listing(inputs: Sequence[str]) -> str:
+    """Inputs, as far as one wants to read them."""
+    return ", ".join(inputs) if len(inputs) <= 6 else f"{len(inputs)} inputs"

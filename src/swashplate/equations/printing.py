@@ -1,0 +1,404 @@
+"""The graph printed: as Python, which Numba compiles, and as C99.
+
+Every value that is needed twice, and every one that an equation calls by a name, gets a name where
+it is first needed; what nobody needs is left out. The operations stay as the equations have them,
+so that both languages give the same bits.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from hashlib import blake2b
+from textwrap import TextWrapper
+from typing import Any
+
+from swashplate.equations.functions import FUNCTIONS, RESERVED, Function, fresh_name
+from swashplate.equations.graph import COMPARISONS, FALSE, LEAVES, TRUE, Node, plain_value
+from swashplate.equations.scheduling import Branch, Flat, Region, Schedule
+
+WIDTH = 96
+"""Characters of a line."""
+SHORT = 30
+"""Characters of a result, beyond which it gets a name."""
+STEMS = {
+    "sqrt": "root", "exp": "power", "/": "ratio", "*": "product", "+": "total", "-": "difference",
+    "if": "chosen", ">": "above", ">=": "above", "<": "below", "<=": "below",
+}  # fmt: skip
+
+
+# --- expressions ----------------------------------------------------------------------------------
+
+Text = tuple[str, int]
+"""An expression, and how tightly it binds: `ATOM` needs no brackets anywhere."""
+_LEVELS = (("if",), ("or",), ("and",), ("not",), COMPARISONS, ("+", "-"), ("*", "/"), ("neg",))
+PRECEDENCE = {op: level for level, each in enumerate(_LEVELS, 1) for op in each}
+POWER = 9
+ATOM = 10
+ONCE, ALL = 1, 2
+"""Of a choice: one side is computed, or both are and one is taken."""
+
+
+class Language:
+    """How operations are written."""
+
+    def number(self, value: Any) -> Text:
+        """A literal number."""
+        raise NotImplementedError
+
+    def operation(self, node: Node, args: Sequence[Text], computed: int) -> Text:
+        """An operation on texts; of a choice `computed` says whether both sides may be."""
+        raise NotImplementedError
+
+    def assigned(self, name: str, node: Node, text: str, pad: str, *, new: bool) -> list[str]:
+        """Lines of an assignment; a `new` name is declared by it."""
+        raise NotImplementedError
+
+    def branch(self, test: str, then: list[str], other: list[str], pad: str) -> list[str]:
+        """Lines of an `if` and its `else`."""
+        raise NotImplementedError
+
+
+def grouped(text: Text, level: int) -> str:
+    """A text, in brackets if it binds less tightly than it must."""
+    return text[0] if text[1] >= level else f"({text[0]})"
+
+
+class Python(Language):
+    """Python as Numba compiles it.
+
+    A choice of which both sides are computed is ``choose(test, one, two)``, and tests are joined by
+    ``&`` and ``|``: from ``one if test else two`` the compiler makes branches.
+    """
+
+    def number(self, value: Any) -> Text:
+        text = repr(value)
+        return text, ATOM if text[0] != "-" else PRECEDENCE["neg"]
+
+    def operation(self, node: Node, args: Sequence[Text], computed: int) -> Text:
+        op, level = node.op, PRECEDENCE.get(node.op, ATOM)
+        if op == "if":
+            return self._choice(node, args, computed)
+        if op == "not":
+            return f"not {grouped(args[0], level)}", level
+        if op == "neg":
+            return f"-{grouped(args[0], level + 1)}", level
+        if op == "**":
+            return f"{grouped(args[0], ATOM)}**{node.value!r}", POWER
+        if level < ATOM:
+            left = level + 1 if op in COMPARISONS else level
+            return f"{grouped(args[0], left)} {op} {grouped(args[1], level + 1)}", level
+        return f"{op}({', '.join(text for text, _ in args)})", ATOM
+
+    def _choice(self, node: Node, args: Sequence[Text], computed: int) -> Text:
+        (test, one, two), (_, then, other) = args, node.args
+        if other is FALSE or then is TRUE:
+            word, second = ("and", one) if other is FALSE else ("or", two)
+            if computed == ALL:
+                return f"{grouped(test, ATOM)} {'&|'[word == 'or']} {grouped(second, ATOM)}", 4
+            level = PRECEDENCE[word]
+            return f"{grouped(test, level + 1)} {word} {grouped(second, level)}", level
+        if computed == ALL:
+            return f"choose({test[0]}, {one[0]}, {two[0]})", ATOM
+        return f"{grouped(one, 2)} if {grouped(test, 2)} else {grouped(two, 1)}", PRECEDENCE["if"]
+
+    def assigned(self, name: str, node: Node, text: str, pad: str, *, new: bool) -> list[str]:
+        return assigned(name, text, pad)
+
+    def branch(self, test: str, then: list[str], other: list[str], pad: str) -> list[str]:
+        if not then:
+            return [*bracketed("if not (", test, "):", pad), *other]
+        fits = len(pad) + len(test) < WIDTH - 4
+        head = [f"{pad}if {test}:"] if fits else bracketed("if (", test, "):", pad)
+        return [*head, *then, *([f"{pad}else:", *other] if other else [])]
+
+
+PYTHON = Python()
+
+
+# --- blocks ---------------------------------------------------------------------------------------
+
+
+class Block:
+    """Lines that compute some results.
+
+    Parameters
+    ----------
+    results : sequence of Node
+        What is wanted.
+    labels : mapping of Node to str
+        What equations call a value.
+    taken : set of str
+        Names that stand for something else; those of the block are added.
+    known : mapping of Node to str, optional
+        Values that are there already, with their names.
+    flat : callable, optional
+        Which branches are not worth one, see `scheduling.Schedule`.
+    language : Language
+        Python by default.
+
+    Attributes
+    ----------
+    lines, texts : list of str
+        The lines, and the results by the names that these make.
+    functions : dict of str to Function
+        What the lines call.
+    inner : dict of str to Node
+        Names that are made in a branch alone.
+    names : dict of Node to str
+        Values that have a name after the block, those of branches left out.
+    """
+
+    def __init__(
+        self,
+        results: Sequence[Node],
+        labels: Mapping[Node, str],
+        taken: set[str],
+        *,
+        known: Mapping[Node, str] | None = None,
+        flat: Flat | None = None,
+        language: Language = PYTHON,
+        pad: str = "",
+    ) -> None:
+        self._labels, self._taken, self._known = labels, taken, dict(known or {})
+        self._language = language
+        self.functions: dict[str, Function] = {}
+        self.inner: dict[str, Node] = {}
+        self._schedule = Schedule(results, self._known, flat)
+        self._named: dict[tuple[Node, Region], str] = {}
+        self._uses = self._counted(results)
+        whole = self._schedule.whole
+        self.lines = self._region(whole, pad)
+        self.texts = [self._result(node, pad) for node in results]
+        self.names = {
+            **self._known,
+            **{node: name for (node, region), name in self._named.items() if region is whole},
+        }
+
+    def text(self, node: Node) -> str:
+        """A result, or what is made of results, by the names that the block makes."""
+        return self._text(node, self._schedule.whole)[0]
+
+    # -- names -------------------------------------------------------------------------------------
+
+    def _counted(self, results: Sequence[Node]) -> dict[tuple[Node, Region], list[Region]]:
+        """From where each value is read, by where it is computed."""
+        uses: dict[tuple[Node, Region], list[Region]] = {}
+
+        def read(node: Node, region: Region) -> None:
+            node = plain_value(node)
+            where = self._schedule.region_of(node, region)
+            if where is not None:
+                uses.setdefault((node, where), []).append(region)
+
+        def walk(region: Region) -> None:
+            for node in region.nodes:
+                for operand in node.args if node.op != "ruled" else ():
+                    read(operand, region)
+            for branch in region.branches:
+                read(branch.test, region)
+                for k, side in enumerate(branch.sides):
+                    for member in branch.members:
+                        read(member.args[1 + k], side)
+                    walk(side)
+
+        for node in results:
+            read(node, self._schedule.whole)
+        walk(self._schedule.whole)
+        return uses
+
+    def _wants_name(self, node: Node, region: Region) -> bool:
+        """Whether a value gets a line of its own."""
+        uses = self._uses[node, region]
+        if node in self._labels or len(uses) > 1 or uses[0] is not region:
+            return not _is_trivial(node)
+        return False
+
+    def _fresh(self, node: Node) -> str:
+        stem = self._labels.get(node) or STEMS.get(node.op, "part")
+        stem = stem.replace(".", "_")
+        return fresh_name(f"value_{stem}" if stem[0].isdigit() else stem, self._taken)
+
+    # -- lines -------------------------------------------------------------------------------------
+
+    def _region(self, region: Region, pad: str) -> list[str]:
+        """Lines of what is computed together."""
+        lines: list[str] = []
+        for step in self._schedule.steps(region):
+            if isinstance(step, Branch):
+                lines += self._branch(step, region, pad)
+            elif step.op == "call":
+                lines += self._call(step, region, pad)
+            elif step.op not in ("result", "ruled") and self._wants_name(step, region):
+                lines += self._define(step, region, pad)
+        return lines
+
+    def _define(self, node: Node, region: Region, pad: str) -> list[str]:
+        """Lines that give a value a name."""
+        text = self._written(node, region)[0]
+        name = self._fresh(node)
+        self._named[node, region] = name
+        if region.branch is not None:
+            self.inner.setdefault(name, node)
+        return self._language.assigned(name, node, text, pad, new=True)
+
+    def _call(self, call: Node, region: Region, pad: str) -> list[str]:
+        """Lines of a call, whose results are a tuple."""
+        function: Function = call.value.function
+        self.functions[function.name] = function
+        results = [
+            (node.value, node)
+            for node in region.nodes
+            if node.op == "result" and node.args[0] is call
+        ]
+        targets = ["_"] * call.value.results
+        for index, node in results:
+            targets[index] = self._fresh(node)
+            self._named[node, region] = targets[index]
+            if region.branch is not None:
+                self.inner.setdefault(targets[index], node)
+        given = ", ".join(self._text(node, region)[0] for node in call.args)
+        left = ", ".join(targets) + ("," if len(targets) == 1 else "")
+        return assigned(left, f"{function.name}({given})", pad)
+
+    def _branch(self, branch: Branch, region: Region, pad: str) -> list[str]:
+        """Lines of a branch; none if it is a choice that stands in an expression."""
+        sides = [self._region(side, f"{pad}    ") for side in branch.sides]
+        if len(branch.members) == 1 and not any(sides):
+            (member,) = branch.members
+            return self._define(member, region, pad) if self._wants_name(member, region) else []
+        names = {}
+        for member in branch.members:
+            names[member] = self._named[member, region] = self._fresh(member)
+            if region.branch is not None:
+                self.inner.setdefault(names[member], member)
+        for k, side in enumerate(branch.sides):
+            for member in branch.members:
+                text = self._text(member.args[1 + k], side)[0]
+                sides[k] += self._language.assigned(
+                    names[member], member, text, f"{pad}    ", new=False
+                )
+        test = self._text(branch.test, region)[0]
+        return self._language.branch(test, *sides, pad)
+
+    def _result(self, node: Node, pad: str) -> str:
+        """Text of a result, by a name if it is long."""
+        whole = self._schedule.whole
+        text = self._text(node, whole)[0]
+        named = (node, whole) in self._named or node in self._known
+        plain = node.op in LEAVES or node.op in ("result", "ruled") or _is_trivial(node)
+        if named or plain or len(text) <= SHORT:
+            return text
+        self.lines += self._define(node, whole, pad)
+        return self._named[node, whole]
+
+    # -- expressions -------------------------------------------------------------------------------
+
+    def _text(self, node: Node, region: Region) -> Text:
+        """A value as it is read in a region: by its name, or written out."""
+        if node in self._known:
+            return self._known[node], ATOM
+        if node.op in LEAVES:
+            return self._written(node, region)
+        where = self._schedule.region_of(node, region)
+        assert where is not None
+        name = self._named.get((node, where))
+        return (name, ATOM) if name is not None else self._written(node, region)
+
+    def _written(self, node: Node, region: Region) -> Text:
+        """A value written out."""
+        if node.op == "name":
+            return node.value, ATOM
+        if node.op == "number":
+            return self._language.number(node.value)
+        if node.op == "ruled":
+            return self._text(node.args[0], region)
+        where = self._schedule.region_of(node, region)
+        branch = None if where is None else self._schedule.branch_of(node, where)
+        if branch is None:
+            args = [self._text(each, region) for each in node.args]
+            return self._language.operation(node, args, ALL)
+        args = [self._text(branch.test, region)]
+        sides = zip(node.args[1:], branch.sides, strict=True)
+        args += [self._text(each, side) for each, side in sides]
+        return self._language.operation(node, args, ONCE)
+
+
+def _is_trivial(node: Node) -> bool:
+    return node.op == "neg" and node.args[0].op in LEAVES
+
+
+# --- functions ------------------------------------------------------------------------------------
+
+
+def bracketed(start: str, text: str, end: str, pad: str = "") -> list[str]:
+    """Text within brackets, on one line or on as many as it takes."""
+    one, inner = f"{pad}{start}{text}{end}", f"{pad}    "
+    if len(one) <= WIDTH:
+        return [one]
+    wrapper = TextWrapper(
+        WIDTH,
+        initial_indent=inner,
+        subsequent_indent=inner,
+        break_long_words=False,
+        break_on_hyphens=False,
+    )
+    return [f"{pad}{start}", *wrapper.wrap(text), f"{pad}{end}"]
+
+
+def assigned(left: str, text: str, pad: str = "") -> list[str]:
+    """Lines of an assignment."""
+    one = f"{pad}{left} = {text}"
+    if len(one) <= WIDTH:
+        return [one]
+    if len(left) <= WIDTH // 2:
+        return bracketed(f"{left} = (", text, ")", pad)
+    *head, last = bracketed("(", left, ")", pad)
+    first, *tail = bracketed("(", text, ")", pad)
+    return [*head, f"{last} = {first.strip()}", *tail]
+
+
+def indented(lines: Iterable[str]) -> list[str]:
+    """Lines moved in."""
+    return [f"    {line}" for line in lines]
+
+
+def function_source(head: str, says: str, lines: Iterable[str], mark: str = "@kernel") -> str:
+    """Text of a function."""
+    head = f"{mark}\ndef {head}:" if mark else f"def {head}:"
+    return "\n".join([head, f'    """{says}"""', *indented(lines), ""])
+
+
+def function_text(
+    name: str,
+    says: str,
+    formals: Sequence[str],
+    results: Sequence[Node],
+    labels: Mapping[Node, str],
+    *,
+    flat: bool = False,
+) -> tuple[str, dict[str, Function]]:
+    """Text of a function of scalars, and the generated functions that it calls.
+
+    It returns a tuple of the results; of a single one the number, unless it is to be `flat`.
+    """
+    arguments = {formal.partition(".")[0] for formal in formals}
+    block = Block(results, labels, {*FUNCTIONS, *arguments, *RESERVED, name})
+    back = ", ".join(block.texts) or "()"
+    if len(results) == 1 and flat:
+        back += ","
+    fits = len(back) < WIDTH - 10
+    lines = [*block.lines, *([f"return {back}"] if fits else bracketed("return (", back, ")"))]
+    head = bracketed(f"def {name}(", ", ".join(formals), "):")
+    if len(says) > WIDTH - 6:
+        says = "\n    (".join(says.rsplit(" (", 1))
+    return "\n".join([*head, f'    """{says}"""', *indented(lines), ""]), block.functions
+
+
+UNNAMED = "00000000"
+"""What stands in a function's name until its text is known."""
+
+
+def named_by_text(name: str, text: str) -> tuple[str, str]:
+    """A name for a function that no other has in place of one with `UNNAMED`, and its text."""
+    digest = blake2b(text.encode(), digest_size=4).hexdigest()
+    return name.replace(UNNAMED, digest), text.replace(UNNAMED, digest, 1)

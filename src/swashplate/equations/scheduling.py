@@ -1,0 +1,260 @@
+"""Where each node of a graph is computed: once, and never in vain.
+
+A choice between two values becomes a branch, in which what only one side needs is computed, unless
+it costs less to compute both. Choices of one test that do not wait for each other share a branch.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from heapq import heappop, heappush
+
+from swashplate.equations.graph import CHEAP, LEAVES, Node, ordered
+
+FEW = 8
+"""Operations that may be done in vain, so that a branch becomes a conditional expression."""
+Flat = Callable[[Sequence[Node]], bool]
+"""Whether what both sides of a branch compute may be computed whatever the test says."""
+
+
+class Region:
+    """What is computed together: the whole, or one side of a branch."""
+
+    def __init__(self, branch: Branch | None = None, side: int = 0) -> None:
+        self.branch, self.side = branch, side
+        self.around: tuple[Region, ...] = (self,)
+        """The region and those that it lies in, the innermost first."""
+        if branch is not None:
+            self.around = (self, *branch.region.around)
+        self.nodes: list[Node] = []
+        self.branches: list[Branch] = []
+
+    @property
+    def earlier(self) -> Iterator[Region]:
+        """Sides of earlier branches that are taken whenever this one is."""
+        if self.branch is not None:
+            for branch in self.branch.region.branches:
+                if branch.test is self.branch.test and branch.level < self.branch.level:
+                    yield branch.sides[self.side]
+
+
+class Branch:
+    """An `if` with its `else`, and the choices that get their values in it."""
+
+    def __init__(self, test: Node, level: int, region: Region) -> None:
+        self.test, self.level, self.region = test, level, region
+        self.sides = Region(self, 0), Region(self, 1)
+        self.members: list[Node] = []
+
+    @property
+    def inside(self) -> Iterator[Node]:
+        """Nodes that are computed on either side, its own choices apart."""
+        for side in self.sides:
+            yield from side.nodes
+            for branch in side.branches:
+                yield from branch.members
+                yield from branch.inside
+
+
+class Schedule:
+    """Regions of all nodes that some results need.
+
+    `known` nodes are there already. `flat` says which branches are not worth one.
+
+    Attributes
+    ----------
+    whole : Region
+        What is always computed.
+    selects : set of Node
+        Choices for which both sides are computed.
+    """
+
+    def __init__(
+        self, results: Sequence[Node], known: Mapping[Node, object], flat: Flat | None = None
+    ) -> None:
+        self._results = [*results]
+        self._order = [n for n in ordered(results, known) if n.op not in LEAVES]
+        self._index = {node: k for k, node in enumerate(self._order)}
+        self.selects: set[Node] = set()
+        decide = flat or is_little
+        while True:
+            self._place()
+            little = [
+                branch
+                for branch in self._all
+                if not any(side.branches for side in branch.sides) and decide([*branch.inside])
+            ]
+            if not little:
+                break
+            self.selects |= {node for branch in little for node in branch.members}
+
+    # -- placing -----------------------------------------------------------------------------------
+
+    def _place(self) -> None:
+        """Give every node its regions: the outermost of those that need it."""
+        self.whole = Region()
+        self._all: list[Branch] = []
+        self._of: dict[Node, list[Region]] = {}
+        self._branch_of: dict[tuple[Node, Region], Branch] = {}
+        branches: dict[tuple[int, Node, Region], Branch] = {}
+        level = self._levels()
+        needed: dict[Node, dict[Region, None]] = {}
+        for node in self._results:
+            needed.setdefault(node, {})[self.whole] = None
+
+        def last_first(node: Node) -> tuple[int, bool, int]:
+            return -level[node], self._is_branch(node), -self._index[node]
+
+        for node in sorted(self._order, key=last_first):
+            regions = covering(needed[node])
+            self._of[node] = regions
+            for region in regions:
+                if not self._is_branch(node):
+                    region.nodes.append(node)
+                    for operand in node.args:
+                        needed.setdefault(operand, {})[region] = None
+                    continue
+                test, one, two = node.args
+                key = level[node], test, region
+                branch = branches.get(key)
+                if branch is None:
+                    branch = branches[key] = Branch(test, level[node], region)
+                    region.branches.append(branch)
+                    self._all.append(branch)
+                    needed.setdefault(test, {})[region] = None
+                branch.members.append(node)
+                self._branch_of[node, region] = branch
+                needed.setdefault(one, {})[branch.sides[0]] = None
+                needed.setdefault(two, {})[branch.sides[1]] = None
+
+    def _is_branch(self, node: Node) -> bool:
+        return node.op == "if" and node not in self.selects
+
+    def _levels(self) -> dict[Node, int]:
+        """How many branches each node waits for, one after the other."""
+        level: dict[Node, int] = {}
+        for node in self._order:
+            below = max((level.get(a, 0) for a in node.args), default=0)
+            level[node] = below + self._is_branch(node)
+        return level
+
+    def region_of(self, node: Node, region: Region) -> Region | None:
+        """Where a node is computed that is needed in some region; None if it was known before."""
+        regions = self._of.get(node)
+        if regions is None:
+            return None
+        for around in region.around:
+            for each in (around, *around.earlier):
+                if each in regions:
+                    return each
+        raise AssertionError(node)
+
+    def branch_of(self, node: Node, region: Region) -> Branch | None:
+        """The branch that gives a choice its value in a region; None of anything else."""
+        return self._branch_of.get((node, region))
+
+    # -- order -------------------------------------------------------------------------------------
+
+    def steps(self, region: Region) -> Iterator[Node | Branch]:
+        """Nodes and branches of a region, each after those that it needs."""
+        items: list[Node | Branch] = [*region.nodes, *region.branches]
+        at: dict[Node | Branch, int] = {}
+        waits: dict[Node | Branch, set[Node | Branch]] = {}
+        for item in items:
+            waits[item] = {*self._needs(item, region)} - {item}
+            nodes = [item] if isinstance(item, Node) else item.members
+            at[item] = min(self._index[node] for node in nodes)
+        behind: dict[Node | Branch, list[Node | Branch]] = {}
+        for item, others in waits.items():
+            for other in others:
+                behind.setdefault(other, []).append(item)
+        ready: list[tuple[int, int, Node | Branch]] = []
+        for k, item in enumerate(items):
+            if not waits[item]:
+                heappush(ready, (at[item], k, item))
+        number = {item: k for k, item in enumerate(items)}
+        while ready:
+            _, _, item = heappop(ready)
+            yield item
+            for later in behind.get(item, ()):
+                waits[later].remove(item)
+                if not waits[later]:
+                    heappush(ready, (at[later], number[later], later))
+
+    def _needs(self, item: Node | Branch, region: Region) -> Iterator[Node | Branch]:
+        """Items of a region that one of its items needs."""
+        for node, where in self.uses(item, region):
+            found = self.region_of(node, where)
+            if found is None or region not in found.around:
+                continue
+            if found is not region:  # within a branch of the region
+                inner = found.around[found.around.index(region) - 1]
+                assert inner.branch is not None
+                yield inner.branch
+            elif self._is_branch(node):
+                yield self._branch_of[node, region]
+            else:
+                yield node
+
+    def uses(self, item: Node | Branch, region: Region) -> Iterator[tuple[Node, Region]]:
+        """What an item of a region reads, all that lies within it included, and from where."""
+        if isinstance(item, Node):
+            yield from ((operand, region) for operand in item.args)
+            return
+        yield item.test, region
+        for k, side in enumerate(item.sides):
+            for member in item.members:
+                yield member.args[1 + k], side
+            for inner in (*side.nodes, *side.branches):
+                yield from self.uses(inner, side)
+
+
+def covering(regions: Iterable[Region]) -> list[Region]:
+    """The outermost of some regions; both sides of one branch are what is around it."""
+    kept: list[Region] = []
+    for region in regions:
+        kept.append(region)
+        changed = True
+        while changed:
+            changed = False
+            last = kept[-1]
+            for k, other in enumerate(kept[:-1]):
+                both = cover(other, last)
+                if both is not None:
+                    del kept[k]
+                    kept[-1] = both
+                    changed = True
+                    break
+    return kept
+
+
+def cover(one: Region, two: Region) -> Region | None:
+    """A region of which both know the names, and that does nothing in vain; None without one."""
+    if one in two.around:
+        return one
+    if two in one.around:
+        return two
+    common = next(region for region in one.around if region in two.around)
+    first = one.around[one.around.index(common) - 1]
+    second = two.around[two.around.index(common) - 1]
+    assert first.branch is not None
+    assert second.branch is not None
+    if first.branch is second.branch:
+        return common if first is one and second is two else None
+    if first.branch.test is second.branch.test and first.side == second.side:
+        early, of_early = (
+            (first, one) if first.branch.level < second.branch.level else (second, two)
+        )
+        return early if early is of_early else None
+    return None
+
+
+def is_little(nodes: Sequence[Node]) -> bool:
+    """Whether some nodes cost less than a branch, and can be computed on any numbers."""
+    return len(nodes) <= FEW and all(is_cheap(node) for node in nodes)
+
+
+def is_cheap(node: Node) -> bool:
+    """Whether an operation can be done for nothing on any numbers."""
+    divided = node.op == "/" and node.args[1].op == "number" and node.args[1].value != 0.0
+    return node.op in CHEAP or divided

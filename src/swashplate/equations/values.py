@@ -1,0 +1,145 @@
+"""Values of an equation that is run on symbols: scalars, options, and tuples of them."""
+
+from __future__ import annotations
+
+import types
+import typing
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from swashplate.equations import graph
+from swashplate.equations.graph import Node
+from swashplate.equations.language import Parsed, hints_of, is_named_tuple
+from swashplate.errors import EquationError
+
+
+
+@dataclass(frozen=True)
+class Flag:
+    """An option: None (off), True (on), or "unknown"."""
+
+    value: Any
+    text: str = ""
+
+
+@dataclass(frozen=True)
+class Tuple:
+    """A tuple or named tuple of values."""
+
+    cls: Any
+    items: tuple[Value, ...]
+
+    @property
+    def fields(self) -> tuple[str, ...]:
+        """Names of the items; of a tuple without names their numbers."""
+        return self.cls._fields if self.cls else tuple(map(str, range(len(self.items))))
+
+
+Value = Node | Flag | Tuple
+
+
+def leaves(value: Value, path: str = "") -> Iterator[tuple[str, Node]]:
+    """All scalars of a value with their dotted paths."""
+    if isinstance(value, Node):
+        yield path, value
+    elif isinstance(value, Tuple):
+        for each, item in zip(value.fields, value.items, strict=True):
+            yield from leaves(item, f"{path}.{each}" if path else each)
+
+
+def rebuilt(value: Value, nodes: Iterator[Node]) -> Value:
+    """The same structure with other scalars in it."""
+    if isinstance(value, Tuple):
+        return Tuple(value.cls, tuple(rebuilt(each, nodes) for each in value.items))
+    return next(nodes) if isinstance(value, Node) else value
+
+
+def alike(one: Value, two: Value) -> bool:
+    """Whether two values can be one: whole numbers are numbers."""
+    if isinstance(one, Node) and isinstance(two, Node):
+        return one.kind == two.kind or {one.kind, two.kind} == {"int", "float"}
+    if isinstance(one, Tuple) and isinstance(two, Tuple):
+        same = one.cls is two.cls and len(one.items) == len(two.items)
+        return same and all(map(alike, one.items, two.items))
+    return isinstance(one, Flag) and isinstance(two, Flag) and one.value == two.value
+
+
+def fixed(value: Any) -> Value | None:
+    """The value of something that does not change: options, numbers, tuples of them."""
+    if value is None or value is True:
+        return Flag(value)
+    if isinstance(value, int | float):
+        return graph.number(value)
+    if isinstance(value, tuple):
+        items = [each for each in map(fixed, value) if each is not None]
+        cls = type(value) if is_named_tuple(type(value)) else None
+        return Tuple(cls, tuple(items)) if len(items) == len(value) else None
+    return None
+
+
+# --- arguments of equations -----------------------------------------------------------------------
+
+
+def arguments(
+    source: Parsed, options: Mapping[str, Any], lengths: Mapping[str, int]
+) -> dict[str, Value]:
+    """Values of an equation's arguments from its annotations, each scalar a name by its path."""
+    try:
+        hints = hints_of(source.function)
+    except NameError as error:
+        raise EquationError(
+            f"{source.file}, line {source.node.lineno}: the types of {source.name} are not all "
+            f"known ({error}): define them above, at the top of the file."
+        ) from None
+    said = dict(_said(options.items(), ""))
+    names = [each.arg for each in source.arguments]
+    return {name: _argument(hints[name], name, name, said, lengths) for name in names}
+
+
+def _said(options: Iterable[tuple[str, Any]], prefix: str) -> Iterator[tuple[str, Any]]:
+    """Values of options, and of all below those that are tuples, by their paths."""
+    for name, value in options:
+        yield f"{prefix}{name}", value
+        if isinstance(value, tuple):
+            fields = getattr(value, "_fields", map(str, range(len(value))))
+            yield from _said(zip(fields, value, strict=True), f"{prefix}{name}.")
+
+
+def _argument(
+    hint: Any, path: str, text: str, options: Mapping[str, Any], lengths: Mapping[str, int]
+) -> Value:
+    """Value of an argument, or of what is at a path below one, called `text` in Python."""
+    origin, args = typing.get_origin(hint), typing.get_args(hint)
+    if hint in (float, int, bool):
+        return graph.name(text, hint.__name__)
+    if origin is typing.Annotated:
+        return _argument(args[0], path, text, options, lengths)
+    if origin in (typing.Union, types.UnionType) and type(None) in args:
+        value = options.get(path, "unknown")
+        if value is False or not isinstance(value, bool | int | float | tuple | str | None):
+            raise EquationError(
+                f"The option {path} is {value!r}: options are None (off) or True (on)."
+            )
+        (inner,) = (each for each in args if each is not type(None))
+        if value is None or value == "unknown" or inner is bool:
+            return Flag(value, path)
+        return _argument(inner, path, text, options, lengths)
+    if is_named_tuple(hint):
+        hints = typing.get_type_hints(hint, include_extras=True)
+        below = [(hints.get(f, float), f"{path}.{f}", f"{text}.{f}") for f in hint._fields]
+        return Tuple(hint, tuple(_argument(*each, options, lengths) for each in below))
+    if origin is tuple:
+        if len(args) == 2 and args[1] is Ellipsis:
+            if path not in lengths:
+                raise EquationError(
+                    f"{path} is a tuple of unknown length: say lengths={{'{path}': 3}}, or how "
+                    "many elements it has."
+                )
+            args = (args[0],) * lengths[path]
+        below = [(each, f"{path}.{i}", f"{text}[{i}]") for i, each in enumerate(args)]
+        return Tuple(None, tuple(_argument(*each, options, lengths) for each in below))
+    raise EquationError(
+        f"{path} of type {hint} cannot be an argument of an equation: it takes float, int, bool, "
+        "bool | None for an option, tuples and named tuples of them."
+    )
