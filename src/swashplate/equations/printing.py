@@ -7,10 +7,10 @@ so that both languages give the same bits.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from hashlib import blake2b
 from textwrap import TextWrapper
-from typing import Any
+from typing import Any, NamedTuple
 
 from swashplate.equations.functions import FUNCTIONS, RESERVED, Function, fresh_name
 from swashplate.equations.graph import COMPARISONS, FALSE, LEAVES, TRUE, Node, plain_value
@@ -118,6 +118,16 @@ PYTHON = Python()
 # --- blocks ---------------------------------------------------------------------------------------
 
 
+class Statement(NamedTuple):
+    """Lines that give some names their values."""
+
+    lines: list[str]
+    names: tuple[str, ...]
+    reads: frozenset[str]
+    nodes: tuple[Node, ...]
+    """What is computed in it."""
+
+
 class Block:
     """Lines that compute some results.
 
@@ -135,11 +145,15 @@ class Block:
         Which branches are not worth one, see `scheduling.Schedule`.
     language : Language
         Python by default.
+    named : bool
+        Whether every result gets a name.
 
     Attributes
     ----------
+    statements : list of Statement
+        What is computed, in order.
     lines, texts : list of str
-        The lines, and the results by the names that these make.
+        The lines of these, and the results by the names that they make.
     functions : dict of str to Function
         What the lines call.
     inner : dict of str to Node
@@ -157,26 +171,34 @@ class Block:
         known: Mapping[Node, str] | None = None,
         flat: Flat | None = None,
         language: Language = PYTHON,
-        pad: str = "",
+        named: bool = False,
     ) -> None:
         self._labels, self._taken, self._known = labels, taken, dict(known or {})
         self._language = language
         self.functions: dict[str, Function] = {}
         self.inner: dict[str, Node] = {}
         self._schedule = Schedule(results, self._known, flat)
+        self._reads: set[str] = set()
+        self._written_nodes: list[Node] = []
         self._named: dict[tuple[Node, Region], str] = {}
         self._uses = self._counted(results)
         whole = self._schedule.whole
-        self.lines = self._region(whole, pad)
-        self.texts = [self._result(node, pad) for node in results]
+        self.statements = [*self._steps(whole, "")]
+        self.results = [self._result(node, named=named) for node in results]
         self.names = {
             **self._known,
             **{node: name for (node, region), name in self._named.items() if region is whole},
         }
 
-    def text(self, node: Node) -> str:
-        """A result, or what is made of results, by the names that the block makes."""
-        return self._text(node, self._schedule.whole)[0]
+    @property
+    def lines(self) -> list[str]:
+        """Lines of all statements."""
+        return [line for statement in self.statements for line in statement.lines]
+
+    @property
+    def texts(self) -> list[str]:
+        """The results, by the names that the lines make."""
+        return [text for text, _ in self.results]
 
     # -- names -------------------------------------------------------------------------------------
 
@@ -222,26 +244,38 @@ class Block:
 
     def _region(self, region: Region, pad: str) -> list[str]:
         """Lines of what is computed together."""
-        lines: list[str] = []
+        return [line for statement in self._steps(region, pad) for line in statement.lines]
+
+    def _steps(self, region: Region, pad: str) -> Iterator[Statement]:
+        """Statements of what is computed together."""
         for step in self._schedule.steps(region):
             if isinstance(step, Branch):
-                lines += self._branch(step, region, pad)
+                yield from self._statement(lambda step=step: self._branch(step, region, pad))
             elif step.op == "call":
-                lines += self._call(step, region, pad)
+                yield from self._statement(lambda step=step: self._call(step, region, pad))
             elif step.op not in ("result", "ruled") and self._wants_name(step, region):
-                lines += self._define(step, region, pad)
-        return lines
+                yield from self._statement(lambda step=step: self._define(step, region, pad))
 
-    def _define(self, node: Node, region: Region, pad: str) -> list[str]:
+    def _statement(self, write: Callable[[], tuple[list[str], list[str]]]) -> Iterator[Statement]:
+        """A statement with what it reads and computes; none if it has no lines."""
+        outer = self._reads, self._written_nodes
+        self._reads, self._written_nodes = set(), []
+        lines, names = write()
+        reads = frozenset(self._reads.difference(names))
+        if lines:
+            yield Statement(lines, tuple(names), reads, tuple(self._written_nodes))
+        self._reads, self._written_nodes = outer[0] | reads, outer[1] + self._written_nodes
+
+    def _define(self, node: Node, region: Region, pad: str) -> tuple[list[str], list[str]]:
         """Lines that give a value a name."""
         text = self._written(node, region)[0]
         name = self._fresh(node)
         self._named[node, region] = name
         if region.branch is not None:
             self.inner.setdefault(name, node)
-        return self._language.assigned(name, node, text, pad, new=True)
+        return self._language.assigned(name, node, text, pad, new=True), [name]
 
-    def _call(self, call: Node, region: Region, pad: str) -> list[str]:
+    def _call(self, call: Node, region: Region, pad: str) -> tuple[list[str], list[str]]:
         """Lines of a call, whose results are a tuple."""
         function: Function = call.value.function
         self.functions[function.name] = function
@@ -258,14 +292,15 @@ class Block:
                 self.inner.setdefault(targets[index], node)
         given = ", ".join(self._text(node, region)[0] for node in call.args)
         left = ", ".join(targets) + ("," if len(targets) == 1 else "")
-        return assigned(left, f"{function.name}({given})", pad)
+        self._written_nodes.append(call)
+        return assigned(left, f"{function.name}({given})", pad), targets
 
-    def _branch(self, branch: Branch, region: Region, pad: str) -> list[str]:
+    def _branch(self, branch: Branch, region: Region, pad: str) -> tuple[list[str], list[str]]:
         """Lines of a branch; none if it is a choice that stands in an expression."""
         sides = [self._region(side, f"{pad}    ") for side in branch.sides]
         if len(branch.members) == 1 and not any(sides):
             (member,) = branch.members
-            return self._define(member, region, pad) if self._wants_name(member, region) else []
+            return self._define(member, region, pad) if self._wants_name(member, region) else ([], [])
         names = {}
         for member in branch.members:
             names[member] = self._named[member, region] = self._fresh(member)
@@ -278,40 +313,47 @@ class Block:
                     names[member], member, text, f"{pad}    ", new=False
                 )
         test = self._text(branch.test, region)[0]
-        return self._language.branch(test, *sides, pad)
+        self._written_nodes += branch.members
+        return self._language.branch(test, *sides, pad), [*names.values()]
 
-    def _result(self, node: Node, pad: str) -> str:
-        """Text of a result, by a name if it is long."""
-        whole = self._schedule.whole
+    def _result(self, node: Node, *, named: bool) -> tuple[str, frozenset[str]]:
+        """Text of a result, by a name if it is long or must have one, and what that reads."""
+        node, whole = plain_value(node), self._schedule.whole
+        self._reads = set()
         text = self._text(node, whole)[0]
-        named = (node, whole) in self._named or node in self._known
-        plain = node.op in LEAVES or node.op in ("result", "ruled") or _is_trivial(node)
-        if named or plain or len(text) <= SHORT:
-            return text
-        self.lines += self._define(node, whole, pad)
-        return self._named[node, whole]
+        done = (node, whole) in self._named or node in self._known or node.op in LEAVES
+        if done or (not named and (len(text) <= SHORT or _is_trivial(node))):
+            return text, frozenset(self._reads)
+        self.statements += self._statement(lambda: self._define(node, whole, ""))
+        name = self._named[node, whole]
+        return name, frozenset((name,))
 
     # -- expressions -------------------------------------------------------------------------------
 
     def _text(self, node: Node, region: Region) -> Text:
         """A value as it is read in a region: by its name, or written out."""
+        node = plain_value(node)
         if node in self._known:
+            self._reads.add(self._known[node])
             return self._known[node], ATOM
         if node.op in LEAVES:
             return self._written(node, region)
         where = self._schedule.region_of(node, region)
         assert where is not None
         name = self._named.get((node, where))
-        return (name, ATOM) if name is not None else self._written(node, region)
+        if name is None:
+            return self._written(node, region)
+        self._reads.add(name)
+        return name, ATOM
 
     def _written(self, node: Node, region: Region) -> Text:
         """A value written out."""
         if node.op == "name":
+            self._reads.add(node.value)
             return node.value, ATOM
         if node.op == "number":
             return self._language.number(node.value)
-        if node.op == "ruled":
-            return self._text(node.args[0], region)
+        self._written_nodes.append(node)
         where = self._schedule.region_of(node, region)
         branch = None if where is None else self._schedule.branch_of(node, where)
         if branch is None:

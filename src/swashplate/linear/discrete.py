@@ -7,15 +7,17 @@ from typing import Any
 
 import numpy as np
 
-from swashplate.equations.adjoints import Derived, derived_function
-from swashplate.equations.code import Code, generating, leaves
-from swashplate.equations.expressions import Node
+from swashplate.equations import graph
 from swashplate.equations.fields import check_mapping, floats_of, is_real, value_at
+from swashplate.equations.functions import generating
+from swashplate.equations.gradients import Derived, derived_function
+from swashplate.equations.graph import Node, names_in, rewritten
 from swashplate.equations.marching.march import Sampler, output_of
 from swashplate.equations.marching.part import Stored, taps_of
 from swashplate.equations.marching.record import check_rate
 from swashplate.equations.marching.run import Instance, Started, called, outside
 from swashplate.equations.model import Model, state_paths
+from swashplate.equations.values import leaves
 from swashplate.errors import DomainError, InputError
 from swashplate.linear.model import LinearModel, Matrices
 
@@ -122,22 +124,25 @@ def _whole_step(
 ) -> tuple[dict[str, Stored], Derived]:
     """A model's next states, then what is seen, with their derivatives: arguments and function."""
     states = [Stored(i, "state", path) for i, path in model.places("state")]
-    sampler = Sampler(model, signals, options, [*states, *seen], ruled=True)
-    code, results = Code(sampler.used[0].code.taken, ruled=True), list[Node]()
+    sampler = Sampler(model, signals, options, [*states, *seen])
+    results, labels = list[Node](), dict[Node, str]()
+    passed: dict[Node, Node] = {}
+    """What the names of signals between parts stand for."""
     for part in sampler.used:
-        code.items += [*part.prologue.items, *sampler.items(part)]
-        results += [node for _, node in leaves(part.following)]
+        results += rewritten([node for _, node in leaves(part.following)], passed)
+        for source, node in sampler.sources.items():
+            if source.part == part.part:
+                passed[graph.name(part.source(source))] = rewritten([node], passed)[0]
+        labels |= part.trace.labels
     for place in seen:
-        own, node = sampler.observed(sampler.parts[place.part], place)
-        code.items += own.items
-        results.append(node)
+        results += rewritten([sampler.observed(sampler.parts[place.part], place)], passed)
     outside = sampler.outside()
-    known = {name: outside[name] for name in sorted(code.reads(results) & outside.keys())}
+    known = {name: outside[name] for name in sorted(names_in(results) & outside.keys())}
     by = [name for name, each in known.items() if each.kind in ("state", "tap", "input")]
     name, says = f"{model.name}_linear", f"Next states and outputs of {model.name}."
     paths = [(str(k), node) for k, node in enumerate(results)]
     pairs = [(each, each) for each in by]
-    return known, derived_function(name, says, [*known], code, paths, pairs, chained=True)
+    return known, derived_function(name, says, [*known], paths, pairs, labels, chained=True)
 
 
 def recurrence(

@@ -14,17 +14,18 @@ from graphlib import TopologicalSorter
 from itertools import product
 from typing import Any, NamedTuple
 
-from swashplate.equations import expressions as ex
-from swashplate.equations.adjoints import Derivatives, Derived, derived_function
-from swashplate.equations.code import Code, Let, generating, leaves
-from swashplate.equations.expressions import Node
+from swashplate.equations import graph
+from swashplate.equations.functions import generating
+from swashplate.equations.gradients import Derived, Gradients, derived_function
+from swashplate.equations.graph import Node, names_in, rewritten
 from swashplate.equations.marching.march import Sampler, march_source, output_of
 from swashplate.equations.marching.part import PartCode, Stored
 from swashplate.equations.marching.pieces import PIECE, Planned, piece
 from swashplate.equations.marching.rows import STRIDE
 from swashplate.equations.marching.run import module
 from swashplate.equations.model import Model, Source
-from swashplate.equations.writing import Writer, function_source, indented
+from swashplate.equations.printing import function_source, indented
+from swashplate.equations.values import leaves
 from swashplate.errors import InputError
 
 Moved = tuple[Stored, str]
@@ -90,12 +91,14 @@ class Graph:
         self.model = model
         self.observed = [output_of(model, each) for each in observed]
         places = [place for place, _ in self.observed]
-        self.sampler = Sampler(model, signals, options, places, ruled=True)
+        self.sampler = Sampler(model, signals, options, places)
         self.size = STRIDE  # Of the block; its first row is for what nobody reads.
         self.row_of: dict[Stored, int] = {}
         self._named: dict[str, int] = {}  # Place of each number's row by its name in the code.
         self.partials: dict[Stored, dict[Stored, Term]] = {}
         self.pieces: list[Planned] = []  # The march, made last, comes first.
+        self._constants: dict[int, dict[Node, str]] = {}
+        """By part, what follows from parameters alone, with its names."""
         # part by part, so that the pieces of the first ones are the same whatever follows
         self.parts = [self._part(part) for part in self.sampler.used]
         for place in places:
@@ -166,28 +169,34 @@ class Graph:
 
     def _fill(self, part: PartCode, results: Mapping[Stored, Node]) -> tuple[int | None, range]:
         """Piece that writes partial derivatives at known states into rows; places of these."""
-        by = {name: Stored(part.part, "p", path) for name, path in part.parameters.items()}
-        for name in {name for node in part.constants for name in node.reads} - by.keys():
-            by[name] = Stored(part.part, "k", name)
-        by |= {node.value: Stored(part.part, "state", path) for path, node in leaves(part.state)}
+        i, ends = part.part, [*results.values()]
+        by: dict[Node, Stored] = {
+            graph.name(name): Stored(i, "p", path) for name, path in part.parameters.items()
+        }
+        ahead, known = self.sampler.ahead(part, ends)
+        self._constants[i] = {node: known[node] for node in part.ahead(ends)}
+        by |= {node: Stored(i, "k", name) for node, name in self._constants[i].items()}
+        by |= {node: Stored(i, "state", path) for path, node in leaves(part.state)}
         for tap in part.taps:
             if tap.tap.delay:
-                by[part.fraction(tap)] = Stored(part.part, "fraction", str(tap.number))
-        by |= {part.source(source): self.number_of(source) for source in self.sampler.sources}
-        active = sorted(part.code.reads(results.values()) & by.keys())
-        found, order = Derivatives(part.code, [*results.values()], active), [*results]
+                by[graph.name(part.fraction(tap))] = Stored(i, "fraction", str(tap.number))
+        for source in self.sampler.sources:
+            by[graph.name(part.source(source))] = self.number_of(source)
+        found, order, moving = Gradients(ends, [*by]), [*results], [*by.values()]
         self.partials |= {each: {} for each in order}
         first, wanted = self.size, dict[int, Node]()
-        for (out, inp), node in zip(found.entries, found.partials, strict=True):
+        for (out, inp), node in found.partials.items():
             term = Term((), float(node.value)) if node.op == "number" else Term((self._row(),))
-            self.partials[order[out]][by[active[inp]]] = term
+            self.partials[order[out]][moving[inp]] = term
             wanted |= dict.fromkeys(term.rows, node)
         if not wanted:
             return None, range(0)
-        taken, nodes = {*part.code.taken, *found.taken}, [*wanted.values()]
-        writer = Writer(taken, found.items, nodes, found.hints, straight=True)
-        read = set(writer.needed)
-        lines = self.sampler.ahead(part, read)
+        nodes = [*wanted.values()]
+        ahead, known = self.sampler.ahead(part, nodes)
+        hints = found.hints([each.path for each in order], [each.path for each in moving], {})
+        block = self.sampler.printed(part, nodes, known=known, hints=hints)
+        read = names_in(nodes)
+        lines = ahead
         lines += [
             f"{part.fraction(tap)} = fraction[{tap.number}]"
             for tap in part.taps
@@ -196,33 +205,34 @@ class Graph:
         inner = [f"{n} = flat[{self._named[n]} + m]" for n in sorted(read & self._named.keys())]
         # what only one side of a choice makes would carry its value from one sample to the next, as
         # far as a compiler can know, and the loop would not become vector instructions
-        inner += [f"{name} = {value}" for name, value in writer.inner.items()]
-        inner += writer.lines
-        inner += [f"flat[{k} + m] = {t}" for k, t in zip(wanted, writer.texts, strict=True)]
+        inner += [
+            f"{name} = {'False' if node.kind == 'bool' else '0.0'}"
+            for name, node in block.inner.items()
+        ]
+        inner += block.lines
+        inner += [f"flat[{k} + m] = {t}" for k, t in zip(wanted, block.texts, strict=True)]
         says = "Partial derivatives at known states."
         lines += ["for m in range(count):", *indented(inner)]
         name = f"fill_{part.own.name}"
         text = function_source(f"{name}({PIECE})", says, lines, "@piece")
-        names = {**self.sampler.names, **writer.functions}
-        self.pieces.append(_planned(f"{self.model.name}_{name}", name, text, names))
+        self.pieces.append(
+            _planned(f"{self.model.name}_{name}", name, text, self.sampler.names)
+        )
         return len(self.pieces), range(first, self.size)
 
     def _link(self, place: Stored) -> dict[Stored, Term]:
         """Partial derivatives of a link: numbers, or refused."""
         part, link = self.sampler.parts[place.part], self.model.links[place.path]
-        code, made = self.sampler.observed(part, place)
-        by = {part.source(source): self.number_of(source) for source in link.sources}
-        derived = Derivatives(code, [made], [*by])
-        if any(each.op != "number" for each in derived.partials):
+        made = self.sampler.observed(part, place)
+        by = {graph.name(part.source(each)): self.number_of(each) for each in link.sources}
+        partials = Gradients([made], [*by]).partials
+        if any(node.op != "number" for node in partials.values()):
             raise InputError(
                 f"Model {self.model.name}: the link {link.name} must be a sum of signals with "
                 "constant factors; put anything else into a part's sample."
             )
         known = [*by.values()]
-        return {
-            known[inp]: Term((), float(node.value))
-            for (_, inp), node in zip(derived.entries, derived.partials, strict=True)
-        }
+        return {known[inp]: Term((), float(node.value)) for (_, inp), node in partials.items()}
 
     # -- where it starts -----------------------------------------------------------------------
 
@@ -235,29 +245,37 @@ class Graph:
     def _started(self, start: str) -> Starting:
         sampler = self.sampler
         outside = {n: each for n, each in sampler.outside().items() if each.kind != "state"}
-        code = Code(sampler.used[0].code.taken, ruled=True)
         results: dict[Stored, Node] = {}
         by: dict[str, str] = {}
+        begins: dict[Node, Node] = {}
+        """What names stand for where the record begins."""
+        labels: dict[Node, str] = {}
         for part in sampler.used:
             i, prefix = part.part, self.model.prefix(part.part)
-            begun, value = part.begun(start)
-            begins, states = dict(leaves(value)), dict(leaves(part.state))
-            code.items += [*part.prologue.items, *begun.items]
-            code.items += [Let(states[path].value, node) for path, node in begins.items()]
-            code.items += sampler.items(part)
-            results |= {Stored(i, "k", name): ex.name(name) for name in sampler.constants(part)}
+            begun = dict(leaves(part.begun(start)))
+            states = dict(leaves(part.state))
+            starts = dict(zip(begun, rewritten(begun.values(), begins), strict=True))
+            begins |= {states[path]: node for path, node in starts.items()}
+            own = [(source, n) for source, n in sampler.sources.items() if source.part == i]
+            signals = rewritten([node for _, node in own], begins)
+            begins |= {
+                graph.name(part.source(source)): node
+                for (source, _), node in zip(own, signals, strict=True)
+            }
+            results |= {Stored(i, "k", name): node for node, name in self._constants[i].items()}
             kept = [each for each in self.partials if each[:2] == (i, "state")]
-            results |= {state: begins[state.path] for state in kept}
+            results |= {state: starts[state.path] for state in kept}
             by |= {name: f"{prefix}{path}" for name, path in part.parameters.items()}
-        arguments = sorted(code.reads(results.values()) & outside.keys())
+            labels |= part.trace.labels
+        arguments = sorted(names_in(results.values()) & outside.keys())
         active = [each for each in arguments if each in by]
         derived = derived_function(
             f"{self.model.name}_start",
             f"Constants and states of {self.model.name} at the start.",
             arguments,
-            code,
             [(" ".join(map(str, key)), node) for key, node in results.items()],
             [(each, each) for each in active],
+            labels,
             chained=True,
         )
         keys = [*results]

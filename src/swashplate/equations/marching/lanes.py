@@ -14,25 +14,24 @@ bit, whatever its neighbours are.
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from functools import reduce
 from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from swashplate.equations import expressions as ex
-from swashplate.equations.code import Choice, Code, Item, Let, Rule, generating, leaves
+from swashplate.equations import graph
 from swashplate.equations.declaration import JIT_OFF
-from swashplate.equations.expressions import Node, text
+from swashplate.equations.functions import choose, generating
+from swashplate.equations.graph import CHEAP, Node
 from swashplate.equations.marching.march import Sampler, lower, output_of
-from swashplate.equations.marching.part import Stored, choose
+from swashplate.equations.marching.part import PartCode, Stored
 from swashplate.equations.marching.rows import aligned
 from swashplate.equations.marching.run import module
 from swashplate.equations.model import Model
-from swashplate.equations.writing import function_source, indented, lines_of
+from swashplate.equations.printing import Block, Statement, function_source, indented
+from swashplate.equations.values import leaves
 
 Array = NDArray[np.float64]
 
@@ -48,97 +47,47 @@ if JIT_OFF:
 
 SHORT = 16
 """Statements that are not worth a loop of their own."""
-VECTOR = {*ex.CHEAP, "choose", "/", "sqrt", "**"}
+VECTOR = {*CHEAP, "/", "sqrt", "**"}
 """Operations that processors have for many numbers at once."""
-CALLS = re.compile(r"([A-Za-z_]\w*)\(")
-CALLED_ONCE = re.compile(r"_[0-9a-f]{8}$")
-"""What a generated function's name ends in."""
+DIGEST = 8
+"""Characters that a generated function's name ends in."""
 
 
-def is_vector(node: Node) -> bool:
-    """Whether a processor can compute an expression for many lanes at once."""
-    return node.op in VECTOR and all(map(is_vector, node.args))
+def all_vector(nodes: Sequence[Node]) -> bool:
+    """Whether a processor can compute some nodes for many lanes at once, whatever tests say."""
+    return all(node.op in VECTOR for node in nodes)
 
 
-def is_flat(item: Item) -> bool:
-    """Whether all of an item can be computed for many lanes at once, whatever its tests say."""
-    if isinstance(item, Choice):
-        merged = [node for each in item.merged for node in each[1:]]
-        return all(map(is_flat, (*item.then, *item.other))) and all(map(is_vector, merged))
-    return isinstance(item, Let) and is_vector(item.node)
-
-
-class Statement(NamedTuple):
-    """Lines that give some names their values."""
-
-    names: tuple[str, ...]
-    lines: list[str]
-    reads: frozenset[str]
-    vector: bool  # Whether a processor can do it for many lanes at once.
+def is_vector(statement: Statement) -> bool:
+    """Whether a processor can do a statement for many lanes at once: it is no branch."""
+    return len(statement.names) <= 1 and all_vector(statement.nodes)
 
 
 class Straight:
-    """A sample without branches in loops over lanes, and what can be computed ahead of the march.
+    """A sample in loops over lanes.
 
-    What follows nothing but parameters, givens, constants and places of taps is `ahead`. Every
-    number that one loop leaves to another has a row of a block: row r of lane l is ``flat[r * LANES
-    + l]``. With all of it in one array at known distances the compiler need not prove at run time
-    that rows do not overlap.
+    Every number that one loop leaves to another has a row of a block: row r of lane l is ``flat[r *
+    LANES + l]``. With all of it in one array at known distances the compiler need not prove at run
+    time that rows do not overlap.
     """
 
-    def __init__(self, sampler: Sampler) -> None:
-        parts = sampler.used
-        self.known = {
-            node.value for part in parts for _, node in (*leaves(part.p), *leaves(part.given))
-        }
-        self.known |= {part.fraction(tap) for part in parts for tap in part.taps}
-        constants = {name for part in parts for name in sampler.constants(part)}
-        self.still, self.fresh = {"h", *self.known, *constants}, parts[0].code.fresh
-        self.ahead: list[Statement] = []
+    def __init__(self) -> None:
         self.loops: list[list[Statement]] = [[]]
         self.number: dict[str, int] = {}  # Rows, given out on demand.
-        self._moved: dict[Node, Node] = {}
 
-    def add(self, code: Code, items: Iterable[Item]) -> None:
-        """Append items of some code."""
-        for item in items:
-            if isinstance(item, Let):
-                self.let(item.name, item.node)
-            elif isinstance(item, Choice) and is_flat(item):
-                self.add(code, (*item.then, *item.other))
-                for name, one, two in item.merged:
-                    self.let(name, ex.make("if", item.test, one, two))
-            else:
-                assert not isinstance(item, Rule)
-                if isinstance(item, Choice):
-                    names = tuple(name for name, _, _ in item.merged)
-                else:
-                    names = item.results
-                alone = Code(code.taken)
-                alone.items = [item]
-                made = [*map(ex.name, names)]
-                reads = frozenset(alone.reads(made))
-                self._append(Statement(names, lines_of(alone, made), reads, False))
-                code.names |= alone.names
+    def add(self, statement: Statement) -> None:
+        """Append a statement, to another loop if only one of both is made of vectors."""
+        if self.loops[-1] and is_vector(self.loops[-1][-1]) != is_vector(statement):
+            self.loops.append([])
+        self.loops[-1].append(statement)
 
-    def let(self, name: str, node: Node) -> None:
-        """Append a name and what it stands for."""
-        made = node if node.reads <= self.still else self._branchless(node)
-        self._append(Statement((name,), [f"{name} = {text(made)}"], made.reads, is_vector(made)))
+    def let(self, name: str, text: str, reads: frozenset[str]) -> None:
+        """Append a name for a text."""
+        self.add(Statement([f"{name} = {text}"], (name,), reads, ()))
 
-    def become(self, name: str, node: Node) -> None:
+    def become(self, name: str, text: str, reads: frozenset[str]) -> None:
         """Append what becomes of a row at the end of a sample."""
-        made = self._branchless(node)
-        self._append(Statement((), [f"{self.row(name)} = {text(made)}"], made.reads, True))
-
-    def _append(self, statement: Statement) -> None:
-        if statement.names and statement.reads <= self.still:
-            self.still.update(statement.names)
-            self.ahead.append(statement)
-        else:
-            if self.loops[-1] and self.loops[-1][-1].vector != statement.vector:
-                self.loops.append([])
-            self.loops[-1].append(statement)
+        self.add(Statement([f"{self.row(name)} = {text}"], (), reads, ()))
 
     def cut(self) -> None:
         """Begin another loop over lanes, unless the present one is short.
@@ -147,25 +96,6 @@ class Straight:
         """
         if len(self.loops[-1]) > SHORT:
             self.loops.append([])
-
-    def _branchless(self, node: Node) -> Node:
-        """An expression without branches, and without what can be computed ahead of the march."""
-        if node.op in ex.LEAVES:
-            return node
-        if node.reads and node.reads <= self.still:
-            if node not in self._moved:
-                name = self.fresh("still")
-                self.let(name, node)
-                self._moved[node] = ex.name(name, node.kind)
-            return self._moved[node]
-        args = [self._branchless(each) for each in node.args]
-        if node.op == "if" and node.kind != "int":
-            return ex.make("choose", *args, kind=node.kind)
-        if node.op == "and":
-            return reduce(lambda a, b: ex.make("choose", a, b, ex.number(False), kind="bool"), args)
-        if node.op == "or":
-            return reduce(lambda a, b: ex.make("choose", a, ex.number(True), b, kind="bool"), args)
-        return ex.make(node.op, *args, value=node.value)
 
     def row(self, name: str) -> str:
         """Text of a lane's number in the row of a name."""
@@ -223,17 +153,32 @@ def report(model: Model, output: str | None = None, *, options: Any = None) -> s
         chosen.append(part.options() if own is None and part.options is not None else own)
     names = (*model.outputs, *model.parts[-1].outputs) or model.parts[-1].signal_names
     sampler = Sampler(model, signals, chosen, [output_of(model, output or names[-1])[0]])
-    for each in sampler.used:
-        straight = Straight(sampler)
-        straight.add(each.code, each.code.kept(sampler.ends[each.part]))
-        for statement in [made for loop in straight.loops for made in loop if not made.vector]:
-            where = each.code.origins.get(statement.names[0], each.own.name)
-            called = {word for line in statement.lines for word in CALLS.findall(line)}
-            slow = sorted(CALLED_ONCE.sub("", word) for word in called - {*VECTOR, *CALLED})
-            found[f"{where} calls {', '.join(slow)}"] = None
+    for part in sampler.used:
+        ends = sampler.ends[part.part]
+        _, known = sampler.ahead(part, ends, still=fractions_of(part))
+        block = sampler.printed(part, ends, known=known, flat=all_vector)
+        for statement in [each for each in block.statements if not is_vector(each)]:
+            for node in statement.nodes:
+                if node.op not in VECTOR:
+                    source = part.trace.origins.get(node)
+                    where = part.own.name if source is None else source.name
+                    found[f"{where} calls {_called(node)}"] = None
     if not found:
         return f"Nothing keeps {model.name} from vector instructions."
     return "\n".join([f"{model.name} is not all vector instructions:", *found])
+
+
+def _called(node: Node) -> str:
+    """What a node calls, as a user would say it."""
+    if node.op != "call":
+        return node.op
+    name, mark, digest = node.value.function.name.rpartition("_")
+    return name if mark and len(digest) == DIGEST else f"{name}{mark}{digest}"
+
+
+def fractions_of(part: PartCode) -> list[str]:
+    """Names of the places of a part's taps, which do not change during a march."""
+    return [part.fraction(tap) for tap in part.taps]
 
 
 class Marched(NamedTuple):
@@ -258,7 +203,9 @@ class Lanes:
     ) -> None:
         place, is_rate = output_of(model, output)
         self._sampler = Sampler(model, signals, options, [place])
-        self._straight = Straight(self._sampler)
+        self._straight = Straight()
+        self._known: dict[int, dict[Node, str]] = {}
+        self._ahead: list[tuple[PartCode, Block]] = []
         text = "\n\n".join(self._texts(place, is_rate))
         names = {**self._sampler.names, **CALLED, "LANES": LANES}
         made = module(f"{model.name}_lanes", text, names)
@@ -268,32 +215,25 @@ class Lanes:
     def _texts(self, place: Stored, is_rate: bool) -> list[str]:
         """Texts of both kernels."""
         sampler, straight, model = self._sampler, self._straight, self._sampler.model
-        # what rows become at the end of a sample
-        following: dict[str, Node] = {}
-        shown = ex.name("value")
+        following: list[tuple[str, str, frozenset[str]]] = []
+        """What rows become at the end of a sample."""
+        worst = ""
         for part in sampler.used:
             straight.cut()
-            straight.add(part.code, part.code.kept(sampler.ends[part.part]))
-            for source, node in sampler.sources.items():
-                if source.part == part.part:
-                    straight.let(part.source(source), node)
-            if part.margin is not None:
-                worst = following.get("worst", ex.name("worst"))
-                following["worst"] = lower(worst, part.margin)
-            if place.part == part.part:
-                code, node = sampler.observed(part, place)
-                straight.add(code, code.kept([node]))
-                straight.let("value", node)
-            state, step = dict(leaves(part.state)), dict(leaves(part.following))
-            following |= {state[path].value: step[path] for path in sampler.carried[part.part]}
+            worst = self._part(part, place, following, worst)
+        if worst:
+            following.append(("worst", worst, frozenset((worst,))))
+        shown = "value"
         if is_rate:
-            trapezium = ex.make("*", ex.name("half"), ex.make("+", ex.name("rate"), shown))
-            following["rate"] = shown
-            straight.let("integral", ex.make("+", ex.name("total"), trapezium))
-            following["total"] = shown = ex.name("integral")
-        straight.let("error", ex.make("-", shown, ex.name("target")))
-        square = ex.make("*", ex.make("*", ex.name("counts"), ex.name("error")), ex.name("error"))
-        following |= {"cost": ex.make("+", ex.name("cost"), square), "shown": shown}
+            following.append(("rate", shown, frozenset((shown,))))
+            trapezium = frozenset(("total", "half", "rate", shown))
+            straight.let("integral", f"total + half * (rate + {shown})", trapezium)
+            shown = "integral"
+            following.append(("total", shown, frozenset((shown,))))
+        straight.let("error", f"{shown} - target", frozenset((shown, "target")))
+        square = frozenset(("cost", "counts", "error"))
+        following.append(("cost", "cost + counts * error * error", square))
+        following.append(("shown", shown, frozenset((shown,))))
         # what a lane sees of a record at a place of its own is fetched a sample ahead of its use: a
         # row that was just written number by number cannot be read as a whole at once
         first: list[str] = []
@@ -305,9 +245,9 @@ class Lanes:
                 for lines, name, n in ((first, queue[1], "0"), (fetched, queue[0], "coming")):
                     index = f"{n} - whole[{tap.number}, lane]"
                     lines.append(f"{straight.row(name)} = sample_at({record}, {index}, 0.0)")
-                following |= {older: ex.name(newer) for newer, older in pairwise(queue)}
-        for name, node in following.items():
-            straight.become(name, node)
+                following += [(old, new, frozenset((new,))) for new, old in pairwise(queue)]
+        for name, text, reads in following:
+            straight.become(name, text, reads)
         read = {name for loop in straight.loops for each in loop for name in each.reads}
         shared = {"target": "measured[n]", "counts": "weight[n]"}
         shared["half"] = "0.5 * h if n > 0 else 0.0"
@@ -333,23 +273,67 @@ class Lanes:
             ),
         ]
 
+    def _part(
+        self,
+        part: PartCode,
+        place: Stored,
+        following: list[tuple[str, str, frozenset[str]]],
+        worst: str,
+    ) -> str:
+        """Append a part's sample; the name of the worst margin so far."""
+        sampler, straight = self._sampler, self._straight
+        head = sampler.printed(
+            part, part.ahead(sampler.ends[part.part], fractions_of(part)), named=True
+        )
+        self._ahead.append((part, head))
+        own = [(source, n) for source, n in sampler.sources.items() if source.part == part.part]
+        steps = dict(leaves(part.following))
+        results = {part.source(source): node for source, node in own}
+        if part.margin is not None:
+            before = graph.name(worst or "worst")
+            worst = part.fresh("lowest")
+            results[worst] = lower(before, part.margin)
+        if place.part == part.part and place.kind != "link":
+            results["value"] = part.node(place)
+        states = dict(leaves(part.state))
+        carried = {states[path].value: steps[path] for path in sampler.carried[part.part]}
+        block = sampler.printed(
+            part, [*results.values(), *carried.values()], known=head.names, flat=all_vector
+        )
+        for statement in block.statements:
+            straight.add(statement)
+        texts = iter(block.results)
+        for name in results:
+            straight.let(name, *next(texts))
+        if place.part == part.part and place.kind == "link":
+            observed = sampler.printed(part, [sampler.observed(part, place)], known=block.names)
+            for statement in observed.statements:
+                straight.add(statement)
+            straight.let("value", *observed.results[0])
+        following += [(name, *next(texts)) for name in carried]
+        return worst
+
     def _prepared(self, read: set[str]) -> list[str]:
         """Lines of a lane ahead of the march, from what is known to what is read in it."""
         sampler, straight = self._sampler, self._straight
-        lines = [line for each in straight.ahead for line in each.lines]
-        lines += straight.saves(read & straight.still - straight.known - {"h"})
-        used = {name for each in straight.ahead for name in each.reads}
-        for part in sampler.used:
-            code, value = part.begun()
-            state, nodes = dict(leaves(part.state)), dict(leaves(value))
-            at_rest = {state[path].value: nodes[path] for path in sampler.carried[part.part]}
-            lines += lines_of(code, at_rest.values())
-            lines += [f"{straight.row(name)} = {text(node)}" for name, node in at_rest.items()]
-            reads = {*sampler.constants(part), *code.reads(at_rest.values())}
-            needed = [ex.name(name) for name in reads]
-            lines[:0] = lines_of(part.prologue, needed)
-            used |= part.prologue.reads(needed)
-        return [*straight.loads(used & straight.known), *lines]
+        lines: list[str] = []
+        used = set[str]()
+        for part, head in self._ahead:
+            lines += head.lines
+            made = {name for each in head.statements for name in each.names}
+            lines += straight.saves(read & made)
+            used |= {name for each in head.statements for name in each.reads} - made
+            states, begun = dict(leaves(part.state)), dict(leaves(part.begun()))
+            carried = sampler.carried[part.part]
+            at_rest = sampler.printed(part, [begun[path] for path in carried], known=head.names)
+            lines += at_rest.lines
+            for path, (text, reads) in zip(carried, at_rest.results, strict=True):
+                lines.append(f"{straight.row(states[path].value)} = {text}")
+                used |= reads
+            made |= {name for each in at_rest.statements for name in each.names}
+            used |= {name for each in at_rest.statements for name in each.reads}
+            used -= made
+        return [*straight.loads(used - {"h"}), *lines]
 
     def __call__(
         self,

@@ -1,7 +1,7 @@
 """Marches: one model over its inputs, a sample after the other, for one set or many at once.
 
-Every march is generated as readable source in which the model's equations stand as straight code
-over scalars (`code`). `PartCode` has one sample of a part, and the functions below wrap it as
+Every march is generated as readable source, printed from the graph of the model's equations.
+`PartCode` has one sample of a part, and the functions below wrap it as
 
 - `march_source`: the march, over whole records or a block of them for the Jacobian,
 - `step_source`: one sample, for steppers and for kernels that close loops.
@@ -15,20 +15,21 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from itertools import chain
-from typing import Any
+from typing import Any, NamedTuple
 
-from swashplate.equations import expressions as ex
-from swashplate.equations.code import Code, Item, Let, Value, leaves
+from swashplate.equations import graph
 from swashplate.equations.declaration import inlined
-from swashplate.equations.expressions import Node, text
 from swashplate.equations.fields import floats_of
-from swashplate.equations.marching.part import PartCode, Stored, choose
+from swashplate.equations.functions import Function, choose
+from swashplate.equations.graph import Node, names_in
+from swashplate.equations.marching.part import PartCode, Stored
 from swashplate.equations.marching.pieces import PIECE
 from swashplate.equations.model import Model, Source
-from swashplate.equations.reading import read
-from swashplate.equations.writing import function_source, indented, lines_of
+from swashplate.equations.printing import Block, assigned, function_source, indented
+from swashplate.equations.scheduling import Flat
+from swashplate.equations.values import Value, leaves
 from swashplate.errors import InputError
 
 _OWN = """
@@ -73,6 +74,8 @@ class Sampler:
         Of each part the results that are needed, and the paths of the states.
     sources : dict of Source to Node
         Signals that other parts or links need.
+    functions : dict of str to Function
+        Generated functions that what was printed calls.
     """
 
     def __init__(
@@ -81,17 +84,16 @@ class Sampler:
         signals: Sequence[str],
         options: Sequence[Any],
         wanted: Sequence[Stored],
-        *,
-        ruled: bool = False,
     ) -> None:
         self.model, self.signals = model, tuple(signals)
         taken = {*RESERVED, *self.signals, *(f"{each}_before" for each in self.signals)}
         self.parts = [
-            PartCode(model, i, signals, each, taken, ruled=ruled) for i, each in enumerate(options)
+            PartCode(model, i, signals, each, taken) for i, each in enumerate(options)
         ]
         self.ends: list[list[Node]] = [[] for _ in self.parts]
         self.carried: list[list[str]] = [[] for _ in self.parts]
         self.sources: dict[Source, Node] = {}
+        self.functions: dict[str, Function] = {}
         for each in wanted:
             if each.kind == "link":
                 self._need(model.links[each.path].sources)
@@ -109,7 +111,7 @@ class Sampler:
         ends += [] if part.margin is None else [part.margin]
         state, following = dict(leaves(part.state)), dict(leaves(part.following))
         while True:
-            read = part.code.reads(ends)
+            read = names_in(ends)
             new = {path for path, node in state.items() if node.value in read} - carried
             if not new:
                 break
@@ -126,11 +128,6 @@ class Sampler:
             node = self.sources[source] = self.parts[source.part].signal(source.signal)
             self.ends[source.part].append(node)
 
-    def items(self, part: PartCode) -> list[Item]:
-        """A part's sample, and the signals of it that other parts or links need."""
-        own = [(source, node) for source, node in self.sources.items() if source.part == part.part]
-        return [*part.code.items, *(Let(part.source(source), node) for source, node in own)]
-
     def outside(self) -> dict[str, Stored]:
         """What is known ahead of a sample, by name: numbers, the state, places and records."""
         known = {"h": Stored(0, "h")}
@@ -146,20 +143,39 @@ class Sampler:
     @property
     def names(self) -> dict[str, Any]:
         """What the text refers to."""
-        found: dict[str, Any] = {"sample_at": sample_at, "choose": choose}
-        for part in self.parts:
-            found |= part.code.names | part.prologue.names
-        return found
+        return {"sample_at": sample_at, "choose": choose, **self.functions}
 
     def read(self, part: PartCode) -> set[str]:
         """Names from outside that a part needs."""
-        return part.code.reads(self.ends[part.part])
+        return names_in(self.ends[part.part])
 
-    def ahead(self, part: PartCode, read: set[str]) -> list[str]:
-        """Lines ahead of a loop: a part's parameters, givens and constants that are read in it."""
-        wanted = [node for node in part.constants if node.reads & read]
-        lines = lines_of(part.prologue, wanted)
-        return [*self.given(part, read | part.prologue.reads(wanted)), *lines]
+    def printed(
+        self,
+        part: PartCode,
+        results: Sequence[Node],
+        *,
+        known: Mapping[Node, str] | None = None,
+        hints: Mapping[Node, str] | None = None,
+        named: bool = False,
+        flat: Flat | None = None,
+    ) -> Block:
+        """Lines that compute some nodes of a part; `hints` are names for some, see `Block`."""
+        labels = {**part.trace.labels, **(hints or {})}
+        block = Block(results, labels, part.taken, known=known, named=named, flat=flat)
+        self.functions |= block.functions
+        return block
+
+    def ahead(
+        self, part: PartCode, ends: Sequence[Node], still: Collection[str] = ()
+    ) -> tuple[list[str], dict[Node, str]]:
+        """Lines ahead of a loop that computes some nodes, and the names that they give.
+
+        They take the parameters and givens that are read, and compute what follows from these and
+        the step alone.
+        """
+        block = self.printed(part, part.ahead(ends, still), named=True)
+        lines = [*self.given(part, names_in(ends)), *block.lines]
+        return lines, block.names
 
     def given(self, part: PartCode, read: set[str]) -> list[str]:
         """Lines that take a part's parameters and givens, as far as they are read, from arrays."""
@@ -172,12 +188,6 @@ class Sampler:
             for path, node in leaves(names)
             if node.value in read
         ]
-
-    def constants(self, part: PartCode) -> list[str]:
-        """Names of a part's constants that its sample reads."""
-        found = dict.fromkeys(name for node in part.constants for name in sorted(node.reads))
-        read = self.read(part) - part.parameters.keys()
-        return [name for name in found if name in read]
 
     def places(self, part: PartCode) -> list[str]:
         """Lines that take the places of a part's taps from arrays."""
@@ -201,52 +211,93 @@ class Sampler:
         known = [each for each in dict.fromkeys(inputs) if each in self.signals]
         return lines + [f"x_{each} = {now(each)}" for each in known if f"x_{each}" in read]
 
-    def body(self, part: PartCode, places: Mapping[Stored, str]) -> list[str]:
-        """Lines of a part's sample, of signals that other parts need, and of what is kept.
+    def body(
+        self,
+        part: PartCode,
+        places: Mapping[Stored, str],
+        known: Mapping[Node, str],
+        pad: str = "",
+    ) -> Sampled:
+        """A part's sample, with signals that other parts need and what is kept.
 
-        `places` are the texts of where numbers are kept; limits are one, a bit for each.
+        `places` are the texts of where numbers are kept; limits are one, a bit for each. `known`
+        nodes have names already.
         """
-        lines = lines_of(part.code, self.ends[part.part])
-        for source, node in self.sources.items():
-            if source.part == part.part:
-                lines.append(f"{part.source(source)} = {text(node)}")
-        for each in (each for each in places if each.part == part.part):
+        own = [(source, n) for source, n in self.sources.items() if source.part == part.part]
+        kept = [each for each in places if each.part == part.part]
+        following = dict(leaves(part.following))
+        steps = [following[path] for path in self.carried[part.part]]
+        results = [node for _, node in own]
+        results += [part.margin] if part.margin is not None else []
+        for each in kept:
             if each.kind == "limits":
-                bits = (f"({1 << k} if {text(n)} else 0)" for k, n in enumerate(part.limits))
-                lines.append(f"{places[each]} = {' | '.join(bits)}")
-            else:
-                code, made = self.observed(part, each)
-                lines += [*lines_of(code, [made]), f"{places[each]} = {text(made)}"]
-        return lines
+                results += part.limits
+            elif each.kind != "link":
+                results.append(part.node(each))
+        block = self.printed(part, [*results, *steps], known=known)
+        lines, texts = block.lines, iter(block.texts)
+        lines += [f"{part.source(source)} = {next(texts)}" for source, _ in own]
+        margin = ""
+        if part.margin is not None:
+            margin = part.fresh("margin")
+            lines += assigned(margin, next(texts))
+        for each in kept:
+            if each.kind == "limits":
+                bits = [f"({1 << k} if {next(texts)} else 0)" for k in range(len(part.limits))]
+                lines += assigned(places[each], " | ".join(bits))
+            elif each.kind != "link":
+                lines += assigned(places[each], next(texts))
+        for each in kept:
+            if each.kind == "link":
+                again = {**known, **block.names}
+                observed = self.printed(part, [self.observed(part, each)], known=again)
+                lines += [*observed.lines, f"{places[each]} = {observed.texts[0]}"]
+        return Sampled(lines, margin, [*texts])
 
-    def observed(self, part: PartCode, stored: Stored) -> tuple[Code, Node]:
-        """A number that is kept, and the code that makes it of what is known at its part's end."""
-        code = Code(part.code.taken, ruled=part.code.ruled)
+    def observed(self, part: PartCode, stored: Stored) -> Node:
+        """A number that is kept, of what is known at its part's end."""
         if stored.kind != "link":
-            return code, part.node(stored)
+            return part.node(stored)
         link = self.model.links[stored.path]
-        sources: dict[str, Value] = {s.signal: ex.name(part.source(s)) for s in link.sources}
+        sources: dict[str, Value] = {
+            each.signal: graph.name(part.source(each)) for each in link.sources
+        }
         assert link.equation is not None
-        made = code.named(read(code, link.equation, sources), link.name)
-        assert isinstance(made, Node)
-        return code, made
+        return part.link(link.equation, link.name, sources)
 
-    def states(self, part: PartCode) -> tuple[list[str], list[str], list[str]]:
-        """Lines that take a part's state out of a flat array, to the next sample, and back."""
+    def states(self, part: PartCode, steps: Sequence[str]) -> States:
+        """How a part's state is taken out of a flat array, to the next sample, and back."""
         carried, places = self.carried[part.part], self.model.places("state")
-        names, following = dict(leaves(part.state)), dict(leaves(part.following))
+        names = dict(leaves(part.state))
         own = [names[path].value for path in carried]
         flat = [f"states[{places.index((part.part, path))}]" for path in carried]
-        step = f"{', '.join(own)} = {', '.join(text(following[path]) for path in carried)}"
+        step = assigned(", ".join(own), ", ".join(steps)) if carried else []
         pairs = [*zip(own, flat, strict=True)]
-        load, save = [f"{a} = {b}" for a, b in pairs], [f"{b} = {a}" for a, b in pairs]
-        return load, [step] if carried else [], save
+        return States([f"{a} = {b}" for a, b in pairs], step, [f"{b} = {a}" for a, b in pairs])
+
+
+class Sampled(NamedTuple):
+    """Text of one sample of a part."""
+
+    lines: list[str]
+    margin: str
+    """Name of the margin of its domain; empty without one."""
+    following: list[str]
+    """What the states that are carried become."""
+
+
+class States(NamedTuple):
+    """Lines around the states of a part."""
+
+    load: list[str]
+    step: list[str]
+    save: list[str]
 
 
 def lower(one: Node, two: Node) -> Node:
     """The lower of two margins; not a number once one of them was none."""
-    test = ex.make("or", ex.make("<=", one, two), ex.make("!=", one, one))
-    return ex.choose(test, one, two)
+    test = graph.either(graph.make("<=", one, two), graph.make("!=", one, one))
+    return graph.choose(test, one, two)
 
 
 def march_source(
@@ -262,19 +313,21 @@ def march_source(
     for k, signal in enumerate(sampler.signals):
         lines += [f"{signal} = records[{k}]", f"{signal}_before = before[{k}]"]
     for part in parts:
-        load, step, save = sampler.states(part)
-        lines += [*sampler.places(part), *sampler.ahead(part, sampler.read(part)), *load]
-        saved += save
+        ahead, known = sampler.ahead(part, sampler.ends[part.part])
+        sample = sampler.body(part, places, known)
+        states = sampler.states(part, sample.following)
+        lines += [*sampler.places(part), *ahead, *states.load]
+        saved += states.save
         fetched = sampler.fetched(
             part,
             lambda signal, back: f"sample_at({signal}, n - ({back}), {signal}_before)",
             lambda signal: f"{signal}[n]",
         )
-        inner = [*fetched, *sampler.body(part, places)]
-        if part.margin is not None:
-            margin = text(part.margin)
-            inner += [f"worst = {margin} if {margin} < worst else worst", f"total += {margin}"]
-        samples.append([*inner, *step])
+        inner = [*fetched, *sample.lines]
+        if sample.margin:
+            worst = f"worst = {sample.margin} if {sample.margin} < worst else worst"
+            inner += [worst, f"total += {sample.margin}"]
+        samples.append([*inner, *states.step])
     margins = any(part.margin is not None for part in parts)
     lines += ["worst, total = inf, 0.0"] if margins else []
     passed = [parts[-1].source(each) for each in sampler.sources if each.part != parts[-1].part]
@@ -320,22 +373,26 @@ def step_source(
         lines += [f"lines[{k}, 0] = inputs[{k}]" for k in tapped]
     places = {each: f"outputs[{k}]" for k, each in enumerate(stored)}
     for part in sampler.used:
-        read, (load, step, save) = sampler.read(part), sampler.states(part)
-        prepare += sampler.ahead(part, read)
-        for name in sampler.constants(part):
-            prepare.append(f"constants[{count}] = {name}")
-            lines.append(f"{name} = constants[{count}]")
+        ends_of_part = sampler.ends[part.part]
+        ahead, known = sampler.ahead(part, ends_of_part)
+        prepare += ahead
+        for node in part.ahead(ends_of_part):
+            prepare.append(f"constants[{count}] = {known[node]}")
+            lines.append(f"{known[node]} = constants[{count}]")
             count += 1
-        lines += [*sampler.places(part), *sampler.given(part, read), *load]
+        sample = sampler.body(part, places, known)
+        states = sampler.states(part, sample.following)
+        lines += [*sampler.places(part), *sampler.given(part, sampler.read(part)), *states.load]
         lines += sampler.fetched(
             part,
             lambda signal, back: f"lines[{row(signal)}, {back}]",
             lambda signal: f"inputs[{row(signal)}]",
         )
-        lines += sampler.body(part, places)
-        if part.margin is not None:
-            ends.append(f"worst = {text(lower(ex.name('worst'), part.margin))}")
-        ends += [*step, *save]
+        lines += sample.lines
+        if sample.margin:
+            lowest = lower(graph.name("worst"), graph.name(sample.margin))
+            ends.append(f"worst = {sampler.printed(part, [lowest]).texts[0]}")
+        ends += [*states.step, *states.save]
     head, says = "prepare(params, given, h, constants)", f"Constants of {model.name}."
     prepared = function_source(head, says, [*prepare, "return"])
     says, lines = f"One sample of {model.name}.", [*lines, *ends, "return worst"]

@@ -1,19 +1,16 @@
-"""One sample of a part of a model as straight code, and where the part starts."""
+"""One sample of a part of a model as a graph, and where the part starts."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Iterable, Sequence
 from functools import cached_property, lru_cache
 from typing import Any, NamedTuple, get_type_hints
 
-from numba import types
-from numba.extending import intrinsic
-
-from swashplate.equations import expressions as ex
-from swashplate.equations.code import Code, Flag, Tuple, Value, fixed, leaves, rebuilt
-from swashplate.equations.declaration import JIT_OFF
-from swashplate.equations.expressions import Node
+from swashplate.equations import graph
 from swashplate.equations.fields import floats_of
+from swashplate.equations.functions import fresh_name
+from swashplate.equations.graph import LEAVES, Node, names_in, ordered
+from swashplate.equations.language import is_named_tuple, plain
 from swashplate.equations.model import (
     Equation,
     Link,
@@ -26,8 +23,8 @@ from swashplate.equations.model import (
     mean_over_sample,
     previous,
 )
-from swashplate.equations.reading import read
-from swashplate.equations.language import is_named_tuple, plain
+from swashplate.equations.tracing import Trace
+from swashplate.equations.values import Flag, Tuple, Value, fixed, leaves, rebuilt
 from swashplate.errors import InputError
 
 HOLDS: dict[str, Equation] = {
@@ -72,10 +69,10 @@ def taps_of(model: Model, signals: tuple[str, ...]) -> tuple[TapOf, ...]:
 
 
 class PartCode:
-    """One sample of a part as straight code.
+    """One sample of a part, as nodes of numbers that have names.
 
     `signals` are the external ones that are given as records; for the others the default parameter
-    counts. `taken` are names that are in use already; `ruled` code is to be differentiated.
+    counts. `taken` are names that are in use already.
     """
 
     def __init__(
@@ -85,36 +82,33 @@ class PartCode:
         signals: Sequence[str],
         options: Any,
         taken: set[str] | None = None,
-        *,
-        ruled: bool = False,
     ) -> None:
         self.model, self.part, self.own = model, part, model.parts[part]
         self.records, self.options = tuple(signals), options
-        self.prologue = Code(set() if taken is None else taken, ruled=ruled)
-        self.code = Code(self.prologue.taken, ruled=ruled)
+        self.trace = Trace()
+        self.taken: set[str] = set() if taken is None else taken
         self.prefix = f"{self.own.name}_" if len(model.parts) > 1 else ""
-        self.code.taken.add("h")
+        self.taken.add("h")
         self.taps = [each for each in taps_of(model, self.records) if each.part == part]
         for tap in self.taps:
-            self.code.taken |= {*self.tap_samples(tap), self.fraction(tap), self.whole(tap)}
+            self.taken |= {*self.tap_samples(tap), self.fraction(tap), self.whole(tap)}
         own = self.own
         self.p = _named(own.parameters, self._fresh("p"))
         self.given = _named(own.given, self._fresh("given")) if own.given else Tuple(None, ())
         self.state = _named(own.state, self._fresh("s"))
         self.parameters = {node.value: path for path, node in leaves(self.p)}
         """Path of each parameter by the name that stands for it."""
-        self.known: dict[str, Value] = {"p": self.p, "h": ex.name("h"), "given": self.given}
+        self.known: dict[str, Value] = {"p": self.p, "h": graph.name("h"), "given": self.given}
         self.known["state"] = self.state
         if own.constants is not None:
-            self.known["k"] = self._call(self.prologue, own.constants)
+            self.known["k"] = self._call(own.constants)
         self.inputs = {name: self._input(name) for name in own.input_types}
         self.known |= self.inputs
-        self.entry = list(self.code.items)  # Items that make the inputs; a start needs them, too.
         if own.inputs is not None:
             self.known["inputs"] = Tuple(own.inputs, tuple(self.inputs.values()))
         if own.sample is not None:
-            self.known["signals"] = self._call(self.code, own.sample)
-        self.following = self._call(self.code, own.step)
+            self.known["signals"] = self._call(own.sample)
+        self.following = self._call(own.step)
         cls = self.following.cls if isinstance(self.following, Tuple) else None
         made = tuple(path for path, n in leaves(self.following) if n.kind in ("float", "int"))
         if cls is not own.state or made != floats_of(own.state):
@@ -123,20 +117,22 @@ class PartCode:
                 f"{own.state.__name__} of numbers on every way."
             )
 
+    def fresh(self, stem: str) -> str:
+        """A name that is not yet taken."""
+        return fresh_name(stem.replace(".", "_"), self.taken)
+
     def _fresh(self, letter: str) -> Callable[[str], str]:
         """What gives the numbers of a named tuple their names."""
-        return lambda path: self.code.fresh(f"{letter}_{self.prefix}{path}")
+        return lambda path: self.fresh(f"{letter}_{self.prefix}{path}")
 
-    def _call(self, code: Code, equation: Equation, **more: Value) -> Value:
-        """Append a call of one of the part's equations, of what is known by argument."""
+    def _call(self, equation: Equation, **more: Value) -> Value:
+        """What one of the part's equations returns, of what is known by argument."""
         known = {**self.known, **more}
         given = {name: known[name] for name in arguments_of(equation) if name in known}
         if "options" in arguments_of(equation):
             given["options"] = fixed(self.options) or Flag("unknown", "options")
-        made, name = read(code, equation, given), plain(equation).__name__
-        before = {*code.taken}
-        made = code.named(made, name if isinstance(made, Node) else "")
-        code.origins |= dict.fromkeys(code.taken - before, name)
+        made = self.trace.call(equation, given)
+        self.trace.label(made, plain(equation).__name__ if isinstance(made, Node) else "")
         return made
 
     def _input(self, name: str) -> Value:
@@ -148,22 +144,27 @@ class PartCode:
         found = next((each for each in self.taps if each.input == name), None)
         if found is None:
             if tap.signal in self.records:
-                return ex.name(f"x_{tap.signal}")
+                return graph.name(f"x_{tap.signal}")
             if name not in self.own.defaults:
                 # refused where the model is given its numbers; a constant keeps the code whole
-                return ex.ZERO
+                return graph.ZERO
             return dict(leaves(self.p))[self.own.defaults[name]]
-        samples = tuple(map(ex.name, self.tap_samples(found)))
-        window = Tuple(Window, (Tuple(None, samples), ex.name(self.fraction(found))))
-        return window if tap.width else self._call(self.code, HOLDS[tap.hold], window=window)
+        samples = tuple(map(graph.name, self.tap_samples(found)))
+        window = Tuple(Window, (Tuple(None, samples), graph.name(self.fraction(found))))
+        return window if tap.width else self._call(HOLDS[tap.hold], window=window)
 
     def _linked(self, link: Link) -> Node:
         """A signal between parts, from the names of its sources."""
-        sources = {each.signal: ex.name(self.source(each)) for each in link.sources}
+        sources = {each.signal: graph.name(self.source(each)) for each in link.sources}
         if link.equation is None:
             return next(iter(sources.values()))
-        made = self.code.named(read(self.code, link.equation, sources), link.name)
+        return self.link(link.equation, link.name, sources)
+
+    def link(self, equation: Equation, name: str, sources: dict[str, Value]) -> Node:
+        """A signal that an equation makes of several."""
+        made = self.trace.call(equation, sources)
         assert isinstance(made, Node)
+        self.trace.label(made, name)
         return made
 
     def source(self, source: Source) -> str:
@@ -187,7 +188,7 @@ class PartCode:
         """Margin of the domain."""
         if self.own.domain is None:
             return None
-        made = self._call(self.code, self.own.domain)
+        made = self._call(self.own.domain)
         if not isinstance(made, Node):
             raise InputError(
                 f"Model {self.own.name}: {plain(self.own.domain).__name__} must return one number, "
@@ -200,12 +201,27 @@ class PartCode:
         """The limits, in their order."""
         if self.own.limits is None:
             return []
-        return [node for _, node in leaves(self._call(self.code, self.own.limits))]
+        return [node for _, node in leaves(self._call(self.own.limits))]
 
-    @cached_property
-    def constants(self) -> list[Node]:
-        """What the part's equation of constants makes, as known in its sample."""
-        return [node for _, node in leaves(self.known["k"])] if "k" in self.known else []
+    def ahead(self, ends: Iterable[Node], still: Collection[str] = ()) -> list[Node]:
+        """What some ends need that follows from parameters, givens and the step alone.
+
+        The last nodes on the way that do; `still` are further names that do not change.
+        """
+        own = {node.value for _, node in (*leaves(self.p), *leaves(self.given))}
+        still = {"h", *own, *still}
+        moves = dict[Node, bool]()
+        found = dict[Node, None]()
+        ends = [*ends]
+        order = ordered(ends)
+        for node in order:
+            named = node.op == "name" and node.value not in still
+            moves[node] = named or any(moves[a] for a in node.args)
+        for node in [*(a for n in order if moves[n] for a in n.args), *ends]:
+            worth = node.op not in (*LEAVES, "call") and node.kind == "float"
+            if worth and not moves[node] and names_in([node]):
+                found[graph.plain_value(node)] = None
+        return [node for node in found if node.op not in LEAVES]
 
     @cached_property
     def outside(self) -> dict[str, Stored]:
@@ -215,7 +231,7 @@ class PartCode:
             for j, name in enumerate(self.tap_samples(tap)):
                 found[name] = Stored(self.part, "tap", f"{tap.input}.{j}")
         for name, node in self.inputs.items():
-            if node == ex.name(f"x_{self.own.tap(name).signal}"):
+            if node == graph.name(f"x_{self.own.tap(name).signal}"):
                 found[node.value] = Stored(self.part, "input", name)
         return found
 
@@ -227,37 +243,36 @@ class PartCode:
     def node(self, stored: Stored) -> Node:
         """A number that is kept."""
         if stored.kind in ("tap", "input"):
-            return next(ex.name(n) for n, each in self.outside.items() if each == stored)
+            return next(graph.name(n) for n, each in self.outside.items() if each == stored)
         if stored.kind == "state":
             return dict(leaves(self.state))[stored.path]
         return self.signal(stored.path)
 
-    def begun(self, start: str = "rest") -> tuple[Code, Value]:
-        """State at the start, and the code that leads to it.
+    def begun(self, start: str = "rest") -> Value:
+        """State at the start.
 
         At rest every signal is zero, or what its default parameter is; ``steady`` is the steady
         state under the inputs as they come. A part without an equation for that has no state.
         """
-        code, own = Code(self.code.taken, ruled=self.code.ruled), self.own
+        own = self.own
         if start == "steady" and own.settled is not None:
-            code.items = list(self.entry)
-            return code, self._call(code, own.settled)
+            return self._call(own.settled)
         if own.rest is None:
             defaults = own.state._field_defaults
             first = [defaults.get(path.split(".")[0], 0.0) for path, _ in leaves(self.state)]
-            return code, rebuilt(self.state, (ex.number(float(each)) for each in first))
+            return rebuilt(self.state, (graph.number(float(each)) for each in first))
         inputs: dict[str, Value] = {}
         for name in own.input_types:
             if name in own.defaults:
                 inputs[name] = dict(leaves(self.p))[own.defaults[name]]
             elif own.tap(name).width:
-                zeros = (ex.ZERO,) * own.tap(name).width
-                inputs[name] = Tuple(Window, (Tuple(None, zeros), ex.ZERO))
+                zeros = (graph.ZERO,) * own.tap(name).width
+                inputs[name] = Tuple(Window, (Tuple(None, zeros), graph.ZERO))
             else:
-                inputs[name] = ex.ZERO
+                inputs[name] = graph.ZERO
         if own.inputs is not None:
             inputs["inputs"] = Tuple(own.inputs, tuple(inputs.values()))
-        return code, self._call(code, own.rest, **inputs)
+        return self._call(own.rest, **inputs)
 
 
 def _named(kind: Any, name_of: Callable[[str], str], path: str = "") -> Value:
@@ -268,5 +283,5 @@ def _named(kind: Any, name_of: Callable[[str], str], path: str = "") -> Value:
         if is_named_tuple(hints[name]):
             items.append(_named(hints[name], name_of, f"{path}{name}_"))
         else:
-            items.append(ex.name(name_of(f"{path}{name}")))
+            items.append(graph.name(name_of(f"{path}{name}")))
     return Tuple(kind, tuple(items))
