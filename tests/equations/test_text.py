@@ -10,7 +10,7 @@ import pytest
 
 from swashplate.equations import closure, closure_hash, derive, equation
 from swashplate.equations.declaration import is_function
-from swashplate.equations.syntax import plain
+from swashplate.equations.language import plain
 from swashplate.models import card, pump
 from swashplate.models import displacement_control as control
 from swashplate.models.channel import CardOptions

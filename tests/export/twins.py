@@ -10,7 +10,7 @@ import numpy as np
 
 from swashplate.equations.c_source import Kind, Unit, c_name, fields_of
 from swashplate.equations.marching.run import module
-from swashplate.equations.syntax import parsed, plain
+from swashplate.equations.language import parsed, plain
 
 CALLS = 3000
 SPECIAL = np.array(
