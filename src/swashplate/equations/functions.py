@@ -21,6 +21,8 @@ R = TypeVar("R")
 
 GENERATING = RLock()
 """Held by the one thread that reads equations or writes code, which compares by identity."""
+
+
 def _choose(test: bool, one: Any, two: Any) -> Any:
     return one if test else two
 

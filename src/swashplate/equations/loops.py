@@ -173,9 +173,7 @@ class _Inner(NamedTuple):
         return Function(*named_by_text(name, text), dict(names))
 
 
-def _inner(
-    outer: Trace, source: Parsed, leading: Sequence[Value], rest: Sequence[Value]
-) -> _Inner:
+def _inner(outer: Trace, source: Parsed, leading: Sequence[Value], rest: Sequence[Value]) -> _Inner:
     """An equation whose `leading` arguments the loop gives, the others as where it is called."""
     trace = outer.inner()
     taken = set[str]()
@@ -200,9 +198,7 @@ def _inner(
     return _Inner(source.name, trace.labels, taken, first, formals, actuals, result)
 
 
-def solved(
-    trace: Trace, residual: Parsed, low: Value, high: Value, rest: Sequence[Value]
-) -> Value:
+def solved(trace: Trace, residual: Parsed, low: Value, high: Value, rest: Sequence[Value]) -> Value:
     """`root` as a call of a generated function, with the rule of its derivatives."""
     inner = _inner(trace, residual, [graph.name("x")], rest)
     if not (isinstance(inner.result, Node) and isinstance(low, Node) and isinstance(high, Node)):

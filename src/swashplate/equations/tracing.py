@@ -9,6 +9,7 @@ from __future__ import annotations
 import ast
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from functools import reduce
 from inspect import Parameter, Signature
 from types import FunctionType, ModuleType
 from typing import Any, TypeVar
@@ -450,10 +451,9 @@ class _Tracer:
         exactly = len(args) == least or (len(args) > least and op in ("min", "max"))
         if not exactly or node.keywords:
             self.refuse(node, f"{op} of {len(args)} arguments", f"give it {least}")
-        made = args[0]
-        for each in args[1:] or [None]:
-            made = self.trace.make(op, made) if each is None else self.trace.make(op, made, each)
-        return made
+        if len(args) == 1:
+            return self.trace.make(op, args[0])
+        return reduce(lambda one, two: self.trace.make(op, one, two), args)
 
     def arguments(self, node: ast.Call, names: Sequence[str], optional: Any) -> Names:
         """Values for arguments of these names, in their order as far as they are given."""

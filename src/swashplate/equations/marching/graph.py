@@ -215,9 +215,7 @@ class Graph:
         lines += ["for m in range(count):", *indented(inner)]
         name = f"fill_{part.own.name}"
         text = function_source(f"{name}({PIECE})", says, lines, "@piece")
-        self.pieces.append(
-            _planned(f"{self.model.name}_{name}", name, text, self.sampler.names)
-        )
+        self.pieces.append(_planned(f"{self.model.name}_{name}", name, text, self.sampler.names))
         return len(self.pieces), range(first, self.size)
 
     def _link(self, place: Stored) -> dict[Stored, Term]:

@@ -153,15 +153,15 @@ def report(model: Model, output: str | None = None, *, options: Any = None) -> s
         chosen.append(part.options() if own is None and part.options is not None else own)
     names = (*model.outputs, *model.parts[-1].outputs) or model.parts[-1].signal_names
     sampler = Sampler(model, signals, chosen, [output_of(model, output or names[-1])[0]])
-    for part in sampler.used:
-        ends = sampler.ends[part.part]
-        _, known = sampler.ahead(part, ends, still=fractions_of(part))
-        block = sampler.printed(part, ends, known=known, flat=all_vector)
+    for used in sampler.used:
+        ends = sampler.ends[used.part]
+        _, known = sampler.ahead(used, ends, still=fractions_of(used))
+        block = sampler.printed(used, ends, known=known, flat=all_vector)
         for statement in [each for each in block.statements if not is_vector(each)]:
             for node in statement.nodes:
                 if node.op not in VECTOR:
-                    source = part.trace.origins.get(node)
-                    where = part.own.name if source is None else source.name
+                    source = used.trace.origins.get(node)
+                    where = used.own.name if source is None else source.name
                     found[f"{where} calls {_called(node)}"] = None
     if not found:
         return f"Nothing keeps {model.name} from vector instructions."

@@ -87,9 +87,7 @@ class Sampler:
     ) -> None:
         self.model, self.signals = model, tuple(signals)
         taken = {*RESERVED, *self.signals, *(f"{each}_before" for each in self.signals)}
-        self.parts = [
-            PartCode(model, i, signals, each, taken) for i, each in enumerate(options)
-        ]
+        self.parts = [PartCode(model, i, signals, each, taken) for i, each in enumerate(options)]
         self.ends: list[list[Node]] = [[] for _ in self.parts]
         self.carried: list[list[str]] = [[] for _ in self.parts]
         self.sources: dict[Source, Node] = {}

@@ -13,7 +13,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swashplate.equations.cache import generated, kernel
-from swashplate.equations.functions import compiled_names, generating
 from swashplate.equations.declaration import inlined, interpreted
 from swashplate.equations.fields import (
     check_mapping,
@@ -23,6 +22,8 @@ from swashplate.equations.fields import (
     numbers_of,
     value_at,
 )
+from swashplate.equations.functions import compiled_names, generating
+from swashplate.equations.language import plain
 from swashplate.equations.marching.march import march_source
 from swashplate.equations.marching.part import Stored, taps_of
 from swashplate.equations.marching.pieces import Planned, addresses, piece, pointers, run_once
@@ -35,7 +36,6 @@ from swashplate.equations.model import (
     place,
     state_paths,
 )
-from swashplate.equations.language import plain
 from swashplate.errors import DomainError, InputError, ParameterError
 
 Array = NDArray[np.float64]
