@@ -73,10 +73,12 @@ class Python(Language):
     """
 
     def number(self, value: Any) -> Text:
+        """A literal number."""
         text = repr(value)
         return text, ATOM if text[0] != "-" else PRECEDENCE["neg"]
 
     def operation(self, node: Node, args: Sequence[Text], computed: int) -> Text:
+        """An operation on texts."""
         op, level = node.op, PRECEDENCE.get(node.op, ATOM)
         if op == "if":
             return self._choice(node, args, computed)
@@ -104,9 +106,11 @@ class Python(Language):
         return f"{grouped(one, 2)} if {grouped(test, 2)} else {grouped(two, 1)}", PRECEDENCE["if"]
 
     def assigned(self, name: str, node: Node, text: str, pad: str, *, new: bool) -> list[str]:
+        """Lines of an assignment."""
         return assigned(name, text, pad)
 
     def branch(self, test: str, then: list[str], other: list[str], pad: str) -> list[str]:
+        """Lines of an `if` and its `else`."""
         if not then:
             return [*bracketed("if not (", test, "):", pad), *other]
         fits = len(pad) + len(test) < WIDTH - 4
