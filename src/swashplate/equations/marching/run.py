@@ -332,11 +332,16 @@ def module(name: str, text: str, names: Mapping[str, Any]) -> dict[str, Any]:
 
 @generating
 def march_of(
-    model: Model, signals: tuple[str, ...], options: tuple[Any, ...], stored: tuple[Stored, ...]
+    model: Model,
+    signals: tuple[str, ...],
+    options: tuple[Any, ...],
+    stored: tuple[Stored, ...],
+    more: tuple[Stored, ...] = (),
 ) -> Planned:
-    """The march over whole records, a row for each number that is kept."""
-    rows = {each: f"flat[{row} * count + n]" for row, each in enumerate(stored)}
-    text, names = march_source(model, signals, options, rows)
+    """The march over whole records, a row for each number that is kept, then for each of `more`."""
+    rows = {each: f"flat[{row} * count + n]" for row, each in enumerate((*stored, *more))}
+    always, later = ({each: rows[each] for each in kept} for kept in (stored, more))
+    text, names = march_source(model, signals, options, always, later)
     names["piece"] = piece
     return generating(lambda: module(f"{model.name}_march", text, names)["march"])
 
@@ -349,15 +354,20 @@ def marched(
     stored: tuple[Stored, ...],
     cause: str = "input",
     begin: Mapping[str, float] = MappingProxyType({}),
+    *,
+    more: tuple[Stored, ...] = (),
+    everything: bool = False,
 ) -> Array:
     """(r, n) numbers in the order of `stored`, marched over whole records; limits as sums of bits.
 
     From where `started` begins, or from states by path; `cause` is what drives the model, for the
-    sentence where it leaves its domain or a number overflows.
+    sentence where it leaves its domain or a number overflows. One and the same march can leave
+    `more` numbers, which follow in the table if it is to leave `everything`.
     """
     signals, size = tuple(records), next(iter(records.values())).size
-    planned = march_of(instance.model, signals, instance.options, stored)
-    table, met = np.empty((len(stored), size)), np.array([np.inf])
+    planned = march_of(instance.model, signals, instance.options, stored, more)
+    stored = (*stored, *more) if everything else stored
+    table, met = np.empty((len(stored), size)), np.array([np.inf, float(everything)])
     states = begun(instance, started, begin)
     values = tuple(np.ascontiguousarray(each, dtype=np.float64) for each in records.values())
     places = instance.places(signals, h)
