@@ -13,10 +13,9 @@ from functools import reduce
 from inspect import Parameter, Signature
 from types import FunctionType, ModuleType
 from typing import Any, TypeVar
-from weakref import WeakKeyDictionary
 
 from swashplate.equations import graph
-from swashplate.equations.declaration import JIT_OFF
+from swashplate.equations.declaration import JIT_OFF, RULES
 from swashplate.equations.graph import FALSE, LEAVES, ONE, TRUE, ZERO, Node, Rule, choose, make
 from swashplate.equations.language import (
     ARITHMETIC,
@@ -35,8 +34,6 @@ from swashplate.equations.values import Flag, Tuple, Value, alike, fixed, leaves
 Names = dict[str, Value]
 R = TypeVar("R")
 
-RULES: WeakKeyDictionary[FunctionType, Any] = WeakKeyDictionary()
-"""Equations that return the derivatives of others."""
 LOOPS = {
     "root": ("residual, low, high", ("the unknown",), solved),
     "repeated": ("step, count, state", ("a state", "the number of the repetition"), repetition),
