@@ -21,9 +21,8 @@ from types import MappingProxyType
 from typing import Any, NamedTuple
 
 from swashplate.equations import graph
-from swashplate.equations.declaration import inlined
 from swashplate.equations.fields import floats_of
-from swashplate.equations.functions import Function, choose
+from swashplate.equations.functions import Function
 from swashplate.equations.graph import Node, names_in
 from swashplate.equations.marching.part import PartCode, Stored
 from swashplate.equations.marching.pieces import PIECE
@@ -54,12 +53,6 @@ MACHINE = [
     "outputs",
 ]
 """What a step takes from a `Machine`."""
-
-
-@inlined
-def sample_at(record: Any, index: int, before: float) -> float:
-    """Sample of a record, or what it was before the record began."""
-    return record[index] if index >= 0 else before
 
 
 class Sampler:
@@ -139,10 +132,10 @@ class Sampler:
                 known[part.fraction(tap)] = Stored(i, "fraction", str(tap.number))
         return known
 
-    @property
-    def names(self) -> dict[str, Any]:
-        """What the text refers to."""
-        return {"sample_at": sample_at, "choose": choose, **self.functions}
+    def module(self, *texts: str) -> str:
+        """Text of a module of some functions, with the generated ones that they call."""
+        called = {n: t for each in self.functions.values() for n, t in each.texts.items()}
+        return "\n\n".join([*(f"@inlined\n{text}" for text in called.values()), *texts])
 
     def read(self, part: PartCode) -> set[str]:
         """Names from outside that a part needs."""
@@ -325,8 +318,8 @@ def march_source(
     options: Sequence[Any],
     places: Mapping[Stored, str],
     more: Mapping[Stored, str] = MappingProxyType({}),
-) -> tuple[str, dict[str, Any]]:
-    """Text of the march over samples as a `piece`, and what its names mean.
+) -> str:
+    """Text of a module with the march over samples as a `piece`.
 
     `places` says what is kept, and where it goes at sample ``n``; `more` what is kept, too, if the
     second number of ``met`` is not zero.
@@ -374,13 +367,13 @@ def march_source(
             "met[0] = worst if worst < met[0] or worst != worst else met[0]",
         ]
     says = f"March {model.name} over its inputs."
-    return function_source(f"march({PIECE})", says, lines, "@piece"), sampler.names
+    return sampler.module(function_source(f"march({PIECE})", says, lines, "@piece"))
 
 
 def step_source(
     model: Model, signals: Sequence[str], options: Sequence[Any], stored: Sequence[Stored]
-) -> tuple[str, dict[str, Any], int]:
-    """Text of one sample, for steppers and loops, what it refers to, and how many constants it has.
+) -> tuple[str, int]:
+    """Text of a module of one sample, for steppers and loops, and how many constants it has.
 
     ``prepare(params, given, h, constants)`` computes constants once. ``step(machine)`` shifts the
     newest inputs into the delay lines (a row for each signal, newest first), fills the outputs with
@@ -423,7 +416,7 @@ def step_source(
     prepared = function_source(head, says, [*prepare, "return"])
     says, lines = f"One sample of {model.name}.", [*lines, *ends, "return worst"]
     stepped = function_source("step(machine)", says, lines, "@inlined")
-    return f"{prepared}\n\n{stepped}", sampler.names, count
+    return sampler.module(prepared, stepped), count
 
 
 def output_of(model: Model, output: str) -> tuple[Stored, bool]:
