@@ -49,6 +49,10 @@ SHORT = 16
 """Statements that are not worth a loop of their own."""
 
 
+DIGEST = 8
+"""Characters that the name of a generated function ends in."""
+
+
 def is_vector(statement: Statement) -> bool:
     """Whether a processor can do a statement for many lanes at once: it is no branch."""
     return len(statement.names) <= 1 and all_vector(statement.nodes)
