@@ -30,17 +30,8 @@ class Opening(NamedTuple):
     opening: float
 
 
-class Share(NamedTuple):
-    share: float
-
-
 class Flow(NamedTuple):
     flow: float
-
-
-@equation
-def valve_share(p: Valve, h: float) -> Share:
-    return Share(1.0 - exp(-h / p.lag))
 
 
 @equation
@@ -49,8 +40,9 @@ def valve_sample(state: Opening, command: float, p: Valve) -> Flow:
 
 
 @equation
-def valve_step(state: Opening, command: float, k: Share) -> Opening:
-    return Opening(state.opening + k.share * (command - state.opening))
+def valve_step(state: Opening, command: float, p: Valve, h: float) -> Opening:
+    share = 1.0 - exp(-h / p.lag)
+    return Opening(state.opening + share * (command - state.opening))
 
 
 @equation
@@ -88,7 +80,6 @@ def valve(hold: str) -> Model:
         state=Opening,
         step=valve_step,
         sample=valve_sample,
-        constants=valve_share,
         settled=valve_settled,
         domain=valve_margin,
         outside="the valve is wide open",

@@ -19,7 +19,7 @@ from swashplate.equations.marching.record import (
     least_substeps,
     on_grid,
 )
-from swashplate.equations.marching.run import Instance, Start, marched
+from swashplate.equations.marching.run import Instance, Start, Started, marched
 from swashplate.equations.marching.use import Stepper
 from swashplate.equations.replacement import as_called
 from swashplate.errors import DomainError, InputError, ParameterError
