@@ -135,7 +135,7 @@ class Gradients:
         self, results: Sequence[Node], by: Sequence[Node], *, chained: bool = False
     ) -> None:
         self._by = dict.fromkeys(by)
-        self._order = ordered(results, operands=_reached)
+        self._order = ordered(results, operands=graph.reached)
         self._moves = self._moving()
         self._divisors = {node.args[1] for node in self._order if node.op == "/"}
         self._calls: dict[Node, tuple[Node, dict[tuple[int, int], Node]]] = {}
@@ -312,11 +312,6 @@ class Gradients:
 TAME = {"number", "name", "+", "-", "*", "neg", "abs", "min", "max", "if", "not"}
 TAME |= {*graph.COMPARISONS}
 """Operations that make finite numbers of moderate ones."""
-
-
-def _reached(node: Node) -> Sequence[Node]:
-    """Operands of a node, and what else a declared derivative is by."""
-    return (*node.args, *node.value.arguments) if node.op == "ruled" else node.args
 
 
 def _followed(node: Node) -> Sequence[Node]:

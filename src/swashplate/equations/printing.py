@@ -7,6 +7,7 @@ so that both languages give the same bits.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from hashlib import blake2b
 from textwrap import TextWrapper
@@ -237,7 +238,7 @@ class Block:
 
     def _fresh(self, node: Node) -> str:
         stem = self._labels.get(node) or STEMS.get(node.op, "part")
-        stem = stem.replace(".", "_")
+        stem = re.sub(r"\W+", "_", stem)
         return fresh_name(f"value_{stem}" if stem[0].isdigit() else stem, self._taken)
 
     # -- lines -------------------------------------------------------------------------------------

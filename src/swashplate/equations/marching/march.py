@@ -391,7 +391,8 @@ def step_source(
         lines += sample.lines
         if sample.margin:
             lowest = lower(graph.name("worst"), graph.name(sample.margin))
-            ends.append(f"worst = {sampler.printed(part, [lowest]).texts[0]}")
+            compared = sampler.printed(part, [lowest])
+            ends += [*compared.lines, f"worst = {compared.texts[0]}"]
         ends += [*states.step, *states.save]
     head, says = "prepare(params, given, h, constants)", f"Constants of {model.name}."
     prepared = function_source(head, says, [*prepare, "return"])
