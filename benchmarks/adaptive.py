@@ -6,8 +6,8 @@ from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
 from swashplate.models.displacement_control import (
-    Pump,
     PressureLimits,
+    Pump,
     Stroking,
     arm_sine,
     orifice_opening,

@@ -143,26 +143,30 @@ def test_feedthrough_and_the_settled_state() -> None:
     assert model.to_scipy().dt == H
 
 
+class Lag(NamedTuple):
+    lag: float
+
+
 class Table(NamedTuple):
     position: float
     speed: float
 
 
 @equation
-def table_rates(state: Table, command: float, p: Share) -> Table:
-    return Table(state.speed, (command - state.speed) / p.share)
+def table_rates(state: Table, command: float, p: Lag) -> Table:
+    return Table(state.speed, (command - state.speed) / p.lag)
 
 
 @equation
-def table_coasts(state: Table, command: float, p: Share) -> Table:
-    return Table(state.speed, command / p.share)
+def table_coasts(state: Table, command: float, p: Lag) -> Table:
+    return Table(state.speed, command / p.lag)
 
 
 def table(rates: Callable[..., Table], lag: float, outputs: tuple[str, ...]) -> LinearModel:
-    model = Model("table", parameters=Share, state=Table, step=discretised(rates, "euler"))
+    model = Model("table", parameters=Lag, state=Table, step=discretised(rates, "euler"))
     states = (Table(0.0, 0.0),)
     return linearize(
-        instance_of_model(model, Share(lag)), {"command": 0.0}, H, states=states, outputs=outputs
+        instance_of_model(model, Lag(lag)), {"command": 0.0}, H, states=states, outputs=outputs
     )
 
 

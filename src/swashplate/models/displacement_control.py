@@ -300,9 +300,7 @@ def pressure_limits(p: Pump) -> PressureLimits:
     """
     lower_stop = (p.Z2 - tan(p.Z13_minus)) / p.Z1
     upper_stop = (p.Z2 + tan(p.Z13_plus)) / p.Z1
-    return PressureLimits(
-        lower_stop, upper_stop, max(-p.Z15, lower_stop), min(p.Z15, upper_stop)
-    )
+    return PressureLimits(lower_stop, upper_stop, max(-p.Z15, lower_stop), min(p.Z15, upper_stop))
 
 
 @equation

@@ -72,9 +72,7 @@ def settled_currents(voltage: float, p: Card) -> Currents:
 
 
 @equation
-def settled_sample(
-    inputs: PumpInputs, p: Pump, h: float, options: PumpOptions
-) -> PumpSignals:
+def settled_sample(inputs: PumpInputs, p: Pump, h: float, options: PumpOptions) -> PumpSignals:
     """What is known of the pump where it has settled under a constant current."""
     return pump_sample(pump_settled(inputs, p, options), inputs, p, h, options)
 

@@ -200,9 +200,7 @@ def substep(
 
 
 @equation
-def plant_signals(
-    motion: Motion, current: float, p: Plant, options: PlantOptions
-) -> PlantSignals:
+def plant_signals(motion: Motion, current: float, p: Plant, options: PlantOptions) -> PlantSignals:
     """What follows from the five states and the current."""
     m, stroke = p.machine, p.machine.spool_stroke
     velocity = stopped(motion.spool_velocity, motion.spool_position, -stroke, stroke)
