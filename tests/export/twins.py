@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from swashplate.equations.c_source import Kind, Unit, c_name, fields_of
-from swashplate.equations.marching.run import module
 from swashplate.equations.language import parsed, plain
+from swashplate.equations.marching.run import module
 
 CALLS = 3000
 SPECIAL = np.array(

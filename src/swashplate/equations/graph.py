@@ -188,9 +188,13 @@ def rewritten(ends: Iterable[Node], by: Mapping[Node, Node]) -> list[Node]:
         if node.op == "ruled":
             arguments = tuple(made[a] for a in value.arguments)
             again = again and arguments == value.arguments
-            value = Rule(arguments, lambda rule=value: tuple(rewritten(rule.slopes, by)))
+            value = _rewritten_rule(value, arguments, by)
         made[node] = node if again else make(node.op, *args, value=value, kind=node.kind)
     return [made[node] for node in ends]
+
+
+def _rewritten_rule(rule: Rule, arguments: tuple[Node, ...], by: Mapping[Node, Node]) -> Rule:
+    return Rule(arguments, lambda: tuple(rewritten(rule.slopes, by)))
 
 
 def plain_value(node: Node) -> Node:

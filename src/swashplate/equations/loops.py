@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from swashplate.equations import graph
 from swashplate.equations.declaration import inlined
-from swashplate.equations.functions import Function, fresh_name
+from swashplate.equations.functions import FUNCTIONS, Function, fresh_name
 from swashplate.equations.gradients import Derived, derived_function, gradients, listing
 from swashplate.equations.graph import ONE, ZERO, Call, Node, Rule, choose, make, names_in
 from swashplate.equations.language import Parsed
@@ -147,6 +147,8 @@ def blank(size: int) -> NDArray[np.float64]:
     return np.zeros(size)
 
 
+FUNCTIONS |= {"root": root, "blank": blank}
+
 # --- as they are traced ---------------------------------------------------------------------------
 
 
@@ -173,9 +175,7 @@ class _Inner(NamedTuple):
         return Function(*named_by_text(name, text), dict(names))
 
 
-def _inner(
-    outer: Trace, source: Parsed, leading: Sequence[Value], rest: Sequence[Value]
-) -> _Inner:
+def _inner(outer: Trace, source: Parsed, leading: Sequence[Value], rest: Sequence[Value]) -> _Inner:
     """An equation whose `leading` arguments the loop gives, the others as where it is called."""
     trace = outer.inner()
     taken = set[str]()
@@ -200,9 +200,7 @@ def _inner(
     return _Inner(source.name, trace.labels, taken, first, formals, actuals, result)
 
 
-def solved(
-    trace: Trace, residual: Parsed, low: Value, high: Value, rest: Sequence[Value]
-) -> Value:
+def solved(trace: Trace, residual: Parsed, low: Value, high: Value, rest: Sequence[Value]) -> Value:
     """`root` as a call of a generated function, with the rule of its derivatives."""
     inner = _inner(trace, residual, [graph.name("x")], rest)
     if not (isinstance(inner.result, Node) and isinstance(low, Node) and isinstance(high, Node)):
@@ -215,7 +213,7 @@ def solved(
     name = f"root_of_{function.name}"
     line = f"return (root({function.name}, {given}),)"
     text = function_source(f"{name}({given})", f"Root of {residual.name}.", [line], "")
-    solver = Function(name, text, {"root": root, function.name: function})
+    solver = Function(name, text, {function.name: function})
     call = make("call", low, high, *inner.actuals, value=Call(solver, 1))
     x = trace.make("result", call, value=0)
     trace.label(x, "root")
@@ -358,7 +356,7 @@ def _carried(
     text = function_source(f"{name}({', '.join(given)})", says, lines, "")
     return Derived(
         *named_by_text(name, text),
-        {"blank": blank, step.name: step},
+        {step.name: step},
         tuple(now),
         tuple(moved),
         tuple((o, moved.index(each)) for o, each in entries),

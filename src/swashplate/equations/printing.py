@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from functools import partial
 from hashlib import blake2b
 from textwrap import TextWrapper
 from typing import Any, NamedTuple
@@ -72,10 +73,12 @@ class Python(Language):
     """
 
     def number(self, value: Any) -> Text:
+        """A literal number."""
         text = repr(value)
         return text, ATOM if text[0] != "-" else PRECEDENCE["neg"]
 
     def operation(self, node: Node, args: Sequence[Text], computed: int) -> Text:
+        """An operation on texts."""
         op, level = node.op, PRECEDENCE.get(node.op, ATOM)
         if op == "if":
             return self._choice(node, args, computed)
@@ -103,9 +106,11 @@ class Python(Language):
         return f"{grouped(one, 2)} if {grouped(test, 2)} else {grouped(two, 1)}", PRECEDENCE["if"]
 
     def assigned(self, name: str, node: Node, text: str, pad: str, *, new: bool) -> list[str]:
+        """Lines of an assignment."""
         return assigned(name, text, pad)
 
     def branch(self, test: str, then: list[str], other: list[str], pad: str) -> list[str]:
+        """Lines of an `if` and its `else`."""
         if not then:
             return [*bracketed("if not (", test, "):", pad), *other]
         fits = len(pad) + len(test) < WIDTH - 4
@@ -251,11 +256,11 @@ class Block:
         """Statements of what is computed together."""
         for step in self._schedule.steps(region):
             if isinstance(step, Branch):
-                yield from self._statement(lambda step=step: self._branch(step, region, pad))
+                yield from self._statement(partial(self._branch, step, region, pad))
             elif step.op == "call":
-                yield from self._statement(lambda step=step: self._call(step, region, pad))
+                yield from self._statement(partial(self._call, step, region, pad))
             elif step.op not in ("result", "ruled") and self._wants_name(step, region):
-                yield from self._statement(lambda step=step: self._define(step, region, pad))
+                yield from self._statement(partial(self._define, step, region, pad))
 
     def _statement(self, write: Callable[[], tuple[list[str], list[str]]]) -> Iterator[Statement]:
         """A statement with what it reads and computes; none if it has no lines."""
@@ -298,10 +303,12 @@ class Block:
 
     def _branch(self, branch: Branch, region: Region, pad: str) -> tuple[list[str], list[str]]:
         """Lines of a branch; none if it is a choice that stands in an expression."""
-        sides = [self._region(side, f"{pad}    ") for side in branch.sides]
+        then, other = sides = [self._region(side, f"{pad}    ") for side in branch.sides]
         if len(branch.members) == 1 and not any(sides):
             (member,) = branch.members
-            return self._define(member, region, pad) if self._wants_name(member, region) else ([], [])
+            return (
+                self._define(member, region, pad) if self._wants_name(member, region) else ([], [])
+            )
         names = {}
         for member in branch.members:
             names[member] = self._named[member, region] = self._fresh(member)
@@ -315,7 +322,7 @@ class Block:
                 )
         test = self._text(branch.test, region)[0]
         self._written_nodes += branch.members
-        return self._language.branch(test, *sides, pad), [*names.values()]
+        return self._language.branch(test, then, other, pad), [*names.values()]
 
     def _result(self, node: Node, *, named: bool) -> tuple[str, frozenset[str]]:
         """Text of a result, by a name if it is long or must have one, and what that reads."""
@@ -325,7 +332,7 @@ class Block:
         done = (node, whole) in self._named or node in self._known or node.op in LEAVES
         if done or (not named and (len(text) <= SHORT or _is_trivial(node))):
             return text, frozenset(self._reads)
-        self.statements += self._statement(lambda: self._define(node, whole, ""))
+        self.statements += self._statement(partial(self._define, node, whole, ""))
         name = self._named[node, whole]
         return name, frozenset((name,))
 

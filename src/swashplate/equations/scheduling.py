@@ -213,8 +213,10 @@ class Schedule:
         for k, side in enumerate(item.sides):
             for member in item.members:
                 yield member.args[1 + k], side
-            for inner in (*side.nodes, *side.branches):
-                yield from self.uses(inner, side)
+            for node in side.nodes:
+                yield from self.uses(node, side)
+            for branch in side.branches:
+                yield from self.uses(branch, side)
 
 
 def covering(regions: Iterable[Region]) -> list[Region]:

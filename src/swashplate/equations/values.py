@@ -14,7 +14,6 @@ from swashplate.equations.language import Parsed, hints_of, is_named_tuple
 from swashplate.errors import EquationError
 
 
-
 @dataclass(frozen=True)
 class Flag:
     """An option: None (off), True (on), or "unknown"."""

@@ -17,11 +17,11 @@ from swashplate.equations.c_source.text import c_name, fields_of, function, lite
 from swashplate.equations.c_source.unit import Unit
 from swashplate.equations.code import Code
 from swashplate.equations.fields import Definition, declared_by, floats_of, value_at
+from swashplate.equations.language import is_named_tuple, plain
 from swashplate.equations.marching.march import Sampler, output_of
 from swashplate.equations.marching.part import HOLDS, TapOf, taps_of
 from swashplate.equations.marching.run import Instance
 from swashplate.equations.model import Equation, Link, Model, Window, arguments_of
-from swashplate.equations.language import is_named_tuple, plain
 
 OWN = """
 number_at put_at is_finite all_finite in_range number_of placed seen constant_window before_all
