@@ -343,7 +343,7 @@ class _Structuring:
             f"{self.model.name}_start",
             f"Constants and states of {self.model.name} at the start.",
             arguments,
-            [(" ".join(map(str, key)), node) for key, node in results.items()],
+            [("_".join(map(str, key)), node) for key, node in results.items()],
             [(each, each) for each in active],
             labels,
             chained=True,
