@@ -46,6 +46,6 @@ def test_columns_are_those_of_tangents(name: str) -> None:
         if drive.parameters.numbers[column] == 0.0 and column in (*SWITCHES, *COULOMB):
             continue  # off, with a derivative to one side that is declared
         index = paths.index(path_of(column))
-        # the gauge Z2 moves the state at rest and all that follows, which cancel but for a thousandth
+        # the gauge Z2 moves the state at rest and all that follows, which cancel but for 0.4 %
         size = max(np.abs(slopes[:, index]).max(), np.abs(alone[:, index]).max())
         assert np.abs(columns[:, k] - slopes[:, index]).max() <= 1e-12 * size, column
