@@ -7,18 +7,13 @@ from typing import Any
 
 import numpy as np
 
-from swashplate.equations import graph
 from swashplate.equations.fields import check_mapping, floats_of, is_real, value_at
-from swashplate.equations.functions import generating
-from swashplate.equations.gradients import Derived, derived_function
-from swashplate.equations.graph import Node, names_in, rewritten
-from swashplate.equations.keeping import kept, key_of
-from swashplate.equations.marching.march import Sampler, output_of
-from swashplate.equations.marching.part import Stored, taps_of
+from swashplate.equations.marching.march import output_of
+from swashplate.equations.marching.part import taps_of
 from swashplate.equations.marching.record import check_rate
 from swashplate.equations.marching.run import Instance, Started, called, outside
-from swashplate.equations.model import Model, state_paths
-from swashplate.equations.values import leaves
+from swashplate.equations.marching.step_derivatives import step_derivatives
+from swashplate.equations.model import state_paths
 from swashplate.errors import DomainError, InputError
 from swashplate.linear.model import LinearModel, Matrices
 
@@ -119,44 +114,6 @@ def _are(states: Any, kinds: Sequence[Any]) -> bool:
     return all(is_real(value) and np.isfinite(value) for value in values)
 
 
-@generating
-def _whole_step(
-    model: Model, signals: tuple[str, ...], options: tuple[Any, ...], seen: tuple[Stored, ...]
-) -> tuple[dict[str, Stored], Derived]:
-    """A model's next states, then what is seen, with their derivatives: arguments and function."""
-    return kept(
-        f"{model.name}_linear",
-        (key_of(model), signals, options, seen),
-        lambda: _derived_step(model, signals, options, seen),
-    )
-
-
-def _derived_step(
-    model: Model, signals: tuple[str, ...], options: tuple[Any, ...], seen: tuple[Stored, ...]
-) -> tuple[dict[str, Stored], Derived]:
-    """The same, made of the equations."""
-    states = [Stored(i, "state", path) for i, path in model.places("state")]
-    sampler = Sampler(model, signals, options, [*states, *seen])
-    results, labels = list[Node](), dict[Node, str]()
-    passed: dict[Node, Node] = {}
-    """What the names of signals between parts stand for."""
-    for part in sampler.used:
-        results += rewritten([node for _, node in leaves(part.following)], passed)
-        for source, node in sampler.sources.items():
-            if source.part == part.part:
-                passed[graph.name(part.source(source))] = rewritten([node], passed)[0]
-        labels |= part.trace.labels
-    for place in seen:
-        results += rewritten([sampler.observed(sampler.parts[place.part], place)], passed)
-    outside = sampler.outside()
-    known = {name: outside[name] for name in sorted(names_in(results) & outside.keys())}
-    by = [name for name, each in known.items() if each.kind in ("state", "tap", "input")]
-    name, says = f"{model.name}_linear", f"Next states and outputs of {model.name}."
-    paths = [(str(k), node) for k, node in enumerate(results)]
-    pairs = [(each, each) for each in by]
-    return known, derived_function(name, says, [*known], paths, pairs, labels, chained=True)
-
-
 def recurrence(
     instance: Instance,
     started: Started,
@@ -182,7 +139,7 @@ def recurrence(
                 f"not have; ask for '{model.integrals[name]}'."
             )
     seen = tuple(output_of(model, name)[0] for name in outputs)
-    arguments, derived = _whole_step(model, signals, instance.options, seen)
+    arguments, derived = step_derivatives(model, signals, instance.options, seen)
     places, states = instance.places(signals, h), state_paths(model)
     n, values = len(states), []
     for stored in arguments.values():

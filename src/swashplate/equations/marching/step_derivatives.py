@@ -1,0 +1,63 @@
+"""One step of a model with its derivatives by states and inputs: what a linear model is made of."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+from swashplate.equations import graph
+from swashplate.equations.functions import generating
+from swashplate.equations.gradients import Derived, derived_function
+from swashplate.equations.graph import Node, names_in, rewritten
+from swashplate.equations.keeping import kept, key_of
+from swashplate.equations.marching.march import Sampler
+from swashplate.equations.marching.part import Stored
+from swashplate.equations.model import Model
+from swashplate.equations.values import leaves
+
+
+class StepDerivatives(NamedTuple):
+    """Next states of a model, then what is seen of it, with their derivatives."""
+
+    arguments: dict[str, Stored]
+    """What the function takes, by name."""
+    derived: Derived
+    """By all states and samples of inputs among them."""
+
+
+@generating
+def step_derivatives(
+    model: Model, signals: tuple[str, ...], options: tuple[Any, ...], seen: tuple[Stored, ...]
+) -> StepDerivatives:
+    """A model's next states, then what is `seen`, with their derivatives."""
+    return kept(
+        f"{model.name}_linear",
+        (key_of(model), signals, options, seen),
+        lambda: _derived(model, signals, options, seen),
+    )
+
+
+def _derived(
+    model: Model, signals: tuple[str, ...], options: tuple[Any, ...], seen: tuple[Stored, ...]
+) -> StepDerivatives:
+    """The same, made of the equations."""
+    states = [Stored(i, "state", path) for i, path in model.places("state")]
+    sampler = Sampler(model, signals, options, [*states, *seen])
+    results, labels = list[Node](), dict[Node, str]()
+    passed: dict[Node, Node] = {}
+    """What the names of signals between parts stand for."""
+    for part in sampler.used:
+        results += rewritten([node for _, node in leaves(part.following)], passed)
+        for source, node in sampler.sources.items():
+            if source.part == part.part:
+                passed[graph.name(part.source(source))] = rewritten([node], passed)[0]
+        labels |= part.trace.labels
+    for place in seen:
+        results += rewritten([sampler.observed(sampler.parts[place.part], place)], passed)
+    outside = sampler.outside()
+    known = {name: outside[name] for name in sorted(names_in(results) & outside.keys())}
+    by = [name for name, each in known.items() if each.kind in ("state", "tap", "input")]
+    name, says = f"{model.name}_linear", f"Next states and outputs of {model.name}."
+    paths = [(str(k), node) for k, node in enumerate(results)]
+    pairs = [(each, each) for each in by]
+    derived = derived_function(name, says, [*known], paths, pairs, labels, chained=True)
+    return StepDerivatives(known, derived)
