@@ -12,11 +12,9 @@ from swashplate.equations.functions import generating
 from swashplate.equations.marching.graph import Graph, Moved, graph_of
 from swashplate.equations.marching.layout import Layout, layout_of, started_by
 from swashplate.equations.marching.observation import ObservedRecord, Own
-from swashplate.equations.marching.pieces import addresses
+from swashplate.equations.marching.pieces import addresses, table_of
 from swashplate.equations.marching.rows import (
-    EIGHTH,
     ROWS,
-    STRIDE,
     Program,
     Sink,
     aligned,
@@ -214,12 +212,24 @@ def _march(
         program, tangent = _at_rest(layout, instance, h, tuple(own.start))
     else:
         program, tangent = _begun(layout, instance, first, h, start, own.start)
-    sink = Sink(rows, np.array(to, dtype=np.int64), np.arange(before, len(rows) - 1), factor)
-    values, met, block = tuple(records.values()), np.array([np.inf]), layout.taken()
-    arrays = arrays_of(instance, values, started, places, states, met, block)
+    sink = Sink(
+        columns=len(rows),
+        length=rows.shape[1],
+        rows=rows,
+        derived=len(columns),
+        to=np.array(to, dtype=np.int64),
+        own=before,
+        folded=int(factor.size > 0),
+        factor=factor,
+    )
+    room = layout.taken()
+    room.tangent[:] = tangent
+    room.integrals[:] = 0.0
+    room.progress[:] = plan.first[:-1]
+    values, met = tuple(records.values()), np.array([np.inf])
+    arrays = arrays_of(instance, values, started, places, states, met, room.block)
     pieces = addresses(graph.pieces, layout.pieces)
-    integrals = np.zeros((program.integrals, 3))
-    room = block, aligned(STRIDE), aligned(EIGHTH), integrals, plan.first[:-1].copy()
-    march_observed(pieces, arrays, (values[0].size, h), tangent.copy(), program, plan, sink, room)
-    layout.give_back(block)
+    tables = table_of(program), table_of(plan), table_of(sink), table_of(room)
+    march_observed(pieces, arrays, (values[0].size, h), tables)
+    layout.give_back(room)
     check_domain(instance, states, float(met[0]), observed.driven_by)

@@ -179,13 +179,14 @@ class ObservedRecord:
             for (_, at), even in zip(places, regular, strict=True)
         ]
         return Plan(
+            count=len(regular),
             first=self._first,
             cell=_joined(cells),
             fraction=_joined(fractions),
             measured=measured,
             weight=weight,
-            even=np.array([bool((each == 1.0).all()) for each in weights]),
-            regular=np.array(regular),
+            even=np.array([(each == 1.0).all() for each in weights], dtype=np.int64),
+            regular=np.array(regular, dtype=np.int64),
             offset_column=np.zeros(0, dtype=np.int64),
         )
 
