@@ -19,6 +19,7 @@ from swashplate.equations.marching.rows import (
     Sink,
     aligned,
     march_observed,
+    routines,
     upright,
 )
 from swashplate.equations.marching.run import Instance, Start, arrays_of, begun, check_domain
@@ -229,7 +230,7 @@ def _march(
     values, met = tuple(records.values()), np.array([np.inf])
     arrays = arrays_of(instance, values, started, places, states, met, room.block)
     pieces = addresses(graph.pieces, layout.pieces)
-    tables = table_of(program), table_of(plan), table_of(sink), table_of(room)
+    tables = table_of(program), table_of(plan), table_of(sink), table_of(room), routines()[1]
     march_observed(pieces, arrays, (values[0].size, h), tables)
     layout.give_back(room)
     check_domain(instance, states, float(met[0]), observed.driven_by)

@@ -52,14 +52,40 @@ Planned = Callable[[], Piece]
 
 def piece(function: Callable[..., None]) -> Piece:
     """Compile a function with the arguments of `PIECE`: strict arithmetic, cached on disk."""
+    return _by_address(function, _TYPES)
+
+
+def routine(function: Callable[..., None]) -> Piece:
+    """Compile a function of whole numbers and arrays, by its annotations, as a piece.
+
+    Kernels `run` it by its address. Called by name, it would be compiled on its own, and again with
+    each that calls it.
+    """
+    hints = {k: v for k, v in function.__annotations__.items() if k != "return"}
+    return _by_address(function, tuple(_type_of(hint) for hint in hints.values()))
+
+
+def _by_address(function: Callable[..., None], arguments: tuple[Any, ...]) -> Piece:
     known[plain(function)] = None
     if JIT_OFF:
         return function
     options = {"nopython": True, "nogil": True, "error_model": "numpy"}
-    made = CFunc(function, (_TYPES, types.void), {}, options)
+    made = CFunc(function, (arguments, types.void), {}, options)
     on_disk(made, function)
     made.compile()
     return made
+
+
+def _type_of(hint: Any) -> Any:
+    """Type in compiled code of what has an annotation: of a whole number, or an array of numbers.
+
+    An array itself, of five numbers and two pointers, takes a compiler a multiple of the time: some
+    40 of them two seconds.
+    """
+    if hint is int:
+        return types.int64
+    _, dtype = get_args(hint)
+    return _pointer(from_dtype(np.dtype(*get_args(dtype))))
 
 
 def addresses(pieces: Sequence[Planned], needed: Container[int]) -> Any:
@@ -78,14 +104,20 @@ def pointers(records: tuple[NDArray[np.float64], ...]) -> Any:
 
 
 def table_of(fields: Any) -> Any:
-    """What `fields_of` reads: a named tuple's whole numbers, and addresses of its arrays.
+    """What `fields_of` reads of a named tuple: its whole numbers, addresses of arrays and routines.
 
-    The arrays must be kept, and be C-contiguous.
+    The arrays, which must be C-contiguous, and the routines must be kept as well.
     """
     if JIT_OFF:
         return fields
-    numbers = [each if isinstance(each, int) else each.ctypes.data for each in fields]
-    return np.array(numbers, dtype=np.int64)
+    return np.array([_number(each) for each in fields], dtype=np.int64)
+
+
+def _number(field: Any) -> int:
+    if isinstance(field, int):
+        return field
+    address: int = field.address if isinstance(field, CFunc) else field.ctypes.data
+    return address
 
 
 if JIT_OFF:
@@ -97,6 +129,10 @@ if JIT_OFF:
     def fields_of(table: Any, kind: Any) -> Any:
         """The named tuple that `table_of` was given."""
         return table
+
+    def run(routine: Piece, arguments: tuple[Any, ...]) -> None:
+        """Run a routine."""
+        routine(*arguments)
 
     def call(piece: Piece, count: int, first: int, h: float, arrays: tuple[Any, ...]) -> None:
         """Call a piece."""
@@ -110,23 +146,22 @@ if JIT_OFF:
 
 else:
 
-    def _call(
-        context: Any, builder: Any, address: Any, numbers: list[Any], arrays: Any, kinds: Any
-    ) -> None:
-        """Emit the call of a piece: first arguments, then data of arrays, or pointers."""
-        wanted = [context.get_value_type(each) for each in _TYPES]
-        taken = [*numbers]
-        for each, kind in zip(arrays, kinds, strict=True):
-            data = each
-            if not isinstance(kind, types.CPointer):
-                data = context.make_array(kind)(context, builder, each).data
-            taken.append(builder.bitcast(data, wanted[len(taken)]))
-        function = ir.FunctionType(ir.VoidType(), wanted).as_pointer()
-        builder.call(builder.inttoptr(address, function), taken)
+    def _unpacked(context: Any, builder: Any, values: Any, kind: Any) -> list[Any]:
+        """Numbers, pointers, and the data of arrays that a tuple holds."""
+        unpacked = []
+        for k, each in enumerate(kind.types):
+            value = builder.extract_value(values, k)
+            if isinstance(each, types.Array):
+                value = context.make_array(each)(context, builder, value).data
+            unpacked.append(value)
+        return unpacked
 
-    def _unpacked(builder: Any, arrays: Any, kind: Any) -> list[Any]:
-        """Items of a tuple."""
-        return [builder.extract_value(arrays, k) for k in range(len(kind.types))]
+    def _call(context: Any, builder: Any, address: Any, arguments: list[Any]) -> None:
+        """Call the piece at an address."""
+        wanted = [context.get_value_type(each) for each in _TYPES]
+        function = ir.FunctionType(ir.VoidType(), wanted).as_pointer()
+        taken = [builder.bitcast(a, kind) for a, kind in zip(arguments, wanted, strict=True)]
+        builder.call(builder.inttoptr(address, function), taken)
 
     @intrinsic
     def behind(typingctx: Any, array: Any, start: Any) -> Any:
@@ -142,26 +177,17 @@ else:
         kind = array if isinstance(array, types.CPointer) else _pointer(array.dtype)
         return taken(kind, array, start), codegen
 
-    def _field_type(hint: Any) -> Any:
-        """Type of a field in compiled code, from its annotation: ``int``, or an array of numbers."""
-        if hint is int:
-            return types.int64
-        _, dtype = get_args(hint)
-        return _pointer(from_dtype(np.dtype(*get_args(dtype))))
-
     @intrinsic
     def fields_of(typingctx: Any, table: Any, kind: Any) -> Any:
-        """The named tuple that `table_of` was given, with pointers for arrays.
-
-        Arrays themselves, of five numbers and two pointers each, take a compiler a multiple of the
-        time: of 40 of them some seconds.
-        """
+        """The named tuple that `table_of` was given, with pointers in place of arrays."""
         fields = kind.instance_class
-        members = [_field_type(hint) for hint in fields.__annotations__.values()]
+        members = [_type_of(hint) for hint in fields.__annotations__.values()]
         unpacked = types.NamedTuple(members, fields)
 
         def codegen(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-            data = context.make_array(table)(context, builder, arguments[0]).data
+            data = arguments[0]
+            if not isinstance(table, types.CPointer):
+                data = context.make_array(table)(context, builder, data).data
             values = []
             for k, member in enumerate(members):
                 value = builder.load(builder.gep(data, [context.get_constant(types.intp, k)]))
@@ -174,12 +200,25 @@ else:
         return taken(unpacked, table, kind), codegen
 
     @intrinsic
+    def run(typingctx: Any, address: Any, arguments: Any) -> Any:
+        """Run the routine at an address with whole numbers and pointers, or data of arrays."""
+
+        def codegen(context: Any, builder: Any, signature: Any, values: Any) -> Any:
+            data = _unpacked(context, builder, values[1], arguments)
+            function = ir.FunctionType(ir.VoidType(), [each.type for each in data])
+            builder.call(builder.inttoptr(values[0], function.as_pointer()), data)
+            return context.get_dummy_value()
+
+        taken: Any = signature
+        return taken(types.void, address, arguments), codegen
+
+    @intrinsic
     def call(typingctx: Any, address: Any, count: Any, first: Any, h: Any, arrays: Any) -> Any:
         """Call the piece at an address with the data of a tuple of arrays."""
 
         def codegen(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-            data = _unpacked(builder, arguments[4], arrays)
-            _call(context, builder, arguments[0], arguments[1:4], data, arrays.types)
+            data = _unpacked(context, builder, arguments[4], arrays)
+            _call(context, builder, arguments[0], [*arguments[1:4], *data])
             return context.get_dummy_value()
 
         taken: Any = signature
@@ -192,13 +231,11 @@ else:
         """Call a recurrence, which takes lanes, how many they are, and tangents."""
 
         def codegen(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-            data = _unpacked(builder, arguments[5], arrays)
-            kinds = [*arrays.types]
-            for position, argument in ((2, 2), (4, 4)):
-                data[position] = arguments[argument]
-                kinds[position] = signature.args[argument]
-            numbers = [arguments[1], arguments[3], context.get_constant(types.float64, 0.0)]
-            _call(context, builder, arguments[0], numbers, data, kinds)
+            address, count, lanes, size, tangent, values = arguments
+            data = _unpacked(context, builder, values, arrays)
+            data[2], data[4] = lanes, tangent
+            h = context.get_constant(types.float64, 0.0)  # None of them has a step.
+            _call(context, builder, address, [count, size, h, *data])
             return context.get_dummy_value()
 
         taken: Any = signature

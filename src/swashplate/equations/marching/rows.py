@@ -14,9 +14,17 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from swashplate.equations.cache import kernel, pasted, subroutine
-from swashplate.equations.declaration import inlined
-from swashplate.equations.marching.pieces import behind, call, call_recurrence, fields_of
+from swashplate.equations.cache import kernel, pasted
+from swashplate.equations.functions import generating
+from swashplate.equations.marching.pieces import (
+    behind,
+    call,
+    call_recurrence,
+    fields_of,
+    routine,
+    run,
+    table_of,
+)
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
@@ -124,7 +132,7 @@ def aligned(*shape: int) -> Array:
     return room
 
 
-@inlined
+@pasted
 def dot(a: Array, b: Array, room: Array) -> float:
     """Scalar product of two columns of ROWS numbers, folded in eighths.
 
@@ -150,32 +158,38 @@ def dot(a: Array, b: Array, room: Array) -> float:
     return total
 
 
-@subroutine
-def absorb(rows: Array, columns: int, factor: Array, room: Array) -> None:
-    """Rotate a block of rows into the triangular factor of all rows before it.
+def absorb(sink: Indices, room: Indices) -> None:
+    """Rotate the rows of a sink into the triangular factor of all rows before it.
 
-    (columns, ROWS) `rows` column by column, zeros where it lacks some, are used up; the (columns,
-    columns) upper triangle `factor`, zeros before the first block, is replaced; `room` has EIGHTH
-    places.
+    They are used up, and are to be zeros where there are fewer than ROWS.
     """
+    rows, columns, factor = (
+        fields_of(sink, Sink).rows,
+        fields_of(sink, Sink).columns,
+        fields_of(sink, Sink).factor,
+    )
+    products = fields_of(room, Room).products
+    lead, scale = 0.0, 0.0
     for j in range(columns):
         pivot, line = behind(rows, j * ROWS), behind(factor, j * columns)
-        square = dot(pivot, pivot, room)
-        if square < NOTHING:
-            continue  # nothing to rotate, as with a parameter that the block does not depend on
-        corner = line[j]
-        norm = sqrt(corner * corner + square)
-        diagonal = -norm if corner > 0.0 else norm
-        lead = corner - diagonal
-        # the reflection 1 - v vᵀ · scale with v = [lead, pivot]: no difference of like numbers
-        scale = 1.0 / (norm * (norm + abs(corner)))
-        line[j] = diagonal
-        for k in range(j + 1, columns):
+        for k in range(j, columns):
             column = behind(rows, k * ROWS)
-            along = scale * (lead * line[k] + dot(pivot, column, room))
-            line[k] -= along * lead
-            for i in range(ROWS):
-                column[i] -= along * pivot[i]
+            product = dot(pivot, column, products)
+            if k > j:
+                along = scale * (lead * line[k] + product)
+                line[k] -= along * lead
+                for i in range(ROWS):
+                    column[i] -= along * pivot[i]
+                continue
+            if product < NOTHING:
+                break  # nothing to rotate, as with a parameter that the block does not depend on
+            corner = line[j]
+            norm = sqrt(corner * corner + product)
+            diagonal = -norm if corner > 0.0 else norm
+            lead = corner - diagonal
+            # the reflection 1 - v vᵀ · scale with v = [lead, pivot]: no difference of like numbers
+            scale = 1.0 / (norm * (norm + abs(corner)))
+            line[j] = diagonal
 
 
 def upright(factor: Array) -> Array:
@@ -187,9 +201,9 @@ def upright(factor: Array) -> Array:
 # --- rows -----------------------------------------------------------------------------------------
 
 
-@subroutine
-def combine(flat: Array, program: Program, t: int, shift: int, count: int, row: Array) -> None:
-    """Sum the products of a sum's terms, from places `shift` behind their rows' first."""
+def combine(table: Indices, flat: Array, t: int, shift: int, count: int, row: Array) -> None:
+    """Sum the products of the terms of a program's sum t, from `shift` behind their rows' first."""
+    program = fields_of(table, Program)
     first, end = program.first[t], program.first[t + 1]
     if first == end:
         for m in range(count):
@@ -229,38 +243,44 @@ def integrate(row: Array, count: int, step: float, state: Array) -> None:
     state[0], state[1] = total, last
 
 
-@subroutine
 def place(
-    flat: Array,
-    program: Program,
-    plan: Plan,
+    programs: Indices,
+    plans: Indices,
+    sinks: Indices,
+    rooms: Indices,
+    routines: Indices,
     r: int,
-    block: tuple[int, int],
-    stamps: tuple[int, int, int],
-    sink: Sink,
-    aside: Array,
+    first: int,
+    size: int,
+    at: int,
+    count: int,
+    to: int,
 ) -> None:
     """Weighted rows of the problem at some stamps of an observation.
 
-    `block` is its first sample and how many it has, `stamps` the first one, how many they are, and
-    from where on they go into the sink; `aside` is room for a row.
+    `first` and `size` are the block's first sample and how many it has, `at` and `count` the first
+    stamp and how many they are; they go into the sink from `to` on.
     """
-    (first, size), (at, count, to) = block, stamps
+    program = fields_of(programs, Program)
+    plan = fields_of(plans, Plan)
+    sink = fields_of(sinks, Sink)
+    flat, aside = fields_of(rooms, Room).block, fields_of(rooms, Room).aside
+    combined = fields_of(routines, Routines).combine
     cell = behind(plan.cell, at)
     fraction = behind(plan.fraction, at)
     weight = behind(plan.weight, at)
     measured = behind(plan.measured, at)
     begin = cell[0]
-    width = min(cell[count - 1] + 2, first + size) - begin
+    width = (cell[count - 1] + 2 if cell[count - 1] + 2 < first + size else first + size) - begin
     for c in range(sink.derived):
         column = behind(sink.rows, sink.to[c] * sink.length + to)
         t = program.seen + r * sink.derived + c
         if plan.regular[r]:
-            combine(flat, program, t, begin - first, count, column)
+            run(combined, (programs, flat, t, begin - first, count, column))
             for i in range(0 if not plan.even[r] else count, count):
                 column[i] *= weight[i]
         else:
-            combine(flat, program, t, begin - first, width, aside)
+            run(combined, (programs, flat, t, begin - first, width, aside))
             aside[width] = aside[width - 1]
             for i in range(count):
                 n, f = cell[i] - begin, fraction[i]
@@ -276,24 +296,41 @@ def place(
         column[i] = weight[i] * ((1.0 - f) * signal[n] + f * signal[n + 1] - measured[i])
 
 
+class Routines(NamedTuple):
+    """What is compiled alone (see `pieces.routine`), and run by its address."""
+
+    combine: int
+    place: int
+    absorb: int
+
+
+@generating
+def routines() -> tuple[Routines, Any]:
+    """All of them, and their table."""
+    compiled = Routines(combine=routine(combine), place=routine(place), absorb=routine(absorb))
+    return compiled, table_of(compiled)
+
+
 @kernel
 def march_observed(
     pieces: Any,
     arrays: tuple[Any, ...],
     grid: tuple[int, float],
-    tables: tuple[Any, Any, Any, Any],
+    tables: tuple[Any, Any, Any, Any, Any],
 ) -> None:
     """March block by block, and compare what comes with what was observed.
 
     `pieces` are addresses, of the march first, and `arrays` what they take from ``records`` on (see
     `pieces.PIECE`). `grid` says how many samples the record has, and the step. `tables` are those
-    of a `Program`, a `Plan`, a `Sink` and a `Room`.
+    of a `Program`, a `Plan`, a `Sink`, a `Room` and of the `Routines`.
     """
     size, h = grid
-    program = fields_of(tables[0], Program)
-    plan = fields_of(tables[1], Plan)
-    sink = fields_of(tables[2], Sink)
-    room = fields_of(tables[3], Room)
+    programs, plans, sinks, rooms, routines = tables
+    program = fields_of(programs, Program)
+    plan = fields_of(plans, Plan)
+    sink = fields_of(sinks, Sink)
+    room = fields_of(rooms, Room)
+    library = fields_of(routines, Routines)
     flat = room.block
     used = 0  # Rows that wait in the sink to be rotated.
     look_back = False
@@ -304,7 +341,7 @@ def march_observed(
             # what interpolation looks back at, from the end of the block before
             for k in range(STRIDE, room.size, STRIDE):
                 flat[k - 1] = flat[k + BLOCK - 1]
-        count = min(BLOCK, size - first)
+        count = BLOCK if BLOCK < size - first else size - first
         for step in range(program.steps):
             todo = behind(program.todo, 4 * step)
             what, a, b = todo[0], todo[1], todo[2]
@@ -312,7 +349,8 @@ def march_observed(
                 call(pieces[a], count, first, h, arrays)
             elif what == COMBINE:
                 for t in range(a, b):
-                    combine(flat, program, t, 0, count, behind(flat, program.target[t]))
+                    row = behind(flat, program.target[t])
+                    run(library.combine, (programs, flat, t, 0, count, row))
             elif what == INTEGRATE:
                 integrate(behind(flat, a), count, h, behind(room.integrals, 3 * b))
             else:
@@ -332,21 +370,21 @@ def march_observed(
                 if sink.folded and plan.weight[at] == 0.0:
                     at += 1
                     continue
-                many = min(end - at, sink.length - used)
+                many = end - at if end - at < sink.length - used else sink.length - used
                 for i in range(1, many if sink.folded else 0):
                     if plan.weight[at + i] == 0.0:
                         many = i
                         break
                 to = used if sink.folded else at
-                place(flat, program, plan, r, (first, count), (at, many, to), sink, room.aside)
+                run(library.place, (*tables, r, first, count, at, many, to))
                 at += many
                 used += many if sink.folded else 0
                 if sink.folded and used == sink.length:
-                    absorb(sink.rows, sink.columns, sink.factor, room.products)
+                    run(library.absorb, (sinks, rooms))
                     used = 0
     if used > 0:
         for c in range(sink.columns):
             column = behind(sink.rows, c * sink.length)
             for i in range(used, sink.length):
                 column[i] = 0.0
-        absorb(sink.rows, sink.columns, sink.factor, room.products)
+        run(library.absorb, (sinks, rooms))
