@@ -19,7 +19,7 @@ from numba.extending import intrinsic
 from numba.np.numpy_support import from_dtype
 from numpy.typing import NDArray
 
-from swashplate.equations.cache import kernel, on_disk
+from swashplate.equations.cache import borrowing_kernel, on_disk
 from swashplate.equations.declaration import JIT_OFF, known
 from swashplate.equations.language import plain
 
@@ -242,7 +242,7 @@ else:
         return taken(types.void, address, count, lanes, size, tangent, arrays), codegen
 
 
-@kernel
+@borrowing_kernel
 def run_once(pieces: Any, arrays: tuple[Any, ...], count: int, h: float) -> None:
     """Call one piece over all samples."""
     call(pieces[0], count, 0, h, arrays)

@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from swashplate.equations.cache import kernel, pasted
+from swashplate.equations.cache import borrowing_kernel, pasted
 from swashplate.equations.functions import generating
 from swashplate.equations.marching.pieces import (
     behind,
@@ -311,7 +311,7 @@ def routines() -> tuple[Routines, Any]:
     return compiled, table_of(compiled)
 
 
-@kernel
+@borrowing_kernel
 def march_observed(
     pieces: Any,
     arrays: tuple[Any, ...],
@@ -325,12 +325,13 @@ def march_observed(
     of a `Program`, a `Plan`, a `Sink`, a `Room` and of the `Routines`.
     """
     size, h = grid
-    programs, plans, sinks, rooms, routines = tables
-    program = fields_of(programs, Program)
-    plan = fields_of(plans, Plan)
-    sink = fields_of(sinks, Sink)
-    room = fields_of(rooms, Room)
-    library = fields_of(routines, Routines)
+    program = fields_of(tables[0], Program)
+    plan = fields_of(tables[1], Plan)
+    sink = fields_of(tables[2], Sink)
+    room = fields_of(tables[3], Room)
+    library = fields_of(tables[4], Routines)
+    programs, plans = behind(tables[0], 0), behind(tables[1], 0)
+    sinks, rooms, routines = behind(tables[2], 0), behind(tables[3], 0), behind(tables[4], 0)
     flat = room.block
     used = 0  # Rows that wait in the sink to be rotated.
     look_back = False
@@ -376,7 +377,7 @@ def march_observed(
                         many = i
                         break
                 to = used if sink.folded else at
-                run(library.place, (*tables, r, first, count, at, many, to))
+                run(library.place, (programs, plans, sinks, rooms, routines, r, first, count, at, many, to))
                 at += many
                 used += many if sink.folded else 0
                 if sink.folded and used == sink.length:
