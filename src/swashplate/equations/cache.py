@@ -203,6 +203,13 @@ def borrowing_kernel(function: Callable[P, R]) -> Callable[P, R]:
     return _kept(function, no_cfunc_wrapper=True, _nrt=False)
 
 
+def subroutine(function: Callable[P, R]) -> Callable[P, R]:
+    """Compile a function that kernels alone call, and take in: no arguments from Python."""
+    known[plain(function)] = None
+    options = {"no_cfunc_wrapper": True, "no_cpython_wrapper": True, "_nrt": False}
+    return njit(nogil=True, error_model="numpy", forceinline=True, **options)(function)
+
+
 def pasted(function: Callable[P, R]) -> Callable[P, R]:
     """Compile a function that has one caller into this: compiled once, and not twice."""
     known[plain(function)] = None

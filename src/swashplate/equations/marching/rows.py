@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from swashplate.equations.cache import borrowing_kernel, pasted
+from swashplate.equations.cache import borrowing_kernel, pasted, subroutine
 from swashplate.equations.functions import generating
 from swashplate.equations.marching.pieces import (
     behind,
@@ -132,7 +132,7 @@ def aligned(*shape: int) -> Array:
     return room
 
 
-@pasted
+@subroutine
 def dot(a: Array, b: Array, room: Array) -> float:
     """Scalar product of two columns of ROWS numbers, folded in eighths.
 
@@ -169,27 +169,24 @@ def absorb(sink: Indices, room: Indices) -> None:
         fields_of(sink, Sink).factor,
     )
     products = fields_of(room, Room).products
-    lead, scale = 0.0, 0.0
     for j in range(columns):
         pivot, line = behind(rows, j * ROWS), behind(factor, j * columns)
-        for k in range(j, columns):
+        square = dot(pivot, pivot, products)
+        if square < NOTHING:
+            continue  # nothing to rotate, as with a parameter that the block does not depend on
+        corner = line[j]
+        norm = sqrt(corner * corner + square)
+        diagonal = -norm if corner > 0.0 else norm
+        lead = corner - diagonal
+        # the reflection 1 - v vᵀ · scale with v = [lead, pivot]: no difference of like numbers
+        scale = 1.0 / (norm * (norm + abs(corner)))
+        line[j] = diagonal
+        for k in range(j + 1, columns):
             column = behind(rows, k * ROWS)
-            product = dot(pivot, column, products)
-            if k > j:
-                along = scale * (lead * line[k] + product)
-                line[k] -= along * lead
-                for i in range(ROWS):
-                    column[i] -= along * pivot[i]
-                continue
-            if product < NOTHING:
-                break  # nothing to rotate, as with a parameter that the block does not depend on
-            corner = line[j]
-            norm = sqrt(corner * corner + product)
-            diagonal = -norm if corner > 0.0 else norm
-            lead = corner - diagonal
-            # the reflection 1 - v vᵀ · scale with v = [lead, pivot]: no difference of like numbers
-            scale = 1.0 / (norm * (norm + abs(corner)))
-            line[j] = diagonal
+            along = scale * (lead * line[k] + dot(pivot, column, products))
+            line[k] -= along * lead
+            for i in range(ROWS):
+                column[i] -= along * pivot[i]
 
 
 def upright(factor: Array) -> Array:
