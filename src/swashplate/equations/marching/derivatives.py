@@ -12,14 +12,14 @@ from swashplate.equations.functions import generating
 from swashplate.equations.marching.graph import Graph, Moved, graph_of
 from swashplate.equations.marching.layout import Layout, layout_of, started_by
 from swashplate.equations.marching.observation import ObservedRecord, Own
-from swashplate.equations.marching.pieces import addresses, table_of
+from swashplate.equations.marching.pieces import Struct, addresses
 from swashplate.equations.marching.rows import (
     ROWS,
     Program,
     Sink,
     aligned,
     march_observed,
-    routines,
+    march_of,
     upright,
 )
 from swashplate.equations.marching.run import Instance, Start, arrays_of, begun, check_domain
@@ -47,7 +47,7 @@ def _begun(
     h: float,
     start: Start,
     own: Collection[str],
-) -> tuple[Program, Array]:
+) -> tuple[Struct[Program], Array]:
     """The layout's program with its numbers, and derivatives of the states at the first sample.
 
     `own` are paths of states that the run starts from as its own unknowns: nothing else moves them.
@@ -65,13 +65,13 @@ def _begun(
     for at, slot in layout.slots:
         is_tap = slot[0].kind == "fraction"
         scale[at] *= places.slope[int(slot[0].path)] if is_tap else slopes[slot]
-    return layout.program._replace(scale=scale), tangent
+    return Struct(layout.program._replace(scale=scale)), tangent
 
 
 @generating
 def _at_rest(
     layout: Layout, instance: Instance, h: float, own: tuple[str, ...]
-) -> tuple[Program, Array]:
+) -> tuple[Struct[Program], Array]:
     """Those of a start at rest, which depends on no record."""
     return _begun(layout, instance, {}, h, "rest", own)
 
@@ -203,7 +203,7 @@ def _march(
     if missing:
         raise InputError(f"{missing[0]} is a column, so Own needs a value of it.")
     graph = graph_of(instance.model, signals, instance.options, seen)
-    plan = observed.plan(own.offsets, before)
+    plan, offsets = observed.plan, observed.offsets(own.offsets)
     numbers = tuple(seen.index(each.signal) for each in observed.observations)
     layout = layout_of(graph, tuple(columns), numbers, start)
     first = {name: float(values[0]) for name, values in records.items()}
@@ -213,7 +213,7 @@ def _march(
         program, tangent = _at_rest(layout, instance, h, tuple(own.start))
     else:
         program, tangent = _begun(layout, instance, first, h, start, own.start)
-    sink = Sink(
+    fields = Sink(
         columns=len(rows),
         length=rows.shape[1],
         rows=rows,
@@ -222,15 +222,17 @@ def _march(
         own=before,
         folded=int(factor.size > 0),
         factor=factor,
+        offset=offsets,
+        offset_row=observed.offset_rows(before),
     )
-    room = layout.taken()
-    room.tangent[:] = tangent
-    room.integrals[:] = 0.0
-    room.progress[:] = plan.first[:-1]
+    sink, room = Struct(fields), layout.taken()
+    room.fields.tangent[:] = tangent
+    room.fields.integrals[:] = 0.0
+    room.fields.progress[:] = plan.fields.first[:-1]
     values, met = tuple(records.values()), np.array([np.inf])
-    arrays = arrays_of(instance, values, started, places, states, met, room.block)
+    arrays = arrays_of(instance, values, started, places, states, met, room.fields.block)
     pieces = addresses(graph.pieces, layout.pieces)
-    tables = table_of(program), table_of(plan), table_of(sink), table_of(room), routines()[1]
-    march_observed(pieces, arrays, (values[0].size, h), tables)
+    structs = march_of(program, plan, sink, room)
+    march_observed(pieces, arrays, values[0].size, h, structs.address)
     layout.give_back(room)
     check_domain(instance, states, float(met[0]), observed.driven_by)

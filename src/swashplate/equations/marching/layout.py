@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from swashplate.equations.functions import generating
 from swashplate.equations.marching.graph import Graph, Group, Moved, PartGraph, Term, abreast
 from swashplate.equations.marching.part import Stored
+from swashplate.equations.marching.pieces import Struct
 from swashplate.equations.marching.rows import (
     CALL,
     COMBINE,
@@ -45,7 +46,7 @@ class Layout:
         self._size, self.tangents = graph.size, 1
         self._constant: dict[float, int] = {}  # Rows that hold just one value.
         self._observations = len(observed)
-        self._spare: deque[Room] = deque(maxlen=8)
+        self._spare: deque[Struct[Room]] = deque(maxlen=8)
         self.places: dict[Moved, int] = {}
         self._by: dict[Stored, dict[int, Term]] = {}
         """Derivatives of what is known, by the number of each column that moves it."""
@@ -83,14 +84,14 @@ class Layout:
         self.pieces = {piece for what, piece, *_ in todo if what in (CALL, RECUR)}
         self.slots = [(k, term.slot) for k, term in enumerate(terms) if term.slot is not None]
 
-    def taken(self) -> Room:
+    def taken(self) -> Struct[Room]:
         """Memory for a march, of an earlier one if it can be: new memory takes longer to get."""
         with suppress(IndexError):  # another thread may be faster
             return self._spare.pop()
         block = aligned_room(self._size)
         for value, row in self._constant.items():
             block[row : row + STRIDE] = value
-        return Room(
+        room = Room(
             size=self._size,
             block=block,
             tangent=np.zeros(self.tangents),
@@ -99,8 +100,9 @@ class Layout:
             integrals=np.zeros((self.program.integrals, 3)),
             progress=np.zeros(self._observations, dtype=np.int64),
         )
+        return Struct(room)
 
-    def give_back(self, room: Room) -> None:
+    def give_back(self, room: Struct[Room]) -> None:
         """Keep the memory of a march that has ended."""
         self._spare.append(room)
 

@@ -8,7 +8,8 @@ compiled once, kept on disk, as is each piece for all models that share it.
 """
 
 from collections.abc import Callable, Container, Sequence
-from typing import Any, get_args
+from functools import cached_property
+from typing import Any, Generic, TypeVar, get_args
 
 import numpy as np
 from llvmlite import ir
@@ -43,6 +44,8 @@ _TYPES = (
     _pointer(types.int64),
     *(_FLOATS,) * 6,
 )
+
+Fields = TypeVar("Fields", bound=tuple[Any, ...])
 
 Piece = Any
 """What `piece` returns."""
@@ -103,21 +106,35 @@ def pointers(records: tuple[NDArray[np.float64], ...]) -> Any:
     return np.array([each.ctypes.data for each in records], dtype=np.int64)
 
 
-def table_of(fields: Any) -> Any:
-    """What `fields_of` reads of a named tuple: its whole numbers, addresses of arrays and routines.
+class Struct(Generic[Fields]):
+    """A named tuple as kernels read it: its whole numbers, and addresses of what else it holds.
 
-    The arrays, which must be C-contiguous, and the routines must be kept as well.
+    That is arrays, routines and structs. Whoever holds the struct holds them, and a copy of it, in
+    another process too, has addresses of its own.
     """
-    if JIT_OFF:
-        return fields
-    return np.array([_number(each) for each in fields], dtype=np.int64)
+
+    def __init__(self, fields: Fields) -> None:
+        self.fields = fields
+        self._words = None if JIT_OFF else np.array([*map(_word, fields)], dtype=np.int64)
+
+    @cached_property
+    def address(self) -> Any:
+        """What `fields_of` is given."""
+        return self if self._words is None else self._words.ctypes.data
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return Struct, (self.fields,)
 
 
-def _number(field: Any) -> int:
+def _word(field: Any) -> int:
     if isinstance(field, int):
         return field
-    address: int = field.address if isinstance(field, CFunc) else field.ctypes.data
-    return address
+    if not isinstance(field, np.ndarray):
+        return int(field.address)
+    found = field.__array_interface__
+    if found["strides"] is not None:
+        raise ValueError("An array of a struct must be C-contiguous.")
+    return int(found["data"][0])
 
 
 if JIT_OFF:
@@ -126,9 +143,9 @@ if JIT_OFF:
         """Numbers of an array from a place on, as one row."""
         return array.reshape(-1)[start:]
 
-    def fields_of(table: Any, kind: Any) -> Any:
-        """The named tuple that `table_of` was given."""
-        return table
+    def fields_of(struct: Any, kind: Any) -> Any:
+        """Fields of a struct."""
+        return struct.fields
 
     def run(routine: Piece, arguments: tuple[Any, ...]) -> None:
         """Run a routine."""
@@ -178,30 +195,28 @@ else:
         return taken(kind, array, start), codegen
 
     @intrinsic
-    def fields_of(typingctx: Any, table: Any, kind: Any) -> Any:
-        """The named tuple that `table_of` was given, with pointers in place of arrays."""
-        fields = kind.instance_class
-        members = [_type_of(hint) for hint in fields.__annotations__.values()]
-        unpacked = types.NamedTuple(members, fields)
+    def fields_of(typingctx: Any, address: Any, kind: Any) -> Any:
+        """Fields of the struct at an address: its named tuple with pointers in place of arrays."""
+        hints = kind.instance_class.__annotations__
+        members = [_type_of(hint) for hint in hints.values()]
+        fields = types.NamedTuple(members, kind.instance_class)
 
         def codegen(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-            data = arguments[0]
-            if not isinstance(table, types.CPointer):
-                data = context.make_array(table)(context, builder, data).data
+            struct = builder.inttoptr(arguments[0], ir.IntType(64).as_pointer())
             values = []
             for k, member in enumerate(members):
-                value = builder.load(builder.gep(data, [context.get_constant(types.intp, k)]))
+                value = builder.load(builder.gep(struct, [context.get_constant(types.intp, k)]))
                 if isinstance(member, types.CPointer):
                     value = builder.inttoptr(value, context.get_value_type(member))
                 values.append(value)
-            return context.make_tuple(builder, unpacked, values)
+            return context.make_tuple(builder, fields, values)
 
         taken: Any = signature
-        return taken(unpacked, table, kind), codegen
+        return taken(fields, address, kind), codegen
 
     @intrinsic
     def run(typingctx: Any, address: Any, arguments: Any) -> Any:
-        """Run the routine at an address with whole numbers and pointers, or data of arrays."""
+        """Run the routine at an address with whole numbers and pointers."""
 
         def codegen(context: Any, builder: Any, signature: Any, values: Any) -> Any:
             data = _unpacked(context, builder, values[1], arguments)

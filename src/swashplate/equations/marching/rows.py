@@ -17,13 +17,13 @@ from numpy.typing import NDArray
 from swashplate.equations.cache import borrowing_kernel, pasted, subroutine
 from swashplate.equations.functions import generating
 from swashplate.equations.marching.pieces import (
+    Struct,
     behind,
     call,
     call_recurrence,
     fields_of,
     routine,
     run,
-    table_of,
 )
 
 Array = NDArray[np.float64]
@@ -36,8 +36,8 @@ STRIDE = BLOCK + 16
 room before and behind a row for the samples next to the block."""
 
 
-# Kernels read these named tuples from tables of addresses (see `pieces.fields_of`), so that a field
-# is a whole number, or an array whose shape others say.
+# Kernels read these named tuples as structs (see `pieces.Struct`), whose arrays do not know their
+# shapes.
 
 
 class Program(NamedTuple):
@@ -69,16 +69,15 @@ CALL, COMBINE, INTEGRATE, RECUR = range(4)
 class Plan(NamedTuple):
     """Where all observations look, one after the other; m samples in all, r observations."""
 
-    count: int  # Observations: r.
+    observations: int  # How many: r.
     first: Indices  # (r + 1,) first sample of each, and m.
     cell: Indices
     """(m,) point of the grid at or before the stamp, never falling within an observation."""
     fraction: Array  # (m,) how far behind it the stamp lies, in steps, 0 to 1.
-    measured: Array  # (m,) measured values, less the offset that is assumed in them.
+    measured: Array  # (m,) measured values.
     weight: Array  # (m,)
     even: Indices  # (r,) whether all weights of an observation are 1.
     regular: Indices  # (r,) whether its stamps are successive points of the grid.
-    offset_column: Indices  # (r,) column of the derivative by the offset, -1 if not wanted.
 
 
 class Sink(NamedTuple):
@@ -92,6 +91,8 @@ class Sink(NamedTuple):
     own: int  # First row of those by the observations' own offsets; residuals come behind them.
     folded: int  # Whether a triangle is wanted.
     factor: Array  # (k + 1, k + 1) triangle, (0, 0) where all rows are wanted.
+    offset: Array  # (r,) offset that is assumed in the measured values of each observation.
+    offset_row: Indices  # (r,) row of the derivative by the offset, -1 if not wanted.
 
 
 class Room(NamedTuple):
@@ -158,16 +159,14 @@ def dot(a: Array, b: Array, room: Array) -> float:
     return total
 
 
-def absorb(sink: Indices, room: Indices) -> None:
+def absorb(sink: int, room: int) -> None:
     """Rotate the rows of a sink into the triangular factor of all rows before it.
 
     They are used up, and are to be zeros where there are fewer than ROWS.
     """
-    rows, columns, factor = (
-        fields_of(sink, Sink).rows,
-        fields_of(sink, Sink).columns,
-        fields_of(sink, Sink).factor,
-    )
+    columns = fields_of(sink, Sink).columns
+    rows = fields_of(sink, Sink).rows
+    factor = fields_of(sink, Sink).factor
     products = fields_of(room, Room).products
     for j in range(columns):
         pivot, line = behind(rows, j * ROWS), behind(factor, j * columns)
@@ -198,9 +197,9 @@ def upright(factor: Array) -> Array:
 # --- rows -----------------------------------------------------------------------------------------
 
 
-def combine(table: Indices, flat: Array, t: int, shift: int, count: int, row: Array) -> None:
+def combine(struct: int, flat: Array, t: int, shift: int, count: int, row: Array) -> None:
     """Sum the products of the terms of a program's sum t, from `shift` behind their rows' first."""
-    program = fields_of(table, Program)
+    program = fields_of(struct, Program)
     first, end = program.first[t], program.first[t + 1]
     if first == end:
         for m in range(count):
@@ -240,29 +239,18 @@ def integrate(row: Array, count: int, step: float, state: Array) -> None:
     state[0], state[1] = total, last
 
 
-def place(
-    programs: Indices,
-    plans: Indices,
-    sinks: Indices,
-    rooms: Indices,
-    routines: Indices,
-    r: int,
-    first: int,
-    size: int,
-    at: int,
-    count: int,
-    to: int,
-) -> None:
+def place(structs: int, r: int, first: int, size: int, at: int, count: int, to: int) -> None:
     """Weighted rows of the problem at some stamps of an observation.
 
     `first` and `size` are the block's first sample and how many it has, `at` and `count` the first
     stamp and how many they are; they go into the sink from `to` on.
     """
-    program = fields_of(programs, Program)
-    plan = fields_of(plans, Plan)
-    sink = fields_of(sinks, Sink)
-    flat, aside = fields_of(rooms, Room).block, fields_of(rooms, Room).aside
-    combined = fields_of(routines, Routines).combine
+    march = fields_of(structs, March)
+    program = fields_of(march.program, Program)
+    plan = fields_of(march.plan, Plan)
+    sink = fields_of(march.sink, Sink)
+    room = fields_of(march.room, Room)
+    flat, aside = room.block, room.aside
     cell = behind(plan.cell, at)
     fraction = behind(plan.fraction, at)
     weight = behind(plan.weight, at)
@@ -273,11 +261,11 @@ def place(
         column = behind(sink.rows, sink.to[c] * sink.length + to)
         t = program.seen + r * sink.derived + c
         if plan.regular[r]:
-            run(combined, (programs, flat, t, begin - first, count, column))
+            run(march.combine, (march.program, flat, t, begin - first, count, column))
             for i in range(0 if not plan.even[r] else count, count):
                 column[i] *= weight[i]
         else:
-            run(combined, (programs, flat, t, begin - first, width, aside))
+            run(march.combine, (march.program, flat, t, begin - first, width, aside))
             aside[width] = aside[width - 1]
             for i in range(count):
                 n, f = cell[i] - begin, fraction[i]
@@ -285,61 +273,65 @@ def place(
     for c in range(sink.own, sink.columns - 1):
         column = behind(sink.rows, c * sink.length + to)
         for i in range(count):
-            column[i] = weight[i] if c == plan.offset_column[r] else 0.0
-    signal = behind(flat, program.value[r] + begin - first)
+            column[i] = weight[i] if c == sink.offset_row[r] else 0.0
+    signal, offset = behind(flat, program.value[r] + begin - first), sink.offset[r]
     column = behind(sink.rows, (sink.columns - 1) * sink.length + to)
     for i in range(count):
         n, f = cell[i] - begin, fraction[i]
-        column[i] = weight[i] * ((1.0 - f) * signal[n] + f * signal[n + 1] - measured[i])
+        simulated = (1.0 - f) * signal[n] + f * signal[n + 1]
+        column[i] = weight[i] * (simulated - (measured[i] - offset))
 
 
-class Routines(NamedTuple):
-    """What is compiled alone (see `pieces.routine`), and run by its address."""
+class March(NamedTuple):
+    """Addresses of structs, and of routines, which are compiled alone (see `pieces.routine`)."""
 
+    program: int
+    plan: int
+    sink: int
+    room: int
     combine: int
     place: int
     absorb: int
 
 
 @generating
-def routines() -> tuple[Routines, Any]:
-    """All of them, and their table."""
-    compiled = Routines(combine=routine(combine), place=routine(place), absorb=routine(absorb))
-    return compiled, table_of(compiled)
+def routines() -> tuple[Any, ...]:
+    """The last fields of a `March`."""
+    return routine(combine), routine(place), routine(absorb)
+
+
+def march_of(
+    program: Struct[Program], plan: Struct[Plan], sink: Struct[Sink], room: Struct[Room]
+) -> Struct[March]:
+    """What `march_observed` is given, with routines, and structs, which must be kept as well."""
+    structs = program.address, plan.address, sink.address, room.address
+    return Struct(March(*structs, *routines()))
 
 
 @borrowing_kernel
-def march_observed(
-    pieces: Any,
-    arrays: tuple[Any, ...],
-    grid: tuple[int, float],
-    tables: tuple[Any, Any, Any, Any, Any],
-) -> None:
+def march_observed(pieces: Any, arrays: tuple[Any, ...], size: int, h: float, structs: int) -> None:
     """March block by block, and compare what comes with what was observed.
 
     `pieces` are addresses, of the march first, and `arrays` what they take from ``records`` on (see
-    `pieces.PIECE`). `grid` says how many samples the record has, and the step. `tables` are those
-    of a `Program`, a `Plan`, a `Sink`, a `Room` and of the `Routines`.
+    `pieces.PIECE`), of a record of `size` samples with step `h`; `structs` is the address of a
+    `March`.
     """
-    size, h = grid
-    program = fields_of(tables[0], Program)
-    plan = fields_of(tables[1], Plan)
-    sink = fields_of(tables[2], Sink)
-    room = fields_of(tables[3], Room)
-    library = fields_of(tables[4], Routines)
-    programs, plans = behind(tables[0], 0), behind(tables[1], 0)
-    sinks, rooms, routines = behind(tables[2], 0), behind(tables[3], 0), behind(tables[4], 0)
+    march = fields_of(structs, March)
+    program = fields_of(march.program, Program)
+    plan = fields_of(march.plan, Plan)
+    sink = fields_of(march.sink, Sink)
+    room = fields_of(march.room, Room)
     flat = room.block
     used = 0  # Rows that wait in the sink to be rotated.
     look_back = False
-    for r in range(plan.count):
+    for r in range(plan.observations):
         look_back = look_back or plan.regular[r] == 0
     for first in range(0, size, BLOCK):
         if first > 0 and look_back:
             # what interpolation looks back at, from the end of the block before
             for k in range(STRIDE, room.size, STRIDE):
                 flat[k - 1] = flat[k + BLOCK - 1]
-        count = BLOCK if BLOCK < size - first else size - first
+        count = size - first if size - first < BLOCK else BLOCK
         for step in range(program.steps):
             todo = behind(program.todo, 4 * step)
             what, a, b = todo[0], todo[1], todo[2]
@@ -348,13 +340,13 @@ def march_observed(
             elif what == COMBINE:
                 for t in range(a, b):
                     row = behind(flat, program.target[t])
-                    run(library.combine, (programs, flat, t, 0, count, row))
+                    run(march.combine, (march.program, flat, t, 0, count, row))
             elif what == INTEGRATE:
                 integrate(behind(flat, a), count, h, behind(room.integrals, 3 * b))
             else:
                 lanes = behind(program.lanes, b)
                 call_recurrence(pieces[a], count, lanes, todo[3] - b, room.tangent, arrays)
-        for r in range(plan.count):
+        for r in range(plan.observations):
             # off the grid the point behind the stamp must be known as well
             known = first + count - (first + count < size and plan.regular[r] == 0)
             row = behind(flat, program.value[r])
@@ -374,15 +366,15 @@ def march_observed(
                         many = i
                         break
                 to = used if sink.folded else at
-                run(library.place, (programs, plans, sinks, rooms, routines, r, first, count, at, many, to))
+                run(march.place, (structs, r, first, count, at, many, to))
                 at += many
                 used += many if sink.folded else 0
                 if sink.folded and used == sink.length:
-                    run(library.absorb, (sinks, rooms))
+                    run(march.absorb, (march.sink, march.room))
                     used = 0
     if used > 0:
         for c in range(sink.columns):
             column = behind(sink.rows, c * sink.length)
             for i in range(used, sink.length):
                 column[i] = 0.0
-        run(library.absorb, (sinks, rooms))
+        run(march.absorb, (march.sink, march.room))
