@@ -199,7 +199,8 @@ else:
         """Fields of the struct at an address: its named tuple with pointers in place of arrays."""
         hints = kind.instance_class.__annotations__
         members = [_type_of(hint) for hint in hints.values()]
-        fields = types.NamedTuple(members, kind.instance_class)
+        named_tuple: Any = types.NamedTuple
+        fields = named_tuple(members, kind.instance_class)
 
         def codegen(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
             struct = builder.inttoptr(arguments[0], ir.IntType(64).as_pointer())
