@@ -207,7 +207,8 @@ def subroutine(function: Callable[P, R]) -> Callable[P, R]:
     known[plain(function)] = None
     options: dict[str, Any] = {"forceinline": True, "_nrt": False}
     wrappers: dict[str, Any] = {"no_cfunc_wrapper": True, "no_cpython_wrapper": True}
-    return njit(nogil=True, error_model="numpy", **options, **wrappers)(function)
+    compiled: Any = njit(nogil=True, error_model="numpy", **options, **wrappers)(function)
+    return compiled  # type: ignore[no-any-return]
 
 
 def pasted(function: Callable[P, R]) -> Callable[P, R]:

@@ -158,7 +158,7 @@ class ObservedRecord:
     def offset_rows(self, first: int) -> Indices:
         """(r,) row of the derivative by each offset, from `first` on, -1 for those not wanted."""
         free = np.array([each.free_offset for each in self.observations])
-        return np.where(free, first + np.cumsum(free) - 1, -1)
+        return np.where(free, first + np.cumsum(free) - 1, -1).astype(np.int64)
 
     @cached_property
     def plan(self) -> Struct[Plan]:

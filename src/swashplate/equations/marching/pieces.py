@@ -8,7 +8,7 @@ compiled once, kept on disk, as is each piece for all models that share it.
 """
 
 from collections.abc import Callable, Container, Sequence
-from functools import cached_property
+from functools import cache, cached_property
 from typing import Any, Generic, TypeVar, get_args
 
 import numpy as np
@@ -17,7 +17,7 @@ from numba import types
 from numba.core.ccallback import CFunc
 from numba.core.typing.templates import signature
 from numba.extending import intrinsic
-from numba.np.numpy_support import from_dtype
+from numba.np.numpy_support import as_dtype, from_dtype
 from numpy.typing import NDArray
 
 from swashplate.equations.cache import borrowing_kernel, on_disk
@@ -82,8 +82,8 @@ def _by_address(function: Callable[..., None], arguments: tuple[Any, ...]) -> Pi
 def _type_of(hint: Any) -> Any:
     """Type in compiled code of what has an annotation: of a whole number, or an array of numbers.
 
-    An array itself, of five numbers and two pointers, takes a compiler a multiple of the time: some
-    40 of them two seconds.
+    An array becomes a pointer: an array of Numba's has seven fields, and some 40 of them would take
+    two seconds to compile.
     """
     if hint is int:
         return types.int64
@@ -115,7 +115,8 @@ class Struct(Generic[Fields]):
 
     def __init__(self, fields: Fields) -> None:
         self.fields = fields
-        self._words = None if JIT_OFF else np.array([*map(_word, fields)], dtype=np.int64)
+        kinds = _array_types(type(fields))
+        self._words = None if JIT_OFF else np.array([*map(_word, fields, kinds)], dtype=np.int64)
 
     @cached_property
     def address(self) -> Any:
@@ -126,14 +127,22 @@ class Struct(Generic[Fields]):
         return Struct, (self.fields,)
 
 
-def _word(field: Any) -> int:
+@cache
+def _array_types(kind: Any) -> tuple[str, ...]:
+    """Of each field of a named tuple the type of an array's numbers, in NumPy's words."""
+    members = map(_type_of, kind.__annotations__.values())
+    return tuple(as_dtype(getattr(member, "dtype", member)).str for member in members)
+
+
+def _word(field: Any, kind: str) -> int:
     if isinstance(field, int):
         return field
     if not isinstance(field, np.ndarray):
         return int(field.address)
+    # compiled code cannot tell what it finds at an address
     found = field.__array_interface__
-    if found["strides"] is not None:
-        raise ValueError("An array of a struct must be C-contiguous.")
+    if found["typestr"] != kind or found["strides"] is not None:
+        raise ValueError(f"An array of a struct must be C-contiguous and of type {kind}.")
     return int(found["data"][0])
 
 

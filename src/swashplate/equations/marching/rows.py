@@ -256,7 +256,8 @@ def place(structs: int, r: int, first: int, size: int, at: int, count: int, to: 
     weight = behind(plan.weight, at)
     measured = behind(plan.measured, at)
     begin = cell[0]
-    width = (cell[count - 1] + 2 if cell[count - 1] + 2 < first + size else first + size) - begin
+    end, behind_last = first + size, cell[count - 1] + 2
+    width = (behind_last if behind_last < end else end) - begin  # `min` would compile for 0.1 s
     for c in range(sink.derived):
         column = behind(sink.rows, sink.to[c] * sink.length + to)
         t = program.seen + r * sink.derived + c
@@ -360,7 +361,8 @@ def march_observed(pieces: Any, arrays: tuple[Any, ...], size: int, h: float, st
                 if sink.folded and plan.weight[at] == 0.0:
                     at += 1
                     continue
-                many = end - at if end - at < sink.length - used else sink.length - used
+                many, left = end - at, sink.length - used
+                many = many if many < left else left
                 for i in range(1, many if sink.folded else 0):
                     if plan.weight[at + i] == 0.0:
                         many = i
