@@ -1,5 +1,8 @@
 """The triangular factor against NumPy's, also where columns are missing, equal or empty."""
 
+import pickle
+from collections.abc import Callable
+from copy import copy, deepcopy
 from typing import NamedTuple
 
 import numpy as np
@@ -120,3 +123,19 @@ def test_derivatives_that_overflow_end_in_a_sentence(hoist: Drive) -> None:
     observed = ObservedRecord(record, [huge], driven_by="current")
     with pytest.raises(DomainError, match="Z8: the derivatives are too large"):
         triangle(hoist.parameters, observed, ["Z8", "Z10"])
+
+
+@pytest.mark.parametrize("copied", [deepcopy, copy, lambda each: pickle.loads(pickle.dumps(each))])
+def test_a_copy_of_an_observed_record_outlives_it(copied: Callable[..., ObservedRecord]) -> None:
+    measured = np.random.default_rng(0).normal(size=2000)
+    record = Record(np.zeros(2000), 0.0, 1.0, 1)
+    inputs = {name: np.zeros(2000) for name in "vwxyz"}
+    seen = Observation("total", record.time, -measured)
+    observed = ObservedRecord(record, [seen], driven_by="u", others=inputs)
+    instance = instance_of(weighted, Gains())
+    assert np.array_equal(engine.residuals(instance, observed), measured)
+    again = copied(observed)
+    del observed, seen, record
+    other = [np.full(2000, 7.0) for _ in range(20)]  # Takes memory that has become free.
+    assert np.array_equal(engine.residuals(instance, again), measured)
+    assert len(other) == 20

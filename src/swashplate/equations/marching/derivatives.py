@@ -11,15 +11,14 @@ from numpy.typing import ArrayLike, NDArray
 from swashplate.equations.functions import generating
 from swashplate.equations.marching.layout import Layout, layout_of, started_by
 from swashplate.equations.marching.observation import ObservedRecord, Own
-from swashplate.equations.marching.pieces import addresses
+from swashplate.equations.marching.pieces import Struct, addresses
 from swashplate.equations.marching.rows import (
-    EIGHTH,
     ROWS,
-    STRIDE,
     Program,
     Sink,
     aligned,
     march_observed,
+    march_of,
     upright,
 )
 from swashplate.equations.marching.run import Instance, Start, arrays_of, begun, check_domain
@@ -48,7 +47,7 @@ def _begun(
     h: float,
     start: Start,
     own: Collection[str],
-) -> tuple[Program, Array]:
+) -> tuple[Struct[Program], Array]:
     """The layout's program with its numbers, and derivatives of the states at the first sample.
 
     `own` are paths of states that the run starts from as its own unknowns: nothing else moves them.
@@ -66,13 +65,13 @@ def _begun(
     for at, slot in layout.slots:
         is_tap = slot[0].kind == "fraction"
         scale[at] *= places.slope[int(slot[0].path)] if is_tap else slopes[slot]
-    return layout.program._replace(scale=scale), tangent
+    return Struct(layout.program._replace(scale=scale)), tangent
 
 
 @generating
 def _at_rest(
     layout: Layout, instance: Instance, h: float, own: tuple[str, ...]
-) -> tuple[Program, Array]:
+) -> tuple[Struct[Program], Array]:
     """Those of a start at rest, which depends on no record."""
     return _begun(layout, instance, {}, h, "rest", own)
 
@@ -204,7 +203,7 @@ def _march(
     if missing:
         raise InputError(f"{missing[0]} is a column, so Own needs a value of it.")
     structure = structure_of(instance.model, signals, instance.options, seen)
-    plan = observed.plan(own.offsets, before)
+    plan, offsets = observed.plan, observed.offsets(own.offsets)
     numbers = tuple(seen.index(each.signal) for each in observed.observations)
     layout = layout_of(structure, tuple(columns), numbers, start)
     first = {name: float(values[0]) for name, values in records.items()}
@@ -214,12 +213,26 @@ def _march(
         program, tangent = _at_rest(layout, instance, h, tuple(own.start))
     else:
         program, tangent = _begun(layout, instance, first, h, start, own.start)
-    sink = Sink(rows, np.array(to, dtype=np.int64), np.arange(before, len(rows) - 1), factor)
-    values, met, block = tuple(records.values()), np.array([np.inf]), layout.taken()
-    arrays = arrays_of(instance, values, started, places, states, met, block)
+    fields = Sink(
+        columns=len(rows),
+        length=rows.shape[1],
+        rows=rows,
+        derived=len(columns),
+        to=np.array(to, dtype=np.int64),
+        own=before,
+        folded=int(factor.size > 0),
+        factor=factor,
+        offset=offsets,
+        offset_row=observed.offset_rows(before),
+    )
+    sink, room = Struct(fields), layout.taken()
+    room.fields.tangent[:] = tangent
+    room.fields.integrals[:] = 0.0
+    room.fields.progress[:] = plan.fields.first[:-1]
+    values, met = tuple(records.values()), np.array([np.inf])
+    arrays = arrays_of(instance, values, started, places, states, met, room.fields.block)
     pieces = addresses(structure.facts.pieces, layout.pieces)
-    integrals = np.zeros((program.integrals, 3))
-    room = block, aligned(STRIDE), aligned(EIGHTH), integrals, plan.first[:-1].copy()
-    march_observed(pieces, arrays, (values[0].size, h), tangent.copy(), program, plan, sink, room)
-    layout.give_back(block)
+    structs = march_of(program, plan, sink, room)
+    march_observed(pieces, arrays, values[0].size, h, structs.address)
+    layout.give_back(room)
     check_domain(instance, states, float(met[0]), observed.driven_by)

@@ -11,13 +11,17 @@ from numpy.typing import NDArray
 from swashplate.equations.fields import floats_of
 from swashplate.equations.functions import generating
 from swashplate.equations.marching.part import Stored, taps_of
+from swashplate.equations.marching.pieces import Struct
 from swashplate.equations.marching.rows import (
     CALL,
     COMBINE,
+    EIGHTH,
     INTEGRATE,
     RECUR,
     STRIDE,
     Program,
+    Room,
+    aligned,
     aligned_room,
 )
 from swashplate.equations.marching.structure import (
@@ -49,7 +53,8 @@ class Layout:
         self.structure, self.columns = structure, columns
         self._size, self.tangents = structure.facts.size, 1
         self._constant: dict[float, int] = {}  # Rows that hold just one value.
-        self._spare: deque[Array] = deque(maxlen=8)
+        self._observations = len(observed)
+        self._spare: deque[Struct[Room]] = deque(maxlen=8)
         self.places: dict[Moved, int] = {}
         self._by: dict[Stored, dict[int, Term]] = {}
         """Derivatives of what is known, by the number of each column that moves it."""
@@ -72,6 +77,7 @@ class Layout:
         ones = self._value(1.0)
         pairs = [(*term.rows, *(ones, -1)[len(term.rows) :]) for term in terms]
         self.program = Program(
+            steps=len(todo),
             todo=np.array(todo, dtype=np.int64),
             target=np.array([row for row, _ in self._sums], dtype=np.int64),
             first=np.cumsum([0, *(len(each) for _, each in self._sums)]).astype(np.int64),
@@ -86,18 +92,27 @@ class Layout:
         self.pieces = {piece for what, piece, *_ in todo if what in (CALL, RECUR)}
         self.slots = [(k, term.slot) for k, term in enumerate(terms) if term.slot is not None]
 
-    def taken(self) -> Array:
-        """Memory for a block, of an earlier march if it can be: new memory takes longer to get."""
+    def taken(self) -> Struct[Room]:
+        """Memory for a march, of an earlier one if it can be: new memory takes longer to get."""
         with suppress(IndexError):  # another thread may be faster
             return self._spare.pop()
         block = aligned_room(self._size)
         for value, row in self._constant.items():
             block[row : row + STRIDE] = value
-        return block
+        room = Room(
+            size=self._size,
+            block=block,
+            tangent=np.zeros(self.tangents),
+            aside=aligned(STRIDE),
+            products=aligned(EIGHTH),
+            integrals=np.zeros((self.program.integrals, 3)),
+            progress=np.zeros(self._observations, dtype=np.int64),
+        )
+        return Struct(room)
 
-    def give_back(self, block: Array) -> None:
+    def give_back(self, room: Struct[Room]) -> None:
         """Keep the memory of a march that has ended."""
-        self._spare.append(block)
+        self._spare.append(room)
 
     def _row(self) -> int:
         self._size += STRIDE

@@ -9,6 +9,7 @@ from typing import NamedTuple, TypeVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from swashplate.equations.marching.pieces import Struct
 from swashplate.equations.marching.record import Record, column
 from swashplate.equations.marching.rows import Plan
 from swashplate.equations.marching.run import Start, check_start
@@ -141,28 +142,27 @@ class ObservedRecord:
         """Lowest and highest value of the record. [V or A]"""
         return float(self.record.values.min()), float(self.record.values.max())
 
-    def plan(self, offsets: Sequence[float], first_own: int) -> Plan:
-        """What the march needs to know of the observations, at values of their offsets.
+    def offsets(self, given: Sequence[float]) -> Array:
+        """(r,) offset of each observation, 0 if none is given.
 
-        `first_own` is the column of the first free one; an `InputError` says if there are not as
-        many offsets as observations.
+        An `InputError` says if there are not as many as observations.
         """
         count = len(self.observations)
-        if len(offsets) not in (0, count) or not np.isfinite(offsets).all():
+        if len(given) not in (0, count) or not np.isfinite(given).all():
             raise InputError(
                 f"There are {count} observations, which need as many finite offsets, not "
-                f"{tuple(offsets)}."
+                f"{tuple(given)}."
             )
-        plan = self._plan
-        if any(offsets):
-            shifts = np.repeat(np.array(offsets), np.diff(plan.first))
-            plan = plan._replace(measured=plan.measured - shifts)
+        return np.array(given, dtype=np.float64) if len(given) else np.zeros(count)
+
+    def offset_rows(self, first: int) -> Indices:
+        """(r,) row of the derivative by each offset, from `first` on, -1 for those not wanted."""
         free = np.array([each.free_offset for each in self.observations])
-        return plan._replace(offset_column=np.where(free, first_own + np.cumsum(free) - 1, -1))
+        return np.where(free, first + np.cumsum(free) - 1, -1).astype(np.int64)
 
     @cached_property
-    def _plan(self) -> Plan:
-        """The plan without offsets."""
+    def plan(self) -> Struct[Plan]:
+        """What the march needs to know of the observations."""
         places = [_cells(self.record, np.asarray(each.time)) for each in self.observations]
         weights = [np.asarray(each.weight) for each in self.observations]
         measured = _joined([np.asarray(each.values) for each in self.observations])
@@ -178,16 +178,17 @@ class ObservedRecord:
             _alike(0.0, at.size) if even else at
             for (_, at), even in zip(places, regular, strict=True)
         ]
-        return Plan(
+        plan = Plan(
+            observations=len(regular),
             first=self._first,
             cell=_joined(cells),
             fraction=_joined(fractions),
             measured=measured,
             weight=weight,
-            even=np.array([bool((each == 1.0).all()) for each in weights]),
-            regular=np.array(regular),
-            offset_column=np.zeros(0, dtype=np.int64),
+            even=np.array([(each == 1.0).all() for each in weights], dtype=np.int64),
+            regular=np.array(regular, dtype=np.int64),
         )
+        return Struct(plan)
 
 
 Rows = TypeVar("Rows", Array, Indices)
@@ -222,17 +223,17 @@ def every_sample(
     size = record.values.size
     seen, plan = _every_sample(signal, record.start, record.rate, record.substeps, size)
     observed = ObservedRecord(record, (seen,), driven_by, start, others)
-    observed.__dict__["_plan"] = plan
+    observed.__dict__["plan"] = plan
     return observed
 
 
 @lru_cache(maxsize=8)
 def _every_sample(
     signal: str, start: float, rate: float, substeps: int, size: int
-) -> tuple[Observation, Plan]:
+) -> tuple[Observation, Struct[Plan]]:
     record = Record(np.zeros(size), start, rate, substeps)
     seen = Observation(signal, record.time, np.zeros(record.time.size))
-    return seen, ObservedRecord(record, (seen,))._plan
+    return seen, ObservedRecord(record, (seen,)).plan
 
 
 def _cells(record: Record, time: Array) -> tuple[Indices, Array]:

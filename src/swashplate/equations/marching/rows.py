@@ -14,9 +14,17 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from swashplate.equations.cache import kernel, pasted, subroutine
-from swashplate.equations.declaration import inlined
-from swashplate.equations.marching.pieces import behind, call
+from swashplate.equations.cache import borrowing_kernel, pasted, subroutine
+from swashplate.equations.functions import generating
+from swashplate.equations.marching.pieces import (
+    Struct,
+    behind,
+    call,
+    call_recurrence,
+    fields_of,
+    routine,
+    run,
+)
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
@@ -28,9 +36,14 @@ STRIDE = BLOCK + 16
 room before and behind a row for the samples next to the block."""
 
 
+# Kernels read these named tuples as structs (see `pieces.Struct`), whose arrays do not know their
+# shapes.
+
+
 class Program(NamedTuple):
     """What is done in every block, in order, and what is observed then."""
 
+    steps: int  # Rows of `todo`: w.
     todo: Indices
     """(w, 4) in each row one of
 
@@ -56,25 +69,43 @@ CALL, COMBINE, INTEGRATE, RECUR = range(4)
 class Plan(NamedTuple):
     """Where all observations look, one after the other; m samples in all, r observations."""
 
+    observations: int  # How many: r.
     first: Indices  # (r + 1,) first sample of each, and m.
     cell: Indices
     """(m,) point of the grid at or before the stamp, never falling within an observation."""
     fraction: Array  # (m,) how far behind it the stamp lies, in steps, 0 to 1.
-    measured: Array  # (m,) measured values, less the offset that is assumed in them.
+    measured: Array  # (m,) measured values.
     weight: Array  # (m,)
-    even: NDArray[np.bool_]  # (r,) whether all weights of an observation are 1.
-    regular: NDArray[np.bool_]
-    """(r,) whether an observation has its stamps on successive points of the grid."""
-    offset_column: Indices  # (r,) column of the derivative by the offset, -1 if not wanted.
+    even: Indices  # (r,) whether all weights of an observation are 1.
+    regular: Indices  # (r,) whether its stamps are successive points of the grid.
 
 
 class Sink(NamedTuple):
     """Where weighted rows go: all residuals or derivatives of a column each, residuals last."""
 
-    rows: Array  # (k + 1, m) all rows, or (k + 1, ROWS) where a triangle is wanted.
-    to: Indices  # (d,) where the derivatives go that the march gives.
-    own: Indices  # (k - d,) where those by the observations' own offsets go.
+    columns: int  # k + 1, residuals counted.
+    length: int  # From one row to the next: m, or ROWS where a triangle is wanted.
+    rows: Array  # (k + 1, length) all rows, or as many as are rotated at once.
+    derived: int  # Derivatives that the march gives: d.
+    to: Indices  # (d,) rows where they go.
+    own: int  # First row of those by the observations' own offsets; residuals come behind them.
+    folded: int  # Whether a triangle is wanted.
     factor: Array  # (k + 1, k + 1) triangle, (0, 0) where all rows are wanted.
+    offset: Array  # (r,) offset that is assumed in the measured values of each observation.
+    offset_row: Indices  # (r,) row of the derivative by the offset, -1 if not wanted.
+
+
+class Room(NamedTuple):
+    """Memory that a march writes to."""
+
+    size: int  # Of the block, in numbers.
+    block: Array
+    tangent: Array
+    """Derivatives of the states at the first sample, replaced by those behind the last."""
+    aside: Array  # (STRIDE,) a row before it is interpolated.
+    products: Array  # (EIGHTH,) see `absorb`.
+    integrals: Array  # (i, 3) states of integrals, zeros before the first sample.
+    progress: Indices  # (r,) next sample of each observation.
 
 
 # --- the triangle ---------------------------------------------------------------------------------
@@ -102,7 +133,7 @@ def aligned(*shape: int) -> Array:
     return room
 
 
-@inlined
+@subroutine
 def dot(a: Array, b: Array, room: Array) -> float:
     """Scalar product of two columns of ROWS numbers, folded in eighths.
 
@@ -128,29 +159,31 @@ def dot(a: Array, b: Array, room: Array) -> float:
     return total
 
 
-@kernel
-def absorb(rows: Array, factor: Array, room: Array) -> None:
-    """Rotate a block of rows into the triangular factor of all rows before it.
+def absorb(sink: int, room: int) -> None:
+    """Rotate the rows of a sink into the triangular factor of all rows before it.
 
-    (k, ROWS) `rows` column by column, zeros where it lacks some, are used up; the (k, k) upper
-    triangle `factor`, zeros before the first block, is replaced; `room` has EIGHTH places.
+    They are used up, and are to be zeros where there are fewer than ROWS.
     """
-    for j in range(rows.shape[0]):
-        pivot = behind(rows, j * ROWS)
-        square = dot(pivot, pivot, room)
+    columns = fields_of(sink, Sink).columns
+    rows = fields_of(sink, Sink).rows
+    factor = fields_of(sink, Sink).factor
+    products = fields_of(room, Room).products
+    for j in range(columns):
+        pivot, line = behind(rows, j * ROWS), behind(factor, j * columns)
+        square = dot(pivot, pivot, products)
         if square < NOTHING:
             continue  # nothing to rotate, as with a parameter that the block does not depend on
-        corner = factor[j, j]
+        corner = line[j]
         norm = sqrt(corner * corner + square)
         diagonal = -norm if corner > 0.0 else norm
         lead = corner - diagonal
         # the reflection 1 - v vᵀ · scale with v = [lead, pivot]: no difference of like numbers
         scale = 1.0 / (norm * (norm + abs(corner)))
-        factor[j, j] = diagonal
-        for k in range(j + 1, rows.shape[0]):
+        line[j] = diagonal
+        for k in range(j + 1, columns):
             column = behind(rows, k * ROWS)
-            along = scale * (lead * factor[j, k] + dot(pivot, column, room))
-            factor[j, k] -= along * lead
+            along = scale * (lead * line[k] + dot(pivot, column, products))
+            line[k] -= along * lead
             for i in range(ROWS):
                 column[i] -= along * pivot[i]
 
@@ -164,9 +197,9 @@ def upright(factor: Array) -> Array:
 # --- rows -----------------------------------------------------------------------------------------
 
 
-@subroutine
-def combine(flat: Array, program: Program, t: int, shift: int, count: int, row: Array) -> None:
-    """Sum the products of a sum's terms, from places `shift` behind their rows' first."""
+def combine(struct: int, flat: Array, t: int, shift: int, count: int, row: Array) -> None:
+    """Sum the products of the terms of a program's sum t, from `shift` behind their rows' first."""
+    program = fields_of(struct, Program)
     first, end = program.first[t], program.first[t + 1]
     if first == end:
         for m in range(count):
@@ -206,126 +239,144 @@ def integrate(row: Array, count: int, step: float, state: Array) -> None:
     state[0], state[1] = total, last
 
 
-@subroutine
-def place(
-    flat: Array,
-    program: Program,
-    plan: Plan,
-    r: int,
-    block: tuple[int, int],
-    stamps: tuple[int, int, int],
-    sink: Sink,
-    aside: Array,
-) -> None:
+def place(structs: int, r: int, first: int, size: int, at: int, count: int, to: int) -> None:
     """Weighted rows of the problem at some stamps of an observation.
 
-    `block` is its first sample and how many it has, `stamps` the first one, how many they are, and
-    from where on they go into the sink; `aside` is room for a row.
+    `first` and `size` are the block's first sample and how many it has, `at` and `count` the first
+    stamp and how many they are; they go into the sink from `to` on.
     """
-    (first, size), (at, count, to) = block, stamps
-    derived, long = sink.to.size, sink.rows.shape[1]
-    cell, fraction, weight = (
-        behind(plan.cell, at),
-        behind(plan.fraction, at),
-        behind(plan.weight, at),
-    )
+    march = fields_of(structs, March)
+    program = fields_of(march.program, Program)
+    plan = fields_of(march.plan, Plan)
+    sink = fields_of(march.sink, Sink)
+    room = fields_of(march.room, Room)
+    flat, aside = room.block, room.aside
+    cell = behind(plan.cell, at)
+    fraction = behind(plan.fraction, at)
+    weight = behind(plan.weight, at)
+    measured = behind(plan.measured, at)
     begin = cell[0]
-    width = min(cell[count - 1] + 2, first + size) - begin
-    for c in range(derived):
-        column, t = behind(sink.rows, sink.to[c] * long + to), program.seen + r * derived + c
+    end, behind_last = first + size, cell[count - 1] + 2
+    width = (behind_last if behind_last < end else end) - begin  # `min` would compile for 0.1 s
+    for c in range(sink.derived):
+        column = behind(sink.rows, sink.to[c] * sink.length + to)
+        t = program.seen + r * sink.derived + c
         if plan.regular[r]:
-            combine(flat, program, t, begin - first, count, column)
+            run(march.combine, (march.program, flat, t, begin - first, count, column))
             for i in range(0 if not plan.even[r] else count, count):
                 column[i] *= weight[i]
         else:
-            combine(flat, program, t, begin - first, width, aside)
+            run(march.combine, (march.program, flat, t, begin - first, width, aside))
             aside[width] = aside[width - 1]
             for i in range(count):
                 n, f = cell[i] - begin, fraction[i]
                 column[i] = weight[i] * ((1.0 - f) * aside[n] + f * aside[n + 1])
-    for c in sink.own:
-        column = behind(sink.rows, c * long + to)
+    for c in range(sink.own, sink.columns - 1):
+        column = behind(sink.rows, c * sink.length + to)
         for i in range(count):
-            column[i] = weight[i] if c == plan.offset_column[r] else 0.0
-    signal, measured = behind(flat, program.value[r] + begin - first), behind(plan.measured, at)
-    column = behind(sink.rows, (sink.rows.shape[0] - 1) * long + to)
+            column[i] = weight[i] if c == sink.offset_row[r] else 0.0
+    signal, offset = behind(flat, program.value[r] + begin - first), sink.offset[r]
+    column = behind(sink.rows, (sink.columns - 1) * sink.length + to)
     for i in range(count):
         n, f = cell[i] - begin, fraction[i]
-        column[i] = weight[i] * ((1.0 - f) * signal[n] + f * signal[n + 1] - measured[i])
+        simulated = (1.0 - f) * signal[n] + f * signal[n + 1]
+        column[i] = weight[i] * (simulated - (measured[i] - offset))
 
 
-@kernel
-def march_observed(
-    pieces: Any,
-    arrays: tuple[Any, ...],
-    grid: tuple[int, float],
-    tangent: Array,
-    program: Program,
-    plan: Plan,
-    sink: Sink,
-    room: tuple[Array, Array, Array, Array, Indices],
-) -> None:
+class March(NamedTuple):
+    """Addresses of structs, and of routines, which are compiled alone (see `pieces.routine`)."""
+
+    program: int
+    plan: int
+    sink: int
+    room: int
+    combine: int
+    place: int
+    absorb: int
+
+
+@generating
+def routines() -> tuple[Any, ...]:
+    """The last fields of a `March`."""
+    return routine(combine), routine(place), routine(absorb)
+
+
+def march_of(
+    program: Struct[Program], plan: Struct[Plan], sink: Struct[Sink], room: Struct[Room]
+) -> Struct[March]:
+    """What `march_observed` is given, with routines, and structs, which must be kept as well."""
+    structs = program.address, plan.address, sink.address, room.address
+    return Struct(March(*structs, *routines()))
+
+
+@borrowing_kernel
+def march_observed(pieces: Any, arrays: tuple[Any, ...], size: int, h: float, structs: int) -> None:
     """March block by block, and compare what comes with what was observed.
 
     `pieces` are addresses, of the march first, and `arrays` what they take from ``records`` on (see
-    `pieces.PIECE`). `grid` says how many samples the record has, and the step.
-    `tangent` holds the derivatives of the states at the first sample, replaced by those behind the
-    last. `room` are the block, a row aside, room for `absorb`, (i, 3) zeros for integrals, and the
-    first stamp of each observation.
+    `pieces.PIECE`), of a record of `size` samples with step `h`; `structs` is the address of a
+    `March`.
     """
-    (size, h), (block, aside, products, integrals, progress) = grid, room
-    flat, folded, long = behind(block, 0), sink.factor.size > 0, sink.rows.shape[1]
+    march = fields_of(structs, March)
+    program = fields_of(march.program, Program)
+    plan = fields_of(march.plan, Plan)
+    sink = fields_of(march.sink, Sink)
+    room = fields_of(march.room, Room)
+    flat = room.block
     used = 0  # Rows that wait in the sink to be rotated.
     look_back = False
-    for r in range(progress.size):
-        look_back = look_back or not plan.regular[r]
+    for r in range(plan.observations):
+        look_back = look_back or plan.regular[r] == 0
     for first in range(0, size, BLOCK):
         if first > 0 and look_back:
             # what interpolation looks back at, from the end of the block before
-            for k in range(STRIDE, block.size, STRIDE):
-                block[k - 1] = block[k + BLOCK - 1]
-        count = min(BLOCK, size - first)
-        for step in range(program.todo.shape[0]):
-            what, a, b = program.todo[step, 0], program.todo[step, 1], program.todo[step, 2]
+            for k in range(STRIDE, room.size, STRIDE):
+                flat[k - 1] = flat[k + BLOCK - 1]
+        count = size - first if size - first < BLOCK else BLOCK
+        for step in range(program.steps):
+            todo = behind(program.todo, 4 * step)
+            what, a, b = todo[0], todo[1], todo[2]
             if what == CALL:
                 call(pieces[a], count, first, h, arrays)
             elif what == COMBINE:
                 for t in range(a, b):
-                    combine(flat, program, t, 0, count, behind(flat, program.target[t]))
+                    row = behind(flat, program.target[t])
+                    run(march.combine, (march.program, flat, t, 0, count, row))
             elif what == INTEGRATE:
-                integrate(behind(flat, a), count, h, integrals[b])
+                integrate(behind(flat, a), count, h, behind(room.integrals, 3 * b))
             else:
                 lanes = behind(program.lanes, b)
-                given = (arrays[0], arrays[1], lanes, arrays[3], tangent, *arrays[5:])
-                call(pieces[a], count, program.todo[step, 3] - b, h, given)
-        for r in range(progress.size):
+                call_recurrence(pieces[a], count, lanes, todo[3] - b, room.tangent, arrays)
+        for r in range(plan.observations):
             # off the grid the point behind the stamp must be known as well
-            known = first + count - (first + count < size and not plan.regular[r])
+            known = first + count - (first + count < size and plan.regular[r] == 0)
             row = behind(flat, program.value[r])
             row[count] = row[count - 1]
-            at = progress[r]
+            at = room.progress[r]
             end = at
             while end < plan.first[r + 1] and plan.cell[end] < known:
                 end += 1
-            progress[r] = end
+            room.progress[r] = end
             while at < end:
-                if folded and plan.weight[at] == 0.0:
+                if sink.folded and plan.weight[at] == 0.0:
                     at += 1
                     continue
-                many = min(end - at, long - used)
-                for i in range(1, many if folded else 0):
+                many, left = end - at, sink.length - used
+                many = many if many < left else left
+                for i in range(1, many if sink.folded else 0):
                     if plan.weight[at + i] == 0.0:
                         many = i
                         break
-                to = used if folded else at
-                place(flat, program, plan, r, (first, count), (at, many, to), sink, aside)
+                to = used if sink.folded else at
+                run(march.place, (structs, r, first, count, at, many, to))
                 at += many
-                used += many if folded else 0
-                if folded and used == long:
-                    absorb(sink.rows, sink.factor, products)
+                used += many if sink.folded else 0
+                if sink.folded and used == sink.length:
+                    run(march.absorb, (march.sink, march.room))
                     used = 0
     if used > 0:
-        for c in range(sink.rows.shape[0]):
-            for i in range(used, long):
-                sink.rows[c, i] = 0.0
-        absorb(sink.rows, sink.factor, products)
+        for c in range(sink.columns):
+            column = behind(sink.rows, c * sink.length)
+            for i in range(used, sink.length):
+                column[i] = 0.0
+        run(march.absorb, (march.sink, march.room))
