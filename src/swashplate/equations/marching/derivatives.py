@@ -21,7 +21,14 @@ from swashplate.equations.marching.rows import (
     march_of,
     upright,
 )
-from swashplate.equations.marching.run import Instance, Start, arrays_of, begun, check_domain
+from swashplate.equations.marching.run import (
+    NO_NUMBER,
+    Instance,
+    Start,
+    arrays_of,
+    begun,
+    check_domain,
+)
 from swashplate.equations.marching.structure import Moved, Structure, structure_of
 from swashplate.errors import DomainError, InputError
 
@@ -36,7 +43,13 @@ def _slopes(
     if start == "steady":
         before.update(first)
     values = [instance.number_at(each, before, h) for each in starting.arguments]
-    found = starting.derived.python(*values)
+    try:
+        found = starting.derived.python(*values)
+    except NO_NUMBER as error:
+        raise DomainError(
+            f"{instance.name}: what follows from the parameters alone cannot be computed for these "
+            f"numbers ({error})."
+        ) from None
     return dict(zip(starting.moves, found[len(found) - len(starting.moves) :], strict=True))
 
 
