@@ -53,9 +53,26 @@ class Language:
         """Lines of an assignment; a `new` name is declared by it."""
         raise NotImplementedError
 
+    def called(
+        self, call: Node, targets: Sequence[str], given: Sequence[str], declared: set[str], pad: str
+    ) -> list[str]:
+        """Lines of a call, whose results get their names; an empty one is not needed.
+
+        Some of them are `declared` already.
+        """
+        raise NotImplementedError
+
     def branch(self, test: str, then: list[str], other: list[str], pad: str) -> list[str]:
         """Lines of an `if` and its `else`."""
         raise NotImplementedError
+
+    def declared(self, names: Mapping[str, Node], pad: str, *, always: bool) -> list[str]:
+        """Lines ahead of a branch that gives some names their values, on both sides `always`."""
+        return []
+
+    def heading(self, node: Node, pad: str) -> list[str]:
+        """Lines ahead of the statement that computes a node."""
+        return []
 
 
 def grouped(text: Text, level: int) -> str:
@@ -103,6 +120,12 @@ class Python(Language):
 
     def assigned(self, name: str, node: Node, text: str, pad: str, *, new: bool) -> list[str]:
         return assigned(name, text, pad)
+
+    def called(
+        self, call: Node, targets: Sequence[str], given: Sequence[str], declared: set[str], pad: str
+    ) -> list[str]:
+        left = ", ".join(each or "_" for each in targets) + ("," if len(targets) == 1 else "")
+        return assigned(left, f"{call.value.function.name}({', '.join(given)})", pad)
 
     def branch(self, test: str, then: list[str], other: list[str], pad: str) -> list[str]:
         if not then:
@@ -181,6 +204,8 @@ class Block:
         self._reads: set[str] = set()
         self._written_nodes: list[Node] = []
         self._named: dict[tuple[Node, Region], str] = {}
+        self._outlive: dict[Branch | None, dict[str, Node]] = {}
+        """Names of each branch that are read after it, while its test is known to hold."""
         self._uses = self._counted(results)
         whole = self._schedule.whole
         self.statements = [*self._steps(whole, "")]
@@ -250,19 +275,30 @@ class Block:
         """Statements of what is computed together."""
         for step in self._schedule.steps(region):
             if isinstance(step, Branch):
-                yield from self._statement(lambda step=step: self._branch(step, region, pad))
+                write, node = self._branch, step.members[0]
             elif step.op == "call":
-                yield from self._statement(lambda step=step: self._call(step, region, pad))
+                write, node = self._call, step
             elif step.op not in ("result", "ruled") and self._wants_name(step, region):
-                yield from self._statement(lambda step=step: self._define(step, region, pad))
+                write, node = self._define, step
+            else:
+                continue
+            yield from self._statement(node, write, step, region, pad)
 
-    def _statement(self, write: Callable[[], tuple[list[str], list[str]]]) -> Iterator[Statement]:
-        """A statement with what it reads and computes; none if it has no lines."""
+    def _statement(
+        self,
+        node: Node,
+        write: Callable[..., tuple[list[str], list[str]]],
+        step: Node | Branch,
+        region: Region,
+        pad: str,
+    ) -> Iterator[Statement]:
+        """A statement with what it reads and computes, first a `node`; none if it has no lines."""
         outer = self._reads, self._written_nodes
         self._reads, self._written_nodes = set(), []
-        lines, names = write()
+        lines, names = write(step, region, pad)
         reads = frozenset(self._reads.difference(names))
         if lines:
+            lines = [*self._language.heading(node, pad), *lines]
             yield Statement(lines, tuple(names), reads, tuple(self._written_nodes))
         self._reads, self._written_nodes = outer[0] | reads, outer[1] + self._written_nodes
 
@@ -270,10 +306,18 @@ class Block:
         """Lines that give a value a name."""
         text = self._written(node, region)[0]
         name = self._fresh(node)
+        outlives = self._name(node, region, name)
+        return self._language.assigned(name, node, text, pad, new=not outlives), [name]
+
+    def _name(self, node: Node, region: Region, name: str) -> bool:
+        """Remember the name of a value; whether it outlives the branch in which it is computed."""
         self._named[node, region] = name
         if region.branch is not None:
             self.inner.setdefault(name, node)
-        return self._language.assigned(name, node, text, pad, new=True), [name]
+        outlives = any(region not in use.around for use in self._uses[node, region])
+        if outlives:
+            self._outlive.setdefault(region.branch, {})[name] = node
+        return outlives
 
     def _call(self, call: Node, region: Region, pad: str) -> tuple[list[str], list[str]]:
         """Lines of a call, whose results are a tuple."""
@@ -284,16 +328,16 @@ class Block:
             for node in region.nodes
             if node.op == "result" and node.args[0] is call
         ]
-        targets = ["_"] * call.value.results
+        targets = [""] * call.value.results
+        declared = set[str]()
         for index, node in results:
             targets[index] = self._fresh(node)
-            self._named[node, region] = targets[index]
-            if region.branch is not None:
-                self.inner.setdefault(targets[index], node)
-        given = ", ".join(self._text(node, region)[0] for node in call.args)
-        left = ", ".join(targets) + ("," if len(targets) == 1 else "")
+            if self._name(node, region, targets[index]):
+                declared.add(targets[index])
+        given = [self._text(node, region)[0] for node in call.args]
         self._written_nodes.append(call)
-        return assigned(left, f"{function.name}({given})", pad), targets
+        lines = self._language.called(call, targets, given, declared, pad)
+        return lines, [each for each in targets if each]
 
     def _branch(self, branch: Branch, region: Region, pad: str) -> tuple[list[str], list[str]]:
         """Lines of a branch; none if it is a choice that stands in an expression."""
@@ -301,11 +345,11 @@ class Block:
         if len(branch.members) == 1 and not any(sides):
             (member,) = branch.members
             return self._define(member, region, pad) if self._wants_name(member, region) else ([], [])
-        names = {}
+        names, declared = {}, {}
         for member in branch.members:
-            names[member] = self._named[member, region] = self._fresh(member)
-            if region.branch is not None:
-                self.inner.setdefault(names[member], member)
+            names[member] = self._fresh(member)
+            if not self._name(member, region, names[member]):
+                declared[names[member]] = member
         for k, side in enumerate(branch.sides):
             for member in branch.members:
                 text = self._text(member.args[1 + k], side)[0]
@@ -314,7 +358,11 @@ class Block:
                 )
         test = self._text(branch.test, region)[0]
         self._written_nodes += branch.members
-        return self._language.branch(test, *sides, pad), [*names.values()]
+        ahead = [
+            *self._language.declared(self._outlive.pop(branch, {}), pad, always=False),
+            *self._language.declared(declared, pad, always=True),
+        ]
+        return [*ahead, *self._language.branch(test, *sides, pad)], [*names.values()]
 
     def _result(self, node: Node, *, named: bool) -> tuple[str, frozenset[str]]:
         """Text of a result, by a name if it is long or must have one, and what that reads."""
@@ -324,7 +372,7 @@ class Block:
         done = (node, whole) in self._named or node in self._known or node.op in LEAVES
         if done or (not named and (len(text) <= SHORT or _is_trivial(node))):
             return text, frozenset(self._reads)
-        self.statements += self._statement(lambda: self._define(node, whole, ""))
+        self.statements += self._statement(node, self._define, node, whole, "")
         name = self._named[node, whole]
         return name, frozenset((name,))
 

@@ -67,6 +67,8 @@ def alike(one: Value, two: Value) -> bool:
 
 def fixed(value: Any) -> Value | None:
     """The value of something that does not change: options, numbers, tuples of them."""
+    if isinstance(value, Node | Flag | Tuple):
+        return value
     if value is None or value is True:
         return Flag(value)
     if isinstance(value, int | float):

@@ -1,0 +1,327 @@
+"""C functions of one part of a model, printed from the graph of its equations.
+
+Each purpose is one function: the constants that follow from parameters and step, one sample with
+all that is known at it and the next state, the start, and what options follow from.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from types import MappingProxyType
+from typing import TYPE_CHECKING
+
+from swashplate.equations import graph
+from swashplate.equations.functions import FUNCTIONS, RESERVED, Function, fresh_name
+from swashplate.equations.graph import CALLED, LEAVES, Node, ordered
+from swashplate.equations.marching.part import PartCode
+from swashplate.equations.model import Equation, Source, arguments_of
+from swashplate.equations.printing import STEMS, Block, assigned
+from swashplate.equations.printing_c import C, as_double, c_name, function, literal, mentions
+from swashplate.equations.values import Flag, Tuple, Value, fixed, leaves
+
+if TYPE_CHECKING:
+    from swashplate.export.c_source.model import Writer
+
+LIBRARY = {*CALLED} - {"sqrt", "floor"}
+"""Functions of which libraries differ in the last bit, or that take long."""
+OWN = {"m", "p", "k", "h", "options", "given", "state", "next", "signals", "limits", "window"}
+"""Names that the functions use themselves, as the equations do."""
+
+
+class PartInC:
+    """A part of a model as C, with options that are decided at run time.
+
+    Attributes
+    ----------
+    constants : dict of Node to str
+        What follows from parameters, givens, options and step alone, with its name.
+    """
+
+    def __init__(self, writer: Writer, number: int) -> None:
+        self.w, self.number = writer, number
+        model = writer.e.model
+        self.own, self.member = model.parts[number], writer.e.members[number]
+        kind = self.own.options
+        self.options: dict[str, Node] = {}
+        for name in kind._fields if kind else ():
+            self.options[name] = graph.name(f"option {self.member}.{name}", "bool")
+        symbols = kind(*(Flag(each, name) for name, each in self.options.items())) if kind else None
+        self.part = PartCode(model, number, model.external, symbols)
+        self._symbols = symbols
+        self.labels = self._labels()
+        self.constants = self._constants()
+
+    # -- the graph ---------------------------------------------------------------------------------
+
+    def traced(self, equation: Equation) -> Value:
+        """What an equation of the part returns."""
+        known = {**self.part.known, "options": fixed(self._symbols)}
+        given = {name: known[name] for name in arguments_of(equation) if name in known}
+        return self.part.trace.call(equation, given)
+
+    def results(self) -> dict[str, list[tuple[str, Node]]]:
+        """Paths and nodes of what a sample computes: signals, limits, the next state."""
+        part, own = self.part, self.own
+        found = {
+            "signals": [*leaves(part.known.get("signals", Tuple(None, ())))],
+            "limits": [],
+            "next": [*leaves(part.following)],
+        }
+        if own.limits is not None:
+            found["limits"] = [*leaves(self.traced(own.limits))]
+        return found
+
+    def _labels(self) -> dict[Node, str]:
+        """What values are called: of a group of parameters, after that, ``plus_filtered``."""
+        groups = {}
+        for path, node in leaves(self.part.p):
+            group, dot, _ = path.rpartition(".")
+            groups[node] = group.replace(".", "_") if dot else ""
+        whole = {"", *groups.values()} == {""}
+        of: dict[Node, str | None] = {}
+        ends = [node for nodes in self.results().values() for _, node in nodes]
+        ends += [] if self.part.margin is None else [self.part.margin]
+        labels = {}
+        for node in ordered(ends):
+            below = {of[each] for each in node.args} - {None}
+            if not node.args:
+                below = {groups[node]} if node in groups else set()
+            of[node] = below.pop() if len(below) == 1 else ("" if below else None)
+            label = self.part.trace.labels.get(node)
+            if label is not None:
+                group = "" if whole else of[node] or ""
+                labels[node] = c_name(f"{group}_{label}" if group else label)
+        return {
+            **{node: c_name(label) for node, label in self.part.trace.labels.items()},
+            **labels,
+        }
+
+    def _constants(self) -> dict[Node, str]:
+        """What follows from parameters and step: if it has a name, or takes a library's function."""
+        ends = [node for nodes in self.results().values() for _, node in nodes]
+        ends += [] if self.part.margin is None else [self.part.margin]
+        still = [node.value for node in self.options.values()]
+        taken = set[str]()
+        found = dict[Node, str]()
+        pending = self.part.ahead(ends, still)[::-1]
+        while pending:
+            node = graph.plain_value(pending.pop())
+            if node in found or node.op in (*LEAVES, "call"):
+                continue
+            named = node in self.labels and node.kind == "float"
+            if not named and not any(each.op in LIBRARY for each in ordered([node])):
+                continue
+            if named or node.op in LIBRARY or node.op == "result":
+                stem = self.labels.get(node) or STEMS.get(node.op, node.op)
+                found[node] = fresh_name(c_name(stem), taken)
+            else:
+                pending += node.args[::-1]
+        return found
+
+    # -- places ------------------------------------------------------------------------------------
+
+    def places(self, pointers: bool = True) -> dict[Node, str]:
+        """What numbers of the part are called in C."""
+        member = self.member
+        p, given, options = (
+            ("p->", "given->", "options->")
+            if pointers
+            else (f"m->{member}.", f"m->{member}_given.", f"m->{member}_options.")
+        )
+        known = {node: f"{p}{path_of(path)}" for path, node in leaves(self.part.p)}
+        known |= {node: f"{given}{path_of(path)}" for path, node in leaves(self.part.given)}
+        known |= {node: f"state->{path_of(path)}" for path, node in leaves(self.part.state)}
+        known |= {node: f"{options}{c_name(name)}" for name, node in self.options.items()}
+        known |= {node: f"k->{name}" for node, name in self.constants.items()}
+        for i, part in enumerate(self.w.e.model.parts[: self.number]):
+            for path in part.signal_names:
+                source = Source(i, path)
+                known[graph.name(self.part.source(source))] = self.w.place(source, "before")
+        return known
+
+    def pointers(self) -> dict[str, str]:
+        """Declarations of what a function reads and writes, by the names that they make."""
+        member, tags = self.member, self.w.tags[self.number]
+        found = {"p": f"const struct {tags['']} *p = &m->{member};"}
+        for word, name in (("constants", "k"), ("options", "options"), ("given", "given")):
+            if word in tags:
+                found[name] = f"const struct {tags[word]} *{name} = &m->{member}_{word};"
+        found["state"] = f"const struct {tags['state']} *state = &m->before.{member};"
+        for word in ("signals", "limits"):
+            if word in tags:
+                found[word] = f"struct {tags[word]} *{word} = &m->{member}_{word};"
+        found["h"] = "const double h = m->step; /* [s] */"
+        return found
+
+    def windows(self) -> list[str]:
+        """Names of the windows that the part looks through, those of its taps in their order."""
+        return [c_name(tap.input) for tap in self.part.taps]
+
+    def body(
+        self,
+        results: Mapping[str, Sequence[tuple[str, Node]]],
+        known: Mapping[Node, str],
+        inputs: Mapping[Node, tuple[str, str]],
+        last: Node | None = None,
+        pointers: Mapping[str, str] = MappingProxyType({}),
+    ) -> list[str]:
+        """Lines that compute results and put them in their places, as ``next->`` and the path.
+
+        `inputs` are values that get their names ahead, each with its name and its text. The `last`
+        of all is returned. `pointers` are further declarations, or others, by name.
+        """
+        taken = {*self.w.loops.taken, *OWN, *self.windows()}
+        names = {node: fresh_name(name, taken) for node, (name, _) in inputs.items()}
+        known = {**known, **names}
+        nodes = [node for each in results.values() for _, node in each]
+        nodes += [last] if last is not None else []
+        language = C(self.w.loops, self.part.trace.origins, taken)
+        block = Block(nodes, self.labels, taken, known=known, language=language)
+        lines, texts = language.headed(block.lines), iter(block.texts)
+        for word, each in results.items():
+            lines += [""] if each and lines else []
+            for path, node in each:
+                value = as_double(node, (next(texts), 0))[0]
+                lines.append(f"{word}->{path_of(path)} = {value};")
+        if last is not None:
+            lines.append(f"return {next(texts)};")
+        text = "\n".join(lines)
+        ahead = [
+            f"const double {names[node]} = {said};"
+            for node, (_, said) in inputs.items()
+            if mentions(text, names[node])
+        ]
+        text = "\n".join([*ahead, text])
+        declared = {**self.pointers(), **pointers}
+        head = [line for name, line in declared.items() if mentions(text, name)] + ahead
+        return [*head, *([""] if head and lines else []), *lines]
+
+    def inputs(self, start: bool = False) -> tuple[dict[Node, str], dict[Node, tuple[str, str]]]:
+        """What an input is called: places of windows, and texts of values that get a name.
+
+        At a `start` what is read through a line has its value before the record.
+        """
+        w, model = self.w, self.w.e.model
+        places, named = dict[Node, str](), dict[Node, tuple[str, str]]()
+        for tap in self.part.taps:
+            before = f"m->before_record[{w.e.lines.index(tap.tap.signal)}]"
+            window = c_name(tap.input)
+            for j, name in enumerate(self.part.tap_samples(tap)):
+                places[graph.name(name)] = before if start else f"{window}->s[{j}]"
+            places[graph.name(self.part.fraction(tap))] = "0.0" if start else f"{window}->f"
+        for name in self.own.input_types:
+            tap, node, default = self.own.tap(name), self.part.inputs[name], None
+            if model.link_of(self.number, name) is not None or not isinstance(node, Node):
+                continue
+            text = w.value_of(tap.signal)
+            if name in self.own.taps:
+                before = f"m->before_record[{w.e.lines.index(tap.signal)}]"
+                if start:
+                    text = before
+                else:
+                    block = Block([node], {}, {*OWN}, known=places, language=C(w.loops, {}, set()))
+                    text = block.texts[0] if not block.lines else ""
+            default = self.own.defaults.get(name)
+            if default is not None:
+                given = f"m->inputs.measured[{w.P}_INPUT_{c_name(tap.signal)}].given"
+                text = f"{given} ? {text} : p->{path_of(default)}"
+            elif name in self.own.taps and not start:
+                continue
+            named[node] = c_name(name), text
+        return places, named
+
+    # -- functions ---------------------------------------------------------------------------------
+
+    def sample(self) -> str:
+        """One sample: signals, limits, the next state, and whether the equations hold."""
+        places, named = self.inputs()
+        margin, windows = self.part.margin, self.windows()
+        holds = None if margin is None else graph.make(">", margin, graph.ZERO)
+        lines = self.body(self.results(), {**self.places(), **places}, named, holds)
+        text = "\n".join(lines)
+        idle = [name for name in ("next", *windows) if not mentions(text, name)]
+        tag = self.w.tags[self.number]["state"]
+        formals = [f"{self.w.e.type} *m", f"struct {tag} *next"]
+        formals += [f"const struct {self.w.e.prefix}_window *{each}" for each in windows]
+        back = "void" if margin is None else "bool"
+        head = f"static {back} {self.member}_sample({', '.join(formals)})"
+        says = f"A sample of the {self.own.name}: what is known at it, and the state at the next."
+        lines = [*(f"(void){name};" for name in idle), *lines]
+        return function(says, head, lines if "m->" in text else ["(void)m;", *lines])
+
+    def start(self, settled: bool) -> str:
+        """The state at the first sample."""
+        equation = self.own.settled if settled else self.own.rest
+        word = "settled" if settled else "rest"
+        head = f"static void {self.member}_{word}({self.w.e.type} *m)"
+        tag = self.w.tags[self.number]["state"]
+        pointer = f"struct {tag} *next = &m->now.{self.member};"
+        if equation is not None:
+            places, named = self.inputs(start=True)
+            value = self.traced(equation)
+            results = {"next": [*leaves(value)]}
+            known = {**self.places(), **places}
+            lines = self.body(results, known, named, pointers={"next": pointer})
+        else:
+            defaults = self.own.state._field_defaults
+            lines = [pointer] if self.own.state._fields else []
+            for path, _ in leaves(self.part.state):
+                first = defaults.get(path.split(".")[0], 0.0)
+                for each in path.split(".")[1:]:
+                    first = getattr(first, each, 0.0)
+                lines.append(f"next->{path_of(path)} = {literal(float(first))};")
+        how = "settled under its inputs" if settled else "at rest"
+        return function(f"The state of the {self.own.name} {how}.", head, lines or ["(void)m;"])
+
+    def computed(self) -> str:
+        """Constants of these parameters, options and this step."""
+        head = f"static void {self.member}_constants({self.w.e.type} *m)"
+        known = self.places()
+        results = []
+        for node, name in self.constants.items():
+            del known[node]
+            results.append((name, node))
+        tag = self.w.tags[self.number]["constants"]
+        pointer = f"struct {tag} *k = &m->{self.member}_constants;"
+        lines = self.body({"k": results}, known, {}, pointers={"k": pointer})
+        says = f"What follows from the parameters of the {self.own.name}, its options and the step."
+        return function(says, head, lines)
+
+    def decided(self, name: str, equation: Equation) -> str:
+        """A function that returns what an equation of parameters, options and step says."""
+        value = self.traced(equation)
+        assert isinstance(value, Node)
+        known = {k: v for k, v in self.places().items() if k not in self.constants}
+        lines = self.body({}, known, {}, value)
+        back = "bool" if value.kind == "bool" else "double"
+        says = (equation.__doc__ or "").strip().partition("\n")[0]
+        return function(says, f"static {back} {name}(const {self.w.e.type} *m)", lines)
+
+    # -- numbers -----------------------------------------------------------------------------------
+
+    def prepared(self) -> tuple[list[str], dict[str, Function]]:
+        """Lines of Python that compute the constants, and the functions that these call.
+
+        They read ``params``, ``given``, ``options`` and ``h``, and fill ``constants``.
+        """
+        taken = {*FUNCTIONS, *RESERVED, "params", "given", "options", "h", "constants", "prepare"}
+        known = {}
+        for array, value in (("params", self.part.p), ("given", self.part.given)):
+            places = self.w.e.model.places("parameters" if array == "params" else "given")
+            for path, node in leaves(value):
+                known[node] = f"{array}[{places.index((self.number, path))}]"
+        for name, node in self.options.items():
+            known[node] = f"options[{self.w.e.options.index((self.number, name))}]"
+        labels = {node: label for node, label in self.labels.items() if label.isidentifier()}
+        block = Block([*self.constants], labels, taken, known=known, named=False)
+        first = self.w.first_constant(self.number)
+        lines = [*block.lines]
+        for k, text in enumerate(block.texts):
+            lines += assigned(f"constants[{first + k}]", text)
+        return lines, block.functions
+
+
+def path_of(path: str) -> str:
+    """A path of Python's as one of C's."""
+    return ".".join(c_name(each) for each in path.split("."))
+
