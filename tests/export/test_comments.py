@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 
 from swashplate import Drive, export
 from swashplate.equations import Definition, Model, equation
-from swashplate.equations.c_source import interface
+from swashplate.export.c_source import interface
 from swashplate.equations.c_source.text import comment, comment_line, function
 
 GCC = shutil.which("gcc")

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from swashplate import Drive, InputError
-from swashplate.equations.c_source import feedthrough
+from swashplate.export.c_source import feedthrough
 from swashplate.export import content_of, drive_sources, libraries, values_of
 from swashplate.simulation.run import Sample
 

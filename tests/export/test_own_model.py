@@ -25,7 +25,7 @@ from swashplate.equations import (
     root,
     simulate,
 )
-from swashplate.equations.c_source import interface
+from swashplate.export.c_source import interface
 from swashplate.export import c, content_of, drive_sources, fmu, libraries, values_of, wasm
 from swashplate.models import displacement_control
 

@@ -41,6 +41,9 @@ ONCE, ALL = 1, 2
 class Language:
     """How operations are written."""
 
+    short = SHORT
+    """Characters of a result, beyond which it gets a name."""
+
     def number(self, value: Any) -> Text:
         """A literal number."""
         raise NotImplementedError
@@ -255,10 +258,36 @@ class Block:
 
     def _wants_name(self, node: Node, region: Region) -> bool:
         """Whether a value gets a line of its own."""
+        return self._stands_out(node, region) and not self._becomes(node, region)
+
+    def _stands_out(self, node: Node, region: Region) -> bool:
+        """Whether a value has a name in the equations, or is needed more than once."""
         uses = self._uses[node, region]
         if node in self._labels or len(uses) > 1 or uses[0] is not region:
             return not _is_trivial(node)
         return False
+
+    def _becomes(self, node: Node, region: Region) -> bool:
+        """Whether a value is nothing but that of a choice of its name, on the side of a region."""
+        label, uses = self._labels.get(node), self._uses[node, region]
+        alone = region.branch is not None and len(uses) == 1 and uses[0] is region
+        return alone and any(
+            plain_value(member.args[1 + region.side]) is node
+            and self._labels.get(member, label) == label
+            for member in region.branch.members  # type: ignore[union-attr]
+        )
+
+    def _has_lines(self, region: Region) -> bool:
+        """Whether something in a region takes a line of its own."""
+        for branch in region.branches:
+            several = len(branch.members) > 1 or any(map(self._has_lines, branch.sides))
+            if several or self._stands_out(branch.members[0], region):
+                return True
+        return any(
+            node.op == "call"
+            or (node.op not in ("result", "ruled") and self._stands_out(node, region))
+            for node in region.nodes
+        )
 
     def _fresh(self, node: Node) -> str:
         stem = self._labels.get(node) or STEMS.get(node.op, "part")
@@ -341,21 +370,23 @@ class Block:
 
     def _branch(self, branch: Branch, region: Region, pad: str) -> tuple[list[str], list[str]]:
         """Lines of a branch; none if it is a choice that stands in an expression."""
-        sides = [self._region(side, f"{pad}    ") for side in branch.sides]
-        if len(branch.members) == 1 and not any(sides):
+        if len(branch.members) == 1 and not any(map(self._has_lines, branch.sides)):
             (member,) = branch.members
             return self._define(member, region, pad) if self._wants_name(member, region) else ([], [])
         names, declared = {}, {}
-        for member in branch.members:
+        for member in reversed(branch.members):  # in the order in which they were computed
             names[member] = self._fresh(member)
             if not self._name(member, region, names[member]):
                 declared[names[member]] = member
+        inner = f"{pad}    "
+        sides = [self._region(side, inner) for side in branch.sides]
         for k, side in enumerate(branch.sides):
-            for member in branch.members:
-                text = self._text(member.args[1 + k], side)[0]
-                sides[k] += self._language.assigned(
-                    names[member], member, text, f"{pad}    ", new=False
-                )
+            for member in names:
+                value = plain_value(member.args[1 + k])
+                if (value, side) in self._uses and self._becomes(value, side):
+                    sides[k] += self._language.heading(value, inner)
+                text = self._text(value, side)[0]
+                sides[k] += self._language.assigned(names[member], member, text, inner, new=False)
         test = self._text(branch.test, region)[0]
         self._written_nodes += branch.members
         ahead = [
@@ -370,7 +401,7 @@ class Block:
         self._reads = set()
         text = self._text(node, whole)[0]
         done = (node, whole) in self._named or node in self._known or node.op in LEAVES
-        if done or (not named and (len(text) <= SHORT or _is_trivial(node))):
+        if done or (not named and (len(text) <= self._language.short or _is_trivial(node))):
             return text, frozenset(self._reads)
         self.statements += self._statement(node, self._define, node, whole, "")
         name = self._named[node, whole]

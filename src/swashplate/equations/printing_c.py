@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 import re
+import sys
 from collections.abc import Iterable, Mapping, Sequence
 from importlib.resources import files
 from typing import Any
@@ -17,7 +18,7 @@ from swashplate.equations.functions import fresh_name
 from swashplate.equations.graph import COMPARISONS, FALSE, TRUE, Node
 from swashplate.equations.language import MATH, Parsed
 from swashplate.equations.loops import PRECISION, STEPS, TINY, Inner
-from swashplate.equations.printing import Block, Language, Text, grouped
+from swashplate.equations.printing import ATOM, Block, Language, Text, grouped
 from swashplate.equations.values import leaves
 
 WIDTH = 100
@@ -37,13 +38,12 @@ erfc gamma lgamma tgamma fmin fmax fdim fma j0 j1 jn y0 y1 yn index time signal 
 """Names that C or its library keeps for itself."""
 BREAKS = re.compile(r"[,;\"] | (?=[?:+/=*-] |&& |\|\| )|\{(?=\.)")
 """Where a long line of C may end."""
-_LEVELS: dict[str, int] = {"if": 1, "or": 2, "and": 3, "==": 7, "!=": 7, "+": 10, "-": 10}
-LEVELS = {**_LEVELS, "<": 8, "<=": 8, ">": 8, ">=": 8, "*": 11, "/": 11, "not": 12, "neg": 12}
-"""How tightly operations bind."""
-BRACKETED = 6
-"""What binds less tightly stands in brackets within `||`, as compilers and readers like it."""
-UNARY = 12
-ATOM = 13
+_LEVELS = (("if",), ("or",), ("and",), ("==", "!="), ("<", "<=", ">", ">="), ("+", "-"), ("*", "/"))
+LEVELS = {op: level for level, each in enumerate((*_LEVELS, ("not", "neg")), 1) for op in each}
+"""How tightly operations bind; names and calls as `ATOM`."""
+UNARY = LEVELS["neg"]
+FEW = 3
+"""Statements of an equation from which on it gets a heading again, not a remark."""
 _SECTION = re.compile(r"^/\*== (\w+) ==\*/\n", re.MULTILINE)
 _HEADING = re.compile(r"^ */\*= (\d+) \*/$")
 
@@ -122,12 +122,12 @@ def comment_line(text: str) -> str:
     return _OF_COMMENTS.sub(lambda pair: f"{pair[0]} ", line)
 
 
-def comment(text: str, pad: str = "") -> list[str]:
+def comment(text: str, pad: str = "", width: int = WIDTH) -> list[str]:
     """A text of one line as a comment, on as many as it takes."""
     line = f"{pad}/* {comment_line(text)} */"
     lines = list[str]()
-    while len(line) > WIDTH and " " in line[len(pad) + 20 : WIDTH]:
-        at = line.rindex(" ", len(pad) + 20, WIDTH)
+    while len(line) > width and " " in line[len(pad) + 20 : width - 3]:
+        at = line.rindex(" ", len(pad) + 20, width - 3)
         lines.append(line[:at])
         line = f"{pad} * {line[at + 1 :]}"
     return [*lines, line]
@@ -153,7 +153,7 @@ def first_line(source: Parsed) -> str:
 
 
 class C(Language):
-    """C99.
+    """C99, long lines not yet on several.
 
     Parameters
     ----------
@@ -172,6 +172,8 @@ class C(Language):
         self._sources: dict[Parsed, int] = {}
 
     # -- expressions -------------------------------------------------------------------------------
+
+    short = sys.maxsize
 
     def number(self, value: Any) -> Text:
         text = literal(value)
@@ -198,18 +200,24 @@ class C(Language):
         compared = op in COMPARISONS
         whole = all(each.kind == "int" for each in node.args) and op != "/"
         left, right = args if whole else doubles
-        least = 9 if compared else level
+        least = LEVELS["+"] if compared else level
         return f"{grouped(left, least)} {op} {grouped(right, max(least, level + 1))}", level
 
     def _choice(self, node: Node, args: Sequence[Text]) -> Text:
         (test, one, two), (_, then, other) = args, node.args
+        opposite = f"!{grouped(test, UNARY)}", UNARY
         if other is FALSE:
-            return f"{grouped(test, 4)} && {grouped(one, 4)}", LEVELS["and"]
+            return _joined(test, "&&", one)
         if then is TRUE:
-            return f"{_alternative(test)} || {_alternative(two)}", LEVELS["or"]
+            return _joined(test, "||", two)
+        if then is FALSE:
+            return _joined(opposite, "&&", two)
+        if other is TRUE:
+            return _joined(opposite, "||", one)
         if node.kind == "float":
             one, two = as_double(then, one), as_double(other, two)
-        return f"{grouped(test, 4)} ? {grouped(one, 2)} : {grouped(two, 1)}", LEVELS["if"]
+        texts = grouped(test, LEVELS["=="]), grouped(one, LEVELS["or"]), two[0]
+        return f"{texts[0]} ? {texts[1]} : {texts[2]}", LEVELS["if"]
 
     # -- statements --------------------------------------------------------------------------------
 
@@ -217,7 +225,7 @@ class C(Language):
         if node.op == "number" and node.kind == "int":
             text = f"{text}.0"
         start = f"const {TYPES[node.kind]} {name}" if new else name
-        return wrapped(f"{pad}{start} = {text};")
+        return [f"{pad}{start} = {text};"]
 
     def called(
         self, call: Node, targets: Sequence[str], given: Sequence[str], declared: set[str], pad: str
@@ -228,20 +236,20 @@ class C(Language):
         if call.value.loop.kind == "root":
             (target,) = targets
             start = target if target in declared else f"const double {target}"
-            return wrapped(f"{pad}{start} = {name}({', '.join(texts)});")
+            return [f"{pad}{start} = {name}({', '.join(texts)});"]
         lines, places = list[str](), list[str]()
         for target, text in zip(targets, texts[1:], strict=False):
             place = target or fresh_name("unused", self._taken)
             places.append(f"&{place}")
             start = place if target in declared else f"double {place}"
-            lines += wrapped(f"{pad}{start} = {text};")
+            lines.append(f"{pad}{start} = {text};")
         arguments = [texts[0], *texts[1 + len(targets) :], *places]
-        return [*lines, *wrapped(f"{pad}{name}({', '.join(arguments)});")]
+        return [*lines, f"{pad}{name}({', '.join(arguments)});"]
 
     def branch(self, test: str, then: list[str], other: list[str], pad: str) -> list[str]:
         if not then:
-            return [*wrapped(f"{pad}if (!({test})) {{"), *other, f"{pad}}}"]
-        lines = [*wrapped(f"{pad}if ({test}) {{"), *then]
+            return [f"{pad}if (!({test})) {{", *other, f"{pad}}}"]
+        lines = [f"{pad}if ({test}) {{", *then]
         if not other:
             return [*lines, f"{pad}}}"]
         inner = f"{pad}    "
@@ -258,7 +266,7 @@ class C(Language):
             zero = "" if always else {"bool": " = false", "int": " = 0"}.get(kind, " = 0.0")
             if own:
                 listed = ", ".join(f"{name}{zero}" for name in own)
-                lines += wrapped(f"{pad}{word} {listed};")
+                lines.append(f"{pad}{word} {listed};")
         return lines
 
     def heading(self, node: Node, pad: str) -> list[str]:
@@ -273,25 +281,42 @@ class C(Language):
         The first one of each equation has the first line of its docstring. None is needed for the
         equation `around` until another has begun.
         """
-        sources = [*self._sources]
         said = set[Parsed]() if around is None else {around}
-        last, kept = around, list[str]()
+        kept = list[str]()
+        for source, own in self._runs(lines, around):
+            pad = own[0][: len(own[0]) - len(own[0].lstrip())] if own else ""
+            says = "" if source is None else first_line(source)
+            if source is None or not own:
+                kept += own
+                continue
+            new = source not in said
+            said.add(source)
+            alone = len(own) < FEW and own[0].endswith(";") and not new
+            remark = f"{own[0]} /* {comment_line(source.name)} */"
+            if alone and len(remark) <= WIDTH - 4:
+                kept += [remark, *own[1:]]
+                continue
+            if kept and not kept[-1].endswith("{") and kept[-1]:
+                kept.append("")
+            text = f"{source.name}: {says}" if new and says else source.name
+            kept += [*comment(text, pad, WIDTH - 4), *own]
+        return kept
+
+    def _runs(
+        self, lines: Iterable[str], around: Parsed | None
+    ) -> list[tuple[Parsed | None, list[str]]]:
+        """Lines that come from one equation after the other; ends of branches stay with them."""
+        sources = [*self._sources]
+        runs: list[tuple[Parsed | None, list[str]]] = [(None, [])]
+        last = around
         for line in lines:
             mark = _HEADING.match(line)
             if mark is None:
-                kept.append(line)
-                continue
-            source = sources[int(mark[1])]
-            if source is last:
-                continue
-            last, pad = source, line[: len(line) - len(line.lstrip())]
-            says = first_line(source)
-            text = f"{source.name}: {says}" if says and source not in said else source.name
-            said.add(source)
-            if kept and kept[-1].strip() and not kept[-1].endswith("{"):
-                kept.append("")
-            kept += comment(text, pad)
-        return kept
+                runs[-1][1].append(line)
+            elif sources[int(mark[1])] is not last:
+                last = sources[int(mark[1])]
+                runs.append((last, []))
+        return runs
 
 
 def as_double(node: Node, text: Text) -> Text:
@@ -308,9 +333,11 @@ def _whole(node: Node, text: str) -> Text:
     return (f"whole_number({text})" if node.kind == "int" else text), ATOM
 
 
-def _alternative(text: Text) -> str:
-    """One side of `||`."""
-    return text[0] if text[1] == LEVELS["or"] else grouped(text, BRACKETED)
+def _joined(one: Text, op: str, two: Text) -> Text:
+    """Two tests; others among them stand in brackets, as compilers and readers like it."""
+    level = LEVELS["and" if op == "&&" else "or"]
+    texts = [each[0] if each[1] == level else grouped(each, LEVELS["=="]) for each in (one, two)]
+    return f" {op} ".join(texts), level
 
 
 # --- functions ------------------------------------------------------------------------------------
@@ -363,7 +390,7 @@ class Loops:
         """An equation as a function of scalars; several results go to where pointers say."""
         results = [(f"next_{path}" if path else "next", node) for path, node in leaves(inner.result)]
         results = [(c_name(path.replace(".", "_")), node) for path, node in results]
-        formals = [*inner.leading, *inner.formals]
+        formals = {**inner.leading, **inner.formals}
         return scalar_function(
             self, name, inner.source, inner.origins, inner.labels, formals, results
         )
@@ -426,7 +453,7 @@ def scalar_function(
     nodes = [node for _, node in results]
     block = Block(nodes, named, taken, known=known, language=language)
     lines = language.headed(block.lines, source)
-    used = "\n".join([*block.lines, *block.texts])
+    used = without_comments("\n".join([*block.lines, *block.texts]))
     idle = [f"(void){each};" for each in names.values() if not mentions(used, each)]
     ends = [as_double(node, (text, 0))[0] for node, text in zip(nodes, block.texts, strict=True)]
     if len(results) == 1:
@@ -441,3 +468,8 @@ def scalar_function(
 def mentions(text: str, name: str) -> bool:
     """Whether a name stands in a text."""
     return re.search(rf"\b{re.escape(name)}\b", text) is not None
+
+
+def without_comments(text: str) -> str:
+    """A text of C without what it says beside the code."""
+    return re.sub(r"/\*.*?\*/", "", text, flags=re.DOTALL)

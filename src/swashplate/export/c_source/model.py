@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from swashplate.equations import graph
 from swashplate.equations.fields import Definition, declared_by, floats_of, value_at
-from swashplate.equations.functions import GENERATING
+from swashplate.equations.functions import GENERATING, choose
 from swashplate.equations.graph import Node, names_in
 from swashplate.equations.language import parsed, plain
 from swashplate.equations.marching.march import Sampler, output_of
@@ -430,7 +430,8 @@ class Writer:
     @cached_property
     def prepare(self) -> Any:
         """``prepare(params, given, options, h, constants)``, compiled: fills the constants."""
-        lines, names = [], dict[str, Any]()
+        lines: list[str] = []
+        names: dict[str, Any] = {"choose": choose}
         for part in self.parts:
             own, functions = part.prepared()
             lines += own

@@ -6,17 +6,26 @@ all that is known at it and the next state, the start, and what options follow f
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 from swashplate.equations import graph
 from swashplate.equations.functions import FUNCTIONS, RESERVED, Function, fresh_name
-from swashplate.equations.graph import CALLED, LEAVES, Node, ordered
+from swashplate.equations.graph import CALLED, LEAVES, Node, names_in, ordered
 from swashplate.equations.marching.part import PartCode
 from swashplate.equations.model import Equation, Source, arguments_of
 from swashplate.equations.printing import STEMS, Block, assigned
-from swashplate.equations.printing_c import C, as_double, c_name, function, literal, mentions
+from swashplate.equations.printing_c import (
+    C,
+    as_double,
+    c_name,
+    function,
+    literal,
+    mentions,
+    without_comments,
+)
+from swashplate.equations.tracing import Trace
 from swashplate.equations.values import Flag, Tuple, Value, fixed, leaves
 
 if TYPE_CHECKING:
@@ -48,59 +57,50 @@ class PartInC:
         symbols = kind(*(Flag(each, name) for name, each in self.options.items())) if kind else None
         self.part = PartCode(model, number, model.external, symbols)
         self._symbols = symbols
-        self.labels = self._labels()
-        self.constants = self._constants()
+        self.results = self._results()
+        ends = [node for nodes in self.results.values() for _, node in nodes]
+        ends += [] if self.part.margin is None else [self.part.margin]
+        self._labels = self.labels(self.part.trace, ends)
+        self.constants = self._constants(ends)
 
     # -- the graph ---------------------------------------------------------------------------------
 
-    def traced(self, equation: Equation) -> Value:
+    def traced(self, equation: Equation, trace: Trace) -> Value:
         """What an equation of the part returns."""
         known = {**self.part.known, "options": fixed(self._symbols)}
         given = {name: known[name] for name in arguments_of(equation) if name in known}
-        return self.part.trace.call(equation, given)
+        return trace.call(equation, given)
 
-    def results(self) -> dict[str, list[tuple[str, Node]]]:
+    def _results(self) -> dict[str, list[tuple[str, Node]]]:
         """Paths and nodes of what a sample computes: signals, limits, the next state."""
         part, own = self.part, self.own
-        found = {
+        limits = Tuple(None, ()) if own.limits is None else self.traced(own.limits, part.trace)
+        return {
             "signals": [*leaves(part.known.get("signals", Tuple(None, ())))],
-            "limits": [],
+            "limits": [*leaves(limits)],
             "next": [*leaves(part.following)],
         }
-        if own.limits is not None:
-            found["limits"] = [*leaves(self.traced(own.limits))]
-        return found
 
-    def _labels(self) -> dict[Node, str]:
-        """What values are called: of a group of parameters, after that, ``plus_filtered``."""
+    def labels(self, trace: Trace, ends: Iterable[Node]) -> dict[Node, str]:
+        """What values are called, after the group of parameters that they follow if it is one."""
         groups = {}
         for path, node in leaves(self.part.p):
             group, dot, _ = path.rpartition(".")
-            groups[node] = group.replace(".", "_") if dot else ""
-        whole = {"", *groups.values()} == {""}
-        of: dict[Node, str | None] = {}
-        ends = [node for nodes in self.results().values() for _, node in nodes]
-        ends += [] if self.part.margin is None else [self.part.margin]
-        labels = {}
+            groups[node] = f"{group.replace('.', '_')}_" if dot else ""
+        several = len({*groups.values()} - {""}) > 1
+        follows: dict[Node, set[str]] = {}
+        labels = {node: c_name(label.replace(".", "_")) for node, label in trace.labels.items()}
         for node in ordered(ends):
-            below = {of[each] for each in node.args} - {None}
-            if not node.args:
-                below = {groups[node]} if node in groups else set()
-            of[node] = below.pop() if len(below) == 1 else ("" if below else None)
-            label = self.part.trace.labels.get(node)
-            if label is not None:
-                group = "" if whole else of[node] or ""
-                labels[node] = c_name(f"{group}_{label}" if group else label)
-        return {
-            **{node: c_name(label) for node, label in self.part.trace.labels.items()},
-            **labels,
-        }
+            follows[node] = {groups[node]} if node in groups else set()
+            follows[node].update(*(follows[each] for each in node.args))
+            if several and node in labels and len(follows[node]) == 1:
+                (group,) = follows[node]
+                labels[node] = group + labels[node].removeprefix(group)
+        return labels
 
-    def _constants(self) -> dict[Node, str]:
+    def _constants(self, ends: Sequence[Node]) -> dict[Node, str]:
         """What follows from parameters and step: if it has a name, or takes a library's function."""
-        ends = [node for nodes in self.results().values() for _, node in nodes]
-        ends += [] if self.part.margin is None else [self.part.margin]
-        still = [node.value for node in self.options.values()]
+        still = {node.value for node in self.options.values()}
         taken = set[str]()
         found = dict[Node, str]()
         pending = self.part.ahead(ends, still)[::-1]
@@ -108,11 +108,13 @@ class PartInC:
             node = graph.plain_value(pending.pop())
             if node in found or node.op in (*LEAVES, "call"):
                 continue
-            named = node in self.labels and node.kind == "float"
+            if not names_in([node]) - still:
+                continue
+            named = node in self._labels and node.kind == "float"
             if not named and not any(each.op in LIBRARY for each in ordered([node])):
                 continue
             if named or node.op in LIBRARY or node.op == "result":
-                stem = self.labels.get(node) or STEMS.get(node.op, node.op)
+                stem = self._labels.get(node) or STEMS.get(node.op, node.op)
                 found[node] = fresh_name(c_name(stem), taken)
             else:
                 pending += node.args[::-1]
@@ -159,6 +161,7 @@ class PartInC:
 
     def body(
         self,
+        trace: Trace,
         results: Mapping[str, Sequence[tuple[str, Node]]],
         known: Mapping[Node, str],
         inputs: Mapping[Node, tuple[str, str]],
@@ -172,11 +175,11 @@ class PartInC:
         """
         taken = {*self.w.loops.taken, *OWN, *self.windows()}
         names = {node: fresh_name(name, taken) for node, (name, _) in inputs.items()}
-        known = {**known, **names}
         nodes = [node for each in results.values() for _, node in each]
         nodes += [last] if last is not None else []
-        language = C(self.w.loops, self.part.trace.origins, taken)
-        block = Block(nodes, self.labels, taken, known=known, language=language)
+        language = C(self.w.loops, trace.origins, taken)
+        labels = self.labels(trace, nodes)
+        block = Block(nodes, labels, taken, known={**known, **names}, language=language)
         lines, texts = language.headed(block.lines), iter(block.texts)
         for word, each in results.items():
             lines += [""] if each and lines else []
@@ -185,7 +188,7 @@ class PartInC:
                 lines.append(f"{word}->{path_of(path)} = {value};")
         if last is not None:
             lines.append(f"return {next(texts)};")
-        text = "\n".join(lines)
+        text = without_comments("\n".join(lines))
         ahead = [
             f"const double {names[node]} = {said};"
             for node, (_, said) in inputs.items()
@@ -203,32 +206,36 @@ class PartInC:
         """
         w, model = self.w, self.w.e.model
         places, named = dict[Node, str](), dict[Node, tuple[str, str]]()
+        before = {each: f"m->before_record[{k}]" for k, each in enumerate(w.e.lines)}
         for tap in self.part.taps:
-            before = f"m->before_record[{w.e.lines.index(tap.tap.signal)}]"
             window = c_name(tap.input)
             for j, name in enumerate(self.part.tap_samples(tap)):
-                places[graph.name(name)] = before if start else f"{window}->s[{j}]"
+                signal = tap.tap.signal
+                places[graph.name(name)] = before[signal] if start else f"{window}->s[{j}]"
             places[graph.name(self.part.fraction(tap))] = "0.0" if start else f"{window}->f"
         for name in self.own.input_types:
-            tap, node, default = self.own.tap(name), self.part.inputs[name], None
-            if model.link_of(self.number, name) is not None or not isinstance(node, Node):
+            node, signal = self.part.inputs[name], self.own.tap(name).signal
+            link, default = model.link_of(self.number, name), self.own.defaults.get(name)
+            if not isinstance(node, Node) or node.op == "number":
                 continue
-            text = w.value_of(tap.signal)
+            if link is not None:
+                if link.equation is None:
+                    named[node] = c_name(name), w.place(link.sources[0], "before")
+                continue
+            text = w.value_of(signal)
             if name in self.own.taps:
-                before = f"m->before_record[{w.e.lines.index(tap.signal)}]"
-                if start:
-                    text = before
-                else:
-                    block = Block([node], {}, {*OWN}, known=places, language=C(w.loops, {}, set()))
-                    text = block.texts[0] if not block.lines else ""
-            default = self.own.defaults.get(name)
+                text = before[signal] if start else self._looked(node, places)
             if default is not None:
-                given = f"m->inputs.measured[{w.P}_INPUT_{c_name(tap.signal)}].given"
+                given = f"m->inputs.measured[{w.P}_INPUT_{c_name(signal)}].given"
                 text = f"{given} ? {text} : p->{path_of(default)}"
-            elif name in self.own.taps and not start:
-                continue
             named[node] = c_name(name), text
         return places, named
+
+    def _looked(self, value: Node, places: Mapping[Node, str]) -> str:
+        """What a tap makes of its window, as one expression."""
+        block = Block([value], {}, set(), known=places, language=C(self.w.loops, {}, set()))
+        assert not block.lines
+        return block.texts[0]
 
     # -- functions ---------------------------------------------------------------------------------
 
@@ -237,8 +244,9 @@ class PartInC:
         places, named = self.inputs()
         margin, windows = self.part.margin, self.windows()
         holds = None if margin is None else graph.make(">", margin, graph.ZERO)
-        lines = self.body(self.results(), {**self.places(), **places}, named, holds)
-        text = "\n".join(lines)
+        known = {**self.places(), **places}
+        lines = self.body(self.part.trace, self.results, known, named, holds)
+        text = without_comments("\n".join(lines))
         idle = [name for name in ("next", *windows) if not mentions(text, name)]
         tag = self.w.tags[self.number]["state"]
         formals = [f"{self.w.e.type} *m", f"struct {tag} *next"]
@@ -258,10 +266,11 @@ class PartInC:
         pointer = f"struct {tag} *next = &m->now.{self.member};"
         if equation is not None:
             places, named = self.inputs(start=True)
-            value = self.traced(equation)
+            trace = Trace()
+            value = self.traced(equation, trace)
             results = {"next": [*leaves(value)]}
             known = {**self.places(), **places}
-            lines = self.body(results, known, named, pointers={"next": pointer})
+            lines = self.body(trace, results, known, named, pointers={"next": pointer})
         else:
             defaults = self.own.state._field_defaults
             lines = [pointer] if self.own.state._fields else []
@@ -283,16 +292,17 @@ class PartInC:
             results.append((name, node))
         tag = self.w.tags[self.number]["constants"]
         pointer = f"struct {tag} *k = &m->{self.member}_constants;"
-        lines = self.body({"k": results}, known, {}, pointers={"k": pointer})
+        lines = self.body(self.part.trace, {"k": results}, known, {}, pointers={"k": pointer})
         says = f"What follows from the parameters of the {self.own.name}, its options and the step."
         return function(says, head, lines)
 
     def decided(self, name: str, equation: Equation) -> str:
         """A function that returns what an equation of parameters, options and step says."""
-        value = self.traced(equation)
+        trace = Trace()
+        value = self.traced(equation, trace)
         assert isinstance(value, Node)
         known = {k: v for k, v in self.places().items() if k not in self.constants}
-        lines = self.body({}, known, {}, value)
+        lines = self.body(trace, {}, known, {}, value)
         back = "bool" if value.kind == "bool" else "double"
         says = (equation.__doc__ or "").strip().partition("\n")[0]
         return function(says, f"static {back} {name}(const {self.w.e.type} *m)", lines)
@@ -312,7 +322,7 @@ class PartInC:
                 known[node] = f"{array}[{places.index((self.number, path))}]"
         for name, node in self.options.items():
             known[node] = f"options[{self.w.e.options.index((self.number, name))}]"
-        labels = {node: label for node, label in self.labels.items() if label.isidentifier()}
+        labels = {node: label for node, label in self._labels.items() if label.isidentifier()}
         block = Block([*self.constants], labels, taken, known=known, named=False)
         first = self.w.first_constant(self.number)
         lines = [*block.lines]
