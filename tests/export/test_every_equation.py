@@ -15,7 +15,8 @@ from tests.equations.test_all_equations import EQUATIONS, equations_of
 from tests.export.twins import InC, flagged
 
 from swashplate.equations import equation
-from swashplate.equations.c_source import Unit
+from swashplate.equations.printing_c import Loops, helpers_in
+from swashplate.export.c_source import equation_in_c
 from swashplate.errors import EquationError
 
 REFUSED = ("rubbing", "rubbed")
@@ -124,19 +125,22 @@ def test_an_equation_in_c_has_the_bits_of_the_compiled_one(
 @pytest.mark.parametrize("name", REFUSED)
 def test_what_has_no_counterpart_in_c_is_refused_by_name(name: str) -> None:
     with pytest.raises(
-        EquationError, match=r"constructs.py, line \d+: rubbing .*Rubbing\.friction.*None"
+        EquationError, match=r"constructs.py, line \d+: rub.* p\.friction is .*None"
     ):
-        Unit().add(CONSTRUCTS[name])
+        equation_in_c(CONSTRUCTS[name], Loops())
 
 
 def test_three_functions_read_as_they_were_reviewed() -> None:
     """And what they call: golden.c is reviewed when it changes."""
-    unit = Unit("swp_")
-    for name in (
-        "channel.limited_current",
-        "displacement_control.pressure_limits",
-        "displacement_control.solenoid_force",
-    ):
-        unit.add(EQUATIONS[name])
-    made = "\n\n".join([*unit.helpers(), *unit.texts])
+    functions = Loops()
+    texts = [
+        equation_in_c(EQUATIONS[name], functions).text
+        for name in (
+            "channel.limited_current",
+            "displacement_control.pressure_limits",
+            "pump.settled_pressure",
+        )
+    ]
+    body = "\n\n".join([*functions.texts, *texts])
+    made = "\n".join([*helpers_in(body), body])
     assert f"{made}\n" == (Path(__file__).parent / "golden.c").read_text("utf-8")

@@ -343,26 +343,32 @@ class Block:
         self._named[node, region] = name
         if region.branch is not None:
             self.inner.setdefault(name, node)
-        outlives = any(region not in use.around for use in self._uses[node, region])
+        outlives = self._outlives(node, region, region)
         if outlives:
             self._outlive.setdefault(region.branch, {})[name] = node
         return outlives
+
+    def _outlives(self, node: Node, where: Region, region: Region) -> bool:
+        """Whether a value of some region is read outside another."""
+        return any(region not in use.around for use in self._uses[node, where])
 
     def _call(self, call: Node, region: Region, pad: str) -> tuple[list[str], list[str]]:
         """Lines of a call, whose results are a tuple."""
         function: Function = call.value.function
         self.functions[function.name] = function
-        results = [
-            (node.value, node)
-            for node in region.nodes
-            if node.op == "result" and node.args[0] is call
-        ]
         targets = [""] * call.value.results
         declared = set[str]()
-        for index, node in results:
-            targets[index] = self._fresh(node)
-            if self._name(node, region, targets[index]):
-                declared.add(targets[index])
+        for node, where in [*self._uses]:  # a result may be needed in a branch alone
+            if node.op != "result" or node.args[0] is not call:
+                continue
+            if self._schedule.region_of(call, where) is region:
+                name = targets[node.value] = targets[node.value] or self._fresh(node)
+                self._named[node, where] = name
+                if self._outlives(node, where, region):
+                    declared.add(name)
+                    self._outlive.setdefault(region.branch, {})[name] = node
+                if region.branch is not None:
+                    self.inner.setdefault(name, node)
         given = [self._text(node, region)[0] for node in call.args]
         self._written_nodes.append(call)
         lines = self._language.called(call, targets, given, declared, pad)

@@ -446,7 +446,8 @@ def scalar_function(
     """
     back, places = returned(results)
     taken = {*functions.taken, name, *(path for path, _ in results)}
-    names = {each: fresh_name(c_name(each.replace(".", "_")), taken) for each in formals}
+    words = {each: re.sub(r"[.\[\]]+", "_", each).strip("_") for each in formals}
+    names = {each: fresh_name(c_name(word), taken) for each, word in words.items()}
     known = {graph.name(each, kind): names[each] for each, kind in formals.items()}
     language = C(functions, origins, taken)
     named = {node: c_name(label) for node, label in labels.items()}

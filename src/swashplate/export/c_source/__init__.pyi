@@ -1,3 +1,5 @@
+from .equation import EquationInC as EquationInC
+from .equation import equation_in_c as equation_in_c
 from .model import Exported as Exported
 from .model import feedthrough as feedthrough
 from .model import newest as newest

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from types import MappingProxyType
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, get_type_hints
 
 from swashplate.equations import graph
 from swashplate.equations.functions import FUNCTIONS, RESERVED, Function, fresh_name
@@ -26,7 +26,7 @@ from swashplate.equations.printing_c import (
     without_comments,
 )
 from swashplate.equations.tracing import Trace
-from swashplate.equations.values import Flag, Tuple, Value, fixed, leaves
+from swashplate.equations.values import Tuple, Value, fixed, leaves, undecided
 
 if TYPE_CHECKING:
     from swashplate.export.c_source.model import Writer
@@ -52,11 +52,16 @@ class PartInC:
         self.own, self.member = model.parts[number], writer.e.members[number]
         kind = self.own.options
         self.options: dict[str, Node] = {}
-        for name in kind._fields if kind else ():
-            self.options[name] = graph.name(f"option {self.member}.{name}", "bool")
-        symbols = kind(*(Flag(each, name) for name, each in self.options.items())) if kind else None
-        self.part = PartCode(model, number, model.external, symbols)
-        self._symbols = symbols
+        self._symbols: Any = None
+        if kind is not None:
+            hints = get_type_hints(kind)
+            flags = [
+                undecided(hints[name], f"{kind.__name__}.{name}", f"option {self.member}.{name}")
+                for name in kind._fields
+            ]
+            self.options = {each: flag.value for each, flag in zip(kind._fields, flags, strict=True)}
+            self._symbols = kind(*flags)
+        self.part = PartCode(model, number, model.external, self._symbols)
         self.results = self._results()
         ends = [node for nodes in self.results.values() for _, node in nodes]
         ends += [] if self.part.margin is None else [self.part.margin]
