@@ -25,8 +25,8 @@ from swashplate.equations import (
     root,
     simulate,
 )
-from swashplate.export.c_source import interface
 from swashplate.export import c, content_of, drive_sources, fmu, libraries, values_of, wasm
+from swashplate.export.c_source import interface
 from swashplate.models import displacement_control
 
 OFF = None

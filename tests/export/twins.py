@@ -62,10 +62,10 @@ def open_lengths(hint: Any, path: str) -> Iterator[tuple[str, int]]:
         yield from open_lengths(each, below)
 
 
-def caller(number: int, made: EquationInC) -> str:
-    """C that calls an equation with numbers in a row."""
+def caller(number: int, made: EquationInC, columns: list[str]) -> str:
+    """C that calls an equation with numbers in a row, a column for each argument."""
     word = {"float": "in[{}]", "int": "(long long)in[{}]", "bool": "in[{}] != 0.0"}
-    arguments = [word[kind].format(i) for i, kind in enumerate(made.formals.values())]
+    arguments = [word[kind].format(columns.index(path)) for path, kind in made.formals.items()]
     kinds = ["bool" if kind == "bool" else "double" for kind in made.results.values()]
     if len(kinds) == 1:
         lines = [f"    const {kinds[0]} r0 = {made.name}({', '.join(arguments)});"]
@@ -170,7 +170,8 @@ class InC:
             lengths = {k: v for n, h in hints_of(equation).items() for k, v in open_lengths(h, n)}
             made = equation_in_c(equation, functions, lengths)
             texts.append(made.text)
-            callers.append(caller(self.numbers[key], made))
+            columns = [path for _, path in Twin(equation, False).columns]
+            callers.append(caller(self.numbers[key], made, columns))
         body = "\n\n".join([*functions.texts, *texts, *callers])
         head = "#include <math.h>\n#include <stdbool.h>\n"
         self.text = "\n\n".join([head, *helpers_in(body), body])

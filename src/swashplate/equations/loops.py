@@ -188,9 +188,7 @@ class Loop(NamedTuple):
     inner: Inner
 
 
-def _inner(
-    outer: Trace, source: Parsed, leading: Sequence[Value], rest: Sequence[Value]
-) -> Inner:
+def _inner(outer: Trace, source: Parsed, leading: Sequence[Value], rest: Sequence[Value]) -> Inner:
     """An equation whose `leading` arguments the loop gives, the others as where it is called."""
     trace = outer.inner()
     taken = set[str]()
@@ -231,9 +229,7 @@ def _inner(
     )
 
 
-def solved(
-    trace: Trace, residual: Parsed, low: Value, high: Value, rest: Sequence[Value]
-) -> Value:
+def solved(trace: Trace, residual: Parsed, low: Value, high: Value, rest: Sequence[Value]) -> Value:
     """`root` as a call of a generated function, with the rule of its derivatives."""
     inner = _inner(trace, residual, [graph.name("x")], rest)
     if not (isinstance(inner.result, Node) and isinstance(low, Node) and isinstance(high, Node)):
@@ -247,7 +243,8 @@ def solved(
     line = f"return (root({function.name}, {given}),)"
     text = function_source(f"{name}({given})", f"Root of {residual.name}.", [line], "")
     solver = Function(name, text, {"root": root, function.name: function})
-    call = make("call", low, high, *inner.actuals, value=Call(solver, 1, loop=Loop(name, "root", inner)))
+    value = Call(solver, 1, loop=Loop(name, "root", inner))
+    call = make("call", low, high, *inner.actuals, value=value)
     x = trace.make("result", call, value=0)
     trace.label(x, "root")
     by = list(dict.fromkeys(node for value in rest for _, node in leaves(value)))

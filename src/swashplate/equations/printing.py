@@ -91,10 +91,12 @@ class Python(Language):
     """
 
     def number(self, value: Any) -> Text:
+        """Its shortest text that gives the same number."""
         text = repr(value)
         return text, ATOM if text[0] != "-" else PRECEDENCE["neg"]
 
     def operation(self, node: Node, args: Sequence[Text], computed: int) -> Text:
+        """An operator with its operands, or a call."""
         op, level = node.op, PRECEDENCE.get(node.op, ATOM)
         if op == "if":
             return self._choice(node, args, computed)
@@ -122,15 +124,18 @@ class Python(Language):
         return f"{grouped(one, 2)} if {grouped(test, 2)} else {grouped(two, 1)}", PRECEDENCE["if"]
 
     def assigned(self, name: str, node: Node, text: str, pad: str, *, new: bool) -> list[str]:
+        """An assignment; a new name needs nothing more."""
         return assigned(name, text, pad)
 
     def called(
         self, call: Node, targets: Sequence[str], given: Sequence[str], declared: set[str], pad: str
     ) -> list[str]:
+        """A call whose tuple comes apart."""
         left = ", ".join(each or "_" for each in targets) + ("," if len(targets) == 1 else "")
         return assigned(left, f"{call.value.function.name}({', '.join(given)})", pad)
 
     def branch(self, test: str, then: list[str], other: list[str], pad: str) -> list[str]:
+        """`if` and `else`, as far as they do something."""
         if not then:
             return [*bracketed("if not (", test, "):", pad), *other]
         fits = len(pad) + len(test) < WIDTH - 4
@@ -269,13 +274,18 @@ class Block:
 
     def _becomes(self, node: Node, region: Region) -> bool:
         """Whether a value is nothing but that of a choice of its name, on the side of a region."""
+        return self._choice(node, region) is not None
+
+    def _choice(self, node: Node, region: Region) -> Node | None:
+        """The choice that a value is nothing but one side of, if both have one name."""
         label, uses = self._labels.get(node), self._uses[node, region]
-        alone = region.branch is not None and len(uses) == 1 and uses[0] is region
-        return alone and any(
-            plain_value(member.args[1 + region.side]) is node
-            and self._labels.get(member, label) == label
-            for member in region.branch.members  # type: ignore[union-attr]
-        )
+        if region.branch is None or len(uses) != 1 or uses[0] is not region:
+            return None
+        for member in region.branch.members:
+            same = label is None or self._labels.get(member, label) == label
+            if plain_value(member.args[1 + region.side]) is node:
+                return member if same else None
+        return None
 
     def _has_lines(self, region: Region) -> bool:
         """Whether something in a region takes a line of its own."""
@@ -303,6 +313,7 @@ class Block:
     def _steps(self, region: Region, pad: str) -> Iterator[Statement]:
         """Statements of what is computed together."""
         for step in self._schedule.steps(region):
+            write: Callable[..., tuple[list[str], list[str]]]
             if isinstance(step, Branch):
                 write, node = self._branch, step.members[0]
             elif step.op == "call":
@@ -378,28 +389,38 @@ class Block:
         """Lines of a branch; none if it is a choice that stands in an expression."""
         if len(branch.members) == 1 and not any(map(self._has_lines, branch.sides)):
             (member,) = branch.members
-            return self._define(member, region, pad) if self._wants_name(member, region) else ([], [])
+            return (
+                self._define(member, region, pad) if self._wants_name(member, region) else ([], [])
+            )
         names, declared = {}, {}
         for member in reversed(branch.members):  # in the order in which they were computed
+            around = self._choice(member, region)
+            if around is not None:
+                assert region.branch is not None
+                names[member] = self._named[around, region.branch.region]
+                self._named[member, region] = names[member]
+                continue
             names[member] = self._fresh(member)
             if not self._name(member, region, names[member]):
                 declared[names[member]] = member
         inner = f"{pad}    "
-        sides = [self._region(side, inner) for side in branch.sides]
+        sides = [self._region(branch.sides[0], inner), self._region(branch.sides[1], inner)]
         for k, side in enumerate(branch.sides):
             for member in names:
-                value = plain_value(member.args[1 + k])
+                value, name = plain_value(member.args[1 + k]), names[member]
+                text = self._text(value, side)[0]
+                if text == name:
+                    continue
                 if (value, side) in self._uses and self._becomes(value, side):
                     sides[k] += self._language.heading(value, inner)
-                text = self._text(value, side)[0]
-                sides[k] += self._language.assigned(names[member], member, text, inner, new=False)
+                sides[k] += self._language.assigned(name, member, text, inner, new=False)
         test = self._text(branch.test, region)[0]
         self._written_nodes += branch.members
         ahead = [
             *self._language.declared(self._outlive.pop(branch, {}), pad, always=False),
             *self._language.declared(declared, pad, always=True),
         ]
-        return [*ahead, *self._language.branch(test, *sides, pad)], [*names.values()]
+        return [*ahead, *self._language.branch(test, sides[0], sides[1], pad)], [*names.values()]
 
     def _result(self, node: Node, *, named: bool) -> tuple[str, frozenset[str]]:
         """Text of a result, by a name if it is long or must have one, and what that reads."""

@@ -100,11 +100,16 @@ def wrapped(line: str) -> list[str]:
         ends = [m.end() for m in BREAKS.finditer(rest, len(indent) + 8, WIDTH + 1)]
         if not ends:
             break
-        at = max([m for m in ends if rest[m - 2] in ",;"] or ends)
-        at = at if at > WIDTH // 2 else max(ends)
+        late = [at for at in ends if at > WIDTH // 2] or ends[-1:]
+        at = min(late, key=lambda at: (_depth(rest[:at]), rest[at - 2] not in ",;", -at))
         lines.append(rest[:at].rstrip())
         rest = f"{indent}    {rest[at:]}"
     return [*lines, rest]
+
+
+def _depth(text: str) -> int:
+    """Brackets that are open at the end of a text."""
+    return text.count("(") + text.count("{") - text.count(")") - text.count("}")
 
 
 _OF_COMMENTS = re.compile(r"\*(?=/)|/(?=\*)|\?(?=\?)")
@@ -165,9 +170,7 @@ class C(Language):
         Names of the block that is printed.
     """
 
-    def __init__(
-        self, functions: Loops, origins: Mapping[Node, Parsed], taken: set[str]
-    ) -> None:
+    def __init__(self, functions: Loops, origins: Mapping[Node, Parsed], taken: set[str]) -> None:
         self._functions, self._origins, self._taken = functions, origins, taken
         self._sources: dict[Parsed, int] = {}
 
@@ -176,10 +179,12 @@ class C(Language):
     short = sys.maxsize
 
     def number(self, value: Any) -> Text:
+        """A literal number."""
         text = literal(value)
         return text, UNARY if text[0] == "-" else ATOM
 
     def operation(self, node: Node, args: Sequence[Text], computed: int) -> Text:
+        """An operator with its operands, or a call; whole numbers among doubles are cast."""
         op, level = node.op, LEVELS.get(node.op, ATOM)
         if op == "if":
             return self._choice(node, args)
@@ -222,6 +227,7 @@ class C(Language):
     # -- statements --------------------------------------------------------------------------------
 
     def assigned(self, name: str, node: Node, text: str, pad: str, *, new: bool) -> list[str]:
+        """An assignment; a new name is a constant."""
         if node.op == "number" and node.kind == "int":
             text = f"{text}.0"
         start = f"const {TYPES[node.kind]} {name}" if new else name
@@ -230,6 +236,7 @@ class C(Language):
     def called(
         self, call: Node, targets: Sequence[str], given: Sequence[str], declared: set[str], pad: str
     ) -> list[str]:
+        """A call of what does the loop: it returns a root, and moves a state where it stands."""
         name = self._functions.name_of(call.value.loop, self._taken)
         pairs = zip(call.args, given, strict=True)
         texts = [as_double(node, (text, 0))[0] for node, text in pairs]
@@ -247,19 +254,22 @@ class C(Language):
         return [*lines, f"{pad}{name}({', '.join(arguments)});"]
 
     def branch(self, test: str, then: list[str], other: list[str], pad: str) -> list[str]:
+        """`if` and `else`, or `else if` if there is nothing but that."""
         if not then:
             return [f"{pad}if (!({test})) {{", *other, f"{pad}}}"]
         lines = [f"{pad}if ({test}) {{", *then]
         if not other:
             return [*lines, f"{pad}}}"]
         inner = f"{pad}    "
-        own = [line for line in other if line[len(inner)] not in " }"]
-        if own == other[:1] and own[0].startswith(f"{inner}if ("):
-            first, *rest = [line[4:] for line in other]
+        alone = other[1:] if _HEADING.match(other[0]) else other
+        own = [line for line in alone if line[len(inner)] not in " }"]
+        if own == alone[:1] and own[0].startswith(f"{inner}if ("):
+            first, *rest = [line[4:] for line in alone]
             return [*lines, f"{pad}}} else {first.lstrip()}", *rest]
         return [*lines, f"{pad}}} else {{", *other, f"{pad}}}"]
 
     def declared(self, names: Mapping[str, Node], pad: str, *, always: bool) -> list[str]:
+        """Declarations by type; zero if only one side gives a value."""
         lines = []
         for kind, word in TYPES.items():
             own = [name for name, node in names.items() if node.kind == kind]
@@ -270,6 +280,7 @@ class C(Language):
         return lines
 
     def heading(self, node: Node, pad: str) -> list[str]:
+        """A mark with the number of the equation, which `headed` makes a comment of."""
         source = self._origins.get(node)
         if source is None:
             return []
@@ -388,7 +399,9 @@ class Loops:
 
     def function(self, name: str, inner: Inner) -> str:
         """An equation as a function of scalars; several results go to where pointers say."""
-        results = [(f"next_{path}" if path else "next", node) for path, node in leaves(inner.result)]
+        results = [
+            (f"next_{path}" if path else "next", node) for path, node in leaves(inner.result)
+        ]
         results = [(c_name(path.replace(".", "_")), node) for path, node in results]
         formals = {**inner.leading, **inner.formals}
         return scalar_function(
@@ -456,6 +469,7 @@ def scalar_function(
     lines = language.headed(block.lines, source)
     used = without_comments("\n".join([*block.lines, *block.texts]))
     idle = [f"(void){each};" for each in names.values() if not mentions(used, each)]
+    idle += [""] if idle and lines else []
     ends = [as_double(node, (text, 0))[0] for node, text in zip(nodes, block.texts, strict=True)]
     if len(results) == 1:
         lines.append(f"return {ends[0]};")

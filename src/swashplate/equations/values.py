@@ -14,7 +14,6 @@ from swashplate.equations.language import Parsed, hints_of, is_named_tuple
 from swashplate.errors import EquationError
 
 
-
 @dataclass(frozen=True)
 class Flag:
     """An option: None (off), True (on), or "unknown"."""
@@ -115,8 +114,8 @@ def undecided(hint: Any, path: str, text: str) -> Flag:
     """An option that is decided at run time, by a name."""
     if set(typing.get_args(hint)) != {bool, type(None)}:
         raise EquationError(
-            f"{path} is of type {getattr(hint, '__name__', hint)}, but an option that is decided at "
-            "run time is bool | None."
+            f"{path} is of type {getattr(hint, '__name__', hint)}, but an option that is decided "
+            "at run time is bool | None."
         )
     return Flag(graph.name(text, "bool"), path)
 

@@ -12,9 +12,9 @@ from dataclasses import dataclass, replace
 from math import inf, isfinite
 from typing import Any, Literal, NamedTuple
 
+from swashplate.equations.fields import Definition, declared_by
 from swashplate.equations.printing_c import c_name, literal
 from swashplate.export.c_source import Exported
-from swashplate.equations.fields import Definition, declared_by
 from swashplate.simulation.result import CHAIN, MEASURED, MOTOR
 
 Causality = Literal["input", "output", "parameter", "independent"]

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
+from swashplate.equations.graph import Node, names_in
 from swashplate.equations.language import parsed
 from swashplate.equations.printing_c import Loops, scalar_function
 from swashplate.equations.tracing import Trace
@@ -22,7 +24,7 @@ class EquationInC(NamedTuple):
     name: str
     text: str
     formals: dict[str, str]
-    """Kinds of its arguments, "float", "int" or "bool", by path; options are "bool"."""
+    """Kinds of the arguments that it reads, by path: "float", "int", or "bool", as options are."""
     results: dict[str, str]
     """Kinds of its results by path; of a single number the path is empty."""
 
@@ -52,18 +54,21 @@ def equation_in_c(
     except EquationError as error:
         where = f"{source.file}, line {source.node.lineno}: {source.name}"
         raise EquationError(f"{where} cannot be written in C: {error}") from None
-    formals = {text: kind for name, value in given.items() for text, kind in _names(value)}
     result = trace.call(equation, given)
+    read = names_in(node for _, node in leaves(result))
+    names = [each for value in given.values() for each in _names(value)]
+    formals = {node.value: node.kind for node in names if node.value in read}
     nodes = [(path, node) for path, node in leaves(result)]
     name = functions.fresh(source.name)
     targets = [(f"result_{path.replace('.', '_')}" if path else "result", n) for path, n in nodes]
     text = scalar_function(functions, name, source, trace.origins, trace.labels, formals, targets)
-    return EquationInC(name, text, formals, {path: node.kind for path, node in nodes})
+    paths = {re.sub(r"\[(\d+)\]", r".\1", each): kind for each, kind in formals.items()}
+    return EquationInC(name, text, paths, {path: node.kind for path, node in nodes})
 
 
-def _names(value: Value) -> list[tuple[str, str]]:
-    """Texts and kinds of all names of an argument, options among them."""
+def _names(value: Value) -> list[Node]:
+    """All names of an argument, options among them."""
     if isinstance(value, Tuple):
         return [each for item in value.items for each in _names(item)]
-    node = value.value if isinstance(value, Flag) else value
-    return [(node.value, node.kind)]
+    node: Node = value.value if isinstance(value, Flag) else value
+    return [node]

@@ -224,10 +224,10 @@ class Writer:
         self.parts = [PartInC(self, i) for i in range(len(self.model.parts))]
         self.constants: list[str] = []
         """Structs of constants."""
-        for part, tags in zip(self.parts, self.tags, strict=True):
-            if part.constants:
-                tags["constants"] = self.structs.fresh(f"{part.member}_constants")
-                self.constants.append(self._constants(part, tags["constants"]))
+        for each, tags in zip(self.parts, self.tags, strict=True):
+            if each.constants:
+                tags["constants"] = self.structs.fresh(f"{each.member}_constants")
+                self.constants.append(self._constants(each, tags["constants"]))
         self.core = self._functions()
 
     def _constants(self, part: PartInC, tag: str) -> str:

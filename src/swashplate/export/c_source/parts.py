@@ -59,7 +59,9 @@ class PartInC:
                 undecided(hints[name], f"{kind.__name__}.{name}", f"option {self.member}.{name}")
                 for name in kind._fields
             ]
-            self.options = {each: flag.value for each, flag in zip(kind._fields, flags, strict=True)}
+            self.options = {
+                each: flag.value for each, flag in zip(kind._fields, flags, strict=True)
+            }
             self._symbols = kind(*flags)
         self.part = PartCode(model, number, model.external, self._symbols)
         self.results = self._results()
@@ -72,7 +74,9 @@ class PartInC:
 
     def traced(self, equation: Equation, trace: Trace) -> Value:
         """What an equation of the part returns."""
-        known = {**self.part.known, "options": fixed(self._symbols)}
+        known = dict(self.part.known)
+        if (options := fixed(self._symbols)) is not None:
+            known["options"] = options
         given = {name: known[name] for name in arguments_of(equation) if name in known}
         return trace.call(equation, given)
 
@@ -104,7 +108,7 @@ class PartInC:
         return labels
 
     def _constants(self, ends: Sequence[Node]) -> dict[Node, str]:
-        """What follows from parameters and step: if it has a name, or takes a library's function."""
+        """What follows from parameters and step, if it has a name or takes a library's function."""
         still = {node.value for node in self.options.values()}
         taken = set[str]()
         found = dict[Node, str]()
@@ -339,4 +343,3 @@ class PartInC:
 def path_of(path: str) -> str:
     """A path of Python's as one of C's."""
     return ".".join(c_name(each) for each in path.split("."))
-
