@@ -20,8 +20,8 @@ import swashplate.models
 from swashplate import Drive, PhysicalSet
 from swashplate.equations import derive
 from swashplate.equations.declaration import interpreted, is_function
-from swashplate.equations.model import Window
 from swashplate.equations.language import plain
+from swashplate.equations.model import Window
 from swashplate.models import card, full_order, machine, pump
 from swashplate.models import channel as single
 from swashplate.models import displacement_control as control

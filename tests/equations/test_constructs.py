@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from tests.equations.differences import compared
 
 from swashplate.equations import declared, derive, equation, interpolate, repeated, root
+from swashplate.equations.declaration import JIT_OFF
 from swashplate.errors import EquationError
 
 pytestmark = pytest.mark.interpreted
@@ -462,6 +463,59 @@ def test_an_infinite_limit_does_no_harm() -> None:
     derived = derive(unlimited, "x")
     for run in (derived.python, derived.compiled):
         assert run(0.5, math.inf) == (1.0, 2.0)
+
+
+@equation
+def shared_log(x: float) -> float:
+    l = log(x)
+    return (l if x > 0.0 else 0.0) + (2.0 * l if x > 1.0 else 0.0)
+
+
+@equation
+def shared_root(x: float) -> float:
+    r = sqrt(x) * x
+    return (r if x > 0.0 else 3.0 * x) + (2.0 * r if x > 1.0 else 0.0)
+
+
+@equation
+def shared_ratio(x: float) -> float:
+    q = 1.0 / x
+    one = 0.0
+    if x > 0.0:
+        one = exp(q) if x > 0.5 else x * q
+    return one + (q * q if x > 1.0 else 0.0)
+
+
+@equation
+def shared_arc(x: float) -> float:
+    a = asin(x)
+    return max(0.0, a if x < 1.0 else 0.0) + (a * a if x < -0.5 else x)
+
+
+@pytest.mark.skipif(JIT_OFF, reason="plain Python refuses log(0) where the equation asks for it")
+@pytest.mark.parametrize(
+    ("function", "x", "slope"),
+    [
+        (shared_log, 0.0, 0.0),
+        (shared_log, -2.0, 0.0),
+        (shared_log, 0.5, 2.0),
+        (shared_log, 2.0, 1.5),
+        (shared_root, 0.0, 3.0),
+        (shared_root, -1.0, 3.0),
+        (shared_root, 4.0, 9.0),
+        (shared_ratio, 0.0, 0.0),
+        (shared_ratio, -0.5, 0.0),
+        (shared_ratio, 0.25, 0.0),
+        (shared_ratio, 2.0, -math.exp(0.5) / 4.0 - 0.25),
+        (shared_arc, 1.0, 1.0),
+        (shared_arc, 2.0, 1.0),
+        (shared_arc, 0.6, 1.0 / 0.8 + 1.0),
+    ],
+)
+def test_a_value_of_sides_that_are_not_taken_does_no_harm(
+    function: Any, x: float, slope: float
+) -> None:
+    assert derive(function, "x").compiled(x)[1] == pytest.approx(slope, rel=1e-14)
 
 
 # --- what comes together --------------------------------------------------------------------------

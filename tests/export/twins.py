@@ -181,7 +181,7 @@ class InC:
         twin = Twin(self.equations[key], on)
         given = rows(twin.columns, on, self.numbers[key])
         wanted, found = np.empty((CALLS, twin.width)), np.empty((CALLS, twin.width))
-        made = module(f"twin_{key.replace('.', '_')}", twin.text, twin.names)
+        made = module(f"twin_{key.replace('.', '_')}", twin.text, **twin.names)
         try:
             made["rows_of"](given, wanted)
         except ZeroDivisionError:  # 0 to a negative power, where C goes on with infinity

@@ -1,4 +1,3 @@
-from .adjoints import Derived as Derived
 from .cache import generated as generated
 from .cache import kernel as kernel
 from .declaration import closure as closure
@@ -9,6 +8,7 @@ from .declaration import source as source
 from .derivatives import declared as declared
 from .derivatives import derive as derive
 from .fields import Definition as Definition
+from .gradients import Derived as Derived
 from .library import soft_threshold as soft_threshold
 from .loops import interpolate as interpolate
 from .loops import repeated as repeated

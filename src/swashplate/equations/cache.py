@@ -243,9 +243,14 @@ def _folder(chosen: str) -> Path | None:
     return wanted
 
 
+def generated_folder() -> Path | None:
+    """Folder in which generated modules are kept, None if nowhere."""
+    return _folder(str(config.CACHE_DIR or ""))  # type: ignore[attr-defined]
+
+
 def cache_folder() -> Path | None:
     """Folder below which generated modules and their machine code are kept, None if nowhere."""
-    folder = _folder(str(config.CACHE_DIR or ""))  # type: ignore[attr-defined]
+    folder = generated_folder()
     if folder is None:
         return None
     return folder.parent if config.CACHE_DIR else folder  # type: ignore[attr-defined]
@@ -266,7 +271,7 @@ def generated(name: str, text: str, names: Mapping[str, Any]) -> dict[str, Any]:
     digest.update(DOCSTRING.sub("", text).encode())
     digest.update(hash_of(reached).encode())
     stem = f"{name}_{digest.hexdigest()}"
-    folder = _folder(str(config.CACHE_DIR or ""))  # type: ignore[attr-defined]
+    folder = generated_folder()
     file = None if folder is None else _written(folder / f"{stem}.py", text)
     path = str(file) if file is not None else remember_text(stem, text)
     module = ModuleType(f"{GENERATED}.{stem}")
@@ -277,21 +282,34 @@ def generated(name: str, text: str, names: Mapping[str, Any]) -> dict[str, Any]:
     return module.__dict__
 
 
+def is_recent(path: Path) -> None:
+    """Note that a file is still in use."""
+    if time() - path.stat().st_mtime > DAY:
+        path.touch()
+
+
 def _written(path: Path, text: str) -> Path | None:
     """The file of a generated module, None if it cannot be written."""
     try:
         if path.exists() and path.read_text("utf-8") == text:
-            if time() - path.stat().st_mtime > DAY:
-                path.touch()  # still in use
+            is_recent(path)
             return path
+    except (OSError, UnicodeDecodeError):  # something else of that name
+        return None
+    return written(path, text.encode())
+
+
+def written(path: Path, content: bytes) -> Path | None:
+    """A file written as a whole, whoever else writes it at once; None if it cannot be written."""
+    try:
         handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=path.stem, suffix=".tmp")
         try:
-            with os.fdopen(handle, "w", encoding="utf-8") as file:
-                file.write(text)
+            with os.fdopen(handle, "wb") as file:
+                file.write(content)
             Path(temporary).replace(path)
         finally:
             Path(temporary).unlink(missing_ok=True)
-    except (OSError, UnicodeDecodeError):  # a full disk, or something else of that name
+    except OSError:  # a full disk, or something else of that name
         return None
     _tidy(path.parent)
     return path

@@ -12,6 +12,7 @@ from hashlib import blake2b
 from pathlib import Path
 from types import CodeType, FunctionType, ModuleType
 from typing import Any, TypeVar
+from weakref import WeakKeyDictionary
 
 from numba import config, njit
 
@@ -23,6 +24,8 @@ F = TypeVar("F", bound=Callable[..., Any])
 # numba makes its settings from the environment, so that a type checker sees none of them
 JIT_OFF = bool(config.DISABLE_JIT)  # type: ignore[attr-defined]
 """Whether nothing is compiled: ``NUMBA_DISABLE_JIT=1``."""
+RULES: WeakKeyDictionary[FunctionType, Any] = WeakKeyDictionary()
+"""Equations that return the derivatives of others, see `declared`."""
 known: dict[Any, None] = {}
 """Plain functions that were given to `inlined`, for when nothing is compiled."""
 

@@ -6,11 +6,11 @@ from collections.abc import Callable, Mapping
 from hashlib import blake2b
 from typing import Any, TypeVar
 
-from swashplate.equations.declaration import inlined, module_of
+from swashplate.equations.declaration import RULES, inlined, module_of
 from swashplate.equations.functions import GENERATING
 from swashplate.equations.gradients import Derived, derived_function, listing
 from swashplate.equations.language import parsed, plain
-from swashplate.equations.tracing import RULES, Trace
+from swashplate.equations.tracing import Trace
 from swashplate.equations.values import Value, arguments, leaves
 
 F = TypeVar("F", bound=Callable[..., Any])

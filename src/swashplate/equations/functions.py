@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Callable
+from dataclasses import dataclass, field, fields
 from functools import cached_property, lru_cache, wraps
 from threading import RLock
 from time import perf_counter
@@ -21,6 +21,8 @@ R = TypeVar("R")
 
 GENERATING = RLock()
 """Held by the one thread that reads equations or writes code, which compares by identity."""
+
+
 def _choose(test: bool, one: Any, two: Any) -> Any:
     return one if test else two
 
@@ -79,7 +81,12 @@ class Function:
 
     name: str
     source: str
-    names: dict[str, Any] = field(default_factory=dict)
+    names: dict[str, Function] = field(default_factory=dict)
+    """Generated functions that it calls."""
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """As it was made, without what is compiled."""
+        return type(self), tuple(getattr(self, each.name) for each in fields(self))
 
     def __repr__(self) -> str:
         return f"{type(self).__name__}({self.name!r})"
@@ -87,34 +94,28 @@ class Function:
     @property
     def texts(self) -> dict[str, str]:
         """Texts of this function and of all that it calls, those first, by name."""
-        inner = [each.texts for each in self.names.values() if isinstance(each, Function)]
+        inner = [each.texts for each in self.names.values()]
         return {k: v for each in [*inner, {self.name: self.source}] for k, v in each.items()}
 
     @cached_property
     def python(self) -> Callable[..., Any]:
         """The function, as plain Python throughout."""
-        names = self.names.items()
-        made: Callable[..., Any] = self._made(
-            {k: v.python if isinstance(v, Function) else interpreted(v) for k, v in names}
-            | {"choose": _choose}
-        )
+        library = {name: interpreted(each) for name, each in FUNCTIONS.items()}
+        own = {name: each.python for name, each in self.names.items()}
+        made: Callable[..., Any] = self._made({**library, "choose": _choose, **own})
         return made
 
     @cached_property
     def compiled(self) -> Any:
         """The function, compiled so that callers inline it."""
-        return inlined(self._made(compiled_names(self.names)))
+        own = {name: each.compiled for name, each in self.names.items()}
+        return inlined(self._made({**FUNCTIONS, **own}))
 
     def _made(self, space: dict[str, Any]) -> Any:
         file = remember_text(self.name, self.source)
-        space = {**FUNCTIONS, "inf": math.inf, "nan": math.nan, **space}
+        space |= {"inf": math.inf, "nan": math.nan}
         exec(compile(self.source, file, "exec"), space)
         return space[self.name]
-
-
-def compiled_names(names: Mapping[str, Any]) -> dict[str, Any]:
-    """What a text refers to, with generated functions compiled."""
-    return {k: v.compiled if isinstance(v, Function) else v for k, v in names.items()}
 
 
 def fresh_name(stem: str, taken: set[str]) -> str:

@@ -14,6 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import NamedTuple
 
 from swashplate.equations import graph
@@ -135,7 +136,7 @@ class Gradients:
         self, results: Sequence[Node], by: Sequence[Node], *, chained: bool = False
     ) -> None:
         self._by = dict.fromkeys(by)
-        self._order = ordered(results, operands=_reached)
+        self._order = ordered(results, operands=graph.reached)
         self._moves = self._moving()
         self._divisors = {node.args[1] for node in self._order if node.op == "/"}
         self._calls: dict[Node, tuple[Node, dict[tuple[int, int], Node]]] = {}
@@ -218,9 +219,7 @@ class Gradients:
                         bars.setdefault(argument, []).append(bar)
         return found
 
-    def _pushed(
-        self, node: Node
-    ) -> Iterator[tuple[Node, Callable[[Contribution], Contribution]]]:
+    def _pushed(self, node: Node) -> Iterator[tuple[Node, Callable[[Contribution], Contribution]]]:
         """Operands of a node, each with what an adjoint becomes on the way to it."""
         if node.op in ("min", "max", "if"):
             test, one, two = node.args if node.op == "if" else _sides(node)
@@ -228,9 +227,9 @@ class Gradients:
             yield two, lambda bar: _taken(bar, _opposite(test))
             return
         for argument, slope in self._slopes(node):
-            yield argument, lambda bar, slope=slope: self._multiplied(bar, slope)
+            yield argument, partial(self._multiplied, slope)
 
-    def _multiplied(self, bar: Contribution, slope: Callable[[Node], Node]) -> Contribution:
+    def _multiplied(self, slope: Callable[[Node], Node], bar: Contribution) -> Contribution:
         """A contribution times a derivative, which need not be finite where it does not count."""
         amount = slope(bar.amount)
         light = bar.masked and self._is_tame(slope(ONE))
@@ -249,12 +248,12 @@ class Gradients:
         if op == "ruled":
             for argument, slope in zip(node.value.arguments, node.value.slopes, strict=True):
                 if slope is not ZERO and not graph.is_number(slope, 0.0):
-                    yield argument, lambda w, slope=slope: times(w, slope)
+                    yield argument, partial(times, slope)
         elif op == "result":
             call = args[0]
             for (k, i), slope in self._derivatives_of(call).items():
                 if k == node.value:
-                    yield call.args[i], lambda w, slope=slope: times(w, slope)
+                    yield call.args[i], partial(times, slope)
         elif op == "neg":
             yield args[0], negative
         elif op in ("+", "-"):
@@ -312,11 +311,6 @@ class Gradients:
 TAME = {"number", "name", "+", "-", "*", "neg", "abs", "min", "max", "if", "not"}
 TAME |= {*graph.COMPARISONS}
 """Operations that make finite numbers of moderate ones."""
-
-
-def _reached(node: Node) -> Sequence[Node]:
-    """Operands of a node, and what else a declared derivative is by."""
-    return (*node.args, *node.value.arguments) if node.op == "ruled" else node.args
 
 
 def _followed(node: Node) -> Sequence[Node]:

@@ -176,15 +176,28 @@ def names_in(ends: Iterable[Node], known: Collection[Node] = ()) -> set[str]:
     return {node.value for node in ordered(ends, known) if node.op == "name"}
 
 
+def reached(node: Node) -> Sequence[Node]:
+    """Operands of a node, and what else its declared derivatives are by."""
+    return (*node.args, *node.value.arguments) if node.op == "ruled" else node.args
+
+
 def rewritten(ends: Iterable[Node], by: Mapping[Node, Node]) -> list[Node]:
     """The ends with other nodes in place of some."""
     ends = [*ends]
     made = dict(by)
-    for node in ordered(ends, by):
-        args = tuple(made[a] for a in node.args)
+    for node in ordered(ends, by, reached):
+        args, value = tuple(made[a] for a in node.args), node.value
         again = args == node.args
-        made[node] = node if again else make(node.op, *args, value=node.value, kind=node.kind)
+        if node.op == "ruled":
+            arguments = tuple(made[a] for a in value.arguments)
+            again = again and arguments == value.arguments
+            value = _rewritten_rule(value, arguments, by)
+        made[node] = node if again else make(node.op, *args, value=value, kind=node.kind)
     return [made[node] for node in ends]
+
+
+def _rewritten_rule(rule: Rule, arguments: tuple[Node, ...], by: Mapping[Node, Node]) -> Rule:
+    return Rule(arguments, lambda: tuple(rewritten(rule.slopes, by)))
 
 
 def plain_value(node: Node) -> Node:

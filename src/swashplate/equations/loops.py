@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from swashplate.equations import graph
 from swashplate.equations.declaration import inlined
-from swashplate.equations.functions import Function, fresh_name
+from swashplate.equations.functions import FUNCTIONS, Function, fresh_name
 from swashplate.equations.gradients import Derived, derived_function, gradients, listing
 from swashplate.equations.graph import ONE, ZERO, Call, Node, Rule, choose, make, names_in
 from swashplate.equations.language import Parsed
@@ -147,6 +147,8 @@ def blank(size: int) -> NDArray[np.float64]:
     return np.zeros(size)
 
 
+FUNCTIONS |= {"root": root, "blank": blank}
+
 # --- as they are traced ---------------------------------------------------------------------------
 
 
@@ -242,7 +244,7 @@ def solved(trace: Trace, residual: Parsed, low: Value, high: Value, rest: Sequen
     name = f"root_of_{function.name}"
     line = f"return (root({function.name}, {given}),)"
     text = function_source(f"{name}({given})", f"Root of {residual.name}.", [line], "")
-    solver = Function(name, text, {"root": root, function.name: function})
+    solver = Function(name, text, {function.name: function})
     value = Call(solver, 1, loop=Loop(name, "root", inner))
     call = make("call", low, high, *inner.actuals, value=value)
     x = trace.make("result", call, value=0)
@@ -387,7 +389,7 @@ def _carried(
     text = function_source(f"{name}({', '.join(given)})", says, lines, "")
     return Derived(
         *named_by_text(name, text),
-        {"blank": blank, step.name: step},
+        {step.name: step},
         tuple(now),
         tuple(moved),
         tuple((o, moved.index(each)) for o, each in entries),

@@ -7,7 +7,9 @@ so that both languages give the same bits.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from functools import partial
 from hashlib import blake2b
 from textwrap import TextWrapper
 from typing import Any, NamedTuple
@@ -91,12 +93,12 @@ class Python(Language):
     """
 
     def number(self, value: Any) -> Text:
-        """Its shortest text that gives the same number."""
+        """A literal number."""
         text = repr(value)
         return text, ATOM if text[0] != "-" else PRECEDENCE["neg"]
 
     def operation(self, node: Node, args: Sequence[Text], computed: int) -> Text:
-        """An operator with its operands, or a call."""
+        """An operation on texts."""
         op, level = node.op, PRECEDENCE.get(node.op, ATOM)
         if op == "if":
             return self._choice(node, args, computed)
@@ -124,7 +126,7 @@ class Python(Language):
         return f"{grouped(one, 2)} if {grouped(test, 2)} else {grouped(two, 1)}", PRECEDENCE["if"]
 
     def assigned(self, name: str, node: Node, text: str, pad: str, *, new: bool) -> list[str]:
-        """An assignment; a new name needs nothing more."""
+        """Lines of an assignment."""
         return assigned(name, text, pad)
 
     def called(
@@ -135,7 +137,7 @@ class Python(Language):
         return assigned(left, f"{call.value.function.name}({', '.join(given)})", pad)
 
     def branch(self, test: str, then: list[str], other: list[str], pad: str) -> list[str]:
-        """`if` and `else`, as far as they do something."""
+        """Lines of an `if` and its `else`."""
         if not then:
             return [*bracketed("if not (", test, "):", pad), *other]
         fits = len(pad) + len(test) < WIDTH - 4
@@ -301,7 +303,7 @@ class Block:
 
     def _fresh(self, node: Node) -> str:
         stem = self._labels.get(node) or STEMS.get(node.op, "part")
-        stem = stem.replace(".", "_")
+        stem = re.sub(r"\W+", "_", stem)
         return fresh_name(f"value_{stem}" if stem[0].isdigit() else stem, self._taken)
 
     # -- lines -------------------------------------------------------------------------------------
@@ -313,29 +315,21 @@ class Block:
     def _steps(self, region: Region, pad: str) -> Iterator[Statement]:
         """Statements of what is computed together."""
         for step in self._schedule.steps(region):
-            write: Callable[..., tuple[list[str], list[str]]]
             if isinstance(step, Branch):
-                write, node = self._branch, step.members[0]
+                write = partial(self._branch, step, region, pad)
+                yield from self._statement(step.members[0], write, pad)
             elif step.op == "call":
-                write, node = self._call, step
+                yield from self._statement(step, partial(self._call, step, region, pad), pad)
             elif step.op not in ("result", "ruled") and self._wants_name(step, region):
-                write, node = self._define, step
-            else:
-                continue
-            yield from self._statement(node, write, step, region, pad)
+                yield from self._statement(step, partial(self._define, step, region, pad), pad)
 
     def _statement(
-        self,
-        node: Node,
-        write: Callable[..., tuple[list[str], list[str]]],
-        step: Node | Branch,
-        region: Region,
-        pad: str,
+        self, node: Node, write: Callable[[], tuple[list[str], list[str]]], pad: str
     ) -> Iterator[Statement]:
-        """A statement with what it reads and computes, first a `node`; none if it has no lines."""
+        """A statement with what it reads and computes, first a node; none if it has no lines."""
         outer = self._reads, self._written_nodes
         self._reads, self._written_nodes = set(), []
-        lines, names = write(step, region, pad)
+        lines, names = write()
         reads = frozenset(self._reads.difference(names))
         if lines:
             lines = [*self._language.heading(node, pad), *lines]
@@ -354,14 +348,10 @@ class Block:
         self._named[node, region] = name
         if region.branch is not None:
             self.inner.setdefault(name, node)
-        outlives = self._outlives(node, region, region)
+        outlives = any(region not in use.around for use in self._uses[node, region])
         if outlives:
             self._outlive.setdefault(region.branch, {})[name] = node
         return outlives
-
-    def _outlives(self, node: Node, where: Region, region: Region) -> bool:
-        """Whether a value of some region is read outside another."""
-        return any(region not in use.around for use in self._uses[node, where])
 
     def _call(self, call: Node, region: Region, pad: str) -> tuple[list[str], list[str]]:
         """Lines of a call, whose results are a tuple."""
@@ -369,17 +359,11 @@ class Block:
         self.functions[function.name] = function
         targets = [""] * call.value.results
         declared = set[str]()
-        for node, where in [*self._uses]:  # a result may be needed in a branch alone
-            if node.op != "result" or node.args[0] is not call:
-                continue
-            if self._schedule.region_of(call, where) is region:
-                name = targets[node.value] = targets[node.value] or self._fresh(node)
-                self._named[node, where] = name
-                if self._outlives(node, where, region):
+        for node in region.nodes:
+            if node.op == "result" and node.args[0] is call:
+                name = targets[node.value] = self._fresh(node)
+                if self._name(node, region, name):
                     declared.add(name)
-                    self._outlive.setdefault(region.branch, {})[name] = node
-                if region.branch is not None:
-                    self.inner.setdefault(name, node)
         given = [self._text(node, region)[0] for node in call.args]
         self._written_nodes.append(call)
         lines = self._language.called(call, targets, given, declared, pad)
@@ -430,7 +414,7 @@ class Block:
         done = (node, whole) in self._named or node in self._known or node.op in LEAVES
         if done or (not named and (len(text) <= self._language.short or _is_trivial(node))):
             return text, frozenset(self._reads)
-        self.statements += self._statement(node, self._define, node, whole, "")
+        self.statements += self._statement(node, partial(self._define, node, whole, ""), "")
         name = self._named[node, whole]
         return name, frozenset((name,))
 

@@ -17,8 +17,8 @@ from types import CellType, FunctionType, ModuleType
 from typing import Any, NamedTuple, get_type_hints
 
 from swashplate.equations.declaration import closure, equation, equation_of_text, is_function
-from swashplate.equations.model import Equation, Model, arguments_of, join
 from swashplate.equations.language import is_named_tuple, plain
+from swashplate.equations.model import Equation, Model, arguments_of, join
 from swashplate.errors import InputError
 
 

@@ -75,6 +75,10 @@ class Schedule:
         self._results = [*results]
         self._order = [n for n in ordered(results, known) if n.op not in LEAVES]
         self._index = {node: k for k, node in enumerate(self._order)}
+        self._results_of: dict[Node, list[Node]] = {}
+        for node in self._order:
+            if node.op == "result":
+                self._results_of.setdefault(node.args[0], []).append(node)
         self.selects: set[Node] = set()
         decide = flat or is_little
         while True:
@@ -107,10 +111,14 @@ class Schedule:
 
         for node in sorted(self._order, key=last_first):
             regions = covering(needed[node])
+            if node.op == "result":  # made together with all others, where the call is
+                needed.setdefault(node.args[0], {}).update(dict.fromkeys(regions))
+                continue
             self._of[node] = regions
+            self._of |= dict.fromkeys(self._results_of.get(node, ()), regions)
             for region in regions:
                 if not self._is_branch(node):
-                    region.nodes.append(node)
+                    region.nodes += [node, *self._results_of.get(node, ())]
                     for operand in node.args:
                         needed.setdefault(operand, {})[region] = None
                     continue
@@ -205,8 +213,10 @@ class Schedule:
         for k, side in enumerate(item.sides):
             for member in item.members:
                 yield member.args[1 + k], side
-            for inner in (*side.nodes, *side.branches):
-                yield from self.uses(inner, side)
+            for node in side.nodes:
+                yield from self.uses(node, side)
+            for branch in side.branches:
+                yield from self.uses(branch, side)
 
 
 def covering(regions: Iterable[Region]) -> list[Region]:

@@ -9,13 +9,13 @@ from __future__ import annotations
 import ast
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from functools import reduce
 from inspect import Parameter, Signature
 from types import FunctionType, ModuleType
 from typing import Any, TypeVar
-from weakref import WeakKeyDictionary
 
 from swashplate.equations import graph
-from swashplate.equations.declaration import JIT_OFF
+from swashplate.equations.declaration import JIT_OFF, RULES
 from swashplate.equations.graph import FALSE, LEAVES, ONE, TRUE, ZERO, Node, Rule, choose, make
 from swashplate.equations.language import (
     ARITHMETIC,
@@ -34,8 +34,6 @@ from swashplate.equations.values import Flag, Tuple, Value, alike, fixed, leaves
 Names = dict[str, Value]
 R = TypeVar("R")
 
-RULES: WeakKeyDictionary[FunctionType, Any] = WeakKeyDictionary()
-"""Equations that return the derivatives of others."""
 LOOPS = {
     "root": ("residual, low, high", ("the unknown",), solved),
     "repeated": ("step, count, state", ("a state", "the number of the repetition"), repetition),
@@ -450,10 +448,9 @@ class _Tracer:
         exactly = len(args) == least or (len(args) > least and op in ("min", "max"))
         if not exactly or node.keywords:
             self.refuse(node, f"{op} of {len(args)} arguments", f"give it {least}")
-        made = args[0]
-        for each in args[1:] or [None]:
-            made = self.trace.make(op, made) if each is None else self.trace.make(op, made, each)
-        return made
+        if len(args) == 1:
+            return self.trace.make(op, args[0])
+        return reduce(lambda one, two: self.trace.make(op, one, two), args)
 
     def arguments(self, node: ast.Call, names: Sequence[str], optional: Any) -> Names:
         """Values for arguments of these names, in their order as far as they are given."""

@@ -12,6 +12,7 @@ from swashplate.equations.fields import check_mapping, floats_of, is_real, value
 from swashplate.equations.functions import generating
 from swashplate.equations.gradients import Derived, derived_function
 from swashplate.equations.graph import Node, names_in, rewritten
+from swashplate.equations.keeping import kept, key_of
 from swashplate.equations.marching.march import Sampler, output_of
 from swashplate.equations.marching.part import Stored, taps_of
 from swashplate.equations.marching.record import check_rate
@@ -123,6 +124,17 @@ def _whole_step(
     model: Model, signals: tuple[str, ...], options: tuple[Any, ...], seen: tuple[Stored, ...]
 ) -> tuple[dict[str, Stored], Derived]:
     """A model's next states, then what is seen, with their derivatives: arguments and function."""
+    return kept(
+        f"{model.name}_linear",
+        (key_of(model), signals, options, seen),
+        lambda: _derived_step(model, signals, options, seen),
+    )
+
+
+def _derived_step(
+    model: Model, signals: tuple[str, ...], options: tuple[Any, ...], seen: tuple[Stored, ...]
+) -> tuple[dict[str, Stored], Derived]:
+    """The same, made of the equations."""
     states = [Stored(i, "state", path) for i, path in model.places("state")]
     sampler = Sampler(model, signals, options, [*states, *seen])
     results, labels = list[Node](), dict[Node, str]()

@@ -13,10 +13,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from swashplate.equations.declaration import interpreted
 from swashplate.equations.fields import declared_by
+from swashplate.equations.language import plain
 from swashplate.equations.marching.run import Instance, Part
 from swashplate.equations.model import Model
 from swashplate.equations.replacement import Replacement, again, check_members, uses
-from swashplate.equations.language import plain
 from swashplate.errors import InputError
 from swashplate.models.card import Card
 from swashplate.models.channel import CardOptions, Channel

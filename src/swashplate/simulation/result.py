@@ -119,7 +119,6 @@ class Simulation(Run):
     """
 
     kept = KEPT
-    later = tuple(name for name in OUTPUTS if name not in (*KEPT, "shaft_position"))
 
     limit_names = tuple(str(each.name).lower() for each in Limit)
 

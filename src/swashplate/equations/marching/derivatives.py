@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from swashplate.equations.functions import generating
-from swashplate.equations.marching.graph import Graph, Moved, graph_of
 from swashplate.equations.marching.layout import Layout, layout_of, started_by
 from swashplate.equations.marching.observation import ObservedRecord, Own
 from swashplate.equations.marching.pieces import addresses
@@ -24,16 +23,17 @@ from swashplate.equations.marching.rows import (
     upright,
 )
 from swashplate.equations.marching.run import Instance, Start, arrays_of, begun, check_domain
+from swashplate.equations.marching.structure import Moved, Structure, structure_of
 from swashplate.errors import DomainError, InputError
 
 Array = NDArray[np.float64]
 
 
 def _slopes(
-    graph: Graph, instance: Instance, first: Mapping[str, float], h: float, start: Start
+    structure: Structure, instance: Instance, first: Mapping[str, float], h: float, start: Start
 ) -> dict[Moved, float]:
     """Derivatives of constants and of states at the start by all parameters that move them."""
-    starting, before = graph.starting(start), dict.fromkeys(first, 0.0)
+    starting, before = structure.starting(start), dict.fromkeys(first, 0.0)
     if start == "steady":
         before.update(first)
     values = [instance.number_at(each, before, h) for each in starting.arguments]
@@ -53,16 +53,16 @@ def _begun(
 
     `own` are paths of states that the run starts from as its own unknowns: nothing else moves them.
     """
-    graph, slopes = layout.graph, dict[Moved, float]()
+    structure, slopes = layout.structure, dict[Moved, float]()
     if layout.columns:
-        slopes = _slopes(graph, instance, first, h, start)
+        slopes = _slopes(structure, instance, first, h, start)
     tangent = np.zeros(layout.tangents)
     for (state, column), at in layout.places.items():
-        if f"{graph.model.prefix(state.part)}{state.path}" in own:
-            tangent[at] = state.path in started_by(graph.model, state.part, column)
+        if f"{structure.model.prefix(state.part)}{state.path}" in own:
+            tangent[at] = state.path in started_by(structure.model, state.part, column)
         else:
             tangent[at] = slopes.get((state, column), 0.0)
-    places, scale = instance.places(graph.sampler.signals, h), layout.program.scale.copy()
+    places, scale = instance.places(structure.signals, h), layout.program.scale.copy()
     for at, slot in layout.slots:
         is_tap = slot[0].kind == "fraction"
         scale[at] *= places.slope[int(slot[0].path)] if is_tap else slopes[slot]
@@ -203,10 +203,10 @@ def _march(
     missing = [c for c in columns if c.startswith("start.") and c[6:] not in own.start]
     if missing:
         raise InputError(f"{missing[0]} is a column, so Own needs a value of it.")
-    graph = graph_of(instance.model, signals, instance.options, seen)
+    structure = structure_of(instance.model, signals, instance.options, seen)
     plan = observed.plan(own.offsets, before)
     numbers = tuple(seen.index(each.signal) for each in observed.observations)
-    layout = layout_of(graph, tuple(columns), numbers, start)
+    layout = layout_of(structure, tuple(columns), numbers, start)
     first = {name: float(values[0]) for name, values in records.items()}
     started = instance.start(first, h, start)
     states, places = begun(instance, started, own.start), instance.places(signals, h)
@@ -217,7 +217,7 @@ def _march(
     sink = Sink(rows, np.array(to, dtype=np.int64), np.arange(before, len(rows) - 1), factor)
     values, met, block = tuple(records.values()), np.array([np.inf]), layout.taken()
     arrays = arrays_of(instance, values, started, places, states, met, block)
-    pieces = addresses(graph.pieces, layout.pieces)
+    pieces = addresses(structure.facts.pieces, layout.pieces)
     integrals = np.zeros((program.integrals, 3))
     room = block, aligned(STRIDE), aligned(EIGHTH), integrals, plan.first[:-1].copy()
     march_observed(pieces, arrays, (values[0].size, h), tangent.copy(), program, plan, sink, room)

@@ -23,10 +23,11 @@ from numpy.typing import NDArray
 
 from swashplate.equations import graph
 from swashplate.equations.declaration import JIT_OFF
-from swashplate.equations.functions import choose, generating
+from swashplate.equations.functions import generating
 from swashplate.equations.graph import CHEAP, Node
+from swashplate.equations.keeping import kept, key_of
 from swashplate.equations.marching.march import Sampler, lower, output_of
-from swashplate.equations.marching.part import PartCode, Stored
+from swashplate.equations.marching.part import PartCode, Stored, taps_of
 from swashplate.equations.marching.rows import aligned
 from swashplate.equations.marching.run import module
 from swashplate.equations.model import Model
@@ -39,11 +40,9 @@ LANES = 16
 """Sets marched side by side: two vectors of eight where the processor has them, else four of 4."""
 
 
-CALLED: dict[str, Any] = {"choose": choose}
-"""What the text calls."""
-if JIT_OFF:
-    # a root that nobody asks for may be one of a number below zero, which compiled code allows
-    CALLED |= {"sqrt": np.sqrt}
+# a root that nobody asks for may be one of a number below zero, which compiled code allows
+CALLED: dict[str, Any] = {"sqrt": np.sqrt} if JIT_OFF else {}
+"""What the text calls in place of the library's."""
 
 SHORT = 16
 """Statements that are not worth a loop of their own."""
@@ -153,15 +152,15 @@ def report(model: Model, output: str | None = None, *, options: Any = None) -> s
         chosen.append(part.options() if own is None and part.options is not None else own)
     names = (*model.outputs, *model.parts[-1].outputs) or model.parts[-1].signal_names
     sampler = Sampler(model, signals, chosen, [output_of(model, output or names[-1])[0]])
-    for part in sampler.used:
-        ends = sampler.ends[part.part]
-        _, known = sampler.ahead(part, ends, still=fractions_of(part))
-        block = sampler.printed(part, ends, known=known, flat=all_vector)
+    for used in sampler.used:
+        ends = sampler.ends[used.part]
+        _, known = sampler.ahead(used, ends, still=fractions_of(used))
+        block = sampler.printed(used, ends, known=known, flat=all_vector)
         for statement in [each for each in block.statements if not is_vector(each)]:
             for node in statement.nodes:
                 if node.op not in VECTOR:
-                    source = part.trace.origins.get(node)
-                    where = part.own.name if source is None else source.name
+                    source = used.trace.origins.get(node)
+                    where = used.own.name if source is None else source.name
                     found[f"{where} calls {_called(node)}"] = None
     if not found:
         return f"Nothing keeps {model.name} from vector instructions."
@@ -190,13 +189,30 @@ class Marched(NamedTuple):
     outputs: Array  # (LANES, n) the output, or (LANES, 0).
 
 
-class Lanes:
-    """The march of LANES sets of a model over one record, for one output.
+class LanePart(NamedTuple):
+    """Where a part's numbers go: names of rows."""
 
-    ``prepare(h, flat)`` computes what does not change, and states at rest, of every lane.
-    ``march(records, whole, h, flat, measured, weight, outputs)`` marches: costs and the worst
-    margins are rows of the block, and ``outputs``, unless empty, are a row for each lane.
-    """
+    part: int
+    parameters: dict[str, str]
+    """Path of each parameter by the name of its row; `given` likewise."""
+    given: dict[str, str]
+    fractions: dict[int, str]
+    """By the number of a tap, the row of the rest of its place."""
+    states: dict[str, str]
+    """By path, the row of each number of the state that is carried."""
+
+
+class LaneFacts(NamedTuple):
+    """What lanes are generated as: plain data."""
+
+    text: str
+    rows: dict[str, int]
+    """Row of each number by its name."""
+    parts: list[LanePart]
+
+
+class _Writer:
+    """Reads a model's equations, and writes the march of its lanes."""
 
     def __init__(
         self, model: Model, signals: Sequence[str], options: Sequence[Any], output: str
@@ -204,13 +220,20 @@ class Lanes:
         place, is_rate = output_of(model, output)
         self._sampler = Sampler(model, signals, options, [place])
         self._straight = Straight()
-        self._known: dict[int, dict[Node, str]] = {}
         self._ahead: list[tuple[PartCode, Block]] = []
-        text = "\n\n".join(self._texts(place, is_rate))
-        names = {**self._sampler.names, **CALLED, "LANES": LANES}
-        made = module(f"{model.name}_lanes", text, names)
-        self.prepare: Callable[..., None] = made["prepare"]
-        self.march: Callable[..., None] = made["march"]
+        text = self._sampler.module(*self._texts(place, is_rate))
+        parts = [self._part_of(part) for part in self._sampler.used]
+        self.facts = LaneFacts(text, self._straight.number, parts)
+
+    def _part_of(self, part: PartCode) -> LanePart:
+        states = dict(leaves(part.state))
+        return LanePart(
+            part.part,
+            part.parameters,
+            {node.value: path for path, node in leaves(part.given)},
+            {tap.number: part.fraction(tap) for tap in part.taps},
+            {path: states[path].value for path in self._sampler.carried[part.part]},
+        )
 
     def _texts(self, place: Stored, is_rate: bool) -> list[str]:
         """Texts of both kernels."""
@@ -335,6 +358,22 @@ class Lanes:
             used -= made
         return [*straight.loads(used - {"h"}), *lines]
 
+
+class Lanes:
+    """The march of LANES sets of a model over one record, for one output.
+
+    ``prepare(h, flat)`` computes what does not change, and states at rest, of every lane.
+    ``march(records, whole, h, flat, measured, weight, outputs)`` marches: costs and the worst
+    margins are rows of the block, and ``outputs``, unless empty, are a row for each lane.
+    """
+
+    def __init__(self, model: Model, signals: tuple[str, ...], facts: LaneFacts) -> None:
+        self._model, self._facts = model, facts
+        self._taps = taps_of(model, signals)
+        made = module(f"{model.name}_lanes", facts.text, LANES=LANES, **CALLED)
+        self.prepare: Callable[..., None] = made["prepare"]
+        self.march: Callable[..., None] = made["march"]
+
     def __call__(
         self,
         numbers: Mapping[str, Array],
@@ -352,29 +391,28 @@ class Lanes:
         sample, ``"start."`` before their paths, where they are not those at rest. The output is
         compared with (n,) `measured` values under the `weight` of each squared error.
         """
-        rows, model, parts = self._straight.number, self._sampler.model, self._sampler.used
+        rows, model = self._facts.rows, self._model
         block = aligned(len(rows), LANES)
-        taps = [tap for part in parts for tap in part.taps]
-        whole = np.zeros((max((tap.number for tap in taps), default=0) + 1, LANES), dtype=np.int64)
+        whole = np.zeros((max(len(self._taps), 1), LANES), dtype=np.int64)
         starts: dict[str, int] = {}
-        for part in parts:
-            prefix, states = model.prefix(part.part), dict(leaves(part.state))
+        for part in self._facts.parts:
+            prefix, own = model.prefix(part.part), model.parts[part.part]
             known = {name: f"{prefix}{path}" for name, path in part.parameters.items()}
-            known |= {node.value: f"given {prefix}{path}" for path, node in leaves(part.given)}
+            known |= {name: f"given {prefix}{path}" for name, path in part.given.items()}
             for name, path in known.items():
                 if name in rows and path in numbers:
                     block[rows[name]] = numbers[path]
                 elif name in rows:
-                    default = part.own.parameters._field_defaults
-                    block[rows[name]] = default[part.parameters[name]]
-            for tap in part.taps:
+                    block[rows[name]] = own.parameters._field_defaults[part.parameters[name]]
+            for tap in (each for each in self._taps if each.part == part.part):
                 late = numbers[f"{prefix}{tap.tap.delay}"] / h if tap.tap.delay else np.zeros(LANES)
                 end = np.maximum(late, tap.tap.ahead) - tap.tap.ahead
                 whole[tap.number] = np.floor(end)
-                if part.fraction(tap) in rows:
-                    block[rows[part.fraction(tap)]] = end - whole[tap.number]
-            for path in self._sampler.carried[part.part]:
-                starts[f"start.{prefix}{path}"] = rows[states[path].value]
+                fraction = part.fractions[tap.number]
+                if fraction in rows:
+                    block[rows[fraction]] = end - whole[tap.number]
+            for path, name in part.states.items():
+                starts[f"start.{prefix}{path}"] = rows[name]
         worst = block[rows["worst"]] if "worst" in rows else np.empty(LANES)
         worst[:] = np.inf
         size = measured.size
@@ -395,4 +433,9 @@ def lanes_of(
     model: Model, signals: tuple[str, ...], options: tuple[Any, ...], output: str
 ) -> Lanes:
     """The compiled lanes of a model for one output."""
-    return Lanes(model, signals, options, output)
+    facts = kept(
+        f"{model.name}_lanes",
+        (key_of(model), signals, options, output),
+        lambda: _Writer(model, signals, options, output).facts,
+    )
+    return Lanes(model, signals, facts)

@@ -8,9 +8,9 @@ from contextlib import suppress
 import numpy as np
 from numpy.typing import NDArray
 
+from swashplate.equations.fields import floats_of
 from swashplate.equations.functions import generating
-from swashplate.equations.marching.graph import Graph, Group, Moved, PartGraph, Term, abreast
-from swashplate.equations.marching.part import Stored
+from swashplate.equations.marching.part import Stored, taps_of
 from swashplate.equations.marching.rows import (
     CALL,
     COMBINE,
@@ -19,6 +19,14 @@ from swashplate.equations.marching.rows import (
     STRIDE,
     Program,
     aligned_room,
+)
+from swashplate.equations.marching.structure import (
+    Group,
+    Moved,
+    PartStructure,
+    Structure,
+    Term,
+    abreast,
 )
 from swashplate.equations.model import Model
 
@@ -36,10 +44,10 @@ class Layout:
     """
 
     def __init__(
-        self, graph: Graph, columns: tuple[str, ...], observed: tuple[int, ...], start: str
+        self, structure: Structure, columns: tuple[str, ...], observed: tuple[int, ...], start: str
     ) -> None:
-        self.graph, self.columns = graph, columns
-        self._size, self.tangents = graph.size, 1
+        self.structure, self.columns = structure, columns
+        self._size, self.tangents = structure.facts.size, 1
         self._constant: dict[float, int] = {}  # Rows that hold just one value.
         self._spare: deque[Array] = deque(maxlen=8)
         self.places: dict[Moved, int] = {}
@@ -49,7 +57,7 @@ class Layout:
         self._sums: list[tuple[int, list[Term]]] = []  # Rows that are made, and of what.
         self._lanes: list[int] = []
         self._seed(start)
-        done = [(part, self._part(part)) for part in graph.parts]
+        done = [(part, self._part(part)) for part in structure.facts.parts]
         integrals: list[Todo] = []
         values, seen = zip(*(self._observed(each, integrals) for each in observed), strict=True)
         made, todo = len(self._sums), [(CALL, 0, 0, 0)]
@@ -103,24 +111,26 @@ class Layout:
 
     def _seed(self, start: str) -> None:
         """What the columns move at once: parameters, constants, places of taps, starts."""
-        graph, number = self.graph, {column: c for c, column in enumerate(self.columns)}
-        for known, column in graph.starting(start).moves if self.columns else ():
+        model, number = self.structure.model, {column: c for c, column in enumerate(self.columns)}
+        moves = self.structure.starting(start).moves if self.columns else ()
+        for known, column in moves:
             if known.kind == "state":
                 self._begun.add((known, column))
             elif column in number:
                 by = self._by.setdefault(known, {})
                 by[number[column]] = Term(slot=(known, column))
-        for part in graph.sampler.used:
-            i, prefix = part.part, graph.model.prefix(part.part)
-            for path in part.parameters.values():
+        taps = taps_of(model, self.structure.signals)
+        for part in self.structure.facts.parts:
+            i, prefix = part.part, model.prefix(part.part)
+            for path in floats_of(model.parts[i].parameters):
                 if f"{prefix}{path}" in number:
                     self._by[Stored(i, "p", path)] = {number[f"{prefix}{path}"]: Term()}
-            for tap in part.taps:
+            for tap in (each for each in taps if each.part == i):
                 column, known = f"{prefix}{tap.tap.delay}", Stored(i, "fraction", str(tap.number))
                 if tap.tap.delay and column in number:
                     self._by[known] = {number[column]: Term(slot=(known, column))}
             for column in self.columns:
-                for path in started_by(graph.model, i, column):
+                for path in started_by(model, i, column):
                     self._begun.add((Stored(i, "state", path), column))
 
     def _terms(self, result: Stored, c: int) -> list[Term]:
@@ -129,7 +139,7 @@ class Layout:
             return [self._by[result][c]] if c in self._by[result] else []
         return [
             partial.times(self._by[by][c])
-            for by, partial in self.graph.partials.get(result, {}).items()
+            for by, partial in self.structure.facts.partials.get(result, {}).items()
             if c in self._by.get(by, ())
         ]
 
@@ -152,7 +162,7 @@ class Layout:
         self._sums.append((row, terms))
         return row
 
-    def _part(self, part: PartGraph) -> list[Todo]:
+    def _part(self, part: PartStructure) -> list[Todo]:
         """What is done for a part: its recurrences, and the signals that others need."""
         todo: list[Todo] = []
         for group in part.groups:
@@ -197,8 +207,8 @@ class Layout:
 
     def _observed(self, number: int, integrals: list[Todo]) -> tuple[int, list[list[Term]]]:
         """Row of an observed signal, and what its derivatives are."""
-        place, integral = self.graph.observed[number]
-        value = self.graph.row_of[place]
+        place, integral = self.structure.observed[number]
+        value = self.structure.facts.row_of[place]
         seen = [self._terms(place, c) for c in range(len(self.columns))]
         if not integral:
             return value, seen
@@ -211,14 +221,14 @@ class Layout:
 
 @generating
 def layout_of(
-    graph: Graph, columns: tuple[str, ...], observed: tuple[int, ...], start: str
+    structure: Structure, columns: tuple[str, ...], observed: tuple[int, ...], start: str
 ) -> Layout:
     """What to do in every block for some columns: paths of parameters, and ``start.`` of a state.
 
-    `observed` says for each observation which of the graph's observed signals it is, and `start`
-    where the record begins.
+    `observed` says for each observation which of the structure's observed signals it is, and
+    `start` where the record begins.
     """
-    return Layout(graph, columns, observed, start)
+    return Layout(structure, columns, observed, start)
 
 
 def started_by(model: Model, part: int, column: str) -> tuple[str, ...]:

@@ -15,14 +15,14 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from itertools import chain
+from types import MappingProxyType
 from typing import Any, NamedTuple
 
 from swashplate.equations import graph
-from swashplate.equations.declaration import inlined
 from swashplate.equations.fields import floats_of
-from swashplate.equations.functions import Function, choose
+from swashplate.equations.functions import Function
 from swashplate.equations.graph import Node, names_in
 from swashplate.equations.marching.part import PartCode, Stored
 from swashplate.equations.marching.pieces import PIECE
@@ -36,7 +36,7 @@ _OWN = """
 n m j c lane first last worst h half value error total count size used progress values lines
 whole fraction params given constants states out flags records before measured weight outputs flat
 inputs table kept tangent lanes columns program plan sink room block met machine volts current speed
-voltage target counts coming cost rate integral shown choose width
+everything voltage target counts coming cost rate integral shown choose width
 """
 RESERVED = {*_OWN.split(), *(name for name in vars(math) if not name.startswith("_"))}
 """Names that the kernels use themselves."""
@@ -53,12 +53,6 @@ MACHINE = [
     "outputs",
 ]
 """What a step takes from a `Machine`."""
-
-
-@inlined
-def sample_at(record: Any, index: int, before: float) -> float:
-    """Sample of a record, or what it was before the record began."""
-    return record[index] if index >= 0 else before
 
 
 class Sampler:
@@ -87,9 +81,7 @@ class Sampler:
     ) -> None:
         self.model, self.signals = model, tuple(signals)
         taken = {*RESERVED, *self.signals, *(f"{each}_before" for each in self.signals)}
-        self.parts = [
-            PartCode(model, i, signals, each, taken) for i, each in enumerate(options)
-        ]
+        self.parts = [PartCode(model, i, signals, each, taken) for i, each in enumerate(options)]
         self.ends: list[list[Node]] = [[] for _ in self.parts]
         self.carried: list[list[str]] = [[] for _ in self.parts]
         self.sources: dict[Source, Node] = {}
@@ -140,10 +132,10 @@ class Sampler:
                 known[part.fraction(tap)] = Stored(i, "fraction", str(tap.number))
         return known
 
-    @property
-    def names(self) -> dict[str, Any]:
-        """What the text refers to."""
-        return {"sample_at": sample_at, "choose": choose, **self.functions}
+    def module(self, *texts: str) -> str:
+        """Text of a module of some functions, with the generated ones that they call."""
+        called = {n: t for each in self.functions.values() for n, t in each.texts.items()}
+        return "\n\n".join([*(f"@inlined\n{text}" for text in called.values()), *texts])
 
     def read(self, part: PartCode) -> set[str]:
         """Names from outside that a part needs."""
@@ -216,43 +208,63 @@ class Sampler:
         part: PartCode,
         places: Mapping[Stored, str],
         known: Mapping[Node, str],
-        pad: str = "",
+        more: Mapping[Stored, str] = MappingProxyType({}),
     ) -> Sampled:
         """A part's sample, with signals that other parts need and what is kept.
 
-        `places` are the texts of where numbers are kept; limits are one, a bit for each. `known`
-        nodes have names already.
+        `places` are the texts of where numbers are kept, and `more` of those that are kept if
+        ``everything`` is; limits are one, a bit for each. `known` nodes have names already.
         """
         own = [(source, n) for source, n in self.sources.items() if source.part == part.part]
-        kept = [each for each in places if each.part == part.part]
-        following = dict(leaves(part.following))
-        steps = [following[path] for path in self.carried[part.part]]
-        results = [node for _, node in own]
-        results += [part.margin] if part.margin is not None else []
-        for each in kept:
-            if each.kind == "limits":
-                results += part.limits
-            elif each.kind != "link":
-                results.append(part.node(each))
-        block = self.printed(part, [*results, *steps], known=known)
-        lines, texts = block.lines, iter(block.texts)
+        steps = dict(leaves(part.following))
+        margin = [] if part.margin is None else [part.margin]
+        kept = [each for each in places if each.part == part.part and each.kind != "link"]
+        results = [node for _, node in own] + margin
+        results += [node for each in kept for node in self.kept_nodes(part, each)]
+        results += [steps[path] for path in self.carried[part.part]]
+        block = self.printed(part, results, known=known)
+        texts = iter(block.texts)
+        lines = block.lines
         lines += [f"{part.source(source)} = {next(texts)}" for source, _ in own]
-        margin = ""
-        if part.margin is not None:
-            margin = part.fresh("margin")
-            lines += assigned(margin, next(texts))
+        margin_name = part.fresh("margin") if margin else ""
+        if margin:
+            lines += assigned(margin_name, next(texts))
         for each in kept:
-            if each.kind == "limits":
-                bits = [f"({1 << k} if {next(texts)} else 0)" for k in range(len(part.limits))]
-                lines += assigned(places[each], " | ".join(bits))
-            elif each.kind != "link":
-                lines += assigned(places[each], next(texts))
+            lines += self.stored(part, each, places[each], texts)
+        following = [*texts]
+        known = {**known, **block.names}
+        links = [each for each in places if each.part == part.part and each.kind == "link"]
+        lines += self.kept_lines(part, links, places, known)
+        later = [each for each in more if each.part == part.part]
+        if later:
+            lines += ["if everything:", *indented(self.kept_lines(part, later, more, known))]
+        return Sampled(lines, margin_name, following)
+
+    def kept_lines(
+        self,
+        part: PartCode,
+        kept: Sequence[Stored],
+        places: Mapping[Stored, str],
+        known: Mapping[Node, str],
+    ) -> list[str]:
+        """Lines that keep some numbers of a part, behind its sample."""
+        nodes = [node for each in kept for node in self.kept_nodes(part, each)]
+        block = self.printed(part, nodes, known=known)
+        lines, texts = block.lines, iter(block.texts)
         for each in kept:
-            if each.kind == "link":
-                again = {**known, **block.names}
-                observed = self.printed(part, [self.observed(part, each)], known=again)
-                lines += [*observed.lines, f"{places[each]} = {observed.texts[0]}"]
-        return Sampled(lines, margin, [*texts])
+            lines += self.stored(part, each, places[each], texts)
+        return lines
+
+    def kept_nodes(self, part: PartCode, stored: Stored) -> list[Node]:
+        """What a number that is kept is made of: limits of a bit each."""
+        return part.limits if stored.kind == "limits" else [self.observed(part, stored)]
+
+    def stored(self, part: PartCode, stored: Stored, place: str, texts: Iterator[str]) -> list[str]:
+        """Lines that keep a number, from the texts of what it is made of."""
+        if stored.kind != "limits":
+            return assigned(place, next(texts))
+        bits = [f"({1 << k} if {next(texts)} else 0)" for k in range(len(part.limits))]
+        return assigned(place, " | ".join(bits))
 
     def observed(self, part: PartCode, stored: Stored) -> Node:
         """A number that is kept, of what is known at its part's end."""
@@ -301,20 +313,26 @@ def lower(one: Node, two: Node) -> Node:
 
 
 def march_source(
-    model: Model, signals: Sequence[str], options: Sequence[Any], places: Mapping[Stored, str]
-) -> tuple[str, dict[str, Any]]:
-    """Text of the march over samples as a `piece`, and what its names mean.
+    model: Model,
+    signals: Sequence[str],
+    options: Sequence[Any],
+    places: Mapping[Stored, str],
+    more: Mapping[Stored, str] = MappingProxyType({}),
+) -> str:
+    """Text of a module with the march over samples as a `piece`.
 
-    `places` says what is kept, and where it goes at sample ``n``.
+    `places` says what is kept, and where it goes at sample ``n``; `more` what is kept, too, if the
+    second number of ``met`` is not zero.
     """
-    sampler = Sampler(model, signals, options, [*places])
+    sampler = Sampler(model, signals, options, [*places, *more])
     parts = sampler.used
     lines, saved, samples = ["last = first + count"], list[str](), list[list[str]]()
     for k, signal in enumerate(sampler.signals):
         lines += [f"{signal} = records[{k}]", f"{signal}_before = before[{k}]"]
+    lines += ["everything = met[1] != 0.0"] if more else []
     for part in parts:
         ahead, known = sampler.ahead(part, sampler.ends[part.part])
-        sample = sampler.body(part, places, known)
+        sample = sampler.body(part, places, known, more)
         states = sampler.states(part, sample.following)
         lines += [*sampler.places(part), *ahead, *states.load]
         saved += states.save
@@ -349,13 +367,13 @@ def march_source(
             "met[0] = worst if worst < met[0] or worst != worst else met[0]",
         ]
     says = f"March {model.name} over its inputs."
-    return function_source(f"march({PIECE})", says, lines, "@piece"), sampler.names
+    return sampler.module(function_source(f"march({PIECE})", says, lines, "@piece"))
 
 
 def step_source(
     model: Model, signals: Sequence[str], options: Sequence[Any], stored: Sequence[Stored]
-) -> tuple[str, dict[str, Any], int]:
-    """Text of one sample, for steppers and loops, what it refers to, and how many constants it has.
+) -> tuple[str, int]:
+    """Text of a module of one sample, for steppers and loops, and how many constants it has.
 
     ``prepare(params, given, h, constants)`` computes constants once. ``step(machine)`` shifts the
     newest inputs into the delay lines (a row for each signal, newest first), fills the outputs with
@@ -391,13 +409,14 @@ def step_source(
         lines += sample.lines
         if sample.margin:
             lowest = lower(graph.name("worst"), graph.name(sample.margin))
-            ends.append(f"worst = {sampler.printed(part, [lowest]).texts[0]}")
+            compared = sampler.printed(part, [lowest])
+            ends += [*compared.lines, f"worst = {compared.texts[0]}"]
         ends += [*states.step, *states.save]
     head, says = "prepare(params, given, h, constants)", f"Constants of {model.name}."
     prepared = function_source(head, says, [*prepare, "return"])
     says, lines = f"One sample of {model.name}.", [*lines, *ends, "return worst"]
     stepped = function_source("step(machine)", says, lines, "@inlined")
-    return f"{prepared}\n\n{stepped}", sampler.names, count
+    return sampler.module(prepared, stepped), count
 
 
 def output_of(model: Model, output: str) -> tuple[Stored, bool]:

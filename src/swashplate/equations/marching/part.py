@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterable, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from functools import cached_property, lru_cache
 from typing import Any, NamedTuple, get_type_hints
 
@@ -160,7 +160,7 @@ class PartCode:
             return next(iter(sources.values()))
         return self.link(link.equation, link.name, sources)
 
-    def link(self, equation: Equation, name: str, sources: dict[str, Value]) -> Node:
+    def link(self, equation: Equation, name: str, sources: Mapping[str, Value]) -> Node:
         """A signal that an equation makes of several."""
         made = self.trace.call(equation, sources)
         assert isinstance(made, Node)

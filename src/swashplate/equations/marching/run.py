@@ -13,7 +13,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swashplate.equations.cache import generated, kernel
-from swashplate.equations.functions import compiled_names, generating
 from swashplate.equations.declaration import inlined, interpreted
 from swashplate.equations.fields import (
     check_mapping,
@@ -23,9 +22,19 @@ from swashplate.equations.fields import (
     numbers_of,
     value_at,
 )
+from swashplate.equations.functions import FUNCTIONS, generating
+from swashplate.equations.keeping import kept, key_of
+from swashplate.equations.language import plain
 from swashplate.equations.marching.march import march_source
 from swashplate.equations.marching.part import Stored, taps_of
-from swashplate.equations.marching.pieces import Planned, addresses, piece, pointers, run_once
+from swashplate.equations.marching.pieces import (
+    Piece,
+    Planned,
+    addresses,
+    piece,
+    pointers,
+    run_once,
+)
 from swashplate.equations.model import (
     Link,
     Model,
@@ -35,7 +44,6 @@ from swashplate.equations.model import (
     place,
     state_paths,
 )
-from swashplate.equations.language import plain
 from swashplate.errors import DomainError, InputError, ParameterError
 
 Array = NDArray[np.float64]
@@ -323,22 +331,65 @@ def instance_of(model: Model, p: Any, *, options: Any = None, given: Any = None)
 # --- marching -------------------------------------------------------------------------------------
 
 
-def module(name: str, text: str, names: Mapping[str, Any]) -> dict[str, Any]:
-    """A generated module with what every one of them needs."""
-    mathematics = {k: v for k, v in vars(math).items() if not k.startswith("_")}
-    used = compiled_names(names)
-    return generated(name, text, {**mathematics, "kernel": kernel, "inlined": inlined, **used})
+@inlined
+def sample_at(record: Any, index: int, before: float) -> float:
+    """Sample of a record, or what it was before the record began."""
+    return record[index] if index >= 0 else before
+
+
+LIBRARY: dict[str, Any] = {
+    **{name: each for name, each in vars(math).items() if not name.startswith("_")},
+    "kernel": kernel,
+    "inlined": inlined,
+    "piece": piece,
+    "sample_at": sample_at,
+    **FUNCTIONS,
+}
+"""What generated modules call besides their own functions."""
+
+
+def module(name: str, text: str, **more: Any) -> dict[str, Any]:
+    """A generated module, compiled."""
+    return generated(name, text, LIBRARY | more)
+
+
+@dataclass(frozen=True)
+class PlannedPiece:
+    """A piece as text, which is compiled when it is first called for."""
+
+    file: str
+    """How the name of its module begins."""
+    member: str
+    text: str
+
+    def __call__(self) -> Piece:
+        """The piece, compiled."""
+        return _compiled(self)
+
+
+@generating
+def _compiled(planned: PlannedPiece) -> Piece:
+    return module(planned.file, planned.text)[planned.member]
 
 
 @generating
 def march_of(
-    model: Model, signals: tuple[str, ...], options: tuple[Any, ...], stored: tuple[Stored, ...]
+    model: Model,
+    signals: tuple[str, ...],
+    options: tuple[Any, ...],
+    stored: tuple[Stored, ...],
+    more: tuple[Stored, ...] = (),
 ) -> Planned:
-    """The march over whole records, a row for each number that is kept."""
-    rows = {each: f"flat[{row} * count + n]" for row, each in enumerate(stored)}
-    text, names = march_source(model, signals, options, rows)
-    names["piece"] = piece
-    return generating(lambda: module(f"{model.name}_march", text, names)["march"])
+    """The march over whole records, a row for each number that is kept, then for each of `more`."""
+    rows = {each: f"flat[{row} * count + n]" for row, each in enumerate((*stored, *more))}
+    always = {each: rows[each] for each in stored}
+    later = {each: rows[each] for each in more}
+    text = kept(
+        f"{model.name}_march",
+        (key_of(model), signals, options, stored, more),
+        lambda: march_source(model, signals, options, always, later),
+    )
+    return PlannedPiece(f"{model.name}_march", "march", text)
 
 
 def marched(
@@ -349,15 +400,20 @@ def marched(
     stored: tuple[Stored, ...],
     cause: str = "input",
     begin: Mapping[str, float] = MappingProxyType({}),
+    *,
+    more: tuple[Stored, ...] = (),
+    everything: bool = False,
 ) -> Array:
     """(r, n) numbers in the order of `stored`, marched over whole records; limits as sums of bits.
 
     From where `started` begins, or from states by path; `cause` is what drives the model, for the
-    sentence where it leaves its domain or a number overflows.
+    sentence where it leaves its domain or a number overflows. One and the same march can leave
+    `more` numbers, which follow in the table if it is to leave `everything`.
     """
     signals, size = tuple(records), next(iter(records.values())).size
-    planned = march_of(instance.model, signals, instance.options, stored)
-    table, met = np.empty((len(stored), size)), np.array([np.inf])
+    planned = march_of(instance.model, signals, instance.options, stored, more)
+    stored = (*stored, *more) if everything else stored
+    table, met = np.empty((len(stored), size)), np.array([np.inf, float(everything)])
     states = begun(instance, started, begin)
     values = tuple(np.ascontiguousarray(each, dtype=np.float64) for each in records.values())
     places = instance.places(signals, h)

@@ -25,6 +25,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swashplate.equations.functions import generating
+from swashplate.equations.keeping import kept, key_of
 from swashplate.equations.marching.march import output_of, step_source
 from swashplate.equations.marching.part import Stored
 from swashplate.equations.marching.record import check_rate
@@ -73,8 +74,12 @@ def _kernels(
     model: Model, inputs: tuple[str, ...], options: tuple[Any, ...], stored: tuple[Stored, ...]
 ) -> tuple[Callable[..., None], Callable[[Machine], float], int]:
     """Compiled constants of a model, its step, and how many constants there are."""
-    text, names, count = step_source(model, inputs, options, stored)
-    made = module(f"{model.name}_step", text, names)
+    text, count = kept(
+        f"{model.name}_step",
+        (key_of(model), inputs, options, stored),
+        lambda: step_source(model, inputs, options, stored),
+    )
+    made = module(f"{model.name}_step", text)
     return made["prepare"], made["step"], count
 
 

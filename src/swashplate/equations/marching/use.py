@@ -28,8 +28,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from swashplate.equations.cache import kernel
-from swashplate.equations.functions import generating
 from swashplate.equations.fields import check_mapping
+from swashplate.equations.functions import generating
 from swashplate.equations.marching.derivatives import jacobian
 from swashplate.equations.marching.march import output_of
 from swashplate.equations.marching.observation import Own, every_sample
@@ -65,14 +65,21 @@ S = TypeVar("S")
 T = TypeVar("T", bound=np.generic)
 
 
+class Left(NamedTuple):
+    """What a march leaves, by name: at first, and besides if it is to leave everything."""
+
+    first: dict[str, Stored]
+    more: dict[str, Stored]
+
+
 @lru_cache(maxsize=256)
-def stored_of(
-    model: Model, names: tuple[str, ...], limits: tuple[int, ...]
-) -> tuple[tuple[str, ...], tuple[Stored, ...]]:
-    """What a march leaves for some signals, and for all limits of some parts: names and places."""
-    places = {name: output_of(model, name)[0] for name in names}
-    places |= {f"limits {part}": Stored(part, "limits") for part in limits}
-    return tuple(places), tuple(places.values())
+def left_by(model: Model, kept: tuple[str, ...]) -> Left:
+    """What a march leaves of a model of which some signals are kept from the first march."""
+    first = {name: output_of(model, name)[0] for name in kept or model.every_signal}
+    more = {name: output_of(model, name)[0] for name in model.every_signal if name not in first}
+    limited = dict.fromkeys(part for part, _ in model.limit_bits.values())
+    more |= {f"limits {part}": Stored(part, "limits") for part in limited}
+    return Left(first, more)
 
 
 def read_only(array: NDArray[T]) -> NDArray[T]:
@@ -110,21 +117,29 @@ class Run(Tabular):
     """Signals that `plot` shows unless others are named; all of them if none is here."""
     kept: ClassVar[tuple[str, ...]] = ()
     """Signals that the first march leaves; all of them if none is named."""
-    later: ClassVar[tuple[str, ...]] = ()
-    """Signals that the second one leaves, besides limits."""
 
     def marched(self) -> Self:
         """The run with its first march done."""
-        self._march(self.kept or self.instance.model.every_signal)
+        self._march()
         return self
 
-    def _march(self, names: tuple[str, ...], limits: tuple[int, ...] = ()) -> None:
-        """Find signals, and all limits of some parts."""
-        left, places = stored_of(self.instance.model, names, limits)
+    def _march(self, *, everything: bool = False) -> None:
+        """Find the signals that are kept from the first march, or all of them and the limits."""
+        first, more = left_by(self.instance.model, self.kept)
         records = {name: each.values for name, each in self.records.items()}
-        start, step, cause = self.started, self.record.step, self.driven_by
-        out = marched(self.instance, records, step, start, places, cause, self.begin)
-        self.found.update(zip(left, out, strict=True))
+        table = marched(
+            self.instance,
+            records,
+            self.record.step,
+            self.started,
+            tuple(first.values()),
+            self.driven_by,
+            self.begin,
+            more=tuple(more.values()),
+            everything=everything,
+        )
+        names = (*first, *more) if everything else (*first,)
+        self.found.update(zip(names, table, strict=True))
 
     @property
     def started(self) -> Started:
@@ -319,7 +334,7 @@ class Run(Tabular):
                 )
             found[signal] = total
         if signal not in found:
-            self._march_again(self.later if signal in self.later else (signal,))
+            self._march(everything=True)
         return found[signal]
 
     def sampled(self, fine: NDArray[T]) -> NDArray[T]:
@@ -340,14 +355,10 @@ class Run(Tabular):
             raise InputError(f"There is no limit '{limit}'; there are {known}.")
         part, bit = limits[limit]
         if f"limits {part}" not in self.found:
-            self._march_again(self.later)
+            self._march(everything=True)
         bits = self.found[f"limits {part}"]
         acts = (bits if fine else self.sampled(bits)).astype(np.uint32) & np.uint32(1 << bit)
         return np.asarray(acts != 0)
-
-    def _march_again(self, names: tuple[str, ...]) -> None:
-        parts = {part for part, _ in self.instance.model.limit_bits.values()}
-        self._march(names, tuple(sorted(parts)))
 
 
 @runtime_checkable

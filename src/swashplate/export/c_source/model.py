@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from swashplate.equations import graph
 from swashplate.equations.fields import Definition, declared_by, floats_of, value_at
-from swashplate.equations.functions import GENERATING, choose
+from swashplate.equations.functions import GENERATING, Function
 from swashplate.equations.graph import Node, names_in
 from swashplate.equations.language import parsed, plain
 from swashplate.equations.marching.march import Sampler, output_of
@@ -431,14 +431,16 @@ class Writer:
     def prepare(self) -> Any:
         """``prepare(params, given, options, h, constants)``, compiled: fills the constants."""
         lines: list[str] = []
-        names: dict[str, Any] = {"choose": choose}
+        functions: dict[str, Function] = {}
         for part in self.parts:
-            own, functions = part.prepared()
+            own, called = part.prepared()
             lines += own
-            names |= functions
+            functions |= called
         head = "prepare(params, given, options, h, constants)"
         text = function_source(head, "What follows from numbers, options and the step.", lines)
-        return module(f"{self.model.name}_constants", text, names)["prepare"]
+        inner = {name: text for each in functions.values() for name, text in each.texts.items()}
+        texts = [*(f"@inlined\n{each}" for each in inner.values()), text]
+        return module(f"{self.model.name}_constants", "\n\n".join(texts))["prepare"]
 
 
 def numbers(exported: Exported, instance: Instance, step: float) -> Array:

@@ -10,6 +10,8 @@ each other (strongly connected components, a `recurrence` each), behind those th
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
 from graphlib import TopologicalSorter
 from itertools import product
 from typing import Any, NamedTuple
@@ -18,11 +20,12 @@ from swashplate.equations import graph
 from swashplate.equations.functions import generating
 from swashplate.equations.gradients import Derived, Gradients, derived_function
 from swashplate.equations.graph import Node, names_in, rewritten
+from swashplate.equations.keeping import kept, key_of
 from swashplate.equations.marching.march import Sampler, march_source, output_of
 from swashplate.equations.marching.part import PartCode, Stored
-from swashplate.equations.marching.pieces import PIECE, Planned, piece
+from swashplate.equations.marching.pieces import PIECE
 from swashplate.equations.marching.rows import STRIDE
-from swashplate.equations.marching.run import module
+from swashplate.equations.marching.run import PlannedPiece
 from swashplate.equations.model import Model, Source
 from swashplate.equations.printing import function_source, indented
 from swashplate.equations.values import leaves
@@ -53,9 +56,10 @@ class Group(NamedTuple):
     piece: int  # See `recurrence`.
 
 
-class PartGraph(NamedTuple):
+class PartStructure(NamedTuple):
     """What is done for a part behind the march."""
 
+    part: int
     fill: int | None  # Piece that fills in its partial derivatives.
     rows: range  # Places of these.
     groups: list[Group]
@@ -72,14 +76,78 @@ class Starting(NamedTuple):
     derived: Derived
 
 
-class Graph:
-    """A model's whole structure for some observed signals, and the pieces of its march.
+class Facts(NamedTuple):
+    """What follows from a model's equations for some observed signals: plain data."""
 
-    `observed` says what is observed, and whether as an integral; `row_of` has the first place of
-    each number that the march leaves in the block; `partials` of each result (signal, or state at
-    the next sample) its partial derivatives by parameters (``p``), constants (``k``), places of
-    taps (``fraction``), states and signals.
-    """
+    size: int
+    """Of the block; its first row is for what nobody reads."""
+    row_of: dict[Stored, int]
+    """First place of each number that the march leaves in the block."""
+    partials: dict[Stored, dict[Stored, Term]]
+    """Of each result (signal, or state at the next sample) its partial derivatives by parameters
+    (``p``), constants (``k``), places of taps (``fraction``), states and signals."""
+    pieces: list[PlannedPiece]
+    """The march comes first."""
+    parts: list[PartStructure]
+    """Parts that are needed."""
+
+
+@dataclass(frozen=True, eq=False)
+class Structure:
+    """A model's whole structure for some observed signals, and the pieces of its march."""
+
+    model: Model
+    signals: tuple[str, ...]
+    """External ones that are given as records."""
+    options: tuple[Any, ...]
+    outputs: tuple[str, ...]
+    """Signals that are observed."""
+    facts: Facts
+
+    @cached_property
+    def observed(self) -> list[tuple[Stored, bool]]:
+        """What is observed, and whether as an integral."""
+        return [output_of(self.model, each) for each in self.outputs]
+
+    def starting(self, start: str) -> Starting:
+        """Constants and states where a record begins at rest or settled; call it `generating`."""
+        if start not in self._starting:
+            model, asked = self.model, (self.signals, self.options, self.outputs)
+            self._starting[start] = kept(
+                f"{model.name}_start",
+                (key_of(model), *asked, start),
+                lambda: _structured(model, *asked).started(start),
+            )
+        return self._starting[start]
+
+    @cached_property
+    def _starting(self) -> dict[str, Starting]:
+        return {}
+
+
+@generating
+def structure_of(
+    model: Model, signals: tuple[str, ...], options: tuple[Any, ...], observed: tuple[str, ...]
+) -> Structure:
+    """A model's structure for some observed signals, made once."""
+    facts = kept(
+        f"{model.name}_jacobian",
+        (key_of(model), signals, options, observed),
+        lambda: _structured(model, signals, options, observed).facts,
+    )
+    return Structure(model, signals, options, observed, facts)
+
+
+@generating
+def _structured(
+    model: Model, signals: tuple[str, ...], options: tuple[Any, ...], observed: tuple[str, ...]
+) -> _Structuring:
+    """The equations of a model, read and differentiated."""
+    return _Structuring(model, signals, options, observed)
+
+
+class _Structuring:
+    """Reads a model's equations, and finds out what flows into what."""
 
     def __init__(
         self,
@@ -89,26 +157,29 @@ class Graph:
         observed: tuple[str, ...],
     ) -> None:
         self.model = model
-        self.observed = [output_of(model, each) for each in observed]
-        places = [place for place, _ in self.observed]
-        self.sampler = Sampler(model, signals, options, places)
-        self.size = STRIDE  # Of the block; its first row is for what nobody reads.
+        self.observed = [output_of(model, each)[0] for each in observed]
+        self.sampler = Sampler(model, signals, options, self.observed)
+        self.size = STRIDE
         self.row_of: dict[Stored, int] = {}
         self._named: dict[str, int] = {}  # Place of each number's row by its name in the code.
         self.partials: dict[Stored, dict[Stored, Term]] = {}
-        self.pieces: list[Planned] = []  # The march, made last, comes first.
+        self.pieces: list[PlannedPiece] = []
         self._constants: dict[int, dict[Node, str]] = {}
         """By part, what follows from parameters alone, with its names."""
         # part by part, so that the pieces of the first ones are the same whatever follows
         self.parts = [self._part(part) for part in self.sampler.used]
-        for place in places:
+        for place in self.observed:
             if place.kind == "link":
                 self._keep(place)
                 self.partials[place] = self._link(place)
-        kept = {each: f"flat[{row} + n - first]" for each, row in self.row_of.items()}
-        text, names = march_source(model, signals, options, kept)
-        self.pieces.insert(0, _planned(f"{model.name}_march", "march", text, names))
-        self._starting: dict[str, Starting] = {}
+        left = {each: f"flat[{row} + n - first]" for each, row in self.row_of.items()}
+        text = march_source(model, signals, options, left)
+        self.pieces.insert(0, PlannedPiece(f"{model.name}_march", "march", text))
+
+    @property
+    def facts(self) -> Facts:
+        """What was found out."""
+        return Facts(self.size, self.row_of, self.partials, self.pieces, self.parts)
 
     def number_of(self, source: Source) -> Stored:
         """A signal of a part, or of its state."""
@@ -128,10 +199,10 @@ class Graph:
 
     # -- what flows ----------------------------------------------------------------------------
 
-    def _part(self, part: PartCode) -> PartGraph:
+    def _part(self, part: PartCode) -> PartStructure:
         """Differentiate what is needed of a part, and plan its pieces."""
         i, sampler = part.part, self.sampler
-        observed = [place for place, _ in self.observed if place.part == i]
+        observed = [place for place in self.observed if place.part == i]
         needed = [self.number_of(source) for source in sampler.sources if source.part == i]
         states = {path: Stored(i, "state", path) for path in sampler.carried[i]}
         following, here = dict(leaves(part.following)), dict(leaves(part.state))
@@ -165,7 +236,7 @@ class Graph:
             factors = [place for row in own for term in row for place in term.rows]
             self.pieces.append(recurrence(pattern))
             groups.append(Group(group, factors, len(self.pieces)))
-        return PartGraph(filled, rows, groups, needed, behind)
+        return PartStructure(i, filled, rows, groups, needed, behind)
 
     def _fill(self, part: PartCode, results: Mapping[Stored, Node]) -> tuple[int | None, range]:
         """Piece that writes partial derivatives at known states into rows; places of these."""
@@ -215,9 +286,8 @@ class Graph:
         lines += ["for m in range(count):", *indented(inner)]
         name = f"fill_{part.own.name}"
         text = function_source(f"{name}({PIECE})", says, lines, "@piece")
-        self.pieces.append(
-            _planned(f"{self.model.name}_{name}", name, text, self.sampler.names)
-        )
+        file = f"{self.model.name}_{name}"
+        self.pieces.append(PlannedPiece(file, name, self.sampler.module(text)))
         return len(self.pieces), range(first, self.size)
 
     def _link(self, place: Stored) -> dict[Stored, Term]:
@@ -236,13 +306,8 @@ class Graph:
 
     # -- where it starts -----------------------------------------------------------------------
 
-    def starting(self, start: str) -> Starting:
-        """Constants and states where a record begins at rest or settled; call it `generating`."""
-        if start not in self._starting:
-            self._starting[start] = self._started(start)
-        return self._starting[start]
-
-    def _started(self, start: str) -> Starting:
+    def started(self, start: str) -> Starting:
+        """Constants and states where a record begins, with their derivatives."""
         sampler = self.sampler
         outside = {n: each for n, each in sampler.outside().items() if each.kind != "state"}
         results: dict[Stored, Node] = {}
@@ -263,8 +328,8 @@ class Graph:
                 for (source, _), node in zip(own, signals, strict=True)
             }
             results |= {Stored(i, "k", name): node for node, name in self._constants[i].items()}
-            kept = [each for each in self.partials if each[:2] == (i, "state")]
-            results |= {state: starts[state.path] for state in kept}
+            carried = [each for each in self.partials if each[:2] == (i, "state")]
+            results |= {state: starts[state.path] for state in carried}
             by |= {name: f"{prefix}{path}" for name, path in part.parameters.items()}
             labels |= part.trace.labels
         arguments = sorted(names_in(results.values()) & outside.keys())
@@ -283,21 +348,13 @@ class Graph:
         return Starting(tuple(outside[name] for name in arguments), moves, derived)
 
 
-@generating
-def graph_of(
-    model: Model, signals: tuple[str, ...], options: tuple[Any, ...], observed: tuple[str, ...]
-) -> Graph:
-    """A model's structure for some observed signals, made once."""
-    return Graph(model, signals, options, observed)
-
-
 def abreast(states: int) -> int:
     """Columns of a recurrence side by side: they fill the time that one waits for itself."""
     return 8 if states == 1 else 2
 
 
 @generating
-def recurrence(pattern: tuple[tuple[float | None, ...], ...]) -> Planned:
+def recurrence(pattern: tuple[tuple[float | None, ...], ...]) -> PlannedPiece:
     """Piece that runs y[n+1] = A[n] y[n] + g[n] for some columns, a few side by side.
 
     Of A `pattern` has what does not change, and None for what does. The second argument is the
@@ -328,12 +385,7 @@ def recurrence(pattern: tuple[tuple[float | None, ...], ...]) -> Planned:
     lines += indented([*ahead, "for m in range(count):", *indented(inner), *after])
     name, says = f"recurrence_{size}", f"Derivatives of {size} states that wait for each other."
     head = PIECE.replace("first", "size").replace("whole", "lanes").replace("params", "tangent")
-    return _planned(name, name, function_source(f"{name}({head})", says, lines, "@piece"), {})
-
-
-def _planned(file: str, name: str, text: str, names: Mapping[str, Any]) -> Planned:
-    """A piece, in a module of its own."""
-    return generating(lambda: module(file, text, {"piece": piece, **names})[name])
+    return PlannedPiece(name, name, function_source(f"{name}({head})", says, lines, "@piece"))
 
 
 def _sum(terms: Sequence[str]) -> str:

@@ -1,0 +1,136 @@
+"""What was made of a model's equations, kept on disk: a warm process reads none of them.
+
+What is kept is plain data: texts of generated modules, and where their numbers go. It is found by a
+key that covers all that it follows from: every equation, constant and type that the model reaches,
+declared derivatives among them, and the engine's own source.
+"""
+
+from __future__ import annotations
+
+import pickle
+from collections.abc import Callable, Iterable
+from functools import cache, lru_cache
+from hashlib import blake2b
+from pathlib import Path
+from typing import Any, TypeVar, get_type_hints
+
+from swashplate.equations.cache import generated_folder, is_recent, written
+from swashplate.equations.declaration import RULES, closure, closure_hash, is_function
+from swashplate.equations.language import is_named_tuple, plain
+from swashplate.equations.model import Model
+
+T = TypeVar("T")
+
+SIZE = 16
+"""Bytes of the hash that a file begins with."""
+
+
+def kept(name: str, key: tuple[Any, ...], make: Callable[[], T]) -> T:
+    """What was made before under this key, or what is made now.
+
+    Parameters
+    ----------
+    name : str
+        How the file's name begins.
+    key : tuple
+        Of strings, numbers and named tuples of them: all that the result follows from, the engine's
+        source apart.
+    make : callable
+        Makes plain data: it is pickled.
+
+    Returns
+    -------
+    object
+        What `make` returned, in this process or another. A damaged file is made anew.
+    """
+    digest = blake2b(f"{engine_hash()} {key!r}".encode(), digest_size=10).hexdigest()
+    folder = generated_folder()
+    path = None if folder is None else folder / f"{name}_{digest}.kept"
+    found = _read(path)
+    if found is not None:
+        result: T = found[0]
+        return result
+    result = make()
+    if path is not None:
+        payload = pickle.dumps((result,), protocol=pickle.HIGHEST_PROTOCOL)
+        written(path, _hash(payload) + payload)
+    return result
+
+
+def _hash(payload: bytes) -> bytes:
+    return blake2b(payload, digest_size=SIZE).digest()
+
+
+def _read(path: Path | None) -> tuple[Any, ...] | None:
+    """What a file holds; None if there is none, or it is damaged."""
+    if path is None:
+        return None
+    try:
+        content = path.read_bytes()
+        if _hash(content[SIZE:]) != content[:SIZE]:
+            return None
+        is_recent(path)
+        found: tuple[Any, ...] = pickle.loads(content[SIZE:])
+    except Exception:  # no file, or whatever unpickling garbage may raise
+        return None
+    return found
+
+
+@cache
+def engine_hash() -> str:
+    """Hash of the source that makes texts of equations."""
+    digest = blake2b(digest_size=10)
+    folder = Path(__file__).parent
+    for path in sorted(folder.rglob("*.py")):
+        digest.update(path.read_bytes())
+    return digest.hexdigest()
+
+
+# --- keys of models -------------------------------------------------------------------------------
+
+
+def fingerprint(equations: Iterable[Any]) -> str:
+    """Hash of some equations, of all that they reach, and of derivatives that are declared."""
+    digest = blake2b(digest_size=16)
+    pending, met = [*equations], set[Any]()
+    while pending:
+        equation = pending.pop()
+        if plain(equation) in met:
+            continue
+        met.add(plain(equation))
+        digest.update(f"{plain(equation).__name__} {closure_hash(equation)}\0".encode())
+        for reached in closure(equation).values():
+            rule = RULES.get(plain(reached)) if is_function(reached) else None
+            if rule is not None:
+                pending.append(rule)
+    return digest.hexdigest()
+
+
+@lru_cache(maxsize=256)
+def key_of(model: Model) -> str:
+    """Hash of all of a model that decides what is generated for it."""
+    digest = blake2b(digest_size=16)
+    equations: list[Any] = [link.equation for link in model.links.values() if link.equation]
+    for part in model.parts:
+        kinds = (part.parameters, part.state, part.inputs, part.options, part.given)
+        said = (
+            part.name,
+            [None if kind is None else _shape(kind) for kind in kinds],
+            sorted(part.taps.items()),
+            sorted(part.defaults.items()),
+        )
+        digest.update(f"{said!r}\0".encode())
+        named = (part.step, part.sample, part.rest, part.settled, part.limits, part.domain)
+        digest.update(f"{[each is not None for each in named]}\0".encode())
+        equations += [each for each in named if each is not None]
+    links = [(name, link.sources) for name, link in model.links.items()]
+    digest.update(f"{model.name} {links!r} {sorted(model.integrals.items())!r}\0".encode())
+    digest.update(fingerprint(equations).encode())
+    return digest.hexdigest()
+
+
+def _shape(kind: Any) -> tuple[Any, ...]:
+    """What of a class of named tuples decides what is generated."""
+    hints = get_type_hints(kind)
+    inner = [(n, _shape(hints[n]) if is_named_tuple(hints.get(n)) else "") for n in kind._fields]
+    return kind.__qualname__, inner, sorted(kind._field_defaults.items())
