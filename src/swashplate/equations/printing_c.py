@@ -101,10 +101,17 @@ def wrapped(line: str) -> list[str]:
         if not ends:
             break
         late = [at for at in ends if at > WIDTH // 2] or ends[-1:]
-        at = min(late, key=lambda at: (_depth(rest[:at]), rest[at - 2] not in ",;", -at))
+        at = min(late, key=lambda at: (_depth(rest[:at]), _rank(rest, at), -at))
         lines.append(rest[:at].rstrip())
         rest = f"{indent}    {rest[at:]}"
     return [*lines, rest]
+
+
+def _rank(line: str, at: int) -> int:
+    """How well a line ends at a place: before a choice best, before a factor or a value worst."""
+    marks = (("?", ":"), ("&&", "||"), ("+", "-"), ("*", "/", "="))
+    ranks = [rank for rank, each in enumerate(marks) if line[at:].startswith(each)]
+    return ranks[0] if ranks else 1
 
 
 def _depth(text: str) -> int:

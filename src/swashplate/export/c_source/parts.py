@@ -91,11 +91,12 @@ class PartInC:
         }
 
     def labels(self, trace: Trace, ends: Iterable[Node]) -> dict[Node, str]:
-        """What values are called, after the group of parameters that they follow if it is one."""
+        """What values are called, after the group of parameters and states that they follow."""
         groups = {}
-        for path, node in leaves(self.part.p):
-            group, dot, _ = path.rpartition(".")
-            groups[node] = f"{group.replace('.', '_')}_" if dot else ""
+        for value in (self.part.p, self.part.state):
+            for path, node in leaves(value):
+                group, dot, _ = path.rpartition(".")
+                groups[node] = f"{group.replace('.', '_')}_" if dot else ""
         several = len({*groups.values()} - {""}) > 1
         follows: dict[Node, set[str]] = {}
         labels = {node: c_name(label.replace(".", "_")) for node, label in trace.labels.items()}
