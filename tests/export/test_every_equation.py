@@ -6,6 +6,7 @@ constructs' test show every construct that an equation may use.
 
 import ctypes
 from functools import cache
+from math import floor
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -14,7 +15,7 @@ from tests.equations import test_constructs
 from tests.equations.test_all_equations import EQUATIONS, equations_of
 from tests.export.twins import InC, flagged
 
-from swashplate.equations import equation
+from swashplate.equations import equation, repeated, root
 from swashplate.equations.printing_c import Loops, helpers_in
 from swashplate.errors import EquationError
 from swashplate.export.c_source import equation_in_c
@@ -81,6 +82,23 @@ def turned(p: Register, x: float) -> Register:
     for i in range(3):
         total += values[i]
     return Register(total, values[0])
+
+
+@equation
+def counted(state: float, number: float, steps: float) -> float:
+    return state + steps * number
+
+
+@equation
+def beyond(x: float, steps: float, on: bool | None) -> float:
+    return x * x * x - steps if on is None else x - steps
+
+
+@equation
+def looped(x: float, on: bool | None) -> float:
+    """Whole numbers among what loops begin with and are given, and an option."""
+    steps = floor(min(max(x, -1e6), 1e6))
+    return repeated(counted, 3.0, 0, steps) + root(beyond, -200, 200.0, steps, on)
 
 
 SETS = {

@@ -208,7 +208,8 @@ def _inner(outer: Trace, source: Parsed, leading: Sequence[Value], rest: Sequenc
             return Flag(formal(value.value, stem, always=False), value.text) if symbolic else value
         if value.op == "number" and not always:
             return value
-        node = graph.name(fresh_name(stem, taken), value.kind)
+        kind = "float" if always and value.kind == "int" else value.kind
+        node = graph.name(fresh_name(stem, taken), kind)
         stands_for[node] = value
         return node
 

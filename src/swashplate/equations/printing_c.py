@@ -245,8 +245,11 @@ class C(Language):
     ) -> list[str]:
         """A call of what does the loop: it returns a root, and moves a state where it stands."""
         name = self._functions.name_of(call.value.loop, self._taken)
-        pairs = zip(call.args, given, strict=True)
-        texts = [as_double(node, (text, 0))[0] for node, text in pairs]
+        own = 2 if call.value.loop.kind == "root" else 1 + len(targets)
+        texts = [
+            as_double(node, (text, 0))[0] if k < own else text
+            for k, (node, text) in enumerate(zip(call.args, given, strict=True))
+        ]
         if call.value.loop.kind == "root":
             (target,) = targets
             start = target if target in declared else f"const double {target}"
@@ -257,7 +260,7 @@ class C(Language):
             places.append(f"&{place}")
             start = place if target in declared else f"double {place}"
             lines.append(f"{pad}{start} = {text};")
-        arguments = [texts[0], *texts[1 + len(targets) :], *places]
+        arguments = [texts[0], *texts[own:], *places]
         return [*lines, f"{pad}{name}({', '.join(arguments)});"]
 
     def branch(self, test: str, then: list[str], other: list[str], pad: str) -> list[str]:
@@ -402,6 +405,7 @@ class Loops:
             write = self._root if loop.kind == "root" else self._repeated
             self.texts += [*texts, write(outer, name, inner)]
             self._names[key] = outer
+            taken |= {name, outer}
         return self._names[key]
 
     def function(self, name: str, inner: Inner) -> str:

@@ -308,7 +308,7 @@ class Writer:
         for part in self.parts:
             lines, windows = self._windows(part, constant=False)
             arguments = ["m", f"&m->now.{part.member}", *windows]
-            call = f"{part.member}_sample({', '.join(arguments)})"
+            call = f"{part.names['sample']}({', '.join(arguments)})"
             holds = part.part.margin is not None
             body += [*lines, f"good = {call} && good;" if holds else f"{call};"]
         for name, signal in self.model.integrals.items():
@@ -329,7 +329,7 @@ class Writer:
         texts = [part.start(settled) for part in self.parts]
         body: list[str] = []
         for i, part in enumerate(self.parts):
-            body.append(f"{part.member}_{word}(m);")
+            body.append(f"{part.names[word]}(m);")
             later = "\n".join(texts[i + 1 :])
             if f"m->{part.member}_signals" in later or f"m->before.{part.member}." in later:
                 lines, windows = self._windows(part, constant=True)
@@ -339,7 +339,7 @@ class Writer:
                     f"m->before.{part.member} = m->now.{part.member};",
                     *lines,
                     f"struct {self.tags[i]['state']} {following}; /* not needed */",
-                    f"{part.member}_sample({arguments});",
+                    f"{part.names['sample']}({arguments});",
                 ]
         what = "settled under what it was given" if settled else "at rest"
         head = f"static void {'settled' if settled else 'rested'}_start({self.e.type} *m)"
@@ -372,7 +372,7 @@ class Writer:
         own = [part for part in self.parts if part.constants]
         texts += [part.computed() for part in own]
         says, head = "Constants of these parameters and this step.", "static void computed"
-        calls = [f"{part.member}_constants(m);" for part in own] or ["(void)m;"]
+        calls = [f"{part.names['constants']}(m);" for part in own] or ["(void)m;"]
         texts.append(function(says, f"{head}({self.e.type} *m)", calls))
         return "\n\n".join(texts)
 

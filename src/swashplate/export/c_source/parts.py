@@ -44,6 +44,10 @@ class PartInC:
     ----------
     constants : dict of Node to str
         What follows from parameters, givens, options and step alone, with its name.
+    windows : list of str
+        Names of what the part looks through, for each of its taps.
+    names : dict of str to str
+        Names of its functions by their purposes.
     """
 
     def __init__(self, writer: Writer, number: int) -> None:
@@ -64,6 +68,12 @@ class PartInC:
             }
             self._symbols = kind(*flags)
         self.part = PartCode(model, number, model.external, self._symbols)
+        own = {*OWN}
+        self.windows = [fresh_name(c_name(tap.input), own) for tap in self.part.taps]
+        self.names = {
+            word: writer.loops.fresh(f"{self.member}_{word}")
+            for word in ("constants", "sample", "rest", "settled")
+        }
         self.results = self._results()
         ends = [node for nodes in self.results.values() for _, node in nodes]
         ends += [] if self.part.margin is None else [self.part.margin]
@@ -132,18 +142,13 @@ class PartInC:
 
     # -- places ------------------------------------------------------------------------------------
 
-    def places(self, pointers: bool = True) -> dict[Node, str]:
+    def places(self) -> dict[Node, str]:
         """What numbers of the part are called in C."""
-        member = self.member
-        p, given, options = (
-            ("p->", "given->", "options->")
-            if pointers
-            else (f"m->{member}.", f"m->{member}_given.", f"m->{member}_options.")
-        )
-        known = {node: f"{p}{path_of(path)}" for path, node in leaves(self.part.p)}
-        known |= {node: f"{given}{path_of(path)}" for path, node in leaves(self.part.given)}
+        known = {}
+        for word, value in (("p", self.part.p), ("given", self.part.given)):
+            known |= {node: f"{word}->{path_of(path)}" for path, node in leaves(value)}
         known |= {node: f"state->{path_of(path)}" for path, node in leaves(self.part.state)}
-        known |= {node: f"{options}{c_name(name)}" for name, node in self.options.items()}
+        known |= {node: f"options->{c_name(name)}" for name, node in self.options.items()}
         known |= {node: f"k->{name}" for node, name in self.constants.items()}
         for i, part in enumerate(self.w.e.model.parts[: self.number]):
             for path in part.signal_names:
@@ -165,10 +170,6 @@ class PartInC:
         found["h"] = "const double h = m->step; /* [s] */"
         return found
 
-    def windows(self) -> list[str]:
-        """Names of the windows that the part looks through, those of its taps in their order."""
-        return [c_name(tap.input) for tap in self.part.taps]
-
     def body(
         self,
         trace: Trace,
@@ -183,7 +184,7 @@ class PartInC:
         `inputs` are values that get their names ahead, each with its name and its text. The `last`
         of all is returned. `pointers` are further declarations, or others, by name.
         """
-        taken = {*self.w.loops.taken, *OWN, *self.windows()}
+        taken = {*self.w.loops.taken, *OWN, *self.windows}
         names = {node: fresh_name(name, taken) for node, (name, _) in inputs.items()}
         nodes = [node for each in results.values() for _, node in each]
         nodes += [last] if last is not None else []
@@ -217,8 +218,7 @@ class PartInC:
         w, model = self.w, self.w.e.model
         places, named = dict[Node, str](), dict[Node, tuple[str, str]]()
         before = {each: f"m->before_record[{k}]" for k, each in enumerate(w.e.lines)}
-        for tap in self.part.taps:
-            window = c_name(tap.input)
+        for tap, window in zip(self.part.taps, self.windows, strict=True):
             for j, name in enumerate(self.part.tap_samples(tap)):
                 signal = tap.tap.signal
                 places[graph.name(name)] = before[signal] if start else f"{window}->s[{j}]"
@@ -252,7 +252,7 @@ class PartInC:
     def sample(self) -> str:
         """One sample: signals, limits, the next state, and whether the equations hold."""
         places, named = self.inputs()
-        margin, windows = self.part.margin, self.windows()
+        margin, windows = self.part.margin, self.windows
         holds = None if margin is None else graph.make(">", margin, graph.ZERO)
         known = {**self.places(), **places}
         lines = self.body(self.part.trace, self.results, known, named, holds)
@@ -262,7 +262,7 @@ class PartInC:
         formals = [f"{self.w.e.type} *m", f"struct {tag} *next"]
         formals += [f"const struct {self.w.e.prefix}_window *{each}" for each in windows]
         back = "void" if margin is None else "bool"
-        head = f"static {back} {self.member}_sample({', '.join(formals)})"
+        head = f"static {back} {self.names['sample']}({', '.join(formals)})"
         says = f"A sample of the {self.own.name}: what is known at it, and the state at the next."
         lines = [*(f"(void){name};" for name in idle), *lines]
         return function(says, head, lines if "m->" in text else ["(void)m;", *lines])
@@ -271,7 +271,7 @@ class PartInC:
         """The state at the first sample."""
         equation = self.own.settled if settled else self.own.rest
         word = "settled" if settled else "rest"
-        head = f"static void {self.member}_{word}({self.w.e.type} *m)"
+        head = f"static void {self.names[word]}({self.w.e.type} *m)"
         tag = self.w.tags[self.number]["state"]
         pointer = f"struct {tag} *next = &m->now.{self.member};"
         if equation is not None:
@@ -294,7 +294,7 @@ class PartInC:
 
     def computed(self) -> str:
         """Constants of these parameters, options and this step."""
-        head = f"static void {self.member}_constants({self.w.e.type} *m)"
+        head = f"static void {self.names['constants']}({self.w.e.type} *m)"
         known = self.places()
         results = []
         for node, name in self.constants.items():
@@ -332,8 +332,7 @@ class PartInC:
                 known[node] = f"{array}[{places.index((self.number, path))}]"
         for name, node in self.options.items():
             known[node] = f"options[{self.w.e.options.index((self.number, name))}]"
-        labels = {node: label for node, label in self._labels.items() if label.isidentifier()}
-        block = Block([*self.constants], labels, taken, known=known, named=False)
+        block = Block([*self.constants], self._labels, taken, known=known)
         first = self.w.first_constant(self.number)
         lines = [*block.lines]
         for k, text in enumerate(block.texts):
