@@ -144,7 +144,7 @@ class PartInC:
 
     def places(self) -> dict[Node, str]:
         """What numbers of the part are called in C."""
-        known = {}
+        known = dict[Node, str]()
         for word, value in (("p", self.part.p), ("given", self.part.given)):
             known |= {node: f"{word}->{path_of(path)}" for path, node in leaves(value)}
         known |= {node: f"state->{path_of(path)}" for path, node in leaves(self.part.state)}
