@@ -6,12 +6,13 @@ from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
 from swashplate.models.displacement_control import (
+    PressureLimits,
     Pump,
-    PumpConstants,
     Stroking,
     arm_sine,
     orifice_opening,
     plate_motion,
+    pressure_limits,
     pressure_rate,
     solenoid_force,
     solenoids_of,
@@ -28,17 +29,19 @@ RTOL, ATOL = 1e-6, 1.0
 
 
 @njit(error_model="numpy")
-def slope(t: float, state: Array, current: Array, h: float, pump: Pump, k: PumpConstants) -> float:
+def slope(
+    t: float, state: Array, current: Array, h: float, pump: Pump, limits: PressureLimits
+) -> float:
     """Rate of the pressure at any time; the current is a straight line between samples. [Pa/s]"""
     at = min(max(t / h, 0.0), current.size - 1.0)
     n = min(int(at), current.size - 2)
     i = current[n] + (at - n) * (current[n + 1] - current[n])
-    p = min(max(state[0], k.lower), k.upper)
+    p = min(max(state[0], limits.lower), limits.upper)
     free = spool_balance(solenoid_force(i, solenoids_of(pump)), arm_sine(p, pump), pump)
     opening = orifice_opening(free, pump)
-    Z6 = plate_motion(p, pump, k)
+    Z6 = plate_motion(p, pump)
     rate = pressure_rate(p, opening, Stroking(Z6, pump.Z7, pump.Z8, pump.Z9), None)
-    if (p >= k.upper and rate > 0.0) or (p <= k.lower and rate < 0.0):
+    if (p >= limits.upper and rate > 0.0) or (p <= limits.lower and rate < 0.0):
         return 0.0
     return rate
 
@@ -53,7 +56,7 @@ def speed_of(pressure: Array, pump: Pump) -> Array:
     return speed
 
 
-def integrate(current: Array, h: float, pump: Pump, k: PumpConstants, longest: float) -> Array:
+def integrate(current: Array, h: float, pump: Pump, longest: float) -> Array:
     """Shaft speed over a signed current. [rad/s]
 
     Parameters
@@ -62,6 +65,7 @@ def integrate(current: Array, h: float, pump: Pump, k: PumpConstants, longest: f
         Longest step. With h no kink of the current or of the equations is stepped over unseen,
         and the integrator never gets to use its order; with `inf` it does. [s]
     """
+    limits = pressure_limits(pump)
     time = h * np.arange(current.size)
     solution = solve_ivp(
         slope,
@@ -69,11 +73,11 @@ def integrate(current: Array, h: float, pump: Pump, k: PumpConstants, longest: f
         [pump.Z2 / pump.Z1],
         method="RK45",
         t_eval=time,
-        args=(current, h, pump, k),
+        args=(current, h, pump, limits),
         rtol=RTOL,
         atol=ATOL,
         max_step=longest,
     )
     if not solution.success:
         raise RuntimeError(solution.message)
-    return speed_of(np.clip(solution.y[0], k.lower, k.upper), pump)
+    return speed_of(np.clip(solution.y[0], limits.lower, limits.upper), pump)

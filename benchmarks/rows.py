@@ -32,7 +32,6 @@ class Kernel:
         self.instance = instance_of(drive.parameters, signal == "voltage")
         started = self.instance.start({signal: float(values[0])}, STEP)
         self.at_rest, self.states = started.flat, started.flat.copy()
-        self.constants = started.arguments[1]["k"]
         kept = (Stored(1, "signals", "shaft_speed"),)
         self.march = march_of(self.instance.model, (signal,), self.instance.options, kept)
         self.pieces = addresses((self.march,), (0,))
@@ -113,8 +112,8 @@ def march_rows(m: Marches) -> Iterator[Row]:
         yield Row("C, pump: what the ratios refer to", duration(pump(m.c_pump).seconds), "1×")
         yield _against_c("C, card and pump", pump(m.c_drive))
         for what, longest in (("steps up to 1/512 s", STEP), ("steps of any length", np.inf)):
-            pump_set, k = m.pump_kernel.instance.parts[1].p, m.pump_kernel.constants
-            run = partial(adaptive.integrate, m.current, STEP, pump_set, k, longest)
+            pump_set = m.pump_kernel.instance.parts[1].p
+            run = partial(adaptive.integrate, m.current, STEP, pump_set, longest)
             timing = in_turns(m.c_pump, run, 5, base_calls=9)
             yield _against_c(f"SciPy `solve_ivp`, pump, {what}", timing)
         yield _against_c("pump, kernels", pump(m.pump_kernel), 4.5)

@@ -35,9 +35,9 @@ IMPLICIT = {
     "tight_step": {"p.Z7"},
     "pump_step": {"p.Z7"},
     "unloaded_leakage": {"Z12"},
-    "flow_speed": {"k.Z12"},
-    "pump_sample": {"k.Z12"},
-    "settled_sample": {"k.Z12"},
+    "flow_speed": {"p.Z12"},
+    "pump_sample": {"p.Z12"},
+    "settled_sample": {"p.Z12"},
 }
 """Declared as that at zero leakage, of an equation that leaves leakage out."""
 VANISHING = {"settled_sample": {"spool_free", "orifice_opening", "swash_rate"}}
@@ -162,7 +162,7 @@ class Draw:
         known: dict[str, Any] = {"h": H, **options}
         own = full_order.Plant if self.name.startswith("full_order.") else control.Pump
         known["p"] = self.argument("p", hints.get("p", own), known)
-        for name in (*[n for n in ("k", "state", "inputs", "signals") if n in hints], *hints):
+        for name in (*[n for n in ("state", "inputs", "signals") if n in hints], *hints):
             if name not in known:
                 known[name] = self.argument(name, hints[name], known)
         return {name: known[name] for name in hints}
@@ -205,22 +205,9 @@ def hoist_machine(draw: Draw, _: dict[str, Any]) -> machine.Machine:
     return machine.Machine(*(size * draw.uniform(0.9, 1.1) for size in sizes))
 
 
-def channel_constants(draw: Draw, known: dict[str, Any]) -> single.ChannelConstants:
-    p = known["p"] if isinstance(known["p"], single.Channel) else None
-    p = p or draw.argument("p", single.Channel, known)
-    options = draw.options(known, single.CardOptions, exact=True)
-    return interpreted(single.channel_constants)(p, H, options)
-
-
-def pump_constants(draw: Draw, known: dict[str, Any]) -> control.PumpConstants:
-    options = known.get("options") or draw.flags(control.PumpOptions)
-    return interpreted(pump.pump_constants)(known["p"], H, options)
-
-
 def pump_state(draw: Draw, known: dict[str, Any]) -> pump.PumpState:
-    options = draw.options(known, control.PumpOptions)
-    k = known.get("k") or interpreted(pump.pump_constants)(known["p"], H, options)
-    pressures = [draw.uniform(0.98 * k.lower, 0.98 * k.upper) for _ in range(2)]
+    limits = interpreted(control.pressure_limits)(known["p"])
+    pressures = [draw.uniform(0.98 * limits.lower, 0.98 * limits.upper) for _ in range(2)]
     names = ("current", "position", *pump.PumpState._fields[4:-1])
     return pump.PumpState(*pressures, *map(draw.number, names), 1.0)
 
@@ -230,26 +217,19 @@ def pump_signals(draw: Draw, known: dict[str, Any]) -> pump.PumpSignals:
     given = {"options": options, **known}
     state = known.get("state") or pump_state(draw, given)
     inputs = known.get("inputs") or draw.argument("inputs", pump.PumpInputs, known)
-    k = known.get("k") or pump_constants(draw, given)
-    return interpreted(pump.pump_sample)(state, inputs, known["p"], k, H, options)
+    return interpreted(pump.pump_sample)(state, inputs, known["p"], H, options)
 
 
 def plant_signals(draw: Draw, known: dict[str, Any]) -> full_order.PlantSignals:
     motion = draw.argument("state", full_order.Motion, known)
-    k = draw.argument("k", full_order.PlantConstants, known)
     options = full_order.PlantOptions()
-    return interpreted(full_order.plant_signals)(motion, 0.4, known["p"], k, options)
+    return interpreted(full_order.plant_signals)(motion, 0.4, known["p"], options)
 
 
 MADE: dict[Any, Callable[[Draw, dict[str, Any]], Any]] = {
     single.Filter: filter_state,
     Window: window,
     machine.Machine: hoist_machine,
-    card.CardConstants: lambda draw, known: interpreted(card.card_constants)(
-        known["p"], H, known.get("options") or draw.flags(single.CardOptions)
-    ),
-    single.ChannelConstants: channel_constants,
-    control.PumpConstants: pump_constants,
     pump.PumpInputs: lambda draw, known: pump.PumpInputs(
         draw.number("current"),
         draw.uniform(0.8, 1.2),
@@ -258,8 +238,8 @@ MADE: dict[Any, Callable[[Draw, dict[str, Any]], Any]] = {
     ),
     pump.PumpState: pump_state,
     pump.PumpSignals: pump_signals,
-    full_order.PlantConstants: lambda _, known: interpreted(full_order.plant_constants)(
-        known["p"], H, full_order.Substeps(12.0)
+    machine.ReliefPressures: lambda _, known: interpreted(machine.relief_pressures)(
+        known["p"].machine
     ),
     full_order.PlantSignals: plant_signals,
 }

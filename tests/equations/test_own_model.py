@@ -37,23 +37,19 @@ class Rod(NamedTuple):
     position: float
 
 
-class Share(NamedTuple):
-    share: float
-
-
 class Stroke(NamedTuple):
     low: float
     high: float
 
 
 @equation
-def constants(p: Valve, h: float) -> Share:
-    return Share(1.0 - exp(-h / p.lag))
+def lag_share(p: Valve, h: float) -> float:
+    return 1.0 - exp(-h / p.lag)
 
 
 @equation
-def step(state: Rod, command: float, p: Valve, k: Share, h: float, given: Stroke) -> Rod:
-    opening = state.opening + k.share * (command - state.opening)
+def step(state: Rod, command: float, p: Valve, h: float, given: Stroke) -> Rod:
+    opening = state.opening + lag_share(p, h) * (command - state.opening)
     flow = max(opening - p.overlap, 0.0) + min(opening + p.overlap, 0.0)
     position = state.position + h * p.gain * flow
     return Rod(opening, min(max(position, given.low), given.high))
@@ -64,7 +60,6 @@ valve = Model(
     parameters=Valve,
     state=Rod,
     step=step,
-    constants=constants,
     given=Stroke,
     taps={"command": Tap("command", delay="delay", hold="mean")},
 )
@@ -285,16 +280,16 @@ def test_an_option_that_is_false_is_off() -> None:
 
 
 @equation
-def implicit(p: Valve, h: float) -> Share:
-    return Share(1.0 - 1.0 / (1.0 + h / p.lag))
+def implicit(p: Valve, h: float) -> float:
+    return 1.0 - 1.0 / (1.0 + h / p.lag)
 
 
 def test_an_equation_of_a_model_is_replaced() -> None:
-    other = replaced(valve, constants, implicit)
+    other = replaced(valve, lag_share, implicit)
     opening = simulate(other, P, {"command": np.ones(9)}, RATE, given=STROKE)["opening"]
     # the delay of 3.3 samples is over
     np.testing.assert_allclose((1.0 - opening[6:]) / (1.0 - opening[5:-1]), 1.0 / 1.2, rtol=1e-12)
-    assert replaced(join("two", valve), constants, implicit).parts[0] is not valve
+    assert replaced(join("two", valve), lag_share, implicit).parts[0] is not valve
 
 
 # --- what is refused ------------------------------------------------------------------------------
@@ -344,13 +339,8 @@ def growing(state: Fill, flow: float) -> Fill:
 
 
 @equation
-def shares(p: Outlet, h: float) -> Outlet:
-    return Outlet(log(p.width - 1.0))
-
-
-@equation
-def drained(state: Fill, flow: float, k: Outlet) -> Fill:
-    return Fill(state.level + k.width * flow)
+def drained(state: Fill, flow: float, p: Outlet) -> Fill:
+    return Fill(state.level + log(p.width - 1.0) * flow)
 
 
 @equation
@@ -520,7 +510,7 @@ OUTSIDE = {
         },
         r"tank: 1 m too high by the flow\.$",
     ),
-    "constants": ({"step": drained, "constants": shares}, "tank: shares cannot be computed"),
+    "parameters": ({"step": drained}, "tank's level is -inf at the end of the record"),
     "rest": ({"rest": full}, r"full cannot be computed for these numbers \(.*zero\)"),
     "overflow": ({"step": growing}, "tank's level is inf at the end of the record"),
 }

@@ -7,6 +7,7 @@ from swashplate.equations.declaration import interpreted
 from swashplate.full_order import FullOrderDrive
 from swashplate.models.displacement_control import solenoid_force
 from swashplate.models.full_order import Motion, free_rates
+from swashplate.models.machine import relief_pressures
 from swashplate.simulation.result import Simulation
 
 SLACK = 1e-9
@@ -27,10 +28,11 @@ def solved(full: FullOrderDrive, run: Simulation, tolerance: float = 1e-8) -> np
     instance = full.instance(run.record.step, card=False)
     options = instance.options[1]
     started = instance.start({"current": float(current[0])}, run.record.step, "rest")
-    k, state = started.arguments[1]["k"], np.array(started.states[1].motion)
+    state = np.array(started.states[1].motion)
+    relief = interpreted(relief_pressures)(m)
     time = run.record.step * np.arange(current.size)
-    lower = np.array([-m.spool_stroke, k.lower, -m.swash_stop_minus])
-    upper = np.array([m.spool_stroke, k.upper, m.swash_stop_plus])
+    lower = np.array([-m.spool_stroke, relief.lower, -m.swash_stop_minus])
+    upper = np.array([m.spool_stroke, relief.upper, m.swash_stop_plus])
     size, places = upper - lower, [0, 2, 3]
     rates_of, force_of = interpreted(free_rates), interpreted(solenoid_force)
 

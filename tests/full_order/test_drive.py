@@ -18,7 +18,7 @@ from swashplate.full_order import (
     validity_table,
     validity_verdict,
 )
-from swashplate.models.machine import machine_speed
+from swashplate.models.machine import machine_speed, static_pressure
 
 
 @pytest.fixture(scope="module")
@@ -106,7 +106,7 @@ def test_oil_and_energy_are_kept(hoist: FullOrderDrive) -> None:
     loaded = hoist.replace(load_torque=3e3, piston_leakage=1e-12)
     command = maneuvers.step(4.0, start=0.1, stop=0.6, length=1.0).sample(8192.0)
     run, m = loaded.simulate(command, 8192.0), loaded.physical.machine
-    pressure = run.stroker_pressure + run.constants.rest_pressure
+    pressure = run.stroker_pressure + interpreted(static_pressure)(m)
 
     def passed(rate: np.ndarray) -> float:
         return float(np.trapezoid(rate, run.time))

@@ -30,17 +30,8 @@ class Opening(NamedTuple):
     opening: float
 
 
-class Share(NamedTuple):
-    share: float
-
-
 class Flow(NamedTuple):
     flow: float
-
-
-@equation
-def valve_share(p: Valve, h: float) -> Share:
-    return Share(1.0 - exp(-h / p.lag))
 
 
 @equation
@@ -49,8 +40,9 @@ def valve_sample(state: Opening, command: float, p: Valve) -> Flow:
 
 
 @equation
-def valve_step(state: Opening, command: float, k: Share) -> Opening:
-    return Opening(state.opening + k.share * (command - state.opening))
+def valve_step(state: Opening, command: float, p: Valve, h: float) -> Opening:
+    share = 1.0 - exp(-h / p.lag)
+    return Opening(state.opening + share * (command - state.opening))
 
 
 @equation
@@ -88,7 +80,6 @@ def valve(hold: str) -> Model:
         state=Opening,
         step=valve_step,
         sample=valve_sample,
-        constants=valve_share,
         settled=valve_settled,
         domain=valve_margin,
         outside="the valve is wide open",
@@ -152,26 +143,30 @@ def test_feedthrough_and_the_settled_state() -> None:
     assert model.to_scipy().dt == H
 
 
+class Lag(NamedTuple):
+    lag: float
+
+
 class Table(NamedTuple):
     position: float
     speed: float
 
 
 @equation
-def table_rates(state: Table, command: float, p: Share) -> Table:
-    return Table(state.speed, (command - state.speed) / p.share)
+def table_rates(state: Table, command: float, p: Lag) -> Table:
+    return Table(state.speed, (command - state.speed) / p.lag)
 
 
 @equation
-def table_coasts(state: Table, command: float, p: Share) -> Table:
-    return Table(state.speed, command / p.share)
+def table_coasts(state: Table, command: float, p: Lag) -> Table:
+    return Table(state.speed, command / p.lag)
 
 
 def table(rates: Callable[..., Table], lag: float, outputs: tuple[str, ...]) -> LinearModel:
-    model = Model("table", parameters=Share, state=Table, step=discretised(rates, "euler"))
+    model = Model("table", parameters=Lag, state=Table, step=discretised(rates, "euler"))
     states = (Table(0.0, 0.0),)
     return linearize(
-        instance_of_model(model, Share(lag)), {"command": 0.0}, H, states=states, outputs=outputs
+        instance_of_model(model, Lag(lag)), {"command": 0.0}, H, states=states, outputs=outputs
     )
 
 

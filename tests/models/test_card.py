@@ -1,7 +1,7 @@
 """The card's equations against what they stand for, worked out another way."""
 
 from itertools import pairwise
-from math import cos, cosh, exp, inf, sin, sinh, sqrt
+from math import cos, cosh, exp, inf, log, sin, sinh, sqrt
 
 import numpy as np
 import pytest
@@ -14,11 +14,10 @@ from scipy.optimize import brentq
 from swashplate import Drive
 from swashplate.equations.model import Window
 from swashplate.models import channel as single
-from swashplate.models.channel import Channel, ChannelConstants, Filter
+from swashplate.models.channel import Channel, Filter
 from swashplate.simulation.instance import step_limit
 
 Array = NDArray[np.float64]
-EXACT = single.CardOptions(exact=True)
 RATES = (200.0, 512.0, 600.0, 1000.0, 2000.0)
 
 
@@ -41,10 +40,9 @@ def test_share_of_an_interval_above_the_dead_zone() -> None:
 
 def marched(p: Channel, steady: Array, h: float) -> Array:
     """I* of the exact filter under an I_ss straight between samples, settled at the first."""
-    k = single.channel_constants(p, h, EXACT)
     state, found = Filter(float(steady[0]), 0.0, 0.0), []
     for begins, ends in pairwise([float(steady[0]), *map(float, steady)]):
-        filtered, rate = single.exact_filter(state, begins, ends, k)
+        filtered, rate = single.exact_filter(state, begins, ends, p, h)
         found.append(filtered)
         state = Filter(filtered, rate, 0.0)
     return np.array(found)
@@ -117,9 +115,11 @@ def test_it_is_stable_and_sticks_at_any_rate(zeta: float) -> None:
 
 @pytest.mark.interpreted
 def test_friction_takes_the_rate_and_stops_at_zero(channel: Channel) -> None:
-    k = ChannelConstants(1.0, 1.0, 0.0, 0.0, 1.0, 0.0, 0.0, coulomb=0.5, lost=0.1)
-    assert single.exact_filter(Filter(0.2, 0.8, 0.0), 0.0, 0.0, k) == pytest.approx((0.15, 0.3))
-    assert single.exact_filter(Filter(0.2, -0.4, 0.0), 0.0, 0.0, k) == pytest.approx((0.24, 0.0))
+    # a filter that nothing else moves: x = x_0 + v h - C h²/2, less where it stops before h
+    p, h = channel._replace(zeta=1e-6, omega=1e-3, C=2.5), 0.2
+    found = [single.exact_filter(Filter(0.2, v, 0.0), 0.0, 0.0, p, h) for v in (0.8, -0.4)]
+    assert found[0] == pytest.approx((0.31, 0.3))
+    assert found[1] == pytest.approx((0.16, 0.0))
 
 
 @pytest.mark.interpreted
@@ -138,7 +138,8 @@ def test_the_course_over_a_step_keeps_integral_and_moment(samples: list[float], 
 
 # --- filter to output ----------------------------------------------------------------------------
 
-LIMITS = {"lim1": 2.0, "lim2": 3.0, "I_t1": 0.3, "I_t2": 0.1}
+LIMITS = {"lim1": 2.0, "lim2": 3.0, "I_t1": 0.3, "I_t2": 0.1, "a": -log(0.9) / 0.01}
+"""The decay leaves 0.9 in a step of 0.01 s."""
 
 
 @pytest.mark.interpreted
@@ -160,7 +161,7 @@ def test_limiter_branches(
     channel: Channel, target: float, previous: float, steady: float, output: float, limited: bool
 ) -> None:
     p = channel._replace(**LIMITS)
-    found = single.limited_current(target, previous, steady, p, 0.9, 0.01, None)
+    found = single.limited_current(target, previous, steady, p, 0.01, None)
     assert found == pytest.approx(output)
     assert single.rate_limit_active(output, target, previous, p.I_t2) is limited
 
@@ -184,5 +185,5 @@ def test_switches_from_within_a_step(
     channel: Channel, target: float, previous: float, steady: float, output: float
 ) -> None:
     p = channel._replace(**LIMITS)
-    found = single.limited_current(target, previous, steady, p, 0.9, 0.01, True)
+    found = single.limited_current(target, previous, steady, p, 0.01, True)
     assert found == pytest.approx(output)

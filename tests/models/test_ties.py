@@ -1,6 +1,6 @@
 """The one-sided derivatives that the models declare where two branches meet."""
 
-from math import tan
+from math import log, tan
 from typing import Any
 
 import pytest
@@ -50,7 +50,7 @@ ZONES = (
     (soft_threshold, ("value", "width")),
 )
 LIMITED = (single.limited_current, ("target", "previous"))
-LIMITS = channel(lim1=2.0, lim2=2.0, I_t1=0.25, I_t2=0.125)
+LIMITS = channel(lim1=2.0, lim2=2.0, I_t1=0.25, I_t2=0.125, a=log(2.0) / H)
 CARD = channel(V_dz=0.5, J=0.3, G1=0.1)
 NO_HEAD = (1e6, 1e-4, Stroking(0.1, 0.0, 1e6, 1e6))
 
@@ -97,7 +97,7 @@ TIES: list[tuple[tuple[Any, tuple[str, ...]], tuple, dict, tuple[float, ...]]] =
     ),
     # the target exactly at I_t1, at what the rate limit allows either way, and at the decay
     *(
-        (LIMITED, (target, previous, 1.0, LIMITS, 0.5, H, split), {"split": split}, (1.0, 0.0))
+        (LIMITED, (target, previous, 1.0, LIMITS, H, split), {"split": split}, (1.0, 0.0))
         for split in (None, True)
         for target, previous in ((0.25, 0.1), (0.75, 0.5), (0.25, 0.5), (0.0625, 0.125))
     ),

@@ -9,12 +9,18 @@ import numpy as np
 import pytest
 import tomlkit
 
-from swashplate import Drive, InputError, ParameterError, maneuvers
-from swashplate.analysis import envelope
+from swashplate import DomainError, Drive, InputError, ParameterError, maneuvers
+from swashplate.analysis import envelope, speed_limits
 from swashplate.equations import Definition, equation
 from swashplate.models.channel import steady_current
-from swashplate.models.displacement_control import Pump, spool_balance
+from swashplate.models.displacement_control import (
+    PressureLimits,
+    Pump,
+    pressure_limits,
+    spool_balance,
+)
 from swashplate.models.pump import shaft_speed
+from swashplate.simulation.run import drive_records, simulate_drive
 
 RATE = 512.0
 COMMAND = maneuvers.sine(4.0, 0.8, start=0.05, length=1.5, settle=0.3).sample(RATE)
@@ -39,6 +45,13 @@ def sealed_balance(force: float, arm_sine: float, p: Pump, test_seal: float) -> 
 def faster(swash_angle: float, leakage: float, Z10: float, Z11: float) -> float:
     """Twice the speed of the package's equation."""
     return 2.0 * (Z10 * swash_angle - Z11 - leakage)
+
+
+@equation
+def narrower(p: Pump) -> PressureLimits:
+    """A relief valve that opens at half of what the package's equation allows."""
+    wide = pressure_limits(p)
+    return PressureLimits(wide.lower_stop, wide.upper_stop, 0.5 * wide.lower, 0.5 * wide.upper)
 
 
 PLAIN = Drive.preset("hoist")
@@ -90,6 +103,17 @@ def test_steady_states_are_those_that_a_march_comes_to() -> None:
     assert envelope(twice).plus.top_speed == pytest.approx(
         2.0 * envelope(PLAIN).plus.top_speed, rel=1e-9
     )
+
+
+def test_limits_of_one_s_own_are_those_of_march_and_analysis() -> None:
+    relieved = PLAIN.with_equation(pressure_limits, narrower)
+    run = relieved.simulate(np.full(1500, 10.0))
+    assert run.shaft_speed.max() == pytest.approx(speed_limits(relieved)[1], rel=1e-12)
+    assert run.shaft_speed.max() < 0.6 * speed_limits(PLAIN)[1]
+    records, beyond = drive_records("voltage", COMMAND, RATE), 1.5 * run.stroker_pressure.max()
+    simulate_drive(PLAIN.parameters, records, "rest", beyond)
+    with pytest.raises(DomainError, match="the pressure at the start is"):
+        simulate_drive(relieved.parameters, records, "rest", beyond)
 
 
 def test_another_process_finds_the_equation() -> None:

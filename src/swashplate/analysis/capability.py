@@ -11,9 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swashplate.drive import Drive
+from swashplate.equations.declaration import interpreted
 from swashplate.equations.marching.record import SOURCE_RATE
 from swashplate.equations.marching.run import Instance, Part, called
-from swashplate.models.displacement_control import PumpOptions
+from swashplate.equations.replacement import as_called
+from swashplate.models.displacement_control import PumpOptions, pressure_limits
 from swashplate.models.pump import PumpState
 from swashplate.parameters.rules import FULL_VOLTAGE
 from swashplate.results import GivenAxes, Result, Tabular, figures
@@ -141,8 +143,9 @@ def acceleration_curve(drive: Drive, voltage: float, points: int = 201) -> Accel
 
 def speed_limits(drive: Drive) -> tuple[float, float]:
     """Lowest and highest speed that the swash plate's stops, or Z15, allow at all. [rad/s]"""
-    k = instance_of(drive.parameters, False).start({"current": 0.0}, 1.0).arguments[1]["k"]
-    low, high = _curve(drive, 0.0, np.array([k.lower, k.upper])).speed
+    instance = instance_of(drive.parameters, False)
+    limits = interpreted(as_called(instance.model, pressure_limits))(instance.parts[1].p)
+    low, high = _curve(drive, 0.0, np.array([limits.lower, limits.upper])).speed
     return float(low), float(high)
 
 

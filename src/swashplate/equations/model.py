@@ -3,9 +3,11 @@
 A model is a value: types of parameters, state and inputs, and equations over them. At every sample
 the engine calls, in this order,
 
-    constants(p, h) -> k              once per simulation
-    sample(state, inputs, p, k, h) -> signals      all that is known at n, computed once
-    step(state, signals, inputs, p, k, h) -> state          from n to n + 1
+    sample(state, inputs, p, h) -> signals      all that is known at n, computed once
+    step(state, signals, inputs, p, h) -> state          from n to n + 1
+
+What follows from ``p``, ``given`` and ``h`` alone, such as ``exp(-h / p.lag)``, is written where it
+is used: the engine finds it and computes it once, before the first sample.
 
 Equations name the arguments that they need; the names mean
 
@@ -15,7 +17,6 @@ Equations name the arguments that they need; the names mean
 | ``signals`` | what ``sample`` returned at n |
 | ``inputs`` | all inputs as a named tuple, or an input's own name for one of them |
 | ``p`` | parameters |
-| ``k`` | constants |
 | ``h`` | step of the grid [s] |
 | ``options`` | options, None (off) or True (on): branches on them cost nothing |
 | ``given`` | numbers that belong to a run, not to the machine: a load, a rod's middle |
@@ -46,7 +47,7 @@ from swashplate.errors import InputError
 Equation = Callable[..., Any]
 Hold = Literal["linear", "previous", "mean"]
 
-ARGUMENTS = ("state", "signals", "inputs", "p", "k", "h", "options", "given")
+ARGUMENTS = ("state", "signals", "inputs", "p", "h", "options", "given")
 """Names that mean what the table above says; any other argument is an input."""
 
 
@@ -145,9 +146,8 @@ class Model:
     state: type[Any]
     step: Equation
     sample: Equation | None = None
-    constants: Equation | None = None
     rest: Equation | None = None
-    """State at rest, of ``inputs, p, k, options, given``; by default the state type's defaults or
+    """State at rest, of ``inputs, p, h, options, given``; by default the state type's defaults or
     zeros."""
     settled: Equation | None = None
     """Steady state under constant inputs, of the same arguments."""
@@ -329,7 +329,7 @@ def _wrong(model: Model) -> Iterator[str]:
         for field_, kind in _no_floats(type_) if type_ is not None else ():
             must = "but must be a float or a named tuple of floats"
             yield f"{says}{field_} is of type {kind}, {must}."
-    for word in ("step", "sample", "constants", "rest", "settled", "limits", "domain"):
+    for word in ("step", "sample", "rest", "settled", "limits", "domain"):
         made = getattr(model, word)
         if not isinstance(plain(made), FunctionType) and not (made is None and word != "step"):
             yield f"{says}{word} must be an equation, not {made!r}."
@@ -562,8 +562,8 @@ def discretised(
     Parameters
     ----------
     rates : equation
-        d(state)/dt of ``state`` and of inputs, ``p``, ``k``, ``options`` and ``given`` as a step
-        has them. It returns the type of the state, each number in its unit per second.
+        d(state)/dt of ``state`` and of inputs, ``p``, ``options`` and ``given`` as a step has
+        them. It returns the type of the state, each number in its unit per second.
     method : {"euler", "heun", "midpoint", "rk4"}
         Explicit Runge-Kutta method, of order 1, 2, 2 and 4.
     substeps : int

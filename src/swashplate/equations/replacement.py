@@ -102,6 +102,19 @@ def uses(model: Model, equation: Equation) -> bool:
     return any(_leading(part, equation) for part in model.parts)
 
 
+@cache
+def as_called(model: Model, equation: Equation) -> Equation:
+    """An equation as a model calls it: itself, or what stands in its place there."""
+    name = plain(equation).__name__
+    for part in model.parts:
+        for each in part.equations:
+            found = closure(each)
+            if name in found:
+                version: Equation = found[name]
+                return version
+    return equation
+
+
 def replaced(
     model: Model, old: Equation, new: Equation, parameters: type[Any] | None = None
 ) -> Model:

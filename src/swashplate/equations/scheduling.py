@@ -264,6 +264,15 @@ def is_little(nodes: Sequence[Node]) -> bool:
     return len(nodes) <= FEW and all(is_cheap(node) for node in nodes)
 
 
+VECTOR = {*CHEAP, "/", "sqrt", "**"}
+"""Operations that processors have for many numbers at once."""
+
+
+def all_vector(nodes: Sequence[Node]) -> bool:
+    """Whether a processor can compute some nodes for many samples at once, whatever tests say."""
+    return all(node.op in VECTOR for node in nodes)
+
+
 def is_cheap(node: Node) -> bool:
     """Whether an operation can be done for nothing on any numbers."""
     divided = node.op == "/" and node.args[1].op == "number" and node.args[1].value != 0.0

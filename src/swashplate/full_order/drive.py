@@ -33,8 +33,8 @@ from swashplate.full_order.physical_set import PhysicalSet, from_lumped
 from swashplate.models import full_order as model
 from swashplate.models.displacement_control import Solenoids, solenoid_force
 from swashplate.models.drive import Source
-from swashplate.models.full_order import PlantConstants, PlantOptions, PlantSignals
-from swashplate.models.machine import Machine, fastest_rate
+from swashplate.models.full_order import PlantOptions, PlantSignals
+from swashplate.models.machine import Machine, fastest_rate, relief_pressures
 from swashplate.parameters.parameter_set import Change
 from swashplate.results import Result, Tabular, figures
 from swashplate.simulation.instance import PATHS, card_of, card_options, check_filter_stability
@@ -95,12 +95,6 @@ class FullOrderSimulation(Run, Tabular):
         found: model.Plant = self.instance.parts[1].p
         return found
 
-    @property
-    def constants(self) -> PlantConstants:
-        """What follows from these alone."""
-        found: PlantConstants = self.started.arguments[1]["k"]
-        return found
-
     @cached_property
     def names(self) -> tuple[str, ...]:
         """The signals that it has: ``"time"`` and `SIGNALS`."""
@@ -153,7 +147,7 @@ class FullOrderSimulation(Run, Tabular):
     def relief_hold(self) -> Flags:
         """1 or -1 where the relief valve holds the stroker pressure."""
         pressure = self.sampled(self.fine("piston_pressure"))
-        return _beyond(pressure, self.constants.lower, self.constants.upper)
+        return _beyond(pressure, *interpreted(relief_pressures)(self.plant.machine))
 
     @property
     def plate_hold(self) -> Flags:

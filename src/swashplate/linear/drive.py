@@ -23,12 +23,14 @@ from swashplate.equations.marching.record import (
     least_substeps,
 )
 from swashplate.equations.marching.run import Instance, called
+from swashplate.equations.replacement import as_called
 from swashplate.errors import DomainError, InputError
 from swashplate.linear.discrete import recurrence
 from swashplate.linear.model import LinearModel, Matrices, with_line
 from swashplate.models.card import Card
 from swashplate.models.displacement_control import moment_sine, solenoid_force
 from swashplate.models.pump import overpowered
+from swashplate.models.refinements import dither_factor, friction_width
 from swashplate.parameters.parameter_set import ParameterSet
 from swashplate.parameters.rules import FULL_VOLTAGE
 from swashplate.results import Result
@@ -389,13 +391,15 @@ def _matrices(
     if options.friction is not None and step > 0.0:
         # the next sample knows the spool's place x and its deflection d as d e^(-h/T) - x w/x_s
         # alone, the deflection that would be left if it came back to where it was balanced
-        k = started.arguments[1]["k"]
         spool, deflection = (states.index(f"pump.{each}") for each in ("spool", "deflection"))
-        friction = k.friction_width / p.spool_presliding
+        width_of = interpreted(as_called(instance.model, friction_width))
+        left_of = interpreted(as_called(instance.model, dither_factor))
+        friction = width_of(p.spool_friction, p.Z4, p.Z5) / p.spool_presliding
+        left = left_of(p.dither_time, step)
         for matrix in (A, C):
             matrix[:, deflection] = -matrix[:, spool] / friction
         for matrix in (A, B):
-            matrix[deflection] = k.dither_factor * matrix[deflection] - friction * matrix[spool]
+            matrix[deflection] = left * matrix[deflection] - friction * matrix[spool]
     if not isfinite(p.dither_time):
         del names["pump.deflection"]  # without dither nothing is left of it
     names |= {each: each for each in memory}

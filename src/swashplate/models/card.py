@@ -15,10 +15,8 @@ from swashplate.models.channel import (
     CardInputs,
     CardOptions,
     Channel,
-    ChannelConstants,
     ChannelSignals,
     Filter,
-    channel_constants,
     channel_level,
     channel_rates,
     channel_sample,
@@ -38,13 +36,6 @@ class Card(NamedTuple):
     tau: Annotated[float, Definition("delay", "s", lower=0.0, upper=10.0, source="3.4",
         needs=BEYOND, plausible=(0.0, 10.0))]
     # fmt: on
-
-
-class CardConstants(NamedTuple):
-    """Constants of both channels."""
-
-    plus: ChannelConstants
-    minus: ChannelConstants
 
 
 class CardState(NamedTuple):
@@ -86,14 +77,6 @@ class CardLimits(NamedTuple):
 
 
 @equation
-def card_constants(p: Card, h: float, options: CardOptions) -> CardConstants:
-    """Constants of the card's march."""
-    return CardConstants(
-        channel_constants(p.plus, h, options), channel_constants(p.minus, h, options)
-    )
-
-
-@equation
 def stable_step(p: Card, h: float, options: CardOptions) -> float:
     """Share of the step that the filters would still bear, above 0 where they are stable. [1]"""
     plus = p.plus.omega * h / step_limit(p.plus.zeta, options.exact)
@@ -103,11 +86,11 @@ def stable_step(p: Card, h: float, options: CardOptions) -> float:
 
 @equation
 def card_sample(
-    state: CardState, inputs: CardInputs, p: Card, k: CardConstants, h: float, options: CardOptions
+    state: CardState, inputs: CardInputs, p: Card, h: float, options: CardOptions
 ) -> CardSignals:
     """Currents of the card at a sample."""
-    plus = channel_sample(state.plus, inputs, 1.0, p.plus, k.plus, h, options)
-    minus = channel_sample(state.minus, inputs, -1.0, p.minus, k.minus, h, options)
+    plus = channel_sample(state.plus, inputs, 1.0, p.plus, h, options)
+    minus = channel_sample(state.minus, inputs, -1.0, p.minus, h, options)
     return CardSignals(
         current=plus.current - minus.current,
         current_positive=plus.current,
@@ -127,7 +110,6 @@ def card_step(
     signals: CardSignals,
     inputs: CardInputs,
     p: Card,
-    k: CardConstants,
     h: float,
     options: CardOptions,
 ) -> CardState:
@@ -145,8 +127,8 @@ def card_step(
         signals.rate_negative,
     )
     return CardState(
-        channel_step(state.plus, plus, p.plus, k.plus, h, options),
-        channel_step(state.minus, minus, p.minus, k.minus, h, options),
+        channel_step(state.plus, plus, p.plus, h, options),
+        channel_step(state.minus, minus, p.minus, h, options),
     )
 
 
@@ -158,7 +140,7 @@ def card_rates(state: CardState, voltage: float, p: Card, options: CardOptions) 
 
 
 @equation
-def card_settled(inputs: CardInputs, p: Card, k: CardConstants, options: CardOptions) -> CardState:
+def card_settled(inputs: CardInputs, p: Card, options: CardOptions) -> CardState:
     """State that a card settles at under a constant command, the newest that it sees."""
     voltage = inputs.at.s[0]
     return CardState(
@@ -173,7 +155,6 @@ def card_limits(
     signals: CardSignals,
     inputs: CardInputs,
     p: Card,
-    k: CardConstants,
     options: CardOptions,
 ) -> CardLimits:
     """Limits that act at a sample."""
@@ -208,7 +189,6 @@ card = Model(
     state=CardState,
     step=card_step,
     sample=card_sample,
-    constants=card_constants,
     settled=card_settled,
     inputs=CardInputs,
     taps={

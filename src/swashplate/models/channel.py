@@ -74,20 +74,6 @@ class CardInputs(NamedTuple):
     span: Window  # Three samples around the end of the sample interval about t - τ, t - τ + h/2.
 
 
-class ChannelConstants(NamedTuple):
-    """What a channel needs of its parameters and the step; but for `decay` 0 without `exact`."""
-
-    decay: float  # exp(-a h).
-    stays: float  # I* one step after 1 A, at rest, without I_ss. [1]
-    swings: float  # I* one step after 1 A/s, without I_ss. [s]
-    pull: float  # Rate one step after I_ss came up to 1 A, at rest. [1/s]
-    slows: float  # Rate one step after 1 A/s, without I_ss. [1]
-    ramp: float  # I* at the end of a step in which I_ss rose from 0 to 1 A. [1]
-    ramp_rate: float  # Rate at the end of such a step. [1/s]
-    coulomb: float  # Rate that the Coulomb term takes in a step. [A/s]
-    lost: float  # I* lost for each rate that the Coulomb term takes. [s]
-
-
 class Filter(NamedTuple):
     """State of one channel."""
 
@@ -263,37 +249,6 @@ def damped_waves(zeta: float, w: float) -> tuple[float, float]:
 
 
 @equation
-def channel_constants(p: Channel, h: float, options: CardOptions) -> ChannelConstants:
-    """Constants of a channel's march.
-
-    With C = e^(-ζw) cosh r and S = e^(-ζw) sinh r/r of `damped_waves` at w = ωh, the solution of
-    I'' + 2ζω I' + ω² I = ω² I_ss is I = (C + ζwS) I_0 + hS I_0', I' = -ω²hS I_0 + (C - ζwS) I_0'
-    without I_ss; under an I_ss that rises by 1 A, straight over the step,
-    I = 1 - 2ζ/w (1 - C - ζwS) - S and I' = (1 - C - ζwS)/h.
-    """
-    decay = exp(-p.a * h)
-    if options.exact is None:
-        return ChannelConstants(decay, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-    w = p.omega * h
-    even, odd = damped_waves(p.zeta, w)
-    stays = even + p.zeta * w * odd
-    gone = 1.0 - stays
-    swings = h * odd
-    pull = p.omega * p.omega * swings
-    return ChannelConstants(
-        decay=decay,
-        stays=stays,
-        swings=swings,
-        pull=pull,
-        slows=even - p.zeta * w * odd,
-        ramp=1.0 - 2.0 * p.zeta / w * gone - odd,
-        ramp_rate=gone / h,
-        coulomb=p.C * swings,
-        lost=gone / pull,
-    )
-
-
-@equation
 def piece(
     first: float, last: float, length: float, centre: float, p: Channel
 ) -> tuple[float, float]:
@@ -332,18 +287,37 @@ def steady_course(direction: float, at: Window, p: Channel) -> tuple[float, floa
 
 
 @equation
-def exact_filter(s: Filter, begins: float, ends: float, k: ChannelConstants) -> tuple[float, float]:
+def exact_filter(
+    s: Filter, begins: float, ends: float, p: Channel, h: float
+) -> tuple[float, float]:
     """I* [A] and its rate [A/s] at this sample, from the state and I_ss of the step between.
+
+    With C = e^(-ζw) cosh r and S = e^(-ζw) sinh r/r of `damped_waves` at w = ωh, the solution of
+    I'' + 2ζω I' + ω² I = ω² I_ss is I = (C + ζwS) I_0 + hS I_0', I' = -ω²hS I_0 + (C - ζwS) I_0'
+    without I_ss; under an I_ss that rises by 1 A, straight over the step,
+    I = 1 - 2ζ/w (1 - C - ζwS) - S and I' = (1 - C - ζwS)/h.
 
     The Coulomb term is a constant between ±C, as large as it must be: it takes C e^(-ζw) h sinh r/r
     of the rate, but stops at zero, where it holds the current. So it sticks exactly, at any step.
     """
+    w = p.omega * h
+    even, odd = damped_waves(p.zeta, w)
+    stays = even + p.zeta * w * odd  # I* one step after 1 A, at rest, without I_ss. [1]
+    gone = 1.0 - stays
+    swings = h * odd  # I* one step after 1 A/s, without I_ss. [s]
+    pull = p.omega * p.omega * swings  # Rate one step after I_ss came up to 1 A, at rest. [1/s]
+    slows = even - p.zeta * w * odd  # Rate one step after 1 A/s, without I_ss. [1]
+    # I* at the end of a step in which I_ss rose from 0 to 1 A [1], and its rate there [1/s]
+    ramp = 1.0 - 2.0 * p.zeta / w * gone - odd
+    ramp_rate = gone / h
+
     off = s.now - begins
     rise = ends - begins
-    rate = k.slows * s.before - k.pull * off + k.ramp_rate * rise
-    left = soft_threshold(rate, k.coulomb)
-    filtered = begins + k.stays * off + k.swings * s.before + k.ramp * rise
-    return faded(filtered - k.lost * (rate - left)), faded(left)
+    rate = slows * s.before - pull * off + ramp_rate * rise
+    left = soft_threshold(rate, p.C * swings)
+    filtered = begins + stays * off + swings * s.before + ramp * rise
+    lost = gone / pull  # I* lost for each rate that the Coulomb term takes. [s]
+    return faded(filtered - lost * (rate - left)), faded(left)
 
 
 # --- filter to output ----------------------------------------------------------------------------
@@ -351,16 +325,17 @@ def exact_filter(s: Filter, begins: float, ends: float, k: ChannelConstants) -> 
 
 @equation
 def limited_current(
-    target: float, previous: float, steady: float, p: Channel, decay: float, h: float, split: Flag
+    target: float, previous: float, steady: float, p: Channel, h: float, split: Flag
 ) -> float:
     """Channel output: the filter's state `target` behind rate limits and the final decay. [A]
 
     Kruse eqs. 3.8 and 3.9 as a limiter of position, because the printed rate form does not keep the
     steady level. `previous` is the output one sample earlier; I_ss = 0 means that the command has
-    gone; `decay` is exp(-a h). Without `split` lim1 takes over from the filter, and the decay from
-    lim2, at a step's end; with it where the output passes I_t1 or I_t2: then it follows both
-    thresholds, and anything before them, without flat stretches or jumps.
+    gone. Without `split` lim1 takes over from the filter, and the decay from lim2, at a step's end;
+    with it where the output passes I_t1 or I_t2: then it follows both thresholds, and anything
+    before them, without flat stretches or jumps.
     """
+    decay = exp(-p.a * h)
     if target >= previous:
         if target <= p.I_t1:
             return target
@@ -396,7 +371,6 @@ def channel_sample(
     inputs: CardInputs,
     direction: float,
     p: Channel,
-    k: ChannelConstants,
     h: float,
     options: CardOptions,
 ) -> ChannelSignals:
@@ -412,19 +386,14 @@ def channel_sample(
         rate = (state.now - state.before) / h
     else:
         begins, ends = steady_course(direction, inputs.at, p)
-        filtered, rate = exact_filter(state, begins, ends, k)
-    current = limited_current(filtered, state.out, steady, p, k.decay, h, options.split)
+        filtered, rate = exact_filter(state, begins, ends, p, h)
+    current = limited_current(filtered, state.out, steady, p, h, options.split)
     return ChannelSignals(current, steady, filtered, rate)
 
 
 @equation
 def channel_step(
-    state: Filter,
-    at: ChannelSignals,
-    p: Channel,
-    k: ChannelConstants,
-    h: float,
-    options: CardOptions,
+    state: Filter, at: ChannelSignals, p: Channel, h: float, options: CardOptions
 ) -> Filter:
     """One channel from a sample to the next."""
     if options.exact is None:

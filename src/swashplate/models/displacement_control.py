@@ -178,17 +178,13 @@ class PumpOptions(NamedTuple):
     own: Flag = OFF  # An equation is the user's own: the steady state is searched for.
 
 
-class PumpConstants(NamedTuple):
-    """What the march needs of the parameters and the step; 0 for what is off."""
+class PressureLimits(NamedTuple):
+    """Pressures at which the stroking pressure is limited. [Pa]"""
 
     lower_stop: float
-    upper_stop: float  # Pressures at which the swash plate reaches its stops. [Pa]
+    upper_stop: float  # At which the swash plate reaches its stops.
     lower: float
-    upper: float  # The same within ±Z15: the pressure never leaves them. [Pa]
-    Z12: float  # With the motor's leakage, where the line is stiff. [1]
-    friction_width: float  # Distance by which friction can hold the spool back. [m]
-    dither_factor: float  # What dither leaves of it in a step. [1]
-    damping_factor: float  # What a step leaves of the plate's lag. [1]
+    upper: float  # The same within ±Z15: the pressure never leaves them.
 
 
 # --- solenoids and spool -------------------------------------------------------------------------
@@ -297,14 +293,14 @@ def orifice_opening(position: float, p: Pump) -> float:
 
 
 @equation
-def pressure_limits(p: Pump) -> tuple[float, float, float, float]:
+def pressure_limits(p: Pump) -> PressureLimits:
     """Pressures at which the swash plate stops, and the same within ±Z15. [Pa]
 
     The stops are (∓tan Z13 + Z2)/Z1. δP never leaves the other two, so nothing winds up at a stop.
     """
     lower_stop = (p.Z2 - tan(p.Z13_minus)) / p.Z1
     upper_stop = (p.Z2 + tan(p.Z13_plus)) / p.Z1
-    return lower_stop, upper_stop, max(-p.Z15, lower_stop), min(p.Z15, upper_stop)
+    return PressureLimits(lower_stop, upper_stop, max(-p.Z15, lower_stop), min(p.Z15, upper_stop))
 
 
 @equation
@@ -405,9 +401,10 @@ def leaky_step(pressure: float, opening: float, p: Stroking, h: float, symmetric
 
 
 @equation
-def plate_motion(pressure: float, p: Pump, k: PumpConstants) -> float:
+def plate_motion(pressure: float, p: Pump) -> float:
     """Z6 while the swash plate can move, 0 while it rests on a stop."""
-    return 0.0 if pressure >= k.upper_stop or pressure <= k.lower_stop else p.Z6
+    limits = pressure_limits(p)
+    return 0.0 if pressure >= limits.upper_stop or pressure <= limits.lower_stop else p.Z6
 
 
 @equation
@@ -439,12 +436,13 @@ def swash_rate(tangent: float, pressure_rate: float, Z1: float) -> float:
 
 
 @equation
-def plate_rate(plate: float, pressure_rate: float, p: Pump, k: PumpConstants) -> float:
+def plate_rate(plate: float, pressure_rate: float, p: Pump) -> float:
     """Rate of the swash plate, zero while a stop or the relief valve holds it. [rad/s]
 
     Of the pressure at which the plate would stand still [Pa] and its rate [Pa/s].
     """
-    held = plate >= k.upper or plate <= k.lower
+    limits = pressure_limits(p)
+    held = plate >= limits.upper or plate <= limits.lower
     return 0.0 if held else swash_rate(swash_tangent(plate, p), pressure_rate, p.Z1)
 
 
@@ -452,7 +450,7 @@ def plate_rate(plate: float, pressure_rate: float, p: Pump, k: PumpConstants) ->
 
 
 @equation
-def closed_pressure(force: float, p: Pump, k: PumpConstants) -> float:
+def closed_pressure(force: float, p: Pump) -> float:
     """δP at which the spool closes, held within the limits.
 
     Without leakage sin α = sin(φ + atan(Z18/Z5)), so δP = (sin α/Z3 + Z2)/Z1. [Pa]
@@ -460,20 +458,20 @@ def closed_pressure(force: float, p: Pump, k: PumpConstants) -> float:
     a = min(max(moment_sine(force, p), -1.0), 1.0)
     angle = min(max(asin(a) + atan(p.Z18 / p.Z5), -0.5 * pi), 0.5 * pi)
     closed = (sin(angle) / p.Z3 + p.Z2) / p.Z1
-    return min(max(closed, k.lower), k.upper)
+    limits = pressure_limits(p)
+    return min(max(closed, limits.lower), limits.upper)
 
 
 @equation
-def leaked_pressure(
-    pressure: float, Z9: float, p: Pump, k: PumpConstants, symmetric: Flag
-) -> float:
+def leaked_pressure(pressure: float, Z9: float, p: Pump, symmetric: Flag) -> float:
     """What leakage takes from the pressure at which the spool closes. [Pa]
 
     The spool opens by x = Z7 δP/(Z8 √head), and x falls by Z1 Z3 (Z5² + Z18²)/(Z5 cos α) for each
     pascal: the first order, which is all that the derivative at Z7 = 0 needs.
     """
     head, _ = flow_head(pressure, pressure, Z9, symmetric)
-    if not k.lower < pressure < k.upper or head <= 0.0:
+    limits = pressure_limits(p)
+    if not limits.lower < pressure < limits.upper or head <= 0.0:
         return 0.0
     s = arm_sine(pressure, p)
     stiffness = p.Z1 * p.Z3 * (p.Z5 * p.Z5 + p.Z18 * p.Z18) / (p.Z5 * sqrt(1.0 - s * s))

@@ -7,7 +7,7 @@ from swashplate.equations.declaration import equation
 from swashplate.equations.model import Model, join
 from swashplate.models.card import Card, Currents, card, flowing_card
 from swashplate.models.channel import CardOptions, channel_level
-from swashplate.models.displacement_control import Pump, PumpConstants, PumpOptions
+from swashplate.models.displacement_control import Pump, PumpOptions
 from swashplate.models.pump import (
     PumpInputs,
     PumpSignals,
@@ -72,11 +72,9 @@ def settled_currents(voltage: float, p: Card) -> Currents:
 
 
 @equation
-def settled_sample(
-    inputs: PumpInputs, p: Pump, k: PumpConstants, h: float, options: PumpOptions
-) -> PumpSignals:
+def settled_sample(inputs: PumpInputs, p: Pump, h: float, options: PumpOptions) -> PumpSignals:
     """What is known of the pump where it has settled under a constant current."""
-    return pump_sample(pump_settled(inputs, p, k, options), inputs, p, k, h, options)
+    return pump_sample(pump_settled(inputs, p, options), inputs, p, h, options)
 
 
 settled_drive = join(
@@ -88,7 +86,6 @@ settled_drive = join(
         Nothing,
         forgotten,
         settled_sample,
-        pump.constants,
         inputs=PumpInputs,
         defaults=pump.defaults,
         options=PumpOptions,

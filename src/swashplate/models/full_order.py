@@ -24,6 +24,7 @@ from swashplate.models.displacement_control import Solenoids, solenoid_force
 from swashplate.models.drive import AMMETER, POSITION, source
 from swashplate.models.machine import (
     Machine,
+    ReliefPressures,
     balanced_spool,
     balanced_tangent,
     fastest_rate,
@@ -87,15 +88,6 @@ class PlantState(NamedTuple):
     motion: Motion  # One sample earlier.
     current: float  # One sample earlier. [A]
     begun: float  # 0 at the first sample, 1 from the second on.
-
-
-class PlantConstants(NamedTuple):
-    """What follows from the parameters alone."""
-
-    rest_pressure: float  # P0, which holds the load at rest with the plate upright. [Pa]
-    lower: float
-    upper: float  # Pressures at which the relief valve opens. [Pa]
-    reserve: float  # 2 less the fastest rate times a sub-step: above 0 where stable. [1]
 
 
 class PlantSignals(NamedTuple):
@@ -165,7 +157,12 @@ class Span(NamedTuple):
 
 @equation
 def substep(
-    state: Motion, number: float, span: Span, p: Plant, k: PlantConstants, options: PlantOptions
+    state: Motion,
+    number: float,
+    span: Span,
+    relief: ReliefPressures,
+    p: Plant,
+    options: PlantOptions,
 ) -> Motion:
     """The five states a sub-step later, see the module's text; sub-steps are counted from 0."""
     m, h, before = p.machine, span.step, state.piston_pressure
@@ -178,7 +175,7 @@ def substep(
     tangent = tan(angle)
     flow = valve_flow(position, before, m, options.symmetric)
     filling = oil_pressure_rate(before, flow, piston_speed(tangent, rate, m), m, options.air)
-    pressure = clipped(before + half * filling, k.lower, k.upper)
+    pressure = clipped(before + half * filling, relief.lower, relief.upper)
 
     moment = spool_moment(position, force, feedback_sine(tangent, m), m)
     resistance = spool_resistance(position, velocity, m)
@@ -193,7 +190,7 @@ def substep(
     return Motion(
         clipped(position + half * faster, -stroke, stroke),
         faster,
-        clipped(before + h * filling, k.lower, k.upper),
+        clipped(before + h * filling, relief.lower, relief.upper),
         clipped(angle + half * turning, -m.swash_stop_minus, m.swash_stop_plus),
         turning,
     )
@@ -203,17 +200,7 @@ def substep(
 
 
 @equation
-def plant_constants(p: Plant, h: float, given: Substeps) -> PlantConstants:
-    """Constants of the march."""
-    lower, upper = relief_pressures(p.machine)
-    fastest = fastest_rate(p.machine) * h / given.substeps
-    return PlantConstants(static_pressure(p.machine), lower, upper, 2.0 - fastest)
-
-
-@equation
-def plant_signals(
-    motion: Motion, current: float, p: Plant, k: PlantConstants, options: PlantOptions
-) -> PlantSignals:
+def plant_signals(motion: Motion, current: float, p: Plant, options: PlantOptions) -> PlantSignals:
     """What follows from the five states and the current."""
     m, stroke = p.machine, p.machine.spool_stroke
     velocity = stopped(motion.spool_velocity, motion.spool_position, -stroke, stroke)
@@ -225,7 +212,7 @@ def plant_signals(
         orifice_opening=valve_opening(motion.spool_position, m),
         valve_flow=valve_flow(motion.spool_position, motion.piston_pressure, m, options.symmetric),
         piston_pressure=motion.piston_pressure,
-        stroker_pressure=motion.piston_pressure - k.rest_pressure,
+        stroker_pressure=motion.piston_pressure - static_pressure(m),
         swash_angle=motion.swash_angle,
         swash_rate=rate,
         shaft_speed=machine_speed(motion.swash_angle, rate, m),
@@ -239,7 +226,6 @@ def plant_sample(
     state: PlantState,
     current: float,
     p: Plant,
-    k: PlantConstants,
     h: float,
     options: PlantOptions,
     given: Substeps,
@@ -252,8 +238,9 @@ def plant_sample(
     count = given.substeps
     rise = (current - state.current) / count
     span = Span(state.begun * h / count, state.current, rise)
-    motion = repeated(substep, count, state.motion, span, p, k, options)
-    return plant_signals(motion, current, p, k, options)
+    relief = relief_pressures(p.machine)
+    motion = repeated(substep, count, state.motion, span, relief, p, options)
+    return plant_signals(motion, current, p, options)
 
 
 @equation
@@ -270,13 +257,14 @@ def plant_step(signals: PlantSignals, current: float) -> PlantState:
 
 
 @equation
-def plant_rest(p: Plant, k: PlantConstants) -> PlantState:
+def plant_rest(p: Plant) -> PlantState:
     """The plate upright with its load held, and the spool where no current moves it."""
-    return PlantState(Motion(p.machine.plussing, 0.0, k.rest_pressure, 0.0, 0.0), 0.0, 0.0)
+    pressure = static_pressure(p.machine)
+    return PlantState(Motion(p.machine.plussing, 0.0, pressure, 0.0, 0.0), 0.0, 0.0)
 
 
 @equation
-def plant_settled(current: float, p: Plant, k: PlantConstants, options: PlantOptions) -> PlantState:
+def plant_settled(current: float, p: Plant, options: PlantOptions) -> PlantState:
     """Where the machine settles under a constant current."""
     m = p.machine
     force = solenoid_force(current, p.solenoids)
@@ -285,15 +273,16 @@ def plant_settled(current: float, p: Plant, k: PlantConstants, options: PlantOpt
     # at a stop of the plate the valve stays open
     position = balanced_spool(force, feedback_sine(tangent, m), m)
     pressure = holding_pressure(tangent, m.motor_constant * m.load_torque, m)
-    held = min(max(pressure, k.lower), k.upper)
+    relief = relief_pressures(m)
+    held = min(max(pressure, relief.lower), relief.upper)
     angle = min(max(atan(tangent), -m.swash_stop_minus), m.swash_stop_plus)
     return PlantState(Motion(position, 0.0, held, angle, 0.0), current, 0.0)
 
 
 @equation
-def plant_domain(k: PlantConstants) -> float:
-    """Above 0 where the scheme is stable."""
-    return k.reserve
+def plant_domain(p: Plant, h: float, given: Substeps) -> float:
+    """2 less the fastest rate times a sub-step: above 0 where the scheme is stable. [1]"""
+    return 2.0 - fastest_rate(p.machine) * h / given.substeps
 
 
 def too_fast(margin: float, cause: str) -> str:
@@ -310,7 +299,6 @@ plant = Model(
     state=PlantState,
     step=plant_step,
     sample=plant_sample,
-    constants=plant_constants,
     rest=plant_rest,
     settled=plant_settled,
     options=PlantOptions,

@@ -100,6 +100,13 @@ class Machine(NamedTuple):
     # fmt: on
 
 
+class ReliefPressures(NamedTuple):
+    """Stroker pressures at which the relief valve opens. [Pa]"""
+
+    lower: float
+    upper: float
+
+
 # --- spool ---------------------------------------------------------------------------------------
 
 
@@ -346,7 +353,7 @@ def static_pressure(p: Machine) -> float:
 
 
 @equation
-def relief_pressures(p: Machine) -> tuple[float, float]:
+def relief_pressures(p: Machine) -> ReliefPressures:
     """Lowest and highest stroker pressure that the relief valve allows. [Pa]
 
     It keeps the pressure between those that hold the swash plate and its static load at the stops
@@ -355,7 +362,9 @@ def relief_pressures(p: Machine) -> tuple[float, float]:
     load, rest = p.motor_constant * p.load_torque, static_pressure(p)
     lower = holding_pressure(tan(-p.swash_stop_minus), load, p)
     upper = holding_pressure(tan(p.swash_stop_plus), load, p)
-    return max(lower, rest - p.relief_pressure), min(upper, rest + p.relief_pressure)
+    return ReliefPressures(
+        max(lower, rest - p.relief_pressure), min(upper, rest + p.relief_pressure)
+    )
 
 
 @equation

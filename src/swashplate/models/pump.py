@@ -5,7 +5,7 @@ swash plate, and with it the flow to the motor. The refinements (`swashplate.mod
 stand in the same sample and the same step; an option that is off leaves nothing of them.
 """
 
-from math import exp, sqrt
+from math import sqrt
 from typing import NamedTuple
 
 from swashplate.equations.declaration import equation
@@ -13,7 +13,6 @@ from swashplate.equations.loops import root
 from swashplate.equations.model import Model
 from swashplate.models.displacement_control import (
     Pump,
-    PumpConstants,
     PumpOptions,
     Stroking,
     arm_sine,
@@ -37,6 +36,7 @@ from swashplate.models.displacement_control import (
 )
 from swashplate.models.refinements import (
     damping_factor,
+    dither_factor,
     friction_width,
     held_back,
     line_rates,
@@ -125,7 +125,6 @@ def flow_speed(
     rate: float,
     inputs: PumpInputs,
     p: Pump,
-    k: PumpConstants,
     options: PumpOptions,
 ) -> float:
     """Speed that the pump's flow gives a stiff line, less what leaks there. [rad/s]
@@ -138,11 +137,12 @@ def flow_speed(
     if options.leakage is not None and options.line is None:
         # a load that hangs on the hoist slows hoisting and speeds lowering up (eq. 6.70)
         Z11 = p.Z11 + p.motor_leakage * inputs.load_torque
-        lost = load_leakage(tangent, rate, k.Z12 * inputs.pump_speed)
+        Z12 = p.Z12 + p.motor_leakage * p.load_inertia * p.Z10
+        lost = load_leakage(tangent, rate, Z12 * inputs.pump_speed)
     elif options.loaded is not None:
-        lost = load_leakage(tangent, rate, k.Z12 * inputs.pump_speed)
+        lost = load_leakage(tangent, rate, p.Z12 * inputs.pump_speed)
     else:
-        lost = unloaded_leakage(tangent, rate * inputs.pump_speed, k.Z12)
+        lost = unloaded_leakage(tangent, rate * inputs.pump_speed, p.Z12)
     return shaft_speed(angle, lost, p.Z10 * inputs.pump_speed, Z11)
 
 
@@ -150,26 +150,8 @@ def flow_speed(
 
 
 @equation
-def pump_constants(p: Pump, h: float, options: PumpOptions) -> PumpConstants:
-    """Constants of the pump's march."""
-    lower_stop, upper_stop, lower, upper = pressure_limits(p)
-    Z12 = p.Z12
-    if options.leakage is not None and options.line is None:
-        Z12 = p.Z12 + p.motor_leakage * p.load_inertia * p.Z10  # eq. 6.70
-    width = 0.0
-    dither = 0.0
-    if options.friction is not None:
-        width = friction_width(p.spool_friction, p.Z4, p.Z5)
-        dither = exp(-h / p.dither_time)
-    damping = 0.0
-    if options.damping is not None:
-        damping = damping_factor(p.swash_damping, p.Z6, h)
-    return PumpConstants(lower_stop, upper_stop, lower, upper, Z12, width, dither, damping)
-
-
-@equation
 def pump_sample(
-    state: PumpState, inputs: PumpInputs, p: Pump, k: PumpConstants, h: float, options: PumpOptions
+    state: PumpState, inputs: PumpInputs, p: Pump, h: float, options: PumpOptions
 ) -> PumpSignals:
     """Everything that is known of the pump at a sample.
 
@@ -188,7 +170,12 @@ def pump_sample(
         balance = stopped_spool(spool, p)
         before = balance if state.begun == 0.0 else state.spool
         deflection = held_back(
-            state.deflection, balance, before, k.friction_width, p.spool_presliding, k.dither_factor
+            state.deflection,
+            balance,
+            before,
+            friction_width(p.spool_friction, p.Z4, p.Z5),
+            p.spool_presliding,
+            dither_factor(p.dither_time, h),
         )
         spool = balance - deflection
     opening = orifice_opening(spool, p)
@@ -200,7 +187,7 @@ def pump_sample(
         rising = pressure_rate(plate, opening, stroking, options.symmetric)
     else:
         rising = plate_pressure_rate(state.pressure, plate, p.swash_damping)
-    rate = plate_rate(plate, rising, p, k)
+    rate = plate_rate(plate, rising, p)
 
     effective = angle
     if options.ripple is not None:
@@ -208,7 +195,7 @@ def pump_sample(
         ahead = state.shaft_angle + h * state.speed
         depth = p.cam_ripple + p.cam_ripple_per_torque * abs(inputs.load_torque)
         effective = rippled_angle(angle, ahead, depth, p.cam_cycles, p.cam_phase)
-    flow = flow_speed(effective, tangent, rate, inputs, p, k, options)
+    flow = flow_speed(effective, tangent, rate, inputs, p, options)
 
     if options.line is None:
         speed = flow
@@ -256,14 +243,14 @@ def pump_step(
     signals: PumpSignals,
     inputs: PumpInputs,
     p: Pump,
-    k: PumpConstants,
     h: float,
     options: PumpOptions,
 ) -> PumpState:
     """The pump from a sample to the next."""
+    limits = pressure_limits(p)
     opening = signals.orifice_opening
     # a damped plate takes its oil as it turns, not as the pressure rises
-    Z6 = plate_motion(state.pressure, p, k) if options.damping is None else 0.0
+    Z6 = plate_motion(state.pressure, p) if options.damping is None else 0.0
     stroking = Stroking(Z6, p.Z7, p.Z8, inputs.supply_pressure)
     if options.leaky is None:
         free = tight_step(state.pressure, opening, stroking, h, options.symmetric)
@@ -271,11 +258,12 @@ def pump_step(
         free = leaky_step(state.pressure, opening, stroking, h, options.symmetric)
     plate = 0.0
     if options.damping is not None:
-        free, follower = plate_follows(free, state.plate_pressure, p.Z6, k.damping_factor)
-        plate = min(max(follower, k.lower), k.upper)
+        lag = damping_factor(p.swash_damping, p.Z6, h)
+        free, follower = plate_follows(free, state.plate_pressure, p.Z6, lag)
+        plate = min(max(follower, limits.lower), limits.upper)
     turning = options.ripple is not None or options.line is not None
     return PumpState(
-        pressure=min(max(free, k.lower), k.upper),
+        pressure=min(max(free, limits.lower), limits.upper),
         plate_pressure=plate,
         magnetising_current=0.0 if options.hysteresis is None else signals.magnetising_current,
         spool=0.0 if options.friction is None else signals.spool_free,
@@ -295,7 +283,6 @@ def pump_rates(
     signals: PumpSignals,
     inputs: PumpInputs,
     p: Pump,
-    k: PumpConstants,
     options: PumpOptions,
 ) -> PumpState:
     """Rates of the pump's state in continuous time, in place of `pump_step`. [1/s]
@@ -304,7 +291,7 @@ def pump_rates(
     and the spool is held back by (w x_b + x_s d)/(x_s + w): by what it has moved of its balance
     x_b and by the state's deflection d, which dither lets go.
     """
-    Z6 = plate_motion(state.pressure, p, k) if options.damping is None else 0.0
+    Z6 = plate_motion(state.pressure, p) if options.damping is None else 0.0
     stroking = Stroking(Z6, p.Z7, p.Z8, inputs.supply_pressure)
     rising = pressure_rate(state.pressure, signals.orifice_opening, stroking, options.symmetric)
     plate = 0.0
@@ -356,13 +343,13 @@ def standing(
 
 
 @equation
-def pump_rest(p: Pump, k: PumpConstants, options: PumpOptions, inputs: PumpInputs) -> PumpState:
+def pump_rest(p: Pump, options: PumpOptions, inputs: PumpInputs) -> PumpState:
     """State of a pump without current: the plate upright at δP = Z2/Z1."""
     return standing(p.Z2 / p.Z1, 0.0, inputs.load_torque, options)
 
 
 @equation
-def settled_pressure(inputs: PumpInputs, p: Pump, k: PumpConstants, options: PumpOptions) -> float:
+def settled_pressure(inputs: PumpInputs, p: Pump, options: PumpOptions) -> float:
     """δP that the pump settles at under a constant current. [Pa]
 
     Without leakage where the spool closes, with it where the flow through the spool is what leaks.
@@ -370,19 +357,21 @@ def settled_pressure(inputs: PumpInputs, p: Pump, k: PumpConstants, options: Pum
     """
     force = solenoid_force(inputs.current, solenoids_of(p))
     if options.leaky is None and options.own is None:
-        closed = closed_pressure(force, p, k)
-        return closed - leaked_pressure(closed, inputs.supply_pressure, p, k, options.symmetric)
-    return root(pressure_gain, k.lower, k.upper, force, inputs.supply_pressure, p, options)
+        closed = closed_pressure(force, p)
+        return closed - leaked_pressure(closed, inputs.supply_pressure, p, options.symmetric)
+    limits = pressure_limits(p)
+    supply = inputs.supply_pressure
+    return root(pressure_gain, limits.lower, limits.upper, force, supply, p, options)
 
 
 @equation
-def pump_settled(inputs: PumpInputs, p: Pump, k: PumpConstants, options: PumpOptions) -> PumpState:
+def pump_settled(inputs: PumpInputs, p: Pump, options: PumpOptions) -> PumpState:
     """State that a pump settles at: the middle of what friction and hysteresis leave open.
 
     The sample there has the speed that the drive settles at; the cam ring's ripple, which does not
     change the mean of a turn, must be off.
     """
-    pressure = settled_pressure(inputs, p, k, options)
+    pressure = settled_pressure(inputs, p, options)
     return standing(pressure, inputs.current, inputs.load_torque, options)
 
 
@@ -392,27 +381,27 @@ def pump_limits(
     signals: PumpSignals,
     inputs: PumpInputs,
     p: Pump,
-    k: PumpConstants,
     options: PumpOptions,
 ) -> PumpLimits:
     """Limits that act at a sample."""
+    lower_stop, upper_stop, lower, upper = pressure_limits(p)
     free = signals.spool_free
     pressure = signals.stroker_pressure
     orifice = p.Z16_plus if free > 0.0 else p.Z16_minus
     # against a stop nothing accelerates, however wide the spool is open
-    held = (pressure >= k.upper and free > 0.0) or (pressure <= k.lower and free < 0.0)
+    held = (pressure >= upper and free > 0.0) or (pressure <= lower and free < 0.0)
     return PumpLimits(
         dead_zone=abs(signals.magnetising_current) <= p.Z17,
         orifice=min(abs(free), p.Z14) > orifice and not held,
         spool=abs(free) > p.Z14,
-        swash_stop=pressure >= k.upper_stop or pressure <= k.lower_stop,
-        relief=(pressure >= k.upper and k.upper < k.upper_stop)
-        or (pressure <= k.lower and k.lower > k.lower_stop),
+        swash_stop=pressure >= upper_stop or pressure <= lower_stop,
+        relief=(pressure >= upper and upper < upper_stop)
+        or (pressure <= lower and lower > lower_stop),
     )
 
 
 @equation
-def pump_domain(signals: PumpSignals, inputs: PumpInputs, p: Pump, k: PumpConstants) -> float:
+def pump_domain(signals: PumpSignals, inputs: PumpInputs, p: Pump) -> float:
     """1 - sin²φ, above 0 within the model: at 0 the solenoid overpowers the feedback spring."""
     a = moment_sine(signals.solenoid_force, p)
     return 1.0 - a * a
@@ -433,7 +422,6 @@ pump = Model(
     state=PumpState,
     step=pump_step,
     sample=pump_sample,
-    constants=pump_constants,
     rest=pump_rest,
     settled=pump_settled,
     inputs=PumpInputs,

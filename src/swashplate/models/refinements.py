@@ -56,6 +56,12 @@ def friction_width(spool_friction: float, Z4: float, Z5: float) -> float:
 
 
 @equation
+def dither_factor(dither_time: float, h: float) -> float:
+    """What dither leaves of the spool's deflection after one step, exp(-h/T). [1]"""
+    return exp(-h / dither_time)
+
+
+@equation
 def held_back(
     deflection: float, balance: float, before: float, width: float, presliding: float, factor: float
 ) -> float:

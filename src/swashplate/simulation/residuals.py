@@ -98,9 +98,7 @@ def made_ready(
     instance = instance_of(_switched_on(parameters, asked), by_voltage)
     start = dict(own.start)
     if PRESSURE in start:
-        first = {name: float(values[0]) for name, values in observed.records.items()}
-        started = instance.start(first, observed.record.step, observed.start)
-        start |= start_states(instance, start[PRESSURE], started)
+        start |= start_states(instance, start[PRESSURE])
     # whether anything observed can depend on a column: on a driven channel, on the pump
     low, high = observed.extremes if by_voltage else (0.0, 0.0)
     moved = {

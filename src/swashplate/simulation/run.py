@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from swashplate.equations.declaration import interpreted
 from swashplate.equations.fields import Definition, is_real
 from swashplate.equations.marching.part import Stored
 from swashplate.equations.marching.record import (
@@ -20,8 +21,10 @@ from swashplate.equations.marching.record import (
 )
 from swashplate.equations.marching.run import Instance, Start, Started, marched
 from swashplate.equations.marching.use import Stepper
+from swashplate.equations.replacement import as_called
 from swashplate.errors import DomainError, InputError, ParameterError
 from swashplate.maneuvers import Maneuver, sampled
+from swashplate.models.displacement_control import pressure_limits
 from swashplate.parameters.parameter_set import ParameterSet
 from swashplate.parameters.plausible import check_plausible
 from swashplate.parameters.rules import FULL_VOLTAGE
@@ -142,19 +145,19 @@ def simulate_drive(
         check_filter_stability(parameters, record.step)
     run = Simulation(instance_of(parameters, driver == "voltage"), records, start)
     if start_pressure is not None:
-        run = replace(run, begin=start_states(run.instance, start_pressure, run.started))
+        run = replace(run, begin=start_states(run.instance, start_pressure))
     return run.marched()
 
 
-def start_states(instance: Instance, pressure: float, started: Started) -> dict[str, float]:
+def start_states(instance: Instance, pressure: float) -> dict[str, float]:
     """Numbers of the pump's state that a pressure at the start sets, by path. [Pa]"""
     if not np.isfinite(pressure):
         raise InputError(f"The pressure at the start must be a finite number, not {pressure}.")
-    k = started.arguments[1]["k"]
-    if not k.lower <= pressure <= k.upper:
+    limits = interpreted(as_called(instance.model, pressure_limits))(instance.parts[1].p)
+    if not limits.lower <= pressure <= limits.upper:
         raise DomainError(
             f"{instance.name}: the pressure at the start is {pressure:.6g} Pa, but the stops of "
-            f"the swash plate and Z15 keep it between {k.lower:.6g} and {k.upper:.6g} Pa."
+            f"the swash plate and Z15 keep it between {limits.lower:.6g} and {limits.upper:.6g} Pa."
         )
     paths = instance.model.parts[1].free_start["pressure"]
     return {f"pump.{path}": float(pressure) for path in paths}

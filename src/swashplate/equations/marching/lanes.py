@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 from swashplate.equations import graph
 from swashplate.equations.declaration import JIT_OFF
 from swashplate.equations.functions import generating
-from swashplate.equations.graph import CHEAP, Node
+from swashplate.equations.graph import Node
 from swashplate.equations.keeping import kept, key_of
 from swashplate.equations.marching.march import Sampler, lower, output_of
 from swashplate.equations.marching.part import PartCode, Stored, taps_of
@@ -32,6 +32,7 @@ from swashplate.equations.marching.rows import aligned
 from swashplate.equations.marching.run import module
 from swashplate.equations.model import Model
 from swashplate.equations.printing import Block, Statement, function_source, indented
+from swashplate.equations.scheduling import VECTOR, all_vector
 from swashplate.equations.values import leaves
 
 Array = NDArray[np.float64]
@@ -46,15 +47,10 @@ CALLED: dict[str, Any] = {"sqrt": np.sqrt} if JIT_OFF else {}
 
 SHORT = 16
 """Statements that are not worth a loop of their own."""
-VECTOR = {*CHEAP, "/", "sqrt", "**"}
-"""Operations that processors have for many numbers at once."""
+
+
 DIGEST = 8
-"""Characters that a generated function's name ends in."""
-
-
-def all_vector(nodes: Sequence[Node]) -> bool:
-    """Whether a processor can compute some nodes for many lanes at once, whatever tests say."""
-    return all(node.op in VECTOR for node in nodes)
+"""Characters that the name of a generated function ends in."""
 
 
 def is_vector(statement: Statement) -> bool:

@@ -40,10 +40,11 @@ class Stored(NamedTuple):
     part: int
     kind: str
     """``signals``, ``state``, ``limits``, ``input``, ``link``, ``tap`` for a tap's sample; ``p``,
-    ``k``, ``given`` and ``fraction`` for a parameter, constant, given and the place of a tap."""
+    ``given`` and ``fraction`` for a parameter, given and the place of a tap; ``k`` for what follows
+    from parameters, givens and the step alone."""
     path: str = ""
-    """Of the number; name of the input, constant or link; input and number of a tap's sample,
-    ``at.0``; number of the tap."""
+    """Of the number; name of the input or link; input and number of a tap's sample, ``at.0``;
+    number of the tap; name in the code of what follows from parameters."""
 
 
 class TapOf(NamedTuple):
@@ -100,8 +101,6 @@ class PartCode:
         """Path of each parameter by the name that stands for it."""
         self.known: dict[str, Value] = {"p": self.p, "h": graph.name("h"), "given": self.given}
         self.known["state"] = self.state
-        if own.constants is not None:
-            self.known["k"] = self._call(own.constants)
         self.inputs = {name: self._input(name) for name in own.input_types}
         self.known |= self.inputs
         if own.inputs is not None:

@@ -195,8 +195,6 @@ class Instance:
         for i, (part, own) in enumerate(zip(self.model.parts, self.parts, strict=True)):
             known: dict[str, Any] = {"p": own.p, "options": own.options, "given": own.given}
             known["h"] = h
-            if part.constants is not None:
-                known["k"] = self._called(part.constants, known)
             for name in part.input_types:
                 tap, link = part.tap(name), self.model.link_of(i, name)
                 if link is not None:

@@ -1,0 +1,186 @@
+"""What is generated from a model's equations is kept on disk, and never outlives them."""
+
+import linecache
+import os
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from swashplate.equations import simulate
+
+pytestmark = pytest.mark.slow
+
+MACHINE = '''
+from typing import NamedTuple
+
+from swashplate.equations import Model, declared, equation
+
+GAIN = 2.0
+TABLE = (1.0, 3.0)
+
+
+class Lag(NamedTuple):
+    share: float
+
+
+class Rod(NamedTuple):
+    position: float
+
+
+@equation
+def deepest(x: float) -> float:
+    """Three calls below the step."""
+    return GAIN * x + TABLE[1]
+
+
+@equation
+def deeper(x: float) -> float:
+    return deepest(x)
+
+
+@equation
+def deep(x: float) -> float:
+    return deeper(x)
+
+
+@equation
+def ruled(x: float) -> float:
+    return x
+
+
+@declared(ruled)
+def _ruled(x: float) -> float:
+    return 1.0
+
+
+@equation
+def step(state: Rod, command: float, p: Lag, h: float) -> Rod:
+    return Rod(state.position + p.share * (deep(ruled(command)) - state.position))
+
+
+rod = Model("rod", parameters=Lag, state=Rod, step=step)
+'''
+RUN = """
+import sys
+sys.path.insert(0, sys.argv[1])
+import numpy as np
+import swashplate.equations.tracing as tracing
+
+count = [0]
+call = tracing.Trace.call
+
+def counted(*arguments):
+    count[0] += 1
+    return call(*arguments)
+
+tracing.Trace.call = counted
+import machine
+from swashplate.equations import sensitivities, simulate, stepper
+
+p, command = machine.Lag(0.5), np.ones(4)
+end = simulate(machine.rod, p, {"command": command}, 100.0)["position"][-1]
+slope = sensitivities(machine.rod, p, {"command": command}, 100.0, output="position")[-1, 0]
+stepper(machine.rod, p, ["command"], rate=100.0)
+print(end, slope, count[0])
+"""
+
+
+def run(folder: Path, text: str) -> tuple[float, float, int]:
+    """Last position, its derivative by the share, and how many equations were read."""
+    (folder / "machine.py").write_text(text, "utf-8")
+    done = subprocess.run(
+        [sys.executable, "-c", RUN, str(folder)],
+        capture_output=True,
+        text=True,
+        check=True,
+        env={**os.environ, "NUMBA_DISABLE_JIT": "0", "NUMBA_CACHE_DIR": str(folder / "cache")},
+    )
+    end, slope, count = done.stdout.split()
+    return float(end), float(slope), int(count)
+
+
+def expected(target: float, share: float = 0.5) -> tuple[float, float]:
+    """After three steps towards a target from zero: target (1 - (1 - share)³), and its slope."""
+    return target * (1.0 - (1.0 - share) ** 3), target * 3.0 * (1.0 - share) ** 2
+
+
+@pytest.fixture
+def warm(tmp_path: Path) -> Path:
+    """A folder in which the machine was run once."""
+    end, slope, count = run(tmp_path, MACHINE)
+    assert (end, slope) == pytest.approx(expected(5.0), rel=1e-14)
+    assert count > 0
+    return tmp_path
+
+
+def test_a_warm_process_reads_no_equation(warm: Path) -> None:
+    end, slope, count = run(warm, MACHINE)
+    assert (end, slope) == pytest.approx(expected(5.0), rel=1e-14)
+    assert count == 0
+    comment = MACHINE.replace('"""Three calls below the step."""', '"""Something else."""  # more')
+    assert run(warm, comment)[2] == 0
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "target"),
+    [
+        ("return GAIN * x + TABLE[1]", "return GAIN * x - TABLE[1]", -1.0),
+        ("GAIN = 2.0", "GAIN = 4.0", 7.0),
+        ("TABLE = (1.0, 3.0)", "TABLE = (1.0, 6.0)", 8.0),
+    ],
+)
+def test_what_is_edited_counts(warm: Path, old: str, new: str, target: float) -> None:
+    assert MACHINE.count(old) == 1
+    end, slope, count = run(warm, MACHINE.replace(old, new))
+    assert (end, slope) == pytest.approx(expected(target), rel=1e-14)
+    assert count > 0
+
+
+def test_a_declared_derivative_that_is_edited_counts(warm: Path) -> None:
+    old = "return 1.0\n\n\n@equation\ndef step"
+    scaled = MACHINE.replace("deep(ruled(command))", "deep(ruled(p.share * command))")
+    right = run(warm, scaled)
+    halved = scaled.replace(old, old.replace("1.0", "0.5"))
+    assert halved != scaled
+    end, slope, _ = run(warm, halved)
+    assert end == right[0]
+    assert slope != right[1]
+
+
+def test_a_damaged_file_is_made_again(warm: Path) -> None:
+    files = [*(warm / "cache").rglob("*.kept")]
+    assert files
+    for number, path in enumerate(files):
+        content = bytearray(path.read_bytes())
+        content[len(content) // 2] ^= 0xFF
+        path.write_bytes(bytes(content) if number % 2 else b"")
+    end, slope, count = run(warm, MACHINE)
+    assert (end, slope) == pytest.approx(expected(5.0), rel=1e-14)
+    assert count > 0
+    assert run(warm, MACHINE)[2] == 0
+
+
+def cell(number: int, text: str, space: dict[str, Any]) -> None:
+    """Run a cell of a notebook, whose text is kept under a name that is not a file's."""
+    name = f"<ipython-input-{number}-abc>"
+    linecache.cache[name] = (len(text), None, text.splitlines(True), name)
+    exec(compile(text, name, "exec"), space)
+
+
+def test_a_cell_of_a_notebook_that_is_run_again_counts() -> None:
+    space: dict[str, Any] = {"__name__": "__main__"}
+    head, _, tail = MACHINE.partition("@equation\ndef deepest")
+    helper, _, rest = tail.partition("@equation\ndef deeper")
+    ends = []
+    for number, sign in enumerate(("+", "-")):
+        changed = helper.replace("x + TABLE", f"x {sign} TABLE")
+        cell(3 * number, head, space)
+        cell(3 * number + 1, f"@equation\ndef deepest{changed}", space)
+        cell(3 * number + 2, f"@equation\ndef deeper{rest}", space)
+        found = simulate(space["rod"], space["Lag"](0.5), {"command": np.ones(4)}, 100.0)
+        ends.append(found["position"][-1])
+    assert ends == pytest.approx([expected(5.0)[0], expected(-1.0)[0]], rel=1e-14)
