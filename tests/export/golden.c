@@ -101,7 +101,7 @@ static double root_of_pressure_gain(double low, double high, double force, doubl
 
 /* Channel output: the filter's state `target` behind rate limits and the final decay. [A] */
 static double limited_current(double target, double previous, double steady, double p_lim1,
-    double p_lim2, double p_I_t1, double p_I_t2, double decay, double h, bool split)
+    double p_lim2, double p_I_t1, double p_I_t2, double p_a, double h, bool split)
 {
     double chosen;
     if (target >= previous) {
@@ -118,12 +118,14 @@ static double limited_current(double target, double previous, double steady, dou
         if (!split || fallen >= p_I_t2) {
             chosen = fallen;
         } else {
+            const double decay = exp(-p_a * h);
             const double left = p_I_t2 * (decay + (previous - p_I_t2) / (previous - fallen)
                 * (1.0 - decay));
             chosen = steady == 0.0 ? left : greater_of(left, target);
         }
     } else {
-        const double value = previous * decay;
+        const double decay_2 = exp(-p_a * h);
+        const double value = previous * decay_2;
 
         /* faded: A value, or zero where it has faded below 1e-30; the derivatives take no
          * notice. */
@@ -135,14 +137,15 @@ static double limited_current(double target, double previous, double steady, dou
 
 /* Pressures at which the swash plate stops, and the same within ±Z15. [Pa] */
 static void pressure_limits(double p_Z1, double p_Z2, double p_Z13_plus, double p_Z13_minus,
-    double p_Z15, double *result_0, double *result_1, double *result_2, double *result_3)
+    double p_Z15, double *result_lower_stop, double *result_upper_stop, double *result_lower,
+    double *result_upper)
 {
     const double lower_stop = (p_Z2 - tan(p_Z13_minus)) / p_Z1;
     const double upper_stop = (p_Z2 + tan(p_Z13_plus)) / p_Z1;
-    *result_0 = lower_stop;
-    *result_1 = upper_stop;
-    *result_2 = greater_of(-p_Z15, lower_stop);
-    *result_3 = lesser_of(p_Z15, upper_stop);
+    *result_lower_stop = lower_stop;
+    *result_upper_stop = upper_stop;
+    *result_lower = greater_of(-p_Z15, lower_stop);
+    *result_upper = lesser_of(p_Z15, upper_stop);
 }
 
 /* Net force of both solenoids on the spool under a signed current. [N] */
@@ -168,10 +171,10 @@ static double solenoid_force(double current, double p_Z17, double p_Z19_plus, do
 /* δP that the pump settles at under a constant current. [Pa] */
 static double settled_pressure(double inputs_current, double inputs_supply_pressure, double p_Z1,
     double p_Z2, double p_Z3, double p_Z4, double p_Z5, double p_Z6, double p_Z7, double p_Z8,
-    double p_Z14, double p_Z16_plus, double p_Z16_minus, double p_Z17, double p_Z18,
-    double p_Z19_plus, double p_Z19_minus, double p_Z20_plus, double p_Z20_minus, double p_Z21_plus,
-    double p_Z21_minus, double p_Z22_plus, double p_Z22_minus, double k_lower, double k_upper,
-    bool options_symmetric, bool options_leaky, bool options_own)
+    double p_Z13_plus, double p_Z13_minus, double p_Z14, double p_Z15, double p_Z16_plus,
+    double p_Z16_minus, double p_Z17, double p_Z18, double p_Z19_plus, double p_Z19_minus,
+    double p_Z20_plus, double p_Z20_minus, double p_Z21_plus, double p_Z21_minus, double p_Z22_plus,
+    double p_Z22_minus, bool options_symmetric, bool options_leaky, bool options_own)
 {
     /* effective_current: Current beyond the symmetric dead zone, i_e = sign(i) max(|i| - Z17,
      * 0). [A] */
@@ -186,6 +189,12 @@ static double settled_pressure(double inputs_current, double inputs_supply_press
     const double c4 = plus ? p_Z22_plus : p_Z22_minus;
     const double force = effective_current * (c1 + effective_current
         * (c2 + effective_current * (c3 + effective_current * c4)));
+
+    /* pressure_limits: Pressures at which the swash plate stops, and the same within ±Z15. [Pa] */
+    const double lower_stop = (p_Z2 - tan(p_Z13_minus)) / p_Z1;
+    const double limits_lower = greater_of(-p_Z15, lower_stop);
+    const double upper_stop = (p_Z2 + tan(p_Z13_plus)) / p_Z1;
+    const double limits_upper = lesser_of(p_Z15, upper_stop);
     double chosen; /* settled_pressure */
     if (!options_leaky && !options_own) {
         /* closed_pressure: δP at which the spool closes, held within the limits. */
@@ -193,7 +202,7 @@ static double settled_pressure(double inputs_current, double inputs_supply_press
         const double angle = lesser_of(greater_of(asin(a) + atan(p_Z18 / p_Z5),
             -0.5 * 3.141592653589793), 0.5 * 3.141592653589793);
         const double closed = (sin(angle) / p_Z3 + p_Z2) / p_Z1;
-        const double closed_2 = lesser_of(greater_of(closed, k_lower), k_upper);
+        const double closed_2 = lesser_of(greater_of(closed, limits_lower), limits_upper);
 
         /* flow_head: Pressure head over the valve, (Z9 - σ δP)/2 [Pa], and σ. */
         const double sign = closed_2 < 0.0 ? -1.0 : 1.0;
@@ -202,7 +211,7 @@ static double settled_pressure(double inputs_current, double inputs_supply_press
 
         /* leaked_pressure: What leakage takes from the pressure at which the spool closes. [Pa] */
         double chosen_2;
-        if (!(k_lower < closed_2 && closed_2 < k_upper) || head <= 0.0) {
+        if (!(limits_lower < closed_2 && closed_2 < limits_upper) || head <= 0.0) {
             chosen_2 = 0.0;
         } else {
             /* arm_sine: sin α of the feedback arm, which follows the swash plate; must lie
@@ -218,9 +227,9 @@ static double settled_pressure(double inputs_current, double inputs_supply_press
         /* settled_pressure */
         chosen = closed_2 - chosen_2;
     } else {
-        const double root = root_of_pressure_gain(k_lower, k_upper, force, inputs_supply_pressure,
-            p_Z1, p_Z2, p_Z3, p_Z4, p_Z5, p_Z6, p_Z7, p_Z8, p_Z14, p_Z16_plus, p_Z16_minus, p_Z18,
-            options_symmetric);
+        const double root = root_of_pressure_gain(limits_lower, limits_upper, force,
+            inputs_supply_pressure, p_Z1, p_Z2, p_Z3, p_Z4, p_Z5, p_Z6, p_Z7, p_Z8, p_Z14,
+            p_Z16_plus, p_Z16_minus, p_Z18, options_symmetric);
         chosen = root;
     }
     return chosen;
