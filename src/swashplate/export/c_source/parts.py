@@ -69,7 +69,10 @@ class PartInC:
             self._symbols = kind(*flags)
         self.part = PartCode(model, number, model.external, self._symbols)
         own = {*OWN}
-        self.windows = [fresh_name(c_name(tap.input), own) for tap in self.part.taps]
+        self.windows = [
+            fresh_name(c_name(tap.input if tap.tap.width else f"{tap.input}_window"), own)
+            for tap in self.part.taps
+        ]
         self.names = {
             word: writer.loops.fresh(f"{self.member}_{word}")
             for word in ("constants", "sample", "rest", "settled")
