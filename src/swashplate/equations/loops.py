@@ -172,12 +172,13 @@ class Inner(NamedTuple):
         """Name of the equation."""
         return self.source.name
 
-    def function(self) -> Function:
-        """The equation as a function of scalars."""
+    def function(self, *, flat: bool = False) -> Function:
+        """The equation as a function of scalars, which returns a tuple if it is to be `flat`."""
         nodes = [node for _, node in leaves(self.result)]
         given = [*self.leading, *self.formals]
         name = f"{self.name}_{UNNAMED}"
-        text, names = function_text(name, f"{self.name} of scalars.", given, nodes, self.labels)
+        says = f"{self.name} of scalars."
+        text, names = function_text(name, says, given, nodes, self.labels, flat=flat)
         return Function(*named_by_text(name, text), dict(names))
 
 
@@ -186,7 +187,7 @@ class Loop(NamedTuple):
 
     name: str
     """Name of the generated function."""
-    kind: Literal["root", "repeated"]
+    kind: Literal["root", "repeated", "once"]
     inner: Inner
 
 
@@ -230,6 +231,19 @@ def _inner(outer: Trace, source: Parsed, leading: Sequence[Value], rest: Sequenc
         [stands_for[node] for node in read],
         result,
     )
+
+
+def called_apart(trace: Trace, source: Parsed, values: Sequence[Value]) -> Value:
+    """An equation as a call of a generated function, without derivatives."""
+    inner = _inner(trace, source, [], values)
+    function = inner.function(flat=True)
+    count = sum(1 for _ in leaves(inner.result))
+    value = Call(function, count, loop=Loop(function.name, "once", inner))
+    call = make("call", *inner.actuals, value=value)
+    results = [trace.make("result", call, value=k) for k in range(count)]
+    if count == 1:
+        trace.label(results[0], source.name)
+    return rebuilt(inner.result, iter(results))
 
 
 def solved(trace: Trace, residual: Parsed, low: Value, high: Value, rest: Sequence[Value]) -> Value:

@@ -245,22 +245,26 @@ class C(Language):
     ) -> list[str]:
         """A call of what does the loop: it returns a root, and moves a state where it stands."""
         name = self._functions.name_of(call.value.loop, self._taken)
-        own = 2 if call.value.loop.kind == "root" else 1 + len(targets)
+        kind = call.value.loop.kind
+        own = {"root": 2, "once": 0}.get(kind, 1 + len(targets))
         texts = [
             as_double(node, (text, 0))[0] if k < own else text
             for k, (node, text) in enumerate(zip(call.args, given, strict=True))
         ]
-        if call.value.loop.kind == "root":
+        if len(targets) == 1 and kind != "repeated":
             (target,) = targets
             start = target if target in declared else f"const double {target}"
             return [f"{pad}{start} = {name}({', '.join(texts)});"]
         lines, places = list[str](), list[str]()
-        for target, text in zip(targets, texts[1:], strict=False):
+        for k, target in enumerate(targets):
             place = target or fresh_name("unused", self._taken)
             places.append(f"&{place}")
             start = place if target in declared else f"double {place}"
-            lines.append(f"{pad}{start} = {text};")
-        arguments = [texts[0], *texts[own:], *places]
+            if kind == "repeated":
+                lines.append(f"{pad}{start} = {texts[1 + k]};")
+            elif target not in declared:
+                lines.append(f"{pad}{start};")
+        arguments = [*texts[: min(own, 1)], *texts[own:], *places]
         return [*lines, f"{pad}{name}({', '.join(arguments)});"]
 
     def branch(self, test: str, then: list[str], other: list[str], pad: str) -> list[str]:
@@ -400,10 +404,14 @@ class Loops:
         if key not in self._names:
             inner: Inner = loop.inner
             name = self.fresh(inner.source.name, taken)
-            texts = [self.function(name, inner)]
+            self.texts.append(self.function(name, inner))
+            if loop.kind == "once":
+                self._names[key] = name
+                taken.add(name)
+                return name
             outer = self.fresh(f"{'root_of' if loop.kind == 'root' else 'repeated'}_{name}", taken)
             write = self._root if loop.kind == "root" else self._repeated
-            self.texts += [*texts, write(outer, name, inner)]
+            self.texts.append(write(outer, name, inner))
             self._names[key] = outer
             taken |= {name, outer}
         return self._names[key]

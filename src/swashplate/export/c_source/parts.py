@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, get_type_hints
 from swashplate.equations import graph
 from swashplate.equations.functions import FUNCTIONS, RESERVED, Function, fresh_name
 from swashplate.equations.graph import CALLED, LEAVES, Node, names_in, ordered
+from swashplate.equations.language import Parsed
 from swashplate.equations.marching.part import PartCode
 from swashplate.equations.model import Equation, Source, arguments_of
 from swashplate.equations.printing import STEMS, Block, assigned
@@ -25,6 +26,7 @@ from swashplate.equations.printing_c import (
     mentions,
     without_comments,
 )
+from swashplate.equations.scheduling import FEW
 from swashplate.equations.tracing import Trace
 from swashplate.equations.values import Tuple, Value, fixed, leaves, undecided
 
@@ -67,7 +69,8 @@ class PartInC:
                 each: flag.value for each, flag in zip(kind._fields, flags, strict=True)
             }
             self._symbols = kind(*flags)
-        self.part = PartCode(model, number, model.external, self._symbols)
+        self._trace(Trace())
+        self._trace(Trace(formulas(self.part.trace)))
         own = {*OWN}
         self.windows = [
             fresh_name(c_name(tap.input if tap.tap.width else f"{tap.input}_window"), own)
@@ -77,13 +80,21 @@ class PartInC:
             word: writer.loops.fresh(f"{self.member}_{word}")
             for word in ("constants", "sample", "rest", "settled")
         }
-        self.results = self._results()
         ends = [node for nodes in self.results.values() for _, node in nodes]
         ends += [] if self.part.margin is None else [self.part.margin]
+        for node in ordered(ends):
+            if node.op == "call":
+                writer.loops.name_of(node.value.loop, set())
         self._labels = self.labels(self.part.trace, ends)
         self.constants = self._constants(ends)
 
     # -- the graph ---------------------------------------------------------------------------------
+
+    def _trace(self, trace: Trace) -> None:
+        """Run the equations of a sample on symbols."""
+        model = self.w.e.model
+        self.part = PartCode(model, self.number, model.external, self._symbols, trace=trace)
+        self.results = self._results()
 
     def traced(self, equation: Equation, trace: Trace) -> Value:
         """What an equation of the part returns."""
@@ -134,7 +145,7 @@ class PartInC:
             if not names_in([node]) - still:
                 continue
             named = node in self._labels and node.kind == "float"
-            if not named and not any(each.op in LIBRARY for each in ordered([node])):
+            if not named and not any(each.op in (*LIBRARY, "call") for each in ordered([node])):
                 continue
             if named or node.op in LIBRARY or node.op == "result":
                 stem = self._labels.get(node) or STEMS.get(node.op, node.op)
@@ -346,3 +357,15 @@ class PartInC:
 def path_of(path: str) -> str:
     """A path of Python's as one of C's."""
     return ".".join(c_name(each) for each in path.split("."))
+
+
+def formulas(trace: Trace) -> set[Parsed]:
+    """Equations of numbers alone that a part uses more than once: they become functions of C."""
+    found = set()
+    for source, calls in trace.calls.items():
+        given, back = max(calls, key=lambda each: len(ordered(each[1], each[0])))
+        numbers = all(each.kind == "float" for each in (*given, *back))
+        plain_arguments = len(given) == len(source.arguments)
+        if len(calls) > 1 and numbers and plain_arguments and len(ordered(back, given)) > FEW:
+            found.add(source)
+    return found
