@@ -193,7 +193,7 @@ class Loop(NamedTuple):
 
 def _inner(outer: Trace, source: Parsed, leading: Sequence[Value], rest: Sequence[Value]) -> Inner:
     """An equation whose `leading` arguments the loop gives, the others as where it is called."""
-    trace = outer.inner()
+    trace = outer.inner(source)
     taken = set[str]()
     names = [each.arg for each in source.arguments]
     given, stands_for = dict[str, Value](), dict[Node, Node]()

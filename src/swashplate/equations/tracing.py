@@ -85,9 +85,9 @@ class Trace:
             rule = RULES.get(plain(equation))
             return result if rule is None else self._ruled(source, parsed(rule), known, result)
 
-    def inner(self) -> Trace:
-        """A trace of its own for what is run within an equation, again and again."""
-        trace = Trace()
+    def inner(self, source: Parsed) -> Trace:
+        """A trace of its own for an equation that is run within another, again and again."""
+        trace = Trace({*self.apart} - {source})
         trace.under_way = [*self.under_way]
         return trace
 
