@@ -14,8 +14,8 @@ from hypothesis import strategies as st
 
 from swashplate import Drive, export
 from swashplate.equations import Definition, Model, equation
-from swashplate.equations.c_source import interface
-from swashplate.equations.c_source.text import comment, comment_line, function
+from swashplate.equations.printing_c import comment, comment_line, function
+from swashplate.export.c_source import interface
 
 GCC = shutil.which("gcc")
 needs_gcc = pytest.mark.skipif(GCC is None, reason="there is no gcc here")

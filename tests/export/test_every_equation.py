@@ -6,6 +6,7 @@ constructs' test show every construct that an equation may use.
 
 import ctypes
 from functools import cache
+from math import floor
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -14,9 +15,10 @@ from tests.equations import test_constructs
 from tests.equations.test_all_equations import EQUATIONS, equations_of
 from tests.export.twins import InC, flagged
 
-from swashplate.equations import equation
-from swashplate.equations.c_source import Unit
+from swashplate.equations import equation, repeated, root
+from swashplate.equations.printing_c import Loops, helpers_in
 from swashplate.errors import EquationError
+from swashplate.export.c_source import equation_in_c
 
 REFUSED = ("rubbing", "rubbed")
 """Constructs of which there are none in C: an option that is a tuple of numbers, or None."""
@@ -82,6 +84,23 @@ def turned(p: Register, x: float) -> Register:
     return Register(total, values[0])
 
 
+@equation
+def counted(state: float, number: float, steps: float) -> float:
+    return state + steps * number
+
+
+@equation
+def beyond(x: float, steps: float, on: bool | None) -> float:
+    return x * x * x - steps if on is None else x - steps
+
+
+@equation
+def looped(x: float, on: bool | None) -> float:
+    """Whole numbers among what loops begin with and are given, and an option."""
+    steps = floor(min(max(x, -1e6), 1e6))
+    return repeated(counted, 3.0, 0, steps) + root(beyond, -200, 200.0, steps, on)
+
+
 SETS = {
     "packaged": EQUATIONS,
     "constructs": {name: each for name, each in CONSTRUCTS.items() if name not in REFUSED},
@@ -124,19 +143,23 @@ def test_an_equation_in_c_has_the_bits_of_the_compiled_one(
 @pytest.mark.parametrize("name", REFUSED)
 def test_what_has_no_counterpart_in_c_is_refused_by_name(name: str) -> None:
     with pytest.raises(
-        EquationError, match=r"constructs.py, line \d+: rubbing .*Rubbing\.friction.*None"
+        EquationError, match=r"constructs.py, line \d+: rub.* p\.friction is .*None"
     ):
-        Unit().add(CONSTRUCTS[name])
+        equation_in_c(CONSTRUCTS[name], Loops())
 
 
-def test_three_functions_read_as_they_were_reviewed() -> None:
+def test_four_functions_read_as_they_were_reviewed() -> None:
     """And what they call: golden.c is reviewed when it changes."""
-    unit = Unit("swp_")
-    for name in (
-        "channel.limited_current",
-        "displacement_control.pressure_limits",
-        "displacement_control.solenoid_force",
-    ):
-        unit.add(EQUATIONS[name])
-    made = "\n\n".join([*unit.helpers(), *unit.texts])
+    functions = Loops()
+    texts = [
+        equation_in_c(EQUATIONS[name], functions).text
+        for name in (
+            "channel.limited_current",
+            "displacement_control.pressure_limits",
+            "displacement_control.solenoid_force",
+            "pump.settled_pressure",
+        )
+    ]
+    body = "\n\n".join([*functions.texts, *texts])
+    made = "\n".join([*helpers_in(body), body])
     assert f"{made}\n" == (Path(__file__).parent / "golden.c").read_text("utf-8")

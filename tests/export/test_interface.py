@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 from swashplate import Drive, InputError
-from swashplate.equations.c_source import feedthrough
 from swashplate.export import content_of, drive_sources, libraries, values_of
+from swashplate.export.c_source import feedthrough
 from swashplate.simulation.run import Sample
 
 OK, BAD_VALUE, UNSTABLE, BAD_DELAY, DOMAIN = range(5)

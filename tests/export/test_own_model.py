@@ -25,8 +25,9 @@ from swashplate.equations import (
     root,
     simulate,
 )
-from swashplate.equations.c_source import interface
+from swashplate.errors import EquationError
 from swashplate.export import c, content_of, drive_sources, fmu, libraries, values_of, wasm
+from swashplate.export.c_source import Exported, interface
 from swashplate.models import displacement_control
 
 OFF = None
@@ -212,6 +213,78 @@ def test_a_model_has_the_bits_of_its_march(case: Any, compiled: Any) -> None:
     for output, values in found.run(command, outputs.split()).items():
         assert np.ptp(values) > 0.1, output
         assert (run[output] == values).all(), output
+
+
+class Numbered(NamedTuple):
+    height: float | None = None
+
+
+@equation
+def numbered(state: Place, p: Lag, options: Numbered) -> Place:
+    return Place(0.0 if options.height is None else options.height)
+
+
+def test_an_option_that_is_a_number_is_refused_by_name() -> None:
+    with pytest.raises(EquationError, match=r"Numbered\.height is of type .*float.*bool \| None"):
+        interface(Exported(Model("numbered", Lag, Place, numbered, options=Numbered), "swp"))
+
+
+# what both sides of an option need is computed before it, what one alone needs on that side; and
+# where the same option is asked again, what the first time has made is still there
+
+
+class Twice(NamedTuple):
+    rough: bool | None = OFF
+
+
+@equation
+def twice(state: Place, command: float, p: Lag, options: Twice) -> Place:
+    first = 0.2 * command
+    if options.rough is not None:
+        first = repeated(halved, 3.0, tanh(command) / p.time, p) + tanh(command)
+    second = tanh(first + state.place) / (1.0 + command * command)
+    if options.rough is not None:
+        second = second + tanh(command) / p.time + tanh(second)
+    return Place(0.5 * state.place + second)
+
+
+@equation
+def halved(state: float, number: float, p: Lag) -> float:
+    return state - 0.5 * p.time * state / (1.0 + number)
+
+
+@pytest.mark.parametrize("options", [Twice(), Twice(True)])
+def test_what_an_option_has_made_is_there_when_it_is_asked_again(
+    options: Twice, compiled: Any
+) -> None:
+    model = Model("twice", Lag, Place, twice, options=Twice)
+    run = simulate(model, Lag(0.3), {"command": PUMPED}, RATE, options=options)
+    made = exported(model, compiled, RATE, parameters=Lag(0.3), options=options)
+    assert (made.run(PUMPED, ["place"])["place"] == run["place"]).all()
+    assert np.ptp(run["place"]) > 0.1
+
+
+def test_a_constant_that_is_no_number_where_it_is_not_needed_is_none_of_the_numbers_checked(
+    compiled: Any,
+) -> None:
+    """0/0 of parameters, on the side of a branch that is not taken."""
+    model = Model("guarded", Gap, Place, guarded)
+    run = simulate(model, Gap(0.0, 0.0), {"command": PUMPED}, RATE)
+    made = exported(model, compiled, RATE, parameters=Gap(0.0, 0.0))
+    assert (made.run(PUMPED, ["place"])["place"] == run["place"]).all()
+
+
+class Gap(NamedTuple):
+    width: float
+    reach: float
+
+
+@equation
+def guarded(state: Place, command: float, p: Gap) -> Place:
+    slope = p.reach / p.width
+    if command > 100.0:
+        return Place(slope * tanh(command) + tanh(slope + command))
+    return Place(0.5 * state.place + command)
 
 
 def test_a_domain_that_is_left_is_said(compiled: Any) -> None:

@@ -8,9 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from swashplate.equations.c_source import Kind, Unit, c_name, fields_of
-from swashplate.equations.language import parsed, plain
+from swashplate.equations.language import is_named_tuple, parsed, plain
 from swashplate.equations.marching.run import module
+from swashplate.equations.printing_c import Loops, helpers_in
+from swashplate.export.c_source import EquationInC, equation_in_c
 
 CALLS = 3000
 SPECIAL = np.array(
@@ -20,56 +21,60 @@ COUNTS = ("count", "substeps")
 """Arguments that say how often something is done: few times."""
 
 
+WINDOW = 3
+"""Elements of tuples whose length the types leave open."""
+
+
 # --- numbers in, numbers out ----------------------------------------------------------------------
 
 
-def scalars(unit: Unit, kind: Kind, path: str) -> Iterator[tuple[str, str]]:
-    """Word and path of every scalar of a kind, in order."""
-    if kind.word == "struct":
-        for name, hint in fields_of(kind.cls):
-            yield from scalars(unit, unit.kind(hint, path), f"{path}.{name}")
-    elif kind.word == "tuple":
-        for i, item in enumerate(kind.items):
-            yield from scalars(unit, item, f"{path}.{i}")
+def items_of(hint: Any, path: str) -> list[tuple[str, Any]] | None:
+    """Paths and types of what is in a tuple; None of a scalar."""
+    args = typing.get_args(hint)
+    if typing.get_origin(hint) is typing.Annotated:
+        return items_of(args[0], path)
+    if is_named_tuple(hint):
+        hints = typing.get_type_hints(hint)
+        return [(f"{path}.{name}", hints.get(name, float)) for name in hint._fields]
+    if typing.get_origin(hint) is tuple:
+        args = (args[0],) * WINDOW if args[-1] is Ellipsis else args
+        return [(f"{path}.{i}", each) for i, each in enumerate(args)]
+    return None
+
+
+def scalars(hint: Any, path: str) -> Iterator[tuple[str, str]]:
+    """Word and path of every scalar of a type, in order."""
+    items = items_of(hint, path)
+    if items is not None:
+        for below, each in items:
+            yield from scalars(each, below)
+    elif type(None) in typing.get_args(hint):
+        yield "flag", path
     else:
-        yield kind.word, path
+        yield {float: "double", int: "int", bool: "bool"}[hint], path
 
 
-def in_c(unit: Unit, kind: Kind, number: Iterator[int]) -> str:
-    """A value in C of numbers in a row."""
-    if kind.word == "struct":
-        inner = [in_c(unit, unit.kind(h, ""), number) for _, h in fields_of(kind.cls)]
-        return f"{{{', '.join(inner) or '0'}}}"
-    if kind.word == "tuple":
-        return f"{{{{{', '.join(in_c(unit, item, number) for item in kind.items)}}}}}"
-    word = {"double": "in[{}]", "int": "(long long)in[{}]"}.get(kind.word, "in[{}] != 0.0")
-    return word.format(next(number))
+def open_lengths(hint: Any, path: str) -> Iterator[tuple[str, int]]:
+    """Lengths of tuples whose types leave them open, by path."""
+    if typing.get_origin(hint) is tuple and Ellipsis in typing.get_args(hint):
+        yield path, WINDOW
+    for below, each in items_of(hint, path) or ():
+        yield from open_lengths(each, below)
 
 
-def out_c(unit: Unit, kind: Kind, text: str) -> Iterator[str]:
-    """The scalars of a value in C."""
-    if kind.word == "struct":
-        for name, hint in fields_of(kind.cls):
-            yield from out_c(unit, unit.kind(hint, ""), f"{text}.{c_name(name)}")
-    elif kind.word == "tuple":
-        for i, item in enumerate(kind.items):
-            array = all(each.word in ("double", "int") for each in kind.items)
-            yield from out_c(unit, item, f"{text}.v[{i}]" if array else f"{text}.v{i}")
+def caller(number: int, made: EquationInC, columns: list[str]) -> str:
+    """C that calls an equation with numbers in a row, a column for each argument."""
+    word = {"float": "in[{}]", "int": "(long long)in[{}]", "bool": "in[{}] != 0.0"}
+    arguments = [word[kind].format(columns.index(path)) for path, kind in made.formals.items()]
+    kinds = ["bool" if kind == "bool" else "double" for kind in made.results.values()]
+    if len(kinds) == 1:
+        lines = [f"    const {kinds[0]} r0 = {made.name}({', '.join(arguments)});"]
     else:
-        yield f"(double){text}"
-
-
-def caller(unit: Unit, number: int, name: str, kinds: dict[str, Kind]) -> str:
-    """C that calls an equation with numbers in a row."""
-    count = iter(range(10_000))
-    lines, arguments = [], []
-    for i, kind in enumerate([k for n, k in kinds.items() if n != "return"]):
-        lines.append(f"    const {unit.declared(kind)} a{i} = {in_c(unit, kind, count)};")
-        arguments.append(f"&a{i}" if kind.whole else f"a{i}")
-    back = kinds["return"]
-    lines.append(f"    const {unit.declared(back)} r = {name}({', '.join(arguments)});")
-    lines += [f"    out[{j}] = {each};" for j, each in enumerate(out_c(unit, back, "r"))]
-    body = "\n".join([*lines, "    (void)r;"])
+        arguments += [f"&r{i}" for i in range(len(kinds))]
+        lines = [f"    {kind} r{i};" for i, kind in enumerate(kinds)]
+        lines.append(f"    {made.name}({', '.join(arguments)});")
+    lines += [f"    out[{i}] = (double)r{i};" for i in range(len(kinds))]
+    body = "\n".join(lines)
     head = f"void call_{number}(const double *in, double *out)"
     return f"{head};\n{head}\n{{\n    (void)in;\n    (void)out;\n{body}\n}}\n"
 
@@ -77,46 +82,42 @@ def caller(unit: Unit, number: int, name: str, kinds: dict[str, Kind]) -> str:
 class Twin:
     """Python of an equation over rows of numbers, with its options decided."""
 
-    def __init__(self, unit: Unit, equation: Any, on: bool) -> None:
-        self.unit, self.names, self.on = unit, {"f": equation, "np": np}, on
-        source = parsed(equation)
-        hints = typing.get_type_hints(source.function)
-        self.columns: list[tuple[str, str]] = []
+    def __init__(self, equation: Any, on: bool) -> None:
+        self.names, self.on = {"f": equation, "np": np}, on
+        hints = hints_of(equation)
+        back = hints.pop("return")
+        self.columns = [each for name, hint in hints.items() for each in scalars(hint, name)]
         self.count = 0
-        given = [self.value(unit.kind(hints[a.arg], ""), a.arg) for a in source.arguments]
-        back = unit.kind(hints["return"], "")
+        given = [self.value(hint, name) for name, hint in hints.items()]
         lines = ["    for i in range(rows.shape[0]):", f"        r = f({', '.join(given)})"]
         out = list(self.scalar(back, "r"))
         self.width = len(out)
         lines += [f"        out[i, {j}] = {each}" for j, each in enumerate(out)]
         self.text = "\n".join(["@kernel", "def rows_of(rows, out):", *lines, ""])
 
-    def value(self, kind: Kind, path: str) -> str:
-        if kind.word == "struct":
-            self.names[kind.cls.__name__] = kind.cls
-            inner = [
-                self.value(self.unit.kind(h, ""), f"{path}.{n}") for n, h in fields_of(kind.cls)
-            ]
-            return f"{kind.cls.__name__}({', '.join(inner)})"
-        if kind.word == "tuple":
-            inner = [self.value(item, f"{path}.{i}") for i, item in enumerate(kind.items)]
-            return f"({', '.join(inner)},)"
-        self.columns.append((kind.word, path))
+    def value(self, hint: Any, path: str) -> str:
+        items = items_of(hint, path)
+        if items is not None:
+            inner = ", ".join(self.value(each, below) for below, each in items)
+            if not is_named_tuple(hint):
+                return f"({inner},)"
+            self.names[hint.__name__] = hint
+            return f"{hint.__name__}({inner})"
+        ((word, _),) = scalars(hint, path)
+        place = f"rows[i, {self.count}]"
         self.count += 1
-        place = f"rows[i, {self.count - 1}]"
-        if kind.word == "flag":
+        if word == "flag":
             return "True" if self.on else "None"
-        return {"double": place, "int": f"int({place})"}.get(kind.word, f"{place} != 0.0")
+        return {"double": place, "int": f"int({place})"}.get(word, f"{place} != 0.0")
 
-    def scalar(self, kind: Kind, text: str) -> Iterator[str]:
-        if kind.word == "struct":
-            for name, hint in fields_of(kind.cls):
-                yield from self.scalar(self.unit.kind(hint, ""), f"{text}.{name}")
-        elif kind.word == "tuple":
-            for i, item in enumerate(kind.items):
-                yield from self.scalar(item, f"{text}[{i}]")
-        else:
-            yield f"1.0 if {text} else 0.0" if kind.word == "bool" else text
+    def scalar(self, hint: Any, text: str) -> Iterator[str]:
+        items = items_of(hint, "")
+        if items is None:
+            yield f"1.0 if {text} else 0.0" if hint is bool else text
+        for below, each in items or ():
+            name = below.removeprefix(".")
+            own = f"{text}.{name}" if is_named_tuple(hint) else f"{text}[{name}]"
+            yield from self.scalar(each, own)
 
 
 def rows(columns: list[tuple[str, str]], on: bool, seed: int) -> np.ndarray:
@@ -144,44 +145,43 @@ def rows(columns: list[tuple[str, str]], on: bool, seed: int) -> np.ndarray:
 # --- comparison -----------------------------------------------------------------------------------
 
 
-def kinds_of(unit: Unit, equation: Any) -> dict[str, Kind]:
-    """Kinds of what an equation takes and returns."""
+def hints_of(equation: Any) -> dict[str, Any]:
+    """Types of what an equation takes and returns."""
     f = plain(equation)
     hints = typing.get_type_hints(f)
-    names = [*(each.arg for each in parsed(f).arguments), "return"]
-    return {name: unit.kind(hints[name], name) for name in names}
+    return {name: hints[name] for name in [*(each.arg for each in parsed(f).arguments), "return"]}
 
 
 def flagged(equation: Any) -> bool:
     """Whether an equation takes options."""
-    unit = Unit()
-    kinds = [kind for name, kind in kinds_of(unit, equation).items() if name != "return"]
-    return any(word == "flag" for kind in kinds for word, _ in scalars(unit, kind, ""))
+    hints = hints_of(equation)
+    del hints["return"]
+    return any(word == "flag" for name, h in hints.items() for word, _ in scalars(h, name))
 
 
 class InC:
     """Equations as one source of C, with a function for each that takes numbers in a row."""
 
     def __init__(self, equations: Mapping[str, Any]) -> None:
-        self.equations, self.unit = equations, Unit("t_")
-        names = {key: self.unit.add(equation) for key, equation in equations.items()}
-        self.numbers = {key: number for number, key in enumerate(names)}
-        callers = [
-            caller(self.unit, self.numbers[key], name, kinds_of(self.unit, equations[key]))
-            for key, name in names.items()
-        ]
-        structs = [text for _, text in self.unit.structs.values()]
-        constants = [text for _, text in self.unit.constants.values()]
+        self.equations, functions = equations, Loops()
+        texts, callers = [], []
+        self.numbers = {key: number for number, key in enumerate(equations)}
+        for key, equation in equations.items():
+            lengths = {k: v for n, h in hints_of(equation).items() for k, v in open_lengths(h, n)}
+            made = equation_in_c(equation, functions, lengths)
+            texts.append(made.text)
+            columns = [path for _, path in Twin(equation, False).columns]
+            callers.append(caller(self.numbers[key], made, columns))
+        body = "\n\n".join([*functions.texts, *texts, *callers])
         head = "#include <math.h>\n#include <stdbool.h>\n"
-        parts = [head, *self.unit.helpers(), *structs, *constants, *self.unit.texts, *callers]
-        self.text = "\n\n".join(parts)
+        self.text = "\n\n".join([head, *helpers_in(body), body])
 
     def compare(self, library: ctypes.CDLL, key: str, on: bool) -> None:
         """The same bits from both, for some thousand rows."""
-        twin = Twin(self.unit, self.equations[key], on)
+        twin = Twin(self.equations[key], on)
         given = rows(twin.columns, on, self.numbers[key])
         wanted, found = np.empty((CALLS, twin.width)), np.empty((CALLS, twin.width))
-        made = module(f"twin_{key.replace('.', '_')}", twin.text, twin.names)
+        made = module(f"twin_{key.replace('.', '_')}", twin.text, **twin.names)
         try:
             made["rows_of"](given, wanted)
         except ZeroDivisionError:  # 0 to a negative power, where C goes on with infinity

@@ -78,7 +78,8 @@ class Call:
 
     `results` is how many numbers the function returns. `derivative` makes the function that returns
     the same numbers and their derivatives by some of its arguments, which are given by their
-    indices; None if nothing flows through it.
+    indices; None if nothing flows through it. `loop` says what the function does, from which other
+    languages print theirs.
     """
 
     def __init__(
@@ -86,8 +87,10 @@ class Call:
         function: Any,
         results: int,
         derivative: Callable[[tuple[int, ...]], Any] | None = None,
+        loop: Any = None,
     ) -> None:
         self.function, self.results, self.derivative = function, results, derivative
+        self.loop = loop
 
 
 _known: dict[tuple[Any, ...], Node] = {}

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from math import inf
-from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +16,7 @@ from swashplate.equations.gradients import Derived, derived_function, gradients,
 from swashplate.equations.graph import ONE, ZERO, Call, Node, Rule, choose, make, names_in
 from swashplate.equations.language import Parsed
 from swashplate.equations.printing import UNNAMED, function_source, function_text, named_by_text
-from swashplate.equations.values import Tuple, Value, alike, leaves, rebuilt
+from swashplate.equations.values import Flag, Tuple, Value, alike, leaves, rebuilt
 
 if TYPE_CHECKING:
     from swashplate.equations.tracing import Trace
@@ -152,52 +152,98 @@ FUNCTIONS |= {"root": root, "blank": blank}
 # --- as they are traced ---------------------------------------------------------------------------
 
 
-class _Inner(NamedTuple):
+class Inner(NamedTuple):
     """An equation that is done many times, with scalars for all that it reads."""
 
-    name: str
+    source: Parsed
     labels: dict[Node, str]
+    origins: dict[Node, Parsed]
     taken: set[str]
-    leading: list[str]
-    """Scalars of its first arguments, which the loop gives."""
-    formals: list[str]
-    """Scalars of the others."""
+    leading: dict[str, str]
+    """Kinds of the scalars of its first arguments, which the loop gives."""
+    formals: dict[str, str]
+    """Kinds of the scalars of the others."""
     actuals: list[Node]
     """What these stand for where it is called."""
     result: Value
 
-    def function(self) -> Function:
-        """The equation as a function of scalars."""
+    @property
+    def name(self) -> str:
+        """Name of the equation."""
+        return self.source.name
+
+    def function(self, *, flat: bool = False) -> Function:
+        """The equation as a function of scalars, which returns a tuple if it is to be `flat`."""
         nodes = [node for _, node in leaves(self.result)]
         given = [*self.leading, *self.formals]
         name = f"{self.name}_{UNNAMED}"
-        text, names = function_text(name, f"{self.name} of scalars.", given, nodes, self.labels)
+        says = f"{self.name} of scalars."
+        text, names = function_text(name, says, given, nodes, self.labels, flat=flat)
         return Function(*named_by_text(name, text), dict(names))
 
 
-def _inner(outer: Trace, source: Parsed, leading: Sequence[Value], rest: Sequence[Value]) -> _Inner:
+class Loop(NamedTuple):
+    """What a generated call does, for other languages."""
+
+    name: str
+    """Name of the generated function."""
+    kind: Literal["root", "repeated", "once"]
+    inner: Inner
+
+
+def _inner(outer: Trace, source: Parsed, leading: Sequence[Value], rest: Sequence[Value]) -> Inner:
     """An equation whose `leading` arguments the loop gives, the others as where it is called."""
-    trace = outer.inner()
+    trace = outer.inner(source)
     taken = set[str]()
     names = [each.arg for each in source.arguments]
-    given, stands_for = dict[str, Value](), dict[str, Node]()
+    given, stands_for = dict[str, Value](), dict[Node, Node]()
+
+    def formal(value: Value, stem: str, *, always: bool) -> Value:
+        """The value with a name for each scalar, and each option that is decided at run time."""
+        if isinstance(value, Tuple):
+            pairs = zip(value.fields, value.items, strict=True)
+            items = [formal(each, f"{stem}_{field}", always=always) for field, each in pairs]
+            return Tuple(value.cls, tuple(items))
+        if isinstance(value, Flag):
+            symbolic = isinstance(value.value, Node)
+            return Flag(formal(value.value, stem, always=False), value.text) if symbolic else value
+        if value.op == "number" and not always:
+            return value
+        kind = "float" if always and value.kind == "int" else value.kind
+        node = graph.name(fresh_name(stem, taken), kind)
+        stands_for[node] = value
+        return node
+
     for k, (name, value) in enumerate(zip(names, [*leading, *rest], strict=True)):
-        nodes = []
-        for path, node in leaves(value):
-            if k < len(leading) or node.op != "number":
-                stem = f"{name}_{path}" if path else name
-                formal = fresh_name(stem.replace(".", "_"), taken)
-                stands_for[formal] = node
-                node = graph.name(formal, node.kind)
-            nodes.append(node)
-        given[name] = rebuilt(value, iter(nodes))
+        given[name] = formal(value, name, always=k < len(leading))
     result = trace.call(source.function, given)
     used = names_in(node for _, node in leaves(result))
     count = sum(1 for value in leading for _ in leaves(value))
     first, others = list(stands_for)[:count], list(stands_for)[count:]
-    formals = [name for name in others if name in used]
-    actuals = [stands_for[name] for name in formals]
-    return _Inner(source.name, trace.labels, taken, first, formals, actuals, result)
+    read = [node for node in others if node.value in used]
+    return Inner(
+        source,
+        trace.labels,
+        trace.origins,
+        taken,
+        {node.value: node.kind for node in first},
+        {node.value: node.kind for node in read},
+        [stands_for[node] for node in read],
+        result,
+    )
+
+
+def called_apart(trace: Trace, source: Parsed, values: Sequence[Value]) -> Value:
+    """An equation as a call of a generated function, without derivatives."""
+    inner = _inner(trace, source, [], values)
+    function = inner.function(flat=True)
+    count = sum(1 for _ in leaves(inner.result))
+    value = Call(function, count, loop=Loop(function.name, "once", inner))
+    call = make("call", *inner.actuals, value=value)
+    results = [trace.make("result", call, value=k) for k in range(count)]
+    if count == 1:
+        trace.label(results[0], source.name)
+    return rebuilt(inner.result, iter(results))
 
 
 def solved(trace: Trace, residual: Parsed, low: Value, high: Value, rest: Sequence[Value]) -> Value:
@@ -214,7 +260,8 @@ def solved(trace: Trace, residual: Parsed, low: Value, high: Value, rest: Sequen
     line = f"return (root({function.name}, {given}),)"
     text = function_source(f"{name}({given})", f"Root of {residual.name}.", [line], "")
     solver = Function(name, text, {function.name: function})
-    call = make("call", low, high, *inner.actuals, value=Call(solver, 1))
+    value = Call(solver, 1, loop=Loop(name, "root", inner))
+    call = make("call", low, high, *inner.actuals, value=value)
     x = trace.make("result", call, value=0)
     trace.label(x, "root")
     by = list(dict.fromkeys(node for value in rest for _, node in leaves(value)))
@@ -280,7 +327,8 @@ def repetition(
         return _carried(inner, name, given, called, [given[k] for k in by if k > 0], by)
 
     arguments = (count, *(node for _, node in leaves(state)), *inner.actuals)
-    call = make("call", *arguments, value=Call(loop, len(names), derivative))
+    value = Call(loop, len(names), derivative, Loop(name, "repeated", inner))
+    call = make("call", *arguments, value=value)
     results = []
     for index, word in enumerate(names):
         results.append(trace.make("result", call, value=index))
@@ -289,7 +337,7 @@ def repetition(
 
 
 def _carried(
-    inner: _Inner,
+    inner: Inner,
     loop: str,
     given: list[str],
     called: str,

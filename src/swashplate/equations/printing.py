@@ -43,6 +43,9 @@ ONCE, ALL = 1, 2
 class Language:
     """How operations are written."""
 
+    short = SHORT
+    """Characters of a result, beyond which it gets a name."""
+
     def number(self, value: Any) -> Text:
         """A literal number."""
         raise NotImplementedError
@@ -55,9 +58,26 @@ class Language:
         """Lines of an assignment; a `new` name is declared by it."""
         raise NotImplementedError
 
+    def called(
+        self, call: Node, targets: Sequence[str], given: Sequence[str], declared: set[str], pad: str
+    ) -> list[str]:
+        """Lines of a call, whose results get their names; an empty one is not needed.
+
+        Some of them are `declared` already.
+        """
+        raise NotImplementedError
+
     def branch(self, test: str, then: list[str], other: list[str], pad: str) -> list[str]:
         """Lines of an `if` and its `else`."""
         raise NotImplementedError
+
+    def declared(self, names: Mapping[str, Node], pad: str, *, always: bool) -> list[str]:
+        """Lines ahead of a branch that gives some names their values, on both sides `always`."""
+        return []
+
+    def heading(self, node: Node, pad: str) -> list[str]:
+        """Lines ahead of the statement that computes a node."""
+        return []
 
 
 def grouped(text: Text, level: int) -> str:
@@ -108,6 +128,13 @@ class Python(Language):
     def assigned(self, name: str, node: Node, text: str, pad: str, *, new: bool) -> list[str]:
         """Lines of an assignment."""
         return assigned(name, text, pad)
+
+    def called(
+        self, call: Node, targets: Sequence[str], given: Sequence[str], declared: set[str], pad: str
+    ) -> list[str]:
+        """A call whose tuple comes apart."""
+        left = ", ".join(each or "_" for each in targets) + ("," if len(targets) == 1 else "")
+        return assigned(left, f"{call.value.function.name}({', '.join(given)})", pad)
 
     def branch(self, test: str, then: list[str], other: list[str], pad: str) -> list[str]:
         """Lines of an `if` and its `else`."""
@@ -187,6 +214,8 @@ class Block:
         self._reads: set[str] = set()
         self._written_nodes: list[Node] = []
         self._named: dict[tuple[Node, Region], str] = {}
+        self._outlive: dict[Branch | None, dict[str, Node]] = {}
+        """Names of each branch that are read after it, while its test is known to hold."""
         self._uses = self._counted(results)
         whole = self._schedule.whole
         self.statements = [*self._steps(whole, "")]
@@ -236,10 +265,41 @@ class Block:
 
     def _wants_name(self, node: Node, region: Region) -> bool:
         """Whether a value gets a line of its own."""
+        return self._stands_out(node, region) and not self._becomes(node, region)
+
+    def _stands_out(self, node: Node, region: Region) -> bool:
+        """Whether a value has a name in the equations, or is needed more than once."""
         uses = self._uses[node, region]
         if node in self._labels or len(uses) > 1 or uses[0] is not region:
             return not _is_trivial(node)
         return False
+
+    def _becomes(self, node: Node, region: Region) -> bool:
+        """Whether a value is nothing but that of a choice of its name, on the side of a region."""
+        return self._choice(node, region) is not None
+
+    def _choice(self, node: Node, region: Region) -> Node | None:
+        """The choice that a value is nothing but one side of, if both have one name."""
+        label, uses = self._labels.get(node), self._uses[node, region]
+        if region.branch is None or len(uses) != 1 or uses[0] is not region:
+            return None
+        for member in region.branch.members:
+            same = label is None or self._labels.get(member, label) == label
+            if plain_value(member.args[1 + region.side]) is node:
+                return member if same else None
+        return None
+
+    def _has_lines(self, region: Region) -> bool:
+        """Whether something in a region takes a line of its own."""
+        for branch in region.branches:
+            several = len(branch.members) > 1 or any(map(self._has_lines, branch.sides))
+            if several or self._stands_out(branch.members[0], region):
+                return True
+        return any(
+            node.op == "call"
+            or (node.op not in ("result", "ruled") and self._stands_out(node, region))
+            for node in region.nodes
+        )
 
     def _fresh(self, node: Node) -> str:
         stem = self._labels.get(node) or STEMS.get(node.op, "part")
@@ -256,19 +316,23 @@ class Block:
         """Statements of what is computed together."""
         for step in self._schedule.steps(region):
             if isinstance(step, Branch):
-                yield from self._statement(partial(self._branch, step, region, pad))
+                write = partial(self._branch, step, region, pad)
+                yield from self._statement(step.members[0], write, pad)
             elif step.op == "call":
-                yield from self._statement(partial(self._call, step, region, pad))
+                yield from self._statement(step, partial(self._call, step, region, pad), pad)
             elif step.op not in ("result", "ruled") and self._wants_name(step, region):
-                yield from self._statement(partial(self._define, step, region, pad))
+                yield from self._statement(step, partial(self._define, step, region, pad), pad)
 
-    def _statement(self, write: Callable[[], tuple[list[str], list[str]]]) -> Iterator[Statement]:
-        """A statement with what it reads and computes; none if it has no lines."""
+    def _statement(
+        self, node: Node, write: Callable[[], tuple[list[str], list[str]]], pad: str
+    ) -> Iterator[Statement]:
+        """A statement with what it reads and computes, first a node; none if it has no lines."""
         outer = self._reads, self._written_nodes
         self._reads, self._written_nodes = set(), []
         lines, names = write()
         reads = frozenset(self._reads.difference(names))
         if lines:
+            lines = [*self._language.heading(node, pad), *lines]
             yield Statement(lines, tuple(names), reads, tuple(self._written_nodes))
         self._reads, self._written_nodes = outer[0] | reads, outer[1] + self._written_nodes
 
@@ -276,53 +340,71 @@ class Block:
         """Lines that give a value a name."""
         text = self._written(node, region)[0]
         name = self._fresh(node)
+        outlives = self._name(node, region, name)
+        return self._language.assigned(name, node, text, pad, new=not outlives), [name]
+
+    def _name(self, node: Node, region: Region, name: str) -> bool:
+        """Remember the name of a value; whether it outlives the branch in which it is computed."""
         self._named[node, region] = name
         if region.branch is not None:
             self.inner.setdefault(name, node)
-        return self._language.assigned(name, node, text, pad, new=True), [name]
+        outlives = any(region not in use.around for use in self._uses[node, region])
+        if outlives:
+            self._outlive.setdefault(region.branch, {})[name] = node
+        return outlives
 
     def _call(self, call: Node, region: Region, pad: str) -> tuple[list[str], list[str]]:
         """Lines of a call, whose results are a tuple."""
         function: Function = call.value.function
         self.functions[function.name] = function
-        results = [
-            (node.value, node)
-            for node in region.nodes
-            if node.op == "result" and node.args[0] is call
-        ]
-        targets = ["_"] * call.value.results
-        for index, node in results:
-            targets[index] = self._fresh(node)
-            self._named[node, region] = targets[index]
-            if region.branch is not None:
-                self.inner.setdefault(targets[index], node)
-        given = ", ".join(self._text(node, region)[0] for node in call.args)
-        left = ", ".join(targets) + ("," if len(targets) == 1 else "")
+        targets = [""] * call.value.results
+        declared = set[str]()
+        for node in region.nodes:
+            if node.op == "result" and node.args[0] is call:
+                name = targets[node.value] = self._fresh(node)
+                if self._name(node, region, name):
+                    declared.add(name)
+        given = [self._text(node, region)[0] for node in call.args]
         self._written_nodes.append(call)
-        return assigned(left, f"{function.name}({given})", pad), targets
+        lines = self._language.called(call, targets, given, declared, pad)
+        return lines, [each for each in targets if each]
 
     def _branch(self, branch: Branch, region: Region, pad: str) -> tuple[list[str], list[str]]:
         """Lines of a branch; none if it is a choice that stands in an expression."""
-        then, other = sides = [self._region(side, f"{pad}    ") for side in branch.sides]
-        if len(branch.members) == 1 and not any(sides):
+        if len(branch.members) == 1 and not any(map(self._has_lines, branch.sides)):
             (member,) = branch.members
             return (
                 self._define(member, region, pad) if self._wants_name(member, region) else ([], [])
             )
-        names = {}
-        for member in branch.members:
-            names[member] = self._named[member, region] = self._fresh(member)
-            if region.branch is not None:
-                self.inner.setdefault(names[member], member)
+        names, declared = {}, {}
+        for member in reversed(branch.members):  # in the order in which they were computed
+            around = self._choice(member, region)
+            if around is not None:
+                assert region.branch is not None
+                names[member] = self._named[around, region.branch.region]
+                self._named[member, region] = names[member]
+                continue
+            names[member] = self._fresh(member)
+            if not self._name(member, region, names[member]):
+                declared[names[member]] = member
+        inner = f"{pad}    "
+        sides = [self._region(branch.sides[0], inner), self._region(branch.sides[1], inner)]
         for k, side in enumerate(branch.sides):
-            for member in branch.members:
-                text = self._text(member.args[1 + k], side)[0]
-                sides[k] += self._language.assigned(
-                    names[member], member, text, f"{pad}    ", new=False
-                )
+            for member in names:
+                value, name = plain_value(member.args[1 + k]), names[member]
+                text = self._text(value, side)[0]
+                if text == name:
+                    continue
+                if (value, side) in self._uses and self._becomes(value, side):
+                    sides[k] += self._language.heading(value, inner)
+                sides[k] += self._language.assigned(name, member, text, inner, new=False)
         test = self._text(branch.test, region)[0]
         self._written_nodes += branch.members
-        return self._language.branch(test, then, other, pad), [*names.values()]
+        ahead = [
+            *self._language.declared(self._outlive.pop(branch, {}), pad, always=False),
+            *self._language.declared(declared, pad, always=True),
+        ]
+        return [*ahead, *self._language.branch(test, sides[0], sides[1], pad)], [*names.values()]
 
     def _result(self, node: Node, *, named: bool) -> tuple[str, frozenset[str]]:
         """Text of a result, by a name if it is long or must have one, and what that reads."""
@@ -330,9 +412,9 @@ class Block:
         self._reads = set()
         text = self._text(node, whole)[0]
         done = (node, whole) in self._named or node in self._known or node.op in LEAVES
-        if done or (not named and (len(text) <= SHORT or _is_trivial(node))):
+        if done or (not named and (len(text) <= self._language.short or _is_trivial(node))):
             return text, frozenset(self._reads)
-        self.statements += self._statement(partial(self._define, node, whole, ""))
+        self.statements += self._statement(node, partial(self._define, node, whole, ""), "")
         name = self._named[node, whole]
         return name, frozenset((name,))
 

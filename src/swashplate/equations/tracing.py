@@ -7,7 +7,7 @@ What is left are operations in the order of the equations: results keep their la
 from __future__ import annotations
 
 import ast
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from functools import reduce
 from inspect import Parameter, Signature
@@ -28,7 +28,7 @@ from swashplate.equations.language import (
     parsed,
     plain,
 )
-from swashplate.equations.loops import interpolate, repeated, repetition, root, solved
+from swashplate.equations.loops import called_apart, interpolate, repeated, repetition, root, solved
 from swashplate.equations.values import Flag, Tuple, Value, alike, fixed, leaves, rebuilt
 
 Names = dict[str, Value]
@@ -52,9 +52,16 @@ class Trace:
         The equation that a value comes from.
     under_way : list of Parsed
         Equations that are being run, each called by the one before.
+    calls : dict of Parsed to set
+        Arguments of each equation that was run, and what it returned for them.
+
+    `apart` are equations that become functions, which are called: in languages that have no
+    derivatives.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, apart: Collection[Parsed] = ()) -> None:
+        self.apart = apart
+        self.calls: dict[Parsed, set[tuple[tuple[Node, ...], tuple[Node, ...]]]] = {}
         self.labels: dict[Node, str] = {}
         self.origins: dict[Node, Parsed] = {}
         self.under_way: list[Parsed] = []
@@ -68,14 +75,19 @@ class Trace:
         defaults = {name: fixed(each) for name, each in source.defaults.items()}
         known = {name: each for name, each in defaults.items() if each is not None} | dict(given)
         known = {each.arg: known[each.arg] for each in source.arguments if each.arg in known}
+        if source in self.apart:
+            return called_apart(self, source, [*known.values()])
         with self.running(source):
             result = _Tracer(source, self).result(known)
+            scalars = tuple(node for value in known.values() for _, node in leaves(value))
+            back = tuple(node for _, node in leaves(result))
+            self.calls.setdefault(source, set()).add((scalars, back))
             rule = RULES.get(plain(equation))
             return result if rule is None else self._ruled(source, parsed(rule), known, result)
 
-    def inner(self) -> Trace:
-        """A trace of its own for what is run within an equation, again and again."""
-        trace = Trace()
+    def inner(self, source: Parsed) -> Trace:
+        """A trace of its own for an equation that is run within another, again and again."""
+        trace = Trace({*self.apart} - {source})
         trace.under_way = [*self.under_way]
         return trace
 

@@ -66,6 +66,8 @@ def alike(one: Value, two: Value) -> bool:
 
 def fixed(value: Any) -> Value | None:
     """The value of something that does not change: options, numbers, tuples of them."""
+    if isinstance(value, Node | Flag | Tuple):
+        return value
     if value is None or value is True:
         return Flag(value)
     if isinstance(value, int | float):
@@ -81,9 +83,12 @@ def fixed(value: Any) -> Value | None:
 
 
 def arguments(
-    source: Parsed, options: Mapping[str, Any], lengths: Mapping[str, int]
+    source: Parsed, options: Mapping[str, Any] | None, lengths: Mapping[str, int]
 ) -> dict[str, Value]:
-    """Values of an equation's arguments from its annotations, each scalar a name by its path."""
+    """Values of an equation's arguments from its annotations, each scalar a name by its path.
+
+    Without `options` these are decided at run time.
+    """
     try:
         hints = hints_of(source.function)
     except NameError as error:
@@ -91,7 +96,7 @@ def arguments(
             f"{source.file}, line {source.node.lineno}: the types of {source.name} are not all "
             f"known ({error}): define them above, at the top of the file."
         ) from None
-    said = dict(_said(options.items(), ""))
+    said = None if options is None else dict(_said(options.items(), ""))
     names = [each.arg for each in source.arguments]
     return {name: _argument(hints[name], name, name, said, lengths) for name in names}
 
@@ -105,8 +110,18 @@ def _said(options: Iterable[tuple[str, Any]], prefix: str) -> Iterator[tuple[str
             yield from _said(zip(fields, value, strict=True), f"{prefix}{name}.")
 
 
+def undecided(hint: Any, path: str, text: str) -> Flag:
+    """An option that is decided at run time, by a name."""
+    if set(typing.get_args(hint)) != {bool, type(None)}:
+        raise EquationError(
+            f"{path} is of type {getattr(hint, '__name__', hint)}, but an option that is decided "
+            "at run time is bool | None."
+        )
+    return Flag(graph.name(text, "bool"), path)
+
+
 def _argument(
-    hint: Any, path: str, text: str, options: Mapping[str, Any], lengths: Mapping[str, int]
+    hint: Any, path: str, text: str, options: Mapping[str, Any] | None, lengths: Mapping[str, int]
 ) -> Value:
     """Value of an argument, or of what is at a path below one, called `text` in Python."""
     origin, args = typing.get_origin(hint), typing.get_args(hint)
@@ -115,6 +130,8 @@ def _argument(
     if origin is typing.Annotated:
         return _argument(args[0], path, text, options, lengths)
     if origin in (typing.Union, types.UnionType) and type(None) in args:
+        if options is None:
+            return undecided(hint, path, text)
         value = options.get(path, "unknown")
         if value is False or not isinstance(value, bool | int | float | tuple | str | None):
             raise EquationError(

@@ -6,6 +6,7 @@ import re
 import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import lru_cache
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
@@ -14,15 +15,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swashplate.drive import Drive
-from swashplate.equations.c_source import Exported, c_name, interface, literal
-from swashplate.equations.c_source.model import Writer
-from swashplate.equations.c_source.text import comment_line, filled
-from swashplate.equations.fields import declared_by, numbers_of
+from swashplate.equations.fields import declared_by
 from swashplate.equations.marching.record import SOURCE_RATE, check_rate
-from swashplate.equations.marching.run import Instance, called
+from swashplate.equations.marching.run import Instance
 from swashplate.equations.marching.run import instance_of as instance_of_model
 from swashplate.equations.model import Model
+from swashplate.equations.printing_c import c_name, comment_line, filled, literal
 from swashplate.errors import FileError, InputError, InputTypeError
+from swashplate.export.c_source import Exported, interface, numbers
 from swashplate.export.variable_list import DRIVE, DRIVE_WORDS, OWN, References, Words, words_of
 from swashplate.models.card import stable_step
 from swashplate.models.displacement_control import steep_stops
@@ -42,7 +42,11 @@ FURTHER = ("main.c", "CMakeLists.txt", "README.md")
 
 def exported_drive(drive: Drive | None = None) -> Exported:
     """The drive as it is in C; with equations of one's own if the drive has some."""
-    equations = () if drive is None else drive.parameters.equations
+    return _exported(() if drive is None else drive.parameters.equations)
+
+
+@lru_cache(maxsize=8)
+def _exported(equations: tuple[Any, ...]) -> Exported:
     model = models_of(equations).drive
     columns = {
         f"{model.prefix(i)}{path}": column
@@ -92,17 +96,6 @@ def values_of(drive: Drive, step: float = LONGEST_STEP) -> Array:
         If the card's filter is unstable at that step, or the step is none.
     """
     return content_of(drive, step).values
-
-
-def _values(instance: Instance, step: float) -> Array:
-    options, constants = list[float](), list[float]()
-    for model, part in zip(instance.model.parts, instance.parts, strict=True):
-        if model.options is not None:
-            options += [0.0 if each is None else 1.0 for each in part.options]
-        if model.constants is not None:
-            known = {"p": part.p, "options": part.options, "given": part.given, "h": step}
-            constants += numbers_of(called(model.constants, known))
-    return np.array([step, *instance.params, *instance.given, *options, *constants])
 
 
 # --- what is exported -----------------------------------------------------------------------------
@@ -185,7 +178,7 @@ def content_of(
         instance = instance_of_model(what, parameters, options=options, given=given)
         exported, name, title = Exported(what, prefix), what.name, f"Model {what.name}"
         references, words = OWN, words_of(exported)
-    values = _values(instance, step)
+    values = numbers(exported, instance, step)
     packaged = isinstance(what, Drive) and not what.parameters.equations
     return Content(exported, instance, values, name, title, packaged, references, words)
 
@@ -285,7 +278,8 @@ _SPEED = Sample._fields[1:].index("shaft_speed")
 
 def _initialiser(exported: Exported, values: Array, name: str, title: str) -> str:
     """Values as an array of C, each with its name."""
-    names = ["step [s]", *(each for each, _ in Writer(exported).values())]
+    writer = exported.writer
+    names = ["step [s]", *(each for each, _ in writer.values()), *writer.constant_names()]
     guard = f"{name.upper()}_VALUES_H"
     head = f"Values of {name} for {exported.prefix}_init, as swashplate computed them."
     lines = [f"/* {comment_line(f'{head} {title}'.strip())} */",

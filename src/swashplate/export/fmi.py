@@ -22,11 +22,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from swashplate.__about__ import __version__
 from swashplate.drive import Drive
-from swashplate.equations.c_source import feedthrough, newest
 from swashplate.equations.fields import value_at
 from swashplate.equations.model import Model
 from swashplate.errors import FileError, InputError
 from swashplate.export.c_folder import LONGEST_STEP, Content, content_of
+from swashplate.export.c_source import feedthrough, newest
 from swashplate.export.libraries import (
     Platform,
     Sources,

@@ -22,9 +22,8 @@ from typing import Any, NamedTuple
 
 from swashplate.documents import parse_toml
 from swashplate.drive import Drive
-from swashplate.equations.c_source import Exported, interface
-from swashplate.equations.c_source.text import filled
 from swashplate.equations.model import Model
+from swashplate.equations.printing_c import filled
 from swashplate.errors import FileError, InputError
 from swashplate.export.c_folder import (
     LONGEST_STEP,
@@ -33,6 +32,7 @@ from swashplate.export.c_folder import (
     exported_drive,
     source_text,
 )
+from swashplate.export.c_source import Exported, interface
 from swashplate.export.variable_list import DRIVE, References, c_header
 from swashplate.tables import write_bytes
 

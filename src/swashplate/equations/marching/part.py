@@ -83,10 +83,11 @@ class PartCode:
         signals: Sequence[str],
         options: Any,
         taken: set[str] | None = None,
+        trace: Trace | None = None,
     ) -> None:
         self.model, self.part, self.own = model, part, model.parts[part]
         self.records, self.options = tuple(signals), options
-        self.trace = Trace()
+        self.trace = Trace() if trace is None else trace
         self.taken: set[str] = set() if taken is None else taken
         self.prefix = f"{self.own.name}_" if len(model.parts) > 1 else ""
         self.taken.add("h")

@@ -5,22 +5,23 @@ from __future__ import annotations
 from collections.abc import Sequence
 from math import inf
 
-from swashplate.equations.c_source.model import Exported, Writer, path_of
-from swashplate.equations.c_source.text import (
+from swashplate.equations.fields import Definition
+from swashplate.equations.printing_c import (
     HELPERS,
     c_name,
     comment_line,
     filled,
     function,
+    helpers_in,
     indented,
     literal,
     sections,
     wrapped,
 )
-from swashplate.equations.fields import Definition
-from swashplate.equations.model import Window
+from swashplate.export.c_source.model import Exported
+from swashplate.export.c_source.parts import path_of
 
-TEXTS = sections("interface.c.in")
+TEXTS = sections(__package__, "interface.c.in")
 """Sections of the text around the equations, by name."""
 
 
@@ -30,15 +31,14 @@ def interface(exported: Exported) -> dict[str, str]:
     return {f"{exported.file}.h": made.header(), f"{exported.file}.c": made.source()}
 
 
-class _Interface(Writer):
+class _Interface:
     """Fills the texts above."""
 
     def __init__(self, exported: Exported) -> None:
-        super().__init__(exported)
+        self.e, self.model, self.writer = exported, exported.model, exported.writer
+        self.P = self.writer.P
         self.arguments = [c_name(name) for name in exported.signals]
-        self.rows, self.numbers = list(self.ranges()), self.values()
-        # first, so that the equations behind links are among the functions
-        self.read = [self.output(name) for name in exported.names]
+        self.rows, self.numbers = list(self.writer.ranges()), self.writer.values()
 
     def filled(self, text: str, **more: str) -> str:
         e, signals = self.e, "".join(f", double {name}" for name in self.arguments)
@@ -55,7 +55,8 @@ class _Interface(Writer):
             "passed": "".join(f", {name}" for name in self.arguments),
             "given": ", ".join(self.arguments),
             "zeros": ", 0.0" * len(self.arguments),
-            "count": len(self.numbers) + 1,
+            "checked": len(self.numbers) + 1,
+            "count": len(self.numbers) + len(self.writer.constant_names()) + 1,
             "longest": literal(e.longest),
         }
         return filled(text, {**words, **more})
@@ -77,8 +78,8 @@ class _Interface(Writer):
             ),
             _enum("Limits, as bits", f"{P}_LIMIT_", [n for _, n in e.limits], "", bits=True),
         ]  # fmt: skip
-        structs = [text for _, text in list(self.unit.structs.values())]
-        structs = [*structs[: self.public], self.struct()]
+        structs = [text for _, text in self.writer.structs.texts.values()]
+        structs += [*self.writer.constants, self.struct()]
         settle = self.filled(TEXTS["settle"]) if e.settles else ""
         return self.filled(
             TEXTS["header"],
@@ -89,10 +90,10 @@ class _Interface(Writer):
 
     def struct(self) -> str:
         """The struct that holds all of a model."""
-        e, unit = self.e, self.unit
+        e, tags = self.e, self.writer.tags
         lines = [f"struct {e.prefix}_memory {{ /* what changes from sample to sample */"]
-        for member, part in zip(e.members, self.model.parts, strict=True):
-            lines.append(f"    struct {unit.struct(part.state)} {member};")
+        for member, own in zip(e.members, tags, strict=True):
+            lines.append(f"    struct {own['state']} {member};")
         for name in self.model.integrals:
             lines += [f"    double {c_name(name)};", f"    double {c_name(name)}_rate;"]
         lines += ["    bool begun; /* a sample was taken */", "};", ""]
@@ -107,9 +108,10 @@ class _Interface(Writer):
         lines += [f"    double {name};" for name in self.arguments]
         lines.append(f"    struct {e.prefix}_measured measured[{max(len(e.measured), 1)}];")
         lines += ["};", "", f"struct {e.type} {{", "    double step; /* [s] */"]
-        for member, part in zip(e.members, self.model.parts, strict=True):
-            tags = self.members_of(part)
-            lines += [f"    struct {tag} {member}{tail};" for tag, tail in tags]
+        for member, own in zip(e.members, tags, strict=True):
+            for word, tag in own.items():
+                if word != "state":
+                    lines.append(f"    struct {tag} {member}{'_' if word else ''}{word};")
         lines.append(f"    struct {e.prefix}_inputs inputs;")
         lines.append(f"    struct {e.prefix}_memory now, before; /* before the last sample */")
         if e.taps:
@@ -128,25 +130,14 @@ class _Interface(Writer):
     # -- source ------------------------------------------------------------------------------------
 
     def source(self) -> str:
-        e, unit = self.e, self.unit
-        window = unit.struct(Window) if e.taps else ""
-        private = [text for _, text in list(unit.structs.values())[self.public :]]
-        constants = [text for _, text in unit.constants.values()]
-        core = "\n\n".join(self.core)
+        e = self.e
+        core = "\n\n".join(self.writer.core)
         sections = [
             self.filled(TEXTS["top"]),
-            "\n".join(self.helpers()),
+            "\n".join(self.helpers(core)),
             self.filled(TEXTS["numbers"]),
-            *([self.filled(TEXTS["lines"], window=window)] if e.taps else []),
-            *(
-                [self.filled(TEXTS["constant"], window=window)]
-                if "constant_window(" in core
-                else []
-            ),
-            "/* --- equations " + "-" * 80 + " */\n",
-            *(["\n\n".join(private) + "\n"] if private else []),
-            *(["\n".join(constants) + "\n"] if constants else []),
-            "\n\n".join(unit.texts) + "\n",
+            *([self.filled(TEXTS["lines"])] if e.taps else []),
+            *([self.filled(TEXTS["constant"])] if "constant_window(" in core else []),
             "/* --- the model " + "-" * 80 + " */\n",
             core + "\n",
             self.filled(TEXTS["fill"], before=self.before_all()),
@@ -156,6 +147,7 @@ class _Interface(Writer):
             self.filled(
                 TEXTS["interface"],
                 settle=self.filled(TEXTS["settled"]) if e.settles else "",
+                constants=self.constants(),
                 move=self.moved(),
                 outputs=self.outputs(),
                 limits=self.limits(),
@@ -164,11 +156,21 @@ class _Interface(Writer):
         ]
         return "\n".join(sections)
 
-    def helpers(self) -> list[str]:
+    def helpers(self, core: str) -> list[str]:
         """What the equations call, and the lines."""
-        found = self.unit.helpers()
+        found = helpers_in(core)
         own = HELPERS["greater_of"]
         return [*found, own] if self.e.taps and own not in found else found
+
+    def constants(self) -> str:
+        """Statements that take the constants of each part."""
+        lines, first = list[str](), len(self.numbers) + 1
+        for part in self.writer.parts:
+            if part.constants:
+                place = f"m->{part.member}_constants"
+                lines.append(f"memcpy(&{place}, values + {first}, sizeof {place});")
+                first += len(part.constants)
+        return _body(lines)
 
     def before_all(self) -> str:
         lines = [f"m->inputs.{name} = {name};" for name in self.arguments]
@@ -195,7 +197,7 @@ class _Interface(Writer):
     def pushed(self) -> str:
         lines = [f"m->inputs.{name} = {name};" for name in self.arguments]
         for k, signal in enumerate(self.e.lines):
-            lines.append(f"m->line[{k}][m->newest] = {self.value_of(signal)};")
+            lines.append(f"m->line[{k}][m->newest] = {self.writer.value_of(signal)};")
         return _body(lines or ["(void)m;"])
 
     def moved(self) -> str:
@@ -267,7 +269,8 @@ class _Interface(Writer):
 
     def outputs(self) -> str:
         lines = []
-        for name, read in zip(self.e.names, self.read, strict=True):
+        for name in self.e.names:
+            read = self.writer.output(name)
             lines += [f"    case {self.P}_{path_name(name)}:", f"        return {read};"]
         return "".join(f"{line}\n" for line in lines)
 

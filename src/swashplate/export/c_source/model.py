@@ -12,16 +12,25 @@ from functools import cached_property
 from math import inf
 from typing import Any, get_type_hints
 
-from swashplate.equations import expressions as ex
-from swashplate.equations.c_source.text import c_name, fields_of, function, literal
-from swashplate.equations.c_source.unit import Unit
-from swashplate.equations.code import Code
+import numpy as np
+from numpy.typing import NDArray
+
+from swashplate.equations import graph
 from swashplate.equations.fields import Definition, declared_by, floats_of, value_at
-from swashplate.equations.language import is_named_tuple, plain
+from swashplate.equations.functions import GENERATING, Function
+from swashplate.equations.graph import Node, names_in
+from swashplate.equations.language import parsed, plain
 from swashplate.equations.marching.march import Sampler, output_of
-from swashplate.equations.marching.part import HOLDS, TapOf, taps_of
-from swashplate.equations.marching.run import Instance
-from swashplate.equations.model import Equation, Link, Model, Window, arguments_of
+from swashplate.equations.marching.part import TapOf, taps_of
+from swashplate.equations.marching.run import Instance, module
+from swashplate.equations.model import Equation, Link, Model, Source
+from swashplate.equations.printing import Block, function_source
+from swashplate.equations.printing_c import C, Loops, c_name, first_line, function, literal
+from swashplate.equations.tracing import Trace
+from swashplate.export.c_source.parts import PartInC, path_of
+from swashplate.export.c_source.structs import Structs, struct
+
+Array = NDArray[np.float64]
 
 OWN = """
 number_at put_at is_finite all_finite in_range number_of placed seen constant_window before_all
@@ -153,6 +162,12 @@ class Exported:
         given = [f"inputs.measured[{k}].given" for k in range(max(len(self.measured), 1))]
         return [*options, *limits, *given, "now.begun", "before.begun", "stale", "settled"]
 
+    @cached_property
+    def writer(self) -> Writer:
+        """What its C is written by."""
+        with GENERATING:
+            return Writer(self)
+
     @property
     def taps(self) -> tuple[TapOf, ...]:
         """What is read through a line."""
@@ -178,116 +193,90 @@ class Exported:
 
 
 class Writer:
-    """Header and source of a model."""
+    """C functions of a model, around one sample, and its structs.
+
+    Attributes
+    ----------
+    tags : list of dict
+        Tags of the structs of each part, by what they hold; parameters by nothing.
+    parts : list of PartInC
+        The parts of the model.
+    core : list of str
+        The functions, in the order in which C needs them.
+    """
 
     def __init__(self, exported: Exported) -> None:
         self.e, self.model = exported, exported.model
-        own = {*OWN.split(), *(f"{exported.prefix}_{each}" for each in PUBLIC.split())}
-        own |= {exported.type}
-        self.unit = Unit(f"{exported.prefix}_", exported.widest, own)
         self.P = exported.prefix.upper()
+        own = {*OWN.split(), *(f"{exported.prefix}_{each}" for each in PUBLIC.split())}
+        own |= {exported.type, f"{exported.prefix}_window", f"{exported.prefix}_memory"}
+        self.structs, self.loops = Structs(exported.prefix, own), Loops(own)
+        self.links: dict[str, str] = {}
+        self._link_names: dict[str, str] = {}
+        self.tags: list[dict[str, str]] = []
         for part in self.model.parts:
-            for equation in (part.step, part.sample, part.constants):
-                named = get_type_hints(plain(equation)).get("p") if equation is not None else None
-                if named is not None:
-                    self.unit.wider |= dict(_wider(named, part.parameters))
-        for part in self.model.parts:  # structs of the header come before those of the functions
-            for kind in (part.parameters, part.options, part.given, part.state, part.signals):
-                if kind is not None:
-                    self.unit.struct(kind)
-            for equation in (part.constants, part.limits):
-                if equation is not None:
-                    self.unit.struct(get_type_hints(plain(equation))["return"])
-        if exported.taps:
-            self.unit.struct(Window)
-        self.public = len(self.unit.structs)
-        self.core = self.functions()
+            kinds = {"": part.parameters, "options": part.options, "given": part.given}
+            kinds |= {"signals": part.signals, "state": part.state}
+            if part.limits is not None:
+                kinds["limits"] = get_type_hints(plain(part.limits))["return"]
+            tags = {word: self.structs.of(kind) for word, kind in kinds.items() if kind}
+            self.tags.append(tags)
+        self.parts = [PartInC(self, i) for i in range(len(self.model.parts))]
+        self.constants: list[str] = []
+        """Structs of constants."""
+        for each, tags in zip(self.parts, self.tags, strict=True):
+            if each.constants:
+                tags["constants"] = self.structs.fresh(f"{each.member}_constants")
+                self.constants.append(self._constants(each, tags["constants"]))
+        self.core = self._functions()
+
+    def _constants(self, part: PartInC, tag: str) -> str:
+        """Struct of what follows from a part's parameters, options and the step."""
+        fields = []
+        for node, name in part.constants.items():
+            origin = part.part.trace.origins.get(node)
+            note = f" /* of {origin.name} */" if origin is not None else ""
+            fields.append(f"double {name};{note}")
+        says = f"What follows from the parameters of the {part.own.name}, its options and the step."
+        return struct(says, tag, fields)
 
     # -- the sample --------------------------------------------------------------------------------
 
-    def functions(self) -> list[str]:
+    def _functions(self) -> list[str]:
         """The functions around one sample."""
-        made = [self.updates(), *self.finite(), self.starts(False)]
-        made += [self.starts(True)] if self.e.settles else []
-        return [*made, self.sample()]
+        made = [self._updates(), self._sampled(), *self._starts(False)]
+        made += self._starts(True) if self.e.settles else []
+        ends = [self._finite_states(), self._finite_outputs(), self._sample()]
+        return [*self.loops.texts, *self.links.values(), *made, *ends]
 
-    def argument(self, i: int, name: str, inputs: Mapping[str, str], state: str) -> str:
-        """What an equation of a part takes under a name."""
-        member, part = self.e.members[i], self.model.parts[i]
-        if name in inputs:
-            return inputs[name]
-        return {
-            "state": f"&m->{state}.{member}",
-            "signals": f"&m->{member}_signals",
-            "inputs": f"&{member}_inputs",
-            "p": f"&m->{member}",
-            "k": f"&m->{member}_constants",
-            "h": "m->step",
-            "options": f"&m->{member}_options",
-            "given": f"&m->{member}_given" if part.given else "",
-        }[name]
+    def place(self, source: Source, state: str) -> str:
+        """Where a signal of a part stands, or a number of its state."""
+        part, member = self.model.parts[source.part], self.e.members[source.part]
+        inside = part.signals is not None and source.signal in floats_of(part.signals)
+        where = f"m->{member}_signals" if inside else f"m->{state}.{member}"
+        return f"{where}.{path_of(source.signal)}"
 
-    def call(
-        self, i: int, equation: Equation, inputs: Mapping[str, str], state: str = "now"
-    ) -> str:
-        """A call of one of a part's equations."""
-        name = self.unit.add(equation)
-        given = (self.argument(i, each, inputs, state) for each in arguments_of(equation))
-        return f"{name}({', '.join(given)})"
-
-    def link(self, link: Link, state: str) -> str:
-        """A signal between parts."""
-        found = []
-        for source in link.sources:
-            part, member = self.model.parts[source.part], self.e.members[source.part]
-            inside = part.signals is not None and source.signal in floats_of(part.signals)
-            where = f"m->{member}_signals" if inside else f"m->{state}.{member}"
-            found.append(f"{where}.{path_of(source.signal)}")
+    def _link(self, link: Link) -> str:
+        """A signal that is made of those of several parts, at the last sample."""
         if link.equation is None:
-            return found[0]
-        return f"{self.unit.add(link.equation)}({', '.join(found)})"
-
-    def inputs(self, i: int, window: str) -> tuple[list[str], dict[str, str]]:
-        """Lines that make a part's inputs, and what stands for each of them.
-
-        `window` is how a tap is read: at its place, or all of one value before the record.
-        """
-        part, member = self.model.parts[i], self.e.members[i]
-        state = "now" if window == "before" else "before"
-        lines, found = [], dict[str, str]()
-        for name in part.input_types:
-            link, tap = self.model.link_of(i, name), part.tap(name)
-            local = f"{member}_{c_name(name)}"
-            default = part.defaults.get(name)
-            if link is not None:
-                lines.append(f"const double {local} = {self.link(link, state)};")
-            elif name in part.taps:
-                number = next(t.number for t in self.e.taps if (t.part, t.input) == (i, name))
-                line, struct = self.e.lines.index(tap.signal), self.unit.struct(Window)
-                made = f"seen(m, {number}, {line}, {tap.samples})"
-                if window == "before":
-                    made = f"constant_window(m->before_record[{line}])"
-                lines.append(f"const struct {struct} {local} = {made};")
-                if tap.width:
-                    found[name] = f"&{local}"
-                    continue
-                value = f"{self.unit.add(HOLDS[tap.hold])}(&{local})"
-                local = f"{local}_held"
-            else:
-                value = self.value_of(tap.signal)
-            if link is None:
-                if default is not None:
-                    given = f"m->inputs.measured[{self.P}_INPUT_{c_name(tap.signal)}].given"
-                    value = f"{given} ? {value} : m->{member}.{path_of(default)}"
-                lines.append(f"const double {local} = {value};")
-            found[name] = local
-        if part.inputs is not None:
-            struct = self.unit.struct(part.inputs)
-            kinds = dict(fields_of(part.inputs))
-            values = [found[n][1:] if kinds[n] is Window else found[n] for n in part.input_types]
-            made = f"(struct {struct}){{{', '.join(values)}}}"
-            lines.append(f"const struct {struct} {member}_inputs = {made};")
-        return lines, found
+            return self.place(link.sources[0], "before")
+        name = c_name(link.name)
+        if name not in self.links:
+            trace = Trace()
+            sources = {each.signal: graph.name(self.place(each, "before")) for each in link.sources}
+            value = trace.call(link.equation, sources)
+            assert isinstance(value, Node)
+            taken = {*self.loops.taken, "m"}
+            labels = {node: c_name(label) for node, label in trace.labels.items()}
+            language = C(self.loops, trace.origins, taken)
+            block = Block([value], labels, taken, language=language)
+            function_name = self.loops.fresh(name)
+            lines = [*language.headed(block.lines), f"return {block.texts[0]};"]
+            says = first_line(parsed(link.equation))
+            head = f"static double {function_name}(const {self.e.type} *m)"
+            self.links[name] = function(says, head, lines)
+            self._link_names[name] = function_name
+        return f"{self._link_names[name]}(m)"
 
     def value_of(self, signal: str) -> str:
         """Where the newest value of an external signal stands."""
@@ -296,136 +285,120 @@ class Writer:
             return f"m->inputs.measured[{self.P}_INPUT_{own}].value"
         return f"m->inputs.{own}"
 
-    def used(self, lines: list[str], tail: list[str]) -> list[str]:
-        """Lines without the locals that nothing reads."""
-        kept: list[str] = []
-        for line in reversed(lines):
-            name = line.partition(" = ")[0].rpartition(" ")[2]
-            if any(name in other for other in (*kept, *tail)):
-                kept.insert(0, line)
-        return kept
+    def _sampled(self) -> str:
+        """A sample of each part."""
+        return "\n\n".join(part.sample() for part in self.parts)
 
-    def sample(self) -> str:
+    def _windows(self, part: PartInC, *, constant: bool) -> tuple[list[str], list[str]]:
+        """Declarations of what a part sees through its taps, and their names."""
+        lines, names = [], []
+        for tap in part.part.taps:
+            line = self.e.lines.index(tap.tap.signal)
+            seen = f"seen(m, {tap.number}, {line}, {tap.tap.samples})"
+            text = f"constant_window(m->before_record[{line}])" if constant else seen
+            name = f"{part.member}_{c_name(tap.input)}"
+            lines.append(f"const struct {self.e.prefix}_window {name} = {text};")
+            names.append(f"&{name}")
+        return lines, names
+
+    def _sample(self) -> str:
         """One sample of the whole model."""
         body: list[str] = []
-        late: list[str] = []
-        for i, part in enumerate(self.model.parts):
-            member = self.e.members[i]
-            lines, inputs = self.inputs(i, "line")
-            tail = []
-            for word, equation in (("signals", part.sample), ("limits", part.limits)):
-                if equation is not None:
-                    made = self.call(i, equation, inputs, "before")
-                    tail.append(f"m->{member}_{word} = {made};")
-            if part.domain is not None:
-                margin = self.call(i, part.domain, inputs, "before")
-                tail.append(f"good = {margin} > 0.0 && good;")
-            step = f"m->now.{member} = {self.call(i, part.step, inputs, 'before')};"
-            body += [*self.used(lines, [*tail, step]), *tail]
-            late.append(step)
-        body += late
+        margins = any(part.part.margin is not None for part in self.parts)
+        for part in self.parts:
+            lines, windows = self._windows(part, constant=False)
+            arguments = ["m", f"&m->now.{part.member}", *windows]
+            call = f"{part.names['sample']}({', '.join(arguments)})"
+            holds = part.part.margin is not None
+            body += [*lines, f"good = {call} && good;" if holds else f"{call};"]
         for name, signal in self.model.integrals.items():
             value, own = self.output(signal), c_name(name)
             body.append(f"m->now.{own}_rate = {value};")
             grown = f"m->before.{own} + 0.5 * m->step * (m->before.{own}_rate + m->now.{own}_rate)"
             body.append(f"m->now.{own} = m->before.begun ? {grown} : 0.0;")
         body.append("m->now.begun = true;")
-        good = "good && all_finite(&m->now) && finite_outputs(m)"
-        body.append(f"return {good} ? {self.P}_OK : {self.P}_DOMAIN;")
+        tests = [*(["good"] if margins else []), "all_finite(&m->now)", "finite_outputs(m)"]
+        body.append(f"return {' && '.join(tests)} ? {self.P}_OK : {self.P}_DOMAIN;")
         says = "One sample: everything at this instant, then all states to the next."
         head = f"static int one_sample({self.e.type} *m)"
-        return function(says, head, ["bool good = true;", *body])
+        return function(says, head, [*(["bool good = true;"] if margins else []), *body])
 
-    def starts(self, settled: bool) -> str:
-        """States at the first sample, at rest or settled."""
+    def _starts(self, settled: bool) -> list[str]:
+        """States at the first sample, at rest or settled: of each part, and of all."""
+        word = "settled" if settled else "rest"
+        texts = [part.start(settled) for part in self.parts]
         body: list[str] = []
-        for i, part in enumerate(self.model.parts):
-            member = self.e.members[i]
-            lines, inputs = self.inputs(i, "before")
-            equation = part.settled if settled else part.rest
-            if equation is not None:
-                tail = [f"m->now.{member} = {self.call(i, equation, inputs)};"]
-            else:
-                defaults = part.state._field_defaults
-                tail = []
-                for path in floats_of(part.state):
-                    value = defaults.get(path.split(".")[0], 0.0)
-                    for each in path.split(".")[1:]:
-                        value = getattr(value, each, 0.0)
-                    tail.append(f"m->now.{member}.{path_of(path)} = {literal(float(value))};")
-            if part.sample is not None and i + 1 < len(self.model.parts):
-                tail.append(f"m->{member}_signals = {self.call(i, part.sample, inputs)};")
-            body += [*self.used(lines, tail), *tail]
+        for i, part in enumerate(self.parts):
+            body.append(f"{part.names[word]}(m);")
+            later = "\n".join(texts[i + 1 :])
+            if f"m->{part.member}_signals" in later or f"m->before.{part.member}." in later:
+                lines, windows = self._windows(part, constant=True)
+                following = f"{part.member}_next"
+                arguments = ", ".join(["m", f"&{following}", *windows])
+                body += [
+                    f"m->before.{part.member} = m->now.{part.member};",
+                    *lines,
+                    f"struct {self.tags[i]['state']} {following}; /* not needed */",
+                    f"{part.names['sample']}({arguments});",
+                ]
         what = "settled under what it was given" if settled else "at rest"
-        name = "settled_start" if settled else "rested_start"
-        head = f"static void {name}({self.e.type} *m)"
-        return function(f"States before the first sample, {what}.", head, body)
+        head = f"static void {'settled' if settled else 'rested'}_start({self.e.type} *m)"
+        return [*texts, function(f"States before the first sample, {what}.", head, body)]
 
-    def updates(self) -> str:
+    def _updates(self) -> str:
         """What follows from parameters and step: options, constants, places of the taps."""
-        options, constants, places = [], [], []
+        texts, options, checks, places = [], [], [], []
         for (i, name), equation in self.e.follows.items():
             member = self.e.members[i]
-            options.append(f"m->{member}_options.{c_name(name)} = {self.call(i, equation, {})};")
-        for i, part in enumerate(self.model.parts):
-            if part.constants is not None:
-                made = self.call(i, part.constants, {})
-                constants.append(f"m->{self.e.members[i]}_constants = {made};")
-        checks = [
-            f"if (!({self.call(i, equation, {})} > 0.0)) {{\n    return {self.P}_UNSTABLE;\n}}"
-            for i, equation in self.e.stable.items()
-        ]
+            made = self.loops.fresh(f"{member}_{name}")
+            texts.append(self.parts[i].decided(made, equation))
+            options.append(f"m->{member}_options.{c_name(name)} = {made}(m);")
+        for i, equation in self.e.stable.items():
+            made = self.loops.fresh(f"{self.e.members[i]}_stable")
+            texts.append(self.parts[i].decided(made, equation))
+            checks += [f"if (!({made}(m) > 0.0)) {{", f"    return {self.P}_UNSTABLE;", "}"]
         for i, _, number, tap in self.e.taps:
             delay = f"m->{self.e.members[i]}.{path_of(tap.delay)}" if tap.delay else "0.0"
             places.append(
-                f"placed(m, {number}, {delay}, {literal(float(tap.ahead))}, {tap.samples})"
+                f"!placed(m, {number}, {delay}, {literal(float(tap.ahead))}, {tap.samples})"
             )
         if places:
-            test = "\n    || ".join(f"!{each}" for each in places)
-            places = [f"if ({test}) {{\n    return {self.P}_BAD_DELAY;\n}}"]
-        lines = [line for each in (*options, *checks, *places) for line in each.split("\n")]
+            test = f"if ({' || '.join(places)}) {{"
+            checks += [test, f"    return {self.P}_BAD_DELAY;", "}"]
         says = "Options, stability and delays of these parameters and this step."
-        body = [*(lines or ["(void)m;"]), f"return {self.P}_OK;"]
-        checked = function(says, f"static int checked({self.e.type} *m)", body)
+        body = [*options, *checks]
+        body = [*(body or ["(void)m;"]), f"return {self.P}_OK;"]
+        texts.append(function(says, f"static int checked({self.e.type} *m)", body))
+        own = [part for part in self.parts if part.constants]
+        texts += [part.computed() for part in own]
         says, head = "Constants of these parameters and this step.", "static void computed"
-        computed = function(says, f"{head}({self.e.type} *m)", constants or ["(void)m;"])
-        return f"{checked}\n\n{computed}"
+        calls = [f"{part.names['constants']}(m);" for part in own] or ["(void)m;"]
+        texts.append(function(says, f"{head}({self.e.type} *m)", calls))
+        return "\n\n".join(texts)
 
-    def finite(self) -> tuple[str, str]:
-        """Whether all states, and all outputs, are finite: without a branch for each."""
+    def _finite_states(self) -> str:
+        """Whether all states are finite: without a branch for each."""
         members = self.e.members
         states = [f"s->{members[i]}.{path_of(path)}" for i, path in self.model.places("state")]
         says = "Whether all states are finite: what is not leaves no zero behind."
         head = f"static bool all_finite(const struct {self.e.prefix}_memory *s)"
-        of_states = function(says, head, _finite(states, "s"))
+        return function(says, head, _finite(states, "s"))
+
+    def _finite_outputs(self) -> str:
         says = "Whether all outputs of the sample are finite."
         head = f"static bool finite_outputs(const {self.e.type} *m)"
-        return of_states, function(says, head, _finite([*map(self.output, self.e.names)], "m"))
+        return function(says, head, _finite([*map(self.output, self.e.names)], "m"))
 
     # -- numbers -----------------------------------------------------------------------------------
 
-    def members_of(self, part: Model) -> Iterator[tuple[str, str]]:
-        """Tag and ending of each member of the struct that belongs to a part."""
-        yield self.unit.struct(part.parameters), ""
-        kinds = [("options", part.options), ("given", part.given), ("signals", part.signals)]
-        for word in ("constants", "limits"):
-            equation = getattr(part, word)
-            if equation is not None:
-                kinds.append((word, get_type_hints(plain(equation))["return"]))
-        for word, kind in kinds:
-            if kind is not None:
-                yield self.unit.struct(kind), f"_{word}"
-
-    def output(self, name: str, state: str = "before") -> str:
+    def output(self, name: str) -> str:
         """Where an output is read."""
         if name in self.model.integrals:
             return f"m->now.{c_name(name)}"
         stored, _ = output_of(self.model, name)
         if stored.kind == "link":
-            return self.link(self.model.links[stored.path], state)
-        where = f"m->{state}." if stored.kind == "state" else "m->"
-        tail = "_signals" if stored.kind == "signals" else ""
-        return f"{where}{self.e.members[stored.part]}{tail}.{path_of(stored.path)}"
+            return self._link(self.model.links[stored.path])
+        return self.place(Source(stored.part, stored.path), "before")
 
     def ranges(self) -> Iterator[tuple[str, str, Definition]]:
         """Name, place and definition of each parameter."""
@@ -438,39 +411,60 @@ class Writer:
             yield name, place, definitions.get((i, path), Definition(name, ""))
 
     def values(self) -> list[tuple[str, str]]:
-        """Name and place of every number that an initialisation takes, the step apart."""
+        """Name and place of every parameter, given and option, as an initialisation takes them."""
         found = [(name, place) for name, place, _ in self.ranges()]
         for i, path, name in self.e.named("given"):
             found.append((name, f"{self.e.members[i]}_given.{path_of(path)}"))
         for i, name in self.e.options:
             found.append((name, f"{self.e.members[i]}_options.{c_name(name)}"))
-        for i, part in enumerate(self.model.parts):
-            if part.constants is not None:
-                kind = get_type_hints(plain(part.constants))["return"]
-                place = f"{self.e.members[i]}_constants"
-                found += [(path, f"{place}.{path_of(path)}") for path in floats_of(kind)]
         return found
 
+    def constant_names(self) -> list[str]:
+        """Names of the constants, which an initialisation takes after the values."""
+        return [f"{part.member} {name}" for part in self.parts for name in part.constants.values()]
 
-def path_of(path: str) -> str:
-    """A path of Python's as one of C's."""
-    return ".".join(c_name(each) for each in path.split("."))
+    def first_constant(self, number: int) -> int:
+        """Index of the first constant of a part."""
+        return sum(len(part.constants) for part in self.parts[:number])
+
+    @cached_property
+    def prepare(self) -> Any:
+        """``prepare(params, given, options, h, constants)``, compiled: fills the constants."""
+        lines: list[str] = []
+        functions: dict[str, Function] = {}
+        for part in self.parts:
+            own, called = part.prepared()
+            lines += own
+            functions |= called
+        head = "prepare(params, given, options, h, constants)"
+        text = function_source(head, "What follows from numbers, options and the step.", lines)
+        inner = {name: text for each in functions.values() for name, text in each.texts.items()}
+        texts = [*(f"@inlined\n{each}" for each in inner.values()), text]
+        return module(f"{self.model.name}_constants", "\n\n".join(texts))["prepare"]
+
+
+def numbers(exported: Exported, instance: Instance, step: float) -> Array:
+    """All numbers that the C ``init`` takes, as Python computes them."""
+    options = [
+        each is not None
+        for model, part in zip(instance.model.parts, instance.parts, strict=True)
+        if model.options is not None
+        for each in part.options
+    ]
+    writer = exported.writer
+    constants = np.zeros(len(writer.constant_names()))
+    flags = np.array(options, dtype=np.bool_)
+    if constants.size:
+        with GENERATING:
+            prepare = writer.prepare
+        prepare(instance.params, instance.given, flags, step, constants)
+    return np.array([step, *instance.params, *instance.given, *options, *constants])
 
 
 def _finite(places: Sequence[str], owner: str) -> list[str]:
     """Statements that return whether all numbers are finite, without a branch for each."""
     lines = [f"none += {place} - {place};" for place in places] or [f"(void){owner};"]
     return ["double none = 0.0;", *lines, "return none == 0.0;"]
-
-
-def _wider(named: Any, kind: Any) -> Iterator[tuple[Any, Any]]:
-    """Classes that equations name, and those with more fields that a part has in their place."""
-    if named is not kind:
-        yield named, kind
-        fields = dict(fields_of(kind))
-        for name, hint in fields_of(named):
-            if is_named_tuple(hint):
-                yield from _wider(hint, fields[name])
 
 
 # --- feedthrough ----------------------------------------------------------------------------------
@@ -484,17 +478,21 @@ def feedthrough(exported: Exported, instance: Instance, step: float) -> dict[str
     model, at_once = exported.model, newest(exported, instance, step)
     places = [output_of(model, name)[0] for name in exported.names]
     sampler = Sampler(model, model.external, instance.options, places)
-    code = Code(sampler.used[0].code.taken)
-    for part in sampler.used:
-        code.items += sampler.items(part)
     signals = {f"x_{name}": name for name in model.external}
     for part in sampler.used:
-        signals |= {part.tap_samples(each)[0]: each.tap.signal
-                    for each in part.taps if each.tap.signal in at_once}  # fmt: skip
+        signals |= {
+            part.tap_samples(each)[0]: each.tap.signal
+            for each in part.taps
+            if each.tap.signal in at_once
+        }
+    sources = {sampler.parts[each.part].source(each): n for each, n in sampler.sources.items()}
     found = {}
     for name, place in zip(exported.names, places, strict=True):
-        own, node = sampler.observed(sampler.parts[place.part], place)
-        read = code.reads([ex.name(each) for each in own.reads([node])])
+        read, pending = set[str](), [sampler.observed(sampler.parts[place.part], place)]
+        while pending:
+            names = names_in([pending.pop()])
+            pending += [sources[each] for each in (names & sources.keys()) - read]
+            read |= names
         found[name] = frozenset(signals[each] for each in read & signals.keys())
     return found
 

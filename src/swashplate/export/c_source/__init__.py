@@ -1,4 +1,4 @@
-"""C99 from equations and models: names, docstrings and operations as they stand in Python."""
+"""C99 of a model: its equations around one sample, and the C interface."""
 
 import lazy_loader
 

@@ -1,0 +1,509 @@
+"""The graph printed as C99: expressions, statements, functions, and the loops that they call.
+
+The operations are those of the Python in their order, so that a strict compiler gives the same
+bits.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+import sys
+from collections.abc import Iterable, Mapping, Sequence
+from importlib.resources import files
+from typing import Any
+
+from swashplate.equations import graph
+from swashplate.equations.functions import fresh_name
+from swashplate.equations.graph import COMPARISONS, FALSE, TRUE, Node
+from swashplate.equations.language import MATH, Parsed
+from swashplate.equations.loops import PRECISION, STEPS, TINY, Inner
+from swashplate.equations.printing import ATOM, Block, Language, Text, grouped
+from swashplate.equations.values import leaves
+
+WIDTH = 100
+"""Longest line of C."""
+TYPES = {"float": "double", "int": "long long", "bool": "bool"}
+"""Types of values by their kinds."""
+WORDS = set(
+    """
+auto break case char const continue default do double else enum extern float for goto if inline int
+long register restrict return short signed sizeof static struct switch typedef union unsigned void
+volatile while bool true false NULL INFINITY NAN size_t offsetof main errno memcpy memset strcmp
+isfinite isnan isinf signbit lesser_of greater_of whole_power whole_number fabs fmod pow ldexp frexp
+modf ceil round trunc rint cosh sinh tanh acosh asinh atanh cbrt log10 log2 log1p exp2 expm1 erf
+erfc gamma lgamma tgamma fmin fmax fdim fma j0 j1 jn y0 y1 yn index time signal div abs linux unix
+""".split()  # noqa: SIM905
+) | set(MATH.values())
+"""Names that C or its library keeps for itself."""
+BREAKS = re.compile(r"[,;\"] | (?=[?:+/=*-] |&& |\|\| )|\{(?=\.)")
+"""Where a long line of C may end."""
+_LEVELS = (("if",), ("or",), ("and",), ("==", "!="), ("<", "<=", ">", ">="), ("+", "-"), ("*", "/"))
+LEVELS = {op: level for level, each in enumerate((*_LEVELS, ("not", "neg")), 1) for op in each}
+"""How tightly operations bind; names and calls as `ATOM`."""
+UNARY = LEVELS["neg"]
+FEW = 3
+"""Statements of an equation from which on it gets a heading again, not a remark."""
+_SECTION = re.compile(r"^/\*== (\w+) ==\*/\n", re.MULTILINE)
+_HEADING = re.compile(r"^ */\*= (\d+) \*/$")
+
+
+# --- texts ----------------------------------------------------------------------------------------
+
+
+def sections(package: str | None, name: str) -> dict[str, str]:
+    """Sections of a file of C in a package, by name."""
+    assert package is not None
+    parts = _SECTION.split((files(package) / name).read_text("utf-8"))[1:]
+    return dict(zip(parts[::2], parts[1::2], strict=True))
+
+
+HELPERS = sections(__package__, "helpers.c.in")
+"""Functions that stand for what C has not, or has otherwise."""
+ROOT = HELPERS.pop("root")
+
+
+def helpers_in(text: str) -> list[str]:
+    """Functions that a text calls, of those that stand for what C has not."""
+    return [each for name, each in HELPERS.items() if f"{name}(" in text]
+
+
+def filled(text: str, words: Mapping[str, Any]) -> str:
+    """A text with words in the place of their names, ``@name@``."""
+    for name, word in words.items():
+        text = text.replace(f"@{name}@", str(word))
+    return text
+
+
+def c_name(name: str) -> str:
+    """A name of Python's as one of C's."""
+    plain_name = "".join(c if c.isascii() else f"u{ord(c):04x}" for c in name)
+    return f"{plain_name}_" if plain_name in WORDS else plain_name
+
+
+def literal(value: float) -> str:
+    """A number as C writes it."""
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, int):
+        return str(value)
+    if math.isinf(value):
+        return "INFINITY" if value > 0.0 else "-INFINITY"
+    return "NAN" if math.isnan(value) else repr(float(value))
+
+
+def wrapped(line: str) -> list[str]:
+    """A line of C on as many lines as it takes."""
+    indent = " " * (len(line) - len(line.lstrip()))
+    lines, rest = list[str](), line
+    while len(rest) > WIDTH:
+        ends = [m.end() for m in BREAKS.finditer(rest, len(indent) + 8, WIDTH + 1)]
+        if not ends:
+            break
+        late = [at for at in ends if at > WIDTH // 2] or ends[-1:]
+        at = min(late, key=lambda at: (_depth(rest[:at]), _rank(rest, at), -at))
+        lines.append(rest[:at].rstrip())
+        rest = f"{indent}    {rest[at:]}"
+    return [*lines, rest]
+
+
+def _rank(line: str, at: int) -> int:
+    """How well a line ends at a place: before a choice best, before a factor or a value worst."""
+    marks = (("?", ":"), ("&&", "||"), ("+", "-"), ("*", "/", "="))
+    ranks = [rank for rank, each in enumerate(marks) if line[at:].startswith(each)]
+    return ranks[0] if ranks else 1
+
+
+def _depth(text: str) -> int:
+    """Brackets that are open at the end of a text."""
+    return text.count("(") + text.count("{") - text.count(")") - text.count("}")
+
+
+_OF_COMMENTS = re.compile(r"\*(?=/)|/(?=\*)|\?(?=\?)")
+"""First characters of what ends or begins a comment, or begins a trigraph."""
+
+
+def comment_line(text: str) -> str:
+    """A text as one line within a comment, which nothing in it can begin or end.
+
+    C removes a backslash at the end of a line, and C99 replaces trigraphs such as ``??/``, before
+    it looks for comments: two harmless lines could be joined to the end of one.
+    """
+    line = "".join(c if c.isprintable() else " " for c in text)
+    line = line.replace("\\", "|")
+    return _OF_COMMENTS.sub(lambda pair: f"{pair[0]} ", line)
+
+
+def comment(text: str, pad: str = "", width: int = WIDTH) -> list[str]:
+    """A text of one line as a comment, on as many as it takes."""
+    line = f"{pad}/* {comment_line(text)} */"
+    lines = list[str]()
+    while len(line) > width and " " in line[len(pad) + 20 : width - 3]:
+        at = line.rindex(" ", len(pad) + 20, width - 3)
+        lines.append(line[:at])
+        line = f"{pad} * {line[at + 1 :]}"
+    return [*lines, line]
+
+
+def indented(lines: Iterable[str]) -> list[str]:
+    """Lines of C moved in, long ones on several."""
+    return [each for line in lines for each in (wrapped(f"    {line}") if line else [""])]
+
+
+def function(says: str, head: str, body: Iterable[str]) -> str:
+    """Text of a function of C."""
+    said = comment(says) if says else []
+    return "\n".join([*said, *wrapped(head), "{", *indented(body), "}"])
+
+
+def first_line(source: Parsed) -> str:
+    """First line of what an equation says about itself."""
+    return (source.function.__doc__ or "").strip().partition("\n")[0].strip()
+
+
+# --- the language ---------------------------------------------------------------------------------
+
+
+class C(Language):
+    """C99, long lines not yet on several.
+
+    Parameters
+    ----------
+    functions : Loops
+        Where functions go that the lines call.
+    origins : mapping of Node to Parsed
+        The equation that a value comes from: comments say where one begins.
+    taken : set of str
+        Names of the block that is printed.
+    """
+
+    def __init__(self, functions: Loops, origins: Mapping[Node, Parsed], taken: set[str]) -> None:
+        self._functions, self._origins, self._taken = functions, origins, taken
+        self._sources: dict[Parsed, int] = {}
+
+    # -- expressions -------------------------------------------------------------------------------
+
+    short = sys.maxsize
+
+    def number(self, value: Any) -> Text:
+        """A literal number."""
+        text = literal(value)
+        return text, UNARY if text[0] == "-" else ATOM
+
+    def operation(self, node: Node, args: Sequence[Text], computed: int) -> Text:
+        """An operator with its operands, or a call; whole numbers among doubles are cast."""
+        op, level = node.op, LEVELS.get(node.op, ATOM)
+        if op == "if":
+            return self._choice(node, args)
+        if op == "not":
+            return f"!{grouped(args[0], level)}", level
+        if op == "neg":
+            text = grouped(args[0], level)
+            return f"-({text})" if text.startswith("-") else f"-{text}", level
+        doubles = [as_double(*each) for each in zip(node.args, args, strict=True)]
+        if op == "**":
+            (base,) = doubles
+            if node.value == 2 and base[1] == ATOM and node.kind == "float":
+                return f"{base[0]} * {base[0]}", LEVELS["*"]
+            return _whole(node, f"whole_power({base[0]}, {node.value})")
+        if level == ATOM:
+            name = {"min": "lesser_of", "max": "greater_of", "abs": "fabs"}.get(op, op)
+            return _whole(node, f"{name}({', '.join(text for text, _ in doubles)})")
+        compared = op in COMPARISONS
+        whole = all(each.kind == "int" for each in node.args) and op != "/"
+        left, right = args if whole else doubles
+        least = LEVELS["+"] if compared else level
+        return f"{grouped(left, least)} {op} {grouped(right, max(least, level + 1))}", level
+
+    def _choice(self, node: Node, args: Sequence[Text]) -> Text:
+        (test, one, two), (_, then, other) = args, node.args
+        opposite = f"!{grouped(test, UNARY)}", UNARY
+        if other is FALSE:
+            return _joined(test, "&&", one)
+        if then is TRUE:
+            return _joined(test, "||", two)
+        if then is FALSE:
+            return _joined(opposite, "&&", two)
+        if other is TRUE:
+            return _joined(opposite, "||", one)
+        if node.kind == "float":
+            one, two = as_double(then, one), as_double(other, two)
+        texts = grouped(test, LEVELS["=="]), grouped(one, LEVELS["or"]), two[0]
+        return f"{texts[0]} ? {texts[1]} : {texts[2]}", LEVELS["if"]
+
+    # -- statements --------------------------------------------------------------------------------
+
+    def assigned(self, name: str, node: Node, text: str, pad: str, *, new: bool) -> list[str]:
+        """An assignment; a new name is a constant."""
+        if node.op == "number" and node.kind == "int":
+            text = f"{text}.0"
+        start = f"const {TYPES[node.kind]} {name}" if new else name
+        return [f"{pad}{start} = {text};"]
+
+    def called(
+        self, call: Node, targets: Sequence[str], given: Sequence[str], declared: set[str], pad: str
+    ) -> list[str]:
+        """A call of what does the loop: it returns a root, and moves a state where it stands."""
+        name = self._functions.name_of(call.value.loop, self._taken)
+        kind = call.value.loop.kind
+        own = {"root": 2, "once": 0}.get(kind, 1 + len(targets))
+        texts = [
+            as_double(node, (text, 0))[0] if k < own else text
+            for k, (node, text) in enumerate(zip(call.args, given, strict=True))
+        ]
+        if len(targets) == 1 and kind != "repeated":
+            (target,) = targets
+            start = target if target in declared else f"const double {target}"
+            return [f"{pad}{start} = {name}({', '.join(texts)});"]
+        lines, places = list[str](), list[str]()
+        for k, target in enumerate(targets):
+            place = target or fresh_name("unused", self._taken)
+            places.append(f"&{place}")
+            start = place if target in declared else f"double {place}"
+            if kind == "repeated":
+                lines.append(f"{pad}{start} = {texts[1 + k]};")
+            elif target not in declared:
+                lines.append(f"{pad}{start};")
+        arguments = [*texts[: min(own, 1)], *texts[own:], *places]
+        return [*lines, f"{pad}{name}({', '.join(arguments)});"]
+
+    def branch(self, test: str, then: list[str], other: list[str], pad: str) -> list[str]:
+        """`if` and `else`, or `else if` if there is nothing but that."""
+        if not then:
+            return [f"{pad}if (!({test})) {{", *other, f"{pad}}}"]
+        lines = [f"{pad}if ({test}) {{", *then]
+        if not other:
+            return [*lines, f"{pad}}}"]
+        inner = f"{pad}    "
+        alone = other[1:] if _HEADING.match(other[0]) else other
+        own = [line for line in alone if line[len(inner)] not in " }"]
+        if own == alone[:1] and own[0].startswith(f"{inner}if ("):
+            first, *rest = [line[4:] for line in alone]
+            return [*lines, f"{pad}}} else {first.lstrip()}", *rest]
+        return [*lines, f"{pad}}} else {{", *other, f"{pad}}}"]
+
+    def declared(self, names: Mapping[str, Node], pad: str, *, always: bool) -> list[str]:
+        """Declarations by type; zero if only one side gives a value."""
+        lines = []
+        for kind, word in TYPES.items():
+            own = [name for name, node in names.items() if node.kind == kind]
+            zero = "" if always else {"bool": " = false", "int": " = 0"}.get(kind, " = 0.0")
+            if own:
+                listed = ", ".join(f"{name}{zero}" for name in own)
+                lines.append(f"{pad}{word} {listed};")
+        return lines
+
+    def heading(self, node: Node, pad: str) -> list[str]:
+        """A mark with the number of the equation, which `headed` makes a comment of."""
+        source = self._origins.get(node)
+        if source is None:
+            return []
+        return [f"{pad}/*= {self._sources.setdefault(source, len(self._sources))} */"]
+
+    def headed(self, lines: Iterable[str], around: Parsed | None = None) -> list[str]:
+        """Lines with a comment where the equation changes that they come from.
+
+        The first one of each equation has the first line of its docstring. None is needed for the
+        equation `around` until another has begun.
+        """
+        said = set[Parsed]() if around is None else {around}
+        kept = list[str]()
+        for source, own in self._runs(lines, around):
+            pad = own[0][: len(own[0]) - len(own[0].lstrip())] if own else ""
+            says = "" if source is None else first_line(source)
+            if source is None or not own:
+                kept += own
+                continue
+            new = source not in said
+            said.add(source)
+            alone = len(own) < FEW and own[0].endswith(";") and not new
+            remark = f"{own[0]} /* {comment_line(source.name)} */"
+            if alone and len(remark) <= WIDTH - 4:
+                kept += [remark, *own[1:]]
+                continue
+            if kept and not kept[-1].endswith("{") and kept[-1]:
+                kept.append("")
+            text = f"{source.name}: {says}" if new and says else source.name
+            kept += [*comment(text, pad, WIDTH - 4), *own]
+        return kept
+
+    def _runs(
+        self, lines: Iterable[str], around: Parsed | None
+    ) -> list[tuple[Parsed | None, list[str]]]:
+        """Lines that come from one equation after the other; ends of branches stay with them."""
+        sources = [*self._sources]
+        runs: list[tuple[Parsed | None, list[str]]] = [(None, [])]
+        last = around
+        for line in lines:
+            mark = _HEADING.match(line)
+            if mark is None:
+                runs[-1][1].append(line)
+            elif sources[int(mark[1])] is not last:
+                last = sources[int(mark[1])]
+                runs.append((last, []))
+        return runs
+
+
+def as_double(node: Node, text: Text) -> Text:
+    """A value as a double if it is a whole number."""
+    if node.kind != "int":
+        return text
+    if re.fullmatch(r"-?\d+", text[0]):
+        return f"{text[0]}.0", text[1]
+    return f"(double){grouped(text, UNARY)}", UNARY
+
+
+def _whole(node: Node, text: str) -> Text:
+    """What a function of doubles returns, as a whole number if it is one."""
+    return (f"whole_number({text})" if node.kind == "int" else text), ATOM
+
+
+def _joined(one: Text, op: str, two: Text) -> Text:
+    """Two tests; others among them stand in brackets, as compilers and readers like it."""
+    level = LEVELS["and" if op == "&&" else "or"]
+    texts = [each[0] if each[1] == level else grouped(each, LEVELS["=="]) for each in (one, two)]
+    return f" {op} ".join(texts), level
+
+
+# --- functions ------------------------------------------------------------------------------------
+
+
+def returned(results: Sequence[tuple[str, Node]]) -> tuple[str, list[str]]:
+    """Type of what a function returns, and formals of its results if there are several."""
+    kinds = ["bool" if node.kind == "bool" else "double" for _, node in results]
+    if len(results) == 1:
+        return kinds[0], []
+    return "void", [f"{kind} *{name}" for kind, (name, _) in zip(kinds, results, strict=True)]
+
+
+class Loops:
+    """C functions of equations that are done again and again, and of what does them.
+
+    Attributes
+    ----------
+    texts : list of str
+        The functions, each after those that it calls.
+    taken : set of str
+        Names of functions, and others that they may not have.
+    """
+
+    def __init__(self, taken: Iterable[str] = ()) -> None:
+        self.texts: list[str] = []
+        self.taken = {*WORDS, *taken}
+        self._names: dict[str, str] = {}
+
+    def fresh(self, stem: str, taken: Iterable[str] = ()) -> str:
+        """A name for a function."""
+        name = fresh_name(c_name(stem), {*self.taken, *taken})
+        self.taken.add(name)
+        return name
+
+    def name_of(self, loop: Any, taken: set[str]) -> str:
+        """Name of the function that does a loop."""
+        key = loop.name
+        if key not in self._names:
+            inner: Inner = loop.inner
+            name = self.fresh(inner.source.name, taken)
+            self.texts.append(self.function(name, inner))
+            if loop.kind == "once":
+                self._names[key] = name
+                taken.add(name)
+                return name
+            outer = self.fresh(f"{'root_of' if loop.kind == 'root' else 'repeated'}_{name}", taken)
+            write = self._root if loop.kind == "root" else self._repeated
+            self.texts.append(write(outer, name, inner))
+            self._names[key] = outer
+            taken |= {name, outer}
+        return self._names[key]
+
+    def function(self, name: str, inner: Inner) -> str:
+        """An equation as a function of scalars; several results go to where pointers say."""
+        results = [
+            (f"next_{path}" if path else "next", node) for path, node in leaves(inner.result)
+        ]
+        results = [(c_name(path.replace(".", "_")), node) for path, node in results]
+        formals = {**inner.leading, **inner.formals}
+        return scalar_function(
+            self, name, inner.source, inner.origins, inner.labels, formals, results
+        )
+
+    def _root(self, name: str, residual: str, inner: Inner) -> str:
+        own = {"low", "high", "x_1", "x_2", "x_3", "f_1", "f_2", "f_3", "t", "x", "f", "best"}
+        taken = {*WORDS, *own, "smallest", "reach", "xi", "phi", "steps", residual}
+        rest = [(kind, fresh_name(c_name(each), taken)) for each, kind in inner.formals.items()]
+        words = {
+            "name": name,
+            "residual": residual,
+            "formals": "".join(f", {TYPES[kind]} {each}" for kind, each in rest),
+            "given": "".join(f", {each}" for _, each in rest),
+            "steps": STEPS,
+            "precision": literal(PRECISION),
+            "tiny": literal(TINY),
+        }
+        lines = filled(ROOT, words).rstrip("\n").split("\n")
+        return "\n".join(each for line in lines for each in wrapped(line))
+
+    def _repeated(self, name: str, step: str, inner: Inner) -> str:
+        *state, number = inner.leading
+        taken = {*WORDS, "count", step}
+        rest = [(kind, fresh_name(c_name(each), taken)) for each, kind in inner.formals.items()]
+        places = [fresh_name(c_name(each), taken) for each in state]
+        number = fresh_name(c_name(number), taken)
+        formals = ["double count", *(f"{TYPES[kind]} {each}" for kind, each in rest)]
+        formals += [f"double *{each}" for each in places]
+        given = [*(f"*{each}" for each in places), f"(double){number}"]
+        given += [each for _, each in rest]
+        if len(places) == 1:
+            line = f"    *{places[0]} = {step}({', '.join(given)});"
+        else:
+            line = f"    {step}({', '.join([*given, *places])});"
+        head = f"static void {name}({', '.join(formals)})"
+        loop = f"for (long long {number} = 0; {number} < whole_number(count); {number}++) {{"
+        return function(f"{inner.source.name}, repeated.", head, [loop, line, "}"])
+
+
+def scalar_function(
+    functions: Loops,
+    name: str,
+    source: Parsed,
+    origins: Mapping[Node, Parsed],
+    labels: Mapping[Node, str],
+    formals: Mapping[str, str],
+    results: Sequence[tuple[str, Node]],
+) -> str:
+    """An equation as a C function of scalars.
+
+    `formals` are its arguments with their kinds. A single result is returned; several go to where
+    the last arguments point, named as in `results`.
+    """
+    back, places = returned(results)
+    taken = {*functions.taken, name, *(path for path, _ in results)}
+    words = {each: re.sub(r"[.\[\]]+", "_", each).strip("_") for each in formals}
+    names = {each: fresh_name(c_name(word), taken) for each, word in words.items()}
+    known = {graph.name(each, kind): names[each] for each, kind in formals.items()}
+    language = C(functions, origins, taken)
+    named = {node: c_name(label) for node, label in labels.items()}
+    nodes = [node for _, node in results]
+    block = Block(nodes, named, taken, known=known, language=language)
+    lines = language.headed(block.lines, source)
+    used = without_comments("\n".join([*block.lines, *block.texts]))
+    idle = [f"(void){each};" for each in names.values() if not mentions(used, each)]
+    idle += [""] if idle and lines else []
+    ends = [as_double(node, (text, 0))[0] for node, text in zip(nodes, block.texts, strict=True)]
+    if len(results) == 1:
+        lines.append(f"return {ends[0]};")
+    else:
+        lines += [f"*{path} = {text};" for (path, _), text in zip(results, ends, strict=True)]
+    declared = [f"{TYPES[kind]} {names[each]}" for each, kind in formals.items()]
+    head = f"static {back} {name}({', '.join([*declared, *places]) or 'void'})"
+    return function(first_line(source), head, [*idle, *lines])
+
+
+def mentions(text: str, name: str) -> bool:
+    """Whether a name stands in a text."""
+    return re.search(rf"\b{re.escape(name)}\b", text) is not None
+
+
+def without_comments(text: str) -> str:
+    """A text of C without what it says beside the code."""
+    return re.sub(r"/\*.*?\*/", "", text, flags=re.DOTALL)

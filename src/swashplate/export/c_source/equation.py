@@ -1,0 +1,74 @@
+"""One equation as a function of C."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from types import MappingProxyType
+from typing import Any, NamedTuple
+
+from swashplate.equations.graph import Node, names_in
+from swashplate.equations.language import parsed
+from swashplate.equations.printing_c import Loops, scalar_function
+from swashplate.equations.tracing import Trace
+from swashplate.equations.values import Flag, Tuple, Value, arguments, leaves
+from swashplate.errors import EquationError
+
+
+class EquationInC(NamedTuple):
+    """A C function of scalars, made from an equation.
+
+    It returns a single result; several go to where its last arguments point.
+    """
+
+    name: str
+    text: str
+    formals: dict[str, str]
+    """Kinds of the arguments that it reads, by path: "float", "int", or "bool", as options are."""
+    results: dict[str, str]
+    """Kinds of its results by path; of a single number the path is empty."""
+
+
+def equation_in_c(
+    equation: Any, functions: Loops, lengths: Mapping[str, int] = MappingProxyType({})
+) -> EquationInC:
+    """An equation as a function of C, with its options as arguments.
+
+    Parameters
+    ----------
+    equation : equation
+        What is printed.
+    functions : Loops
+        Where functions go that it calls.
+    lengths : mapping of str to int, optional
+        Lengths of tuples whose types leave them open, by path.
+
+    Raises
+    ------
+    EquationError
+        If the equation has no counterpart in C.
+    """
+    source, trace = parsed(equation), Trace()
+    try:
+        given = arguments(source, None, lengths)
+    except EquationError as error:
+        where = f"{source.file}, line {source.node.lineno}: {source.name}"
+        raise EquationError(f"{where} cannot be written in C: {error}") from None
+    result = trace.call(equation, given)
+    read = names_in(node for _, node in leaves(result))
+    names = [each for value in given.values() for each in _names(value)]
+    formals = {node.value: node.kind for node in names if node.value in read}
+    nodes = [(path, node) for path, node in leaves(result)]
+    name = functions.fresh(source.name)
+    targets = [(f"result_{path.replace('.', '_')}" if path else "result", n) for path, n in nodes]
+    text = scalar_function(functions, name, source, trace.origins, trace.labels, formals, targets)
+    paths = {re.sub(r"\[(\d+)\]", r".\1", each): kind for each, kind in formals.items()}
+    return EquationInC(name, text, paths, {path: node.kind for path, node in nodes})
+
+
+def _names(value: Value) -> list[Node]:
+    """All names of an argument, options among them."""
+    if isinstance(value, Tuple):
+        return [each for item in value.items for each in _names(item)]
+    node: Node = value.value if isinstance(value, Flag) else value
+    return [node]

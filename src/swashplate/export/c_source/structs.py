@@ -1,0 +1,79 @@
+"""Structs of C for the named tuples of a model."""
+
+from __future__ import annotations
+
+import inspect
+import re
+from collections.abc import Iterable
+from typing import Any, get_type_hints
+
+from swashplate.equations.fields import definition_of
+from swashplate.equations.functions import fresh_name
+from swashplate.equations.language import is_named_tuple
+from swashplate.equations.printing_c import c_name, comment, comment_line
+
+
+class Structs:
+    """Structs in the order in which C needs them; those within others come first.
+
+    Attributes
+    ----------
+    texts : dict
+        Tag and text of each, by the class of named tuples that it stands for.
+    """
+
+    def __init__(self, prefix: str, taken: Iterable[str]) -> None:
+        self.prefix, self._taken = prefix, {*taken}
+        self.texts: dict[Any, tuple[str, str]] = {}
+
+    def of(self, cls: Any) -> str:
+        """Tag of the struct of a class of named tuples."""
+        if cls not in self.texts:
+            tag = self.fresh(_snake(cls.__name__))
+            notes = _notes(cls)
+            hints = get_type_hints(cls)
+            fields = []
+            for name in cls._fields:
+                declared = f"{self._type(hints.get(name, float))} {c_name(name)};"
+                note = comment_line(notes[name])
+                fields.append(f"{declared} /* {note} */" if note else declared)
+            doc = inspect.getdoc(cls) or ""
+            says = "" if doc.startswith(f"{cls.__name__}(") else doc.splitlines()[0]
+            self.texts[cls] = tag, struct(says, tag, fields)
+        return self.texts[cls][0]
+
+    def fresh(self, stem: str) -> str:
+        """A tag that nothing else has."""
+        return fresh_name(c_name(f"{self.prefix}_{stem}"), self._taken)
+
+    def _type(self, hint: Any) -> str:
+        if is_named_tuple(hint):
+            return f"struct {self.of(hint)}"
+        return "double" if hint in (float, int) else "bool"
+
+
+def struct(says: str, tag: str, fields: Iterable[str]) -> str:
+    """Text of a struct; one without fields has a byte, as C99 wants it."""
+    head = comment(says) if says else []
+    lines = [f"    {each}" for each in fields] or ["    char nothing;"]
+    return "\n".join([*head, f"struct {tag} {{", *lines, "};"])
+
+
+def _snake(name: str) -> str:
+    """Name of a class in lower case: ``CardOptions`` is ``card_options``."""
+    return re.sub(r"(?<=[a-z0-9])(?=[A-Z])", "_", name).lower()
+
+
+def _notes(cls: Any) -> dict[str, str]:
+    """What is said about each field: its definition, or the comment after it."""
+    hints = get_type_hints(cls, include_extras=True)
+    try:
+        text = inspect.getsource(cls)
+    except (OSError, TypeError):
+        text = ""
+    notes = dict(re.findall(r"^    (\w+):.*?# (?!fmt|noqa|type:)(.*)$", text, re.MULTILINE))
+    for name in cls._fields:
+        definition = definition_of(hints.get(name))
+        if definition is not None and definition.unit:
+            notes[name] = f"{definition.name} [{definition.unit}]"
+    return {name: notes.get(name, "") for name in cls._fields}
