@@ -90,7 +90,7 @@ def derived_function(
     return Derived(*named_by_text(name, text), dict(functions), outputs, inputs, entries)
 
 
-def gradients(
+def partials_of(
     results: Sequence[Node], by: Sequence[Node], *, chained: bool = False
 ) -> dict[tuple[int, int], Node]:
     """Partial derivatives of results by some nodes that are not structurally zero.

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from swashplate.equations import graph
 from swashplate.equations.declaration import inlined
 from swashplate.equations.functions import FUNCTIONS, Function, fresh_name
-from swashplate.equations.gradients import Derived, derived_function, gradients, listing
+from swashplate.equations.gradients import Derived, derived_function, listing, partials_of
 from swashplate.equations.graph import ONE, ZERO, Call, Node, Rule, choose, make, names_in
 from swashplate.equations.language import Parsed
 from swashplate.equations.printing import UNNAMED, function_source, function_text, named_by_text
@@ -274,7 +274,7 @@ def solved(trace: Trace, residual: Parsed, low: Value, high: Value, rest: Sequen
         with trace.within(chain):
             value = trace.call(residual.function, dict(zip(names, [x, *rest], strict=True)))
         assert isinstance(value, Node)
-        partials = gradients([value], [x, *moving])
+        partials = partials_of([value], [x, *moving])
         if (0, 0) not in partials:
             residual.refuse(None, f"no derivative by {names[0]}", "use the unknown in it")
         inside = graph.both(make("<", low, x), make("<", x, high))

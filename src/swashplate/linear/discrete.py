@@ -9,10 +9,10 @@ import numpy as np
 
 from swashplate.equations.fields import check_mapping, floats_of, is_real, value_at
 from swashplate.equations.marching.march import output_of
+from swashplate.equations.marching.one_step import step_derivatives
 from swashplate.equations.marching.part import taps_of
 from swashplate.equations.marching.record import check_rate
 from swashplate.equations.marching.run import Instance, Started, called, outside
-from swashplate.equations.marching.step_derivatives import step_derivatives
 from swashplate.equations.model import state_paths
 from swashplate.errors import DomainError, InputError
 from swashplate.linear.model import LinearModel, Matrices
