@@ -263,7 +263,8 @@ class _Writer:
                 queue = [f"{part.fraction(tap)}_coming", *part.tap_samples(tap)]
                 for lines, name, n in ((first, queue[1], "0"), (fetched, queue[0], "coming")):
                     index = f"{n} - whole[{tap.number}, lane]"
-                    lines.append(f"{straight.row(name)} = sample_at({record}, {index}, 0.0)")
+                    lines.append(f"at = {index}")
+                    lines.append(f"{straight.row(name)} = {record}[at] if at >= 0 else 0.0")
                 following += [(old, new, frozenset((new,))) for new, old in pairwise(queue)]
         for name, text, reads in following:
             straight.become(name, text, reads)

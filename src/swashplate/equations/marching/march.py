@@ -36,7 +36,7 @@ _OWN = """
 n m j c lane first last worst h half value error total count size used progress values lines
 whole fraction params given constants states out flags records before measured weight outputs flat
 inputs table kept tangent lanes columns program plan sink room block met machine volts current speed
-everything voltage target counts coming cost rate integral shown choose width
+at everything voltage target counts coming cost rate integral shown choose width
 """
 RESERVED = {*_OWN.split(), *(name for name in vars(math) if not name.startswith("_"))}
 """Names that the kernels use themselves."""
@@ -338,7 +338,7 @@ def march_source(
         saved += states.save
         fetched = sampler.fetched(
             part,
-            lambda signal, back: f"sample_at({signal}, n - ({back}), {signal}_before)",
+            lambda signal, back: f"{signal}[n - ({back})] if n >= {back} else {signal}_before",
             lambda signal: f"{signal}[n]",
         )
         inner = [*fetched, *sample.lines]

@@ -329,18 +329,11 @@ def instance_of(model: Model, p: Any, *, options: Any = None, given: Any = None)
 # --- marching -------------------------------------------------------------------------------------
 
 
-@inlined
-def sample_at(record: Any, index: int, before: float) -> float:
-    """Sample of a record, or what it was before the record began."""
-    return record[index] if index >= 0 else before
-
-
 LIBRARY: dict[str, Any] = {
     **{name: each for name, each in vars(math).items() if not name.startswith("_")},
     "kernel": kernel,
     "inlined": inlined,
     "piece": piece,
-    "sample_at": sample_at,
     **FUNCTIONS,
 }
 """What generated modules call besides their own functions."""
