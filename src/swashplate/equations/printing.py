@@ -88,9 +88,14 @@ def grouped(text: Text, level: int) -> str:
 class Python(Language):
     """Python as Numba compiles it.
 
-    A choice of which both sides are computed is ``choose(test, one, two)``, and tests are joined by
-    ``&`` and ``|``: from ``one if test else two`` the compiler makes branches.
+    A choice of which both sides may be computed is ``choose(test, one, two)``, and tests are joined
+    by ``&`` and ``|``: no branch, which a compiler would take a while to remove. With `branches` it
+    is ``one if test else two``, as the compiler likes: where one sample waits for the one before, a
+    processor that foresees a branch need not wait for its test.
     """
+
+    def __init__(self, *, branches: bool = False) -> None:
+        self._all = ONCE if branches else ALL
 
     def number(self, value: Any) -> Text:
         """A literal number."""
@@ -101,7 +106,7 @@ class Python(Language):
         """An operation on texts."""
         op, level = node.op, PRECEDENCE.get(node.op, ATOM)
         if op == "if":
-            return self._choice(node, args, computed)
+            return self._choice(node, args, min(computed, self._all))
         if op == "not":
             return f"not {grouped(args[0], level)}", level
         if op == "neg":
@@ -145,7 +150,7 @@ class Python(Language):
         return [*head, *then, *([f"{pad}else:", *other] if other else [])]
 
 
-PYTHON = Python()
+PYTHON, BRANCHING = Python(), Python(branches=True)
 
 
 # --- blocks ---------------------------------------------------------------------------------------

@@ -27,7 +27,14 @@ from swashplate.equations.graph import Node, names_in
 from swashplate.equations.marching.part import PartCode, Stored
 from swashplate.equations.marching.pieces import PIECE
 from swashplate.equations.model import Model, Source
-from swashplate.equations.printing import Block, assigned, function_source, indented
+from swashplate.equations.printing import (
+    BRANCHING,
+    PYTHON,
+    Block,
+    assigned,
+    function_source,
+    indented,
+)
 from swashplate.equations.scheduling import Flat
 from swashplate.equations.values import Value, leaves
 from swashplate.errors import InputError
@@ -151,9 +158,15 @@ class Sampler:
         named: bool = False,
         flat: Flat | None = None,
     ) -> Block:
-        """Lines that compute some nodes of a part; `hints` are names for some, see `Block`."""
+        """Lines that compute some nodes of a part; `hints` are names for some, see `Block`.
+
+        With `flat`, for loops of vector instructions, choices are not branches.
+        """
         labels = {**part.trace.labels, **(hints or {})}
-        block = Block(results, labels, part.taken, known=known, named=named, flat=flat)
+        language = BRANCHING if flat is None else PYTHON
+        block = Block(
+            results, labels, part.taken, known=known, named=named, flat=flat, language=language
+        )
         self.functions |= block.functions
         return block
 
