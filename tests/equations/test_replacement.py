@@ -58,12 +58,12 @@ def following(state: Level, command: float, p: Gain) -> Level:
 
 @equation
 def first_level(p: Gain) -> Level:
-    return Level(twice(p.gain))
+    return Level(this.twice(p.gain))
 
 
 @equation
 def read(state: Level) -> Read:
-    return Read(this.twice(state.level))
+    return Read(twice(state.level))
 
 
 tank = Model("tank", Gain, Level, following, sample=read, rest=first_level, settled=first_level)
@@ -113,6 +113,13 @@ def test_a_replacement_may_call_what_another_one_replaces(first: int) -> None:
     assert level_of(model).tolist() == [20.0, *(3.0 * 20.0 * COMMAND[:3])]
 
 
+def test_models_of_the_same_equations_differ_by_what_these_stand_for() -> None:
+    one = replaced(replaced(tank, twice, ten_times), one_more, three_times)
+    other = replaced(replaced(tank, twice, three_times), one_more, ten_times)
+    assert level_of(one, 0.5).tolist() == [10.0, *(0.5 * 3.0 * 20.0 * COMMAND[:3])]
+    assert level_of(other, 0.5).tolist() == [3.0, *(0.5 * 10.0 * 2.0 * 6.0 * COMMAND[:3])]
+
+
 def test_a_replacement_may_call_what_calls_the_original() -> None:
     # one_more calls around, in which one_more calls twice as it is
     model = replaced(tank, twice, around)
@@ -133,9 +140,17 @@ def emptied(state: Level, command: float, p: Gain) -> Level:
     return Level(-following(state, command, p).level)
 
 
+@equation
+def filled(state: Level, command: float, p: Gain) -> Level:
+    return Level(3.0 * following(state, command, p).level)
+
+
 def test_an_equation_of_the_model_itself_is_replaced() -> None:
-    model = replaced(replaced(tank, following, emptied), twice, ten_times)
-    assert level_of(model).tolist() == [20.0, *(-20.0 * COMMAND[:3] - 1.0)]
+    model = replaced(tank, following, emptied)
+    changed = replaced(model, twice, ten_times)
+    assert level_of(changed).tolist() == [20.0, *(-20.0 * COMMAND[:3] - 1.0)]
+    other = replaced(model, emptied, filled)
+    assert level_of(other).tolist() == [2.0, *(3.0 * (2.0 * COMMAND[:3] + 1.0))]
 
 
 @equation

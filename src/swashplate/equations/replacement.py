@@ -150,7 +150,7 @@ def replaced(
     if not uses(model, old):
         raise InputError(f"Model {model.name} does not use {plain(old).__name__}.")
     parts = [_part(part, made) for part in model.parts]
-    if len(parts) == 1:
+    if model.parts == (model,):
         return parts[0]
     links, replacements = _link_equations(model), model.replacements
     if parameters is not None and all(map(operator.is_, parts, model.parts)):
