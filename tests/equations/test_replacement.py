@@ -114,10 +114,10 @@ def test_a_replacement_may_call_what_another_one_replaces(first: int) -> None:
 
 
 def test_models_of_the_same_equations_differ_by_what_these_stand_for() -> None:
-    one = replaced(replaced(tank, twice, ten_times), one_more, three_times)
-    other = replaced(replaced(tank, twice, three_times), one_more, ten_times)
-    assert level_of(one, 0.5).tolist() == [10.0, *(0.5 * 3.0 * 20.0 * COMMAND[:3])]
-    assert level_of(other, 0.5).tolist() == [3.0, *(0.5 * 10.0 * 2.0 * 6.0 * COMMAND[:3])]
+    one = replaced(replaced(tank, twice, ten_times), one_more, shifted)
+    other = replaced(replaced(tank, twice, shifted), one_more, ten_times)
+    assert level_of(one).tolist() == [20.0, *(20.0 * COMMAND[:3] + 4.0)]
+    assert level_of(other).tolist() == [6.0, *(20.0 * COMMAND[:3] + 40.0)]
 
 
 def test_a_replacement_may_call_what_calls_the_original() -> None:
