@@ -115,7 +115,7 @@ def test_a_replacement_may_call_what_another_one_replaces(first: int) -> None:
 
 def test_models_of_the_same_equations_differ_by_what_these_stand_for() -> None:
     one = replaced(replaced(tank, twice, ten_times), one_more, shifted)
-    other = replaced(replaced(tank, twice, shifted), one_more, ten_times)
+    other = replaced(replaced(tank, one_more, ten_times), twice, shifted)
     assert level_of(one).tolist() == [20.0, *(20.0 * COMMAND[:3] + 4.0)]
     assert level_of(other).tolist() == [6.0, *(20.0 * COMMAND[:3] + 40.0)]
 
