@@ -55,7 +55,7 @@ class Callee(NamedTuple):
     replacements: Replacements
 
 
-def called_by(equation: Any, replacements: Replacements) -> Callee:
+def callee_of(equation: Any, replacements: Replacements) -> Callee:
     """What is run if an equation is called."""
     found, within = standing(equation, replacements)
     return Callee(parsed(found), within)
@@ -96,7 +96,7 @@ class Trace:
 
     def callee(self, equation: Any) -> Callee:
         """What is run if an equation is called."""
-        return called_by(equation, self.replacements)
+        return callee_of(equation, self.replacements)
 
     def call(self, equation: Any, given: Mapping[str, Value]) -> Value:
         """What an equation returns; arguments that are not `given` by name have their defaults."""

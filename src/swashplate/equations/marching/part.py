@@ -23,7 +23,7 @@ from swashplate.equations.model import (
     mean_over_sample,
     previous,
 )
-from swashplate.equations.tracing import Trace, called_by
+from swashplate.equations.tracing import Trace, callee_of
 from swashplate.equations.values import Flag, Tuple, Value, fixed, leaves, rebuilt
 from swashplate.errors import InputError
 
@@ -162,7 +162,7 @@ class PartCode:
 
     def link(self, equation: Equation, name: str, sources: Mapping[str, Value]) -> Node:
         """A signal that an equation makes of several."""
-        made = self.trace.run(called_by(equation, self.model.replacements), sources)
+        made = self.trace.run(callee_of(equation, self.model.replacements), sources)
         assert isinstance(made, Node)
         self.trace.label(made, name)
         return made
