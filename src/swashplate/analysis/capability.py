@@ -14,7 +14,6 @@ from swashplate.drive import Drive
 from swashplate.equations.declaration import interpreted
 from swashplate.equations.marching.record import SOURCE_RATE
 from swashplate.equations.marching.run import Instance, Part, called
-from swashplate.equations.replacement import as_called
 from swashplate.models.displacement_control import PumpOptions, pressure_limits
 from swashplate.models.pump import PumpState
 from swashplate.parameters.rules import FULL_VOLTAGE
@@ -144,7 +143,8 @@ def acceleration_curve(drive: Drive, voltage: float, points: int = 201) -> Accel
 def speed_limits(drive: Drive) -> tuple[float, float]:
     """Lowest and highest speed that the swash plate's stops, or Z15, allow at all. [rad/s]"""
     instance = instance_of(drive.parameters, False)
-    limits = interpreted(as_called(instance.model, pressure_limits))(instance.parts[1].p)
+    limits_of = interpreted(pressure_limits, instance.model.parts[1].replacements)
+    limits = limits_of(instance.parts[1].p)
     low, high = _curve(drive, 0.0, np.array([limits.lower, limits.upper])).speed
     return float(low), float(high)
 
@@ -175,7 +175,9 @@ def _curve(drive: Drive, voltage: float, pressure: Array) -> AccelerationCurve:
     instance = Instance(instance.model, (front, still), instance.name)
     known = instance.start({"current": drive.steady_current(voltage)}, 1.0).arguments[1]
     pump: Any = instance.model.parts[1]
-    found = [called(pump.sample, {**known, "state": PumpState(each)}) for each in pressure.tolist()]
+    found = [
+        called(pump, pump.sample, {**known, "state": PumpState(each)}) for each in pressure.tolist()
+    ]
     speed, rate, free = np.array([(s.shaft_speed, s.swash_rate, s.spool_free) for s in found]).T
     orifice = np.where(free > 0.0, p.Z16_plus, p.Z16_minus)
     limited = np.minimum(np.abs(free), p.Z14) > orifice

@@ -7,10 +7,10 @@ a file, decides whether machine code kept on disk still holds.
 import inspect
 import linecache
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from hashlib import blake2b
 from pathlib import Path
-from types import CodeType, FunctionType, ModuleType
+from types import CellType, CodeType, FunctionType, MappingProxyType, ModuleType, SimpleNamespace
 from typing import Any, TypeVar
 from weakref import WeakKeyDictionary
 
@@ -20,6 +20,11 @@ from swashplate.equations.language import is_named_tuple, parsed, plain, resolve
 from swashplate.errors import EquationError
 
 F = TypeVar("F", bound=Callable[..., Any])
+
+Replacements = Mapping[Any, tuple[Any, ...]]
+"""Equations that stand for others, by the plain functions of those: the first of each tuple, and
+within it the next."""
+NO_REPLACEMENTS: Replacements = MappingProxyType({})
 
 # numba makes its settings from the environment, so that a type checker sees none of them
 JIT_OFF = bool(config.DISABLE_JIT)  # type: ignore[attr-defined]
@@ -111,22 +116,66 @@ def equation_of_text(text: str, name: str, names: dict[str, Any]) -> Any:
     return equation(space[name])
 
 
-_uncompiled: dict[Any, Any] = {}
+# --- equations that stand for others --------------------------------------------------------------
 
 
-def interpreted(function: Any) -> Any:
+def standing(function: Any, replacements: Replacements) -> tuple[Any, Replacements]:
+    """What stands for an equation, itself if nothing does, and the replacements within that.
+
+    An equation does not stand for anything while it is run: it may call what it replaces.
+    """
+    replacements = _without(function, replacements)
+    while chain := replacements.get(plain(function)):
+        function = chain[0]
+        replacements = _without(function, replacements)
+    return function, replacements
+
+
+def _without(function: Any, replacements: Replacements) -> Replacements:
+    """Replacements less those by one equation."""
+    if not any(function in chain for chain in replacements.values()):
+        return replacements
+    return {
+        old: tuple(new for new in chain if new is not function)
+        for old, chain in replacements.items()
+    }
+
+
+_uncompiled: dict[tuple[Any, ...], Any] = {}
+
+
+def interpreted(function: Any, replacements: Replacements = NO_REPLACEMENTS) -> Any:
     """A function and all that it calls as plain Python, for one call where compiling costs more."""
+    function, replacements = standing(function, replacements)
     f = plain(function)
     if not isinstance(f, FunctionType):
         return function
-    if f not in _uncompiled:
-        space = dict(f.__globals__)
-        made = FunctionType(f.__code__, space, f.__name__, f.__defaults__, f.__closure__)
-        _uncompiled[f] = made
-        for name in dict.fromkeys(_names(f.__code__)):
-            if is_function(space.get(name)):
-                space[name] = interpreted(space[name])
-    return _uncompiled[f]
+    key = (f, *(each for each in replacements.items() if each[1]))
+    if key not in _uncompiled:
+        space, cells = dict(f.__globals__), tuple(CellType() for _ in f.__closure__ or ())
+        made = FunctionType(f.__code__, space, f.__name__, f.__defaults__, cells or None)
+        made.__kwdefaults__ = f.__kwdefaults__
+        _uncompiled[key] = made
+        names = dict.fromkeys(_names(f.__code__))
+        for name in names:
+            if name in space:
+                space[name] = _interpreted(space[name], names, replacements)
+        for cell, original in zip(cells, f.__closure__ or (), strict=True):
+            cell.cell_contents = _interpreted(original.cell_contents, names, replacements)
+    return _uncompiled[key]
+
+
+def _interpreted(thing: Any, names: Iterable[str], replacements: Replacements) -> Any:
+    """What a function names, with all equations of these names as plain Python."""
+    if is_function(thing):
+        return interpreted(thing, replacements)
+    if not isinstance(thing, ModuleType):
+        return thing
+    members = {name: getattr(thing, name) for name in names if hasattr(thing, name)}
+    equations = {
+        name: interpreted(each, replacements) for name, each in members.items() if is_function(each)
+    }
+    return SimpleNamespace(**{**vars(thing), **equations}) if equations else thing
 
 
 # --- what a function reaches ----------------------------------------------------------------------
@@ -197,6 +246,20 @@ def closure(function: Any) -> dict[str, Any]:
             if not number:
                 met.add(plain(each))
                 pending.append(each)
+    return found
+
+
+def reached(functions: Iterable[Any], replacements: Replacements) -> set[FunctionType]:
+    """Plain functions of all equations that are run if some are called, those among them."""
+    found: set[FunctionType] = set()
+    met, pending = set(), [(each, replacements) for each in functions]
+    while pending:
+        function, within = standing(*pending.pop())
+        state = (plain(function), *(each for each in within.items() if each[1]))
+        if state not in met:
+            met.add(state)
+            found.add(plain(function))
+            pending += [(each, within) for _, each in _reached(function) if is_function(each)]
     return found
 
 

@@ -15,7 +15,13 @@ from pathlib import Path
 from typing import Any, TypeVar, get_type_hints
 
 from swashplate.equations.cache import generated_folder, is_recent, written
-from swashplate.equations.declaration import RULES, closure, closure_hash, is_function
+from swashplate.equations.declaration import (
+    RULES,
+    Replacements,
+    closure,
+    closure_hash,
+    is_function,
+)
 from swashplate.equations.language import is_named_tuple, plain
 from swashplate.equations.model import Model
 
@@ -123,10 +129,27 @@ def key_of(model: Model) -> str:
         named = (part.step, part.sample, part.rest, part.settled, part.limits, part.domain)
         digest.update(f"{[each is not None for each in named]}\0".encode())
         equations += [each for each in named if each is not None]
+        digest.update(f"{_replacement_hashes(part.replacements)!r}\0".encode())
+        equations += _new_equations(part.replacements)
     links = [(name, link.sources) for name, link in model.links.items()]
     digest.update(f"{model.name} {links!r} {sorted(model.integrals.items())!r}\0".encode())
+    digest.update(f"{_replacement_hashes(model.replacements)!r}\0".encode())
+    equations += _new_equations(model.replacements)
     digest.update(fingerprint(equations).encode())
     return digest.hexdigest()
+
+
+def _replacement_hashes(replacements: Replacements) -> list[tuple[str, list[str]]]:
+    """Which equations stand for which, in an order that is always the same."""
+    return sorted(
+        (f"{old.__module__}.{old.__qualname__}", [closure_hash(new) for new in chain])
+        for old, chain in replacements.items()
+    )
+
+
+def _new_equations(replacements: Replacements) -> list[Any]:
+    """All equations that stand for others."""
+    return [new for chain in replacements.values() for new in chain]
 
 
 def _shape(kind: Any) -> tuple[Any, ...]:

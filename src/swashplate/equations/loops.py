@@ -19,7 +19,7 @@ from swashplate.equations.printing import UNNAMED, function_source, function_tex
 from swashplate.equations.values import Flag, Tuple, Value, alike, leaves, rebuilt
 
 if TYPE_CHECKING:
-    from swashplate.equations.tracing import Trace
+    from swashplate.equations.tracing import Callee, Trace
 
 S = TypeVar("S")
 
@@ -191,8 +191,9 @@ class Loop(NamedTuple):
     inner: Inner
 
 
-def _inner(outer: Trace, source: Parsed, leading: Sequence[Value], rest: Sequence[Value]) -> Inner:
+def _inner(outer: Trace, callee: Callee, leading: Sequence[Value], rest: Sequence[Value]) -> Inner:
     """An equation whose `leading` arguments the loop gives, the others as where it is called."""
+    source = callee.source
     trace = outer.inner(source)
     taken = set[str]()
     names = [each.arg for each in source.arguments]
@@ -216,7 +217,7 @@ def _inner(outer: Trace, source: Parsed, leading: Sequence[Value], rest: Sequenc
 
     for k, (name, value) in enumerate(zip(names, [*leading, *rest], strict=True)):
         given[name] = formal(value, name, always=k < len(leading))
-    result = trace.call(source.function, given)
+    result = trace.run(callee, given)
     used = names_in(node for _, node in leaves(result))
     count = sum(1 for value in leading for _ in leaves(value))
     first, others = list(stands_for)[:count], list(stands_for)[count:]
@@ -233,24 +234,25 @@ def _inner(outer: Trace, source: Parsed, leading: Sequence[Value], rest: Sequenc
     )
 
 
-def called_apart(trace: Trace, source: Parsed, values: Sequence[Value]) -> Value:
+def called_apart(trace: Trace, callee: Callee, values: Sequence[Value]) -> Value:
     """An equation as a call of a generated function, without derivatives."""
-    inner = _inner(trace, source, [], values)
+    inner = _inner(trace, callee, [], values)
     function = inner.function(flat=True)
     count = sum(1 for _ in leaves(inner.result))
     value = Call(function, count, loop=Loop(function.name, "once", inner))
     call = make("call", *inner.actuals, value=value)
     results = [trace.make("result", call, value=k) for k in range(count)]
     if count == 1:
-        trace.label(results[0], source.name)
+        trace.label(results[0], inner.name)
     return rebuilt(inner.result, iter(results))
 
 
-def solved(trace: Trace, residual: Parsed, low: Value, high: Value, rest: Sequence[Value]) -> Value:
+def solved(trace: Trace, callee: Callee, low: Value, high: Value, rest: Sequence[Value]) -> Value:
     """`root` as a call of a generated function, with the rule of its derivatives."""
-    inner = _inner(trace, residual, [graph.name("x")], rest)
+    residual = callee.source
+    inner = _inner(trace, callee, [graph.name("x")], rest)
     if not (isinstance(inner.result, Node) and isinstance(low, Node) and isinstance(high, Node)):
-        trace.under_way[-1].refuse(
+        trace.under_way[-1].source.refuse(
             None, "a residual or a bracket that is a tuple", "let each be one float"
         )
     function = inner.function()
@@ -272,7 +274,7 @@ def solved(trace: Trace, residual: Parsed, low: Value, high: Value, rest: Sequen
         # the implicit function theorem within the bracket
         names = [each.arg for each in residual.arguments]
         with trace.within(chain):
-            value = trace.call(residual.function, dict(zip(names, [x, *rest], strict=True)))
+            value = trace.run(callee, dict(zip(names, [x, *rest], strict=True)))
         assert isinstance(value, Node)
         partials = partials_of([value], [x, *moving])
         if (0, 0) not in partials:
@@ -295,10 +297,11 @@ def solved(trace: Trace, residual: Parsed, low: Value, high: Value, rest: Sequen
 
 
 def repetition(
-    trace: Trace, step: Parsed, count: Value, state: Value, rest: Sequence[Value]
+    trace: Trace, callee: Callee, count: Value, state: Value, rest: Sequence[Value]
 ) -> Value:
     """`repeated` as a call of a generated function, with one that carries its derivatives along."""
-    inner = _inner(trace, step, [state, graph.name("number")], rest)
+    step = callee.source
+    inner = _inner(trace, callee, [state, graph.name("number")], rest)
     names: tuple[str, ...] = ("state",)
     items: tuple[Value, ...] = (state,)
     if isinstance(state, Tuple) and state.cls:
@@ -307,7 +310,7 @@ def repetition(
     if not (numbers and isinstance(count, Node) and alike(inner.result, state)):
         what = f"repeated of {step.name}, which does not return a state"
         instead = "let it take and return the same named tuple of floats, or a float"
-        trace.under_way[-1].refuse(None, what, instead)
+        trace.under_way[-1].source.refuse(None, what, instead)
     *now, number = inner.leading
     times = fresh_name("count", inner.taken)
     given = [times, *now, *inner.formals]

@@ -33,7 +33,7 @@ from operator import attrgetter
 from types import FunctionType, ModuleType
 from typing import Any, Literal, NamedTuple, get_args, get_type_hints
 
-from swashplate.equations.declaration import equation, equation_of_text
+from swashplate.equations.declaration import Replacements, equation, equation_of_text
 from swashplate.equations.fields import (
     Definition,
     definition_of,
@@ -175,6 +175,9 @@ class Model:
     """Models in series, this one alone if it is not joined."""
     links: Mapping[str, Link] = field(default_factory=dict)
     """Signals that are equations over the parts' signals, by name."""
+    replacements: Replacements = field(default_factory=dict)
+    """Equations that stand for others wherever those are called, see `replaced`; of a joined model
+    in its links."""
     recipe: tuple[Any, ...] = ()
     """A function and its arguments that make the model again in another process; by default it is
     looked up by its name."""
@@ -433,7 +436,7 @@ def join(
     links : mapping of str to equation, optional
         Further signals, made of the parts' signals that the equation's arguments name.
     **changes
-        `integrals`, `outputs`, `free_start` of the whole.
+        `integrals`, `outputs`, `free_start`, `replacements` of the whole.
 
     Raises
     ------

@@ -1,22 +1,28 @@
 """One equation of a model replaced by another, without a change to the model's own text.
 
-Equations call each other by name, so a replacement needs new versions of all that lead to it: each
-is the same function with other names around it. They are equations like any others, and everything
-made of a model follows: derivatives, marches, batches, linear models, fits.
+A model says which equations stand for which. Whatever runs its equations, on symbols or on numbers,
+looks there whenever one is called, so that everything made of a model follows: derivatives,
+marches, batches, linear models, fits, C.
 """
 
 from __future__ import annotations
 
+import operator
 import sys
 from collections import namedtuple
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import fields, replace
 from functools import cache
 from importlib import import_module
-from types import CellType, FunctionType, ModuleType
+from types import ModuleType
 from typing import Any, NamedTuple, get_type_hints
 
-from swashplate.equations.declaration import closure, equation, equation_of_text, is_function
+from swashplate.equations.declaration import (
+    Replacements,
+    equation_of_text,
+    is_function,
+    reached,
+)
 from swashplate.equations.language import is_named_tuple, plain
 from swashplate.equations.model import Equation, Model, arguments_of, join
 from swashplate.errors import InputError
@@ -99,20 +105,18 @@ def check_members(members: Mapping[str, Any], names: Mapping[str, str]) -> None:
 
 def uses(model: Model, equation: Equation) -> bool:
     """Whether any of a model's equations is or calls this one."""
-    return any(_leading(part, equation) for part in model.parts)
+    parts = any(_calls(part.equations, part.replacements, equation) for part in model.parts)
+    return parts or _calls(_link_equations(model).values(), model.replacements, equation)
 
 
-@cache
-def as_called(model: Model, equation: Equation) -> Equation:
-    """An equation as a model calls it: itself, or what stands in its place there."""
-    name = plain(equation).__name__
-    for part in model.parts:
-        for each in part.equations:
-            found = closure(each)
-            if name in found:
-                version: Equation = found[name]
-                return version
-    return equation
+def _link_equations(model: Model) -> dict[str, Equation]:
+    """Equations over the signals of several parts, by the signals that they make."""
+    return {name: link.equation for name, link in model.links.items() if link.equation}
+
+
+def _calls(equations: Iterable[Equation], replacements: Replacements, equation: Equation) -> bool:
+    """Whether any of some equations is or calls another one."""
+    return plain(equation) in reached(equations, replacements)
 
 
 def replaced(
@@ -142,21 +146,31 @@ def replaced(
     InputError
         If the model does not use the equation, or the arguments do not fit.
     """
-    parts = [_part(part, old, new, parameters) for part in model.parts]
-    if all(part is own for part, own in zip(parts, model.parts, strict=True)):
+    made = Replacement(old, new, parameters)
+    if not uses(model, old):
         raise InputError(f"Model {model.name} does not use {plain(old).__name__}.")
-    made = parts[0]
-    if len(parts) > 1:
-        made = join(
-            model.name,
-            *parts,
-            links={name: link.equation for name, link in model.links.items() if link.equation},
-            integrals=model.integrals,
-            outputs=model.outputs,
-            free_start=model.free_start,
+    parts = [_part(part, made) for part in model.parts]
+    if model.parts == (model,):
+        return parts[0]
+    links, replacements = _link_equations(model), model.replacements
+    if parameters is not None and all(map(operator.is_, parts, model.parts)):
+        raise InputError(
+            f"{plain(old).__name__} is an equation of a link between models, which has no "
+            "parameters: one in its place has the same arguments and brings none along."
         )
-    object.__setattr__(made, "recipe", (again, (model, Replacement(old, new, parameters))))
-    return made
+    if _calls(links.values(), replacements, old):
+        in_links = _called_like(old, new, model.name, model.parameters)
+        replacements = _with(replacements, old, in_links)
+    return join(
+        model.name,
+        *parts,
+        links=links,
+        integrals=model.integrals,
+        outputs=model.outputs,
+        free_start=model.free_start,
+        replacements=replacements,
+        recipe=(again, (model, made)),
+    )
 
 
 @cache
@@ -165,28 +179,32 @@ def again(model: Model, made: Replacement) -> Model:
     return replaced(model, *made)
 
 
-def _part(part: Model, old: Equation, new: Equation, parameters: Any) -> Model:
+def _part(part: Model, made: Replacement) -> Model:
     """A part with the replacement, itself if it does not use the equation."""
-    leading = _leading(part, old)
-    if not leading:
+    if not _calls(part.equations, part.replacements, made.old):
         return part
     own: Any = part.parameters
-    kind = _extended(own, parameters) if parameters else own
-    names = {part.parameters.__name__: kind}
-    made = {plain(old): _called_like(old, new, part.name, kind)}
-    rebuilt = {name: _rebuilt(each, old, made, names) for name, each in leading.items()}
-    return replace(part, parts=(), parameters=kind, **rebuilt)
+    more: Any = made.parameters
+    kind = own if more is None else _extended(own, more)
+    new = _called_like(made.old, made.new, part.name, kind)
+    changes: dict[str, Any] = {
+        each.name: new
+        for each in fields(part)
+        if plain(getattr(part, each.name)) is plain(made.old)
+    }
+    changes["replacements"] = _with(part.replacements, made.old, new)
+    changes["recipe"] = again, (part, made)
+    return replace(part, parts=(), parameters=kind, **changes)
 
 
-def _leading(part: Model, old: Equation) -> dict[str, Equation]:
-    """Equations of a part that are another one, or call it, by the part's fields."""
-    found = {each.name: getattr(part, each.name) for each in fields(part)}
-    return {name: each for name, each in found.items() if _reaches(each, old)}
-
-
-def _reaches(function: Any, old: Equation) -> bool:
-    known = closure(function).values() if is_function(function) else ()
-    return any(plain(each) is plain(old) for each in known)
+def _with(replacements: Replacements, old: Equation, new: Equation) -> Replacements:
+    """Replacements with one more, also in the place of what already stands for another."""
+    found = {
+        each: tuple(new if plain(stands) is plain(old) else stands for stands in chain)
+        for each, chain in replacements.items()
+    }
+    found[plain(old)] = (*found.get(plain(old), ()), new)
+    return found
 
 
 @cache
@@ -236,25 +254,3 @@ def _called_like(old: Equation, new: Equation, part: str, kind: type[Any]) -> Eq
     passed = ", ".join((*taken, *(f"p.{each}" for each in more)))
     text = f"def {name}({arguments}) -> Type_return:\n    return own_equation({passed})\n"
     return equation_of_text(text, name, names | {"own_equation": new})  # type: ignore[no-any-return]
-
-
-def _rebuilt(function: Any, old: Equation, made: dict[Any, Any], names: Mapping[str, Any]) -> Any:
-    """Anything, and a function that leads to the old equation leading to the new one."""
-    f: Any = plain(function)
-    if not _reaches(function, old):
-        return function
-    if f not in made:
-        space = {**f.__globals__, **{k: v for k, v in names.items() if k in f.__globals__}}
-        called = [name for name in f.__code__.co_names if name in f.__globals__]
-        space |= {n: _rebuilt(f.__globals__[n], old, made, names) for n in called if n not in names}
-        inner = [_rebuilt(each.cell_contents, old, made, names) for each in f.__closure__ or ()]
-        cells = tuple(map(CellType, inner)) or None
-        copy = FunctionType(f.__code__, space, f.__name__, f.__defaults__, cells)
-        copy.__kwdefaults__, copy.__module__ = f.__kwdefaults__, f.__module__
-        copy.__annotations__ = {
-            key: names.get(each.__name__, each) if is_named_tuple(each) else each
-            for key, each in f.__annotations__.items()
-        }
-        copy.__doc__, copy.__qualname__ = f.__doc__, f.__qualname__
-        made[f] = equation(copy)
-    return made[f]

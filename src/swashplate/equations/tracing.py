@@ -12,10 +12,17 @@ from contextlib import contextmanager
 from functools import reduce
 from inspect import Parameter, Signature
 from types import FunctionType, ModuleType
-from typing import Any, TypeVar
+from typing import Any, NamedTuple, TypeVar
 
 from swashplate.equations import graph
-from swashplate.equations.declaration import JIT_OFF, RULES
+from swashplate.equations.declaration import (
+    JIT_OFF,
+    NO_REPLACEMENTS,
+    RULES,
+    Replacements,
+    closure,
+    standing,
+)
 from swashplate.equations.graph import FALSE, LEAVES, ONE, TRUE, ZERO, Node, Rule, choose, make
 from swashplate.equations.language import (
     ARITHMETIC,
@@ -41,6 +48,19 @@ LOOPS = {
 """What loops take ahead of the rest, what their equation takes ahead of it, how they are made."""
 
 
+class Callee(NamedTuple):
+    """An equation that is run, and what stands for others within it."""
+
+    source: Parsed
+    replacements: Replacements
+
+
+def callee_of(equation: Any, replacements: Replacements) -> Callee:
+    """What is run if an equation is called."""
+    found, within = standing(equation, replacements)
+    return Callee(parsed(found), within)
+
+
 class Trace:
     """Equations that are run on symbols, and what is known of the nodes that this makes.
 
@@ -50,58 +70,75 @@ class Trace:
         What equations call a value, the first that does.
     origins : dict of Node to Parsed
         The equation that a value comes from.
-    under_way : list of Parsed
+    under_way : list of Callee
         Equations that are being run, each called by the one before.
     calls : dict of Parsed to set
         Arguments of each equation that was run, and what it returned for them.
 
     `apart` are equations that become functions, which are called: in languages that have no
-    derivatives.
+    derivatives. `replacements` are equations that stand for others, see `declaration.standing`.
     """
 
-    def __init__(self, apart: Collection[Parsed] = ()) -> None:
-        self.apart = apart
+    def __init__(
+        self, apart: Collection[Parsed] = (), replacements: Replacements = NO_REPLACEMENTS
+    ) -> None:
+        self.apart, self._replacements = apart, replacements
         self.calls: dict[Parsed, set[tuple[tuple[Node, ...], tuple[Node, ...]]]] = {}
         self.labels: dict[Node, str] = {}
         self.origins: dict[Node, Parsed] = {}
-        self.under_way: list[Parsed] = []
+        self.under_way: list[Callee] = []
         self._rules: dict[tuple[Any, ...], Rule] = {}
+
+    @property
+    def replacements(self) -> Replacements:
+        """Equations that stand for others in the one that is being run."""
+        return self.under_way[-1].replacements if self.under_way else self._replacements
+
+    def callee(self, equation: Any) -> Callee:
+        """What is run if an equation is called."""
+        return callee_of(equation, self.replacements)
 
     def call(self, equation: Any, given: Mapping[str, Value]) -> Value:
         """What an equation returns; arguments that are not `given` by name have their defaults."""
-        source = parsed(equation)
-        if source in self.under_way:
+        return self.run(self.callee(equation), given)
+
+    def run(self, callee: Callee, given: Mapping[str, Value]) -> Value:
+        """What an equation returns, and not what might stand for it."""
+        source = callee.source
+        if callee in self.under_way:
             source.refuse(None, "a call of itself", "write a loop over a literal range")
         defaults = {name: fixed(each) for name, each in source.defaults.items()}
         known = {name: each for name, each in defaults.items() if each is not None} | dict(given)
         known = {each.arg: known[each.arg] for each in source.arguments if each.arg in known}
         if source in self.apart:
-            return called_apart(self, source, [*known.values()])
-        with self.running(source):
+            return called_apart(self, callee, [*known.values()])
+        with self.running(callee):
             result = _Tracer(source, self).result(known)
             scalars = tuple(node for value in known.values() for _, node in leaves(value))
             back = tuple(node for _, node in leaves(result))
             self.calls.setdefault(source, set()).add((scalars, back))
-            rule = RULES.get(plain(equation))
-            return result if rule is None else self._ruled(source, parsed(rule), known, result)
+            rule = RULES.get(source.function)
+            if rule is None or _is_changed(callee):
+                return result
+            return self._ruled(source, parsed(rule), known, result)
 
     def inner(self, source: Parsed) -> Trace:
         """A trace of its own for an equation that is run within another, again and again."""
-        trace = Trace({*self.apart} - {source})
+        trace = Trace({*self.apart} - {source}, self._replacements)
         trace.under_way = [*self.under_way]
         return trace
 
     @contextmanager
-    def running(self, source: Parsed) -> Iterator[None]:
+    def running(self, callee: Callee) -> Iterator[None]:
         """While an equation is being run."""
-        self.under_way.append(source)
+        self.under_way.append(callee)
         try:
             yield
         finally:
             self.under_way.pop()
 
     @contextmanager
-    def within(self, chain: Sequence[Parsed]) -> Iterator[None]:
+    def within(self, chain: Sequence[Callee]) -> Iterator[None]:
         """Back within equations that were under way at some time."""
         outer, self.under_way = self.under_way, [*chain]
         try:
@@ -116,7 +153,7 @@ class Trace:
     def noted(self, node: Node) -> Node:
         """A node, with the equation that it comes from."""
         if self.under_way and node.op not in LEAVES:
-            self.origins.setdefault(node, self.under_way[-1])
+            self.origins.setdefault(node, self.under_way[-1].source)
         return node
 
     def label(self, value: Value, stem: str) -> None:
@@ -141,7 +178,8 @@ class Trace:
         chain = tuple(self.under_way)
 
         def slopes() -> tuple[Node, ...]:
-            with self.within(chain), self.running(rule):
+            # a rule is that of the equation as it is written
+            with self.within(chain), self.running(Callee(rule, NO_REPLACEMENTS)):
                 partials = [node for _, node in leaves(_Tracer(rule, self).result(known))]
             if len(partials) != len(by) * len(results):
                 rule.refuse(
@@ -159,6 +197,14 @@ class Trace:
             self.label(node, f"{source.name}_{path}" if path else source.name)
             nodes.append(self.make("ruled", node, value=part))
         return rebuilt(result, iter(nodes))
+
+
+def _is_changed(callee: Callee) -> bool:
+    """Whether an equation reaches one for which another stands, so that no rule of it holds."""
+    replaced = {old for old, chain in callee.replacements.items() if chain}
+    if not replaced:
+        return False
+    return any(plain(each) in replaced for each in closure(callee.source.function).values())
 
 
 def _part_of(rule: Rule, index: int) -> Rule:
@@ -449,9 +495,9 @@ class _Tracer:
         if not _is_equation(found):
             text = ast.unparse(node.func)
             self.refuse(node, f"a call of {text}", f"make {text} an @equation")
-        callee = parsed(found)
-        names = [each.arg for each in callee.arguments]
-        return self.trace.call(found, self.arguments(node, names, callee.defaults))
+        callee = self.trace.callee(found)
+        names = [each.arg for each in callee.source.arguments]
+        return self.trace.run(callee, self.arguments(node, names, callee.source.defaults))
 
     def function(self, node: ast.Call, op: str) -> Node:
         """Value of a function of numbers."""
@@ -489,9 +535,9 @@ class _Tracer:
         found = self.outside(first) if named else None
         if not _is_equation(found):
             self.refuse(node, f"{word} of something else", "give it the name of an @equation")
-        inner, values = parsed(found), [self.value(each) for each in node.args[1:]]
-        if len(inner.arguments) != len(own) + len(values) - 2:
-            what = f"{word} of {inner.name} with other arguments"
+        inner, values = self.trace.callee(found), [self.value(each) for each in node.args[1:]]
+        if len(inner.source.arguments) != len(own) + len(values) - 2:
+            what = f"{word} of {inner.source.name} with other arguments"
             self.refuse(node, what, f"let it take {', '.join(own)} and the rest")
         return make_of(self.trace, inner, values[0], values[1], values[2:])
 

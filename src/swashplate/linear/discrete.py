@@ -93,7 +93,9 @@ def linearize(
                 )
         # what belongs to the first sample alone has passed
         known = instance.start(at, h, "steady").arguments
-        states = [called(part.step, each) for part, each in zip(model.parts, known, strict=True)]
+        states = [
+            called(part, part.step, each) for part, each in zip(model.parts, known, strict=True)
+        ]
     started = instance.start(at, h, "steady", states)
     named = tuple(model.outputs) or tuple(model.parts[-1].outputs)
     named = tuple(each for each in named if each not in model.integrals)
@@ -130,7 +132,10 @@ def recurrence(
     """
     model, signals = instance.model, tuple(started.before)
     for part, known in zip(model.parts, started.arguments, strict=True):
-        if part.domain is not None and not (margin := called(part.domain, known)) > 0.0:
+        if part.domain is None:
+            continue
+        margin = called(part, part.domain, known)
+        if not margin > 0.0:
             raise DomainError(f"{instance.name}: {outside(model, margin, 'operating point')}")
     for name in outputs:
         if name in model.integrals:

@@ -23,7 +23,6 @@ from swashplate.equations.marching.record import (
     least_substeps,
 )
 from swashplate.equations.marching.run import Instance, called
-from swashplate.equations.replacement import as_called
 from swashplate.errors import DomainError, InputError
 from swashplate.linear.discrete import recurrence
 from swashplate.linear.model import LinearModel, Matrices, with_line
@@ -262,7 +261,9 @@ def operating_point(
     assert current is not None
     instance = without_ripple(instance_of(parameters, False))
     pump, options, _ = instance.parts[1]
-    sine = interpreted(moment_sine)(interpreted(solenoid_force)(current, pump), pump)
+    replacements = instance.model.parts[1].replacements
+    force = interpreted(solenoid_force, replacements)(current, pump)
+    sine = interpreted(moment_sine, replacements)(force, pump)
     if not (margin := 1.0 - sine * sine) > 0.0:
         raise DomainError(f"{name}: {overpowered(margin, 'current')}")
 
@@ -302,7 +303,7 @@ def operating_point(
         )
     known = instance.start({"current": current}, 1.0 / SOURCE_RATE, "steady").arguments[1]
     equations: Any = instance.model.parts[1]
-    limits = called(equations.limits, known)
+    limits = called(equations, equations.limits, known)
     for limit, what in NO_GAIN.items():
         if getattr(limits, limit):
             raise DomainError(
@@ -373,7 +374,8 @@ def _matrices(
 
     # a pump that has stood for a sample
     standing = instance.start(at, step or 1.0 / SOURCE_RATE, "steady").arguments[1]
-    state = called(instance.model.parts[1].step, standing)
+    pump = instance.model.parts[1]
+    state = called(pump, pump.step, standing)
     if options.symmetric is not None and point.orifice_opening == 0.0:
         lower = CLOSED / p.Z1
         state = state._replace(
@@ -392,8 +394,8 @@ def _matrices(
         # the next sample knows the spool's place x and its deflection d as d e^(-h/T) - x w/x_s
         # alone, the deflection that would be left if it came back to where it was balanced
         spool, deflection = (states.index(f"pump.{each}") for each in ("spool", "deflection"))
-        width_of = interpreted(as_called(instance.model, friction_width))
-        left_of = interpreted(as_called(instance.model, dither_factor))
+        width_of = interpreted(friction_width, pump.replacements)
+        left_of = interpreted(dither_factor, pump.replacements)
         friction = width_of(p.spool_friction, p.Z4, p.Z5) / p.spool_presliding
         left = left_of(p.dither_time, step)
         for matrix in (A, C):

@@ -21,7 +21,6 @@ from swashplate.equations.marching.record import (
 )
 from swashplate.equations.marching.run import Instance, Start, Started, marched
 from swashplate.equations.marching.use import Stepper
-from swashplate.equations.replacement import as_called
 from swashplate.errors import DomainError, InputError, ParameterError
 from swashplate.maneuvers import Maneuver, sampled
 from swashplate.models.displacement_control import pressure_limits
@@ -153,7 +152,8 @@ def start_states(instance: Instance, pressure: float) -> dict[str, float]:
     """Numbers of the pump's state that a pressure at the start sets, by path. [Pa]"""
     if not np.isfinite(pressure):
         raise InputError(f"The pressure at the start must be a finite number, not {pressure}.")
-    limits = interpreted(as_called(instance.model, pressure_limits))(instance.parts[1].p)
+    limits_of = interpreted(pressure_limits, instance.model.parts[1].replacements)
+    limits = limits_of(instance.parts[1].p)
     if not limits.lower <= pressure <= limits.upper:
         raise DomainError(
             f"{instance.name}: the pressure at the start is {pressure:.6g} Pa, but the stops of "

@@ -23,7 +23,7 @@ from swashplate.equations.model import (
     mean_over_sample,
     previous,
 )
-from swashplate.equations.tracing import Trace
+from swashplate.equations.tracing import Trace, callee_of
 from swashplate.equations.values import Flag, Tuple, Value, fixed, leaves, rebuilt
 from swashplate.errors import InputError
 
@@ -87,7 +87,7 @@ class PartCode:
     ) -> None:
         self.model, self.part, self.own = model, part, model.parts[part]
         self.records, self.options = tuple(signals), options
-        self.trace = Trace() if trace is None else trace
+        self.trace = Trace(replacements=self.own.replacements) if trace is None else trace
         self.taken: set[str] = set() if taken is None else taken
         self.prefix = f"{self.own.name}_" if len(model.parts) > 1 else ""
         self.taken.add("h")
@@ -162,7 +162,7 @@ class PartCode:
 
     def link(self, equation: Equation, name: str, sources: Mapping[str, Value]) -> Node:
         """A signal that an equation makes of several."""
-        made = self.trace.call(equation, sources)
+        made = self.trace.run(callee_of(equation, self.model.replacements), sources)
         assert isinstance(made, Node)
         self.trace.label(made, name)
         return made

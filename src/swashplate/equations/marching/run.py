@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swashplate.equations.cache import generated, kernel
-from swashplate.equations.declaration import inlined, interpreted
+from swashplate.equations.declaration import Replacements, inlined, interpreted
 from swashplate.equations.fields import (
     check_mapping,
     floats_of,
@@ -198,7 +198,7 @@ class Instance:
             for name in part.input_types:
                 tap, link = part.tap(name), self.model.link_of(i, name)
                 if link is not None:
-                    known[name] = linked(link, states, found)
+                    known[name] = linked(link, states, found, self.model.replacements)
                     continue
                 if tap.signal in first:
                     value = (before if name in part.taps else first)[tap.signal]
@@ -211,7 +211,7 @@ class Instance:
             states.append(known["state"])
             if part.sample is not None:
                 try:
-                    known["signals"] = called(part.sample, known)
+                    known["signals"] = called(part, part.sample, known)
                 except NO_NUMBER:
                     # outside the domain; the march, which asks for its margin, says what is wrong
                     none = dict.fromkeys(floats_of(part.signals or tuple), math.nan)
@@ -222,7 +222,7 @@ class Instance:
     def _state(self, part: Model, known: Mapping[str, Any], start: Start) -> Any:
         equation = part.rest if start == "rest" else part.settled
         if equation is not None:
-            found = self._called(equation, known)
+            found = self._called(part, equation, known)
             if not isinstance(found, part.state):
                 raise InputError(
                     f"{self.name}: {plain(equation).__name__} must return a "
@@ -238,9 +238,9 @@ class Instance:
         empty = [path for path in floats_of(part.state) if path.split(".")[0] not in defaults]
         return made(part.state, dict.fromkeys(empty, 0.0))
 
-    def _called(self, equation: Callable[..., Any], known: Mapping[str, Any]) -> Any:
+    def _called(self, part: Model, equation: Callable[..., Any], known: Mapping[str, Any]) -> Any:
         try:
-            return called(equation, known)
+            return called(part, equation, known)
         except NO_NUMBER as error:
             raise DomainError(
                 f"{self.name}: {plain(equation).__name__} cannot be computed for these numbers "
@@ -248,12 +248,18 @@ class Instance:
             ) from None
 
 
-def called(equation: Callable[..., Any], known: Mapping[str, Any]) -> Any:
-    """What an equation gives for what is known by the names of its arguments."""
-    return interpreted(equation)(*(known[name] for name in arguments_of(equation)))
+def called(part: Model, equation: Callable[..., Any], known: Mapping[str, Any]) -> Any:
+    """What an equation of a part gives for what is known by the names of its arguments."""
+    arguments = (known[name] for name in arguments_of(equation))
+    return interpreted(equation, part.replacements)(*arguments)
 
 
-def linked(link: Link, states: Sequence[Any], found: Sequence[Mapping[str, Any]]) -> float:
+def linked(
+    link: Link,
+    states: Sequence[Any],
+    found: Sequence[Mapping[str, Any]],
+    replacements: Replacements,
+) -> float:
     """A signal between parts, from the states and signals of those before."""
     values = []
     for source in link.sources:
@@ -262,7 +268,7 @@ def linked(link: Link, states: Sequence[Any], found: Sequence[Mapping[str, Any]]
         values.append(value_at(signals if inside else states[source.part], source.signal))
     if link.equation is None:
         return float(values[0])
-    return float(interpreted(link.equation)(*values))
+    return float(interpreted(link.equation, replacements)(*values))
 
 
 def instance_of(model: Model, p: Any, *, options: Any = None, given: Any = None) -> Instance:

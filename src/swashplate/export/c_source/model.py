@@ -19,7 +19,7 @@ from swashplate.equations import graph
 from swashplate.equations.fields import Definition, declared_by, floats_of, value_at
 from swashplate.equations.functions import GENERATING, Function
 from swashplate.equations.graph import Node, names_in
-from swashplate.equations.language import parsed, plain
+from swashplate.equations.language import plain
 from swashplate.equations.marching.march import Sampler, output_of
 from swashplate.equations.marching.part import TapOf, taps_of
 from swashplate.equations.marching.run import Instance, module
@@ -262,7 +262,7 @@ class Writer:
             return self.place(link.sources[0], "before")
         name = c_name(link.name)
         if name not in self.links:
-            trace = Trace()
+            trace = Trace(replacements=self.model.replacements)
             sources = {each.signal: graph.name(self.place(each, "before")) for each in link.sources}
             value = trace.call(link.equation, sources)
             assert isinstance(value, Node)
@@ -272,7 +272,7 @@ class Writer:
             block = Block([value], labels, taken, language=language)
             function_name = self.loops.fresh(name)
             lines = [*language.headed(block.lines), f"return {block.texts[0]};"]
-            says = first_line(parsed(link.equation))
+            says = first_line(trace.callee(link.equation).source)
             head = f"static double {function_name}(const {self.e.type} *m)"
             self.links[name] = function(says, head, lines)
             self._link_names[name] = function_name

@@ -6,7 +6,7 @@ all that is known at it and the next state, the start, and what options follow f
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, get_type_hints
 
@@ -69,8 +69,8 @@ class PartInC:
                 each: flag.value for each, flag in zip(kind._fields, flags, strict=True)
             }
             self._symbols = kind(*flags)
-        self._trace(Trace())
-        self._trace(Trace(formulas(self.part.trace)))
+        self._trace(self.trace())
+        self._trace(self.trace(apart=formulas(self.part.trace)))
         own = {*OWN}
         self.windows = [
             fresh_name(c_name(tap.input if tap.tap.width else f"{tap.input}_window"), own)
@@ -89,6 +89,10 @@ class PartInC:
         self.constants = self._constants(ends)
 
     # -- the graph ---------------------------------------------------------------------------------
+
+    def trace(self, apart: Collection[Parsed] = ()) -> Trace:
+        """What runs the part's equations on symbols."""
+        return Trace(apart, self.own.replacements)
 
     def _trace(self, trace: Trace) -> None:
         """Run the equations of a sample on symbols."""
@@ -290,7 +294,7 @@ class PartInC:
         pointer = f"struct {tag} *next = &m->now.{self.member};"
         if equation is not None:
             places, named = self.inputs(start=True)
-            trace = Trace()
+            trace = self.trace()
             value = self.traced(equation, trace)
             results = {"next": [*leaves(value)]}
             known = {**self.places(), **places}
@@ -322,7 +326,7 @@ class PartInC:
 
     def decided(self, name: str, equation: Equation) -> str:
         """A function that returns what an equation of parameters, options and step says."""
-        trace = Trace()
+        trace = self.trace()
         value = self.traced(equation, trace)
         assert isinstance(value, Node)
         known = {k: v for k, v in self.places().items() if k not in self.constants}
