@@ -151,6 +151,27 @@ def test_a_declared_derivative_that_is_edited_counts(warm: Path) -> None:
     assert slope != right[1]
 
 
+STANDS_IN = """
+
+@equation
+def other(x: float) -> float:
+    return 3.0 * x
+
+
+rod = replaced(rod, deeper, other)
+"""
+
+
+def test_an_equation_that_stands_for_another_counts(warm: Path) -> None:
+    imported = MACHINE.replace("declared, equation", "declared, equation, replaced")
+    end, slope, count = run(warm, imported + STANDS_IN)
+    assert (end, slope) == pytest.approx(expected(3.0), rel=1e-14)
+    assert count > 0
+    end, slope, count = run(warm, imported + STANDS_IN.replace("3.0", "4.0"))
+    assert (end, slope) == pytest.approx(expected(4.0), rel=1e-14)
+    assert count > 0
+
+
 def test_a_damaged_file_is_made_again(warm: Path) -> None:
     files = [*(warm / "cache").rglob("*.kept")]
     assert files
