@@ -4,6 +4,7 @@ import math
 from math import acos, asin, atan2, cos, exp, floor, hypot, log, sin, sqrt, tan, tanh
 from typing import Any, NamedTuple
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -516,6 +517,84 @@ def test_a_value_of_sides_that_are_not_taken_does_no_harm(
     function: Any, x: float, slope: float
 ) -> None:
     assert derive(function, "x").compiled(x)[1] == pytest.approx(slope, rel=1e-14)
+
+
+@equation
+def guarded_divisor(x: float) -> float:
+    s = sqrt(x)
+    return s + (1.0 / s if s > 0.0 else 0.0)
+
+
+@equation
+def link_of_a_chain(x: float) -> tuple[float, float]:
+    first = 1.0 / x
+    return first, first if x > 0.0 else 0.0
+
+
+@pytest.mark.skipif(JIT_OFF, reason="plain Python refuses 1/0 where the equation asks for it")
+def test_a_guard_holds_for_what_is_divided_by_and_along_a_chain() -> None:
+    derived = derive(guarded_divisor, "x").compiled
+    assert derived(0.0) == (0.0, 0.0)
+    assert derived(4.0) == (2.5, 0.25 - 1.0 / 16.0)
+    chain = derive(link_of_a_chain, "x")
+    slopes = dict(zip(chain.entries, chain.compiled(0.0)[2:], strict=True))
+    assert slopes[1, 0] == 0.0
+    assert chain.compiled(2.0)[2:] == (-0.25, -0.25)
+
+
+@equation
+def smoothed(x: float, smooth: bool | None) -> float:
+    return abs(x)
+
+
+@declared(smoothed)
+def _smoothed(x: float, smooth: bool | None) -> float:
+    if smooth is None:
+        return 1.0 if x >= 0.0 else -1.0
+    return 2.0 * x
+
+
+@equation
+def both_ways(x: float) -> float:
+    return smoothed(x, OFF) + 10.0 * smoothed(x, ON)
+
+
+def test_a_rule_is_that_of_its_options() -> None:
+    assert derive(both_ways, "x").python(0.5) == (5.5, 1.0 + 10.0)
+
+
+@equation
+def off_by(x: float, a: float) -> float:
+    return x - a
+
+
+@equation
+def between(low: float, high: float, a: float) -> float:
+    return root(off_by, low, high, a)
+
+
+@pytest.mark.parametrize("ends", [(0.0, 1.0), (1.0, 0.0)])
+def test_a_bracket_may_fall(ends: tuple[float, float]) -> None:
+    derived = derive(between, ("low", "high", "a"))
+    assert derived.inputs == ("low", "high", "a")
+    value, *slopes = derived.python(*ends, 0.25)
+    assert value == pytest.approx(0.25, rel=1e-15)
+    assert slopes == [0.0, 0.0, 1.0]
+    value, *slopes = derived.python(*ends, 3.0)  # beyond: the nearer end
+    assert value == 1.0
+    assert slopes == [float(ends[0] == 1.0), float(ends[1] == 1.0), 0.0]
+
+
+FROM_NUMPY = np.float64(0.5)
+
+
+@equation
+def halved(x: float) -> float:
+    return FROM_NUMPY * x
+
+
+def test_a_constant_may_be_numpys() -> None:
+    assert derive(halved, "x").python(3.0) == (1.5, 0.5)
 
 
 # --- what comes together --------------------------------------------------------------------------

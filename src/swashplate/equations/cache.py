@@ -294,7 +294,7 @@ def generated(name: str, text: str, names: Mapping[str, Any]) -> dict[str, Any]:
     return module.__dict__
 
 
-def is_recent(path: Path) -> None:
+def mark_used(path: Path) -> None:
     """Note that a file is still in use."""
     if time() - path.stat().st_mtime > DAY:
         path.touch()
@@ -304,7 +304,7 @@ def _written(path: Path, text: str) -> Path | None:
     """The file of a generated module, None if it cannot be written."""
     try:
         if path.exists() and path.read_text("utf-8") == text:
-            is_recent(path)
+            mark_used(path)
             return path
     except (OSError, UnicodeDecodeError):  # something else of that name
         return None

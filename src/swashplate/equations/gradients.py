@@ -7,20 +7,20 @@ Conventions where a derivative does not exist:
 - Of `min` and `max` at a tie the last argument counts; `abs` at zero counts as rising.
 - A conditional expression has the derivative of the side that is taken; decisions and `floor`
   have none.
-- Where `sqrt`, `asin`, `acos`, `hypot` or `atan2` have an infinite slope or none, it counts as 0.
+- If `sqrt`, `asin`, `acos`, `hypot` or `atan2` has an infinite slope or none, it counts as 0.
 """
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import NamedTuple
 
 from swashplate.equations import graph
-from swashplate.equations.functions import Function
+from swashplate.equations.functions import FUNCTIONS, Function
 from swashplate.equations.graph import (
-    CALLED,
     FALSE,
     ONE,
     TRUE,
@@ -80,7 +80,7 @@ def derived_function(
         name, says, formals, [*found.values, *found.partials.values()], hints, flat=True
     )
     for each in formals:
-        if each in CALLED and f"{each}(" in text:
+        if each in FUNCTIONS and re.search(rf"\b{each}\(", text):
             raise EquationError(
                 f"An argument is called {each}, and so is the function that its derivatives need: "
                 "give the argument another name."
@@ -137,8 +137,11 @@ class Gradients:
     ) -> None:
         self._by = dict.fromkeys(by)
         self._order = ordered(results, operands=graph.reached)
-        self._moves = self._moving()
-        self._divisors = {node.args[1] for node in self._order if node.op == "/"}
+        self._active = self._active_nodes()
+        self._divisors = {
+            node.args[1] for node in ordered(results, operands=_always) if node.op == "/"
+        }
+        """What the results divide by, whatever tests say: a second division does no more harm."""
         self._calls: dict[Node, tuple[Node, dict[tuple[int, int], Node]]] = {}
         """Calls that move something: with derivatives, and these by indices of result and argument.
         """
@@ -183,7 +186,7 @@ class Gradients:
 
     # -- what moves --------------------------------------------------------------------------------
 
-    def _moving(self) -> set[Node]:
+    def _active_nodes(self) -> set[Node]:
         """Nodes that follow, continuously, what is differentiated by."""
         moves = set(self._by)
         for node in self._order:
@@ -200,7 +203,7 @@ class Gradients:
         bars: dict[Node, list[Contribution]] = {result: [Contribution(TRUE, ONE, False)]}
         found: dict[Node, Node] = {}
         for node in reversed(self._order):
-            if node not in bars or node not in self._moves:
+            if node not in bars or node not in self._active:
                 continue
             total = _total(bars.pop(node))
             found[node] = total.zero_elsewhere
@@ -209,11 +212,11 @@ class Gradients:
             if node in self._links:
                 for below, slope in self._links[node].items():
                     if below in self._by:
-                        bar = Contribution(TRUE, times(found[node], slope), False)
+                        bar = Contribution(total.test, times(total.amount, slope), False)
                         bars.setdefault(below, []).append(bar)
                 continue
             for argument, push in self._pushed(node):
-                if argument in self._moves:
+                if argument in self._active:
                     bar = push(total)
                     if bar.amount is not ZERO:
                         bars.setdefault(argument, []).append(bar)
@@ -223,8 +226,8 @@ class Gradients:
         """Operands of a node, each with what an adjoint becomes on the way to it."""
         if node.op in ("min", "max", "if"):
             test, one, two = node.args if node.op == "if" else _sides(node)
-            yield one, lambda bar: _taken(bar, test)
-            yield two, lambda bar: _taken(bar, _opposite(test))
+            yield one, lambda bar: _restricted(bar, test)
+            yield two, lambda bar: _restricted(bar, _opposite(test))
             return
         for argument, slope in self._slopes(node):
             yield argument, partial(self._multiplied, slope)
@@ -232,10 +235,10 @@ class Gradients:
     def _multiplied(self, slope: Callable[[Node], Node], bar: Contribution) -> Contribution:
         """A contribution times a derivative, which need not be finite where it does not count."""
         amount = slope(bar.amount)
-        light = bar.masked and self._is_tame(slope(ONE))
+        light = bar.masked and self._stays_finite(slope(ONE))
         return Contribution(bar.test, amount, light)
 
-    def _is_tame(self, node: Node) -> bool:
+    def _stays_finite(self, node: Node) -> bool:
         """Whether a node is finite wherever the names in it are moderate."""
         for each in ordered([node], self._tame):
             tame = each.op in TAME and all(self._tame[a] for a in each.args)
@@ -281,8 +284,8 @@ class Gradients:
             by = self._over(node)
             yield args[0], lambda w: times(w, times(args[0], by))
             yield args[1], lambda w: times(w, times(args[1], by))
-        elif op in FUNCTIONS:
-            slope = FUNCTIONS[op](args[0], node, self._over)
+        elif op in ELEMENTARY:
+            slope = ELEMENTARY[op](args[0], node, self._over)
             yield args[0], lambda w: times(w, slope)
 
     def _over(self, node: Node) -> Node:
@@ -292,7 +295,7 @@ class Gradients:
     def _derivatives_of(self, call: Node) -> dict[tuple[int, int], Node]:
         """Derivatives of a call's results by its arguments that move, by their indices."""
         if call not in self._calls:
-            by = tuple(k for k, node in enumerate(call.args) if node in self._moves)
+            by = tuple(k for k, node in enumerate(call.args) if node in self._active)
             own: Call = call.value
             if not by or own.derivative is None:
                 return {}
@@ -322,13 +325,18 @@ def _followed(node: Node) -> Sequence[Node]:
     return node.args[1:] if node.op == "if" else node.args
 
 
+def _always(node: Node) -> Sequence[Node]:
+    """Operands that are computed whenever a node is: of a choice the test alone."""
+    return node.args[:1] if node.op == "if" else node.args
+
+
 def _sides(node: Node) -> tuple[Node, Node, Node]:
     """`min` or `max` as a choice: at a tie the last operand counts."""
     one, two = node.args
     return make("<" if node.op == "min" else ">", one, two), one, two
 
 
-def _taken(bar: Contribution, test: Node) -> Contribution:
+def _restricted(bar: Contribution, test: Node) -> Contribution:
     """A contribution that only counts on one side of a choice."""
     return Contribution(graph.both(bar.test, test), bar.amount, False)
 
@@ -384,7 +392,7 @@ def _arc(a: Node, over: Callable[[Node], Node]) -> Node:
     return over(make("sqrt", minus(ONE, make("*", a, a))))
 
 
-FUNCTIONS: dict[str, Callable[[Node, Node, Callable[[Node], Node]], Node]] = {
+ELEMENTARY: dict[str, Callable[[Node, Node, Callable[[Node], Node]], Node]] = {
     "sqrt": lambda a, value, over: times(graph.number(0.5), over(value)),
     "exp": lambda a, value, over: value,
     "log": lambda a, value, over: graph.inverse(a),

@@ -25,7 +25,7 @@ CALLED = (
 )
 """Operations that are functions of `math`."""
 CHEAP = {*LEAVES, *COMPARISONS, "not", "+", "-", "*", "neg", "min", "max", "abs", "if", "ruled"}
-"""Operations that can be done for nothing on any numbers: no error, no call of a library."""
+"""Operations that cost next to nothing on any numbers: no error, no call of a library."""
 
 
 class Node:
@@ -123,7 +123,8 @@ def make(op: str, *args: Node, value: Any = None, kind: str | None = None) -> No
 def number(value: float) -> Node:
     """A literal number."""
     kind = {bool: "bool", int: "int"}.get(type(value), "float")
-    return make("number", value=value, kind=kind)
+    # what NumPy has made of a number is written otherwise
+    return make("number", value=float(value) if kind == "float" else value, kind=kind)
 
 
 def name(text: str, kind: str = "float") -> Node:
@@ -316,5 +317,5 @@ def inverse(a: Node) -> Node:
 
 
 def finite_inverse(a: Node) -> Node:
-    """1/a for a ≥ 0, and 0 in place of infinity."""
+    """1/a for a > 0, and 0 for a = 0."""
     return inverse(choose(make(">", a, ZERO), a, number(inf)))

@@ -14,7 +14,7 @@ from hashlib import blake2b
 from pathlib import Path
 from typing import Any, TypeVar, get_type_hints
 
-from swashplate.equations.cache import generated_folder, is_recent, written
+from swashplate.equations.cache import generated_folder, mark_used, written
 from swashplate.equations.declaration import (
     RULES,
     Replacements,
@@ -75,7 +75,7 @@ def _read(path: Path | None) -> tuple[Any, ...] | None:
         content = path.read_bytes()
         if _hash(content[SIZE:]) != content[:SIZE]:
             return None
-        is_recent(path)
+        mark_used(path)
         found: tuple[Any, ...] = pickle.loads(content[SIZE:])
     except Exception:  # no file, or whatever unpickling garbage may raise
         return None
@@ -126,17 +126,22 @@ def key_of(model: Model) -> str:
             sorted(part.defaults.items()),
         )
         digest.update(f"{said!r}\0".encode())
-        named = (part.step, part.sample, part.rest, part.settled, part.limits, part.domain)
-        digest.update(f"{[each is not None for each in named]}\0".encode())
-        equations += [each for each in named if each is not None]
+        roles = (part.step, part.sample, part.rest, part.settled, part.limits, part.domain)
+        digest.update(f"{[_hash_of(each) for each in roles]}\0".encode())
+        equations += [each for each in roles if each is not None]
         digest.update(f"{_replacement_hashes(part.replacements)!r}\0".encode())
         equations += _new_equations(part.replacements)
-    links = [(name, link.sources) for name, link in model.links.items()]
+    links = [(name, link.sources, _hash_of(link.equation)) for name, link in model.links.items()]
     digest.update(f"{model.name} {links!r} {sorted(model.integrals.items())!r}\0".encode())
     digest.update(f"{_replacement_hashes(model.replacements)!r}\0".encode())
     equations += _new_equations(model.replacements)
     digest.update(fingerprint(equations).encode())
     return digest.hexdigest()
+
+
+def _hash_of(equation: Any) -> str:
+    """Hash of an equation, empty without one."""
+    return "" if equation is None else closure_hash(equation)
 
 
 def _replacement_hashes(replacements: Replacements) -> list[tuple[str, list[str]]]:
@@ -155,5 +160,8 @@ def _new_equations(replacements: Replacements) -> list[Any]:
 def _shape(kind: Any) -> tuple[Any, ...]:
     """What of a class of named tuples decides what is generated."""
     hints = get_type_hints(kind)
-    inner = [(n, _shape(hints[n]) if is_named_tuple(hints.get(n)) else "") for n in kind._fields]
+    inner = [
+        (name, _shape(hints[name]) if is_named_tuple(hints[name]) else str(hints[name]))
+        for name in kind._fields
+    ]
     return kind.__qualname__, inner, sorted(kind._field_defaults.items())

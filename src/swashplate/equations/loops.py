@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from swashplate.equations import graph
 from swashplate.equations.declaration import inlined
-from swashplate.equations.functions import FUNCTIONS, Function, fresh_name
+from swashplate.equations.functions import FUNCTIONS, RESERVED, Function, fresh_name
 from swashplate.equations.gradients import Derived, derived_function, listing, partials_of
 from swashplate.equations.graph import ONE, ZERO, Call, Node, Rule, choose, make, names_in
 from swashplate.equations.language import Parsed
@@ -48,15 +48,15 @@ def root(residual: Callable[..., float], low: float, high: float, *arguments: An
     Returns
     -------
     float
-        The root, to the last bits. Where the residual has one sign in all of the bracket, the end
-        at which it is smaller.
+        The root, to the last bits. If the residual has the same sign at both ends, the end at which
+        its magnitude is smaller.
 
     Notes
     -----
     Inverse quadratic interpolation where it is safe, bisection elsewhere (Chandrupatla 1997). By
     the implicit function theorem the derivatives are those of the residual by its arguments over
     that by the unknown, with the other sign; at an end of the bracket they are those of the end,
-    and where the residual is flat they count as zero.
+    and if the residual is flat they count as zero.
     """
     x_1, x_2 = high, low
     f_1, f_2 = residual(high, *arguments), residual(low, *arguments)
@@ -195,7 +195,7 @@ def _inner(outer: Trace, callee: Callee, leading: Sequence[Value], rest: Sequenc
     """An equation whose `leading` arguments the loop gives, the others as where it is called."""
     source = callee.source
     trace = outer.inner(source)
-    taken = set[str]()
+    taken = {*FUNCTIONS, *RESERVED}
     names = [each.arg for each in source.arguments]
     given, stands_for = dict[str, Value](), dict[Node, Node]()
 
@@ -279,12 +279,14 @@ def solved(trace: Trace, callee: Callee, low: Value, high: Value, rest: Sequence
         partials = partials_of([value], [x, *moving])
         if (0, 0) not in partials:
             residual.refuse(None, f"no derivative by {names[0]}", "use the unknown in it")
-        inside = graph.both(make("<", low, x), make("<", x, high))
+        lowest, highest = make("min", low, high), make("max", low, high)
+        inside = graph.both(make("<", lowest, x), make("<", x, highest))
+        at_low = make("==", x, low)
         divisible = graph.both(inside, make("!=", partials[0, 0], ZERO))
         inverse = make("/", ONE, choose(divisible, partials[0, 0], graph.number(inf)))
         found = [
-            choose(make("<=", x, low), ONE, ZERO),
-            choose(make(">=", x, high), ONE, ZERO),
+            choose(inside, ZERO, choose(at_low, ONE, ZERO)),
+            choose(inside, ZERO, choose(at_low, ZERO, ONE)),
         ]
         for i in range(1, len(moving) + 1):
             slope = ZERO

@@ -1,4 +1,4 @@
-"""Where each node of a graph is computed: once, and never in vain.
+"""Where each node of a graph is computed: as seldom as the branches allow.
 
 A choice between two values becomes a branch, in which what only one side needs is computed, unless
 it costs less to compute both. Choices of one test that do not wait for each other share a branch.

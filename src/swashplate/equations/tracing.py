@@ -189,7 +189,8 @@ class Trace:
                 )
             return tuple(partials)
 
-        key = (source.function, *by.values(), *(node for _, node in results))
+        decided = tuple((name, _options_in(value)) for name, value in known.items())
+        key = (source.function, decided, *by.values(), *(node for _, node in results))
         whole = self._rules.setdefault(key, Rule(tuple(by.values()), slopes))
         nodes = []
         for k, (path, node) in enumerate(results):
@@ -205,6 +206,15 @@ def _is_changed(callee: Callee) -> bool:
     if not replaced:
         return False
     return any(plain(each) in replaced for each in closure(callee.source.function).values())
+
+
+def _options_in(value: Value) -> tuple[Any, ...]:
+    """What of a value a rule may decide by besides floats: options, and whole numbers."""
+    if isinstance(value, Tuple):
+        return tuple(map(_options_in, value.items))
+    if isinstance(value, Flag):
+        return (value.value,)
+    return () if value.kind == "float" else (value,)
 
 
 def _part_of(rule: Rule, index: int) -> Rule:

@@ -16,7 +16,7 @@ from swashplate.errors import EquationError
 
 @dataclass(frozen=True)
 class Flag:
-    """An option: None (off), True (on), or "unknown"."""
+    """An option: None (off), True (on), "unknown", or the node that decides it at run time."""
 
     value: Any
     text: str = ""

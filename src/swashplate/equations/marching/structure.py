@@ -47,6 +47,7 @@ class Term(NamedTuple):
 
     def times(self, other: Term) -> Term:
         """The product of both."""
+        assert self.slot is None or other.slot is None
         return Term(self.rows + other.rows, self.scale * other.scale, self.slot or other.slot)
 
 
@@ -66,7 +67,7 @@ class PartStructure(NamedTuple):
     rows: range  # Places of these.
     groups: list[Group]
     needed: list[Stored]  # Signals that other parts or links need.
-    behind: dict[Stored, Stored]  # Signals that are a state behind the sample.
+    behind: dict[Stored, Stored]  # Signals that equal a state at the next sample.
 
 
 class Starting(NamedTuple):
@@ -112,7 +113,7 @@ class Structure:
         return [output_of(self.model, each) for each in self.outputs]
 
     def starting(self, start: str) -> Starting:
-        """Constants and states where a record begins at rest or settled; call it `generating`."""
+        """Constants and states where a record begins at rest or settled; within `generating`."""
         if start not in self._starting:
             model, asked = self.model, (self.signals, self.options, self.outputs)
             self._starting[start] = kept(
@@ -214,8 +215,10 @@ class _Structuring:
             if each.kind == "signals":
                 node = part.signal(each.path)
                 same = [state for state in states.values() if results[state] is node]
-                behind |= {each: same[0]} if same else {}
-                results |= {} if same else {each: node}
+                if same:
+                    behind[each] = same[0]
+                else:
+                    results[each] = node
                 self._keep(each)
         for path, state in states.items():
             self._keep(state, here[path].value)
@@ -227,7 +230,7 @@ class _Structuring:
                 self._keep(number, name)
         filled, rows = self._fill(part, results)
         flows = {
-            state: {by for by in self.partials[state] if by in states.values()}
+            state: [by for by in self.partials[state] if by in states.values()]
             for state in states.values()
         }
         groups = []
@@ -246,7 +249,7 @@ class _Structuring:
         by: dict[Node, Stored] = {
             graph.name(name): Stored(i, "p", path) for name, path in part.parameters.items()
         }
-        ahead, known = self.sampler.ahead(part, ends)
+        _, known = self.sampler.ahead(part, ends)
         self._constants[i] = {node: known[node] for node in part.ahead(ends)}
         by |= {node: Stored(i, "k", name) for node, name in self._constants[i].items()}
         by |= {node: Stored(i, "state", path) for path, node in leaves(part.state)}
@@ -399,7 +402,7 @@ def _sum(terms: Sequence[str]) -> str:
     return terms[0] if not half else f"({_sum(terms[:half])} + {_sum(terms[half:])})"
 
 
-def _strongly_connected(flows: Mapping[Stored, set[Stored]]) -> Iterable[tuple[Stored, ...]]:
+def _strongly_connected(flows: Mapping[Stored, list[Stored]]) -> Iterable[tuple[Stored, ...]]:
     """States in groups that wait for each other, each group behind those that it needs."""
     reach = {each: {each} for each in flows}
     for _ in flows:  # no way is longer
@@ -411,5 +414,6 @@ def _strongly_connected(flows: Mapping[Stored, set[Stored]]) -> Iterable[tuple[S
     }
     order: TopologicalSorter[tuple[Stored, ...]] = TopologicalSorter()
     for each in flows:
-        order.add(group[each], *({group[i] for i in flows[each]} - {group[each]}))
+        others = dict.fromkeys(group[i] for i in flows[each])
+        order.add(group[each], *(other for other in others if other != group[each]))
     return order.static_order()
