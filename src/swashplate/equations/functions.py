@@ -20,7 +20,7 @@ P = ParamSpec("P")
 R = TypeVar("R")
 
 GENERATING = RLock()
-"""Held by the one thread that reads equations or writes code, which compares by identity."""
+"""Held while equations are read or code is written: nodes are compared by identity."""
 
 
 def _choose(test: bool, one: Any, two: Any) -> Any:

@@ -117,10 +117,10 @@ class Contribution(NamedTuple):
 
 
 class Gradients:
-    """Results with their derivatives by some nodes, what lies below these being left alone.
+    """Derivatives of results with respect to some nodes, whose own operands count as given.
 
-    `chained` is shorter where the results are links of one chain: one that others follow is swept
-    once, their adjoints end at it, and go on with its derivatives.
+    By adjoints, backwards. With `chained`, if one result depends on another, the sweep ends at that
+    one and goes on with its derivatives.
 
     Attributes
     ----------
@@ -136,7 +136,7 @@ class Gradients:
         self, results: Sequence[Node], by: Sequence[Node], *, chained: bool = False
     ) -> None:
         self._by = dict.fromkeys(by)
-        self._order = ordered(results, operands=graph.reached)
+        self._order = ordered(results, operands=graph.dependencies)
         self._active = self._active_nodes()
         self._divisors = {
             node.args[1] for node in ordered(results, operands=_always) if node.op == "/"
@@ -176,12 +176,12 @@ class Gradients:
             label = "" if len(outputs) == 1 else f"{word(outputs[o])}_"
             if node not in spoken:
                 found.setdefault(node, f"d_{label}{word(inputs[i])}")
-        for o, bars in enumerate(self.adjoints):
+        for o, pending in enumerate(self.adjoints):
             label = "" if len(outputs) == 1 else f"{word(outputs[o])}_"
-            for node, bar in bars.items():
+            for node, contribution in pending.items():
                 name = labels.get(graph.plain_value(node))
-                if name and bar not in spoken:
-                    found.setdefault(bar, f"d_{label}{name}")
+                if name and contribution not in spoken:
+                    found.setdefault(contribution, f"d_{label}{name}")
         return found
 
     # -- what moves --------------------------------------------------------------------------------
@@ -200,43 +200,45 @@ class Gradients:
         """Derivatives of a result by all that it follows."""
         if result in self._links:
             return self._links[result]
-        bars: dict[Node, list[Contribution]] = {result: [Contribution(TRUE, ONE, False)]}
+        pending: dict[Node, list[Contribution]] = {result: [Contribution(TRUE, ONE, False)]}
         found: dict[Node, Node] = {}
         for node in reversed(self._order):
-            if node not in bars or node not in self._active:
+            if node not in pending or node not in self._active:
                 continue
-            total = _total(bars.pop(node))
+            total = _total(pending.pop(node))
             found[node] = total.zero_elsewhere
             if found[node] is ZERO or node in self._by:
                 continue
             if node in self._links:
                 for below, slope in self._links[node].items():
                     if below in self._by:
-                        bar = Contribution(total.test, times(total.amount, slope), False)
-                        bars.setdefault(below, []).append(bar)
+                        contribution = Contribution(total.test, times(total.amount, slope), False)
+                        pending.setdefault(below, []).append(contribution)
                 continue
             for argument, push in self._pushed(node):
                 if argument in self._active:
-                    bar = push(total)
-                    if bar.amount is not ZERO:
-                        bars.setdefault(argument, []).append(bar)
+                    contribution = push(total)
+                    if contribution.amount is not ZERO:
+                        pending.setdefault(argument, []).append(contribution)
         return found
 
     def _pushed(self, node: Node) -> Iterator[tuple[Node, Callable[[Contribution], Contribution]]]:
         """Operands of a node, each with what an adjoint becomes on the way to it."""
         if node.op in ("min", "max", "if"):
             test, one, two = node.args if node.op == "if" else _sides(node)
-            yield one, lambda bar: _restricted(bar, test)
-            yield two, lambda bar: _restricted(bar, _opposite(test))
+            yield one, lambda contribution: _restricted(contribution, test)
+            yield two, lambda contribution: _restricted(contribution, _opposite(test))
             return
         for argument, slope in self._slopes(node):
             yield argument, partial(self._multiplied, slope)
 
-    def _multiplied(self, slope: Callable[[Node], Node], bar: Contribution) -> Contribution:
+    def _multiplied(
+        self, slope: Callable[[Node], Node], contribution: Contribution
+    ) -> Contribution:
         """A contribution times a derivative, which need not be finite where it does not count."""
-        amount = slope(bar.amount)
-        light = bar.masked and self._stays_finite(slope(ONE))
-        return Contribution(bar.test, amount, light)
+        amount = slope(contribution.amount)
+        light = contribution.masked and self._stays_finite(slope(ONE))
+        return Contribution(contribution.test, amount, light)
 
     def _stays_finite(self, node: Node) -> bool:
         """Whether a node is finite wherever the names in it are moderate."""
@@ -336,21 +338,21 @@ def _sides(node: Node) -> tuple[Node, Node, Node]:
     return make("<" if node.op == "min" else ">", one, two), one, two
 
 
-def _restricted(bar: Contribution, test: Node) -> Contribution:
+def _restricted(contribution: Contribution, test: Node) -> Contribution:
     """A contribution that only counts on one side of a choice."""
-    return Contribution(graph.both(bar.test, test), bar.amount, False)
+    return Contribution(graph.both(contribution.test, test), contribution.amount, False)
 
 
-def _total(bars: Sequence[Contribution]) -> Contribution:
+def _total(pending: Sequence[Contribution]) -> Contribution:
     """All contributions to an adjoint as one."""
-    total = bars[0]
-    for bar in bars[1:]:
-        if bar.test is total.test:
-            amount = graph.plus(total.amount, bar.amount)
-            total = Contribution(bar.test, amount, total.masked and bar.masked)
+    total = pending[0]
+    for contribution in pending[1:]:
+        if contribution.test is total.test:
+            amount = graph.plus(total.amount, contribution.amount)
+            total = Contribution(contribution.test, amount, total.masked and contribution.masked)
         else:
-            amount = graph.plus(total.zero_elsewhere, bar.zero_elsewhere)
-            total = Contribution(_union(total.test, bar.test), amount, True)
+            amount = graph.plus(total.zero_elsewhere, contribution.zero_elsewhere)
+            total = Contribution(_union(total.test, contribution.test), amount, True)
     return total
 
 

@@ -19,7 +19,7 @@ from typing import Any
 
 COMPARISONS = ("<", "<=", ">", ">=", "==", "!=")
 LEAVES = ("number", "name")
-CALLED = (
+MATH_FUNCTIONS = (
     *("sqrt", "exp", "log", "sin", "cos", "tan", "asin", "acos", "atan", "tanh"),
     *("atan2", "hypot", "floor"),
 )
@@ -104,7 +104,7 @@ def _kind(op: str, args: tuple[Node, ...]) -> str:
     if op in ("call", "result"):
         return "float"
     kinds = {a.kind for a in (args[1:] if op == "if" else args)}
-    if op == "floor" or (kinds == {"int"} and op not in ("/", *CALLED)):
+    if op == "floor" or (kinds == {"int"} and op not in ("/", *MATH_FUNCTIONS)):
         return "int"
     return "bool" if op == "if" and kinds == {"bool"} else "float"
 
@@ -144,7 +144,7 @@ def is_number(node: Node, value: float | None = None) -> bool:
 # --- walks ----------------------------------------------------------------------------------------
 
 
-def computed_from(node: Node) -> Sequence[Node]:
+def operands_of(node: Node) -> Sequence[Node]:
     """Operands of a node."""
     return node.args
 
@@ -152,7 +152,7 @@ def computed_from(node: Node) -> Sequence[Node]:
 def ordered(
     ends: Iterable[Node],
     known: Collection[Node] = (),
-    operands: Callable[[Node], Sequence[Node]] = computed_from,
+    operands: Callable[[Node], Sequence[Node]] = operands_of,
 ) -> list[Node]:
     """Nodes that some ends are computed from, each after its operands; none below `known` ones."""
     done, order = set(known), list[Node]()
@@ -177,7 +177,7 @@ def names_in(ends: Iterable[Node], known: Collection[Node] = ()) -> set[str]:
     return {node.value for node in ordered(ends, known) if node.op == "name"}
 
 
-def reached(node: Node) -> Sequence[Node]:
+def dependencies(node: Node) -> Sequence[Node]:
     """Operands of a node, and what else its declared derivatives are by."""
     return (*node.args, *node.value.arguments) if node.op == "ruled" else node.args
 
@@ -186,7 +186,7 @@ def rewritten(ends: Iterable[Node], by: Mapping[Node, Node]) -> list[Node]:
     """The ends with other nodes in place of some."""
     ends = [*ends]
     made = dict(by)
-    for node in ordered(ends, by, reached):
+    for node in ordered(ends, by, dependencies):
         args, value = tuple(made[a] for a in node.args), node.value
         again = args == node.args
         if node.op == "ruled":

@@ -19,10 +19,10 @@ from types import FunctionType, SimpleNamespace
 from typing import Any, NoReturn
 from weakref import WeakKeyDictionary
 
-from swashplate.equations.graph import CALLED
+from swashplate.equations.graph import MATH_FUNCTIONS
 from swashplate.errors import EquationError
 
-MATH: dict[Any, str] = {getattr(math, name): name for name in CALLED}
+MATH: dict[Any, str] = {getattr(math, name): name for name in MATH_FUNCTIONS}
 """Functions of `math` that an equation may call."""
 CHOICES: dict[Any, str] = {min: "min", max: "max", abs: "abs"}
 ARITHMETIC = {ast.Add: "+", ast.Sub: "-", ast.Mult: "*", ast.Div: "/", ast.Pow: "**"}

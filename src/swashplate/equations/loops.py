@@ -314,13 +314,13 @@ def repetition(
         instead = "let it take and return the same named tuple of floats, or a float"
         trace.under_way[-1].source.refuse(None, what, instead)
     *now, number = inner.leading
-    times = fresh_name("count", inner.taken)
-    given = [times, *now, *inner.formals]
+    count_name = fresh_name("count", inner.taken)
+    given = [count_name, *now, *inner.formals]
     states = ", ".join(now)
     called = ", ".join([*now, f"float({number})", *inner.formals])
     function = inner.function()
     lines = [
-        f"for {number} in range(int({times})):",
+        f"for {number} in range(int({count_name})):",
         f"    {states} = {function.name}({called})",
         f"return {states},",
     ]
@@ -329,7 +329,7 @@ def repetition(
     loop = Function(name, text, {function.name: function})
 
     def derivative(by: tuple[int, ...]) -> Derived:
-        return _carried(inner, name, given, called, [given[k] for k in by if k > 0], by)
+        return _tangent_loop(inner, name, given, called, [given[k] for k in by if k > 0], by)
 
     arguments = (count, *(node for _, node in leaves(state)), *inner.actuals)
     value = Call(loop, len(names), derivative, Loop(name, "repeated", inner))
@@ -341,7 +341,7 @@ def repetition(
     return rebuilt(state, iter(results))
 
 
-def _carried(
+def _tangent_loop(
     inner: Inner,
     loop: str,
     given: list[str],

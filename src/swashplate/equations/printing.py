@@ -353,7 +353,7 @@ class Block:
         self._named[node, region] = name
         if region.branch is not None:
             self.inner.setdefault(name, node)
-        outlives = any(region not in use.around for use in self._uses[node, region])
+        outlives = any(region not in use.enclosing for use in self._uses[node, region])
         if outlives:
             self._outlive.setdefault(region.branch, {})[name] = node
         return outlives

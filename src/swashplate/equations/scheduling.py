@@ -22,10 +22,10 @@ class Region:
 
     def __init__(self, branch: Branch | None = None, side: int = 0) -> None:
         self.branch, self.side = branch, side
-        self.around: tuple[Region, ...] = (self,)
+        self.enclosing: tuple[Region, ...] = (self,)
         """The region and those that it lies in, the innermost first."""
         if branch is not None:
-            self.around = (self, *branch.region.around)
+            self.enclosing = (self, *branch.region.enclosing)
         self.nodes: list[Node] = []
         self.branches: list[Branch] = []
 
@@ -110,7 +110,7 @@ class Schedule:
             return -level[node], self._is_branch(node), -self._index[node]
 
         for node in sorted(self._order, key=last_first):
-            regions = covering(needed[node])
+            regions = merged(needed[node])
             if node.op == "result":  # made together with all others, where the call is
                 needed.setdefault(node.args[0], {}).update(dict.fromkeys(regions))
                 continue
@@ -151,8 +151,8 @@ class Schedule:
         regions = self._of.get(node)
         if regions is None:
             return None
-        for around in region.around:
-            for each in (around, *around.earlier):
+        for enclosing in region.enclosing:
+            for each in (enclosing, *enclosing.earlier):
                 if each in regions:
                     return each
         raise AssertionError(node)
@@ -193,10 +193,10 @@ class Schedule:
         """Items of a region that one of its items needs."""
         for node, where in self.uses(item, region):
             found = self.region_of(node, where)
-            if found is None or region not in found.around:
+            if found is None or region not in found.enclosing:
                 continue
             if found is not region:  # within a branch of the region
-                inner = found.around[found.around.index(region) - 1]
+                inner = found.enclosing[found.enclosing.index(region) - 1]
                 assert inner.branch is not None
                 yield inner.branch
             elif self._is_branch(node):
@@ -219,7 +219,7 @@ class Schedule:
                 yield from self.uses(branch, side)
 
 
-def covering(regions: Iterable[Region]) -> list[Region]:
+def merged(regions: Iterable[Region]) -> list[Region]:
     """The outermost of some regions; both sides of one branch are what is around it."""
     kept: list[Region] = []
     for region in regions:
@@ -229,7 +229,7 @@ def covering(regions: Iterable[Region]) -> list[Region]:
             changed = False
             last = kept[-1]
             for k, other in enumerate(kept[:-1]):
-                both = cover(other, last)
+                both = common_region(other, last)
                 if both is not None:
                     del kept[k]
                     kept[-1] = both
@@ -238,24 +238,22 @@ def covering(regions: Iterable[Region]) -> list[Region]:
     return kept
 
 
-def cover(one: Region, two: Region) -> Region | None:
+def common_region(one: Region, two: Region) -> Region | None:
     """A region of which both know the names, and that does nothing in vain; None without one."""
-    if one in two.around:
+    if one in two.enclosing:
         return one
-    if two in one.around:
+    if two in one.enclosing:
         return two
-    common = next(region for region in one.around if region in two.around)
-    first = one.around[one.around.index(common) - 1]
-    second = two.around[two.around.index(common) - 1]
+    common = next(region for region in one.enclosing if region in two.enclosing)
+    first = one.enclosing[one.enclosing.index(common) - 1]
+    second = two.enclosing[two.enclosing.index(common) - 1]
     assert first.branch is not None
     assert second.branch is not None
     if first.branch is second.branch:
         return common if first is one and second is two else None
     if first.branch.test is second.branch.test and first.side == second.side:
-        early, of_early = (
-            (first, one) if first.branch.level < second.branch.level else (second, two)
-        )
-        return early if early is of_early else None
+        earlier, use = (first, one) if first.branch.level < second.branch.level else (second, two)
+        return earlier if earlier is use else None
     return None
 
 

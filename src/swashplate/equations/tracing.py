@@ -75,14 +75,14 @@ class Trace:
     calls : dict of Parsed to set
         Arguments of each equation that was run, and what it returned for them.
 
-    `apart` are equations that become functions, which are called: in languages that have no
+    `outlined` are equations that become functions, which are called: in languages that have no
     derivatives. `replacements` are equations that stand for others, see `declaration.standing`.
     """
 
     def __init__(
-        self, apart: Collection[Parsed] = (), replacements: Replacements = NO_REPLACEMENTS
+        self, outlined: Collection[Parsed] = (), replacements: Replacements = NO_REPLACEMENTS
     ) -> None:
-        self.apart, self._replacements = apart, replacements
+        self.outlined, self._replacements = outlined, replacements
         self.calls: dict[Parsed, set[tuple[tuple[Node, ...], tuple[Node, ...]]]] = {}
         self.labels: dict[Node, str] = {}
         self.origins: dict[Node, Parsed] = {}
@@ -110,7 +110,7 @@ class Trace:
         defaults = {name: fixed(each) for name, each in source.defaults.items()}
         known = {name: each for name, each in defaults.items() if each is not None} | dict(given)
         known = {each.arg: known[each.arg] for each in source.arguments if each.arg in known}
-        if source in self.apart:
+        if source in self.outlined:
             return called_apart(self, callee, [*known.values()])
         with self.running(callee):
             result = _Tracer(source, self).result(known)
@@ -124,7 +124,7 @@ class Trace:
 
     def inner(self, source: Parsed) -> Trace:
         """A trace of its own for an equation that is run within another, again and again."""
-        trace = Trace({*self.apart} - {source}, self._replacements)
+        trace = Trace({*self.outlined} - {source}, self._replacements)
         trace.under_way = [*self.under_way]
         return trace
 
@@ -258,9 +258,9 @@ class _Tracer:
                     if test.op == "number":
                         pending[:0] = each.body if test.value else each.orelse
                     elif has_return([each]):
-                        one, _ = self.way(self.returned, [*each.body, *pending])
-                        two, _ = self.way(self.returned, [*each.orelse, *pending])
-                        return self.either(each, test, one, two)
+                        one, _ = self.in_branch(self.returned, [*each.body, *pending])
+                        two, _ = self.in_branch(self.returned, [*each.orelse, *pending])
+                        return self.select(each, test, one, two)
                     else:
                         self.merge(test, each)
                 case ast.For(target=target, iter=ast.Call(args=args)):
@@ -280,7 +280,7 @@ class _Tracer:
                     self.bind(target, self.value(term))
         return None
 
-    def way(self, run: Callable[[Any], R], what: Any) -> tuple[R, Names]:
+    def in_branch(self, run: Callable[[Any], R], what: Any) -> tuple[R, Names]:
         """What one way of a decision comes to, and its names; those here stay as they are."""
         outer, self.names = self.names, dict(self.names)
         try:
@@ -290,18 +290,18 @@ class _Tracer:
 
     def merge(self, test: Node, each: ast.If) -> None:
         """An `if` that does not return: what both of its ways set is merged."""
-        _, one = self.way(self.block, each.body)
-        _, two = self.way(self.block, each.orelse)
+        _, one = self.in_branch(self.block, each.body)
+        _, two = self.in_branch(self.block, each.orelse)
         for name in {**one, **two}:
             if name not in one or name not in two:
                 self.names.pop(name, None)  # without a value one way: refused where it is read
             elif one[name] is not two[name]:
                 if not alike(one[name], two[name]):
                     self.refuse(each, f"{name} of two structures", "give it the same kind of value")
-                self.names[name] = self.either(each, test, one[name], two[name])
+                self.names[name] = self.select(each, test, one[name], two[name])
                 self.trace.label(self.names[name], name)
 
-    def either(self, at: ast.AST, test: Node, one: Value, two: Value) -> Value:
+    def select(self, at: ast.AST, test: Node, one: Value, two: Value) -> Value:
         """The value of one of two ways."""
         if not alike(one, two):
             self.refuse(at, "results of different structure", "give the same tuple on every way")
@@ -336,7 +336,7 @@ class _Tracer:
         self.refuse(node, "a test of a tuple", "compare its elements")
 
     def known(self, node: ast.AST, option: Flag) -> Any:
-        """Value of an option, refused where it was not said."""
+        """Value of an option, refused if it was not given."""
         if option.value == "unknown":
             what = f"a test of the option {option.text}, whose value is not known"
             self.refuse(node, what, f'say options={{"{option.text}": None}}, or True')
@@ -391,7 +391,7 @@ class _Tracer:
                 test = self.test(node.test)
                 if test.op == "number":
                     return self.value(node.body if test.value else node.orelse)
-                return self.either(node, test, self.value(node.body), self.value(node.orelse))
+                return self.select(node, test, self.value(node.body), self.value(node.orelse))
             case ast.Call():
                 return self.call(node)
         self.refuse(node, "this expression", "use arithmetic")

@@ -30,7 +30,7 @@ from swashplate.equations.marching.structure import (
     PartStructure,
     Structure,
     Term,
-    abreast,
+    interleaved,
 )
 from swashplate.equations.model import Model
 
@@ -214,7 +214,7 @@ class Layout:
         if not found:
             return []
         idle = [(self._value(0.0), 0, 0)] * len(group.states)
-        found += [idle] * (-len(found) % abreast(len(group.states)))
+        found += [idle] * (-len(found) % interleaved(len(group.states)))
         self._lanes += group.factors
         for lanes in zip(*found, strict=True):
             self._lanes += [place for each in zip(*lanes, strict=True) for place in each]

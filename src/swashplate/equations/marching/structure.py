@@ -184,7 +184,7 @@ class _Structuring:
         """What was found out."""
         return Facts(self.size, self.row_of, self.partials, self.pieces, self.parts)
 
-    def number_of(self, source: Source) -> Stored:
+    def as_stored(self, source: Source) -> Stored:
         """A signal of a part, or of its state."""
         state = source.signal in dict(leaves(self.sampler.parts[source.part].state))
         return Stored(source.part, "state" if state else "signals", source.signal)
@@ -206,7 +206,7 @@ class _Structuring:
         """Differentiate what is needed of a part, and plan its pieces."""
         i, sampler = part.part, self.sampler
         observed = [place for place in self.observed if place.part == i]
-        needed = [self.number_of(source) for source in sampler.sources if source.part == i]
+        needed = [self.as_stored(source) for source in sampler.sources if source.part == i]
         states = {path: Stored(i, "state", path) for path in sampler.carried[i]}
         following, here = dict(leaves(part.following)), dict(leaves(part.state))
         results = {state: following[path] for path, state in states.items()}
@@ -257,7 +257,7 @@ class _Structuring:
             if tap.tap.delay:
                 by[graph.name(part.fraction(tap))] = Stored(i, "fraction", str(tap.number))
         for source in self.sampler.sources:
-            by[graph.name(part.source(source))] = self.number_of(source)
+            by[graph.name(part.source(source))] = self.as_stored(source)
         found, order, moving = Gradients(ends, [*by]), [*results], [*by.values()]
         self.partials |= {each: {} for each in order}
         first, wanted = self.size, dict[int, Node]()
@@ -302,7 +302,7 @@ class _Structuring:
         """Partial derivatives of a link: numbers, or refused."""
         part, link = self.sampler.parts[place.part], self.model.links[place.path]
         made = self.sampler.observed(part, place)
-        by = {graph.name(part.source(each)): self.number_of(each) for each in link.sources}
+        by = {graph.name(part.source(each)): self.as_stored(each) for each in link.sources}
         partials = Gradients([made], [*by]).partials
         if any(node.op != "number" for node in partials.values()):
             raise InputError(
@@ -356,7 +356,7 @@ class _Structuring:
         return Starting(tuple(outside[name] for name in arguments), moves, derived)
 
 
-def abreast(states: int) -> int:
+def interleaved(states: int) -> int:
     """Columns of a recurrence side by side: they fill the time that one waits for itself."""
     return 8 if states == 1 else 2
 
@@ -365,12 +365,13 @@ def abreast(states: int) -> int:
 def recurrence(pattern: tuple[tuple[float | None, ...], ...]) -> PlannedPiece:
     """Piece that runs y[n+1] = A[n] y[n] + g[n] for some columns, a few side by side.
 
-    Of A `pattern` has what does not change, and None for what does. The second argument is the
-    length of `lanes`, which stand in place of ``whole``: the places in ``flat`` of what changes in
-    A, row by row; then for each state and all columns the places of inputs g and results y, from
-    the block's first sample to the one behind it, and of y in ``tangent``, in place of ``params``.
+    `pattern` holds the entries of A that do not change, and None for the others. The second
+    argument is the length of `lanes`, which stand in place of ``whole``: offsets into ``flat``,
+    first of the changing entries of A, row by row; then, for each state and all columns, of its
+    input g and its result y, from the block's first sample to the one after it, and of y in
+    ``tangent``, in place of ``params``. There are a multiple of `interleaved` columns.
     """
-    size, together = len(pattern), range(abreast(len(pattern)))
+    size, together = len(pattern), range(interleaved(len(pattern)))
     changing = [(i, l) for i in range(size) for l in range(size) if pattern[i][l] is None]
     lines = [f"at{i}_{l} = lanes[{k}]" for k, (i, l) in enumerate(changing)]
     ahead, after = list[str](), list[str]()

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, get_type_hints
 
 from swashplate.equations import graph
 from swashplate.equations.functions import FUNCTIONS, RESERVED, Function, fresh_name
-from swashplate.equations.graph import CALLED, LEAVES, Node, names_in, ordered
+from swashplate.equations.graph import LEAVES, MATH_FUNCTIONS, Node, names_in, ordered
 from swashplate.equations.language import Parsed
 from swashplate.equations.marching.part import PartCode
 from swashplate.equations.model import Equation, Source, arguments_of
@@ -33,7 +33,7 @@ from swashplate.equations.values import Tuple, Value, fixed, leaves, undecided
 if TYPE_CHECKING:
     from swashplate.export.c_source.model import Writer
 
-LIBRARY = {*CALLED} - {"sqrt", "floor"}
+LIBRARY = {*MATH_FUNCTIONS} - {"sqrt", "floor"}
 """Functions of which libraries differ in the last bit, or that take long."""
 OWN = {"m", "p", "k", "h", "options", "given", "state", "next", "signals", "limits", "window"}
 """Names that the functions use themselves, as the equations do."""
@@ -70,7 +70,7 @@ class PartInC:
             }
             self._symbols = kind(*flags)
         self._trace(self.trace())
-        self._trace(self.trace(apart=formulas(self.part.trace)))
+        self._trace(self.trace(outlined=formulas(self.part.trace)))
         own = {*OWN}
         self.windows = [
             fresh_name(c_name(tap.input if tap.tap.width else f"{tap.input}_window"), own)
@@ -90,9 +90,9 @@ class PartInC:
 
     # -- the graph ---------------------------------------------------------------------------------
 
-    def trace(self, apart: Collection[Parsed] = ()) -> Trace:
+    def trace(self, outlined: Collection[Parsed] = ()) -> Trace:
         """What runs the part's equations on symbols."""
-        return Trace(apart, self.own.replacements)
+        return Trace(outlined, self.own.replacements)
 
     def _trace(self, trace: Trace) -> None:
         """Run the equations of a sample on symbols."""
