@@ -157,13 +157,15 @@ class Sampler:
         hints: Mapping[Node, str] | None = None,
         named: bool = False,
         flat: Flat | None = None,
+        branches: bool = True,
     ) -> Block:
         """Lines that compute some nodes of a part; `hints` are names for some, see `Block`.
 
-        With `flat`, for loops of vector instructions, choices are not branches.
+        Choices are not branches with `flat`, for loops of vector instructions, or if there are to
+        be none but those that save work.
         """
         labels = {**part.trace.labels, **(hints or {})}
-        language = BRANCHING if flat is None else PYTHON
+        language = BRANCHING if branches and flat is None else PYTHON
         block = Block(
             results, labels, part.taken, known=known, named=named, flat=flat, language=language
         )
@@ -262,7 +264,8 @@ class Sampler:
     ) -> list[str]:
         """Lines that keep some numbers of a part, behind its sample."""
         nodes = [node for each in kept for node in self.kept_nodes(part, each)]
-        block = self.printed(part, nodes, known=known)
+        # nothing waits for these, and branches take long to compile
+        block = self.printed(part, nodes, known=known, branches=False)
         lines, texts = block.lines, iter(block.texts)
         for each in kept:
             lines += self.stored(part, each, places[each], texts)
@@ -276,7 +279,7 @@ class Sampler:
         """Lines that keep a number, from the texts of what it is made of."""
         if stored.kind != "limits":
             return assigned(place, next(texts))
-        bits = [f"({1 << k} if {next(texts)} else 0)" for k in range(len(part.limits))]
+        bits = [f"choose({next(texts)}, {1 << k}, 0)" for k in range(len(part.limits))]
         return assigned(place, " | ".join(bits))
 
     def observed(self, part: PartCode, stored: Stored) -> Node:
