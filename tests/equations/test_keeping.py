@@ -5,12 +5,12 @@ import os
 import subprocess
 import sys
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
 
-from swashplate.equations import simulate
+from swashplate.equations import Model, equation, join, simulate
 
 pytestmark = pytest.mark.slow
 
@@ -205,3 +205,46 @@ def test_a_cell_of_a_notebook_that_is_run_again_counts() -> None:
         found = simulate(space["rod"], space["Lag"](0.5), {"command": np.ones(4)}, 100.0)
         ends.append(found["position"][-1])
     assert ends == pytest.approx([expected(5.0)[0], expected(-1.0)[0]], rel=1e-14)
+
+
+class Level(NamedTuple):
+    level: float
+
+
+class Depth(NamedTuple):
+    depth: float
+
+
+class Share(NamedTuple):
+    share: float
+
+
+@equation
+def fill(state: Level, command: float, p: Share) -> Level:
+    return Level(state.level + p.share * command)
+
+
+@equation
+def sink(state: Depth, level: float, p: Share) -> Depth:
+    return Depth(state.depth + p.share * level)
+
+
+@equation
+def doubled(level: float) -> float:
+    return 2.0 * level
+
+
+@equation
+def tripled(level: float) -> float:
+    return 3.0 * level
+
+
+def test_models_of_other_links_are_told_apart() -> None:
+    parts = Model("tank", Share, Level, fill), Model("pond", Share, Depth, sink)
+    first = {"one": doubled, "two": doubled, "three": tripled}
+    second = {"one": doubled, "two": tripled, "three": tripled}
+    for links, factor in ((first, 2.0), (second, 3.0)):
+        model = join("linked", *parts, links=links)
+        numbers = model.parameters(Share(1.0), Share(1.0))
+        run = simulate(model, numbers, {"command": np.ones(4)}, 1.0)
+        assert run["two"].tolist() == [factor * each for each in run["level"]]
