@@ -14,6 +14,7 @@ from hashlib import blake2b
 from pathlib import Path
 from typing import Any, TypeVar, get_type_hints
 
+from swashplate.__about__ import __version__
 from swashplate.equations.cache import generated_folder, mark_used, written
 from swashplate.equations.declaration import (
     RULES,
@@ -85,7 +86,8 @@ def _read(path: Path | None) -> tuple[Any, ...] | None:
 @cache
 def engine_hash() -> str:
     """Hash of the source that makes texts of equations."""
-    digest = blake2b(digest_size=10)
+    # an installation may have byte code alone
+    digest = blake2b(__version__.encode(), digest_size=10)
     folder = Path(__file__).parent
     for path in sorted(folder.rglob("*.py")):
         digest.update(path.read_bytes())
