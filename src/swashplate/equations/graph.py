@@ -288,8 +288,10 @@ def times(a: Node, b: Node) -> Node:
     if is_number(b):
         a, b = b, a
     if is_number(a):
-        if a.value in (0.0, 1.0, -1.0):
-            return ZERO if not a.value else b if a.value > 0.0 else negative(b)
+        if a.value == 0.0:
+            return ZERO
+        if a.value in (1.0, -1.0):
+            return b if a.value > 0.0 else negative(b)
         if is_number(b) and isfinite(a.value * b.value):
             return number(float(a.value * b.value))
         if b.op == "*" and is_number(b.args[0]):

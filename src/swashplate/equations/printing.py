@@ -8,6 +8,7 @@ so that both languages give the same bits.
 from __future__ import annotations
 
 import re
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from functools import partial
 from hashlib import blake2b
@@ -40,24 +41,25 @@ ONCE, ALL = 1, 2
 """Of a choice: one side is computed, or both are and one is taken."""
 
 
-class Language:
+class Language(ABC):
     """How operations are written."""
 
     short = SHORT
     """Characters of a result, beyond which it gets a name."""
 
+    @abstractmethod
     def number(self, value: Any) -> Text:
         """A literal number."""
-        raise NotImplementedError
 
+    @abstractmethod
     def operation(self, node: Node, args: Sequence[Text], computed: int) -> Text:
         """An operation on texts; of a choice `computed` says whether both sides may be."""
-        raise NotImplementedError
 
+    @abstractmethod
     def assigned(self, name: str, node: Node, text: str, pad: str, *, new: bool) -> list[str]:
         """Lines of an assignment; a `new` name is declared by it."""
-        raise NotImplementedError
 
+    @abstractmethod
     def called(
         self, call: Node, targets: Sequence[str], given: Sequence[str], declared: set[str], pad: str
     ) -> list[str]:
@@ -65,11 +67,10 @@ class Language:
 
         Some of them are `declared` already.
         """
-        raise NotImplementedError
 
+    @abstractmethod
     def branch(self, test: str, then: list[str], other: list[str], pad: str) -> list[str]:
         """Lines of an `if` and its `else`."""
-        raise NotImplementedError
 
     def declared(self, names: Mapping[str, Node], pad: str, *, always: bool) -> list[str]:
         """Lines ahead of a branch that gives some names their values, on both sides `always`."""
