@@ -141,8 +141,12 @@ class Sampler:
 
     def module(self, *texts: str) -> str:
         """Text of a module of some functions, with the generated ones that they call."""
-        called = {n: t for each in self.functions.values() for n, t in each.texts.items()}
-        return "\n\n".join([*(f"@inlined\n{text}" for text in called.values()), *texts])
+        called: dict[str, str] = {}
+        for function in self.functions.values():
+            if any(f"{function.name}(" in text for text in texts):
+                called |= function.texts
+        inlined = [f"@inlined\n{text}" for text in called.values()]
+        return "\n\n".join([*inlined, *texts])
 
     def read(self, part: PartCode) -> set[str]:
         """Names from outside that a part needs."""

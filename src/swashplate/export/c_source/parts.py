@@ -130,7 +130,8 @@ class PartInC:
         labels = {node: c_name(label.replace(".", "_")) for node, label in trace.labels.items()}
         for node in ordered(ends):
             follows[node] = {groups[node]} if node in groups else set()
-            follows[node].update(*(follows[each] for each in node.args))
+            for operand in node.args:
+                follows[node] |= follows[operand]
             if several and node in labels and len(follows[node]) == 1:
                 (group,) = follows[node]
                 labels[node] = group + labels[node].removeprefix(group)
