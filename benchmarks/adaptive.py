@@ -15,7 +15,6 @@ from swashplate.models.displacement_control import (
     pressure_limits,
     pressure_rate,
     solenoid_force,
-    solenoids_of,
     spool_balance,
     swash_angle,
     swash_tangent,
@@ -37,7 +36,7 @@ def slope(
     n = min(int(at), current.size - 2)
     i = current[n] + (at - n) * (current[n + 1] - current[n])
     p = min(max(state[0], limits.lower), limits.upper)
-    free = spool_balance(solenoid_force(i, solenoids_of(pump)), arm_sine(p, pump), pump)
+    free = spool_balance(solenoid_force(i, pump), arm_sine(p, pump), pump)
     opening = orifice_opening(free, pump)
     Z6 = plate_motion(p, pump)
     rate = pressure_rate(p, opening, Stroking(Z6, pump.Z7, pump.Z8, pump.Z9), None)

@@ -174,6 +174,8 @@ class Draw:
             return self.number(name)
         if kind == control.Flag:
             return self.random.choice([None, True])
+        if kind == control.Pump | control.Solenoids:
+            kind = control.Pump
         if kind in (control.Pump, control.Solenoids, single.Channel):
             return kind(*map(self.parameter, kind._fields))
         if kind in (card.CardSignals, single.ChannelSignals):

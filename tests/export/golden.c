@@ -174,8 +174,14 @@ static double settled_pressure(double inputs_current, double inputs_supply_press
     double p_Z13_plus, double p_Z13_minus, double p_Z14, double p_Z15, double p_Z16_plus,
     double p_Z16_minus, double p_Z17, double p_Z18, double p_Z19_plus, double p_Z19_minus,
     double p_Z20_plus, double p_Z20_minus, double p_Z21_plus, double p_Z21_minus, double p_Z22_plus,
-    double p_Z22_minus, bool options_symmetric, bool options_leaky, bool options_own)
+    double p_Z22_minus, bool options_symmetric, bool options_leaky)
 {
+    /* pressure_limits: Pressures at which the swash plate stops, and the same within ±Z15. [Pa] */
+    const double lower_stop = (p_Z2 - tan(p_Z13_minus)) / p_Z1;
+    const double limits_lower = greater_of(-p_Z15, lower_stop);
+    const double upper_stop = (p_Z2 + tan(p_Z13_plus)) / p_Z1;
+    const double limits_upper = lesser_of(p_Z15, upper_stop);
+
     /* effective_current: Current beyond the symmetric dead zone, i_e = sign(i) max(|i| - Z17,
      * 0). [A] */
     const double effective_current = greater_of(inputs_current - p_Z17, 0.0)
@@ -190,13 +196,17 @@ static double settled_pressure(double inputs_current, double inputs_supply_press
     const double force = effective_current * (c1 + effective_current
         * (c2 + effective_current * (c3 + effective_current * c4)));
 
-    /* pressure_limits: Pressures at which the swash plate stops, and the same within ±Z15. [Pa] */
-    const double lower_stop = (p_Z2 - tan(p_Z13_minus)) / p_Z1;
-    const double limits_lower = greater_of(-p_Z15, lower_stop);
-    const double upper_stop = (p_Z2 + tan(p_Z13_plus)) / p_Z1;
-    const double limits_upper = lesser_of(p_Z15, upper_stop);
-    double chosen; /* settled_pressure */
-    if (!options_leaky && !options_own) {
+    /* settled_pressure */
+    double chosen;
+    if (options_leaky) {
+        const double root = root_of_pressure_gain(limits_lower, limits_upper, force,
+            inputs_supply_pressure, p_Z1, p_Z2, p_Z3, p_Z4, p_Z5, p_Z6, p_Z7, p_Z8, p_Z14,
+            p_Z16_plus, p_Z16_minus, p_Z18, options_symmetric);
+
+        /* searched_pressure: δP at which the flow through the spool is what leaks, whatever the
+         * equations are. [Pa] */
+        chosen = root;
+    } else {
         /* closed_pressure: δP at which the spool closes, held within the limits. */
         const double a = lesser_of(greater_of(force * (p_Z5 / sqrt(p_Z4)), -1.0), 1.0);
         const double angle = lesser_of(greater_of(asin(a) + atan(p_Z18 / p_Z5),
@@ -223,14 +233,7 @@ static double settled_pressure(double inputs_current, double inputs_supply_press
                 / (p_Z5 * sqrt(1.0 - s * s));
             chosen_2 = p_Z7 * closed_2 / (p_Z8 * sqrt(head) * stiffness);
         }
-
-        /* settled_pressure */
-        chosen = closed_2 - chosen_2;
-    } else {
-        const double root = root_of_pressure_gain(limits_lower, limits_upper, force,
-            inputs_supply_pressure, p_Z1, p_Z2, p_Z3, p_Z4, p_Z5, p_Z6, p_Z7, p_Z8, p_Z14,
-            p_Z16_plus, p_Z16_minus, p_Z18, options_symmetric);
-        chosen = root;
+        chosen = closed_2 - chosen_2; /* settled_pressure */
     }
     return chosen;
 }

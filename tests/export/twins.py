@@ -149,7 +149,14 @@ def hints_of(equation: Any) -> dict[str, Any]:
     """Types of what an equation takes and returns."""
     f = plain(equation)
     hints = typing.get_type_hints(f)
-    return {name: hints[name] for name in [*(each.arg for each in parsed(f).arguments), "return"]}
+    names = [*(each.arg for each in parsed(f).arguments), "return"]
+    return {name: by_itself(hints[name]) for name in names}
+
+
+def by_itself(hint: Any) -> Any:
+    """The type of an argument of an equation by itself: of several named tuples the first."""
+    kinds = typing.get_args(hint)
+    return kinds[0] if kinds and all(map(is_named_tuple, kinds)) and "|" in str(hint) else hint
 
 
 def flagged(equation: Any) -> bool:

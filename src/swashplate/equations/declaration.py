@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from hashlib import blake2b
 from pathlib import Path
 from types import CellType, CodeType, FunctionType, MappingProxyType, ModuleType, SimpleNamespace
-from typing import Any, TypeVar
+from typing import Any, TypeVar, get_args
 from weakref import WeakKeyDictionary
 
 from numba import config, njit
@@ -220,8 +220,9 @@ def _reached(thing: Any) -> Iterator[tuple[str, Any]]:
                 hint = resolved(f, hint)
             except NameError:
                 continue
-        if is_named_tuple(hint):
-            yield hint.__name__, hint
+        for kind in (hint, *get_args(hint)):
+            if is_named_tuple(kind):
+                yield kind.__name__, kind
 
 
 def closure(function: Any) -> dict[str, Any]:

@@ -141,6 +141,9 @@ def _argument(
         if value is None or value == "unknown" or inner is bool:
             return Flag(value, path)
         return _argument(inner, path, text, options, lengths)
+    if origin in (typing.Union, types.UnionType) and all(map(is_named_tuple, args)):
+        # whichever has what the equation reads; by itself it takes the first
+        return _argument(args[0], path, text, options, lengths)
     if is_named_tuple(hint):
         hints = typing.get_type_hints(hint, include_extras=True)
         below = [(hints.get(f, float), f"{path}.{f}", f"{text}.{f}") for f in hint._fields]

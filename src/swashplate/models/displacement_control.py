@@ -140,7 +140,7 @@ class Pump(NamedTuple):
 
 
 class Solenoids(NamedTuple):
-    """Parameters of the solenoids, those of `Pump` by the same names."""
+    """Parameters of the solenoids by themselves, those of `Pump` by the same names."""
 
     Z17: float
     Z19_plus: float
@@ -175,7 +175,6 @@ class PumpOptions(NamedTuple):
     damping: Flag = OFF  # Damping of the swash plate, see `plate_follows`.
     leakage: Flag = OFF  # Leakage of the motor under load, see `load_leakage`.
     line: Flag = OFF  # Line and inertia, see `line_step`.
-    own: Flag = OFF  # An equation is the user's own: the steady state is searched for.
 
 
 class PressureLimits(NamedTuple):
@@ -205,23 +204,7 @@ def _effective_current(current: float, Z17: float) -> tuple[float, float]:
 
 
 @equation
-def solenoids_of(p: Pump) -> Solenoids:
-    """The solenoids of a pump."""
-    return Solenoids(
-        p.Z17,
-        p.Z19_plus,
-        p.Z19_minus,
-        p.Z20_plus,
-        p.Z20_minus,
-        p.Z21_plus,
-        p.Z21_minus,
-        p.Z22_plus,
-        p.Z22_minus,
-    )
-
-
-@equation
-def solenoid_force(current: float, p: Solenoids) -> float:
+def solenoid_force(current: float, p: Pump | Solenoids) -> float:
     """Net force of both solenoids on the spool under a signed current. [N]
 
     F = Z19 i_e + Z20 i_e² + Z21 i_e³ + Z22 i_e⁴, positive towards more speed; Kruse eq. 6.61 on the

@@ -27,7 +27,6 @@ from swashplate.models.displacement_control import (
     pressure_limits,
     pressure_rate,
     solenoid_force,
-    solenoids_of,
     spool_balance,
     stopped_spool,
     swash_angle,
@@ -161,7 +160,7 @@ def pump_sample(
     current = inputs.current
     if options.hysteresis is not None:
         current = magnetising_current(current, state.magnetising_current, p.solenoid_hysteresis)
-    force = solenoid_force(current, solenoids_of(p))
+    force = solenoid_force(current, p)
 
     plate = state.pressure if options.damping is None else state.plate_pressure
     spool = spool_balance(force, arm_sine(plate, p), p)
@@ -352,13 +351,22 @@ def pump_rest(p: Pump, options: PumpOptions, inputs: PumpInputs) -> PumpState:
 def settled_pressure(inputs: PumpInputs, p: Pump, options: PumpOptions) -> float:
     """δP that the pump settles at under a constant current. [Pa]
 
-    Without leakage where the spool closes, with it where the flow through the spool is what leaks.
-    Where it closes is known in closed form of the package's equations alone.
+    Without leakage where the spool closes, which is known in closed form.
     """
-    force = solenoid_force(inputs.current, solenoids_of(p))
-    if options.leaky is None and options.own is None:
-        closed = closed_pressure(force, p)
-        return closed - leaked_pressure(closed, inputs.supply_pressure, p, options.symmetric)
+    if options.leaky is not None:
+        return searched_pressure(inputs, p, options)
+    closed = closed_pressure(solenoid_force(inputs.current, p), p)
+    return closed - leaked_pressure(closed, inputs.supply_pressure, p, options.symmetric)
+
+
+@equation
+def searched_pressure(inputs: PumpInputs, p: Pump, options: PumpOptions) -> float:
+    """δP at which the flow through the spool is what leaks, whatever the equations are. [Pa]
+
+    With leakage there is no closed form, and of equations that stand for the package's none is
+    known: see `swashplate.simulation.instance.models_of`.
+    """
+    force = solenoid_force(inputs.current, p)
     limits = pressure_limits(p)
     supply = inputs.supply_pressure
     return root(pressure_gain, limits.lower, limits.upper, force, supply, p, options)

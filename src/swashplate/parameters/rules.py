@@ -21,7 +21,6 @@ from swashplate.models.displacement_control import (
     Pump,
     moment_sine,
     solenoid_force,
-    solenoids_of,
 )
 from swashplate.parameters.definitions import OPTIONS, SWITCHES, Definition, find
 
@@ -196,11 +195,10 @@ def _static(n: Values, size: int) -> tuple[Array, Array]:
 @inlined
 def _extremes(channel: Channel, pump: Pump, side: int, voltages: Array) -> tuple[float, float]:
     """Lowest steady current [A] and largest |sin φ| of one side within some voltages."""
-    solenoids = solenoids_of(pump)
     least, most = inf, 0.0
     for voltage in voltages:
         current = channel_level(voltage, channel)
-        force = solenoid_force(-current if side == 1 else current, solenoids)
+        force = solenoid_force(-current if side == 1 else current, pump)
         sine = abs(moment_sine(force, pump))
         # what is no number stays
         least = current if current < least or current != current else least

@@ -30,6 +30,7 @@ from swashplate.models.drive import (
     pump_drive,
     settled_drive,
 )
+from swashplate.models.pump import searched_pressure, settled_pressure
 from swashplate.parameters.definitions import OWN
 from swashplate.parameters.parameter_set import ParameterSet
 from swashplate.parameters.rules import SIDES, Broken, Rule, applied
@@ -72,8 +73,11 @@ class Models(NamedTuple):
 
 @lru_cache(maxsize=64)
 def models_of(equations: tuple[Replacement, ...]) -> Models:
-    """The drive's models with one's own equations in them."""
+    """The drive's models with user-defined equations in them."""
     models = Models(drive, pump_drive, flowing_drive, flowing_pump_drive, settled_drive)
+    if any(uses(pump_drive, each.old) for each in equations):
+        # where the spool closes is known in closed form of the package's equations alone
+        equations = (*equations, Replacement(settled_pressure, searched_pressure))
     for each in equations:
         models = Models(*(again(m, each) if uses(m, each.old) else m for m in models))
     return models
@@ -136,8 +140,6 @@ def pump_options(parameters: ParameterSet) -> PumpOptions:
         on.add("steep")
     if parameters.pressure_root == "symmetric":
         on.add("symmetric")
-    if any(uses(pump_drive, each.old) for each in parameters.equations):
-        on.add("own")
     return PumpOptions(**dict.fromkeys(on, True))
 
 
