@@ -11,10 +11,16 @@ from math import pi
 import numpy as np
 from numpy.typing import NDArray
 
-from swashplate.crane import Crane, Stick, control, extremes, simulate
+from swashplate.crane import Crane, Stick, control, simulate
+from swashplate.crane.closed_loop.stepper import Actuation
 from swashplate.crane.control import Control
-from swashplate.crane.extremes import THREE_HOURS, largest_of_gaussian, largest_of_peaks, peaks_of
-from swashplate.crane.stepper import Actuation
+from swashplate.crane.sea import extremes
+from swashplate.crane.sea.extremes import (
+    THREE_HOURS,
+    largest_of_gaussian,
+    largest_of_peaks,
+    peaks_of,
+)
 
 Array = NDArray[np.float64]
 

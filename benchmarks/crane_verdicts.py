@@ -35,8 +35,8 @@ from swashplate.crane import (
     operability,
     read_ship,
 )
-from swashplate.crane.confidence import rms_of
-from swashplate.crane.judgment import Judgment, largest_of
+from swashplate.crane.sea.confidence import rms_of
+from swashplate.crane.studies.judgment import Judgment, largest_of
 
 IDEAL_DESIGN = (
     control.DelayedFeedback(0.2, 0.2) | control.ShipCompensation() | control.PositionLoop(1.5)

@@ -5,7 +5,7 @@ from math import exp, log, pi, sqrt
 import numpy as np
 import pytest
 
-from swashplate.crane.extremes import largest_of_gaussian, largest_of_peaks, peaks_of
+from swashplate.crane.sea.extremes import largest_of_gaussian, largest_of_peaks, peaks_of
 
 DURATION = 10_800.0
 

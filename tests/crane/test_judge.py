@@ -24,11 +24,11 @@ from swashplate.crane import (
     sweep,
     upgraded,
 )
-from swashplate.crane.confidence import fewest_seaways, mean_of, more_seaways, share_of
-from swashplate.crane.judging import seaways_needed
-from swashplate.crane.outcome import STOPPED
-from swashplate.crane.result import PUMPS
+from swashplate.crane.closed_loop.result import PUMPS
 from swashplate.crane.rope import GRAVITY
+from swashplate.crane.sea.confidence import fewest_seaways, mean_of, more_seaways, share_of
+from swashplate.crane.studies.judging import seaways_needed
+from swashplate.crane.studies.outcome import STOPPED
 from swashplate.errors import InputError, ParameterError
 from swashplate.executors import Processes, Serial, Threads
 from swashplate.identification.assessment import Identification

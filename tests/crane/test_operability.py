@@ -15,8 +15,8 @@ from swashplate.crane import (
     linear_response,
     operability,
 )
-from swashplate.crane.operating import LEFT, NEAR, WORKABLE
-from swashplate.crane.study import Study
+from swashplate.crane.studies.operating import LEFT, NEAR, WORKABLE
+from swashplate.crane.studies.study import Study
 from swashplate.errors import FileError, InputError
 from swashplate.executors import Serial, Threads
 

@@ -31,7 +31,7 @@ from swashplate.crane import (
     judge,
     simulate,
 )
-from swashplate.crane.operating import Cell
+from swashplate.crane.studies.operating import Cell
 from swashplate.report import figures
 from swashplate.report.figures.crane import seaway_words
 from swashplate.report.scene import write_judgment, write_operability, write_scene

@@ -193,7 +193,7 @@ def judge(
 
         more["executor"] = Dask(dask)
     from swashplate.crane import judge as judge_control
-    from swashplate.crane.judging import SEAWAYS, seaways_needed
+    from swashplate.crane.studies.judging import SEAWAYS, seaways_needed
 
     crane = study.chosen
     side.print(seaways_needed(study.seeds or SEAWAYS, allowed / 100.0))

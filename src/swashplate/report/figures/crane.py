@@ -13,7 +13,7 @@ from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 from numpy.typing import NDArray
 
 from swashplate.crane import Crane, CraneRun, Followable, Hull, Seaway, Sweep
-from swashplate.crane.confidence import rms_of
+from swashplate.crane.sea.confidence import rms_of
 from swashplate.errors import InputError
 from swashplate.report import style
 from swashplate.report.lines import SHADES, draw, fit_time, shade_handle, stretches

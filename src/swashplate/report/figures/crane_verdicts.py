@@ -17,9 +17,9 @@ from matplotlib.ticker import FixedLocator, FuncFormatter, MaxNLocator, NullLoca
 from numpy.typing import NDArray
 
 from swashplate.crane import LIMITED, Hull, Judged, Judgment, Operability
-from swashplate.crane.confidence import rms_of
-from swashplate.crane.operating import WORKABLE, label_of
-from swashplate.crane.study import NONE
+from swashplate.crane.sea.confidence import rms_of
+from swashplate.crane.studies.operating import WORKABLE, label_of
+from swashplate.crane.studies.study import NONE
 from swashplate.report import style
 from swashplate.report.figures.crane import assumed, remark, remarks, seaway_words
 from swashplate.results import GivenAxes

@@ -13,9 +13,9 @@ from markupsafe import Markup
 from swashplate.crane import Crane, Hull, Judgment, Operability, Seaway, follow
 from swashplate.crane.axes import AXES
 from swashplate.crane.drives import UNUSABLE
-from swashplate.crane.judgment import Decision
-from swashplate.crane.operating import WORKABLE, label_of
-from swashplate.crane.study import NONE
+from swashplate.crane.studies.judgment import Decision
+from swashplate.crane.studies.operating import WORKABLE, label_of
+from swashplate.crane.studies.study import NONE
 from swashplate.errors import DomainError, InputError
 from swashplate.report.fit_report.html_page import (
     Block,

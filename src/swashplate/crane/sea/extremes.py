@@ -13,7 +13,7 @@ from math import pi
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from swashplate.crane.confidence import Estimate
+from swashplate.crane.sea.confidence import Estimate
 
 Array = NDArray[np.float64]
 

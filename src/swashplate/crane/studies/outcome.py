@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swashplate.crane.axes import AXES, RATE
-from swashplate.crane.extremes import peaks_of
-from swashplate.crane.result import PUMPS, CraneRun
+from swashplate.crane.closed_loop.result import PUMPS, CraneRun
 from swashplate.crane.rope import GRAVITY, rope_leads, swing_of
+from swashplate.crane.sea.extremes import peaks_of
 from swashplate.simulation.result import Limit
 
 Array = NDArray[np.float64]

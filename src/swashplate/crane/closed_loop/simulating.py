@@ -7,12 +7,12 @@ from typing import Unpack
 from numpy.typing import ArrayLike
 
 from swashplate.crane.axes import RATE
+from swashplate.crane.closed_loop.loop import DIRECT, IDEAL
+from swashplate.crane.closed_loop.result import CraneRun
+from swashplate.crane.closed_loop.stepper import CraneStepper, Setup
+from swashplate.crane.closed_loop.stick import Array, Stick
 from swashplate.crane.crane import Crane
-from swashplate.crane.loop import DIRECT, IDEAL
-from swashplate.crane.result import CraneRun
-from swashplate.crane.sea import Seaway, motion_of
-from swashplate.crane.stepper import CraneStepper, Setup
-from swashplate.crane.stick import Array, Stick
+from swashplate.crane.sea.seaway import Seaway, motion_of
 from swashplate.errors import InputError
 
 

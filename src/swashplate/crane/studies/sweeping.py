@@ -10,11 +10,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from swashplate.crane.axes import check_names
-from swashplate.crane.changed_drives import upgraded
 from swashplate.crane.crane import Crane
-from swashplate.crane.sea import HIGHEST, Seaway
-from swashplate.crane.spectral import linear_response
-from swashplate.crane.study import NONE, Case, Controllers, Study
+from swashplate.crane.sea.seaway import HIGHEST, Seaway
+from swashplate.crane.studies.changed_drives import upgraded
+from swashplate.crane.studies.spectral import linear_response
+from swashplate.crane.studies.study import NONE, Case, Controllers, Study
 from swashplate.errors import InputError
 from swashplate.results import Result, figures
 from swashplate.tables import Column, Table

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from swashplate.crane.axes import check_names
 from swashplate.crane.rope import GRAVITY
-from swashplate.crane.transfer_functions import CRANE_SHIP, MOTIONS, Hull, TransferFunctions
+from swashplate.crane.sea.transfer_functions import CRANE_SHIP, MOTIONS, Hull, TransferFunctions
 from swashplate.equations import kernel
 from swashplate.errors import InputError
 from swashplate.logs import Series, TextOptions, read_series

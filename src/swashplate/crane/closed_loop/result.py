@@ -12,12 +12,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swashplate.crane.axes import AXES, RATE, check_names
+from swashplate.crane.closed_loop.loop import Fixed
+from swashplate.crane.closed_loop.signals import ROWS, Signals
+from swashplate.crane.closed_loop.stepper import ACTUATIONS
 from swashplate.crane.crane import Crane
-from swashplate.crane.loop import Fixed
 from swashplate.crane.rope import GRAVITY, in_ship_axes, rope_leads, swing_of
-from swashplate.crane.signals import ROWS, Signals
-from swashplate.crane.stepper import ACTUATIONS
-from swashplate.crane.transfer_functions import MOTIONS
+from swashplate.crane.sea.transfer_functions import MOTIONS
 from swashplate.errors import InputError
 from swashplate.results import Tabular, figures
 from swashplate.simulation.result import Limit, Named, Simulation

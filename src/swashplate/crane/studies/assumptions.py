@@ -13,14 +13,14 @@ from typing import NamedTuple
 
 import numpy as np
 
+from swashplate.crane.closed_loop.stick import Stick
 from swashplate.crane.crane import Crane
-from swashplate.crane.extremes import largest_of_peaks
-from swashplate.crane.outcome import Outcome
-from swashplate.crane.sea import Seaway
-from swashplate.crane.spectral import linear_response
-from swashplate.crane.stick import Stick
-from swashplate.crane.study import Case, Study
-from swashplate.crane.transfer_functions import Hull
+from swashplate.crane.sea.extremes import largest_of_peaks
+from swashplate.crane.sea.seaway import Seaway
+from swashplate.crane.sea.transfer_functions import Hull
+from swashplate.crane.studies.outcome import Outcome
+from swashplate.crane.studies.spectral import linear_response
+from swashplate.crane.studies.study import Case, Study
 from swashplate.errors import SwashplateError
 
 SEAWAYS, LENGTH = 6, 300.0

@@ -16,19 +16,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swashplate.crane.axes import RATE, check_names
+from swashplate.crane.closed_loop.result import FARTHEST_SWING, CraneRun
+from swashplate.crane.closed_loop.simulating import begun, simulate
+from swashplate.crane.closed_loop.stepper import Actuation, Setup, feels_load
+from swashplate.crane.closed_loop.stick import Stick
 from swashplate.crane.control import Clip, Control
 from swashplate.crane.crane import Crane
-from swashplate.crane.following import follow
 from swashplate.crane.kinematics import Vector, boom_at, rotation, tip_of, to_inertial
 from swashplate.crane.limits import LIMITED
-from swashplate.crane.outcome import STOPPED, Outcome, outcome_of
-from swashplate.crane.result import FARTHEST_SWING, CraneRun
 from swashplate.crane.rope import GRAVITY
-from swashplate.crane.sea import Seaway, Spectrum
-from swashplate.crane.simulating import begun, simulate
-from swashplate.crane.spectral import stationary_start
-from swashplate.crane.stepper import Actuation, Setup, feels_load
-from swashplate.crane.stick import Stick
+from swashplate.crane.sea.seaway import Seaway, Spectrum
+from swashplate.crane.studies.following import follow
+from swashplate.crane.studies.outcome import STOPPED, Outcome, outcome_of
+from swashplate.crane.studies.spectral import stationary_start
 from swashplate.errors import DomainError, InputError
 from swashplate.executors import Executor, Threads
 from swashplate.progress import counted

@@ -11,11 +11,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from swashplate.crane.axes import AXES
+from swashplate.crane.closed_loop.loop import largest_sine
 from swashplate.crane.crane import Crane
 from swashplate.crane.kinematics import boom_at, reach_rate, tip_of
-from swashplate.crane.loop import largest_sine
-from swashplate.crane.sea import SEA_STATES, Seaway, Spectrum
-from swashplate.crane.spectral import tip_motion
+from swashplate.crane.sea.seaway import SEA_STATES, Seaway, Spectrum
+from swashplate.crane.studies.spectral import tip_motion
 from swashplate.errors import InputError
 from swashplate.results import GivenAxes, Result, figures
 from swashplate.tables import Column, Table

@@ -14,9 +14,11 @@ from typing import TYPE_CHECKING, Literal, NamedTuple, cast, overload
 import numpy as np
 from numpy.typing import NDArray
 
-from swashplate.crane.assumptions import Turn
 from swashplate.crane.axes import AXES, check_names
-from swashplate.crane.confidence import (
+from swashplate.crane.closed_loop.result import PUMPS, CraneRun, limit_table
+from swashplate.crane.control import PositionLoop
+from swashplate.crane.limits import LIMITED
+from swashplate.crane.sea.confidence import (
     Estimate,
     counted_words,
     mean_of,
@@ -24,14 +26,12 @@ from swashplate.crane.confidence import (
     rms_of,
     share_of,
 )
-from swashplate.crane.control import PositionLoop
-from swashplate.crane.extremes import THREE_HOURS, largest_of_peaks
-from swashplate.crane.limits import LIMITED
-from swashplate.crane.outcome import Outcome
-from swashplate.crane.result import PUMPS, CraneRun, limit_table
-from swashplate.crane.spectral import LinearResponse
-from swashplate.crane.study import NONE, Study, assumed_words
-from swashplate.crane.transfer_functions import CRANE_SHIP, Hull
+from swashplate.crane.sea.extremes import THREE_HOURS, largest_of_peaks
+from swashplate.crane.sea.transfer_functions import CRANE_SHIP, Hull
+from swashplate.crane.studies.assumptions import Turn
+from swashplate.crane.studies.outcome import Outcome
+from swashplate.crane.studies.spectral import LinearResponse
+from swashplate.crane.studies.study import NONE, Study, assumed_words
 from swashplate.results import GivenAxes, Tabular, figures
 from swashplate.simulation.result import Limit
 from swashplate.tables import Column, Table, count, listed

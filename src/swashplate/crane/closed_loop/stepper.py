@@ -11,12 +11,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from swashplate.analysis.compensation import InverseMap
-from swashplate.crane import loop
 from swashplate.crane.axes import AXES, RATE, check_names
+from swashplate.crane.closed_loop import loop
+from swashplate.crane.closed_loop.loop import Fixed, Inverse, Plant, State
+from swashplate.crane.closed_loop.signals import ROWS, Signals, columns_of
 from swashplate.crane.control import GIVES, SEEN, Control, stages_of
 from swashplate.crane.crane import Crane
 from swashplate.crane.kinematics import Shafts, Vector, boom_at, rope_length, shaft_torques, tip_of
-from swashplate.crane.loop import Fixed, Inverse, Plant, State
 from swashplate.crane.rope import (
     AIR,
     GRAVITY,
@@ -26,7 +27,6 @@ from swashplate.crane.rope import (
     swing_of,
     too_fast,
 )
-from swashplate.crane.signals import ROWS, Signals, columns_of
 from swashplate.drive import Drive
 from swashplate.equations import CompiledStep, Machine, compiled_step
 from swashplate.equations.marching.run import marched

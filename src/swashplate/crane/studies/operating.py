@@ -17,16 +17,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swashplate.crane.axes import AXES
+from swashplate.crane.closed_loop.result import PUMPS
 from swashplate.crane.control import Control
 from swashplate.crane.crane import Crane
-from swashplate.crane.extremes import largest_of_peaks
 from swashplate.crane.limits import LIMITED
-from swashplate.crane.outcome import Outcome
-from swashplate.crane.result import PUMPS
-from swashplate.crane.scatter import Scatter
-from swashplate.crane.sea import Seaway, Spectrum
-from swashplate.crane.spectral import DEMANDS, linear_response
-from swashplate.crane.study import BUILT, IDEAL, NONE, Case, Drives, Study, assumed_words
+from swashplate.crane.sea.extremes import largest_of_peaks
+from swashplate.crane.sea.scatter import Scatter
+from swashplate.crane.sea.seaway import Seaway, Spectrum
+from swashplate.crane.studies.outcome import Outcome
+from swashplate.crane.studies.spectral import DEMANDS, linear_response
+from swashplate.crane.studies.study import BUILT, IDEAL, NONE, Case, Drives, Study, assumed_words
 from swashplate.errors import InputError
 from swashplate.executors import Executor, Serial, Threads
 from swashplate.progress import counted

@@ -22,6 +22,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from swashplate.crane.closed_loop.signals import ABSENT, LOAD, PULL, SHAFT, SPEED, TIP, Columns
 from swashplate.crane.control import SEEN, Sensing, Settings
 from swashplate.crane.kinematics import (
     Boom,
@@ -51,7 +52,6 @@ from swashplate.crane.rope import (
     rope_step,
     set_off,
 )
-from swashplate.crane.signals import ABSENT, LOAD, PULL, SHAFT, SPEED, TIP, Columns
 from swashplate.equations import Machine, equation, inlined, kernel
 from swashplate.equations.functions import generating
 from swashplate.parameters.rules import FULL_VOLTAGE

@@ -9,14 +9,15 @@ from typing import Any
 
 import numpy as np
 
-from swashplate.crane.assumptions import turns_of
 from swashplate.crane.axes import AXES, check_names
-from swashplate.crane.changed_drives import upgraded
-from swashplate.crane.confidence import fewest_seaways, rms_of
 from swashplate.crane.control import Chain, Clip, Control, PositionLoop
 from swashplate.crane.crane import Crane
-from swashplate.crane.following import follow
-from swashplate.crane.judgment import (
+from swashplate.crane.rope import GRAVITY
+from swashplate.crane.sea.confidence import fewest_seaways, rms_of
+from swashplate.crane.studies.assumptions import turns_of
+from swashplate.crane.studies.changed_drives import upgraded
+from swashplate.crane.studies.following import follow
+from swashplate.crane.studies.judgment import (
     LOOP,
     QUESTIONS,
     Judgment,
@@ -26,10 +27,9 @@ from swashplate.crane.judgment import (
     judged_limits,
     share_worse,
 )
-from swashplate.crane.outcome import Outcome
-from swashplate.crane.rope import GRAVITY
-from swashplate.crane.spectral import linear_response
-from swashplate.crane.study import NONE, Case, Controllers, Study
+from swashplate.crane.studies.outcome import Outcome
+from swashplate.crane.studies.spectral import linear_response
+from swashplate.crane.studies.study import NONE, Case, Controllers, Study
 from swashplate.errors import InputError
 from swashplate.simulation.result import Limit
 from swashplate.tables import count

@@ -1,0 +1,1 @@
+"""The sea under a crane: seaways, the ship's motion in them, how often they come, extremes."""
