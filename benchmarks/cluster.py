@@ -17,9 +17,9 @@ from distributed import LocalCluster
 from swashplate import Campaign
 from swashplate.campaign import rig
 from swashplate.executors import Dask, Serial
-from swashplate.identification.setup import load_setup
-from swashplate.identification.solving import Solution, sobol_starts, solve_from
-from swashplate.identification.stages import stage_problem
+from swashplate.identification.estimation.setup import load_setup
+from swashplate.identification.estimation.solving import Solution, sobol_starts, solve_from
+from swashplate.identification.estimation.stages import stage_problem
 
 WORKERS, STARTS = 3, 16
 

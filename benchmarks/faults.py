@@ -45,7 +45,7 @@ from second_machine import draws, logger
 from second_machine.faults import FAULTS, FEWER, unseen
 
 from swashplate import Drive
-from swashplate.identification import discrepancy
+from swashplate.identification.diagnostics import discrepancy
 
 FOLDER = Path(__file__).parent
 RATE = 512.0

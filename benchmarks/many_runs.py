@@ -23,8 +23,8 @@ import polars as pl
 
 from swashplate import Drive
 from swashplate.campaign import rig
+from swashplate.identification.estimation.setup import load_setup
 from swashplate.identification.fitting import drawn
-from swashplate.identification.setup import load_setup
 from swashplate.maneuvers import source_tests
 
 COUNTS_PER_TURN = 2526.315789473684

@@ -13,10 +13,10 @@ from swashplate import Campaign, maneuvers
 from swashplate.campaign import rig
 from swashplate.full_order.drive import FullOrderDrive
 from swashplate.identification.assessment import Identification
-from swashplate.identification.determination import identifiability_of
+from swashplate.identification.estimation.setup import load_setup
 from swashplate.identification.fitting import fit
-from swashplate.identification.intervals import uncertainty_of
-from swashplate.identification.setup import load_setup
+from swashplate.identification.statistics.determination import identifiability_of
+from swashplate.identification.statistics.intervals import uncertainty_of
 from swashplate.report.fit_report import write_fit_report
 
 ROUNDS = 5

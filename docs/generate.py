@@ -18,7 +18,7 @@ from pydantic import BaseModel
 
 from swashplate.campaign import CampaignFile
 from swashplate.cli import EPILOG, HELP, app
-from swashplate.identification.setup import Setup
+from swashplate.identification.estimation.setup import Setup
 from swashplate.parameters import CATALOGUE, REFINEMENTS, Block, Definition, SetFile
 
 HERE = Path(__file__).parent

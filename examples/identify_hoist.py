@@ -16,12 +16,12 @@ import numpy as np
 
 from swashplate import Campaign, Drive, identify
 from swashplate.campaign import rig
-from swashplate.identification.drive_model import true_value
-from swashplate.identification.experiment_design import outlook
+from swashplate.identification.estimation.drive_model import true_value
+from swashplate.identification.estimation.setup import load_setup
+from swashplate.identification.estimation.stages import smooth
 from swashplate.identification.fitting import drawn
-from swashplate.identification.intervals import uncertainty_of
-from swashplate.identification.setup import load_setup
-from swashplate.identification.stages import smooth
+from swashplate.identification.statistics.experiment_design import outlook
+from swashplate.identification.statistics.intervals import uncertainty_of
 from swashplate.identification.validation import with_speeds
 from swashplate.report.figures import plot_channel, save_figure
 

@@ -25,8 +25,8 @@ from reproduction.source_errors import (
 from swashplate.campaign import Experiment
 from swashplate.drive import Drive
 from swashplate.errors import InputError
+from swashplate.identification.estimation.setup import load_setup
 from swashplate.identification.fitting import Search, drawn, fit
-from swashplate.identification.setup import load_setup
 from swashplate.identification.validation import RunQuality, predict, with_speeds
 from swashplate.parameters.parameter_set import ParameterSet
 

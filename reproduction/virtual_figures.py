@@ -12,7 +12,7 @@ from reproduction.content import Curve, Figure, Panel
 from reproduction.curves import MULTIPLIED, filtered_speed_deg_s
 from swashplate.campaign import interpolate_counts
 from swashplate.drive import Drive
-from swashplate.identification.drive_model import measured_current
+from swashplate.identification.estimation.drive_model import measured_current
 from swashplate.simulation.run import simulate_drive
 
 WINDOW = (1.55, 1.75)

@@ -16,7 +16,7 @@ from PIL import Image
 from tests.identification.given import TWO_STAGES, virtual
 
 from swashplate import maneuvers
-from swashplate.identification.setup import setup_text
+from swashplate.identification.estimation.setup import setup_text
 
 pytestmark = pytest.mark.slow  # a kernel is started, and compiles all that a fit needs
 

@@ -21,11 +21,11 @@ from swashplate.analysis import (
 )
 from swashplate.campaign import Campaign, rig
 from swashplate.identification.assessment import Identification
-from swashplate.identification.drive_model import DriveModel
+from swashplate.identification.estimation.drive_model import DriveModel
+from swashplate.identification.estimation.setup import Free, Setup, load_setup
+from swashplate.identification.estimation.unknowns import Unknown, Unknowns
 from swashplate.identification.fitting import Fit, fit
-from swashplate.identification.intervals import uncertainty_of
-from swashplate.identification.setup import Free, Setup, load_setup
-from swashplate.identification.unknowns import Unknown, Unknowns
+from swashplate.identification.statistics.intervals import uncertainty_of
 from swashplate.maneuvers import source_tests
 
 VOLTAGE = maneuvers.step(9.0, stop=4.0, length=5.0).sample()

@@ -18,8 +18,8 @@ from swashplate.campaign import (
     guess_drive,
     guessed_set,
 )
+from swashplate.identification.estimation.setup import Free, Setup, Stage, load_setup
 from swashplate.identification.fitting import fit
-from swashplate.identification.setup import Free, Setup, Stage, load_setup
 
 RATE = 200.0
 TIME = np.arange(int(12.0 * RATE)) / RATE

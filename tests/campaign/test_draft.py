@@ -19,7 +19,7 @@ from swashplate.campaign import (
     rig,
 )
 from swashplate.campaign import draft_campaign as draft
-from swashplate.identification.setup import Setup
+from swashplate.identification.estimation.setup import Setup
 
 HEADERS = {
     "voltage": ("Joystick voltage", "lever [V]", "command_V", "Joystickspannung"),

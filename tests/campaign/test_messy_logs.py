@@ -17,7 +17,7 @@ from swashplate.campaign import (
     spiked,
     unsigned_currents,
 )
-from swashplate.identification.data_checks import (
+from swashplate.identification.diagnostics.data_checks import (
     check_runs,
     refuse_unsound,
     spike_findings,

@@ -20,9 +20,9 @@ from tests.shown import check_shown
 import swashplate
 from swashplate import Campaign, Drive
 from swashplate.identification.assessment import Identification
+from swashplate.identification.estimation.setup import Setup
 from swashplate.identification.fitting import Fit, fit
-from swashplate.identification.intervals import uncertainty_of
-from swashplate.identification.setup import Setup
+from swashplate.identification.statistics.intervals import uncertainty_of
 from swashplate.locks import locked
 
 Words = Callable[..., str]

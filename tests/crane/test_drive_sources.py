@@ -12,7 +12,7 @@ from swashplate.crane import Crane, Stick, control, judge, simulate, upgraded
 from swashplate.crane.crane import preset_text
 from swashplate.identification import Verdict, load_setup
 from swashplate.identification.assessment import FitFile, StoredVerdict
-from swashplate.identification.discrepancy import ClassError, PredictionError
+from swashplate.identification.diagnostics.discrepancy import ClassError, PredictionError
 from swashplate.report.scene import write_judgment, write_scene
 
 HEADLINES = {

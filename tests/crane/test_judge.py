@@ -32,8 +32,8 @@ from swashplate.crane.studies.outcome import STOPPED
 from swashplate.errors import InputError, ParameterError
 from swashplate.executors import Processes, Serial, Threads
 from swashplate.identification.assessment import Identification
+from swashplate.identification.estimation.setup import Free, Setup, load_setup
 from swashplate.identification.fitting import fit
-from swashplate.identification.setup import Free, Setup, load_setup
 from swashplate.maneuvers import source_tests
 from swashplate.simulation.result import Limit
 

@@ -13,10 +13,15 @@ from swashplate import Campaign, Channel, Experiment
 from swashplate.campaign import rig
 from swashplate.campaign.experiment import InputSignal, Source
 from swashplate.executors import Serial
-from swashplate.identification.arrow import Block
-from swashplate.identification.problem import TOLERANCE, LinearisedFit, LinearisedRun, factor_of
-from swashplate.identification.setup import Setup
-from swashplate.identification.unknowns import Unknown, Unknowns
+from swashplate.identification.estimation.arrow import Block
+from swashplate.identification.estimation.problem import (
+    TOLERANCE,
+    LinearisedFit,
+    LinearisedRun,
+    factor_of,
+)
+from swashplate.identification.estimation.setup import Setup
+from swashplate.identification.estimation.unknowns import Unknown, Unknowns
 
 UNITS = {
     "voltage": "V",

@@ -7,12 +7,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from tests.identification.given import TIME, bench_run
 
-from swashplate.identification.arrow import Block, arrow_factor, whitening
-from swashplate.identification.intervals import uncertainty
-from swashplate.identification.model import Linearised
-from swashplate.identification.problem import Problem, linearised_fit
-from swashplate.identification.solving import solve
-from swashplate.identification.unknowns import Unknown, Unknowns
+from swashplate.identification.estimation.arrow import Block, arrow_factor, whitening
+from swashplate.identification.estimation.model import Linearised
+from swashplate.identification.estimation.problem import Problem, linearised_fit
+from swashplate.identification.estimation.solving import solve
+from swashplate.identification.estimation.unknowns import Unknown, Unknowns
+from swashplate.identification.statistics.intervals import uncertainty
 
 TOLERANCE = 1e-10
 
@@ -105,7 +105,7 @@ class Level:
 
 def test_memory_does_not_grow_with_runs_times_unknowns(monkeypatch) -> None:
     """200 runs with a free zero each: all derivatives together would be 26 MB."""
-    monkeypatch.setattr("swashplate.identification.problem.KEPT", 1e5)
+    monkeypatch.setattr("swashplate.identification.estimation.problem.KEPT", 1e5)
     rng, count = np.random.default_rng(1), 200
     levels = rng.uniform(1.0, 2.0, count)
     runs = [

@@ -8,9 +8,9 @@ from tests.identification.given import model_of, run_of
 
 from swashplate import Drive
 from swashplate.campaign import Experiment
-from swashplate.identification.between_samples import doubt, joined
+from swashplate.identification.estimation.between_samples import doubt, joined
+from swashplate.identification.estimation.stages import configuration, smooth
 from swashplate.identification.fitting import fit
-from swashplate.identification.stages import configuration, smooth
 from swashplate.maneuvers import sine, step
 
 RATE = 128.0

@@ -9,10 +9,10 @@ import pytest
 
 from swashplate import Campaign, Drive
 from swashplate.campaign import rig
-from swashplate.identification.causes import behind_lag
+from swashplate.identification.diagnostics.causes import behind_lag
+from swashplate.identification.diagnostics.judging import Verdict, verdict
+from swashplate.identification.estimation.setup import load_setup
 from swashplate.identification.fitting import Fit, fit
-from swashplate.identification.judging import Verdict, verdict
-from swashplate.identification.setup import load_setup
 from swashplate.identification.validation import predict
 from swashplate.maneuvers import ramp, sine, step
 

@@ -9,14 +9,14 @@ from tests.identification.given import run_of, virtual
 
 from swashplate import Campaign, Drive, Experiment, InputError, maneuvers
 from swashplate.campaign import guess_drive
-from swashplate.identification.data_checks import (
+from swashplate.identification.diagnostics.data_checks import (
     Finding,
     check_runs,
     refuse_unsound,
 )
+from swashplate.identification.estimation.setup import Free, Setup, Stage
+from swashplate.identification.estimation.stages import smooth
 from swashplate.identification.fitting import fit
-from swashplate.identification.setup import Free, Setup, Stage
-from swashplate.identification.stages import smooth
 
 NOMINAL = smooth(Drive.preset("hoist").parameters)
 TRUTH = Drive(NOMINAL).scale(Z10=1.1)

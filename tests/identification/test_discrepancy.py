@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from tests.identification.given import TIME, bench_run, linear_fit, unknowns_of
 
-from swashplate.identification.discrepancy import (
+from swashplate.identification.diagnostics.discrepancy import (
     Cell,
     PredictionError,
     Record,
@@ -20,7 +20,7 @@ from swashplate.identification.discrepancy import (
     record_of,
     variance_function,
 )
-from swashplate.identification.problem import LinearisedRun
+from swashplate.identification.estimation.problem import LinearisedRun
 from swashplate.identification.validation import RunQuality, compared
 
 STEP = 0.01

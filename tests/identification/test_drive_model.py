@@ -8,17 +8,17 @@ from tests.identification.given import TWO_STAGES, run_of, virtual
 
 from swashplate import Campaign, Drive, Experiment, InputError
 from swashplate.campaign.experiment import InputSignal
-from swashplate.identification.determination import bounds_reached
-from swashplate.identification.drive_model import (
+from swashplate.identification.estimation.drive_model import (
     DriveModel,
     at_rate_of,
     measured_current,
     simulated_current,
 )
+from swashplate.identification.estimation.setup import Free, Setup, Stage, load_setup
+from swashplate.identification.estimation.stages import smooth, stage_problem, start_currents_of
+from swashplate.identification.estimation.unknowns import Unknown
 from swashplate.identification.fitting import fit
-from swashplate.identification.setup import Free, Setup, Stage, load_setup
-from swashplate.identification.stages import smooth, stage_problem, start_currents_of
-from swashplate.identification.unknowns import Unknown
+from swashplate.identification.statistics.determination import bounds_reached
 from swashplate.identification.validation import at_instants, predict
 from swashplate.maneuvers import source_tests, step
 

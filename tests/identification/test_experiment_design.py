@@ -8,11 +8,15 @@ import pytest
 from tests.identification.given import run_of, unknowns_of, virtual
 
 from swashplate import Campaign, Drive, Experiment, InputError, maneuvers
-from swashplate.identification.determination import (
+from swashplate.identification.estimation.setup import Forces, Free, Setup, Stage, load_setup
+from swashplate.identification.estimation.stages import smooth
+from swashplate.identification.estimation.unknowns import Prior
+from swashplate.identification.fitting import fit
+from swashplate.identification.statistics.determination import (
     Identifiability,
     identifiability,
 )
-from swashplate.identification.experiment_design import (
+from swashplate.identification.statistics.experiment_design import (
     MEMORY,
     Candidate,
     Outlook,
@@ -25,11 +29,7 @@ from swashplate.identification.experiment_design import (
     in_turn,
     outlook,
 )
-from swashplate.identification.fitting import fit
-from swashplate.identification.intervals import uncertainty_of
-from swashplate.identification.setup import Forces, Free, Setup, Stage, load_setup
-from swashplate.identification.stages import smooth
-from swashplate.identification.unknowns import Prior
+from swashplate.identification.statistics.intervals import uncertainty_of
 from swashplate.maneuvers import sine, step
 
 AB = unknowns_of("ab", np.ones(2))

@@ -25,7 +25,7 @@ from swashplate import (
 )
 from swashplate.equations import Model
 from swashplate.identification import ModelSetup, Search, fit, load_setup
-from swashplate.identification.setup import Free, setup_text
+from swashplate.identification.estimation.setup import Free, setup_text
 
 TRUTH = {"J_plus": 0.26, "J_minus": 0.31, "Z10": 13.0}
 

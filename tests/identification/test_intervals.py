@@ -19,8 +19,19 @@ from tests.identification.test_own_model import NOISE, RANGES, RUNS, servo
 
 from swashplate import Campaign, DomainError, Drive, InputError, ParameterError
 from swashplate.identification import ModelSetup, fit
-from swashplate.identification.interval_ends import checked_ends
-from swashplate.identification.intervals import (
+from swashplate.identification.estimation.problem import (
+    LinearisedRun,
+    Loss,
+    Problem,
+    influence,
+    linearised_fit,
+)
+from swashplate.identification.estimation.setup import Setup, load_setup, setup_text
+from swashplate.identification.estimation.solving import solve
+from swashplate.identification.estimation.unknowns import Prior, Unknown, Unknowns
+from swashplate.identification.noise import Covariance
+from swashplate.identification.statistics.interval_ends import checked_ends
+from swashplate.identification.statistics.intervals import (
     Handed,
     estimates,
     prior_sentences,
@@ -30,18 +41,7 @@ from swashplate.identification.intervals import (
     weighed,
     with_handed,
 )
-from swashplate.identification.noise import Covariance
-from swashplate.identification.problem import (
-    LinearisedRun,
-    Loss,
-    Problem,
-    influence,
-    linearised_fit,
-)
-from swashplate.identification.profiles import profile
-from swashplate.identification.setup import Setup, load_setup, setup_text
-from swashplate.identification.solving import solve
-from swashplate.identification.unknowns import Prior, Unknown, Unknowns
+from swashplate.identification.statistics.profiles import profile
 from swashplate.maneuvers import source_tests
 
 

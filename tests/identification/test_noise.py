@@ -7,14 +7,14 @@ from scipy.stats import t as student
 from tests.identification.given import first_order, linear_fit, unknowns_of
 
 from swashplate.identification import uncertainty
+from swashplate.identification.estimation.problem import LinearisedFit, LinearisedRun
+from swashplate.identification.estimation.unknowns import Unknown, Unknowns
 from swashplate.identification.noise import (
     NoiseColour,
     band_score_covariance,
     noise_colours,
     spectral_covariance,
 )
-from swashplate.identification.problem import LinearisedFit, LinearisedRun
-from swashplate.identification.unknowns import Unknown, Unknowns
 
 RUNS, N, RATE = 4, 4096, 512.0
 TIME = np.arange(N) / RATE

@@ -37,8 +37,8 @@ from swashplate.identification import (
     solve,
     verdict,
 )
-from swashplate.identification.intervals import uncertainty_of
-from swashplate.identification.model import linearised
+from swashplate.identification.estimation.model import linearised
+from swashplate.identification.statistics.intervals import uncertainty_of
 
 RATE = 20.0
 TIME = np.arange(240) / RATE

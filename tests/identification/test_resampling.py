@@ -16,20 +16,20 @@ from tests.identification.given import (
 )
 
 from swashplate import Campaign, Drive, Experiment, InputError
+from swashplate.identification.estimation.problem import Problem
+from swashplate.identification.estimation.setup import Free, Stage
+from swashplate.identification.estimation.solving import solve
+from swashplate.identification.estimation.unknowns import Unknown, Unknowns
 from swashplate.identification.fitting import fit
-from swashplate.identification.intervals import uncertainty_of
-from swashplate.identification.problem import Problem
-from swashplate.identification.profiles import profiles_of
 from swashplate.identification.resampling import (
     CrossValidation,
     Fold,
     cross_validate,
     deal,
 )
-from swashplate.identification.setup import Free, Stage
-from swashplate.identification.solving import solve
 from swashplate.identification.stage_fit import StageFit
-from swashplate.identification.unknowns import Unknown, Unknowns
+from swashplate.identification.statistics.intervals import uncertainty_of
+from swashplate.identification.statistics.profiles import profiles_of
 from swashplate.identification.validation import predict
 from swashplate.parameters.files import load_preset
 

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from tests.identification.given import bench_run, run_of
 
-from swashplate.identification.data_checks import Finding, clipped_channels
-from swashplate.identification.soundness import outlying_runs
+from swashplate.identification.diagnostics.data_checks import Finding, clipped_channels
+from swashplate.identification.diagnostics.soundness import outlying_runs
 from swashplate.identification.validation import RunQuality, compared
 
 TIME = np.arange(2000) * 0.01

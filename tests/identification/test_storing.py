@@ -12,11 +12,11 @@ from tests.identification.given import TWO_STAGES, put
 
 from swashplate import Campaign, Drive, FileError, InputError, ParameterError
 from swashplate.identification.assessment import Identification
+from swashplate.identification.estimation.solving import Solution
 from swashplate.identification.fitting import Fit, fingerprint, fit
-from swashplate.identification.interval_ends import Point
-from swashplate.identification.profiles import Profile
 from swashplate.identification.resampling import CrossValidation, Fold
-from swashplate.identification.solving import Solution
+from swashplate.identification.statistics.interval_ends import Point
+from swashplate.identification.statistics.profiles import Profile
 from swashplate.identification.validation import Measures
 from swashplate.locks import locked
 
@@ -69,7 +69,11 @@ def test_a_fit_comes_back_as_it_was(path: Path, campaign: Campaign, fitted: Fit)
             assert np.array_equal(getattr(ours.solution, name), value), name
 
 
-COMPUTED = ("intervals.effects_of", "intervals.uncertainty", "assessment.verdict")
+COMPUTED = (
+    "statistics.intervals.effects_of",
+    "statistics.intervals.uncertainty",
+    "assessment.verdict",
+)
 
 
 def test_what_is_stored_is_not_computed_again(path, campaign, fitted, monkeypatch) -> None:

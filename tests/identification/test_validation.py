@@ -10,7 +10,7 @@ from tests.identification.given import bench_run, first_order, run_of, virtual
 
 from swashplate import Campaign, Drive, InputError, maneuvers
 from swashplate.campaign import rig
-from swashplate.identification.judging import verdict
+from swashplate.identification.diagnostics.judging import verdict
 from swashplate.identification.validation import (
     compared,
     ignored_windows,

@@ -8,11 +8,11 @@ from tests.identification.given import RISE, TIME, bench_run, risen, run_of
 
 from swashplate import Drive
 from swashplate.identification import Verdict, verdict
-from swashplate.identification.problem import Problem
-from swashplate.identification.setup import Stage
-from swashplate.identification.solving import solve
+from swashplate.identification.estimation.problem import Problem
+from swashplate.identification.estimation.setup import Stage
+from swashplate.identification.estimation.solving import solve
+from swashplate.identification.estimation.unknowns import Unknown, Unknowns
 from swashplate.identification.stage_fit import Interval, StageFit
-from swashplate.identification.unknowns import Unknown, Unknowns
 from swashplate.identification.validation import RunQuality, compared
 
 WAVE = 10.0 * np.sin(2.0 * np.pi * TIME / 4.0)

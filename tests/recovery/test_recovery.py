@@ -10,14 +10,14 @@ from tests.identification.given import run_of, virtual
 from swashplate import Campaign, DomainError, Drive, FullOrderDrive, ParameterError, maneuvers
 from swashplate.campaign import ChannelKind
 from swashplate.campaign.experiment import Experiment
+from swashplate.identification.estimation.model import Linearised
+from swashplate.identification.estimation.problem import Problem, linearised_fit
+from swashplate.identification.estimation.setup import Free, Setup, Stage, load_setup
+from swashplate.identification.estimation.solving import solve
+from swashplate.identification.estimation.unknowns import Unknown, Unknowns
 from swashplate.identification.fitting import Fit, drawn, fit
-from swashplate.identification.intervals import uncertainty
-from swashplate.identification.model import Linearised
-from swashplate.identification.problem import Problem, linearised_fit
-from swashplate.identification.setup import Free, Setup, Stage, load_setup
-from swashplate.identification.solving import solve
 from swashplate.identification.stage_fit import StageFit
-from swashplate.identification.unknowns import Unknown, Unknowns
+from swashplate.identification.statistics.intervals import uncertainty
 from swashplate.parameters import OPTIONS, REFINEMENTS
 
 AXES = ("hoist", "slew", "luff")

@@ -20,14 +20,14 @@ from tests.report.conftest import injected, policy_of, with_script
 from swashplate import Campaign, Drive, FileError, InputError, maneuvers
 from swashplate.identification import verdict
 from swashplate.identification.assessment import Identification
-from swashplate.identification.causes import Cause
+from swashplate.identification.diagnostics.causes import Cause
+from swashplate.identification.estimation.setup import Setup
+from swashplate.identification.estimation.solving import Solution
 from swashplate.identification.fitting import Fit, fit
-from swashplate.identification.interval_ends import Point
-from swashplate.identification.intervals import uncertainty_of
-from swashplate.identification.profiles import Profile
 from swashplate.identification.resampling import CrossValidation, Fold
-from swashplate.identification.setup import Setup
-from swashplate.identification.solving import Solution
+from swashplate.identification.statistics.interval_ends import Point
+from swashplate.identification.statistics.intervals import uncertainty_of
+from swashplate.identification.statistics.profiles import Profile
 from swashplate.identification.validation import Measures, predict, with_speeds
 from swashplate.maneuvers import parse
 from swashplate.report.fit_report import (

@@ -14,9 +14,9 @@ from swashplate import Drive, Experiment, maneuvers
 from swashplate.analysis import envelope, standard_errors, variances_from_bounds
 from swashplate.campaign import fit_configuration, guess_drive, guess_table, guessed_set
 from swashplate.identification import verdict
-from swashplate.identification.determination import identifiability_of
+from swashplate.identification.estimation.setup import Free, Setup
 from swashplate.identification.fitting import Fit, fit
-from swashplate.identification.setup import Free, Setup
+from swashplate.identification.statistics.determination import identifiability_of
 from swashplate.identification.validation import predict
 from swashplate.report.fit_report.summary import largest_commands, numbers_of, numbers_table
 from swashplate.tables import Cell

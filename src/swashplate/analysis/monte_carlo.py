@@ -16,12 +16,12 @@ from swashplate.analysis.whatif import pulled
 from swashplate.drive import Drive
 from swashplate.errors import DomainError, InputError, ParameterError
 from swashplate.identification.assessment import Identification
-from swashplate.identification.determination import identifiability_of
-from swashplate.identification.drive_model import LIMIT_COLUMNS, DriveModel
-from swashplate.identification.effects import effect_of_fixed, slopes_by
-from swashplate.identification.intervals import uncertainty_of
-from swashplate.identification.setup import Forces
+from swashplate.identification.estimation.drive_model import LIMIT_COLUMNS, DriveModel
+from swashplate.identification.estimation.setup import Forces
 from swashplate.identification.stage_fit import StageFit
+from swashplate.identification.statistics.determination import identifiability_of
+from swashplate.identification.statistics.effects import effect_of_fixed, slopes_by
+from swashplate.identification.statistics.intervals import uncertainty_of
 from swashplate.parameters.parameter_set import ParameterSet
 from swashplate.parameters.rules import FULL_VOLTAGE
 from swashplate.results import Result

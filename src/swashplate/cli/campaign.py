@@ -145,7 +145,7 @@ def check(path: Path = CAMPAIGN, *, strict: bool = False) -> None:
       swashplate campaign check harbour/campaign.toml --strict
     """
     from swashplate import campaign as tests
-    from swashplate.identification.data_checks import beside_the_drives
+    from swashplate.identification.diagnostics.data_checks import beside_the_drives
 
     words.check_kind(path, "campaign")
     with working(f"Reading {path}"):
@@ -210,7 +210,7 @@ def plot(
     """
     from swashplate.campaign import Campaign
     from swashplate.identification import predict
-    from swashplate.identification.drive_model import SIGNALS
+    from swashplate.identification.estimation.drive_model import SIGNALS
 
     with working(f"Reading {path}"):
         campaign = Campaign.from_toml(path)
@@ -387,9 +387,9 @@ def excitation(
       swashplate excitation harbour/campaign.toml --setup mine.toml --from worn.toml
       swashplate excitation harbour/campaign.toml --out runs.csv
     """
-    from swashplate.identification.data_checks import check_runs, refuse_unsound
-    from swashplate.identification.experiment_design import outlook
-    from swashplate.identification.stages import smooth
+    from swashplate.identification.diagnostics.data_checks import check_runs, refuse_unsound
+    from swashplate.identification.estimation.stages import smooth
+    from swashplate.identification.statistics.experiment_design import outlook
 
     with working(f"Reading {path}"):
         _, runs, plan, drive = words.fit_of(path, axis, setup, begin)
@@ -445,9 +445,9 @@ def advise(
     """
     from swashplate.campaign import KINDS
     from swashplate.drive import Drive
-    from swashplate.identification import experiment_design as design
-    from swashplate.identification.setup import load_setup
-    from swashplate.identification.stages import smooth
+    from swashplate.identification.estimation.setup import load_setup
+    from swashplate.identification.estimation.stages import smooth
+    from swashplate.identification.statistics import experiment_design as design
 
     tested = words.file_kind(Path(word)) == "campaign"
     fitted = words.drive_file(drive or word) if drive or not tested else None

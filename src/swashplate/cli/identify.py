@@ -30,8 +30,8 @@ from swashplate.tables import PRINTED, TABLE, check_folder, joined, made_folder
 
 if TYPE_CHECKING:
     from swashplate.identification.assessment import Identification
-    from swashplate.identification.judging import Verdict
-    from swashplate.identification.stages import Parameters
+    from swashplate.identification.diagnostics.judging import Verdict
+    from swashplate.identification.estimation.stages import Parameters
     from swashplate.parameters.parameter_set import ParameterSet
 
 INTERRUPTED = 130
@@ -267,8 +267,8 @@ def validate(
     """
     from swashplate.identification import tables
     from swashplate.identification.assessment import versions
-    from swashplate.identification.data_checks import refuse_unsound, spike_findings
-    from swashplate.identification.judging import verdict
+    from swashplate.identification.diagnostics.data_checks import refuse_unsound, spike_findings
+    from swashplate.identification.diagnostics.judging import verdict
     from swashplate.identification.validation import predict, with_speeds
 
     if out is not None:
@@ -390,9 +390,9 @@ def demo(*, out: Path = Path("demo"), seed: int = 1) -> None:
     from swashplate.campaign import Campaign, rig
     from swashplate.drive import Drive
     from swashplate.identification import tables
+    from swashplate.identification.estimation.setup import load_setup
     from swashplate.identification.fitting import drawn
     from swashplate.identification.identifying import identify
-    from swashplate.identification.setup import load_setup
     from swashplate.identification.validation import with_speeds
     from swashplate.report.figures import plot_channel, save_figure
 

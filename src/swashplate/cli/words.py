@@ -20,8 +20,8 @@ if TYPE_CHECKING:
     from swashplate.campaign import Campaign, Experiment
     from swashplate.cli.options import Sampling
     from swashplate.drive import Drive
-    from swashplate.identification.model_setup import ModelSetup
-    from swashplate.identification.setup import Setup
+    from swashplate.identification.estimation.model_setup import ModelSetup
+    from swashplate.identification.estimation.setup import Setup
     from swashplate.maneuvers import Maneuver
     from swashplate.parameters.parameter_set import Change, ParameterSet
     from swashplate.simulation.result import Array, Simulation
@@ -98,8 +98,8 @@ def fit_of(
     path: Path, axis: str | None, setup: str | None, begin: str | None
 ) -> tuple[Campaign, tuple[Experiment, ...], Setup, ParameterSet]:
     """What a fit is about: campaign, runs to fit, what is free, and the drive it begins at."""
+    from swashplate.identification.estimation.stages import setup_of
     from swashplate.identification.identifying import runs_to_fit
-    from swashplate.identification.stages import setup_of
 
     campaign, chosen = campaign_of(path, axis)
     start = campaign.drive(chosen).parameters if begin is None else parameters_of(begin)
@@ -130,7 +130,7 @@ def parameters_of(word: str) -> ParameterSet:
 def model_parameters_of(folder: str, file: Path, runs: Sequence[Experiment]) -> ModelSetup:
     """A model of one's own with the numbers that a fit wrote into its folder."""
     from swashplate.equations.fields import is_real
-    from swashplate.identification.model_setup import ModelSetup
+    from swashplate.identification.estimation.model_setup import ModelSetup
 
     setup = ModelSetup.from_file(file)
     place = Path(folder) / NUMBERS if Path(folder).is_dir() else Path(folder)

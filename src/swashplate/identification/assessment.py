@@ -24,6 +24,13 @@ from swashplate.documents import read_json
 from swashplate.drive import Drive
 from swashplate.errors import DomainError, FileError, InputError, MissingFileError
 from swashplate.identification import tables
+from swashplate.identification.diagnostics.judging import REQUIRED, Verdict, verdict
+from swashplate.identification.estimation.model_setup import ModelSetup
+from swashplate.identification.estimation.problem import Problem
+from swashplate.identification.estimation.setup import Setup, Stage, setup_text
+from swashplate.identification.estimation.solving import Solution
+from swashplate.identification.estimation.stages import Parameters
+from swashplate.identification.estimation.unknowns import Unknown, Unknowns
 from swashplate.identification.fitting import (
     Estimated,
     Fit,
@@ -31,22 +38,15 @@ from swashplate.identification.fitting import (
     fingerprint,
     staged,
 )
-from swashplate.identification.intervals import (
+from swashplate.identification.resampling import CrossValidation, folds_tables
+from swashplate.identification.stage_fit import Interval, StageFit
+from swashplate.identification.statistics.intervals import (
     Estimate,
     estimates_of,
     intervals_of,
     unseen_limits,
 )
-from swashplate.identification.judging import REQUIRED, Verdict, verdict
-from swashplate.identification.model_setup import ModelSetup
-from swashplate.identification.problem import Problem
-from swashplate.identification.profiles import Profile
-from swashplate.identification.resampling import CrossValidation, folds_tables
-from swashplate.identification.setup import Setup, Stage, setup_text
-from swashplate.identification.solving import Solution
-from swashplate.identification.stage_fit import Interval, StageFit
-from swashplate.identification.stages import Parameters
-from swashplate.identification.unknowns import Unknown, Unknowns
+from swashplate.identification.statistics.profiles import Profile
 from swashplate.identification.validation import RunQuality, predict
 from swashplate.locks import locked
 from swashplate.parameters.definitions import find

@@ -24,8 +24,7 @@ from swashplate.equations import Model as Equations
 from swashplate.errors import InputError, UnknownNameError
 from swashplate.executors import Executor, Serial
 from swashplate.identification import tables
-from swashplate.identification.between_samples import settle
-from swashplate.identification.data_checks import (
+from swashplate.identification.diagnostics.data_checks import (
     check_model,
     check_rank,
     check_runs,
@@ -33,15 +32,20 @@ from swashplate.identification.data_checks import (
     spike_findings,
     unfitted_currents,
 )
-from swashplate.identification.drive_model import DriveModel, with_card_filter
-from swashplate.identification.intervals import Estimate, uncertainty_of, weighed
-from swashplate.identification.model import EquationModel, Model, OwnModel
-from swashplate.identification.model_setup import ModelSetup
-from swashplate.identification.problem import Loss, Problem
-from swashplate.identification.setup import FreeParameters, Setup, Stage
-from swashplate.identification.solving import Progress, Solution, sobol_starts, solve, solve_from
-from swashplate.identification.stage_fit import Interval, StageFit
-from swashplate.identification.stages import (
+from swashplate.identification.estimation.between_samples import settle
+from swashplate.identification.estimation.drive_model import DriveModel, with_card_filter
+from swashplate.identification.estimation.model import EquationModel, Model, OwnModel
+from swashplate.identification.estimation.model_setup import ModelSetup
+from swashplate.identification.estimation.problem import Loss, Problem
+from swashplate.identification.estimation.setup import FreeParameters, Setup, Stage
+from swashplate.identification.estimation.solving import (
+    Progress,
+    Solution,
+    sobol_starts,
+    solve,
+    solve_from,
+)
+from swashplate.identification.estimation.stages import (
     Parameters,
     configuration,
     smooth,
@@ -49,7 +53,9 @@ from swashplate.identification.stages import (
     start_currents_of,
     with_estimates,
 )
-from swashplate.identification.unknowns import Prior
+from swashplate.identification.estimation.unknowns import Prior
+from swashplate.identification.stage_fit import Interval, StageFit
+from swashplate.identification.statistics.intervals import Estimate, uncertainty_of, weighed
 from swashplate.parameters.definitions import columns_of
 from swashplate.parameters.parameter_set import ParameterSet
 from swashplate.parameters.rules import SIDES

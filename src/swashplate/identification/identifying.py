@@ -18,18 +18,18 @@ from swashplate.equations.fields import is_real
 from swashplate.errors import InputError, InputTypeError
 from swashplate.executors import Executor, Serial
 from swashplate.identification.assessment import Identification, versions
-from swashplate.identification.between_samples import doubt
-from swashplate.identification.data_checks import refuse_unsound, spike_findings
+from swashplate.identification.diagnostics.data_checks import refuse_unsound, spike_findings
+from swashplate.identification.diagnostics.judging import REQUIRED
+from swashplate.identification.estimation.between_samples import doubt
+from swashplate.identification.estimation.model import Model
+from swashplate.identification.estimation.model_setup import ModelSetup
+from swashplate.identification.estimation.problem import Loss
+from swashplate.identification.estimation.setup import FreeParameters, Setup
+from swashplate.identification.estimation.stages import Parameters, setup_of
 from swashplate.identification.fitting import Fit, Search, fit
-from swashplate.identification.judging import REQUIRED
-from swashplate.identification.model import Model
-from swashplate.identification.model_setup import ModelSetup
-from swashplate.identification.problem import Loss
-from swashplate.identification.profiles import Profile, profiles_of
 from swashplate.identification.resampling import cross_validate
-from swashplate.identification.setup import FreeParameters, Setup
 from swashplate.identification.stage_fit import StageFit
-from swashplate.identification.stages import Parameters, setup_of
+from swashplate.identification.statistics.profiles import Profile, profiles_of
 from swashplate.parameters.files import named_set
 from swashplate.parameters.parameter_set import ParameterSet
 

@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.fft import irfft, next_fast_len, rfft, rfftfreq
 
-from swashplate.identification.problem import LinearisedFit, LinearisedRun
-from swashplate.identification.unknowns import Unknowns
+from swashplate.identification.estimation.problem import LinearisedFit, LinearisedRun
+from swashplate.identification.estimation.unknowns import Unknowns
 from swashplate.results import Result
 
 Array = NDArray[np.float64]

@@ -12,12 +12,12 @@ from numpy.typing import NDArray
 from swashplate.campaign.experiment import Experiment
 from swashplate.errors import DomainError, InputError
 from swashplate.executors import Executor, Serial
+from swashplate.identification.estimation.problem import Loss
+from swashplate.identification.estimation.setup import Setup
+from swashplate.identification.estimation.solving import NO_EFFECT
+from swashplate.identification.estimation.stages import Parameters
 from swashplate.identification.fitting import Search, fit
-from swashplate.identification.problem import Loss
-from swashplate.identification.setup import Setup
-from swashplate.identification.solving import NO_EFFECT
 from swashplate.identification.stage_fit import StageFit
-from swashplate.identification.stages import Parameters
 from swashplate.identification.validation import (
     Measures,
     measures,

@@ -14,11 +14,11 @@ from typing import Any, Literal, NamedTuple, TypeVar, cast
 
 from swashplate.drive import Drive
 from swashplate.errors import InputError
-from swashplate.identification.model_setup import ModelSetup
-from swashplate.identification.problem import LinearisedFit, Problem, linearised_fit
-from swashplate.identification.setup import Stage
-from swashplate.identification.solving import Solution
-from swashplate.identification.stages import Parameters
+from swashplate.identification.estimation.model_setup import ModelSetup
+from swashplate.identification.estimation.problem import LinearisedFit, Problem, linearised_fit
+from swashplate.identification.estimation.setup import Stage
+from swashplate.identification.estimation.solving import Solution
+from swashplate.identification.estimation.stages import Parameters
 from swashplate.identification.validation import RunQuality, run_qualities
 from swashplate.results import Result
 

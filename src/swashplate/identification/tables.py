@@ -10,20 +10,20 @@ from math import inf
 from typing import NamedTuple
 
 from swashplate.campaign.experiment import Channel, Experiment
-from swashplate.identification.determination import (
+from swashplate.identification.estimation.drive_model import DriveModel, true_value
+from swashplate.identification.estimation.model_setup import ModelSetup
+from swashplate.identification.estimation.stages import Parameters
+from swashplate.identification.estimation.unknowns import Kind, Unknown
+from swashplate.identification.noise import LEVEL
+from swashplate.identification.stage_fit import Interval, StageFit, Status
+from swashplate.identification.statistics.determination import (
     GAUGES,
     bounds_reached,
     identifiability_of,
     without_value,
 )
-from swashplate.identification.drive_model import DriveModel, true_value
-from swashplate.identification.intervals import Estimate, estimates_of, uncertainty_of
-from swashplate.identification.model_setup import ModelSetup
-from swashplate.identification.noise import LEVEL
-from swashplate.identification.profiles import Profile
-from swashplate.identification.stage_fit import Interval, StageFit, Status
-from swashplate.identification.stages import Parameters
-from swashplate.identification.unknowns import Kind, Unknown
+from swashplate.identification.statistics.intervals import Estimate, estimates_of, uncertainty_of
+from swashplate.identification.statistics.profiles import Profile
 from swashplate.identification.validation import (
     Measures,
     RunQuality,

@@ -13,12 +13,17 @@ from scipy.fft import irfft, next_fast_len, rfft
 from swashplate.campaign.experiment import Channel, Experiment
 from swashplate.campaign.speed import DIFFERENTIATOR, speed_from_angle, speed_of
 from swashplate.errors import InputError
-from swashplate.identification.drive_model import SIGNALS, DriveModel, edges_problem, with_edges
-from swashplate.identification.model_setup import ModelSetup
+from swashplate.identification.estimation.drive_model import (
+    SIGNALS,
+    DriveModel,
+    edges_problem,
+    with_edges,
+)
+from swashplate.identification.estimation.model_setup import ModelSetup
+from swashplate.identification.estimation.problem import Problem
+from swashplate.identification.estimation.solving import solve
+from swashplate.identification.estimation.stages import Parameters
 from swashplate.identification.noise import LONGEST, Grid, correlation_length, grid_of, pair_sums
-from swashplate.identification.problem import Problem
-from swashplate.identification.solving import solve
-from swashplate.identification.stages import Parameters
 from swashplate.parameters.parameter_set import HasParameters, ParameterSet, set_of
 from swashplate.results import Result, figures
 

@@ -8,8 +8,8 @@ import numpy as np
 from markupsafe import Markup
 from numpy.typing import NDArray
 
-from swashplate.identification.profiles import Profile
-from swashplate.identification.unknowns import Unknown
+from swashplate.identification.estimation.unknowns import Unknown
+from swashplate.identification.statistics.profiles import Profile
 from swashplate.report.lines import thinned
 
 Array = NDArray[np.float64]

@@ -16,16 +16,16 @@ from swashplate.drive import Drive
 from swashplate.errors import InputError
 from swashplate.identification import tables
 from swashplate.identification.assessment import Identification, motion_of
-from swashplate.identification.determination import Identifiability, identifiability_of
+from swashplate.identification.diagnostics.judging import Verdict, starts_of, verdict
+from swashplate.identification.estimation.model_setup import ModelSetup
+from swashplate.identification.estimation.solving import Solution
+from swashplate.identification.estimation.stages import Parameters
 from swashplate.identification.fitting import Fit
-from swashplate.identification.intervals import uncertainty_of
-from swashplate.identification.judging import Verdict, starts_of, verdict
-from swashplate.identification.model_setup import ModelSetup
-from swashplate.identification.profiles import Profile
 from swashplate.identification.resampling import CrossValidation, folds_tables
-from swashplate.identification.solving import Solution
 from swashplate.identification.stage_fit import StageFit
-from swashplate.identification.stages import Parameters
+from swashplate.identification.statistics.determination import Identifiability, identifiability_of
+from swashplate.identification.statistics.intervals import uncertainty_of
+from swashplate.identification.statistics.profiles import Profile
 from swashplate.identification.validation import RunQuality, at_instants, percent
 from swashplate.parameters.parameter_set import ParameterSet
 from swashplate.report.fit_report import charts

@@ -20,7 +20,7 @@ from swashplate.equations.marching.record import Record, record_of
 from swashplate.errors import InputError
 from swashplate.export import exported_drive, values_of
 from swashplate.export.libraries import WASM, packaged
-from swashplate.identification.drive_model import SIGNALS, at_rate_of, voltage_record
+from swashplate.identification.estimation.drive_model import SIGNALS, at_rate_of, voltage_record
 from swashplate.identification.validation import at_instants, ignored_windows
 from swashplate.maneuvers import Maneuver
 from swashplate.parameters.parameter_set import HasParameters, Parameter, ParameterSet, set_of

@@ -23,10 +23,10 @@ from swashplate.analysis import (
 from swashplate.campaign import Campaign
 from swashplate.drive import Drive
 from swashplate.errors import SwashplateError
-from swashplate.identification.determination import weak_unknowns
-from swashplate.identification.intervals import unseen_limits
-from swashplate.identification.judging import Verdict
+from swashplate.identification.diagnostics.judging import Verdict
 from swashplate.identification.stage_fit import StageFit
+from swashplate.identification.statistics.determination import weak_unknowns
+from swashplate.identification.statistics.intervals import unseen_limits
 from swashplate.identification.validation import (
     following,
     percent,

@@ -15,8 +15,8 @@ from pydantic import BaseModel, ConfigDict, Field
 from swashplate.documents import read_json
 from swashplate.errors import DomainError, FileError, InputError, SwashplateError
 from swashplate.executors import Executor, Serial
-from swashplate.identification.problem import Evaluation, Loss, Problem
-from swashplate.identification.unknowns import Vector
+from swashplate.identification.estimation.problem import Evaluation, Loss, Problem
+from swashplate.identification.estimation.unknowns import Vector
 from swashplate.progress import counted
 from swashplate.results import Result
 from swashplate.tables import count, made_folder, write_text

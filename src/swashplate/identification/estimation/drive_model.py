@@ -27,10 +27,10 @@ from swashplate.equations.marching.record import (
     record_of,
 )
 from swashplate.errors import DomainError, InputError, ParameterError
-from swashplate.identification.model import Asked, EquationModel
-from swashplate.identification.problem import Problem
-from swashplate.identification.setup import Forces
-from swashplate.identification.unknowns import Prior, Unknown, Unknowns, zero_name
+from swashplate.identification.estimation.model import Asked, EquationModel
+from swashplate.identification.estimation.problem import Problem
+from swashplate.identification.estimation.setup import Forces
+from swashplate.identification.estimation.unknowns import Prior, Unknown, Unknowns, zero_name
 from swashplate.parameters.definitions import is_column
 from swashplate.parameters.parameter_set import ParameterSet
 from swashplate.results import Result

@@ -13,12 +13,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swashplate.errors import InputError
-from swashplate.identification.drive_model import (
+from swashplate.identification.estimation.drive_model import (
     LIMIT_COLUMNS,
     LIMITS,
     limits_unreached,
 )
-from swashplate.identification.effects import (
+from swashplate.identification.estimation.problem import LinearisedFit, Problem, linearised_fit
+from swashplate.identification.estimation.unknowns import Unknowns
+from swashplate.identification.noise import (
+    Covariance,
+    NoiseColour,
+    coloured_noise_covariance,
+    noise_colours,
+    spectral_covariance,
+)
+from swashplate.identification.stage_fit import Interval, StageFit, Status, once_per_stage
+from swashplate.identification.statistics.effects import (
     IN_RUN,
     RunToRun,
     effect_of_fixed,
@@ -27,17 +37,7 @@ from swashplate.identification.effects import (
     slopes_by,
     slopes_by_earlier,
 )
-from swashplate.identification.interval_ends import CheckedEnd, checked_ends
-from swashplate.identification.noise import (
-    Covariance,
-    NoiseColour,
-    coloured_noise_covariance,
-    noise_colours,
-    spectral_covariance,
-)
-from swashplate.identification.problem import LinearisedFit, Problem, linearised_fit
-from swashplate.identification.stage_fit import Interval, StageFit, Status, once_per_stage
-from swashplate.identification.unknowns import Unknowns
+from swashplate.identification.statistics.interval_ends import CheckedEnd, checked_ends
 from swashplate.results import Result, short
 from swashplate.tables import percent
 

@@ -14,18 +14,24 @@ from scipy.linalg import solve_banded
 
 from swashplate.campaign.experiment import Experiment
 from swashplate.errors import DomainError, InputError, ParameterError
-from swashplate.identification.drive_model import (
+from swashplate.identification.estimation.drive_model import (
     CURRENTS,
     DriveModel,
     measured_current,
     simulated_current,
 )
-from swashplate.identification.effects import HYSTERESIS, Changes, RunParts, SimulatedRun, source_of
-from swashplate.identification.model import EquationModel, linearised
-from swashplate.identification.problem import Problem
-from swashplate.identification.solving import Solution, solve
+from swashplate.identification.estimation.model import EquationModel, linearised
+from swashplate.identification.estimation.problem import Problem
+from swashplate.identification.estimation.solving import Solution, solve
+from swashplate.identification.estimation.unknowns import Unknown, Unknowns
 from swashplate.identification.stage_fit import StageFit
-from swashplate.identification.unknowns import Unknown, Unknowns
+from swashplate.identification.statistics.effects import (
+    HYSTERESIS,
+    Changes,
+    RunParts,
+    SimulatedRun,
+    source_of,
+)
 from swashplate.identification.validation import percent
 from swashplate.parameters.definitions import CATALOGUE, COLUMNS, SWITCHES
 from swashplate.results import Result

@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swashplate.errors import DomainError
-from swashplate.identification.drive_model import DriveModel
-from swashplate.identification.problem import TOLERANCE, LinearisedFit, Problem
-from swashplate.identification.solving import solve
-from swashplate.identification.unknowns import Vector
+from swashplate.identification.estimation.drive_model import DriveModel
+from swashplate.identification.estimation.problem import TOLERANCE, LinearisedFit, Problem
+from swashplate.identification.estimation.solving import solve
+from swashplate.identification.estimation.unknowns import Vector
 
 Array = NDArray[np.float64]
 

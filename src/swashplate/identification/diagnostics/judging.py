@@ -10,25 +10,25 @@ from typing import get_args
 
 from swashplate.campaign.experiment import Channel, Experiment
 from swashplate.errors import DomainError, InputError
-from swashplate.identification.causes import Cause, causes_of, fixed_numbers
-from swashplate.identification.data_checks import Finding
-from swashplate.identification.determination import WIDE, weak_unknowns
-from swashplate.identification.discrepancy import (
+from swashplate.identification.diagnostics.causes import Cause, causes_of, fixed_numbers
+from swashplate.identification.diagnostics.data_checks import Finding
+from swashplate.identification.diagnostics.discrepancy import (
     ClassError,
     Motion,
     PredictionError,
     prediction_errors,
 )
-from swashplate.identification.drive_model import (
+from swashplate.identification.diagnostics.soundness import unsound_data
+from swashplate.identification.estimation.drive_model import (
     LIMIT_COLUMNS,
     LIMITS,
     SIGNALS,
     DriveModel,
     limits_reached,
 )
-from swashplate.identification.solving import Solution
-from swashplate.identification.soundness import unsound_data
+from swashplate.identification.estimation.solving import Solution
 from swashplate.identification.stage_fit import StageFit
+from swashplate.identification.statistics.determination import WIDE, weak_unknowns
 from swashplate.identification.validation import RunQuality, percent
 from swashplate.parameters.definitions import COLUMNS
 from swashplate.results import Result, listing

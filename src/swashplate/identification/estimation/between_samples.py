@@ -15,11 +15,11 @@ import numpy as np
 from swashplate.campaign.experiment import Experiment
 from swashplate.campaign.schema import Between
 from swashplate.errors import DomainError
-from swashplate.identification.model import EquationModel
-from swashplate.identification.problem import Loss
-from swashplate.identification.setup import Setup
-from swashplate.identification.solving import solve
-from swashplate.identification.stages import Parameters, stage_problem
+from swashplate.identification.estimation.model import EquationModel
+from swashplate.identification.estimation.problem import Loss
+from swashplate.identification.estimation.setup import Setup
+from swashplate.identification.estimation.solving import solve
+from swashplate.identification.estimation.stages import Parameters, stage_problem
 
 WORDS: Mapping[Between, str] = {
     "linear": "a straight line between samples",

@@ -26,7 +26,7 @@ from swashplate.errors import (
     ParameterError,
     meant,
 )
-from swashplate.identification.unknowns import Prior, Unknown
+from swashplate.identification.estimation.unknowns import Prior, Unknown
 from swashplate.parameters.definitions import find
 from swashplate.parameters.parameter_set import ParameterSet
 from swashplate.parameters.rules import SIDES

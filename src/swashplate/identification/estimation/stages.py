@@ -22,7 +22,7 @@ from swashplate.documents import validated
 from swashplate.drive import Drive
 from swashplate.errors import InputError, UnknownParameterError
 from swashplate.executors import available_cores
-from swashplate.identification.drive_model import (
+from swashplate.identification.estimation.drive_model import (
     CURRENTS,
     MOST_EDGES,
     START_CURRENTS,
@@ -36,9 +36,9 @@ from swashplate.identification.drive_model import (
     simulated_current,
     unknown_instants,
 )
-from swashplate.identification.model_setup import ModelSetup
-from swashplate.identification.problem import Problem, noise_scales
-from swashplate.identification.setup import (
+from swashplate.identification.estimation.model_setup import ModelSetup
+from swashplate.identification.estimation.problem import Problem, noise_scales
+from swashplate.identification.estimation.setup import (
     FreeParameters,
     Setup,
     Stage,
@@ -47,7 +47,7 @@ from swashplate.identification.setup import (
     load_setup,
     setup_names,
 )
-from swashplate.identification.unknowns import Unknown, Unknowns, bounded
+from swashplate.identification.estimation.unknowns import Unknown, Unknowns, bounded
 from swashplate.parameters.definitions import SWITCHES, Definition, columns_of, find
 from swashplate.parameters.parameter_set import ParameterSet
 from swashplate.parameters.plausible import check_plausible

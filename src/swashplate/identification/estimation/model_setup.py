@@ -28,11 +28,17 @@ from swashplate.errors import (
     UnknownNameError,
     meant,
 )
-from swashplate.identification.model import OwnModel, simulated, states_started_by
-from swashplate.identification.problem import Problem, noise_scales
-from swashplate.identification.setup import Free, Setup, Stage, StandardUncertainty, deviation
-from swashplate.identification.solving import solve
-from swashplate.identification.unknowns import Unknown, Unknowns, zero_name
+from swashplate.identification.estimation.model import OwnModel, simulated, states_started_by
+from swashplate.identification.estimation.problem import Problem, noise_scales
+from swashplate.identification.estimation.setup import (
+    Free,
+    Setup,
+    Stage,
+    StandardUncertainty,
+    deviation,
+)
+from swashplate.identification.estimation.solving import solve
+from swashplate.identification.estimation.unknowns import Unknown, Unknowns, zero_name
 from swashplate.parameters.plausible import check_plausible
 from swashplate.results import Result
 

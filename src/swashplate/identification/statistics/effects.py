@@ -16,15 +16,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swashplate.campaign.experiment import Channel, Experiment, resolution_of_inputs
-from swashplate.identification.drive_model import (
+from swashplate.identification.estimation.drive_model import (
     CURRENTS,
     DriveModel,
     measured_current,
     simulated_current,
 )
-from swashplate.identification.model import Model, simulated
-from swashplate.identification.model import linearised as linearised_model
-from swashplate.identification.problem import LinearisedFit, LinearisedRun
+from swashplate.identification.estimation.model import Model, simulated
+from swashplate.identification.estimation.model import linearised as linearised_model
+from swashplate.identification.estimation.problem import LinearisedFit, LinearisedRun
 from swashplate.identification.stage_fit import StageFit
 from swashplate.results import Result
 

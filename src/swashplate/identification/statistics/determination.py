@@ -13,11 +13,11 @@ from numpy.typing import NDArray
 from scipy.linalg import null_space, qr
 
 from swashplate.errors import InputError
-from swashplate.identification.arrow import dense_factor, triangular_factor, whitening
-from swashplate.identification.intervals import estimates_of, uncertainty_of
-from swashplate.identification.problem import TOLERANCE
+from swashplate.identification.estimation.arrow import dense_factor, triangular_factor, whitening
+from swashplate.identification.estimation.problem import TOLERANCE
+from swashplate.identification.estimation.unknowns import Unknown, Unknowns
 from swashplate.identification.stage_fit import StageFit, once_per_stage
-from swashplate.identification.unknowns import Unknown, Unknowns
+from swashplate.identification.statistics.intervals import estimates_of, uncertainty_of
 from swashplate.models.displacement_control import FORCE, MOTION, PRESSURE, TRAVEL, ZERO
 from swashplate.parameters.definitions import CATALOGUE
 from swashplate.results import Result

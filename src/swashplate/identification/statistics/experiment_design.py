@@ -21,20 +21,20 @@ from swashplate.campaign.experiment import Channel, Experiment, InputSignal, Sou
 from swashplate.campaign.rig import COUNTS_PER_TURN
 from swashplate.drive import Drive
 from swashplate.errors import InputError
-from swashplate.identification.arrow import dense_factor, triangular_factor, whitening
-from swashplate.identification.determination import Identifiability, identifiability
-from swashplate.identification.drive_model import CURRENTS, DriveModel
-from swashplate.identification.noise import spectral_covariance
-from swashplate.identification.problem import (
+from swashplate.identification.estimation.arrow import dense_factor, triangular_factor, whitening
+from swashplate.identification.estimation.drive_model import CURRENTS, DriveModel
+from swashplate.identification.estimation.problem import (
     TOLERANCE,
     LinearisedFit,
     Problem,
     factor_of,
     linearised_fit,
 )
-from swashplate.identification.setup import Setup, Stage
-from swashplate.identification.stages import stage_problem
-from swashplate.identification.unknowns import Unknowns
+from swashplate.identification.estimation.setup import Setup, Stage
+from swashplate.identification.estimation.stages import stage_problem
+from swashplate.identification.estimation.unknowns import Unknowns
+from swashplate.identification.noise import spectral_covariance
+from swashplate.identification.statistics.determination import Identifiability, identifiability
 from swashplate.maneuvers import Maneuver, multisine, ramp, sine, stairs, step
 from swashplate.parameters.definitions import CATALOGUE, COLUMNS
 from swashplate.parameters.parameter_set import HasParameters, ParameterSet, set_of

@@ -19,12 +19,17 @@ from swashplate.campaign.quality import (
     wrapped_positions,
 )
 from swashplate.errors import InputError, UnsoundDataError
-from swashplate.identification.drive_model import CURRENTS, SIGNALS, kinds_of, simulated_run
-from swashplate.identification.model import EquationModel
-from swashplate.identification.model_setup import ModelSetup
-from swashplate.identification.problem import Loss, Problem
-from swashplate.identification.setup import Setup
-from swashplate.identification.stages import smooth
+from swashplate.identification.estimation.drive_model import (
+    CURRENTS,
+    SIGNALS,
+    kinds_of,
+    simulated_run,
+)
+from swashplate.identification.estimation.model import EquationModel
+from swashplate.identification.estimation.model_setup import ModelSetup
+from swashplate.identification.estimation.problem import Loss, Problem
+from swashplate.identification.estimation.setup import Setup
+from swashplate.identification.estimation.stages import smooth
 from swashplate.parameters.parameter_set import ParameterSet
 from swashplate.parameters.rules import FULL_VOLTAGE
 from swashplate.tables import count

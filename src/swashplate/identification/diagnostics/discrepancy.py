@@ -22,7 +22,7 @@ from scipy.special import stdtrit
 
 from swashplate.campaign.experiment import Experiment
 from swashplate.campaign.recognition import UNNAMED
-from swashplate.identification.problem import LinearisedFit, LinearisedRun
+from swashplate.identification.estimation.problem import LinearisedFit, LinearisedRun
 from swashplate.identification.stage_fit import StageFit
 from swashplate.identification.validation import RunQuality
 from swashplate.results import Result

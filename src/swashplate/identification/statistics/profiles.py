@@ -10,7 +10,10 @@ from numpy.typing import NDArray
 
 from swashplate.errors import InputError
 from swashplate.executors import Executor, Serial
-from swashplate.identification.interval_ends import (
+from swashplate.identification.estimation.problem import Problem
+from swashplate.identification.estimation.unknowns import Unknown
+from swashplate.identification.stage_fit import StageFit
+from swashplate.identification.statistics.interval_ends import (
     Ending,
     Minimise,
     Point,
@@ -18,10 +21,7 @@ from swashplate.identification.interval_ends import (
     minimiser,
     side_of,
 )
-from swashplate.identification.intervals import uncertainty_of
-from swashplate.identification.problem import Problem
-from swashplate.identification.stage_fit import StageFit
-from swashplate.identification.unknowns import Unknown
+from swashplate.identification.statistics.intervals import uncertainty_of
 from swashplate.progress import counted
 from swashplate.results import Result
 from swashplate.tables import UNIT, Column, Table

@@ -14,7 +14,7 @@ from swashplate.campaign.experiment import Channel, Experiment
 from swashplate.equations import Model as OfEquations
 from swashplate.equations.marching.observation import ObservedRecord
 from swashplate.errors import InputError
-from swashplate.identification.arrow import (
+from swashplate.identification.estimation.arrow import (
     ArrowFactor,
     Block,
     Whitening,
@@ -23,7 +23,7 @@ from swashplate.identification.arrow import (
     triangular_factor,
     whitening,
 )
-from swashplate.identification.model import (
+from swashplate.identification.estimation.model import (
     Asked,
     EquationModel,
     Linearised,
@@ -33,7 +33,7 @@ from swashplate.identification.model import (
     part_of,
     simulated,
 )
-from swashplate.identification.unknowns import Unknowns
+from swashplate.identification.estimation.unknowns import Unknowns
 from swashplate.results import Result, short
 from swashplate.tables import count
 

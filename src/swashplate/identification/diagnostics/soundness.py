@@ -10,13 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import stdtrit
 
-from swashplate.identification.data_checks import (
+from swashplate.identification.diagnostics.data_checks import (
     Finding,
     clipped_channels,
     contradicting_runs,
     refusal,
 )
-from swashplate.identification.discrepancy import (
+from swashplate.identification.diagnostics.discrepancy import (
     USUAL_SPREAD,
     WORTH,
     Cell,
@@ -29,7 +29,7 @@ from swashplate.identification.discrepancy import (
     windowed,
     without_runs,
 )
-from swashplate.identification.drive_model import DriveModel
+from swashplate.identification.estimation.drive_model import DriveModel
 from swashplate.identification.stage_fit import StageFit
 from swashplate.identification.validation import RunQuality
 

@@ -1,0 +1,1 @@
+"""How well the unknowns are known: intervals, profiles, identifiability, design of experiments."""
