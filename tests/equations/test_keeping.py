@@ -68,7 +68,7 @@ RUN = """
 import sys
 sys.path.insert(0, sys.argv[1])
 import numpy as np
-import swashplate.equations.tracing as tracing
+import swashplate.equations.code_generation.tracing as tracing
 
 count = [0]
 call = tracing.Trace.call

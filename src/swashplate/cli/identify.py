@@ -65,7 +65,7 @@ class Clock:
     def part(self, name: str) -> Iterator[None]:
         """Count what is done to a part."""
         begun = perf_counter()
-        from swashplate.equations.functions import generating_time
+        from swashplate.equations.code_generation.functions import generating_time
 
         before = generating_time()
         yield

@@ -2,8 +2,8 @@
 
 from math import pi
 
+from swashplate.equations.code_generation.derivatives import declared
 from swashplate.equations.declaration import equation
-from swashplate.equations.derivatives import declared
 
 FADED = 1e-30
 """Value that counts as none: fading on into denormal numbers makes a march at rest 2.5 times as

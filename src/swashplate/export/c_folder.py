@@ -15,12 +15,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swashplate.drive import Drive
+from swashplate.equations.code_generation.printing_c import c_name, comment_line, filled, literal
 from swashplate.equations.fields import declared_by
 from swashplate.equations.marching.record import SOURCE_RATE, check_rate
 from swashplate.equations.marching.run import Instance
 from swashplate.equations.marching.run import instance_of as instance_of_model
 from swashplate.equations.model import Model
-from swashplate.equations.printing_c import c_name, comment_line, filled, literal
 from swashplate.errors import FileError, InputError, InputTypeError
 from swashplate.export.c_source import Exported, interface, numbers
 from swashplate.export.variable_list import DRIVE, DRIVE_WORDS, OWN, References, Words, words_of

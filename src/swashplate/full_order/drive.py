@@ -16,8 +16,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from swashplate import maneuvers
 from swashplate.drive import Drive
+from swashplate.equations.code_generation.derivatives import derive
 from swashplate.equations.declaration import interpreted
-from swashplate.equations.derivatives import derive
 from swashplate.equations.marching.derivatives import jacobian
 from swashplate.equations.marching.observation import every_sample
 from swashplate.equations.marching.record import (

@@ -16,8 +16,8 @@ and C mean the same at every rate.
 from math import cos, exp, inf, pi, sin, sqrt
 from typing import Annotated, NamedTuple
 
+from swashplate.equations.code_generation.derivatives import declared
 from swashplate.equations.declaration import equation
-from swashplate.equations.derivatives import declared
 from swashplate.equations.fields import OFF, Definition, Flag
 from swashplate.equations.library import faded, interpolated, soft_threshold
 from swashplate.equations.model import Window

@@ -16,8 +16,8 @@ term Z6, the plate's own motion, is absent while the plate rests on a stop.
 from math import asin, atan, inf, pi, sin, sqrt, tan
 from typing import Annotated, NamedTuple
 
+from swashplate.equations.code_generation.derivatives import declared
 from swashplate.equations.declaration import equation
-from swashplate.equations.derivatives import declared
 from swashplate.equations.fields import MINUS, OFF, Definition, Flag
 from swashplate.equations.library import TAN_22_5, arctangent, small_arctangent
 

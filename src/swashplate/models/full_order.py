@@ -14,10 +14,10 @@ below 2. Limits are projections: what is beyond a stop is put back on it and sto
 from math import atan, tan
 from typing import NamedTuple
 
+from swashplate.equations.code_generation.loops import repeated, root
 from swashplate.equations.declaration import equation
 from swashplate.equations.fields import OFF, Flag
 from swashplate.equations.library import clipped
-from swashplate.equations.loops import repeated, root
 from swashplate.equations.model import Model, join
 from swashplate.models.card import card
 from swashplate.models.displacement_control import Solenoids, solenoid_force

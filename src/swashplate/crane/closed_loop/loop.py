@@ -53,7 +53,7 @@ from swashplate.crane.rope import (
     set_off,
 )
 from swashplate.equations import Machine, equation, inlined, kernel
-from swashplate.equations.functions import generating
+from swashplate.equations.code_generation.functions import generating
 from swashplate.parameters.rules import FULL_VOLTAGE
 
 Array = NDArray[np.float64]

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from swashplate.equations.functions import generating
+from swashplate.equations.code_generation.functions import generating
 from swashplate.equations.marching.layout import Layout, layout_of, started_by
 from swashplate.equations.marching.observation import ObservedRecord, Own
 from swashplate.equations.marching.pieces import Struct, addresses

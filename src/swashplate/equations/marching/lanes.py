@@ -22,8 +22,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swashplate.equations import graph
+from swashplate.equations.code_generation.functions import generating
+from swashplate.equations.code_generation.printing import (
+    Block,
+    Statement,
+    function_source,
+    indented,
+)
+from swashplate.equations.code_generation.scheduling import VECTOR, all_vector
+from swashplate.equations.code_generation.values import leaves
 from swashplate.equations.declaration import JIT_OFF
-from swashplate.equations.functions import generating
 from swashplate.equations.graph import Node
 from swashplate.equations.keeping import kept, key_of
 from swashplate.equations.marching.march import Sampler, lower, output_of
@@ -31,9 +39,6 @@ from swashplate.equations.marching.part import PartCode, Stored, taps_of
 from swashplate.equations.marching.rows import aligned
 from swashplate.equations.marching.run import module
 from swashplate.equations.model import Model
-from swashplate.equations.printing import Block, Statement, function_source, indented
-from swashplate.equations.scheduling import VECTOR, all_vector
-from swashplate.equations.values import leaves
 
 Array = NDArray[np.float64]
 

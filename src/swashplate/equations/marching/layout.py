@@ -8,8 +8,8 @@ from contextlib import suppress
 import numpy as np
 from numpy.typing import NDArray
 
+from swashplate.equations.code_generation.functions import generating
 from swashplate.equations.fields import floats_of
-from swashplate.equations.functions import generating
 from swashplate.equations.marching.part import Stored, taps_of
 from swashplate.equations.marching.pieces import Struct
 from swashplate.equations.marching.rows import (

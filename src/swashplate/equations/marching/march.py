@@ -21,13 +21,8 @@ from types import MappingProxyType
 from typing import Any, NamedTuple
 
 from swashplate.equations import graph
-from swashplate.equations.fields import floats_of
-from swashplate.equations.functions import Function
-from swashplate.equations.graph import Node, names_in
-from swashplate.equations.marching.part import PartCode, Stored
-from swashplate.equations.marching.pieces import PIECE
-from swashplate.equations.model import Model, Source
-from swashplate.equations.printing import (
+from swashplate.equations.code_generation.functions import Function
+from swashplate.equations.code_generation.printing import (
     BRANCHING,
     PYTHON,
     Block,
@@ -35,8 +30,13 @@ from swashplate.equations.printing import (
     function_source,
     indented,
 )
-from swashplate.equations.scheduling import Flat
-from swashplate.equations.values import Value, leaves
+from swashplate.equations.code_generation.scheduling import Flat
+from swashplate.equations.code_generation.values import Value, leaves
+from swashplate.equations.fields import floats_of
+from swashplate.equations.graph import Node, names_in
+from swashplate.equations.marching.part import PartCode, Stored
+from swashplate.equations.marching.pieces import PIECE
+from swashplate.equations.model import Model, Source
 from swashplate.errors import InputError
 
 _OWN = """

@@ -5,14 +5,14 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 from swashplate.equations import graph
-from swashplate.equations.functions import generating
-from swashplate.equations.gradients import Derived, derived_function
+from swashplate.equations.code_generation.functions import generating
+from swashplate.equations.code_generation.gradients import Derived, derived_function
+from swashplate.equations.code_generation.values import leaves
 from swashplate.equations.graph import Node, names_in, rewritten
 from swashplate.equations.keeping import kept, key_of
 from swashplate.equations.marching.march import Sampler
 from swashplate.equations.marching.part import Stored
 from swashplate.equations.model import Model
-from swashplate.equations.values import leaves
 
 
 class StepDerivatives(NamedTuple):

@@ -7,8 +7,10 @@ from functools import cached_property, lru_cache
 from typing import Any, NamedTuple, get_type_hints
 
 from swashplate.equations import graph
+from swashplate.equations.code_generation.functions import fresh_name
+from swashplate.equations.code_generation.tracing import Trace, callee_of
+from swashplate.equations.code_generation.values import Flag, Tuple, Value, fixed, leaves, rebuilt
 from swashplate.equations.fields import floats_of
-from swashplate.equations.functions import fresh_name
 from swashplate.equations.graph import LEAVES, Node, names_in, ordered
 from swashplate.equations.language import is_named_tuple, plain
 from swashplate.equations.model import (
@@ -23,8 +25,6 @@ from swashplate.equations.model import (
     mean_over_sample,
     previous,
 )
-from swashplate.equations.tracing import Trace, callee_of
-from swashplate.equations.values import Flag, Tuple, Value, fixed, leaves, rebuilt
 from swashplate.errors import InputError
 
 HOLDS: dict[str, Equation] = {

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swashplate.equations.cache import borrowing_kernel, pasted, subroutine
-from swashplate.equations.functions import generating
+from swashplate.equations.code_generation.functions import generating
 from swashplate.equations.marching.pieces import (
     Struct,
     behind,

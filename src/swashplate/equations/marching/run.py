@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swashplate.equations.cache import generated, kernel
+from swashplate.equations.code_generation.functions import FUNCTIONS, generating
 from swashplate.equations.declaration import Replacements, inlined, interpreted
 from swashplate.equations.fields import (
     check_mapping,
@@ -22,7 +23,6 @@ from swashplate.equations.fields import (
     numbers_of,
     value_at,
 )
-from swashplate.equations.functions import FUNCTIONS, generating
 from swashplate.equations.keeping import kept, key_of
 from swashplate.equations.language import plain
 from swashplate.equations.marching.march import march_source

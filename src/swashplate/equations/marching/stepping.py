@@ -24,7 +24,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from swashplate.equations.functions import generating
+from swashplate.equations.code_generation.functions import generating
 from swashplate.equations.keeping import kept, key_of
 from swashplate.equations.marching.march import output_of, step_source
 from swashplate.equations.marching.part import Stored

@@ -17,9 +17,12 @@ from itertools import product
 from typing import Any, NamedTuple
 
 from swashplate.equations import graph
+from swashplate.equations.code_generation.functions import generating
+from swashplate.equations.code_generation.gradients import Derived, Gradients, derived_function
+from swashplate.equations.code_generation.printing import function_source, indented
+from swashplate.equations.code_generation.scheduling import all_vector
+from swashplate.equations.code_generation.values import leaves
 from swashplate.equations.declaration import JIT_OFF
-from swashplate.equations.functions import generating
-from swashplate.equations.gradients import Derived, Gradients, derived_function
 from swashplate.equations.graph import Node, names_in, rewritten
 from swashplate.equations.keeping import kept, key_of
 from swashplate.equations.marching.march import Sampler, march_source, output_of
@@ -28,9 +31,6 @@ from swashplate.equations.marching.pieces import PIECE
 from swashplate.equations.marching.rows import STRIDE
 from swashplate.equations.marching.run import PlannedPiece
 from swashplate.equations.model import Model, Source
-from swashplate.equations.printing import function_source, indented
-from swashplate.equations.scheduling import all_vector
-from swashplate.equations.values import leaves
 from swashplate.errors import InputError
 
 Moved = tuple[Stored, str]

@@ -28,8 +28,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from swashplate.equations.cache import kernel
+from swashplate.equations.code_generation.functions import generating
 from swashplate.equations.fields import check_mapping
-from swashplate.equations.functions import generating
 from swashplate.equations.marching.derivatives import jacobian
 from swashplate.equations.marching.march import output_of
 from swashplate.equations.marching.observation import Own, every_sample

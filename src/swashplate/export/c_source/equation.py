@@ -7,11 +7,11 @@ from collections.abc import Mapping
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
+from swashplate.equations.code_generation.printing_c import Loops, scalar_function
+from swashplate.equations.code_generation.tracing import Trace
+from swashplate.equations.code_generation.values import Flag, Tuple, Value, arguments, leaves
 from swashplate.equations.graph import Node, names_in
 from swashplate.equations.language import parsed
-from swashplate.equations.printing_c import Loops, scalar_function
-from swashplate.equations.tracing import Trace
-from swashplate.equations.values import Flag, Tuple, Value, arguments, leaves
 from swashplate.errors import EquationError
 
 

@@ -16,17 +16,24 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swashplate.equations import graph
+from swashplate.equations.code_generation.functions import GENERATING, Function
+from swashplate.equations.code_generation.printing import Block, function_source
+from swashplate.equations.code_generation.printing_c import (
+    C,
+    Loops,
+    c_name,
+    first_line,
+    function,
+    literal,
+)
+from swashplate.equations.code_generation.tracing import Trace
 from swashplate.equations.fields import Definition, declared_by, floats_of, value_at
-from swashplate.equations.functions import GENERATING, Function
 from swashplate.equations.graph import Node, names_in
 from swashplate.equations.language import plain
 from swashplate.equations.marching.march import Sampler, output_of
 from swashplate.equations.marching.part import TapOf, taps_of
 from swashplate.equations.marching.run import Instance, module
 from swashplate.equations.model import Equation, Link, Model, Source
-from swashplate.equations.printing import Block, function_source
-from swashplate.equations.printing_c import C, Loops, c_name, first_line, function, literal
-from swashplate.equations.tracing import Trace
 from swashplate.export.c_source.parts import PartInC, path_of
 from swashplate.export.c_source.structs import Structs, struct
 

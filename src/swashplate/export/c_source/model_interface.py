@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from math import inf
 
-from swashplate.equations.fields import Definition
-from swashplate.equations.printing_c import (
+from swashplate.equations.code_generation.printing_c import (
     HELPERS,
     c_name,
     comment_line,
@@ -18,6 +17,7 @@ from swashplate.equations.printing_c import (
     sections,
     wrapped,
 )
+from swashplate.equations.fields import Definition
 from swashplate.export.c_source.model import Exported
 from swashplate.export.c_source.parts import path_of
 

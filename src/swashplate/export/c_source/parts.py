@@ -11,13 +11,9 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, get_type_hints
 
 from swashplate.equations import graph
-from swashplate.equations.functions import FUNCTIONS, RESERVED, Function, fresh_name
-from swashplate.equations.graph import LEAVES, MATH_FUNCTIONS, Node, names_in, ordered
-from swashplate.equations.language import Parsed
-from swashplate.equations.marching.part import PartCode
-from swashplate.equations.model import Equation, Source, arguments_of
-from swashplate.equations.printing import STEMS, Block, assigned
-from swashplate.equations.printing_c import (
+from swashplate.equations.code_generation.functions import FUNCTIONS, RESERVED, Function, fresh_name
+from swashplate.equations.code_generation.printing import STEMS, Block, assigned
+from swashplate.equations.code_generation.printing_c import (
     C,
     as_double,
     c_name,
@@ -26,9 +22,13 @@ from swashplate.equations.printing_c import (
     mentions,
     without_comments,
 )
-from swashplate.equations.scheduling import FEW
-from swashplate.equations.tracing import Trace
-from swashplate.equations.values import Tuple, Value, fixed, leaves, undecided
+from swashplate.equations.code_generation.scheduling import FEW
+from swashplate.equations.code_generation.tracing import Trace
+from swashplate.equations.code_generation.values import Tuple, Value, fixed, leaves, undecided
+from swashplate.equations.graph import LEAVES, MATH_FUNCTIONS, Node, names_in, ordered
+from swashplate.equations.language import Parsed
+from swashplate.equations.marching.part import PartCode
+from swashplate.equations.model import Equation, Source, arguments_of
 
 if TYPE_CHECKING:
     from swashplate.export.c_source.model import Writer

@@ -15,9 +15,9 @@ from hashlib import blake2b
 from textwrap import TextWrapper
 from typing import Any, NamedTuple
 
-from swashplate.equations.functions import FUNCTIONS, RESERVED, Function, fresh_name
+from swashplate.equations.code_generation.functions import FUNCTIONS, RESERVED, Function, fresh_name
+from swashplate.equations.code_generation.scheduling import Branch, Flat, Region, Schedule
 from swashplate.equations.graph import COMPARISONS, FALSE, LEAVES, TRUE, Node, plain_value
-from swashplate.equations.scheduling import Branch, Flat, Region, Schedule
 
 WIDTH = 96
 """Characters of a line."""

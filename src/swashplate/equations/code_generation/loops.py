@@ -10,16 +10,26 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swashplate.equations import graph
+from swashplate.equations.code_generation.functions import FUNCTIONS, RESERVED, Function, fresh_name
+from swashplate.equations.code_generation.gradients import (
+    Derived,
+    derived_function,
+    listing,
+    partials_of,
+)
+from swashplate.equations.code_generation.printing import (
+    UNNAMED,
+    function_source,
+    function_text,
+    named_by_text,
+)
+from swashplate.equations.code_generation.values import Flag, Tuple, Value, alike, leaves, rebuilt
 from swashplate.equations.declaration import inlined
-from swashplate.equations.functions import FUNCTIONS, RESERVED, Function, fresh_name
-from swashplate.equations.gradients import Derived, derived_function, listing, partials_of
 from swashplate.equations.graph import ONE, ZERO, Call, Node, Rule, choose, make, names_in
 from swashplate.equations.language import Parsed
-from swashplate.equations.printing import UNNAMED, function_source, function_text, named_by_text
-from swashplate.equations.values import Flag, Tuple, Value, alike, leaves, rebuilt
 
 if TYPE_CHECKING:
-    from swashplate.equations.tracing import Callee, Trace
+    from swashplate.equations.code_generation.tracing import Callee, Trace
 
 S = TypeVar("S")
 

@@ -19,7 +19,8 @@ from functools import partial
 from typing import NamedTuple
 
 from swashplate.equations import graph
-from swashplate.equations.functions import FUNCTIONS, Function
+from swashplate.equations.code_generation.functions import FUNCTIONS, Function
+from swashplate.equations.code_generation.printing import function_text, named_by_text
 from swashplate.equations.graph import (
     FALSE,
     ONE,
@@ -34,7 +35,6 @@ from swashplate.equations.graph import (
     ordered,
     times,
 )
-from swashplate.equations.printing import function_text, named_by_text
 from swashplate.errors import EquationError
 
 

@@ -15,6 +15,23 @@ from types import FunctionType, ModuleType
 from typing import Any, NamedTuple, TypeVar
 
 from swashplate.equations import graph
+from swashplate.equations.code_generation.loops import (
+    called_apart,
+    interpolate,
+    repeated,
+    repetition,
+    root,
+    solved,
+)
+from swashplate.equations.code_generation.values import (
+    Flag,
+    Tuple,
+    Value,
+    alike,
+    fixed,
+    leaves,
+    rebuilt,
+)
 from swashplate.equations.declaration import (
     JIT_OFF,
     NO_REPLACEMENTS,
@@ -35,8 +52,6 @@ from swashplate.equations.language import (
     parsed,
     plain,
 )
-from swashplate.equations.loops import called_apart, interpolate, repeated, repetition, root, solved
-from swashplate.equations.values import Flag, Tuple, Value, alike, fixed, leaves, rebuilt
 
 Names = dict[str, Value]
 R = TypeVar("R")

@@ -6,12 +6,12 @@ from collections.abc import Callable, Mapping
 from hashlib import blake2b
 from typing import Any, TypeVar
 
+from swashplate.equations.code_generation.functions import GENERATING
+from swashplate.equations.code_generation.gradients import Derived, derived_function, listing
+from swashplate.equations.code_generation.tracing import Trace
+from swashplate.equations.code_generation.values import Value, arguments, leaves
 from swashplate.equations.declaration import RULES, inlined, module_of
-from swashplate.equations.functions import GENERATING
-from swashplate.equations.gradients import Derived, derived_function, listing
 from swashplate.equations.language import parsed, plain
-from swashplate.equations.tracing import Trace
-from swashplate.equations.values import Value, arguments, leaves
 
 F = TypeVar("F", bound=Callable[..., Any])
 

@@ -14,12 +14,12 @@ from importlib.resources import files
 from typing import Any
 
 from swashplate.equations import graph
-from swashplate.equations.functions import fresh_name
+from swashplate.equations.code_generation.functions import fresh_name
+from swashplate.equations.code_generation.loops import PRECISION, STEPS, TINY, Inner
+from swashplate.equations.code_generation.printing import ATOM, Block, Language, Text, grouped
+from swashplate.equations.code_generation.values import leaves
 from swashplate.equations.graph import COMPARISONS, FALSE, TRUE, Node
 from swashplate.equations.language import MATH, Parsed
-from swashplate.equations.loops import PRECISION, STEPS, TINY, Inner
-from swashplate.equations.printing import ATOM, Block, Language, Text, grouped
-from swashplate.equations.values import leaves
 
 WIDTH = 100
 """Longest line of C."""

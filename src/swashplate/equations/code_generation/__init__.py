@@ -1,0 +1,1 @@
+"""From equations to code: traced into a graph, differentiated, scheduled, printed."""
