@@ -102,6 +102,10 @@ values = st.floats(-2.0, 2.0).filter(lambda x: abs(x) > 1e-3)
     "    x = sqrt(0.5 + helper(x, x) * helper(x, x))\n    return (x + x), (x / (1.0 + y * y))",
     (1.0, 1.0, 1.0, 1.0),
 )
+@example(  # a name that both ways set to the same value once kept the value from before
+    "    if x > 0.5:\n        x = 1.5\n    else:\n        x = 1.5\n    return x, y",
+    (1.0, 1.0, 1.0, 1.0),
+)
 @settings(max_examples=200)
 def test_random_equations(body: str, at: tuple[float, ...]) -> None:
     f = made(body)
