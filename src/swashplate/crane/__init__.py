@@ -1,4 +1,7 @@
-"""Cranes: three identified drives, a boom on a moving ship, a load on its rope, and control."""
+"""Cranes: three identified drives, a boom on a moving ship, a load on its rope, and control.
+
+The crane itself stands here; `sea` moves its ship, `closed_loop` runs it, `studies` judge it.
+"""
 
 import lazy_loader
 

@@ -1,6 +1,7 @@
 """How an equation becomes code, and a machine of equations a model.
 
-An equation is written once, as a value; this package knows nothing of drives.
+An equation is written once, as a value; this package knows nothing of drives. `code_generation`
+makes code of equations, `marching` runs models.
 """
 
 import lazy_loader

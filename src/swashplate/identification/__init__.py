@@ -1,4 +1,7 @@
-"""Identification: unknowns of a model found from a campaign, and how well they are known."""
+"""Identification: unknowns of a model found from a campaign, and how well they are known.
+
+A fit takes `estimation` for its stages, `statistics` for intervals, `diagnostics` for the verdict.
+"""
 
 import lazy_loader
 
