@@ -20,6 +20,7 @@ from swashplate.campaign import CampaignFile
 from swashplate.cli import EPILOG, HELP, app
 from swashplate.identification.estimation.setup import Setup
 from swashplate.parameters import CATALOGUE, REFINEMENTS, Block, Definition, SetFile
+from swashplate.results import Drawn
 
 HERE = Path(__file__).parent
 
@@ -66,6 +67,8 @@ def api_pages() -> Iterator[tuple[str, str]]:
             lines += [f"## {short}", "", "```{eval-rst}", f".. {kind}:: {name}"]
             if kind == "autoclass":
                 lines += ["   :members:", "   :exclude-members: model_config"]
+                if issubclass(found, Drawn):
+                    lines += ["", f"   .. automethod:: {name}.plot"]
             lines += ["```", ""]
         yield page["name"], "\n".join(lines)
 

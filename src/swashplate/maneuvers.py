@@ -22,17 +22,13 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import TYPE_CHECKING, cast, overload
+from typing import ClassVar
 
 import numpy as np
 import numpy.typing as npt
 
 from swashplate.errors import InputError
-from swashplate.results import GivenAxes, Result, figures
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
+from swashplate.results import Drawn
 
 __all__ = ["Maneuver", "chirp", "multisine", "parse", "ramp", "rest", "sine", "source_tests"]
 __all__ += ["stairs", "step"]
@@ -108,7 +104,7 @@ def row(name: str, values: npt.ArrayLike) -> Array:
 
 
 @dataclass(frozen=True, eq=False)
-class Maneuver(Result):
+class Maneuver(Drawn):
     """A voltage command of finite length; call it with times to have the voltage.
 
     Attributes
@@ -124,6 +120,8 @@ class Maneuver(Result):
     highest : float
         Frequency of its fastest sine, 0 where it has none. [Hz]
     """
+
+    drawn_by: ClassVar[str] = "plot_maneuver"
 
     name: str
     length: float
@@ -166,18 +164,6 @@ class Maneuver(Result):
                 "of a whole number: change its length or the rate."
             )
         return np.arange(round(samples) + 1) / rate
-
-    @overload
-    def plot(self, *, ax: None = None, title: str | None = None) -> Figure: ...
-
-    @overload
-    def plot(self, *, ax: GivenAxes, title: str | None = None) -> GivenAxes: ...
-
-    def plot(
-        self, *, ax: Axes | Sequence[Axes] | None = None, title: str | None = None
-    ) -> Figure | Axes | Sequence[Axes]:
-        """Figure of its voltage over time; with `ax` it is drawn there, and `ax` returned."""
-        return cast("Figure", figures().plot_maneuver(self, ax=ax, title=title))
 
     def sample(self, rate: float = 512.0) -> Array:
         """Voltage [V] at the instants of `time(rate)`.

@@ -15,7 +15,7 @@ from html import escape
 from importlib import import_module
 from pathlib import Path
 from textwrap import shorten
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any, ClassVar, TypeVar, cast, overload
 
 from swashplate.errors import InputError
 from swashplate.tables import Table, write_table
@@ -23,6 +23,7 @@ from swashplate.tables import Table, write_table
 if TYPE_CHECKING:
     import polars
     from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 GivenAxes = TypeVar("GivenAxes", bound="Axes | Sequence[Axes]")
 """Matplotlib axes that a caller gives to draw in, and gets back."""
@@ -112,6 +113,30 @@ class Result:
         lines = "\n".join(f"- {sentence}" for sentence in self._sentences())
         parts = [headline, lines, *tables] if headline else [repr(self), *tables, lines]
         return "\n\n".join(part for part in parts if part)
+
+
+class Drawn(Result):
+    """A result that one function of `swashplate.report.figures` draws, also on given axes."""
+
+    drawn_by: ClassVar[str]
+    """Name of that function."""
+
+    @overload
+    def plot(self, *, ax: None = None, title: str | None = None) -> Figure: ...
+
+    @overload
+    def plot(self, *, ax: GivenAxes, title: str | None = None) -> GivenAxes: ...
+
+    def plot(
+        self, *, ax: Axes | Sequence[Axes] | None = None, title: str | None = None
+    ) -> Figure | Axes | Sequence[Axes]:
+        """Figure of the result, as the function `drawn_by` of `swashplate.report.figures` says.
+
+        By default a new figure; with `ax` it is drawn there, and `ax` returned. A `title` stands in
+        the place of the words that say what is shown.
+        """
+        draw = getattr(figures(), self.drawn_by)
+        return cast("Figure", draw(self, ax=ax, title=title))
 
 
 def listing(sentences: Sequence[str]) -> str:

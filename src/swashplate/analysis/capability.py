@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field, fields, replace
 from math import atan, inf
-from typing import TYPE_CHECKING, Any, Literal, cast, get_args, overload
+from typing import TYPE_CHECKING, Any, ClassVar, Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,15 +17,13 @@ from swashplate.equations.marching.run import Instance, Part, called
 from swashplate.models.displacement_control import PumpOptions, pressure_limits
 from swashplate.models.pump import PumpState
 from swashplate.parameters.rules import FULL_VOLTAGE
-from swashplate.results import GivenAxes, Result, Tabular, figures
+from swashplate.results import Drawn, Result, Tabular
 from swashplate.simulation.instance import instance_of
 from swashplate.tables import UNIT, Cell, Column, Table, plain
 from swashplate.units import display_unit
 
 if TYPE_CHECKING:
     import polars
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 Array = NDArray[np.float64]
 
@@ -226,8 +224,10 @@ class Way(Result):
 
 
 @dataclass(frozen=True, eq=False)
-class Envelope(Tabular):
+class Envelope(Tabular, Drawn):
     """What a drive can do."""
+
+    drawn_by: ClassVar[str] = "plot_envelope"
 
     name: str
     """Name of the drive."""
@@ -298,22 +298,6 @@ class Envelope(Tabular):
         import polars as pl
 
         return self.table().to_polars().filter(pl.col("unit") != "")
-
-    @overload
-    def plot(self, *, ax: None = None, title: str | None = None) -> Figure: ...
-
-    @overload
-    def plot(self, *, ax: GivenAxes, title: str | None = None) -> GivenAxes: ...
-
-    def plot(
-        self, *, ax: Axes | Sequence[Axes] | None = None, title: str | None = None
-    ) -> Figure | Axes | Sequence[Axes]:
-        """Figure of acceleration over speed, its limits labelled.
-
-        By default a new figure; with `ax` it is drawn there, and `ax` returned. See
-        `swashplate.report.figures.plot_envelope`.
-        """
-        return cast("Figure", figures().plot_envelope(self, ax=ax, title=title))
 
 
 def envelope(drive: Drive) -> Envelope:

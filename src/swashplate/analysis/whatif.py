@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from math import isnan
-from typing import TYPE_CHECKING, cast, overload
+from typing import TYPE_CHECKING, ClassVar, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,13 +24,12 @@ from swashplate.errors import DomainError, InputError, ParameterError
 from swashplate.maneuvers import Maneuver
 from swashplate.parameters.definitions import CATALOGUE, COLUMNS, REFINEMENTS, columns_of
 from swashplate.parameters.rules import FULL_VOLTAGE
-from swashplate.results import GivenAxes, Result, figures
+from swashplate.results import Drawn, Result, figures
 from swashplate.simulation.result import Simulation
 from swashplate.tables import UNIT, Column, Table, listed, quantity
 from swashplate.units import of_shaft
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
     from swashplate.analysis.monte_carlo import Bands
@@ -302,8 +301,10 @@ LEAST = 5e-4  # A lever that moves an outcome by less than this part has no row 
 
 
 @dataclass(frozen=True, eq=False)
-class OneAtATime(Result):
+class OneAtATime(Drawn):
     """Outcomes with each lever moved down and up by itself."""
+
+    drawn_by: ClassVar[str] = "plot_tornado"
 
     ranges: Mapping[str, Range]  # Factors down and up by lever.
     outcomes: tuple[Outcome, ...]
@@ -311,22 +312,6 @@ class OneAtATime(Result):
     low: Array  # (L, K) with each lever at its lower factor.
     high: Array  # (L, K) with each lever at its upper factor.
     sentences: tuple[str, ...]  # What could not be simulated, or has no such outcome.
-
-    @overload
-    def plot(self, *, ax: None = None, title: str | None = None) -> Figure: ...
-
-    @overload
-    def plot(self, *, ax: GivenAxes, title: str | None = None) -> GivenAxes: ...
-
-    def plot(
-        self, *, ax: Axes | Sequence[Axes] | None = None, title: str | None = None
-    ) -> Figure | Axes | Sequence[Axes]:
-        """Figure of what each lever does by itself, a panel an outcome, the strongest at the top.
-
-        By default a new figure; with `ax`, one for each outcome that is defined, it is drawn there,
-        and `ax` returned. See `swashplate.report.figures.plot_tornado`.
-        """
-        return cast("Figure", figures().plot_tornado(self, ax=ax, title=title))
 
     @property
     def swings(self) -> Array:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from math import cos, pi, radians, sin
-from typing import TYPE_CHECKING, NamedTuple, cast, overload
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -17,12 +17,8 @@ from swashplate.crane.kinematics import boom_at, reach_rate, tip_of
 from swashplate.crane.sea.seaway import SEA_STATES, Seaway, Spectrum
 from swashplate.crane.studies.spectral import tip_motion
 from swashplate.errors import InputError
-from swashplate.results import GivenAxes, Result, figures
+from swashplate.results import Drawn
 from swashplate.tables import Column, Table
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 Array = NDArray[np.float64]
 
@@ -40,8 +36,10 @@ class Demand(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class Followable(Result):
+class Followable(Drawn):
     """Largest sines that the axes of a crane can follow."""
+
+    drawn_by: ClassVar[str] = "plot_follow"
 
     periods: Array
     """(n,) [s]"""
@@ -51,21 +49,6 @@ class Followable(Result):
     seas: Mapping[str, Demand]
     crane: Crane = field(repr=False)
     boom_deg: float
-
-    @overload
-    def plot(self, *, ax: None = None, title: str = "") -> Figure: ...
-
-    @overload
-    def plot(self, *, ax: GivenAxes, title: str = "") -> GivenAxes: ...
-
-    def plot(
-        self, *, ax: Axes | Sequence[Axes] | None = None, title: str = ""
-    ) -> Figure | Axes | Sequence[Axes]:
-        """Figure of the amplitudes over the period, with what seas ask for as points.
-
-        By default a new figure; with `ax` it is drawn there, and `ax` returned.
-        """
-        return cast("Figure", figures().plot_follow(self, ax=ax, title=title))
 
     def tables(self) -> list[Table]:
         """Amplitudes over the period, and what seas ask for."""

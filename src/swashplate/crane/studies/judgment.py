@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from math import isfinite, nan, pi
-from typing import TYPE_CHECKING, Literal, NamedTuple, cast, overload
+from typing import TYPE_CHECKING, ClassVar, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,14 +32,12 @@ from swashplate.crane.studies.assumptions import Turn
 from swashplate.crane.studies.outcome import Outcome
 from swashplate.crane.studies.spectral import LinearResponse
 from swashplate.crane.studies.study import NONE, Study, assumed_words
-from swashplate.results import GivenAxes, Tabular, figures
+from swashplate.results import Drawn, Tabular
 from swashplate.simulation.result import Limit
 from swashplate.tables import Column, Table, count, listed
 
 if TYPE_CHECKING:
     import polars
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 Array = NDArray[np.float64]
 Question = Literal["harm", "sufficiency"]
@@ -114,8 +112,10 @@ class Remedy(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class Judgment(Tabular):
+class Judgment(Tabular, Drawn):
     """Variants of control and drives in the same seaways, and what follows."""
+
+    drawn_by: ClassVar[str] = "plot_judgment"
 
     study: Study
     """Crane, variants, seaways, and for how long each counts."""
@@ -136,21 +136,6 @@ class Judgment(Tabular):
 
     def __repr__(self) -> str:
         return f"Judgment({count(len(self.study.seeds), 'seaway')}, {', '.join(self.names)})"
-
-    @overload
-    def plot(self, *, ax: None = None, title: str = "") -> Figure: ...
-
-    @overload
-    def plot(self, *, ax: GivenAxes, title: str = "") -> GivenAxes: ...
-
-    def plot(
-        self, *, ax: Axes | Sequence[Axes] | None = None, title: str = ""
-    ) -> Figure | Axes | Sequence[Axes]:
-        """Figure of the swing of every variant in every seaway, and of all that has a limit.
-
-        By default a new figure; with `ax` the swing alone is drawn there, and `ax` returned.
-        """
-        return cast("Figure", figures().plot_judgment(self, ax=ax, title=title))
 
     # --- numbers of variants ----------------------------------------------------------------------
 

@@ -108,7 +108,7 @@ class Operability(Tabular):
             shares[cell.limited_by] = shares.get(cell.limited_by, 0.0) + share
         return dict(sorted(shares.items(), key=lambda entry: -entry[1]))
 
-    def plot(self, *, title: str = "") -> Figure:
+    def plot(self, *, title: str | None = None) -> Figure:
         """Figure of what limits each sea, a panel for each variant."""
         return cast("Figure", figures().plot_operability(self, title=title))
 

@@ -84,7 +84,7 @@ class Sweep(Result):
         """(n, variants) root mean square over the seaways [rad]; NaN if a run left the model."""
         return np.asarray(np.sqrt(np.mean(self.values**2, axis=0)))
 
-    def plot(self, *, title: str = "") -> Figure:
+    def plot(self, *, title: str | None = None) -> Figure:
         """Figure of the swing over the quantity; `swashplate.report.figures.plot_sweep`."""
         return cast("Figure", figures().plot_sweep(self, title=title))
 

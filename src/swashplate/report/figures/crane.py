@@ -190,7 +190,7 @@ CENTRE = 0.05
 """Swing at the centre of a polar figure, whose radius is logarithmic. [deg]"""
 
 
-def plot_sweep(result: Sweep, *, title: str = "") -> Figure:
+def plot_sweep(result: Sweep, *, title: str | None = None) -> Figure:
     """Figure of the swing over a quantity, for several variants: mean and 95 % interval.
 
     Over the bearing of the boom it is polar, with a logarithmic radius, half a circle if the
@@ -324,15 +324,15 @@ LOWEST_DEMAND = 0.2
 
 
 @overload
-def plot_follow(result: Followable, *, ax: None = None, title: str = "") -> Figure: ...
+def plot_follow(result: Followable, *, ax: None = None, title: str | None = None) -> Figure: ...
 
 
 @overload
-def plot_follow(result: Followable, *, ax: GivenAxes, title: str = "") -> GivenAxes: ...
+def plot_follow(result: Followable, *, ax: GivenAxes, title: str | None = None) -> GivenAxes: ...
 
 
 def plot_follow(
-    result: Followable, *, ax: Axes | Sequence[Axes] | None = None, title: str = ""
+    result: Followable, *, ax: Axes | Sequence[Axes] | None = None, title: str | None = None
 ) -> Figure | Axes | Sequence[Axes]:
     """Figure of the amplitude that each axis can follow over the period, and what seas ask of it.
 

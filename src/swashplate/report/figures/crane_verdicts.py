@@ -47,15 +47,15 @@ FACES = {"yes": style.BLUE, "no": style.VERMILION, "not decided": "white"}
 
 
 @overload
-def plot_judgment(result: Judgment, *, ax: None = None, title: str = "") -> Figure: ...
+def plot_judgment(result: Judgment, *, ax: None = None, title: str | None = None) -> Figure: ...
 
 
 @overload
-def plot_judgment(result: Judgment, *, ax: GivenAxes, title: str = "") -> GivenAxes: ...
+def plot_judgment(result: Judgment, *, ax: GivenAxes, title: str | None = None) -> GivenAxes: ...
 
 
 def plot_judgment(
-    result: Judgment, *, ax: Axes | Sequence[Axes] | None = None, title: str = ""
+    result: Judgment, *, ax: Axes | Sequence[Axes] | None = None, title: str | None = None
 ) -> Figure | Axes | Sequence[Axes]:
     """Figure of a judgment: swing of each variant in each seaway, and what has a limit.
 
@@ -283,7 +283,7 @@ ABREAST = 3
 """Panels side by side."""
 
 
-def plot_operability(result: Operability, *, title: str = "") -> Figure:
+def plot_operability(result: Operability, *, title: str | None = None) -> Figure:
     """Figure of operability: what limits each sea of the scatter diagram, a panel for each variant.
 
     A cell has the colour of what limits it first at most of the headings, the stronger the more
