@@ -351,6 +351,22 @@ def _first(happens: NDArray[np.bool_], every: int) -> float:
     return first * every / RATE if happens[first] else inf
 
 
+def named_runs(
+    runs: CraneRun | Mapping[str, CraneRun], most: int, shown: str
+) -> dict[str, CraneRun]:
+    """Runs by their names, of which something shows so many at most; one alone by its actuation.
+
+    Raises
+    ------
+    InputError
+        If there is none, or more.
+    """
+    named = {runs.actuation: runs} if isinstance(runs, CraneRun) else dict(runs)
+    if not 0 < len(named) <= most:
+        raise InputError(f"{shown} shows 1 to {most} runs of a crane, not {len(named)}.")
+    return named
+
+
 def run_tables(runs: Mapping[str, CraneRun]) -> list[Table]:
     """Swing and end of runs, a row for each by its name; what limits their drives.
 

@@ -19,6 +19,7 @@ from swashplate.report.lines import (
     GAP_MARK,
     IGNORED,
     Array,
+    Mask,
     Shade,
     draw,
     gap_rows,
@@ -95,10 +96,15 @@ def _signals(experiment: Experiment) -> dict[tuple[str, str], InputSignal | Chan
     return {("", experiment.input.unit): experiment.input, **channels}
 
 
+def _scale_rows(used: Mask) -> Mask:
+    """Which samples set the scale of a panel: those that are used, or all if none is."""
+    return used if used.any() else np.ones_like(used)
+
+
 def _counted(signal: InputSignal | Channel) -> Array:
     """Samples that are not ignored; all of them of an input, or where none is left."""
     used = getattr(signal, "used", None)
-    return signal.values if used is None or not used.any() else signal.values[used]
+    return signal.values if used is None else signal.values[_scale_rows(used)]
 
 
 def _column(key: tuple[str, str], signals: Sequence[InputSignal | Channel]) -> Column:
@@ -419,13 +425,13 @@ def plot_channel(
     unit = display_unit(channel.shown_unit, float(np.abs(values).max()))
     labels = [unit.label(channel.kind.replace("_", " ").replace("encoder counts", "angle"))]
     if lower:
-        scale = lower[-1][1] if channel.is_position or not used.any() else lower[-1][1][used]
+        scale = lower[-1][1] if channel.is_position else lower[-1][1][_scale_rows(used)]
         small = display_unit(si, float(np.abs(scale).max()))
         labels.append(small.label(below))
     heights, words = [2.4, 2.2] if lower else [3.2], channel.name if title is None else title
     figure, axes = sheet(heights, words, labels, "time (s)", legend=legend)
     how: dict[str, Any] = {"held": channel.is_position, "width": THIN, "zorder": 2.5}
-    counted = values[used] if used.any() else values
+    counted = values[_scale_rows(used)]
     room = 0.12 * float(np.ptp(counted)) or 1.0 / unit.factor
     axes[0].set_ylim(unit.factor * (counted.min() - room), unit.factor * (counted.max() + room))
     draw(axes[0], time, unit.factor * values, INK if channel.is_position else BLUE, **how)
@@ -442,11 +448,16 @@ def plot_channel(
         zero_line(axes[1])
         for when, what, color, width in lower:
             draw(axes[1], when, small.factor * what, color, width=width)
+    _mark_samples(axes, time, used)
+    return figure
+
+
+def _mark_samples(axes: Sequence[Axes], time: Array, used: Mask) -> None:
+    """Mark what is ignored of a record and its gaps in panels over it, from end to end."""
     for ax in axes:
         shade(ax, stretches(time, ~used), IGNORED)
         mark_gaps(ax, time)
     axes[-1].set_xlim(float(time[0]), float(time[-1]))
-    return figure
 
 
 # --- one channel against a model ------------------------------------------------------------------
@@ -482,7 +493,7 @@ def plot_prediction(
     channel = quality.experiment[quality.channel]
     rows = rows_within(channel.time, window, str(channel.source))
     time, used = channel.time[rows], channel.used[rows]
-    counted = used if used.any() else np.ones_like(used)
+    counted = _scale_rows(used)
     panels = [_overlay(each, rows) for each in signals]
     judged = signals[-1]
     residual = judged.residual[rows]
@@ -505,9 +516,7 @@ def plot_prediction(
         for values, color in panel.curves:
             width = WIDE if color == BLUE else NARROW
             draw(ax, time, unit.factor * values, color, width=width)
-        shade(ax, stretches(time, ~used), IGNORED)
-        mark_gaps(ax, time)
-    axes[-1].set_xlim(float(time[0]), float(time[-1]))
+    _mark_samples(axes, time, used)
     return figure
 
 

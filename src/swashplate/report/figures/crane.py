@@ -13,8 +13,8 @@ from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 from numpy.typing import NDArray
 
 from swashplate.crane import Crane, CraneRun, Followable, Hull, Seaway, Sweep
+from swashplate.crane.closed_loop.result import named_runs
 from swashplate.crane.sea.confidence import rms_of
-from swashplate.errors import InputError
 from swashplate.report import style
 from swashplate.report.lines import SHADES, draw, fit_time, shade_handle, stretches
 from swashplate.results import GivenAxes
@@ -123,9 +123,7 @@ def plot_crane(
     sea : mapping of str to CraneRun, optional
         The same in a seaway, whose swing gets a panel of its own.
     """
-    named = {runs.actuation: runs} if isinstance(runs, CraneRun) else dict(runs)
-    if not 0 < len(named) <= MOST_RUNS:
-        raise InputError(f"A figure shows 1 to {MOST_RUNS} runs of a crane, not {len(named)}.")
+    named = named_runs(runs, MOST_RUNS, "A figure")
     first, looks = next(iter(named.values())), style.strokes(named)
     driven = {name: run for name, run in named.items() if run.actuation != "ideal"}
     shown = [("swing_deg", "swing (deg)", 2.1, named)]

@@ -10,6 +10,7 @@ import numpy as np
 
 from swashplate.crane import CraneRun
 from swashplate.crane.axes import RATE
+from swashplate.crane.closed_loop.result import named_runs
 from swashplate.errors import InputError
 from swashplate.report.fit_report.html_page import rendered, script_json
 from swashplate.tables import write_text
@@ -34,9 +35,7 @@ def write_scene(runs: CraneRun | Mapping[str, CraneRun], path: str | Path) -> No
     InputError, FileError
         For none, more than four, or runs that differ in length; if the file cannot be written.
     """
-    named = {runs.actuation: runs} if isinstance(runs, CraneRun) else dict(runs)
-    if not 0 < len(named) <= MOST_RUNS:
-        raise InputError(f"A scene shows 1 to {MOST_RUNS} runs of a crane, not {len(named)}.")
+    named = named_runs(runs, MOST_RUNS, "A scene")
     if len({len(each.out) for each in named.values()}) > 1:
         raise InputError("The runs of a scene must be of one length.")
     first = next(iter(named.values()))
