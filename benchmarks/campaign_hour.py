@@ -13,21 +13,15 @@ from statistics import median
 
 import numpy as np
 import polars as pl
+from campaign_file import campaign_text
 
 from swashplate import Drive
 
-CAMPAIGN = """
-[axes.hoist]
-drive = "hoist"
-time = { column = "time" }
-input = { kind = "voltage", column = "voltage" }
-channels.current = { kind = "rectified_current", column = "current" }
-channels.counts = { kind = "encoder_counts", column = "counts", counts_per_turn = 2526.3 }
-channels.swash = { kind = "swash_angle", column = "swash" }
-
-[[runs]]
-file = "hour.csv"
-"""
+CHANNELS = {
+    "current": '{ kind = "rectified_current", column = "current" }',
+    "counts": '{ kind = "encoder_counts", column = "counts", counts_per_turn = 2526.3 }',
+    "swash": '{ kind = "swash_angle", column = "swash" }',
+}
 PROCESS = """
 import resource, sys, time
 begun = time.perf_counter()
@@ -63,7 +57,16 @@ def write_hour(folder: Path) -> Path:
             "swash [rad]": np.round(run.swash_angle + 1e-4 * noise[1], 5),
         }
     ).write_csv(folder / "hour.csv")
-    (folder / "campaign.toml").write_text(CAMPAIGN, "utf-8")
+    text = campaign_text(
+        "One hour",
+        axis="hoist",
+        drive="hoist",
+        command="voltage",
+        interpolation="linear",
+        channels=CHANNELS,
+        runs={"hour.csv": "fit"},
+    )
+    (folder / "campaign.toml").write_text(text, "utf-8")
     return folder / "campaign.toml"
 
 

@@ -16,21 +16,28 @@ from second_machine import draws, logger
 HYSTERESIS = "solenoid_hysteresis"
 """Cause that every second machine has a little of."""
 LONGEST = 600.0
-"""After which a command is ended, and the campaign counted as failed. [s]"""
+"""After which a command is ended by default, and the campaign counted as failed. [s]"""
 
 
 class Program:
-    """The swashplate of a Python executable, by its command line."""
+    """The swashplate of a Python executable, by its command line.
 
-    def __init__(self, python):
-        self.python = python
+    With one thread of the linear algebra, or as many as that takes by itself. A command is ended
+    after its longest time. [s]
+    """
+
+    def __init__(self, python, one_thread=True, longest=LONGEST):
+        self.python, self.longest = python, longest
         self.environment = {
             **os.environ,
-            "OPENBLAS_NUM_THREADS": "1",
-            "OMP_NUM_THREADS": "1",
             "COLUMNS": "1000",  # no sentence is broken into lines
             "NO_COLOR": "1",
         }
+        # without byte code every command compiles the package's modules from their source
+        self.environment.pop("PYTHONDONTWRITEBYTECODE", None)
+        if one_thread:
+            self.environment["OPENBLAS_NUM_THREADS"] = "1"
+            self.environment["OMP_NUM_THREADS"] = "1"
 
     def run(self, *words, folder):
         """Exit code, output, CPU time [s] and largest memory [MB] of a command."""
@@ -42,7 +49,7 @@ class Program:
                 stderr=subprocess.STDOUT,
                 env=self.environment,
             )
-            watch = Timer(LONGEST, process.kill)
+            watch = Timer(self.longest, process.kill)
             watch.start()
             _, status, usage = os.wait4(process.pid, 0)
             watch.cancel()

@@ -9,9 +9,7 @@ process at a time; run it twice and take the second, as the first one compiles.
 """
 
 import argparse
-import os
 import shutil
-import subprocess
 import sys
 import tempfile
 from concurrent.futures import ProcessPoolExecutor
@@ -20,6 +18,8 @@ from pathlib import Path
 
 import numpy as np
 import polars as pl
+from campaign_file import campaign_text
+from command_line import Program
 
 from swashplate import Drive
 from swashplate.campaign import rig
@@ -31,26 +31,14 @@ COUNTS_PER_TURN = 2526.315789473684
 RATE = 512.0
 AMMETER = 0.003
 """Standard deviation of its noise. [A]"""
-CAMPAIGN = f"""
-title = "One log"
-virtual = true
-
-[axes.hoist]
-drive = "hoist"
-start = "rest"
-time = {{ column = "time", unit = "s" }}
-input = {{ kind = "voltage", column = "voltage", unit = "V", interpolation = "linear" }}
-channels.current = {{ kind = "rectified_current", column = "current", unit = "A" }}
-
-[axes.hoist.channels.counts]
-kind = "encoder_counts"
-column = "counts"
-counts_per_turn = {COUNTS_PER_TURN}
-
-[[runs]]
-file = "log.csv"
-role = "fit"
-"""
+LONGEST = 7200.0
+"""After which a command is ended. [s]"""
+CHANNELS = {
+    "current": '{ kind = "rectified_current", column = "current", unit = "A" }',
+    "counts": (
+        f'{{ kind = "encoder_counts", column = "counts", counts_per_turn = {COUNTS_PER_TURN} }}'
+    ),
+}
 
 
 def machine() -> Drive:
@@ -98,25 +86,26 @@ def write_log(minutes: float, folder: Path) -> Path:
             "counts": turned,
         }
     ).write_csv(folder / "log.csv")
-    (folder / "campaign.toml").write_text(CAMPAIGN, "utf-8")
+    text = campaign_text(
+        "One log",
+        axis="hoist",
+        drive="hoist",
+        command="voltage",
+        interpolation="linear",
+        channels=CHANNELS,
+        runs={"log.csv": "fit"},
+    )
+    (folder / "campaign.toml").write_text(text, "utf-8")
     return folder / "campaign.toml"
 
 
-def command(*words: str) -> tuple[float, float]:
+def command(folder: Path, *words: str) -> tuple[float, float]:
     """Processor time [s] and largest memory [MB] of a command, which may say "not usable"."""
-    # without byte code every command compiles the package's modules from their source
-    surroundings = {k: v for k, v in os.environ.items() if k != "PYTHONDONTWRITEBYTECODE"}
-    process = subprocess.Popen(
-        [sys.executable, "-m", "swashplate", *words],
-        env=surroundings,
-        stdout=subprocess.DEVNULL,
-        stderr=subprocess.DEVNULL,
-    )
-    _, status, used = os.wait4(process.pid, 0)
-    process.returncode = os.waitstatus_to_exitcode(status)
-    if process.returncode not in (0, 1):
-        raise SystemExit(f"swashplate {' '.join(words)} ended with {process.returncode}.")
-    return used.ru_utime + used.ru_stime, used.ru_maxrss / 1024.0
+    program = Program(sys.executable, one_thread=False, longest=LONGEST)
+    code, output, seconds, megabytes = program.run(*words, folder=folder)
+    if code not in (0, 1):
+        raise SystemExit(f"swashplate {' '.join(words)} ended with {code}:\n{output}")
+    return seconds, megabytes
 
 
 def main() -> None:
@@ -134,9 +123,8 @@ def main() -> None:
             # elsewhere: a process begins with the memory of the one that starts it
             with ProcessPoolExecutor(1) as writer:
                 path = writer.submit(write, size, Path(folder)).result()
-            out = str(Path(folder) / "fitted")
-            fitted, of_fit = command("fit", str(path), "--out", out)
-            reported, of_report = command("report", out)
+            fitted, of_fit = command(path.parent, "fit", path.name, "--out", "fitted")
+            reported, of_report = command(path.parent, "report", "fitted")
         row = f"{fitted:.1f} s | {of_fit:.0f} MB | {reported:.1f} s | {of_report:.0f} MB"
         print(f"| {words} | {row} |", flush=True)
 

@@ -23,6 +23,7 @@ from pathlib import Path
 os.environ["OPENBLAS_NUM_THREADS"] = "1"
 
 import numpy as np
+from campaign_file import campaign_text
 
 from swashplate.executors import Processes
 
@@ -139,19 +140,9 @@ def tests_of(largest):
     return {name: maneuver.sample(SLOW) for name, maneuver in tests.items()}
 
 
-CAMPAIGN = """\
-title = "Winch {seed}, simulated"
-virtual = true
-[axes.winch]
-drive = "neutral"
-start = "rest"
-time = {{ column = "time", unit = "s" }}
-input = {{ kind = "voltage", column = "command", unit = "V", interpolation = "previous" }}
-channels.{channel}
-"""
 CHANNELS = {
-    "tacho": 'tacho = { kind = "shaft_speed", column = "speed", unit = "rad/s" }',
-    "encoder": 'encoder = {{ kind = "encoder_counts", column = "counts", counts_per_turn = {} }}',
+    "tacho": '{ kind = "shaft_speed", column = "speed", unit = "rad/s" }',
+    "encoder": '{{ kind = "encoder_counts", column = "counts", counts_per_turn = {} }}',
 }
 
 
@@ -164,7 +155,7 @@ def write_logs(seed, folder):
     channel = CHANNELS[sensor]
     if sensor == "encoder":
         channel = channel.format(float(counts_per_turn))
-    lines = [CAMPAIGN.format(seed=seed, channel=channel)]
+    roles = {}
     for name, command in tests_of(largest).items():
         # what a 12-bit converter puts out
         command = np.clip(np.rint(command * 204.8), -2048, 2047) / 204.8
@@ -184,9 +175,17 @@ def write_logs(seed, folder):
         rows = [f"time,command,{head}"]
         rows += [f"{t:.7f},{v:.6f},{x}" for t, v, x in zip(stamps, command, values, strict=True)]
         (folder / f"{name}.csv").write_text("\n".join(rows) + "\n", "utf-8")
-        role = "validate" if name == "held_out" else "fit"
-        lines.append(f'[[runs]]\nfile = "{name}.csv"\nrole = "{role}"\n')
-    (folder / "campaign.toml").write_text("\n".join(lines), "utf-8")
+        roles[f"{name}.csv"] = "validate" if name == "held_out" else "fit"
+    text = campaign_text(
+        f"Winch {seed}, simulated",
+        axis="winch",
+        drive="neutral",
+        command="command",
+        interpolation="previous",
+        channels={sensor: channel},
+        runs=roles,
+    )
+    (folder / "campaign.toml").write_text(text, "utf-8")
 
 
 def fitted(seed, folder):
