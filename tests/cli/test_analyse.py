@@ -10,7 +10,7 @@ import polars as pl
 import pytest
 
 from swashplate import Drive, maneuvers
-from swashplate.analysis import monte_carlo, performance, pulled
+from swashplate.analysis import monte_carlo, performance, with_factors
 
 FULL_ORDER = Path(__file__).parents[2] / "docs" / "full-order.md"
 
@@ -82,7 +82,9 @@ def test_the_change_that_is_proposed_is_enough(done, number, tmp_path, levers):
     text = done("size", "hoist", "--acceleration-deg-s2", "220", *words, "--out", "larger.toml")
     given = dict(re.findall(r"--scale (\w+)=([\d.]+)", text))
     assert set(given) == set(levers)
-    changed = pulled(Drive.preset("hoist"), {name: float(each) for name, each in given.items()})
+    changed = with_factors(
+        Drive.preset("hoist"), {name: float(each) for name, each in given.items()}
+    )
     assert np.degrees(performance(changed).acceleration) >= 220.0
     assert [*cells(text, "acceleration")[:2]] == [">=", "220.00"]
     assert number(text, "orifice") == pytest.approx(float(given["orifice"]), rel=1e-3)
