@@ -98,10 +98,10 @@ def test_one_at_a_time(done, tmp_path):
     text = done("sensitivity", "hoist", *few, *words)
     assert "final speed, 196.00 deg/s as it is" in text
     assert cells(text, "pump") == ["0.9", "1.1", "176.40", "215.60", "20.0", "%"]
-    assert "not moved by orifice" in text
+    assert "not changed by orifice" in text
     assert (tmp_path / "t.png").read_bytes().startswith(b"\x89PNG")
     table = pl.read_csv(tmp_path / "s.csv")
-    assert table["lever"].to_list() == ["pump", "orifice"]
+    assert table["design variable"].to_list() == ["pump", "orifice"]
     assert table["upper factor"].to_list() == [1.1, 1.5]
     assert table["at upper factor"][0] == pytest.approx(1.1 * table["as it is"][0], rel=1e-6)
 
