@@ -226,7 +226,7 @@ def test_one_fit_at_a_time_into_a_folder(refused: Words, virtual: Path, tmp_path
 
 def test_a_model_that_is_executed_says_so(run, virtual: Path, tmp_path: Path) -> None:
     page = re.sub(r"[\s│]+", " ", run("fit", "--help").stdout)
-    assert "The file is executed: name only one that you trust" in page
+    assert "The file is executed: use only one that you trust" in page
     (tmp_path / "ending.py").write_text("import sys\nsys.exit(7)\n")
     done = run("fit", CAMPAIGN, "--model", "ending.py")
     assert done.exit_code == 2
@@ -280,7 +280,7 @@ def test_validations_that_are_refused(refused: Words, held_out: Path) -> None:
     text = held_out.read_text("utf-8").replace('role = "validate"', 'role = "ignore"')
     held_out.write_text(text, "utf-8")
     said = refused("validate", "hoist", CAMPAIGN)
-    assert "no run of the axis 'hoist' has the role 'validate'; another" in said
+    assert "no run of the axis 'hoist' has the role 'validate'; select another" in said
 
 
 def test_the_command_and_python_write_the_same(done: Words, held_out: Path, tmp_path: Path) -> None:
@@ -329,7 +329,7 @@ def test_reports_that_are_refused(refused: Words, fitted: Fit, tmp_path: Path) -
     path = tmp_path / CAMPAIGN
     text = path.read_text("utf-8")
     path.write_text(text.replace("virtual = true", "virtual = false"), "utf-8")
-    assert "nobody knows its truth" in refused(*command, "--truth", "virtual/truth")
+    assert "its true parameters are unknown" in refused(*command, "--truth", "virtual/truth")
     path.write_text(text.replace('role = "fit"', 'role = "fit"\nweight = 2.0', 1), "utf-8")
     assert "is not as it was when fitted/fit.json was fitted" in refused(*command)
 

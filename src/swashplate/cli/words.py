@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from swashplate.analysis.outcomes import Trial
     from swashplate.analysis.whatif import Range
     from swashplate.campaign import Campaign, Experiment
-    from swashplate.cli.options import Sampling
+    from swashplate.cli.options import Sampling, Simulating, Start
     from swashplate.drive import Drive
     from swashplate.identification.model_setup import ModelSetup
     from swashplate.identification.setup import Setup
@@ -128,7 +128,7 @@ def parameters_of(word: str) -> ParameterSet:
 
 
 def model_parameters_of(folder: str, file: Path, runs: Sequence[Experiment]) -> ModelSetup:
-    """A model of one's own with the numbers that a fit wrote into its folder."""
+    """A user-defined model with the numbers that a fit wrote into its folder."""
     from swashplate.equations.fields import is_real
     from swashplate.identification.model_setup import ModelSetup
 
@@ -143,7 +143,9 @@ def model_parameters_of(folder: str, file: Path, runs: Sequence[Experiment]) -> 
         )
     for name, value in table.items():
         if isinstance(value, bool) or not is_real(value):
-            raise InputError(f"{place}: {name} under [{setup.name}] is {value!r:.60}, no number.")
+            raise InputError(
+                f"{place}: {name} under [{setup.name}] is {value!r:.60}, which is not a number."
+            )
     return replace(nominal, numbers={name: float(value) for name, value in table.items()})
 
 
@@ -256,7 +258,7 @@ def ranges_of(words: Sequence[str], usual: Range) -> dict[str, Range]:
 def pairs_of(
     option: str, given: Sequence[str] | None, example: str, *, often: bool = False
 ) -> list[tuple[str, str]]:
-    """What stands before and behind the equals sign of each; the first is given once, or often."""
+    """The text before and after each equals sign; the first is given once, or often."""
     pairs = list[tuple[str, str]]()
     for each in given or ():
         name, equals, value = each.partition("=")
@@ -336,11 +338,31 @@ def at_rate(drive: Drive, rate: float) -> Drive:
     return drive.at_every_rate()
 
 
-def simulated(drive: Drive, command: str, options: Sampling) -> tuple[str, Simulation]:
+def simulated_as(drive: Drive, command: str, options: Simulating) -> tuple[str, Simulation]:
+    """As `simulated`, from the start and with the inputs that the options name."""
+    return simulated(
+        drive,
+        command,
+        options,
+        start=options.start,
+        clip=options.clip,
+        measured=options.measured or (),
+    )
+
+
+def simulated(
+    drive: Drive,
+    command: str,
+    options: Sampling,
+    *,
+    start: Start = "rest",
+    clip: bool = False,
+    measured: Sequence[str] = (),
+) -> tuple[str, Simulation]:
     """Name of a command, a maneuver or a file, and the drive's simulation over it."""
     from swashplate.logs import open_log, read_series
 
-    head = command.partition(":")[0]  # stairs:2/4/0 is no path
+    head = command.partition(":")[0]  # stairs:2/4/0 is not a path
     if not ("/" in head or _ENDING.search(head) or Path(command).is_file()):
         maneuver = maneuver_of(command, drive)
         name, where, values, time = maneuver.name, "", maneuver.sample(options.rate), None
@@ -363,23 +385,28 @@ def simulated(drive: Drive, command: str, options: Sampling) -> tuple[str, Simul
                 "--interpolation previous (each row held until the next)."
             )
         name, where, values, time = Path(command).name, f"{command}: ", series.values, series.time
-    between, start, clip = options.interpolation, options.start, options.clip
-    given = _measured(command if where else "", options)
+    inputs = _measured(measured, command if where else "", options.time_column)
     try:
         return name, drive.simulate(
-            values, options.rate, time=time, interpolation=between, start=start, clip=clip, **given
+            values,
+            options.rate,
+            time=time,
+            interpolation=options.interpolation,
+            start=start,
+            clip=clip,
+            **inputs,
         )
     except InputError as error:
         raise InputError(f"{where}{error}") from None
 
 
-def _measured(log: str, options: Sampling) -> dict[str, Any]:
-    """Inputs beside the voltage by name: a column of a log, or a number."""
+def _measured(measured: Sequence[str], log: str, time_column: str) -> dict[str, Any]:
+    """Inputs other than the voltage by name: a column of a log, or a number."""
     from swashplate.logs import read_series
     from swashplate.simulation.result import MEASURED
 
     found = dict[str, Any]()
-    for word in options.measured or ():
+    for word in measured:
         name, _, said = (part.strip() for part in word.partition("="))
         if name not in MEASURED or not said or name in found:
             known = ", ".join(MEASURED)
@@ -391,7 +418,7 @@ def _measured(log: str, options: Sampling) -> dict[str, Any]:
                 must = "a maneuver has no columns, so give a number in SI"
                 raise InputError(f"--measured {word}: {must}.") from None
             unit = MEASURED[name][0]
-            found[name] = read_series(log, said, unit, time_column=options.time_column).values
+            found[name] = read_series(log, said, unit, time_column=time_column).values
     return found
 
 
