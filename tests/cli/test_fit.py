@@ -50,7 +50,7 @@ def test_a_campaign_becomes_a_drive(done, refused, campaign, tmp_path) -> None:
     said = done(*words, "--timing")
     (times,) = re.findall(r"^Time: +(.*)$", said, re.MULTILINE)
     parts = dict(each.removesuffix(" s").rsplit(" ", 1) for each in times.split(", "))
-    assert [*parts] == ["start and kernels", "reading", "search", "judging", "report"]
+    assert [*parts] == ["start and kernels", "reading", "search", "assessment", "report"]
     assert all(float(each) >= 0.0 for each in parts.values())
     assert said.index("Stage card") < said.index("Stage pump")
     fitted = Drive.from_toml(tmp_path / "fitted" / "drive.toml")
@@ -245,7 +245,7 @@ def test_a_drive_beside_the_runs_that_were_held_out(done, held_out, tmp_path) ->
     assert "hoist_step_4_V" not in said
     assert re.search(r"\ncurrent +\n.* mA ", said, re.DOTALL)
     assert re.search(r"\nspeed from counts +\n.* deg/s ", said, re.DOTALL)
-    assert "'of range' below means" in " ".join(said.split())
+    assert "'of range' below: over" in " ".join(said.split())
     assert "Usable: predicts speed from counts within 0." in said
     assert "Data: Not judged: a drive that was not fitted to these runs" in said
     assert "Values: " not in said

@@ -204,8 +204,7 @@ def check(
         of_file = dict.fromkeys((*tests.campaign_findings(campaign), *beside_the_drives(campaign)))
     roles = [each.role for each in campaign]
     counted = ", ".join(f"{roles.count(role)} to {role}" for role in dict.fromkeys(roles))
-    virtual = " (virtual)" * campaign.virtual
-    note(f"{campaign.title}{virtual}: {len(campaign)} experiments ({counted})")
+    note(f"{words.title_of(campaign)}: {len(campaign)} experiments ({counted})")
     for overview in campaign.overviews:
         show(overview.table())
         bullets([overview.sentence])
@@ -290,7 +289,7 @@ def plot(
         how = {"window": window, "title": f"{run}, {channel}"}
         draw(out, "plot_channel", shown, simulated, **how)
     else:
-        figures = campaign.plot(title=campaign.title + " (virtual)" * campaign.virtual)
+        figures = campaign.plot(title=words.title_of(campaign))
         several = [out.with_stem(f"{out.stem}-{k}") for k in range(1, len(figures) + 1)]
         check_free(*several, force=force)
         for path, figure in zip([out] if len(figures) == 1 else several, figures, strict=True):

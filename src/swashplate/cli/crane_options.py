@@ -492,5 +492,5 @@ def _refuse_unusable(crane: Crane) -> None:
             raise InputError(
                 f"{axis}={source.place}: the verdict on the fit of this drive is "
                 f"'{source.verdict.rstrip('.')}'; fit again until it is usable, as its report "
-                f"advises, give another drive, or take this one all the same with --force."
+                f"advises, give another drive, or accept this one with --force."
             )

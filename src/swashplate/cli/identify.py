@@ -62,7 +62,7 @@ FILES = {
 """What `Identification.save` writes, of a drive or of a user-defined model."""
 MEASURES = (
     "NRMSE is the RMSE over the standard deviation of what was measured, fit % is 100 (1 - NRMSE); "
-    "'of range' below means over the largest less the smallest value of the signal."
+    "'of range' below: over the range of the signal, its largest less its smallest value."
 )
 
 Loss = Literal["linear", "soft_l1", "cauchy"]
@@ -233,12 +233,12 @@ def fit(
             "starts are written; the same command with --resume continues."
         )
         raise typer.Exit(INTERRUPTED)
-    with working("Judging"), clock.part("judging"):
+    with working("Assessing"), clock.part("assessment"):
         verdict = result.verdict
     with clock.part("report"):
         lines = _written(result, out)
         lines += [_reported(result, out)] if report else []
-    note(f"{campaign.title}{' (virtual)' * campaign.virtual}")
+    note(words.title_of(campaign))
     _say_fit(result)
     for line in [*lines, f"Time:      {clock}"] if timing else lines:
         note(line)
@@ -364,8 +364,7 @@ def validate(
                 parameters, campaign, page, predicted, judged=judged, notes=notes
             )
         lines = [f"Measures:  {out / 'measures.csv'}", f"Report:    {page}"]
-    virtual = " (virtual)" * campaign.virtual
-    note(f"{campaign.title}{virtual}, {chosen}: {parameters.name} from {drive}")
+    note(f"{words.title_of(campaign)}, {chosen}: {parameters.name} from {drive}")
     show(*measures)
     say(MEASURES)
     for line in lines:
@@ -442,7 +441,7 @@ def report(
                     f"{fitted} is not the drive that {folder / 'fit.json'} found "
                     f"({', '.join(other[:3])} differ): assess it with 'swashplate validate'."
                 )
-    with working("Judging"):
+    with working("Assessing"):
         verdict = found.verdict
     note(_reported(found, folder, true))
     save(pdf, "Printed", lambda to: print_report(folder / "report.html", to))

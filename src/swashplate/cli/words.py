@@ -48,9 +48,9 @@ _MARKS = {"runs": "campaign", "stages": "setup", "control_card": "drive", "pump_
 _INSTEAD = {
     ("log", "campaign"): "make a campaign of it with 'swashplate campaign init {}'",
     ("log", "drive"): "a drive is a packaged name, a parameter file or the folder of a fit",
-    ("drive", "campaign"): "name the campaign first; a fit begins at a drive given with --from",
+    ("drive", "campaign"): "name the campaign first, and the initial drive with --from",
     ("setup", "campaign"): "name the campaign first, and this file with --setup",
-    ("campaign", "drive"): "name a drive here, and the campaign where CAMPAIGN.toml stands",
+    ("campaign", "drive"): "name a drive here, and the campaign in place of CAMPAIGN.toml",
     ("setup", "drive"): "name a drive here, and this file with --setup",
 }
 
@@ -74,6 +74,11 @@ def check_kind(path: Path, wanted: str) -> None:
     instead = _INSTEAD.get((kind, wanted))
     if path.is_file() and instead is not None:
         raise InputError(f"{path} is {_NAMES[kind]}, not {_NAMES[wanted]}: {instead.format(path)}.")
+
+
+def title_of(campaign: Campaign) -> str:
+    """Title of a campaign, marked if its tests are virtual."""
+    return f"{campaign.title} (virtual)" if campaign.virtual else campaign.title
 
 
 def campaign_of(path: Path, axis: str | None = None) -> tuple[Campaign, str]:
@@ -291,9 +296,9 @@ def changes_between(before: ParameterSet, after: ParameterSet) -> list[str]:
         ratios = [b / a for a, b in zip(old.values, new.values, strict=False) if a and isfinite(a)]
         far = [r for r in ratios if isfinite(r) and not 1.0 / SURPRISING < abs(r) < SURPRISING]
         if any(far):
+            in_unit = f" ({unit})" if unit else ""
             lines.append(
-                f"! {old.symbol} is {max(far):.3g} times what it was: is it meant"
-                f"{f' in {unit}' * bool(unit)}?"
+                f"! {old.symbol} changes by a factor of {max(far):.3g}: check its unit{in_unit}."
             )
     return lines
 
@@ -333,7 +338,7 @@ def at_rate(drive: Drive, rate: float) -> Drive:
     steps = "" if marched == rate else f", computed in steps of 1/{marched:g} s,"
     note(
         f"{drive.name}: the card's filter is a recursion for {own:g} Hz; at {rate:g} Hz{steps} the "
-        "differential equation with the same poles takes its place."
+        "differential equation with the same poles replaces it."
     )
     return drive.at_every_rate()
 
