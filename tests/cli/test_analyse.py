@@ -10,7 +10,7 @@ import polars as pl
 import pytest
 
 from swashplate import Drive, maneuvers
-from swashplate.analysis import monte_carlo, performance, pulled
+from swashplate.analysis import monte_carlo, performance, with_factors
 
 FULL_ORDER = Path(__file__).parents[2] / "docs" / "full-order.md"
 
@@ -82,7 +82,9 @@ def test_the_change_that_is_proposed_is_enough(done, number, tmp_path, levers):
     text = done("size", "hoist", "--acceleration-deg-s2", "220", *words, "--out", "larger.toml")
     given = dict(re.findall(r"--scale (\w+)=([\d.]+)", text))
     assert set(given) == set(levers)
-    changed = pulled(Drive.preset("hoist"), {name: float(each) for name, each in given.items()})
+    changed = with_factors(
+        Drive.preset("hoist"), {name: float(each) for name, each in given.items()}
+    )
     assert np.degrees(performance(changed).acceleration) >= 220.0
     assert [*cells(text, "acceleration")[:2]] == [">=", "220.00"]
     assert number(text, "orifice") == pytest.approx(float(given["orifice"]), rel=1e-3)
@@ -96,10 +98,10 @@ def test_one_at_a_time(done, tmp_path):
     text = done("sensitivity", "hoist", *few, *words)
     assert "final speed, 196.00 deg/s as it is" in text
     assert cells(text, "pump") == ["0.9", "1.1", "176.40", "215.60", "20.0", "%"]
-    assert "not moved by orifice" in text
+    assert "not changed by orifice" in text
     assert (tmp_path / "t.png").read_bytes().startswith(b"\x89PNG")
     table = pl.read_csv(tmp_path / "s.csv")
-    assert table["lever"].to_list() == ["pump", "orifice"]
+    assert table["design variable"].to_list() == ["pump", "orifice"]
     assert table["upper factor"].to_list() == [1.1, 1.5]
     assert table["at upper factor"][0] == pytest.approx(1.1 * table["as it is"][0], rel=1e-6)
 

@@ -93,7 +93,7 @@ def limits(
         shares = shares_of(chosen, run)
     title = f"{drive.title}, {name}"
     save(out, "Shares of each limit, in SI", shares.write)
-    draw(plot, "plot_limit_timeline", run, wanted=shares.wanted, title=title)
+    draw(plot, "plot_limit_timeline", run, reference=shares.reference, title=title)
     error = quantity(shares.error, "rad/s", spec=".3f")
     # which of the limits that act here no test reached is said below, by the result itself
     drive.note(f"{title}: {error} rms from a drive without limits", unreached=False)
@@ -106,9 +106,9 @@ def limits(
 
 def _list_levers(requested: bool) -> None:
     if requested:
-        from swashplate.analysis.whatif import levers_table
+        from swashplate.analysis.design_variables import design_variables_table
 
-        show(levers_table())
+        show(design_variables_table())
         raise typer.Exit
 
 
@@ -184,7 +184,7 @@ def whatif(
     if uncertainty is not None:
         with working("Drawing drives"):
             draws = monte_carlo.stored_draws(uncertainty, drive=choice.chosen, campaign=campaign)
-            drawn = {AS_IS: draws, CHANGED: draws.pulled(moved)}
+            drawn = {AS_IS: draws, CHANGED: draws.with_factors(moved)}
             said.append(
                 f"± is half of the interval that contains {100.0 * LEVEL:g} % of the drives."
             )
@@ -259,7 +259,7 @@ def size(
     unless others are named.
     """
     from swashplate.analysis import sizing
-    from swashplate.analysis.outcomes import proportional_speed, trial
+    from swashplate.analysis.outcomes import proportional_speed, trial_of
 
     if (tracking_deg_s is None) != (maneuver is None):
         raise InputError("--tracking-deg-s and --maneuver belong together: give both or neither.")
@@ -267,12 +267,12 @@ def size(
     speed, acceleration, error = (None if each is None else radians(each) for each in given)
     required = sizing.Requirements(speed, acceleration, error, direction)
     with working("Sizing"):
-        follow, ranges = None, words.ranges_of(levers or SIZED, sizing.WIDEST)
+        follow, ranges = None, words.ranges_of(levers or SIZED, sizing.DEFAULT_RANGE)
         if maneuver is not None:
             voltage = words.maneuver_of(maneuver, drive.chosen).sample()
             # a larger drive may well be what it takes to reach it
-            wanted = proportional_speed(drive.chosen, voltage, limited=False)
-            follow = trial(drive.chosen, voltage, wanted=wanted)
+            reference = proportional_speed(drive.chosen, voltage, limited=False)
+            follow = trial_of(drive.chosen, voltage, reference=reference)
         found = sizing.size(drive.chosen, required, ranges, follow=follow)
     save(out, "Changed drive", found.drive.to_toml)
     drive.note(drive.title)
@@ -321,7 +321,7 @@ def sensitivity(
 
     with working("Simulating"):
         name, trial = words.trial_of(drive.chosen, maneuver, sampling)
-        ranges = words.ranges_of(levers or (*PULLED, "plussing"), SPAN)
+        ranges = words.ranges_of(levers or (*PULLED, "spool_offset"), SPAN)
         found = one_at_a_time(drive.chosen, ranges, trial, outcomes=tuple(outcomes or OUTCOMES))
     title = f"{drive.title}, {name}"
     save(out, "All numbers, in SI", joined(found.tables(every=True)).write)
@@ -397,8 +397,8 @@ def compensate(
         tables = found.tables([radians(each) for each in speeds_deg_s or ()])
         if stick is not None:
             name, run = words.simulated(chosen, stick, sampling)
-            wanted = compensation.wanted_of_stick(found, run["voltage"])
-            bought = compensation.improvement(chosen, wanted, run.record.rate, inverse=found)
+            reference = compensation.speed_of_command(found, run["voltage"])
+            bought = compensation.improvement(chosen, reference, run.record.rate, inverse=found)
             tables.append(replace(bought.table(), title=f"Error of the speed under {name}"))
     save(out, "Inverse map, in SI", found.write)
     draw(plot, "plot_compensation", found, bought)

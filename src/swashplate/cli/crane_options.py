@@ -352,7 +352,7 @@ class Studied(Operated):
 
     def sets(self) -> dict[str, Any]:
         """Sets of drives by name."""
-        from swashplate.analysis.whatif import find_lever
+        from swashplate.analysis.design_variables import powers_of
         from swashplate.crane import drawn_cranes, upgraded
 
         names = filter(None, map(str.strip, (self.drives or "ideal,identified").split(",")))
@@ -374,7 +374,7 @@ class Studied(Operated):
                     f"{words}: write the axis first, luff.orifice=1.5; the axes are "
                     f"{', '.join(AXES)}."
                 )
-            find_lever(lever)
+            powers_of(lever)
             factor = number_of(words, text)
             crane = upgraded(crane, axis, {lever: factor})
             changed.append(f"{axis} {lever} ×{factor:g}")

@@ -15,8 +15,8 @@ from swashplate.errors import FileError, InputError, MissingFileError, UnknownPa
 from swashplate.units import unit_text
 
 if TYPE_CHECKING:
+    from swashplate.analysis.design_variables import FactorRange
     from swashplate.analysis.outcomes import Trial
-    from swashplate.analysis.whatif import Range
     from swashplate.campaign import Campaign, Experiment
     from swashplate.cli.options import Sampling, Simulating, Start
     from swashplate.drive import Drive
@@ -212,18 +212,18 @@ def drive_of(word: str, values: Sequence[str] = (), factors: Sequence[str] = ())
         try:
             return find(name)
         except UnknownParameterError:
-            from swashplate.analysis.whatif import find_lever
+            from swashplate.analysis.design_variables import powers_of
 
-            return find_lever(name)  # refuses it, and lists levers as well
+            return powers_of(name)  # refuses it, and lists levers as well
 
     chosen = assigned("--set", values, set_as, valued, units=True)
     levers = assigned("--scale", pulling, scaled_as, str, (1,))
     drive = Drive(parameters_of(word)).replace(**chosen)
     drive = drive.scale(**assigned("--scale", scaling, scaled_as, scalable))
     if levers:
-        from swashplate.analysis.whatif import pulled
+        from swashplate.analysis.design_variables import with_factors
 
-        drive = pulled(drive, levers)
+        drive = with_factors(drive, levers)
     return drive
 
 
@@ -232,9 +232,9 @@ def _is_lever(name: str) -> bool:
 
     if name in CATALOGUE or name in COLUMNS or name in REFINEMENTS:
         return False
-    from swashplate.analysis.whatif import LEVERS
+    from swashplate.analysis.design_variables import DESIGN_VARIABLES
 
-    return name in LEVERS
+    return name in DESIGN_VARIABLES
 
 
 def physical_values(words: Sequence[str]) -> dict[str, Change]:
@@ -247,17 +247,17 @@ def physical_values(words: Sequence[str]) -> dict[str, Change]:
 
 def factors_of(words: Sequence[str]) -> dict[str, float]:
     """Factors by lever or parameter from words such as ``orifice=1.5``."""
-    from swashplate.analysis.whatif import find_lever
+    from swashplate.analysis.design_variables import powers_of
 
-    return assigned("--scale", words, "orifice=1.5", find_lever, (1,))
+    return assigned("--scale", words, "orifice=1.5", powers_of, (1,))
 
 
-def ranges_of(words: Sequence[str], usual: Range) -> dict[str, Range]:
+def ranges_of(words: Sequence[str], usual: FactorRange) -> dict[str, FactorRange]:
     """Ranges of factors by lever from words such as ``pump`` or ``pump=0.8/1.5``."""
-    from swashplate.analysis.whatif import find_lever
+    from swashplate.analysis.design_variables import powers_of
 
     whole = [word if "=" in word else f"{word}={usual[0]}/{usual[1]}" for word in words]
-    return assigned("--lever", whole, "pump or pump=0.8/1.5", find_lever, (2,))
+    return assigned("--lever", whole, "pump or pump=0.8/1.5", powers_of, (2,))
 
 
 def pairs_of(
@@ -436,8 +436,8 @@ def window_of(time: Array, begin: float | None, end: float | None) -> tuple[floa
 
 def trial_of(drive: Drive, command: str, options: Sampling) -> tuple[str, Trial]:
     """Name of a command, a maneuver or a log, and the trial that it makes."""
-    from swashplate.analysis.outcomes import trial
+    from swashplate.analysis.outcomes import trial_of
 
     drive = at_rate(drive, options.rate)
     name, run = simulated(drive, command, options)
-    return name, trial(drive, run["voltage"], options.rate)
+    return name, trial_of(drive, run["voltage"], options.rate)
