@@ -54,7 +54,7 @@ def test_figure_9_1(done, number, tmp_path):
     assert "+50.0 %" in text
     assert (tmp_path / "w.png").read_bytes().startswith(b"\x89PNG")
     assert Drive.from_toml(tmp_path / "larger.toml")["Z10"].value == pytest.approx(18.594)
-    text = done("whatif", "--levers")
+    text = done("whatif", "--variables")
     for word in ("orifice _plus _minus", "drive_speed", "rate_limit_down", "Z16 by its square"):
         assert word in text
 
@@ -78,7 +78,7 @@ def test_bands(done, tmp_path, monkeypatch):
 
 @pytest.mark.parametrize("levers", [("orifice",), ("orifice", "pump")])
 def test_the_change_that_is_proposed_is_enough(done, number, tmp_path, levers):
-    words = [word for lever in levers for word in ("--lever", lever)]
+    words = [word for lever in levers for word in ("--variable", lever)]
     text = done("size", "hoist", "--acceleration-deg-s2", "220", *words, "--out", "larger.toml")
     given = dict(re.findall(r"--scale (\w+)=([\d.]+)", text))
     assert set(given) == set(levers)
@@ -93,7 +93,14 @@ def test_the_change_that_is_proposed_is_enough(done, number, tmp_path, levers):
 
 
 def test_one_at_a_time(done, tmp_path):
-    few = ("--lever", "pump", "--lever", "orifice=0.8/1.5", "--maneuver", "step:9,stop=4,length=5")
+    few = (
+        "--variable",
+        "pump",
+        "--variable",
+        "orifice=0.8/1.5",
+        "--maneuver",
+        "step:9,stop=4,length=5",
+    )
     words = ("--outcome", "final_speed", "--plot", "t.png", "--out", "s.csv")
     text = done("sensitivity", "hoist", *few, *words)
     assert "final speed, 196.00 deg/s as it is" in text

@@ -5,7 +5,7 @@ import shlex
 import pytest
 
 REFUSED = {
-    "simulate hoist step:4 --set orifice=2": "orifice is a lever, which has no value of its own",
+    "simulate hoist step:4 --set orifice=2": "orifice is a design variable, which has no value",
     "whatif hoist --scale motor_leakage=2": "motor_leakage has no value here",
     "simulate hoist stairs:2,4,0": "separate levels by /, as in stairs:2/4/0",
     "bode hoist --points 1": "--points is 1, but must be 2 to 2000",
@@ -21,12 +21,12 @@ REFUSED = {
     "linearize hoist": "give one of --at and --current",
     "linearize hoist --current 1 --input voltage": "needs --at, not",
     "linearize hoist --at 0.1": "lies in the card's dead zone, so the gain is 0; linearise at +0.",
-    "sensitivity hoist --lever pumpe": "no design variable 'pumpe' (did you mean pump?)",
-    "sensitivity hoist --lever pump --lever pump=1/2": "--lever gives pump twice",
+    "sensitivity hoist --variable pumpe": "no design variable 'pumpe' (did you mean pump?)",
+    "sensitivity hoist --variable pump --variable pump=1/2": "--variable gives pump twice",
     "sensitivity hoist --outcome speed": "There is no outcome 'speed'",
     "size hoist --speed-deg-s 500": "the hoist reaches speed 370 deg/s (required 500 deg/s)",
     "size hoist --tracking-deg-s 5": "--tracking-deg-s and --maneuver belong together",
-    "whatif hoist --scale orifise=1.5": "There is no design variable 'orifise' (did you mean orifice?)",
+    "whatif hoist --scale orifise=1.5": "no design variable 'orifise' (did you mean orifice?)",
     "whatif hoist --scale pump=2 --uncertainty none": "There is no fit.json in none",
     "full-order neutral": "neutral: spool_stroke (stroke of the spool, both ways) is inf m",
     "full-order hoist --plot run.png": "--plot draws one run; name a maneuver",

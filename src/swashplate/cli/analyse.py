@@ -19,13 +19,13 @@ from swashplate.cli.options import (
     FigureFile,
     Force,
     Interpolation,
-    LeversOption,
     ManeuverOrLog,
     OptionalCommand,
     Sampling,
     SetFile,
     Simulating,
     TableFile,
+    VariablesOption,
 )
 from swashplate.cli.terminal import bullets, check_output, draw, note, save, say, show, working
 from swashplate.errors import InputError
@@ -35,7 +35,7 @@ LEVEL, SPAN = 0.95, (0.9, 1.1)
 """Level of the bands, and the usual factors of a design variable."""
 OUTCOMES = ("final_speed", "rise_time", "largest_acceleration", "tracking_error", "creep")
 SIZED = ("orifice", "pump")
-PULLED = (*SIZED, "supply_pressure", "rate_limits", "dead_zone", "spool_stroke", "relief")
+VARIED = (*SIZED, "supply_pressure", "rate_limits", "dead_zone", "spool_stroke", "relief")
 MOST_POINTS = 2000
 AMPLITUDES = (1.0, 4.0, 6.5, 9.0)
 
@@ -104,7 +104,7 @@ def limits(
         say(sentence)
 
 
-def _list_levers(requested: bool) -> None:
+def _list_variables(requested: bool) -> None:
     if requested:
         from swashplate.analysis.design_variables import design_variables_table
 
@@ -120,7 +120,7 @@ def _list_levers(requested: bool) -> None:
         swashplate whatif slew --scale orifice_diameter=1.2 --maneuver step:6 --plot w.png
         swashplate whatif fitted --scale dead_zone=0 --uncertainty fitted
         swashplate whatif mine.toml --scale pump=1.2 --maneuver log.csv --interpolation previous
-        swashplate whatif --levers
+        swashplate whatif --variables
     """,
 )
 def whatif(
@@ -130,10 +130,10 @@ def whatif(
         list[str],
         typer.Option(
             "--scale",
-            metavar="LEVER=FACTOR",
+            metavar="NAME=FACTOR",
             help=(
                 "Factor on a design variable, such as orifice=1.5, pump=1.5 or dead_zone=0 (see "
-                "--levers), or on a parameter, such as Z16_plus=1.2; may be repeated."
+                "--variables), or on a parameter, such as Z16_plus=1.2; may be repeated."
             ),
         ),
     ],
@@ -152,13 +152,13 @@ def whatif(
     ] = None,
     plot: FigureFile = None,
     out: SetFile = None,
-    levers: Annotated[
+    list_variables: Annotated[
         bool,
         typer.Option(
-            "--levers",
+            "--variables",
             metavar=NO_VALUE,
             help="List the design variables and exit.",
-            callback=_list_levers,
+            callback=_list_variables,
             is_eager=True,
         ),
     ] = False,
@@ -167,9 +167,9 @@ def whatif(
 ) -> None:
     """Predict the effect of a change to the machine.
 
-    Simulates the drive as it is and with design variables (levers) changed, over
-    one command. The desired speed is proportional to the voltage, with the gain
-    of the drive as it is. With --uncertainty, metrics get intervals and the
+    Simulates the drive as it is and with design variables changed, over one
+    command. The reference speed is proportional to the voltage, with the gain of
+    the drive as it is. With --uncertainty, metrics get intervals and the
     figure gets bands: drives are drawn from the errors of a fit's estimates.
     """
     from swashplate.analysis import monte_carlo
@@ -212,8 +212,8 @@ def whatif(
     app,
     "size",
     examples="""
-        swashplate size hoist --speed-deg-s 250 --lever pump
-        swashplate size hoist --acceleration-deg-s2 200 --lever orifice=1/2 --lever pump=1/1.5
+        swashplate size hoist --speed-deg-s 250 --variable pump
+        swashplate size hoist --acceleration-deg-s2 200 --variable orifice=1/2 --variable pump=1/1.5
         swashplate size hoist --tracking-deg-s 19 --maneuver sine:9,0.1 --out larger.toml
     """,
 )
@@ -238,7 +238,7 @@ def size(
         typer.Option(
             metavar="NAME",
             help=(
-                "Maneuver to follow: the desired speed is proportional to its voltage, with the "
+                "Maneuver to follow: the reference speed is proportional to its voltage, with the "
                 "gain of the drive as it is. Each candidate is commanded in proportion to that "
                 "speed, with its own gain."
             ),
@@ -247,7 +247,7 @@ def size(
     direction: Annotated[
         Direction, typer.Option(help="Direction in which speed and acceleration are required.")
     ] = "both",
-    levers: LeversOption = None,
+    variables: VariablesOption = None,
     out: SetFile = None,
     force: Force = False,
 ) -> None:
@@ -267,7 +267,7 @@ def size(
     speed, acceleration, error = (None if each is None else radians(each) for each in given)
     required = sizing.Requirements(speed, acceleration, error, direction)
     with working("Sizing"):
-        follow, ranges = None, words.ranges_of(levers or SIZED, sizing.DEFAULT_RANGE)
+        follow, ranges = None, words.ranges_of(variables or SIZED, sizing.DEFAULT_RANGE)
         if maneuver is not None:
             voltage = words.maneuver_of(maneuver, drive.chosen).sample()
             # a larger drive may well be what it takes to reach it
@@ -291,14 +291,14 @@ def size(
     "sensitivity",
     examples="""
         swashplate sensitivity hoist
-        swashplate sensitivity hoist --lever orifice --lever pump=0.8/1.5 --plot tornado.png
+        swashplate sensitivity hoist --variable orifice --variable pump=0.8/1.5 --plot tornado.png
         swashplate sensitivity slew --maneuver step:4 --out all.csv
     """,
 )
 def sensitivity(
     drive: DriveChoice,
     *,
-    levers: LeversOption = None,
+    variables: VariablesOption = None,
     outcomes: Annotated[
         list[str] | None,
         typer.Option(
@@ -321,11 +321,11 @@ def sensitivity(
 
     with working("Simulating"):
         name, trial = words.trial_of(drive.chosen, maneuver, sampling)
-        ranges = words.ranges_of(levers or (*PULLED, "spool_offset"), SPAN)
+        ranges = words.ranges_of(variables or (*VARIED, "spool_offset"), SPAN)
         found = one_at_a_time(drive.chosen, ranges, trial, outcomes=tuple(outcomes or OUTCOMES))
     title = f"{drive.title}, {name}"
     save(out, "All numbers, in SI", joined(found.tables(every=True)).write)
-    draw(plot, "plot_tornado", found, title=f"{title}: each lever by itself")
+    draw(plot, "plot_tornado", found, title=f"{title}: each design variable by itself")
     drive.note(title)
     show(*found.tables())
     bullets(dict.fromkeys(found.sentences))
@@ -358,7 +358,7 @@ def compensate(
         typer.Option(
             "--speed-deg-s",
             metavar="DEG/S",
-            help="Desired speed whose voltage is printed; may be repeated.",
+            help="Required speed whose voltage is printed; may be repeated.",
         ),
     ] = None,
     points: Annotated[
@@ -376,7 +376,7 @@ def compensate(
     sampling: Sampling,
     force: Force = False,
 ) -> None:
-    """Invert a drive's steady-state map: find the voltage for a desired speed.
+    """Invert a drive's steady-state map: find the voltage for a required speed.
 
     The map steps across the dead zone, ends where the speed saturates, and is
     linear between its points, so that any controller can evaluate it. With a
@@ -402,7 +402,7 @@ def compensate(
             tables.append(replace(bought.table(), title=f"Error of the speed under {name}"))
     save(out, "Inverse map, in SI", found.write)
     draw(plot, "plot_compensation", found, bought)
-    drive.note(f"{drive.title}: voltage for a desired speed")
+    drive.note(f"{drive.title}: voltage for a required speed")
     show(*tables)
 
 

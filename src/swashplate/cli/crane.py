@@ -145,7 +145,7 @@ def run(
 ) -> None:
     """Run a crane, once or with several variants of control and drives.
 
-    Joystick positions are fractions of full speed: desired speeds, or with
+    Joystick positions are fractions of full speed: speeds, or with
     'volts', as on the crane, a voltage of 10 V at 1. The residual swing is the
     largest one within 25 s, counted from 4 s after the joystick has returned and
     the controller has ended its command.

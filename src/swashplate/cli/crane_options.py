@@ -368,16 +368,16 @@ class Studied(Operated):
             side.print(f"Drawn: {', '.join(drawn)}{as_given}")
         crane, changed = self.chosen, []
         for name, text in pairs_of("--scale", self.scale, "luff.orifice=1.5"):
-            (axis, _, lever), words = name.partition("."), f"--scale {name}={text}"
-            if not lever or axis not in AXES:
+            (axis, _, variable), words = name.partition("."), f"--scale {name}={text}"
+            if not variable or axis not in AXES:
                 raise InputError(
                     f"{words}: write the axis first, luff.orifice=1.5; the axes are "
                     f"{', '.join(AXES)}."
                 )
-            powers_of(lever)
+            powers_of(variable)
             factor = number_of(words, text)
-            crane = upgraded(crane, axis, {lever: factor})
-            changed.append(f"{axis} {lever} ×{factor:g}")
+            crane = upgraded(crane, axis, {variable: factor})
+            changed.append(f"{axis} {variable} ×{factor:g}")
         if changed:
             sets[", ".join(changed)] = crane
         return sets

@@ -336,11 +336,11 @@ def validate(
     with working(f"Reading {path}"):
         parameters: Parameters | None = None if model else words.parameters_of(drive)
         campaign, chosen = words.campaign_of(path, axis)
-        wanted = ("fit", "validate") if role == "all" else (role,)
-        runs = [each for each in campaign.select(axis=chosen) if each.role in wanted]
+        roles = ("fit", "validate") if role == "all" else (role,)
+        runs = [each for each in campaign.select(axis=chosen) if each.role in roles]
     if not runs:
         raise InputError(
-            f"{path}: no run of the axis '{chosen}' has the role {' or '.join(map(repr, wanted))}; "
+            f"{path}: no run of the axis '{chosen}' has the role {' or '.join(map(repr, roles))}; "
             "select another with --role."
         )
     with working("Predicting"):

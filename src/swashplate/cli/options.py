@@ -160,14 +160,14 @@ ManeuverOrLog = Annotated[
         help='Command: a maneuver, such as step:9 or "step +9 V", or a log.',
     ),
 ]
-LeversOption = Annotated[
+VariablesOption = Annotated[
     list[str] | None,
     typer.Option(
-        "--lever",
-        metavar="LEVER[=LOW/HIGH]",
+        "--variable",
+        metavar="NAME[=LOW/HIGH]",
         help=(
             "Design variable or parameter, alone or with its lowest and highest factor; may be "
-            "repeated. 'swashplate whatif --levers' lists them."
+            "repeated. 'swashplate whatif --variables' lists them."
         ),
     ),
 ]

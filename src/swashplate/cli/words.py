@@ -1,4 +1,4 @@
-"""From the words of a command line to drives, commands, campaigns, levers and simulations."""
+"""From the words of a command line to drives, commands, campaigns and simulations."""
 
 from __future__ import annotations
 
@@ -68,12 +68,14 @@ def file_kind(path: Path) -> str:
     return next((kind for mark, kind in _MARKS.items() if mark in found), "")
 
 
-def check_kind(path: Path, wanted: str) -> None:
-    """Refuse a file that is plainly of another kind than wanted; say where such a file goes."""
+def check_kind(path: Path, expected: str) -> None:
+    """Refuse a file that is plainly of another kind than expected; say where such a file goes."""
     kind = file_kind(path)
-    instead = _INSTEAD.get((kind, wanted))
+    instead = _INSTEAD.get((kind, expected))
     if path.is_file() and instead is not None:
-        raise InputError(f"{path} is {_NAMES[kind]}, not {_NAMES[wanted]}: {instead.format(path)}.")
+        raise InputError(
+            f"{path} is {_NAMES[kind]}, not {_NAMES[expected]}: {instead.format(path)}."
+        )
 
 
 def title_of(campaign: Campaign) -> str:
@@ -154,7 +156,7 @@ def model_parameters_of(folder: str, file: Path, runs: Sequence[Experiment]) -> 
     return replace(nominal, numbers={name: float(value) for name, value in table.items()})
 
 
-# --- changes and levers ---------------------------------------------------------------------------
+# --- changes and design variables -----------------------------------------------------------------
 
 
 def assigned(
@@ -193,20 +195,22 @@ def assigned(
 
 
 def drive_of(word: str, values: Sequence[str] = (), factors: Sequence[str] = ()) -> Drive:
-    """The drive of a name or file, with values set and then scaled, by parameter or by lever."""
+    """The drive of a name or file, with values set and then scaled."""
     from swashplate.drive import Drive
     from swashplate.parameters.definitions import find
 
     def valued(name: str) -> Any:
-        if _is_lever(name):
-            words = f"{name} is a lever, which has no value of its own: --scale {name}=1.5."
+        if _is_design_variable(name):
+            words = f"{name} is a design variable, which has no value: write --scale {name}=1.5."
             raise InputError(words)
         return find(name)
 
     set_as = "Z16=1.2e-4, Z16=1.2e-4/1.5e-4 (plus/minus) or Z16_plus=0.12mm"
     scaled_as = "Z16=1.5, Z16=1.5/1.2 (plus/minus) or orifice=1.5"
-    pulling = [word for word in factors if _is_lever(word.partition("=")[0].strip())]
-    scaling = [word for word in factors if word not in pulling]
+    scaled_variables = [
+        word for word in factors if _is_design_variable(word.partition("=")[0].strip())
+    ]
+    scaling = [word for word in factors if word not in scaled_variables]
 
     def scalable(name: str) -> Any:
         try:
@@ -214,20 +218,20 @@ def drive_of(word: str, values: Sequence[str] = (), factors: Sequence[str] = ())
         except UnknownParameterError:
             from swashplate.analysis.design_variables import powers_of
 
-            return powers_of(name)  # refuses it, and lists levers as well
+            return powers_of(name)  # refuses it, and lists design variables as well
 
     chosen = assigned("--set", values, set_as, valued, units=True)
-    levers = assigned("--scale", pulling, scaled_as, str, (1,))
+    changes = assigned("--scale", scaled_variables, scaled_as, str, (1,))
     drive = Drive(parameters_of(word)).replace(**chosen)
     drive = drive.scale(**assigned("--scale", scaling, scaled_as, scalable))
-    if levers:
+    if changes:
         from swashplate.analysis.design_variables import with_factors
 
-        drive = with_factors(drive, levers)
+        drive = with_factors(drive, changes)
     return drive
 
 
-def _is_lever(name: str) -> bool:
+def _is_design_variable(name: str) -> bool:
     from swashplate.parameters.definitions import CATALOGUE, COLUMNS, REFINEMENTS
 
     if name in CATALOGUE or name in COLUMNS or name in REFINEMENTS:
@@ -246,18 +250,18 @@ def physical_values(words: Sequence[str]) -> dict[str, Change]:
 
 
 def factors_of(words: Sequence[str]) -> dict[str, float]:
-    """Factors by lever or parameter from words such as ``orifice=1.5``."""
+    """Factors by design variable or parameter from words such as ``orifice=1.5``."""
     from swashplate.analysis.design_variables import powers_of
 
     return assigned("--scale", words, "orifice=1.5", powers_of, (1,))
 
 
 def ranges_of(words: Sequence[str], usual: FactorRange) -> dict[str, FactorRange]:
-    """Ranges of factors by lever from words such as ``pump`` or ``pump=0.8/1.5``."""
+    """Ranges of factors by design variable from words such as ``pump`` or ``pump=0.8/1.5``."""
     from swashplate.analysis.design_variables import powers_of
 
     whole = [word if "=" in word else f"{word}={usual[0]}/{usual[1]}" for word in words]
-    return assigned("--lever", whole, "pump or pump=0.8/1.5", powers_of, (2,))
+    return assigned("--variable", whole, "pump or pump=0.8/1.5", powers_of, (2,))
 
 
 def pairs_of(
