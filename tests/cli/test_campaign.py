@@ -1,4 +1,4 @@
-"""``campaign``, ``rig``, ``excitation`` and ``advise``: tests, and what they are worth."""
+"""``campaign``, ``rig`` and ``advise``: tests, and what they are worth."""
 
 import re
 from collections.abc import Callable

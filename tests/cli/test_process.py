@@ -261,6 +261,8 @@ def test_every_end_of_an_interval_is_whole(monkeypatch, capsys) -> None:
 GROUP = typer.main.get_group(app).commands
 COMMANDS = [*GROUP.values(), *GROUP["campaign"].commands.values()]
 COMMANDS = [each for each in COMMANDS if not hasattr(each, "commands")]
+OF_CRANES = [*GROUP["crane"].commands.values()]
+"""Their examples take minutes; tests/crane runs such commands."""
 INSTEAD = {
     "--starts 50": "--starts 1 --jobs 1",
     "--folds 5": "--folds 2 --jobs 1",
@@ -282,11 +284,11 @@ def examples() -> list[str]:
     return list(dict.fromkeys(found))
 
 
-@pytest.mark.parametrize("command", COMMANDS, ids=lambda each: str(each.name))
+@pytest.mark.parametrize("command", [*COMMANDS, *OF_CRANES], ids=lambda each: str(each.name))
 def test_each_command_has_an_example_and_short_lines(command):
     """Lines are kept as they are written, and a line has 78 characters between its margins."""
     assert max(map(len, command.help.splitlines())) <= 78
-    assert re.search(rf"swashplate (campaign )?{command.name}\b", command.epilog)
+    assert re.search(rf"swashplate (campaign |crane )?{command.name}\b", command.epilog)
 
 
 @pytest.fixture(scope="module")
