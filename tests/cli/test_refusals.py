@@ -5,7 +5,7 @@ import shlex
 import pytest
 
 REFUSED = {
-    "simulate hoist step:4 --set orifice=2": "orifice is a lever, which has no value of its own",
+    "simulate hoist step:4 --set orifice=2": "orifice is a design variable, which has no value",
     "whatif hoist --scale motor_leakage=2": "motor_leakage has no value here",
     "simulate hoist stairs:2,4,0": "separate levels by /, as in stairs:2/4/0",
     "bode hoist --points 1": "--points is 1, but must be 2 to 2000",
@@ -21,8 +21,8 @@ REFUSED = {
     "linearize hoist": "give one of --at and --current",
     "linearize hoist --current 1 --input voltage": "needs --at, not",
     "linearize hoist --at 0.1": "lies in the card's dead zone, so the gain is 0; linearise at +0.",
-    "sensitivity hoist --lever pumpe": "no design variable 'pumpe' (did you mean pump?)",
-    "sensitivity hoist --lever pump --lever pump=1/2": "--lever gives pump twice",
+    "sensitivity hoist --variable pumpe": "no design variable 'pumpe' (did you mean pump?)",
+    "sensitivity hoist --variable pump --variable pump=1/2": "--variable gives pump twice",
     "sensitivity hoist --outcome speed": "There is no outcome 'speed'",
     "size hoist --speed-deg-s 500": "the hoist reaches speed 370 deg/s (required 500 deg/s)",
     "size hoist --tracking-deg-s 5": "--tracking-deg-s and --maneuver belong together",
@@ -48,7 +48,10 @@ REFUSED = {
     "simulate hoist step:9 --scale Z1=1/2": "takes one factor, not 2",
     "size hoist --speed-deg-s 250 --out no/a.toml": "folder no does not",
     "compensate hoist --out a.xlsx": "written as .toml, .csv or .parquet",
-    "excitation none.toml --out no/a.csv": "folder no does not exist",
+    "show --toml": "Name the drive to show",
+    "advise hoist --from slew": "--from needs a campaign: hoist is a drive without tests",
+    "advise hoist --runs runs.csv": "--runs needs a campaign",
+    "advise none.toml --out no/a.csv": "folder no does not exist",
     "campaign plot none.toml --out a.gif": ".png, .svg or .pdf",
     "simulate hoist step:11 --out run.csv": "11 V at 1 s, but the card takes ±10 V; check its unit",
     "export hoist": "Say what to export: --fmu FILE.fmu, --c DIR or --wasm FILE.wasm",
