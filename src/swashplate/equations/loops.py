@@ -15,6 +15,7 @@ from swashplate.equations.functions import FUNCTIONS, RESERVED, Function, fresh_
 from swashplate.equations.gradients import Derived, derived_function, listing, partials_of
 from swashplate.equations.graph import ONE, ZERO, Call, Node, Rule, choose, make, names_in
 from swashplate.equations.language import Parsed
+from swashplate.equations.lowering import Lowering, Operand, lowers
 from swashplate.equations.printing import UNNAMED, function_source, function_text, named_by_text
 from swashplate.equations.values import Flag, Tuple, Value, alike, leaves, rebuilt
 
@@ -148,6 +149,12 @@ def blank(size: int) -> NDArray[np.float64]:
 
 
 FUNCTIONS |= {"root": root, "blank": blank}
+
+
+@lowers(blank)
+def _blank(code: Lowering, size: Operand) -> Operand:
+    return code.room(int(size.text))
+
 
 # --- as they are traced ---------------------------------------------------------------------------
 

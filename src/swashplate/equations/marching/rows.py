@@ -14,7 +14,6 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from swashplate.equations.cache import borrowing_kernel, pasted, subroutine
 from swashplate.equations.functions import generating
 from swashplate.equations.marching.pieces import (
     Struct,
@@ -133,7 +132,6 @@ def aligned(*shape: int) -> Array:
     return room
 
 
-@subroutine
 def dot(a: Array, b: Array, room: Array) -> float:
     """Scalar product of two columns of ROWS numbers, folded in eighths.
 
@@ -222,7 +220,6 @@ def combine(struct: int, flat: Array, t: int, shift: int, count: int, row: Array
                 row[m] += scale * a[m]
 
 
-@pasted
 def integrate(row: Array, count: int, step: float, state: Array) -> None:
     """Replace a rate by its trapezoidal integral over the whole record.
 
@@ -309,8 +306,7 @@ def march_of(
     return Struct(March(*structs, *routines()))
 
 
-@borrowing_kernel
-def march_observed(pieces: Any, arrays: tuple[Any, ...], size: int, h: float, structs: int) -> None:
+def march_observed(pieces: Indices, arrays: Indices, size: int, h: float, structs: int) -> None:
     """March block by block, and compare what comes with what was observed.
 
     `pieces` are addresses, of the march first, and `arrays` what they take from ``records`` on (see
@@ -380,3 +376,9 @@ def march_observed(pieces: Any, arrays: tuple[Any, ...], size: int, h: float, st
             for i in range(used, sink.length):
                 column[i] = 0.0
         run(march.absorb, (march.sink, march.room))
+
+
+@generating
+def compiled_march() -> Any:
+    """`march_observed`, compiled."""
+    return routine(march_observed)

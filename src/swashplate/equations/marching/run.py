@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swashplate.equations.cache import generated, kernel
-from swashplate.equations.declaration import Replacements, inlined, interpreted
+from swashplate.equations.declaration import JIT_OFF, Replacements, inlined, interpreted
 from swashplate.equations.fields import (
     check_mapping,
     floats_of,
@@ -25,15 +25,15 @@ from swashplate.equations.fields import (
 from swashplate.equations.functions import FUNCTIONS, generating
 from swashplate.equations.keeping import kept, key_of
 from swashplate.equations.language import plain
+from swashplate.equations.lowering import definition_in
+from swashplate.equations.machine_code import machine_code
 from swashplate.equations.marching.march import march_source
 from swashplate.equations.marching.part import Stored, taps_of
 from swashplate.equations.marching.pieces import (
+    PIECE_KINDS,
     Piece,
     Planned,
-    addresses,
-    piece,
     pointers,
-    run_once,
 )
 from swashplate.equations.model import (
     Link,
@@ -339,7 +339,6 @@ LIBRARY: dict[str, Any] = {
     **{name: each for name, each in vars(math).items() if not name.startswith("_")},
     "kernel": kernel,
     "inlined": inlined,
-    "piece": piece,
     **FUNCTIONS,
 }
 """What generated modules call besides their own functions."""
@@ -366,7 +365,11 @@ class PlannedPiece:
 
 @generating
 def _compiled(planned: PlannedPiece) -> Piece:
-    return module(planned.file, planned.text)[planned.member]
+    file, member, text = planned.file, planned.member, planned.text
+    if JIT_OFF:
+        piece: Piece = module(file, text)[member]
+        return piece
+    return machine_code(file, text, PIECE_KINDS, lambda: definition_in(text, member, LIBRARY))
 
 
 @generating
@@ -415,7 +418,7 @@ def marched(
     values = tuple(np.ascontiguousarray(each, dtype=np.float64) for each in records.values())
     places = instance.places(signals, h)
     arrays = arrays_of(instance, values, started, places, states, met, table.reshape(-1))
-    run_once(addresses((planned,), (0,)), arrays, size, h)
+    planned()(size, 0, h, *arrays)
     check_domain(instance, states, float(met[0]), cause)
     check_outputs(instance, stored, table, h, cause)
     return table

@@ -293,7 +293,7 @@ class _Structuring:
         says = "Partial derivatives at known states."
         lines += ["for m in range(count):", *indented(inner)]
         name = f"fill_{part.own.name}"
-        text = function_source(f"{name}({PIECE})", says, lines, "@piece")
+        text = function_source(f"{name}({PIECE})", says, lines, "")
         file = f"{self.model.name}_{name}"
         self.pieces.append(PlannedPiece(file, name, self.sampler.module(text)))
         return len(self.pieces), range(first, self.size)
@@ -394,7 +394,7 @@ def recurrence(pattern: tuple[tuple[float | None, ...], ...]) -> PlannedPiece:
     lines += indented([*ahead, "for m in range(count):", *indented(inner), *after])
     name, says = f"recurrence_{size}", f"Derivatives of {size} states that wait for each other."
     head = PIECE.replace("first", "size").replace("whole", "lanes").replace("params", "tangent")
-    return PlannedPiece(name, name, function_source(f"{name}({head})", says, lines, "@piece"))
+    return PlannedPiece(name, name, function_source(f"{name}({head})", says, lines, ""))
 
 
 def _sum(terms: Sequence[str]) -> str:
