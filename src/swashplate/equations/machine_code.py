@@ -104,6 +104,13 @@ def _machine() -> Any:
     )
 
 
+def _passes(machine: Any) -> Any:
+    """What optimises: loops become vector instructions, and arithmetic stays as it is written."""
+    options = llvm.create_pipeline_tuning_options(speed_level=LEVEL)
+    options.loop_vectorization, options.slp_vectorization = True, False
+    return llvm.create_pass_builder(machine, options)
+
+
 def _compiled(name: str, text: str) -> bytes:
     """Object code of a module."""
     work = progress.begin(COMPILING, name)
@@ -112,9 +119,10 @@ def _compiled(name: str, text: str) -> bytes:
             machine, module = _machine(), llvm.parse_assembly(text)
             module.triple, module.data_layout = machine.triple, str(machine.target_data)
             module.verify()
-            options = llvm.create_pipeline_tuning_options(speed_level=LEVEL)
-            options.loop_vectorization = True
-            passes = llvm.create_pass_builder(machine, options)
+            for function in module.functions:
+                passes = _passes(machine)
+                passes.getFunctionPassManager().run(function, passes)
+            passes = _passes(machine)
             passes.getModulePassManager().run(module, passes)
             content: bytes = machine.emit_object(module)
             return content
