@@ -127,9 +127,8 @@ class Scope:
     """Label behind the function."""
     local: dict[str, Any] = field(default_factory=dict)
     """Names of what is no operand: functions, tuples, fields."""
-    results: int | None = None
-    """How many numbers it returns as a tuple; None if it returns one, or nothing."""
-    returns: bool = False
+    result: Any = None
+    """What it returns: an operand, or a tuple of them; None if nothing."""
 
     def key(self, name: str) -> str:
         """Name of a variable among those of all functions."""
@@ -204,7 +203,8 @@ class Lowering:
         return self.operand(pointer.kind, text)
 
     def _label(self, stem: str) -> str:
-        # apart from values, whose number changes if a variable turns out wider
+        """A name that no other label has, nor a variable: of one that is kept it has a dollar."""
+        # counted apart from values, whose number changes if a variable turns out wider
         self._labels += 1
         return f"{stem}{self._labels}"
 
@@ -238,7 +238,7 @@ class Lowering:
 
     def room(self, size: int) -> Operand:
         """Memory for some floats, all zero."""
-        key = self._label("room.")
+        key = self._label("room$")
         self._allocate(key, f"[{size} x double]")
         self.declare("llvm.memset.p0.i64", "void @llvm.memset.p0.i64(ptr, i8, i64, i1)")
         self.emit(f"call void @llvm.memset.p0.i64(ptr %{key}, i8 0, i64 {8 * size}, i1 false)")
@@ -255,10 +255,10 @@ class Lowering:
             case ast.Expr(value):
                 if not isinstance(value, ast.Constant):
                     self._value(value, scope)
-            case ast.Assign([target], value) | ast.AnnAssign(target=target, value=ast.expr() as value):
-                self._assign(target, value, scope)
+            case ast.Assign([target], value) | ast.AnnAssign(target, _, ast.expr() as value):
+                self._put(target, self._value(value, scope), scope)
             case ast.AugAssign(target, op, value):
-                self._assign(target, ast.BinOp(target, op, value), scope)
+                self._put(target, self._value(ast.BinOp(target, op, value), scope), scope)
             case ast.If(test, then, other):
                 return self._if(test, then, other, scope)
             case ast.For(ast.Name(name), ast.Call(ast.Name("range"), bounds), body):
@@ -274,9 +274,6 @@ class Lowering:
             case _:
                 raise NotImplementedError(ast.unparse(node))
         return True
-
-    def _assign(self, target: ast.expr, value: ast.expr, scope: Scope) -> None:
-        self._put(target, self._value(value, scope), scope)
 
     def _put(self, target: ast.expr, value: Any, scope: Scope) -> None:
         match target:
@@ -315,7 +312,7 @@ class Lowering:
         start = values[0] if len(values) > 1 else number(0)
         stop = values[min(len(values), 2) - 1]
         step = values[2].text if len(values) > 2 else "1"
-        counter, head = self._label("counter."), self._label("for")
+        counter, head = self._label("counter$"), self._label("for")
         inside, onwards, end = self._label("do"), self._label("next"), self._label("end")
         self._store(counter, start)
         self._jump(head)
@@ -347,18 +344,16 @@ class Lowering:
         self._loops.pop()
 
     def _return(self, value: Any, scope: Scope) -> None:
-        several = isinstance(value, tuple)
-        items = value if several else () if value is None else (value,)
-        scope.returns, scope.results = bool(items), len(items) if several else None
-        for k, item in enumerate(items):
-            self._store(scope.key(f"result{k}"), item)
+        if value is not None:
+            scope.result = value
+            self._keep(scope.key("result$"), value)
         self._jump(scope.end)
 
     # -- expressions -------------------------------------------------------------------------------
 
     def _value(self, node: ast.expr, scope: Scope) -> Any:
         match node:
-            case ast.Constant(value):
+            case ast.Constant(bool() | int() | float() as value):
                 return number(value)
             case ast.Name(name):
                 key = scope.key(name)
@@ -367,7 +362,7 @@ class Lowering:
                 return tuple(self._values_of(items, scope))
             case ast.UnaryOp(ast.Not(), operand):
                 return self.operand("bool", f"xor i1 {self._test(operand, scope).text}, true")
-            case ast.UnaryOp(ast.USub(), ast.Constant(value)):
+            case ast.UnaryOp(ast.USub(), ast.Constant(int() | float() as value)):
                 return number(-value)
             case ast.UnaryOp(ast.USub(), operand):
                 return self._negative(self._value(operand, scope))
@@ -454,7 +449,7 @@ class Lowering:
 
     def _joined(self, tests: list[ast.expr], scope: Scope, *, every: bool) -> Operand:
         """Tests that are made until one decides."""
-        key, onwards, end = self._label("test."), "", self._label("end")
+        key, onwards, end = self._label("test$"), "", self._label("end")
         for k, test in enumerate(tests):
             value = self._test(test, scope)
             self._store(key, value)
@@ -466,16 +461,33 @@ class Lowering:
         self._begin(end)
         return self._load(key)
 
-    def _chosen(self, test: ast.expr, then: ast.expr, other: ast.expr, scope: Scope) -> Operand:
-        key = self._label("chosen.")
+    def _chosen(self, test: ast.expr, then: ast.expr, other: ast.expr, scope: Scope) -> Any:
+        """One of two numbers, or tuples of them, of which only that one is computed."""
+        key = self._label("chosen$")
         one, two, end = self._label("then"), self._label("else"), self._label("end")
         self._fork(self._test(test, scope), one, two)
+        value: Any = None
         for label, node in ((one, then), (two, other)):
             self._begin(label)
-            self._store(key, self._value(node, scope))
+            value = self._value(node, scope)
+            self._keep(key, value)
             self._jump(end)
         self._begin(end)
-        return self._load(key)
+        return self._kept(key, value)
+
+    def _keep(self, key: str, value: Any) -> None:
+        """Store a number, or each of a tuple."""
+        if isinstance(value, Operand):
+            self._store(key, value)
+            return
+        for k, item in enumerate(value):
+            self._store(f"{key}.{k}", item)
+
+    def _kept(self, key: str, like: Any) -> Any:
+        """What was stored: a number, or a tuple as long as another."""
+        if isinstance(like, Operand):
+            return self._load(key)
+        return tuple(self._load(f"{key}.{k}") for k in range(len(like)))
 
     def choice(self, test: Operand, one: Operand, two: Operand) -> Operand:
         """One of two numbers that both have been computed."""
@@ -487,11 +499,11 @@ class Lowering:
     # -- calls -------------------------------------------------------------------------------------
 
     def _call(self, function: Any, given: list[Any]) -> Any:
-        write = LOWERED.get(function)
-        if write is not None:
-            return write(self, *given)
-        known = isinstance(function, Definition)
-        return self._written_out(function if known else definition_of(function), given)
+        if isinstance(function, Definition):
+            return self._written_out(function, given)
+        if function in LOWERED:
+            return LOWERED[function](self, *given)
+        return self._written_out(definition_of(function), given)
 
     def _written_out(self, function: Definition, given: list[Any]) -> Any:
         """A function in the place of its call."""
@@ -504,11 +516,7 @@ class Lowering:
         if self._body(function.tree.body, scope):
             self._jump(scope.end)
         self._begin(scope.end)
-        if not scope.returns:
-            return None
-        count = 1 if scope.results is None else scope.results
-        found = tuple(self._load(scope.key(f"result{k}")) for k in range(count))
-        return found[0] if scope.results is None else found
+        return None if scope.result is None else self._kept(scope.key("result$"), scope.result)
 
     def called(self, name: str, *given: Operand) -> Operand:
         """A function of floats, of LLVM or of C."""

@@ -40,10 +40,9 @@ class Code:
             self._engine.add_object_file(llvm.ObjectFileRef.from_data(content))
             self._engine.finalize_object()
             self.address: int = self._engine.get_function_address(SYMBOL)
-        types = {"int": c_int64, "float": c_double}
-        self._function = CFUNCTYPE(None, *(types.get(kind, c_void_p) for kind in kinds))(
-            self.address
-        )
+        types: dict[str, Any] = {"int": c_int64, "float": c_double}
+        prototype = CFUNCTYPE(None, *(types.get(kind, c_void_p) for kind in kinds))
+        self._function = prototype(self.address)
 
     def __call__(self, *arguments: Any) -> None:
         """Run it, without the interpreter's lock."""

@@ -1,15 +1,16 @@
 """Pieces of a march, compiled one by one and called by address.
 
-A Jacobian runs some generated kernels over every block of samples. A kernel that called them by
-name would be compiled together with them, for every model and every choice of its options. So all
-pieces have one signature, ``piece(count, first, h, records, before, whole, fraction, params, given,
-states, met, flat) -> None``, and the kernel that calls them, by address, is the same for all:
-compiled once, kept on disk, as is each piece for all models that share it.
+A Jacobian runs some generated functions over every block of samples. What called them by name would
+be compiled together with them, for every model and every choice of its options. So all pieces have
+one signature, ``piece(count, first, h, records, before, whole, fraction, params, given, states,
+met, flat) -> None``, and the routine that calls them, by address, is the same for all: compiled
+once, kept on disk, as is each piece for all models that share it.
 """
 
 from collections.abc import Callable, Container, Sequence
+from dataclasses import dataclass
 from functools import cache, cached_property
-from typing import Any, Generic, NamedTuple, TypeVar, get_args
+from typing import Any, Generic, TypeVar, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,7 +24,7 @@ from swashplate.equations.lowering import (
     number,
     type_of,
 )
-from swashplate.equations.machine_code import Code, machine_code
+from swashplate.equations.machine_code import machine_code
 
 PIECE = "count, first, h, records, before, whole, fraction, params, given, states, met, flat"
 """Arguments of a piece.
@@ -40,28 +41,27 @@ PIECE_KINDS = ("int", "int", "float", f"*{FLOATS}", FLOATS, INTS, *(FLOATS,) * 6
 
 Fields = TypeVar("Fields", bound=tuple[Any, ...])
 
-Piece = Code | Callable[..., None]
-"""What is called: machine code, or a plain function if nothing is compiled."""
+Piece = Any
+"""What is called: machine code (`Code`), or a plain function if nothing is compiled."""
 Planned = Callable[[], Piece]
 """Compiles a piece when it is first needed (`generating`): residuals alone need no derivatives."""
 
 
 def routine(function: Callable[..., None]) -> Piece:
-    """Compile a function of whole numbers and arrays, by its annotations."""
+    """Compile a function of numbers and arrays that is part of the engine, by its annotations.
+
+    Arrays become pointers, which do not know their shapes. Other routines `run` it by its address.
+    """
     if JIT_OFF:
         return function
     hints = {k: v for k, v in function.__annotations__.items() if k != "return"}
     kinds = tuple(_kind_of(hint) for hint in hints.values())
-    return machine_code(
-        function.__name__,
-        f"{function.__module__}.{function.__qualname__}",
-        kinds,
-        lambda: definition_of(function),
-    )
+    name = function.__name__
+    return machine_code(name, name, kinds, lambda: definition_of(function))
 
 
 def _kind_of(hint: Any) -> str:
-    """Kind in compiled code of what has an annotation: a number, or an array of numbers."""
+    """Kind in compiled code of what has an annotation: a number, or a pointer for an array."""
     if hint in (int, float):
         return str(hint.__name__)
     _, dtype = get_args(hint)
@@ -142,7 +142,8 @@ def fields_of(struct: Any, kind: Any) -> Any:
     return struct.fields
 
 
-class _Fields(NamedTuple):
+@dataclass(frozen=True)
+class _Fields:
     """Fields of the struct at an address, read when they are asked for."""
 
     words: Operand
@@ -175,7 +176,7 @@ def _run(code: Lowering, address: Operand, arguments: tuple[Operand, ...]) -> No
     code.emit(f"call void {_pointer(code, INTS, address).text}({texts})")
 
 
-def call(piece: Piece, count: int, first: int, h: float, arrays: tuple[Any, ...]) -> None:
+def call(piece: Piece, count: int, first: int, h: float, arrays: Any) -> None:
     """Call a piece with arrays, see `pointers`."""
     piece(count, first, h, *arrays)
 
@@ -193,7 +194,7 @@ def _each(code: Lowering, arrays: Operand) -> list[Operand]:
 
 
 def call_recurrence(
-    piece: Piece, count: int, lanes: Any, size: int, tangent: Any, arrays: tuple[Any, ...]
+    piece: Piece, count: int, lanes: Any, size: int, tangent: Any, arrays: Any
 ) -> None:
     """Call a recurrence, which takes lanes, how many they are, and tangents."""
     piece(count, size, 0.0, *arrays[:2], lanes, arrays[3], tangent, *arrays[5:])
