@@ -295,7 +295,9 @@ class _Tracer:
         for name in {**one, **two}:
             if name not in one or name not in two:
                 self.names.pop(name, None)  # without a value one way: refused where it is read
-            elif one[name] is not two[name]:
+            elif one[name] is two[name]:
+                self.names[name] = one[name]
+            else:
                 if not alike(one[name], two[name]):
                     self.refuse(each, f"{name} of two structures", "give it the same kind of value")
                 self.names[name] = self.select(each, test, one[name], two[name])
