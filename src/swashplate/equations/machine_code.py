@@ -51,7 +51,7 @@ class Code:
         )
 
 
-_loaded: dict[tuple[str, tuple[str, ...]], Code] = {}
+_loaded: dict[tuple[str, str, tuple[str, ...]], Code] = {}
 
 
 def machine_code(
@@ -70,11 +70,11 @@ def machine_code(
     definition : callable
         Gives the function.
     """
-    key = (text, kinds)
+    key = (name, text, kinds)
     if key not in _loaded:
         content = kept(
             f"{name}_code",
-            (text, kinds, llvmlite_version, llvm.llvm_version_info, *_host()),
+            (*key, llvmlite_version, llvm.llvm_version_info, *_host()),
             lambda: _compiled(name, lowered(definition(), kinds, SYMBOL)),
         )
         _loaded[key] = Code(content, kinds)

@@ -365,11 +365,22 @@ class PlannedPiece:
 
 @generating
 def _compiled(planned: PlannedPiece) -> Piece:
-    file, member, text = planned.file, planned.member, planned.text
+    return compiled(planned.file, planned.text, planned.member, PIECE_KINDS, {})
+
+
+def compiled(
+    file: str, text: str, member: str, kinds: tuple[str, ...], names: Mapping[str, Any]
+) -> Piece:
+    """A function of a generated module, compiled: it takes numbers and arrays, and fills arrays.
+
+    `file` is how the module's name begins, `kinds` are those of the arguments (see `lowering`), and
+    `names` what the text refers to besides `LIBRARY`.
+    """
     if JIT_OFF:
-        piece: Piece = module(file, text)[member]
-        return piece
-    return machine_code(file, text, PIECE_KINDS, lambda: definition_in(text, member, LIBRARY))
+        return module(file, text, **names)[member]
+    title = file if file.endswith(member) else f"{file}_{member}"
+    library = LIBRARY | {**names}
+    return machine_code(title, text, kinds, lambda: definition_in(text, member, library))
 
 
 @generating
