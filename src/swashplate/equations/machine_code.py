@@ -110,20 +110,27 @@ def _passes(machine: Any) -> Any:
     return llvm.create_pass_builder(machine, options)
 
 
+def optimised(text: str) -> Any:
+    """A module of LLVM's, in the form in which it becomes machine code."""
+    with global_compiler_lock:
+        machine, module = _machine(), llvm.parse_assembly(text)
+        module.triple, module.data_layout = machine.triple, str(machine.target_data)
+        module.verify()
+        for function in module.functions:
+            passes = _passes(machine)
+            passes.getFunctionPassManager().run(function, passes)
+        passes = _passes(machine)
+        passes.getModulePassManager().run(module, passes)
+        return module
+
+
 def _compiled(name: str, text: str) -> bytes:
     """Object code of a module."""
     work = progress.begin(COMPILING, name)
     try:
+        module = optimised(text)
         with global_compiler_lock:
-            machine, module = _machine(), llvm.parse_assembly(text)
-            module.triple, module.data_layout = machine.triple, str(machine.target_data)
-            module.verify()
-            for function in module.functions:
-                passes = _passes(machine)
-                passes.getFunctionPassManager().run(function, passes)
-            passes = _passes(machine)
-            passes.getModulePassManager().run(module, passes)
-            content: bytes = machine.emit_object(module)
-            return content
+            content: bytes = _machine().emit_object(module)
+        return content
     finally:
         progress.end(work)

@@ -373,10 +373,10 @@ class Lanes:
     def __init__(self, model: Model, signals: tuple[str, ...], facts: LaneFacts) -> None:
         self._model, self._facts = model, facts
         self._taps = taps_of(model, signals)
-        names, text = {"LANES": LANES, **CALLED}, facts.text
-        file = f"{model.name}_lanes"
-        self.prepare = compiled(file, text, "prepare", PREPARE_KINDS, names)
-        self.march = compiled(file, text, "march", MARCH_KINDS, names)
+        self.text = facts.text
+        names, file = {"LANES": LANES, **CALLED}, f"{model.name}_lanes"
+        self.prepare = compiled(file, self.text, "prepare", PREPARE_KINDS, names)
+        self.march = compiled(file, self.text, "march", MARCH_KINDS, names)
 
     def __call__(
         self,
