@@ -14,7 +14,6 @@ from timing import Timing, cores_used, in_turns, one_core
 from swashplate import Drive, Serial, SquaredError, maneuvers
 from swashplate.equations.marching.observation import Observation, ObservedRecord
 from swashplate.equations.marching.part import Stored
-from swashplate.equations.marching.pieces import addresses, run_once
 from swashplate.equations.marching.record import record_of
 from swashplate.equations.marching.run import arrays_of, march_of
 from swashplate.simulation.instance import instance_of
@@ -33,8 +32,8 @@ class Kernel:
         started = self.instance.start({signal: float(values[0])}, STEP)
         self.at_rest, self.states = started.flat, started.flat.copy()
         kept = (Stored(1, "signals", "shaft_speed"),)
-        self.march = march_of(self.instance.model, (signal,), self.instance.options, kept)
-        self.pieces = addresses((self.march,), (0,))
+        planned = march_of(self.instance.model, (signal,), self.instance.options, kept)
+        self.march = planned()
         self.out, self.met = np.empty((1, values.size)), np.empty(1)
         self.values = (values,)
         places = self.instance.places((signal,), STEP)
@@ -51,7 +50,7 @@ class Kernel:
     def __call__(self) -> Array:
         """The shaft speed from rest."""
         self.states[:], self.met[:] = self.at_rest, np.inf
-        run_once(self.pieces, self.arrays, self.out.size, STEP)
+        self.march(self.out.size, 0, STEP, *self.arrays)
         return self.out[0]
 
 

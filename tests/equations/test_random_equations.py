@@ -98,6 +98,10 @@ values = st.floats(-2.0, 2.0).filter(lambda x: abs(x) > 1e-3)
 
 
 @given(bodies(), st.tuples(values, values, values, values))
+@example(  # what both ways set to the same value once stayed what it was before
+    "    if x > 0.5:\n        x = 1.5\n    else:\n        x = 1.5\n    return x, x",
+    (1.0, 1.0, 1.0, 1.0),
+)
 @example(  # a second value of an adjoint was once named as the adjoint of a second value
     "    x = sqrt(0.5 + helper(x, x) * helper(x, x))\n    return (x + x), (x / (1.0 + y * y))",
     (1.0, 1.0, 1.0, 1.0),

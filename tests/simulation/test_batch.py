@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 import polars as pl
 import pytest
-from numba import config, njit
+from numba import config
 
 from swashplate import (
     Drive,
@@ -22,7 +22,10 @@ from swashplate import (
     simulate_many,
 )
 from swashplate.equations import Model, Tap, equation, simulate
-from swashplate.equations.marching.lanes import lanes_of
+from swashplate.equations.code_generation.lowering import definition_in, lowered
+from swashplate.equations.code_generation.machine_code import optimised
+from swashplate.equations.marching.lanes import LANES, MARCH_KINDS, lanes_of
+from swashplate.equations.marching.run import LIBRARY
 from swashplate.models.displacement_control import PumpOptions
 from swashplate.models.drive import pump_drive
 from swashplate.simulation import batch as batches
@@ -312,9 +315,7 @@ def test_samples_without_weight_may_be_missing(hoist: Drive) -> None:
 @pytest.mark.skipif(config.CPU_NAME == "generic", reason="vectors of two do not pay")
 def test_the_sets_are_marched_as_vectors() -> None:
     lanes = lanes_of(pump_drive, ("current",), (None, PumpOptions()), "shaft_speed")
-    march = njit(error_model="numpy")(lanes.march.py_func)  # not from the cache, which has no text
-    row, table = "float64[::1]", "float64[:, ::1]"
-    march.compile(f"(UniTuple({row}, 1), int64[:, ::1], float64, {row}, {row}, {row}, {table})")
-    (text,) = march.inspect_llvm().values()
+    march = definition_in(lanes.text, "march", {**LIBRARY, "LANES": LANES})
+    text = str(optimised(lowered(march, MARCH_KINDS, "march")))
     assert re.search(r"<\d+ x double> @llvm\.sqrt", text)
     assert not re.search(r"gather|call double @llvm\.sqrt", text)

@@ -191,48 +191,17 @@ def kernel(function: Callable[P, R]) -> Callable[P, R]:
     RuntimeWarning
         If there is no place for the cache; the function works all the same.
     """
-    return _kept(function, no_cfunc_wrapper=True)
-
-
-def borrowing_kernel(function: Callable[P, R]) -> Callable[P, R]:
-    """A `kernel` that makes and returns no array: it borrows those that its caller holds.
-
-    Without counts of references to them it compiles in nine tenths of the time.
-    """
-    return _kept(function, no_cfunc_wrapper=True, _nrt=False)
-
-
-def subroutine(function: Callable[P, R]) -> Callable[P, R]:
-    """Compile a function that kernels alone call, and inline: Python cannot call it."""
     known[plain(function)] = None
-    options: dict[str, Any] = {"forceinline": True, "_nrt": False}
-    wrappers: dict[str, Any] = {"no_cfunc_wrapper": True, "no_cpython_wrapper": True}
-    compiled: Any = njit(nogil=True, error_model="numpy", **options, **wrappers)(function)
-    return compiled  # type: ignore[no-any-return]
-
-
-def pasted(function: Callable[P, R]) -> Callable[P, R]:
-    """Compile a function into the only one that calls it: not on its own as well."""
-    known[plain(function)] = None
-    return njit(nogil=True, error_model="numpy", inline="always")(function)
-
-
-def _kept(function: Callable[P, R], **options: Any) -> Callable[P, R]:
-    known[plain(function)] = None
+    options: dict[str, Any] = {"no_cfunc_wrapper": True}
     compiled: Any = njit(nogil=True, error_model="numpy", **options)(function)
     if not JIT_OFF:
-        on_disk(compiled, function)
+        try:
+            compiled._cache = _KernelCache(function)
+        except RuntimeError:
+            # typed into a session, it has no file to be known by; else no folder can be written
+            if Path(plain(function).__code__.co_filename).is_file():
+                warn(UNCACHED, RuntimeWarning, stacklevel=2)
     return compiled  # type: ignore[no-any-return]
-
-
-def on_disk(compiled: Any, function: Callable[..., Any]) -> None:
-    """Let a compiled function keep its machine code."""
-    try:
-        compiled._cache = _KernelCache(function)
-    except RuntimeError:
-        # typed into a session, it has no file to be known by; else no folder can be written
-        if Path(plain(function).__code__.co_filename).is_file():
-            warn(UNCACHED, RuntimeWarning, stacklevel=3)
 
 
 # --- generated modules ----------------------------------------------------------------------------

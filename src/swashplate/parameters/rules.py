@@ -37,8 +37,9 @@ FULL_VOLTAGE = 10.0  # Largest command, either way. [V]
 SIDES = ("plus", "minus")  # Endings of what has two directions.
 VOLTAGES = np.linspace(0.0, FULL_VOLTAGE, 101)
 """Commands at which the static rules are checked. [V]"""
-FEW, _alone = 20, count()
-"""Sets checked one by one from which on machine code pays, and how many there were."""
+FEW, _alone = 5000, count()
+"""Sets checked one by one for which Python takes as long as compiling does, and how many there
+were."""
 N_CHANNEL, N_PUMP = len(Channel._fields), len(Pump._fields)
 
 OF_REFINEMENTS: tuple[Rule, ...] = (

@@ -13,6 +13,7 @@ from typing import Any, ParamSpec, TypeVar
 from numba import types
 from numba.extending import intrinsic
 
+from swashplate.equations.code_generation.lowering import Lowering, Operand, lowers
 from swashplate.equations.declaration import JIT_OFF, inlined, interpreted, remember_text
 from swashplate.equations.language import CHOICES, MATH
 
@@ -40,6 +41,11 @@ def _selected(typing: Any, test: Any, one: Any, two: Any) -> Any:
 choose: Any = _choose if JIT_OFF else intrinsic(_selected)
 """``choose(test, a, b)`` is one of two numbers that both have been computed: from ``a if test else
 b`` the compiler makes branches, or a choice between two addresses, and gathers."""
+
+
+@lowers(choose)
+def _lowered_choice(code: Lowering, test: Operand, one: Operand, two: Operand) -> Operand:
+    return code.choice(test, one, two)
 
 
 FUNCTIONS: dict[str, Any] = {name: each for each, name in [*MATH.items(), *CHOICES.items()]}

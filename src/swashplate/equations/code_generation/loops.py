@@ -17,6 +17,7 @@ from swashplate.equations.code_generation.gradients import (
     listing,
     partials_of,
 )
+from swashplate.equations.code_generation.lowering import Lowering, Operand, lowers
 from swashplate.equations.code_generation.printing import (
     UNNAMED,
     function_source,
@@ -158,6 +159,12 @@ def blank(size: int) -> NDArray[np.float64]:
 
 
 FUNCTIONS |= {"root": root, "blank": blank}
+
+
+@lowers(blank)
+def _blank(code: Lowering, size: Operand) -> Operand:
+    return code.room(int(size.text))
+
 
 # --- as they are traced ---------------------------------------------------------------------------
 

@@ -195,8 +195,6 @@ class Block:
         The lines of these, and the results by the names that they make.
     functions : dict of str to Function
         What the lines call.
-    inner : dict of str to Node
-        Names that are made in a branch alone.
     names : dict of Node to str
         Values that have a name after the block, those of branches left out.
     """
@@ -215,7 +213,6 @@ class Block:
         self._labels, self._taken, self._known = labels, taken, dict(known or {})
         self._language = language
         self.functions: dict[str, Function] = {}
-        self.inner: dict[str, Node] = {}
         self._schedule = Schedule(results, self._known, flat)
         self._reads: set[str] = set()
         self._written_nodes: list[Node] = []
@@ -352,8 +349,6 @@ class Block:
     def _name(self, node: Node, region: Region, name: str) -> bool:
         """Remember the name of a value; whether it outlives the branch in which it is computed."""
         self._named[node, region] = name
-        if region.branch is not None:
-            self.inner.setdefault(name, node)
         outlives = any(region not in use.enclosing for use in self._uses[node, region])
         if outlives:
             self._outlive.setdefault(region.branch, {})[name] = node

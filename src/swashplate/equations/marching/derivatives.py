@@ -11,13 +11,13 @@ from numpy.typing import ArrayLike, NDArray
 from swashplate.equations.code_generation.functions import generating
 from swashplate.equations.marching.layout import Layout, layout_of, started_by
 from swashplate.equations.marching.observation import ObservedRecord, Own
-from swashplate.equations.marching.pieces import Struct, addresses
+from swashplate.equations.marching.pieces import Struct, addresses, pointers
 from swashplate.equations.marching.rows import (
     ROWS,
     Program,
     Sink,
     aligned,
-    march_observed,
+    compiled_march,
     march_of,
     upright,
 )
@@ -246,6 +246,7 @@ def _march(
     arrays = arrays_of(instance, values, started, places, states, met, room.fields.block)
     pieces = addresses(structure.facts.pieces, layout.pieces)
     structs = march_of(program, plan, sink, room)
-    march_observed(pieces, arrays, values[0].size, h, structs.address)
+    march = compiled_march()
+    march(pieces, pointers(arrays), values[0].size, h, structs.address)
     layout.give_back(room)
     check_domain(instance, states, float(met[0]), observed.driven_by)

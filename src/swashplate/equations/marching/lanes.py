@@ -14,7 +14,7 @@ bit, whatever its neighbours are.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from itertools import pairwise
 from typing import Any, NamedTuple
 
@@ -36,8 +36,9 @@ from swashplate.equations.graph import Node
 from swashplate.equations.keeping import kept, key_of
 from swashplate.equations.marching.march import Sampler, lower, output_of
 from swashplate.equations.marching.part import PartCode, Stored, taps_of
+from swashplate.equations.marching.pieces import FLOATS, INTS, pointers
 from swashplate.equations.marching.rows import aligned
-from swashplate.equations.marching.run import module
+from swashplate.equations.marching.run import compiled
 from swashplate.equations.model import Model
 
 Array = NDArray[np.float64]
@@ -49,6 +50,12 @@ LANES = 16
 # a root that nobody asks for may be one of a number below zero, which compiled code allows
 CALLED: dict[str, Any] = {"sqrt": np.sqrt} if JIT_OFF else {}
 """What the text calls in place of the library's."""
+
+PREPARE_KINDS = ("float", FLOATS)
+MARCH = "count, h, length, records, whole, flat, measured, weight, outputs"
+"""Arguments of a march: samples, step, length of a row of the outputs, 0 without any, and arrays
+without shapes."""
+MARCH_KINDS = ("int", "float", "int", f"*{FLOATS}", INTS, *(FLOATS,) * 4)
 
 SHORT = 16
 """Statements that are not worth a loop of their own."""
@@ -237,7 +244,7 @@ class _Writer:
         )
 
     def _texts(self, place: Stored, is_rate: bool) -> list[str]:
-        """Texts of both kernels."""
+        """Texts of both functions."""
         sampler, straight, model = self._sampler, self._straight, self._sampler.model
         following: list[tuple[str, str, frozenset[str]]] = []
         """What rows become at the end of a sample."""
@@ -267,7 +274,7 @@ class _Writer:
                 record = f"records[{sampler.signals.index(tap.tap.signal)}]"
                 queue = [f"{part.fraction(tap)}_coming", *part.tap_samples(tap)]
                 for lines, name, n in ((first, queue[1], "0"), (fetched, queue[0], "coming")):
-                    index = f"{n} - whole[{tap.number}, lane]"
+                    index = f"{n} - whole[{tap.number} * LANES + lane]"
                     lines.append(f"at = {index}")
                     lines.append(f"{straight.row(name)} = {record}[at] if at >= 0 else 0.0")
                 following += [(old, new, frozenset((new,))) for new, old in pairwise(queue)]
@@ -281,20 +288,19 @@ class _Writer:
         if fetched:
             inner += ["coming = min(n + 1, last)", *over_lanes(fetched)]
         inner += straight.lines({"h", *shared})
-        kept = over_lanes([f"outputs[lane, n] = {straight.row('shown')}"])
-        inner += ["if outputs.size > 0:", *indented(kept)]
-        lines = ["last = measured.size - 1", *over_lanes(first)]
-        lines += ["for n in range(measured.size):", *indented(inner)]
+        kept = over_lanes([f"outputs[lane * length + n] = {straight.row('shown')}"])
+        inner += ["if length > 0:", *indented(kept)]
+        lines = ["last = count - 1", *over_lanes(first)]
+        lines += ["for n in range(count):", *indented(inner)]
         return [
             function_source(
                 "prepare(h, flat)",
                 f"What does not change, and states at rest, of LANES sets of {model.name}.",
                 over_lanes(self._prepared(read)),
+                "",
             ),
             function_source(
-                "march(records, whole, h, flat, measured, weight, outputs)",
-                f"March LANES sets of {model.name} over one record.",
-                lines,
+                f"march({MARCH})", f"March LANES sets of {model.name} over one record.", lines, ""
             ),
         ]
 
@@ -364,17 +370,18 @@ class _Writer:
 class Lanes:
     """The march of LANES sets of a model over one record, for one output.
 
-    ``prepare(h, flat)`` computes what does not change, and states at rest, of every lane.
-    ``march(records, whole, h, flat, measured, weight, outputs)`` marches: costs and the worst
-    margins are rows of the block, and ``outputs``, unless empty, are a row for each lane.
+    `prepare` computes what does not change, and states at rest, of every lane. `march` marches:
+    costs and the worst margins are rows of the block, and its outputs, if there are any, are a row
+    for each lane.
     """
 
     def __init__(self, model: Model, signals: tuple[str, ...], facts: LaneFacts) -> None:
         self._model, self._facts = model, facts
         self._taps = taps_of(model, signals)
-        made = module(f"{model.name}_lanes", facts.text, LANES=LANES, **CALLED)
-        self.prepare: Callable[..., None] = made["prepare"]
-        self.march: Callable[..., None] = made["march"]
+        self.text = facts.text
+        names, file = {"LANES": LANES, **CALLED}, f"{model.name}_lanes"
+        self.prepare = compiled(file, self.text, "prepare", PREPARE_KINDS, names)
+        self.march = compiled(file, self.text, "march", MARCH_KINDS, names)
 
     def __call__(
         self,
@@ -420,12 +427,15 @@ class Lanes:
         size = measured.size
         # rows an odd number of cache lines apart, so that they do not share places in a cache
         outputs = np.empty((LANES, (size | 15) + 9 if keep else 0))
-        values = tuple(np.require(each, np.float64, ["C", "W"]) for each in records.values())
+        values = tuple(map(np.ascontiguousarray, records.values()))
+        measured, weight = np.ascontiguousarray(measured), np.ascontiguousarray(weight)
         with np.errstate(all="ignore"):  # of ways that are not taken there is nothing to say
             self.prepare(h, block.reshape(-1))
             for path in starts.keys() & numbers.keys():
                 block[starts[path]] = numbers[path]
-            self.march(values, whole, h, block.reshape(-1), measured, weight, outputs)
+            flat, left = block.reshape(-1), outputs.reshape(-1)
+            length, own = outputs.shape[1], pointers(values)
+            self.march(size, h, length, own, whole.reshape(-1), flat, measured, weight, left)
         end = block[[rows["cost"], *starts.values()]].sum(axis=0)
         return Marched(block[rows["cost"]], worst, end, outputs[:, :size])
 

@@ -387,7 +387,7 @@ def march_source(
             "met[0] = worst if worst < met[0] or worst != worst else met[0]",
         ]
     says = f"March {model.name} over its inputs."
-    return sampler.module(function_source(f"march({PIECE})", says, lines, "@piece"))
+    return sampler.module(function_source(f"march({PIECE})", says, lines, ""))
 
 
 def step_source(

@@ -1,7 +1,7 @@
 """From derivatives on the grid to weighted rows of a least-squares problem, and their triangle.
 
-What is here knows no model: library kernels work on rows of a block of samples that a program names
-by their first places.
+What is here knows no model: routines work on rows of a block of samples that a program names by
+their first places.
 
 With [J r] = Q R, the small triangle R holds all that a Gauss-Newton or trust-region step needs: RᵀR
 is [J r]ᵀ[J r], and J has the singular values of R's columns. R is made by Householder reflections,
@@ -14,7 +14,6 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from swashplate.equations.cache import borrowing_kernel, pasted, subroutine
 from swashplate.equations.code_generation.functions import generating
 from swashplate.equations.marching.pieces import (
     Struct,
@@ -36,7 +35,7 @@ STRIDE = BLOCK + 16
 room before and behind a row for the samples next to the block."""
 
 
-# Kernels read these named tuples as structs (see `pieces.Struct`), whose arrays do not know their
+# Routines read these named tuples as structs (see `pieces.Struct`), whose arrays do not know their
 # shapes.
 
 
@@ -133,7 +132,6 @@ def aligned(*shape: int) -> Array:
     return room
 
 
-@subroutine
 def dot(a: Array, b: Array, room: Array) -> float:
     """Scalar product of two columns of ROWS numbers, folded in eighths.
 
@@ -222,7 +220,6 @@ def combine(struct: int, flat: Array, t: int, shift: int, count: int, row: Array
                 row[m] += scale * a[m]
 
 
-@pasted
 def integrate(row: Array, count: int, step: float, state: Array) -> None:
     """Replace a rate by its trapezoidal integral over the whole record.
 
@@ -257,7 +254,7 @@ def place(structs: int, r: int, first: int, size: int, at: int, count: int, to: 
     measured = behind(plan.measured, at)
     begin = cell[0]
     end, behind_last = first + size, cell[count - 1] + 2
-    width = (behind_last if behind_last < end else end) - begin  # `min` would compile for 0.1 s
+    width = min(behind_last, end) - begin
     for c in range(sink.derived):
         column = behind(sink.rows, sink.to[c] * sink.length + to)
         t = program.seen + r * sink.derived + c
@@ -309,8 +306,7 @@ def march_of(
     return Struct(March(*structs, *routines()))
 
 
-@borrowing_kernel
-def march_observed(pieces: Any, arrays: tuple[Any, ...], size: int, h: float, structs: int) -> None:
+def march_observed(pieces: Indices, arrays: Indices, size: int, h: float, structs: int) -> None:
     """March block by block, and compare what comes with what was observed.
 
     `pieces` are addresses, of the march first, and `arrays` what they take from ``records`` on (see
@@ -332,7 +328,7 @@ def march_observed(pieces: Any, arrays: tuple[Any, ...], size: int, h: float, st
             # what interpolation looks back at, from the end of the block before
             for k in range(STRIDE, room.size, STRIDE):
                 flat[k - 1] = flat[k + BLOCK - 1]
-        count = size - first if size - first < BLOCK else BLOCK
+        count = min(size - first, BLOCK)
         for step in range(program.steps):
             todo = behind(program.todo, 4 * step)
             what, a, b = todo[0], todo[1], todo[2]
@@ -362,7 +358,7 @@ def march_observed(pieces: Any, arrays: tuple[Any, ...], size: int, h: float, st
                     at += 1
                     continue
                 many, left = end - at, sink.length - used
-                many = many if many < left else left
+                many = min(many, left)
                 for i in range(1, many if sink.folded else 0):
                     if plan.weight[at + i] == 0.0:
                         many = i
@@ -380,3 +376,9 @@ def march_observed(pieces: Any, arrays: tuple[Any, ...], size: int, h: float, st
             for i in range(used, sink.length):
                 column[i] = 0.0
         run(march.absorb, (march.sink, march.room))
+
+
+@generating
+def compiled_march() -> Any:
+    """`march_observed`, compiled."""
+    return routine(march_observed)

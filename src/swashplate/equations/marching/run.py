@@ -14,7 +14,9 @@ from numpy.typing import NDArray
 
 from swashplate.equations.cache import generated, kernel
 from swashplate.equations.code_generation.functions import FUNCTIONS, generating
-from swashplate.equations.declaration import Replacements, inlined, interpreted
+from swashplate.equations.code_generation.lowering import definition_in
+from swashplate.equations.code_generation.machine_code import machine_code
+from swashplate.equations.declaration import JIT_OFF, Replacements, inlined, interpreted
 from swashplate.equations.fields import (
     check_mapping,
     floats_of,
@@ -28,12 +30,10 @@ from swashplate.equations.language import plain
 from swashplate.equations.marching.march import march_source
 from swashplate.equations.marching.part import Stored, taps_of
 from swashplate.equations.marching.pieces import (
+    PIECE_KINDS,
     Piece,
     Planned,
-    addresses,
-    piece,
     pointers,
-    run_once,
 )
 from swashplate.equations.model import (
     Link,
@@ -339,7 +339,6 @@ LIBRARY: dict[str, Any] = {
     **{name: each for name, each in vars(math).items() if not name.startswith("_")},
     "kernel": kernel,
     "inlined": inlined,
-    "piece": piece,
     **FUNCTIONS,
 }
 """What generated modules call besides their own functions."""
@@ -366,7 +365,22 @@ class PlannedPiece:
 
 @generating
 def _compiled(planned: PlannedPiece) -> Piece:
-    return module(planned.file, planned.text)[planned.member]
+    return compiled(planned.file, planned.text, planned.member, PIECE_KINDS, {})
+
+
+def compiled(
+    file: str, text: str, member: str, kinds: tuple[str, ...], names: Mapping[str, Any]
+) -> Piece:
+    """A function of a generated module, compiled: it takes numbers and arrays, and fills arrays.
+
+    `file` is how the module's name begins, `kinds` are those of the arguments (see `lowering`), and
+    `names` what the text refers to besides `LIBRARY`.
+    """
+    if JIT_OFF:
+        return module(file, text, **names)[member]
+    title = file if file.endswith(member) else f"{file}_{member}"
+    library = LIBRARY | {**names}
+    return machine_code(title, text, kinds, lambda: definition_in(text, member, library))
 
 
 @generating
@@ -415,7 +429,7 @@ def marched(
     values = tuple(np.ascontiguousarray(each, dtype=np.float64) for each in records.values())
     places = instance.places(signals, h)
     arrays = arrays_of(instance, values, started, places, states, met, table.reshape(-1))
-    run_once(addresses((planned,), (0,)), arrays, size, h)
+    planned()(size, 0, h, *arrays)
     check_domain(instance, states, float(met[0]), cause)
     check_outputs(instance, stored, table, h, cause)
     return table

@@ -270,8 +270,8 @@ class _Structuring:
         nodes = [*wanted.values()]
         ahead, known = self.sampler.ahead(part, nodes)
         hints = found.hints([each.path for each in order], [each.path for each in moving], {})
-        # a loop without branches becomes vector instructions, and compiles in half of the time;
-        # plain Python refuses roots and quotients that nobody asks for
+        # a loop without branches becomes vector instructions; plain Python refuses roots and
+        # quotients that nobody asks for
         flat = None if JIT_OFF else all_vector
         block = self.sampler.printed(part, nodes, known=known, hints=hints, flat=flat)
         read = names_in(nodes)
@@ -282,18 +282,12 @@ class _Structuring:
             if part.fraction(tap) in read
         ]
         inner = [f"{n} = flat[{self._named[n]} + m]" for n in sorted(read & self._named.keys())]
-        # what only one side of a choice makes would carry its value from one sample to the next, as
-        # far as a compiler can know, and the loop would not become vector instructions
-        inner += [
-            f"{name} = {'False' if node.kind == 'bool' else '0.0'}"
-            for name, node in block.inner.items()
-        ]
         inner += block.lines
         inner += [f"flat[{k} + m] = {t}" for k, t in zip(wanted, block.texts, strict=True)]
         says = "Partial derivatives at known states."
         lines += ["for m in range(count):", *indented(inner)]
         name = f"fill_{part.own.name}"
-        text = function_source(f"{name}({PIECE})", says, lines, "@piece")
+        text = function_source(f"{name}({PIECE})", says, lines, "")
         file = f"{self.model.name}_{name}"
         self.pieces.append(PlannedPiece(file, name, self.sampler.module(text)))
         return len(self.pieces), range(first, self.size)
@@ -394,7 +388,7 @@ def recurrence(pattern: tuple[tuple[float | None, ...], ...]) -> PlannedPiece:
     lines += indented([*ahead, "for m in range(count):", *indented(inner), *after])
     name, says = f"recurrence_{size}", f"Derivatives of {size} states that wait for each other."
     head = PIECE.replace("first", "size").replace("whole", "lanes").replace("params", "tangent")
-    return PlannedPiece(name, name, function_source(f"{name}({head})", says, lines, "@piece"))
+    return PlannedPiece(name, name, function_source(f"{name}({head})", says, lines, ""))
 
 
 def _sum(terms: Sequence[str]) -> str:

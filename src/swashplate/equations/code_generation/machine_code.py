@@ -1,0 +1,136 @@
+"""Machine code of functions in LLVM's language, made once on a machine and kept on disk.
+
+The passes, the processor's instructions and C's functions are those that Numba takes, so that
+numbers are the same to the last bit wherever an equation is compiled.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from ctypes import CFUNCTYPE, c_double, c_int64, c_void_p
+from functools import cache
+from typing import Any
+
+import numpy as np
+from llvmlite import __version__ as llvmlite_version
+from llvmlite import binding as llvm
+from numba.core.compiler_lock import global_compiler_lock
+from numba.core.registry import cpu_target
+
+from swashplate import progress
+from swashplate.equations.cache import COMPILING
+from swashplate.equations.code_generation.lowering import Definition, lowered
+from swashplate.equations.keeping import kept
+
+SYMBOL = "code"
+"""Name of every function within its own module."""
+LEVEL = 3
+"""Of optimisation, as Numba's."""
+
+
+class Code:
+    """A function's machine code: it is called with numbers and arrays, and by others at `address`.
+
+    It is never unloaded.
+    """
+
+    def __init__(self, content: bytes, kinds: Sequence[str]) -> None:
+        with global_compiler_lock:
+            self._engine = llvm.create_mcjit_compiler(llvm.parse_assembly(""), _machine())
+            self._engine.add_object_file(llvm.ObjectFileRef.from_data(content))
+            self._engine.finalize_object()
+            self.address: int = self._engine.get_function_address(SYMBOL)
+        types: dict[str, Any] = {"int": c_int64, "float": c_double}
+        prototype = CFUNCTYPE(None, *(types.get(kind, c_void_p) for kind in kinds))
+        self._function = prototype(self.address)
+
+    def __call__(self, *arguments: Any) -> None:
+        """Run it, without the interpreter's lock."""
+        self._function(
+            *(each.ctypes.data if isinstance(each, np.ndarray) else each for each in arguments)
+        )
+
+
+_loaded: dict[tuple[str, str, tuple[str, ...]], Code] = {}
+
+
+def machine_code(
+    name: str, text: str, kinds: tuple[str, ...], definition: Callable[[], Definition]
+) -> Code:
+    """Machine code of a function that returns nothing.
+
+    Parameters
+    ----------
+    name : str
+        Of what is compiled, for a person who waits, and for the file.
+    text : str
+        What the code follows from, the engine's source apart.
+    kinds : tuple of str
+        Of the arguments, see `lowered`.
+    definition : callable
+        Gives the function.
+    """
+    key = (name, text, kinds)
+    if key not in _loaded:
+        content = kept(
+            f"{name}_code",
+            (*key, llvmlite_version, llvm.llvm_version_info, *_host()),
+            lambda: _compiled(name, lowered(definition(), kinds, SYMBOL)),
+        )
+        _loaded[key] = Code(content, kinds)
+    return _loaded[key]
+
+
+@cache
+def _host() -> tuple[str, str, str]:
+    """The machine that code is made for: triple, processor, and what that can do."""
+    # Numba makes the functions of C known to LLVM as well
+    triple, processor, features = cpu_target.target_context.codegen().magic_tuple()
+    return triple, processor, features
+
+
+def _machine() -> Any:
+    """What makes code for this machine."""
+    triple, processor, features = _host()
+    target = llvm.Target.from_triple(triple)
+    return target.create_target_machine(
+        cpu=processor,
+        features=features,
+        opt=LEVEL,
+        reloc="static" if target.name.startswith("x86") else "default",
+        codemodel="jitdefault",
+        jit=True,
+    )
+
+
+def _passes(machine: Any) -> Any:
+    """What optimises: loops become vector instructions, and arithmetic stays as it is written."""
+    options = llvm.create_pipeline_tuning_options(speed_level=LEVEL)
+    options.loop_vectorization, options.slp_vectorization = True, False
+    return llvm.create_pass_builder(machine, options)
+
+
+def optimised(text: str) -> Any:
+    """A module of LLVM's, in the form in which it becomes machine code."""
+    with global_compiler_lock:
+        machine, module = _machine(), llvm.parse_assembly(text)
+        module.triple, module.data_layout = machine.triple, str(machine.target_data)
+        module.verify()
+        for function in module.functions:
+            passes = _passes(machine)
+            passes.getFunctionPassManager().run(function, passes)
+        passes = _passes(machine)
+        passes.getModulePassManager().run(module, passes)
+        return module
+
+
+def _compiled(name: str, text: str) -> bytes:
+    """Object code of a module."""
+    work = progress.begin(COMPILING, name)
+    try:
+        module = optimised(text)
+        with global_compiler_lock:
+            content: bytes = _machine().emit_object(module)
+        return content
+    finally:
+        progress.end(work)
